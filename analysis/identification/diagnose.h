@@ -41,7 +41,7 @@ struct Diagnosis {
 
 /// Blocks of 2 s that are searched: half an hour. Selection was measured on flights of 20 to 300 blocks, and its least
 /// gain of 2 % stands out of a thousand as out of ten thousand.
-inline constexpr std::size_t kMostSearched = 1000;
+inline constexpr std::size_t kMostSearched = 500;
 
 /// Diagnoses the model of one kind of vehicle on the flights `which`. Of flights of more than `most_searched` blocks,
 /// names, rivals, formulas and detectable sizes come from an excerpt of about as many, stretches of every flight
