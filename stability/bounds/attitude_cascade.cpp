@@ -73,43 +73,49 @@ bool is_stable(const Cascade& loop) { return is_stable(cascade_transfer(loop, Ca
 
 namespace {
 
-/// The factor of `ratio` at which stability ends, between one that keeps it and one that does not.
-double boundary(Cascade loop, double stable, double unstable) {
-  const double ratio = loop.ratio;
+/// The factor at which stability ends, between one that keeps it and one that does not.
+double boundary(const std::function<bool(double)>& holds, double stable, double unstable) {
   for (int i = 0; i < 60; ++i) {
     const double middle = std::sqrt(stable * unstable);
-    loop.ratio = ratio * middle;
-    (is_stable(loop) ? stable : unstable) = middle;
+    (holds(middle) ? stable : unstable) = middle;
   }
   return stable;
 }
 
 }  // namespace
 
-CascadeMargins cascade_margins(const Cascade& loop) {
-  CascadeMargins margins;
-  if (!is_stable(loop)) return margins;
+void set_gain_margins(const std::function<bool(double)>& holds, CascadeMargins& margins) {
   constexpr double kFurthest = 1e4, kStep = 1.05;
-  const auto holds = [&loop](double factor) {
-    Cascade changed = loop;
-    changed.ratio *= factor;
-    return is_stable(changed);
-  };
   double up = kStep, down = 1 / kStep;
   while (up < kFurthest && holds(up)) up *= kStep;
-  margins.gain = up < kFurthest ? boundary(loop, up / kStep, up) : kInfinity;
+  margins.gain = up < kFurthest ? boundary(holds, up / kStep, up) : kInfinity;
   while (down > 1 / kFurthest && holds(down)) down /= kStep;
-  margins.low_gain = down > 1 / kFurthest ? boundary(loop, down * kStep, down) : 0;
-  const CutLoop cut(loop);
-  margins.delay_s = delay_margin(cut.open(), cut.feedback());
+  margins.low_gain = down > 1 / kFurthest ? boundary(holds, down * kStep, down) : 0;
+}
+
+void set_damping(const std::vector<std::complex<double>>& of_poles, CascadeMargins& margins) {
   margins.damping = 1;
-  for (const std::complex<double>& pole : poles(sum(cut.open(), cut.feedback()))) {
+  for (const std::complex<double>& pole : of_poles) {
     if (pole.imag() == 0) continue;
     const double damping = -pole.real() / std::abs(pole);
     if (damping >= margins.damping) continue;
     margins.damping = damping;
     margins.frequency_rad_s = std::abs(pole);
   }
+}
+
+CascadeMargins cascade_margins(const Cascade& loop) {
+  CascadeMargins margins;
+  if (!is_stable(loop)) return margins;
+  const auto holds = [&loop](double factor) {
+    Cascade changed = loop;
+    changed.ratio *= factor;
+    return is_stable(changed);
+  };
+  set_gain_margins(holds, margins);
+  const CutLoop cut(loop);
+  margins.delay_s = delay_margin(cut.open(), cut.feedback());
+  set_damping(poles(sum(cut.open(), cut.feedback())), margins);
   return margins;
 }
 

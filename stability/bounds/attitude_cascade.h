@@ -9,7 +9,10 @@
 /// tau = -K (omega - omega_r), omega_r = -Lambda theta, has it with Kw = K, KR = K Lambda.
 #pragma once
 
+#include <complex>
+#include <functional>
 #include <optional>
+#include <vector>
 
 #include "stability/bounds/impulse_response.h"
 
@@ -56,6 +59,14 @@ struct CascadeMargins {
   double damping = 0, frequency_rad_s = 0;
 };
 CascadeMargins cascade_margins(const Cascade& loop);
+
+/// Sets `gain` and `low_gain` to the ends of the factors around 1, between 1e-4 and 1e4, for which the loop stays
+/// stable. @param holds whether it is, for a factor of its gain; true for 1. It is asked in steps of 5 %: a range of
+/// unstable factors that is narrower may be passed over.
+void set_gain_margins(const std::function<bool(double factor)>& holds, CascadeMargins& margins);
+
+/// Sets `damping` and `frequency_rad_s`.
+void set_damping(const std::vector<std::complex<double>>& of_poles, CascadeMargins& margins);
 
 enum class Nearness { kClear, kClose, kUnstable };
 inline constexpr double kLeastGainMargin = 2, kLeastDamping = 0.05;

@@ -1,6 +1,7 @@
 /// @file How far errors of the estimates and a force error move a vehicle, its speed and acceleration included.
 #pragma once
 
+#include "stability/bounds/disturbance_bounds.h"
 #include "stability/bounds/error_parts.h"
 #include "stability/bounds/small_gain.h"
 

@@ -1,6 +1,8 @@
 // bound as a user runs it: promises for a further flight, and the margins of the attitude loop.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -73,6 +75,53 @@ TEST(BoundCommand, TakesTheGainsOfTheAttitudeLawFromTheFileThatFlies) {
   const Outcome half = run_shell("swarmcert bound --gains gains.toml --model " + model, folder.path());
   EXPECT_EQ(half.exit_code, 3);
   EXPECT_NE(half.output.find("Kw"), std::string::npos) << half.output;
+}
+
+/// Where Lambda and K couple axes, these have one row, as one loop; the others keep their own.
+TEST(BoundCommand, CoupledAxesHaveMarginsOfTheAttitudeLoopAsOneLoop) {
+  const ScratchFolder folder;
+  const std::string law =
+      "[attitude]\nKR = 0.007\nKw = 0.00115\nKI = 0.02\n[lag]\nmotor_s = 0.0575\nbody_rate_s = 0.003\n";
+  const auto result_of = [&](const std::string& position) {
+    const std::string gains = gains_file(folder, "[position]\n" + position + "rate_hz = 500\n" + law);
+    return json_of(folder, "bound" + gains)["attitude"];
+  };
+  const Json straight = result_of("Lambda = [1.2, 1.8, 2]\nK = [0.12, 0.15, 0.2]\n");
+  ASSERT_EQ(straight.size(), 2u);
+  EXPECT_EQ(straight[0]["axis"], "x");
+  EXPECT_FALSE(straight[0].contains("channels"));
+
+  const Json pair = result_of("Lambda = [[1.2, 0.3, 0], [0.3, 1.8, 0], [0, 0, 2]]\nK = [0.12, 0.15, 0.2]\n");
+  ASSERT_EQ(pair.size(), 1u);
+  EXPECT_EQ(pair[0]["axis"], "xy");
+  EXPECT_TRUE(pair[0]["stable"].get<bool>());
+  ASSERT_EQ(pair[0]["channels"].size(), 2u);
+  double least = 1;
+  for (const Json& row : straight) least = std::min(least, row["damping"].get<double>());
+  EXPECT_GT(std::abs(pair[0]["damping"].get<double>() - least), 1e-3) << pair[0];
+  EXPECT_TRUE(pair[0]["exact"].is_null());
+  EXPECT_NE(pair[0]["why_no_exact"].get<std::string>().find("coupled"), std::string::npos);
+  // As little coupling as can be changes as little.
+  const Json hardly =
+      result_of("Lambda = [[1.2, 1e-9, 0], [1e-9, 1.8, 0], [0, 0, 2]]\nK = [0.12, 0.15, 0.2]\n");
+  for (const char* const margin : {"gain_margin", "delay_margin_s"}) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      const double own = straight[i][margin].get<double>();
+      EXPECT_NEAR(hardly[0]["channels"][i][margin].get<double>(), own, 1e-6 * own) << margin;
+    }
+  }
+  const Json beside =
+      result_of("Lambda = [[1.2, 0, 0.3], [0, 1.8, 0], [0.3, 0, 2]]\nK = [0.12, 0.15, 0.2]\n");
+  ASSERT_EQ(beside.size(), 2u);
+  EXPECT_EQ(beside[0], straight[1]) << "y has a loop of its own";
+  EXPECT_EQ(beside[1]["axis"], "xz");
+  const Outcome text =
+      run_shell("swarmcert bound" + gains_file(folder,
+                                               "[position]\nLambda = [[1.2, 0.3, 0], [0.3, 1.8, 0], "
+                                               "[0, 0, 2]]\nK = 0.12\n" +
+                                                   law),
+                folder.path());
+  EXPECT_NE(text.output.find("as one loop, all motors together"), std::string::npos) << text.output;
 }
 
 /// A result of compare whose flights had these amplitudes along all axes, and otherwise anything.

@@ -254,5 +254,20 @@ TEST(TuneCommand, ProposesNothingCloseToALimitCycleOfTheAttitudeLoop) {
   EXPECT_EQ(run_shell("swarmcert tune" + gains + " --axis z" + attitude, folder.path()).exit_code, 2);
 }
 
+TEST(TuneCommand, MindsTheAttitudeLoopOfAnAxisBesideCoupledOnesAndRefusesThose) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(
+      folder,
+      "[position]\nLambda = [[1.2, 0, 0.3], [0, 1.8, 0], [0.3, 0, 2]]\nK = [0.12, 0.15, 0.2]\nrate_hz = 500\n"
+      "[attitude]\nKR = 0.007\nKw = 0.00115\nKI = 0.02\n[lag]\nmotor_s = 0.0575\nbody_rate_s = 0.003\n");
+  const Json result = json_of(folder, "tune" + gains + " --axis y --nodes 100");
+  ASSERT_TRUE(result["shipped"].contains("limit_cycle"));
+  EXPECT_NEAR(result["shipped"]["limit_cycle"]["gain_margin"].get<double>(),
+              json_of(folder, "bound" + gains)["attitude"][0]["gain_margin"].get<double>(), 1e-9);
+  const Outcome coupled = run_shell("swarmcert tune" + gains + " --axis x", folder.path());
+  EXPECT_EQ(coupled.exit_code, 2);
+  EXPECT_NE(coupled.output.find("couples axes"), std::string::npos) << coupled.output;
+}
+
 }  // namespace
 }  // namespace swarmcert::tests

@@ -38,15 +38,20 @@ files::Json gains_json(const stability::Cascade& loop, CascadeInput input, const
           {"impulse", finite(h.max_abs())}};
 }
 
-}  // namespace
-
-bool has_attitude_gains(const Tracking& input, const std::string& words) {
-  if (!words.empty()) return true;
-  return input.gains.attitude && axis_loop(input.gains, input.plant, 0) &&
-         axis_loop(input.gains, input.plant, 1);
+/// Axes that Lambda or K couples to others.
+std::vector<int> coupled_axes(const Tracking& input) {
+  std::vector<int> result;
+  for (int axis = 0; axis < 3; ++axis)
+    if (!axis_loop(input.gains, input.plant, axis)) result.push_back(axis);
+  return result;
 }
 
-stability::Cascade attitude_cascade(const Tracking& input, const std::string& words, int axis) {
+/// Lags, ratio and, for x and y, attitude law of an axis, without its position gains.
+stability::Cascade without_position(const Tracking& input, const std::string& words, int axis) {
+  stability::Cascade loop;
+  loop.ratio = input.plant.thrust_scale;
+  loop.lag_s = input.gains.motor_lag_s;
+  if (axis == 2) return loop;
   // A vehicle tilts about its other horizontal axis.
   const auto about = static_cast<std::size_t>(1 - axis);
   const std::array<double, 3> gains =
@@ -54,58 +59,124 @@ stability::Cascade attitude_cascade(const Tracking& input, const std::string& wo
           ? read_attitude_gains(words)
           : std::array<double, 3>{input.gains.attitude->KR_Nm[about], input.gains.attitude->Kw_Nm_s[about],
                                   input.gains.attitude->KI_Nm_per_s[about]};
+  const double inertia = input.model.inertia_kg_m2[about];
+  loop.attitude = stability::AttitudeLoop{gains[0] / inertia, gains[1] / inertia, gains[2] / inertia};
+  loop.body_rate_lag_s = input.gains.body_rate_lag_s;
+  return loop;
+}
+
+/// The delay of gains.toml uses up the margin; where it uses up all of it, the loop is unstable.
+stability::CascadeMargins left_by_delay(stability::CascadeMargins margins, const Tracking& input) {
+  margins.delay_s = std::max(0.0, margins.delay_s - input.gains.delay_s);
+  return margins.delay_s == 0 ? stability::CascadeMargins{} : margins;
+}
+
+files::Json margins_json(const stability::CascadeMargins& margins) {
+  return {{"gain_margin", finite(margins.gain)},
+          {"least_gain", finite(margins.low_gain)},
+          {"delay_margin_s", finite(margins.delay_s)}};
+}
+
+files::Json axis_json(const Tracking& input, const std::string& words, int axis) {
+  const stability::Cascade loop = attitude_cascade(input, words, axis);
+  const stability::CascadeMargins margins = left_by_delay(cascade_margins(loop), input);
+  files::Json row = margins_json(margins);
+  row.update({{"axis", stability::axis_name(axis)},
+              {"stable", margins.gain > 0},
+              {"verdict", name(nearness_to_limit_cycle(margins))},
+              {"damping", margins.damping},
+              {"frequency_rad_s", margins.frequency_rad_s},
+              {"exact",
+               {{"force", gains_json(loop, CascadeInput::kAcceleration, "m per m/s^2")},
+                {"velocity_error", gains_json(loop, CascadeInput::kVelocityError, "m per m/s")},
+                {"torque", gains_json(loop, CascadeInput::kAngularAcceleration, "m per rad/s^2")}}}});
+  return row;
+}
+
+files::Json coupled_json(const Tracking& input, const std::string& words, const std::vector<int>& axes) {
+  const stability::CoupledCascade loop = coupled_attitude_cascade(input, words, axes);
+  stability::CoupledMargins margins = coupled_margins(loop);
+  margins.together = left_by_delay(margins.together, input);
+  std::string all;
+  files::Json channels = files::Json::array();
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    // Where the delay of all motors makes the loop unstable, no channel has a margin left.
+    stability::CascadeMargins& alone = margins.alone[i];
+    alone = margins.together.gain > 0 ? left_by_delay(alone, input) : stability::CascadeMargins{};
+    all += stability::axis_name(axes[i]);
+    files::Json channel = margins_json(alone);
+    channel["axis"] = stability::axis_name(axes[i]);
+    channels.push_back(std::move(channel));
+  }
+  files::Json row = margins_json(margins.together);
+  row.update({{"axis", all},
+              {"stable", margins.together.gain > 0},
+              {"verdict", name(nearness_to_limit_cycle(margins))},
+              {"damping", margins.together.damping},
+              {"frequency_rad_s", margins.together.frequency_rad_s},
+              {"channels", std::move(channels)},
+              {"exact", nullptr},
+              {"why_no_exact",
+               "a disturbance along one coupled axis moves the others: the gain of one axis alone does "
+               "not bound its error"}});
+  return row;
+}
+
+}  // namespace
+
+bool has_attitude_gains(const Tracking& input, const std::string& words) {
+  return !words.empty() || input.gains.attitude.has_value();
+}
+
+stability::Cascade attitude_cascade(const Tracking& input, const std::string& words, int axis) {
   const std::optional<stability::AxisLoop> position = axis_loop(input.gains, input.plant, axis);
   if (!position) throw UsageError("attitude gains: Lambda or K couples the axes; make them diagonal");
+  stability::Cascade loop = without_position(input, words, axis);
   // axis_loop() has the thrust's scale in its gains already.
-  const double scale = input.plant.thrust_scale;
-  const double inertia = input.model.inertia_kg_m2[about];
-  stability::Cascade loop{position->Kp / scale,
-                          position->Kd / scale,
-                          position->Ki / scale,
-                          scale,
-                          stability::AttitudeLoop{gains[0] / inertia, gains[1] / inertia, gains[2] / inertia},
-                          input.gains.motor_lag_s,
-                          input.gains.body_rate_lag_s};
+  loop.Kp = position->Kp / loop.ratio;
+  loop.Kd = position->Kd / loop.ratio;
+  loop.Ki = position->Ki / loop.ratio;
   if (const auto sampled = sampled_axis_loop(input.gains, input.plant, axis))
-    loop.Ki = effective_Ki(*sampled) / scale;
+    loop.Ki = effective_Ki(*sampled) / loop.ratio;
+  return loop;
+}
+
+stability::CoupledCascade coupled_attitude_cascade(const Tracking& input, const std::string& words,
+                                                   const std::vector<int>& axes) {
+  stability::CoupledCascade loop;
+  const stability::PidMatrices all = stability::pid_matrices(*input.gains.composite, input.plant.mass_kg);
+  loop.position = {all.Kp(axes, axes), all.Kd(axes, axes), all.Ki(axes, axes)};
+  if (input.gains.rate_hz > 0) loop.position.Ki *= input.gains.integrator_step_s * input.gains.rate_hz;
+  for (const int axis : axes) loop.channels.push_back(without_position(input, words, axis));
   return loop;
 }
 
 files::Json attitude_json(const Tracking& input, const std::string& words) {
   files::Json rows = files::Json::array();
-  for (int axis = 0; axis < 2; ++axis) {
-    const stability::Cascade loop = attitude_cascade(input, words, axis);
-    stability::CascadeMargins margins = cascade_margins(loop);
-    // The delay of gains.toml uses up the margin.
-    margins.delay_s = std::max(0.0, margins.delay_s - input.gains.delay_s);
-    if (margins.delay_s == 0) margins = {};
-    rows.push_back({{"axis", stability::axis_name(axis)},
-                    {"stable", margins.gain > 0},
-                    {"verdict", name(nearness_to_limit_cycle(margins))},
-                    {"gain_margin", finite(margins.gain)},
-                    {"least_gain", finite(margins.low_gain)},
-                    {"delay_margin_s", finite(margins.delay_s)},
-                    {"damping", margins.damping},
-                    {"frequency_rad_s", margins.frequency_rad_s},
-                    {"exact",
-                     {{"force", gains_json(loop, CascadeInput::kAcceleration, "m per m/s^2")},
-                      {"velocity_error", gains_json(loop, CascadeInput::kVelocityError, "m per m/s")},
-                      {"torque", gains_json(loop, CascadeInput::kAngularAcceleration, "m per rad/s^2")}}}});
-  }
+  const std::vector<int> coupled = coupled_axes(input);
+  for (int axis = 0; axis < 2; ++axis)
+    if (axis_loop(input.gains, input.plant, axis)) rows.push_back(axis_json(input, words, axis));
+  if (!coupled.empty()) rows.push_back(coupled_json(input, words, coupled));
   return rows;
 }
 
 void print_attitude(const files::Json& attitude) {
   fmt::print("\nAround the attitude loop, linear; gain margin: factor that destabilises\n");
+  const auto number = [](const files::Json& row, const char* key, const char* format) {
+    return row[key].is_number() ? fmt::format(fmt::runtime(format), row[key].get<double>())
+                                : std::string("any");
+  };
   for (const files::Json& row : attitude) {
-    const auto number = [&row](const char* key, const char* format) {
-      return row[key].is_number() ? fmt::format(fmt::runtime(format), row[key].get<double>())
-                                  : std::string("any");
-    };
     fmt::print("  {} {:<24} gain margin {}, delay margin {} s, least damping {} at {} rad/s\n",
                row["axis"].get<std::string>(), row["verdict"].get<std::string>(),
-               number("gain_margin", "{:.3g}"), number("delay_margin_s", "{:.3g}"),
-               number("damping", "{:.3g}"), number("frequency_rad_s", "{:.3g}"));
+               number(row, "gain_margin", "{:.3g}"), number(row, "delay_margin_s", "{:.3g}"),
+               number(row, "damping", "{:.3g}"), number(row, "frequency_rad_s", "{:.3g}"));
+    if (!row.contains("channels")) continue;
+    fmt::print("    as one loop, all motors together; those of one axis alone:\n");
+    for (const files::Json& channel : row["channels"]) {
+      fmt::print("    {} gain margin {}, delay margin {} s\n", channel["axis"].get<std::string>(),
+                 number(channel, "gain_margin", "{:.3g}"), number(channel, "delay_margin_s", "{:.3g}"));
+    }
   }
 }
 

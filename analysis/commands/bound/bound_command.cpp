@@ -161,15 +161,13 @@ void add_extras(const BoundOptions& options, const CommonOptions& common, const 
 }
 
 /// The extras as text, where there are any.
-void print_extras(const Tracking& input, const files::Json& result) {
+void print_extras(const files::Json& result) {
   const auto print = [&result](const char* field, void (*print_field)(const files::Json&)) {
     if (result.contains(field)) print_field(result[field]);
   };
   print("uncertain", print_uncertain);
   print("coverage", print_promise);
   print("attitude", print_attitude);
-  if (!result.contains("attitude") && input.gains.attitude)
-    fmt::print("\nmargins of the attitude loop: none, as Lambda or K couples the axes\n");
   print("verified", print_verified);
   print("local_tube", print_local_tube);
   if (result.contains("tube")) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
@@ -220,7 +218,7 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
     print_tracking(input, source, report);
     print_float_errors(float32);
     if (disturbance.truth) print_truth(*disturbance.truth);
-    print_extras(input, result);
+    print_extras(result);
     if (certificate) print_certificate_summary(*certificate, options.certificate);
     if (!report_path.empty()) fmt::print("\nreport: {}\n", report_path);
   }
