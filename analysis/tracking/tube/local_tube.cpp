@@ -27,13 +27,6 @@ void inherit(LeastTube& better, const LeastTube& worse) {
   if (worse.proved && (!better.proved || worse.radius_m(2) < better.radius_m(2))) better = worse;
 }
 
-void unite(TruthSizes& a, const TruthSizes& b) {
-  for (std::size_t k = 0; k < 3; ++k) a.force_N[k] = hull(a.force_N[k], b.force_N[k]);
-  a.rest_width_N = std::max(a.rest_width_N, b.rest_width_N);
-  for (std::size_t n = 0; n < a.gradient_N_m.size(); ++n)
-    a.gradient_N_m[n] = std::max(a.gradient_N_m[n], b.gradient_N_m[n]);
-}
-
 /// A tube of one radius, as far as it is proved, cut down to what holds slice by slice.
 LeastTube narrowed(const LeastTube& tube, const SlicedTube& sliced, const Motion& motion) {
   if (!sliced.proved) return tube;

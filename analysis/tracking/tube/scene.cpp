@@ -1,6 +1,7 @@
 #include "analysis/tracking/tube/scene.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "analysis/tracking/tube/force_difference.h"
@@ -8,6 +9,11 @@
 namespace swarmcert::analysis {
 
 namespace {
+
+/// Largest part of an interval of lags: from its lag to this much more, as a logarithm. Errors of one part differ by
+/// little, and those of all parts are united.
+constexpr double kLagPart = 0.05;
+constexpr int kMostLagParts = 16;
 
 double length(double x, double y, double z) {
   return sqrt(Interval(x) * Interval(x) + Interval(y) * Interval(y) + Interval(z) * Interval(z)).upper;
@@ -93,6 +99,13 @@ Deviations all_within(const Radii& radii) {
   return result;
 }
 
+void unite(TruthSizes& a, const TruthSizes& b) {
+  for (std::size_t k = 0; k < 3; ++k) a.force_N[k] = hull(a.force_N[k], b.force_N[k]);
+  a.rest_width_N = std::max(a.rest_width_N, b.rest_width_N);
+  for (std::size_t n = 0; n < a.gradient_N_m.size(); ++n)
+    a.gradient_N_m[n] = std::max(a.gradient_N_m[n], b.gradient_N_m[n]);
+}
+
 double network_age_s(const stability::Gains& gains, bool is_sampled) {
   double age_s = gains.network_latency_s;
   if (gains.network_rate_hz > 0) age_s = up(up(1 / gains.network_rate_hz) + age_s);
@@ -126,7 +139,8 @@ Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& t
         analysis::estimate_answer(loops_.axis[k], estimates.velocity_m_s[k], estimates.position_m[k],
                                   static_cast<std::size_t>(motion_.slices));
   }
-  if (!loops_.axis[2].has_lag) return;
+  add_lag_parts(is_sampled);
+  if (!refusal().empty() || !loops_.axis[2].has_lag) return;
   lag_start_z_ = lag_start(loops_.axis[2], motion_.slice_s);
   // Vehicles start at their set points; the prediction is what it differs from the truth, and the truth.
   const Deviations none = all_within(Radii::none(vehicles));
@@ -136,6 +150,29 @@ Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& t
     const Interval prediction_N =
         ForceDifference(*this, stretch, none).over(none) + truth_sizes(stretch, none).force_N[2];
     excess_N_[static_cast<std::size_t>(i)] = hull(0, -prediction_N);
+  }
+}
+
+void Scene::add_lag_parts(bool is_sampled) {
+  const double low_s = motor_lag_s_.lower, high_s = motor_lag_s_.upper;
+  const int count =
+      has_lag_interval()
+          ? std::clamp(static_cast<int>(std::ceil(std::log(high_s / low_s) / kLagPart)), 1, kMostLagParts)
+          : 1;
+  double from_s = low_s;
+  for (int p = 1; p <= count; ++p) {
+    const double to_s =
+        p == count ? high_s : low_s * std::pow(high_s / low_s, static_cast<double>(p) / count);
+    LagPart part;
+    part.loops = count == 1 ? loops_
+                            : error_loops(tracking_, motion_.slice_s, motion_.slices, is_sampled,
+                                          Interval(from_s, to_s));
+    // A part of an interval for which there are kernels has them too, unless rounding decides.
+    if (!part.loops.refusal.empty()) loops_.refusal = part.loops.refusal;
+    if (part.loops.refusal.empty() && part.loops.axis[2].has_lag)
+      part.start_z = lag_start(part.loops.axis[2], motion_.slice_s);
+    lag_parts_.push_back(std::move(part));
+    from_s = to_s;
   }
 }
 

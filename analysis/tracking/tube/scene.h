@@ -48,6 +48,15 @@ struct TruthSizes {
   std::vector<double> gradient_N_m;  ///< per neighbour, |d f_z / d p_j|; infinite where the field jumps
 };
 
+/// Makes `a` contain `b`.
+void unite(TruthSizes& a, const TruthSizes& b);
+
+/// The loops whose motors lag by what lies in a part of the interval of lags, and what the start of rotors does to z.
+struct LagPart {
+  ErrorLoops loops;
+  LagStart start_z;
+};
+
 /// How old the states are, at most, that a prediction rests on when it acts: a period of the network and its latency,
 /// and one of a sampled loop, which acts for that long on what it was told.
 double network_age_s(const stability::Gains& gains, bool is_sampled = false);
@@ -71,6 +80,8 @@ class Scene {
   const ResidualEnvelope* residual() const { return residual_; }  ///< null: there is none
   const Motion& motion() const { return motion_; }
   const ErrorLoops& loops() const { return loops_; }
+  /// Parts that cover the interval of lags, none of which is wider than its kLagPart, unless there were too many.
+  const std::vector<LagPart>& lag_parts() const { return lag_parts_; }
   double network_age_s() const { return network_age_s_; }
   Interval motor_lag_s() const { return motor_lag_s_; }
   bool has_lag_interval() const { return motor_lag_s_.lower < motor_lag_s_.upper; }
@@ -128,6 +139,7 @@ class Scene {
 
  private:
   ErrorHistory start_errors(int vehicle) const;
+  void add_lag_parts(bool is_sampled);
 
   const stability::TrackingSetup& tracking_;
   double network_age_s_;
@@ -137,6 +149,7 @@ class Scene {
   TruthForce truth_;
   Motion motion_;
   ErrorLoops loops_;
+  std::vector<LagPart> lag_parts_;
   EstimateErrors estimates_;
   std::array<EstimateAnswer, 3> estimate_answers_;
   std::vector<Interval> excess_N_;  ///< per vehicle

@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/tracking/tube/axis_in_slices.h"
 #include "nn/base/parallel.h"
 
 namespace swarmcert::analysis {
 
 namespace {
-
-using stability::KernelCells;
 
 constexpr int kMostTries = 12;
 /// What is tried is this much wider than what came out last, relatively and in m or m/s.
@@ -49,128 +48,58 @@ Deviations hull_of(const Deviations& a, const Deviations& b) {
   return each(a, b, [](Interval x, Interval y) { return hull(x, y); });
 }
 
-/// Signals of one vehicle and axis, and what all but the present slice do to the error.
-struct Axis {
-  const ErrorLoop* loop = nullptr;
-  std::vector<Interval> force, lagging;  ///< d and w, slices so far; of m x the part HeldAnswer::mean_N
-  std::vector<Interval> whole_force;     ///< d with all of m x
-  std::vector<Interval> sawtooth;        ///< +- HeldAnswer::sawtooth_N_s
-  std::vector<Interval> acceleration;    ///< e'', likewise
-  LoopHistory met;                       ///< likewise
-  const LagStart* start = nullptr;       ///< of the rotors; null: there is none
-  Interval excess_N{0};                  ///< their thrust beyond the weight at the start
-  const EstimateAnswer* estimates = nullptr;
-  Interval position_m, velocity_m_s;  ///< from the slices before
-  Interval acceleration_m_s2;         ///< likewise; where the loop is sampled
+/// By the part of the interval of lags in which the vehicle's own lies.
+using ByPart = std::vector<Deviations>;
 
-  void begin_slice() {
-    const std::size_t n = force.size();
-    position_m = answer_to_past(*loop->h1, force, n);
-    velocity_m_s = answer_to_past(*loop->h2, force, n);
-    const double of_estimates_m = estimates->errors.position_m[n];
-    const double of_estimates_m_s = estimates->errors.velocity_m_s[n];
-    if (of_estimates_m > 0 || of_estimates_m_s > 0) {
-      position_m += Interval(-of_estimates_m, of_estimates_m);
-      velocity_m_s += Interval(-of_estimates_m_s, of_estimates_m_s);
-    }
-    if (loop->period_s > 0) {
-      begin_acceleration(n);
-      const double of_estimates_m_s2 = estimates->acceleration_m_s2[n];
-      if (of_estimates_m_s2 > 0) acceleration_m_s2 += Interval(-of_estimates_m_s2, of_estimates_m_s2);
-    }
-    if (loop->has_whole_periods) {
-      position_m += answer_to_past(*loop->slope1, sawtooth, n);
-      velocity_m_s += answer_to_past(*loop->slope2, sawtooth, n);
-    }
-    if (!loop->has_lag) return;
-    if (start != nullptr) {
-      position_m += excess_N * start->position_m[n];
-      velocity_m_s += excess_N * start->velocity_m_s[n];
-    }
-    position_m += answer_to_past(*loop->g1, lagging, n);
-    velocity_m_s += answer_to_past(*loop->g2, lagging, n);
-  }
+template <class Change>
+ByPart each(const ByPart& a, const ByPart& b, const Change& change) {
+  ByPart result;
+  for (std::size_t p = 0; p < a.size(); ++p) result.push_back(each(a[p], b[p], change));
+  return result;
+}
 
-  static Interval last(const std::vector<Interval>& past) { return past.empty() ? Interval(0) : past.back(); }
+bool every_inside(const ByPart& inner, const ByPart& outer) {
+  bool result = true;
+  for (std::size_t p = 0; p < inner.size(); ++p) result = result && every_inside(inner[p], outer[p]);
+  return result;
+}
 
-  void begin_acceleration(std::size_t n) {
-    if (!loop->has_lag) {
-      acceleration_m_s2 = -answer_to_past(*loop->direct_rest, whole_force, n);
-      return;
-    }
-    acceleration_m_s2 = answer_to_past(*loop->h3, force, n) - answer_to_past(*loop->direct_rest, lagging, n);
-    if (loop->has_whole_periods) acceleration_m_s2 += answer_to_past(*loop->slope3, sawtooth, n);
-    if (start != nullptr) acceleration_m_s2 += excess_N * start->acceleration_m_s2[n];
-  }
+ByPart hull_of(const ByPart& a, const ByPart& b) {
+  return each(a, b, [](Interval x, Interval y) { return hull(x, y); });
+}
 
-  /// m x and e'' of this slice if its signals without m x are d and w, e' is `velocity` since a period ago.
-  /// @param back slices before this one in which a command that acts in this one may have been made.
-  HeldAnswer held(Interval d, Interval w, Interval velocity, Interval jerk_m_s3, const LoopHistory& history,
-                  std::size_t back) const {
-    const std::size_t n = force.size();
-    const auto with_last = [](Interval now, const std::vector<Interval>& past) {
-      return hull(now, last(past));
-    };
-    const Interval direct = Interval(1) / loop->mass_kg;
-    HeldSlice slice;
-    slice.velocity_m_s = velocity;
-    slice.history = history;
-    slice.jerk_m_s3 = jerk_m_s3;
-    const KernelCells& rest = *loop->direct_rest;
-    if (loop->has_lag) {
-      slice.acceleration_m_s2 = acceleration_m_s2 + stability::answer(*loop->h3, 0, with_last(d, force)) +
-                                direct * w - stability::answer(rest, 0, with_last(w, lagging));
-      slice.per_N = slice.per_rising_N = loop->h3->integral[0];
-      if (loop->has_whole_periods) {
-        slice.acceleration_m_s2 += stability::answer(*loop->slope3, 0, last(sawtooth));
-        slice.per_rising_N = std::min(
-            slice.per_N,
-            up(up(loop->h3->integral[0] / 2) + up(up(loop->period_s / 8) * loop->slope3->integral[0])));
-      }
-    } else {
-      slice.acceleration_m_s2 =
-          acceleration_m_s2 + direct * d - stability::answer(rest, 0, with_last(d, whole_force));
-      slice.per_N = slice.per_rising_N = (direct + rest.integral[0]).upper;
-    }
-    slice.acceleration_before_m_s2 = slice.acceleration_m_s2;
-    for (std::size_t k = n - std::min(back, n); k < n; ++k) {
-      slice.acceleration_before_m_s2 = hull(slice.acceleration_before_m_s2, acceleration[k]);
-    }
-    for (const Interval& a : acceleration)
-      slice.largest_acceleration_m_s2 = std::max(slice.largest_acceleration_m_s2, a.mag());
-    return hold_error(*loop, slice);
-  }
+/// Whatever part each vehicle's lag lies in.
+Deviations united(const ByPart& parts) {
+  Deviations result = parts.front();
+  for (const Deviations& part : parts) result = hull_of(result, part);
+  return result;
+}
 
-  /// The errors of this slice if its signals are these. @param saw bounds the integral of the sawtooth in d, N s.
-  void answer(Interval d, Interval w, double saw, Interval& position, Interval& velocity) const {
-    const Interval both_d = hull(d, last(force));
-    position = position_m + stability::answer(*loop->h1, 0, both_d);
-    velocity = velocity_m_s + stability::answer(*loop->h2, 0, both_d);
-    if (loop->has_whole_periods) {
-      const Interval both_saw = hull(Interval(-saw, saw), last(sawtooth));
-      position += stability::answer(*loop->slope1, 0, both_saw);
-      velocity += stability::answer(*loop->slope2, 0, both_saw);
-    }
-    if (!loop->has_lag) return;
-    const Interval both_w = hull(w, last(lagging));
-    position += stability::answer(*loop->g1, 0, both_w);
-    velocity += stability::answer(*loop->g2, 0, both_w);
-  }
-};
+double largest_position_m(const ByPart& parts) {
+  double largest_m = 0;
+  for (const Deviations& part : parts)
+    for (const Deviation& one : part)
+      for (const Interval& x : one.position_m) largest_m = std::max(largest_m, x.mag());
+  return largest_m;
+}
 
 class Sweep {
  public:
   Sweep(const Scene& scene, const EnclosureOptions& options, double tolerance_N)
-      : scene_(scene), options_(options), tolerance_N_(tolerance_N) {
-    for (int i = 0; i < scene.vehicles(); ++i) {
-      axes_.emplace_back();
-      for (std::size_t k = 0; k < 3; ++k) {
-        axes_.back()[k].loop = &scene.loops().axis[k];
-        axes_.back()[k].estimates = &scene.estimate_answer(k);
+      : scene_(scene), options_(options), tolerance_N_(tolerance_N), axes_(scene.lag_parts().size()) {
+    for (std::size_t p = 0; p < axes_.size(); ++p) {
+      const LagPart& part = scene.lag_parts()[p];
+      axes_[p].resize(static_cast<std::size_t>(scene.vehicles()));
+      for (int i = 0; i < scene.vehicles(); ++i) {
+        std::array<AxisInSlices, 3>& axes = axes_[p][static_cast<std::size_t>(i)];
+        for (std::size_t k = 0; k < 3; ++k) {
+          axes[k].loop = &part.loops.axis[k];
+          axes[k].estimates = &scene.estimate_answer(k);
+        }
+        if (!part.loops.axis[2].has_lag) continue;
+        axes[2].start = &part.start_z;
+        axes[2].excess_N = scene.excess_at_start_N(i);
       }
-      if (!scene.loops().axis[2].has_lag) continue;
-      axes_.back()[2].start = &scene.lag_start_z();
-      axes_.back()[2].excess_N = scene.excess_at_start_N(i);
     }
     // Where slices are whole periods, only their borders are rounded.
     const ErrorLoop& loop = scene.loops().axis[0];
@@ -184,38 +113,29 @@ class Sweep {
   /// @returns false where no tube was found for the next slice, or it was cancelled.
   bool advance(SlicedTube& tube, double farthest_m) {
     const auto n = static_cast<int>(tube.slices.size());
-    const auto count = static_cast<std::size_t>(scene_.vehicles());
-    for (auto& of_vehicle : axes_)
-      for (Axis& axis : of_vehicle) axis.begin_slice();
+    for (auto& of_part : axes_)
+      for (auto& of_vehicle : of_part)
+        for (AxisInSlices& axis : of_vehicle) axis.begin_slice();
     // As if the signals stood still.
-    Signals signals = n == 0 ? Signals(count) : last_;
-    Deviations tried;
+    Signals signals = last_;
+    if (n == 0) signals.assign(axes_.size(), std::vector<Signal>(axes_.front().size()));
+    ByPart tried;
     for (int i = 0; i < kMostTries; ++i) {
-      const Deviations answered = answers(signals);
+      const ByPart answered = answers(signals);
       if (i > 0 && every_inside(answered, tried)) {
         keep(signals, answered, tube);
         return true;
       }
-      const Deviations next = each(answered, answered, [](Interval x, Interval) { return wider(x); });
+      const ByPart next = each(answered, answered, [](Interval x, Interval) { return wider(x); });
       tried = i == 0 ? next : hull_of(tried, next);
-      double largest_m = 0;
-      for (const Deviation& one : tried)
-        for (const Interval& x : one.position_m) largest_m = std::max(largest_m, x.mag());
-      if (!(largest_m <= farthest_m)) {
+      if (!(largest_position_m(tried) <= farthest_m)) {
         tube.why =
             fmt::format("at {:.3g} s errors could exceed {:g} m", n * scene_.motion().slice_s, farthest_m);
         return false;
       }
-      const auto with_past = [&](int slices) {
-        Deviations result = tried;
-        for (int back = 1; back <= std::min(slices, n); ++back)
-          result = hull_of(result, tube.slices[static_cast<std::size_t>(n - back)]);
-        return result;
-      };
-      const Deviations seen = with_past(remembered_), recent = with_past(held_);
-      files::parallel_for(scene_.vehicles(), options_.jobs, [&](int v) {
-        signals[static_cast<std::size_t>(v)] = signals_of(v, n, seen, recent);
-      });
+      const ByPart seen = with_past(tried, remembered_), recent = with_past(tried, held_);
+      files::parallel_for(scene_.vehicles(), options_.jobs,
+                          [&](int v) { set_signals(v, n, seen, recent, signals); });
       if (options_.cancelled != nullptr && *options_.cancelled) return false;
     }
     tube.why = fmt::format("no tube was found that holds at {:.3g} s", n * scene_.motion().slice_s);
@@ -230,33 +150,49 @@ class Sweep {
     LoopHistory met[3];  ///< up to the end of the slice
     HeldAnswer held[3];  ///< 0 where the loop is continuous
   };
-  using Signals = std::vector<Signal>;
+  using Signals = std::vector<std::vector<Signal>>;  ///< [part][vehicle]
 
+  /// Deviations in the last `slices` slices too.
+  ByPart with_past(ByPart now, int slices) const {
+    const auto count = std::min(past_.size(), static_cast<std::size_t>(slices));
+    for (std::size_t back = 1; back <= count; ++back) now = hull_of(now, past_[past_.size() - back]);
+    return now;
+  }
+
+  /// Of one vehicle, for every part in which its lag may lie. Its neighbours' lags are anywhere.
   /// @param seen what a prediction that acts in the slice may rest on.
   /// @param recent what a command that acts in it may rest on.
-  Signal signals_of(int vehicle, int slice, const Deviations& seen, const Deviations& recent) const {
+  void set_signals(int vehicle, int slice, const ByPart& seen, const ByPart& recent, Signals& signals) const {
     const Motion& motion = scene_.motion();
     const int s = motion.stretch_of[static_cast<std::size_t>(vehicle)][static_cast<std::size_t>(slice)];
     const Stretch& stretch = motion.stretches[static_cast<std::size_t>(s)];
-    ForceDifference difference(scene_, stretch, seen);
-    difference.refine(options_.boxes, tolerance_N_, options_.cancelled);
-    Signal signal;
-    signal.difference_N = difference.over(seen);
-    signal.truth = scene_.truth_sizes(stretch, seen);
-    const Interval mass_kg(scene_.tracking().plant.mass_kg);
     const auto i = static_cast<std::size_t>(vehicle);
+    Deviations deviations = united(seen);
+    ForceDifference difference(scene_, stretch, deviations);
+    difference.refine(options_.boxes, tolerance_N_, options_.cancelled);
+    for (std::size_t p = 0; p < seen.size(); ++p) {
+      deviations[i] = seen[p][i];
+      Signal& signal = signals[p][i];
+      signal.difference_N = difference.over(deviations);
+      signal.truth = scene_.truth_sizes(stretch, deviations);
+      set_loop_signals(stretch, slice, axes_[p][i], deviations[i], recent[p][i], signal);
+    }
+  }
+
+  /// What follows for each axis.
+  void set_loop_signals(const Stretch& stretch, int slice, const std::array<AxisInSlices, 3>& axes,
+                        const Deviation& seen, const Deviation& recent, Signal& signal) const {
+    const Interval mass_kg(scene_.tracking().plant.mass_kg);
     for (std::size_t k = 0; k < 3; ++k) {
       signal.lagging_N[k] = signal.truth.force_N[k] - mass_kg * stretch.acceleration_now_m_s2[k];
-      signal.met[k] = axes_[i][k].met;
+      signal.met[k] = axes[k].met;
       signal.met[k].add(scene_.in_slice(stretch, slice, k, signal.difference_N.mag(), signal.truth,
-                                        seen[i].position_m[k].mag(), seen[i].velocity_m_s[k].mag()));
+                                        seen.position_m[k].mag(), seen.velocity_m_s[k].mag()));
       if (scene_.loops().is_sampled()) {
-        signal.held[k] =
-            axes_[i][k].held(known_force(signal, k), signal.lagging_N[k], recent[i].velocity_m_s[k],
-                             stretch.jerk_m_s3[k], signal.met[k], static_cast<std::size_t>(held_));
+        signal.held[k] = axes[k].held(known_force(signal, k), signal.lagging_N[k], recent.velocity_m_s[k],
+                                      stretch.jerk_m_s3[k], signal.met[k], static_cast<std::size_t>(held_));
       }
     }
-    return signal;
   }
 
   static Interval known_force(const Signal& signal, std::size_t axis) {
@@ -268,34 +204,50 @@ class Sweep {
     return scene_.loops().is_sampled() ? known + signal.held[axis].mean_N : known;
   }
 
-  Deviations answers(const Signals& signals) const {
-    Deviations result(signals.size());
-    for (std::size_t i = 0; i < signals.size(); ++i) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        axes_[i][k].answer(force(signals[i], k), signals[i].lagging_N[k], signals[i].held[k].sawtooth_N_s,
-                           result[i].position_m[k], result[i].velocity_m_s[k]);
+  ByPart answers(const Signals& signals) const {
+    ByPart result(signals.size(), Deviations(signals.front().size()));
+    for (std::size_t p = 0; p < signals.size(); ++p) {
+      for (std::size_t i = 0; i < signals[p].size(); ++i) {
+        const Signal& signal = signals[p][i];
+        for (std::size_t k = 0; k < 3; ++k) {
+          axes_[p][i][k].answer(force(signal, k), signal.lagging_N[k], signal.held[k].sawtooth_N_s,
+                                result[p][i].position_m[k], result[p][i].velocity_m_s[k]);
+        }
       }
     }
     return result;
   }
 
-  void keep(const Signals& signals, const Deviations& answered, SlicedTube& tube) {
-    for (std::size_t i = 0; i < signals.size(); ++i) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        const HeldAnswer& held = signals[i].held[k];
-        axes_[i][k].force.push_back(force(signals[i], k));
-        axes_[i][k].whole_force.push_back(known_force(signals[i], k) + held.hold_N);
-        axes_[i][k].sawtooth.emplace_back(-held.sawtooth_N_s, held.sawtooth_N_s);
-        axes_[i][k].lagging.push_back(signals[i].lagging_N[k]);
-        axes_[i][k].met = signals[i].met[k];
-        axes_[i][k].acceleration.push_back(held.acceleration_m_s2);
-        tube.hold_N[i][k].push_back(held.hold_N.mag());
+  void keep(const Signals& signals, const ByPart& answered, SlicedTube& tube) {
+    for (std::size_t i = 0; i < signals.front().size(); ++i) {
+      Signal all = signals.front()[i];
+      double hold_N[3] = {0, 0, 0};
+      for (std::size_t p = 0; p < signals.size(); ++p) {
+        const Signal& signal = signals[p][i];
+        for (std::size_t k = 0; k < 3; ++k) {
+          keep_signals(signal, k, axes_[p][i][k]);
+          hold_N[k] = std::max(hold_N[k], signal.held[k].hold_N.mag());
+        }
+        all.difference_N = hull(all.difference_N, signal.difference_N);
+        unite(all.truth, signal.truth);
       }
-      tube.force_error_N[i].push_back(signals[i].difference_N);
-      tube.truth[i].push_back(signals[i].truth);
+      for (std::size_t k = 0; k < 3; ++k) tube.hold_N[i][k].push_back(hold_N[k]);
+      tube.force_error_N[i].push_back(all.difference_N);
+      tube.truth[i].push_back(all.truth);
     }
-    tube.slices.push_back(answered);
+    tube.slices.push_back(united(answered));
+    past_.push_back(answered);
     last_ = signals;
+  }
+
+  void keep_signals(const Signal& signal, std::size_t k, AxisInSlices& axis) const {
+    const HeldAnswer& held = signal.held[k];
+    axis.force.push_back(force(signal, k));
+    axis.whole_force.push_back(known_force(signal, k) + held.hold_N);
+    axis.sawtooth.emplace_back(-held.sawtooth_N_s, held.sawtooth_N_s);
+    axis.lagging.push_back(signal.lagging_N[k]);
+    axis.met = signal.met[k];
+    axis.acceleration.push_back(held.acceleration_m_s2);
   }
 
   const Scene& scene_;
@@ -303,7 +255,8 @@ class Sweep {
   double tolerance_N_;
   int held_ = 0;  ///< slices before the present one in which a command that acts in it may have been made
   int remembered_ = 0;  ///< slices before the present one whose states the network may still act upon
-  std::vector<std::array<Axis, 3>> axes_;
+  std::vector<std::vector<std::array<AxisInSlices, 3>>> axes_;  ///< [part][vehicle]
+  std::vector<ByPart> past_;                                    ///< slice by slice
   Signals last_;
 };
 

@@ -40,6 +40,10 @@ struct SlicedTube {
 /// B_n(E) lies inside E, errors stay in B_n(E) during slice n. For were there a first time t at which one reaches the
 /// border of E, all states before t would lie in what the signals were enclosed over, and the errors at t in B_n(E),
 /// inside E: a contradiction; at the slice's start they lie in B_n(E) for the same reason. E_n = B_n(E) is kept.
+///
+/// Where the motors' lag lies in an interval, each vehicle has a set E for each part of it (Scene::lag_parts()) in
+/// which its own lag may lie, made with the kernels of that part; its forces are enclosed over that set and over those
+/// of its neighbours of all parts. A lag is constant and so stays in one part. The union is the tube's slice.
 /// @param tolerance_N see ForceDifference::refine().
 /// @param farthest_m gives up beyond this deviation.
 SlicedTube sliced_tube(const Scene& scene, const EnclosureOptions& options, double tolerance_N,
