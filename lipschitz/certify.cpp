@@ -32,8 +32,7 @@ void require_relu_on_a_box(const std::map<std::string, const Weights*>& parts,
   for (const auto& [name, weights] : parts) {
     if (weights->is_relu()) continue;
     throw std::invalid_argument(std::string(options.domain.empty() ? "--method branch" : "bounds on a box") +
-                                ": for ReLU networks only; " + name + " has " +
-                                files::function_of(weights->activation).words +
+                                ": for ReLU networks only; " + name + " has " + weights->activation_names() +
                                 " between its layers, so that only bounds for all inputs can be proved");
   }
 }
@@ -51,8 +50,10 @@ bool has_witness(const std::map<std::string, const Weights*>& parts, const std::
 
 /// The largest slopes of what lies between the layers of `weights`; nothing where they are 1.
 void add_steepest_slopes(const Weights& weights, std::vector<UpperBound>& factors) {
-  const double steepest = files::function_of(weights.activation).steepest();
-  for (std::size_t k = 1; k < weights.layers.size() && steepest != 1; ++k) factors.emplace_back(steepest);
+  for (const files::Activation activation : weights.activations()) {
+    const double steepest = files::function_of(activation).steepest();
+    if (steepest != 1) factors.emplace_back(steepest);
+  }
 }
 
 /// The law's bound from those of its terms, and whether one of them was cut short.
@@ -155,11 +156,15 @@ void judge_gamma(const std::map<std::string, const Weights*>& parts, Certificati
   std::size_t next = 0;
   for (const auto& [name, weights] : parts) {
     std::vector<Enclosure> norms;
-    for (std::size_t k = 0; k < weights->layers.size(); ++k)
-      norms.push_back(result.layers[next + k].norm.norm);
+    std::vector<CertifiedLayer*> judged;
+    for (const files::Layer& layer : weights->layers) {
+      CertifiedLayer& certified = result.layers[next++];
+      if (layer.is_added) continue;
+      norms.push_back(certified.norm.norm);
+      judged.push_back(&certified);
+    }
     const auto verdicts = respects_gamma(*result.gamma, norms);
-    for (std::size_t k = 0; k < norms.size(); ++k) result.layers[next + k].respects_gamma = verdicts[k];
-    next += norms.size();
+    for (std::size_t k = 0; k < norms.size(); ++k) judged[k]->respects_gamma = verdicts[k];
   }
 }
 
@@ -173,9 +178,11 @@ void multiply_norms(const std::map<std::string, const Weights*>& parts,
       if (layer.network == name) norms.push_back(layer.norm.norm.upper);
     }
     add_steepest_slopes(*parts.at(name), norms);
-    const files::ActivationFunction& function = files::function_of(parts.at(name)->activation);
-    bound.has_slopes = bound.has_slopes && !function.sorts();
-    bound.is_monotone = bound.is_monotone && function.is_monotone();
+    for (const files::Activation activation : parts.at(name)->activations()) {
+      const files::ActivationFunction& function = files::function_of(activation);
+      bound.has_slopes = bound.has_slopes && !function.sorts();
+      bound.is_monotone = bound.is_monotone && function.is_monotone();
+    }
   }
   bound.is_relu = has_witness(parts, bound.function);
   bound.product = bound.upper = product_up(norms);

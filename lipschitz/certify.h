@@ -47,7 +47,8 @@ struct CertifiedLayer {
   std::string network;  ///< "network", "phi:<kind>" or "rho:<kind>"
   std::string name;     ///< the layer's name in its file
   SpectralNorm norm;
-  /// Whether the layer satisfies what was stated of gamma: proved, refuted, inconclusive; nothing where nothing was.
+  /// Whether the layer satisfies what was stated of gamma: proved, refuted, inconclusive; nothing where nothing was, or
+  /// the layer is none of the file.
   std::optional<Verdict> respects_gamma;
 };
 
@@ -104,7 +105,7 @@ std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const st
 
 /// Certifies NET as a whole. Upper bounds hold in exact arithmetic for the weights as stored, over all inputs and so
 /// over every box; lower bounds are exact slopes between two float32 points. The clamp of NET, which never increases
-/// a distance, leaves the upper bounds valid. Functions with another activation than ReLU, and set functions where any
+/// a distance, leaves the upper bounds valid. Functions with other activations than ReLU, and set functions where any
 /// phi has one, get upper bounds only: by the same matrix inequality where the activation is monotone
 /// (checker/stages.h), else, up to the size that bent_bound.h states, by its extension. Branch and bound runs on what
 /// the clamp lets through of the box, or on a projective cover of all inputs where there is no box.

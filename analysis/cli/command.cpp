@@ -35,12 +35,14 @@ constexpr const char* kHalvesOrPairs =
     "maxmin:halves compares number i with number i of the layer's second half, maxmin:pairs neighbours; the "
     "larger ones come first";
 
-void set_activation(files::NetworkArguments& arguments, const std::string& name) {
-  if (!files::is_activation(name))
-    throw UsageError("--activation " + name +
-                     ": is none of those whose slopes are known: " + files::activations() +
+void set_activation(files::NetworkArguments& arguments, const std::string& text) {
+  for (const std::string& name : files::listed_activations(text)) {
+    if (files::is_activation(name)) continue;
+    throw UsageError("--activation " + text + ": " + files::in_quotes(name) +
+                     " is none of those whose slopes are known: " + files::activations() +
                      (name == "maxmin" ? std::string("; ") + kHalvesOrPairs + " in both" : ""));
-  arguments.activation = name;
+  }
+  arguments.activation = text;
 }
 
 }  // namespace
@@ -61,8 +63,10 @@ void declare_order(CLI::App& app, files::NetworkArguments& arguments) {
 void declare_activation(CLI::App& app, files::NetworkArguments& arguments) {
   app.add_option_function<std::string>(
       "--activation", [&arguments](const std::string& name) { set_activation(arguments, name); },
-      "Between the layers, which a state dict does not tell (default: relu). Others than ReLU can be "
-      "certified and checked: " +
+      "Between the layers, which a state dict does not tell (default: relu): one name for all, or one for "
+      "each "
+      "layer but the last, and one more if it follows the last layer, as in relu,relu,tanh. Others than ReLU "
+      "can be certified and checked: " +
           files::activations() + ". " + kHalvesOrPairs + "; groupsort sorts upwards");
 }
 

@@ -3,6 +3,7 @@
 
 #include "lipschitz/checker/certificate_checker.h"
 #include "nn/base/content_hash.h"
+#include "nn/weights/activation.h"
 #include "nn/weights/chain.h"
 #include "nn/weights/function_names.h"
 
@@ -203,9 +204,8 @@ void CertificateChecker::check_product(const Json& bound, const std::vector<std:
   for (const std::string& name : names) {
     require(norms_.count(name) == 1, where + ": there is no network " + name);
     total = total * norms_.at(name);
-    const files::Weights& weights = *parts_.at(name);
-    const Dyadic steepest = files::function_of(weights.activation).steepest();
-    for (std::size_t k = 1; k < weights.layers.size(); ++k) total = total * steepest;
+    for (const files::Activation activation : parts_.at(name)->activations())
+      total = total * files::function_of(activation).steepest();
   }
   require(Dyadic(upper) >= total, where + ": claims less than the product of the norms");
 }
@@ -214,15 +214,17 @@ void CertificateChecker::check_activations(const Json& bound, const std::vector<
                                            const std::string& where) const {
   for (const std::string& name : names) {
     require(parts_.count(name) == 1, where + ": there is no network " + name);
-    const files::ActivationFunction& function = files::function_of(parts_.at(name)->activation);
-    if (function.activation == files::Activation::kRelu) continue;
-    const std::string with = " of a network with " + function.words;
-    require(bound["domain"] == "global" && bound["upper_method"] != "branch",
-            where + ": a bound on a box" + with);
-    require(bound["lower"].is_null() && bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
-            where + ": a lower bound" + with);
-    require(!function.sorts() || bound["upper_method"] == "product",
-            where + ": a bound from slopes of single numbers" + with);
+    for (const files::Activation activation : parts_.at(name)->activations()) {
+      if (activation == files::Activation::kRelu) continue;
+      const files::ActivationFunction& function = files::function_of(activation);
+      const std::string with = " of a network with " + function.words;
+      require(bound["domain"] == "global" && bound["upper_method"] != "branch",
+              where + ": a bound on a box" + with);
+      require(bound["lower"].is_null() && bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
+              where + ": a lower bound" + with);
+      require(!function.sorts() || bound["upper_method"] == "product",
+              where + ": a bound from slopes of single numbers" + with);
+    }
   }
 }
 
@@ -289,21 +291,35 @@ void CertificateChecker::check_law(const Json& law) {
 std::string statement_for(const files::Network& network) {
   const auto parts = files::parts(network);
   const bool sorts = std::any_of(parts.begin(), parts.end(), [](const auto& part) {
-    return part.second->layers.size() > 1 && files::function_of(part.second->activation).sorts();
+    const std::vector<files::Activation> all = part.second->activations();
+    return std::any_of(all.begin(), all.end(), [](auto one) { return files::function_of(one).sorts(); });
   });
   return std::string(kStatement) + (sorts ? kSortingStatement : "");
 }
 
+namespace {
+
+/// The activations that a chain states, separated by commas.
+std::string stated_activations(const files::Json& chain) {
+  std::string text;
+  for (const files::Json& step : chain) {
+    const std::string op = step.at("op").get<std::string>();
+    if (files::activation_called(op)) text += (text.empty() ? "" : ",") + op;
+  }
+  return text;
+}
+
+}  // namespace
+
 files::Network with_stated_activations(const files::Json& certificate, files::Network network) {
   const auto adopt = [&certificate](const std::string& part, files::Weights& weights) {
-    if (weights.states_activation() || weights.layers.size() == 1) return;
+    if (weights.states_activation()) return;
     try {
-      for (const files::Json& step : certificate.at("network").at("weights").at(part).at("chain")) {
-        const auto activation = files::activation_called(step.at("op").get<std::string>());
-        if (!activation || !weights.has_groups_of(*activation)) continue;
-        weights.activation = *activation;
-        return;
-      }
+      const std::string text =
+          stated_activations(certificate.at("network").at("weights").at(part).at("chain"));
+      if (text.empty() || !files::activation_misfit(weights, text).empty()) return;
+      weights = files::with_activation(std::move(weights), text);
+      weights.activation_is_given = false;  // by the certificate alone
     } catch (const files::Json::exception&) {
       return;  // check() says what is wrong with it
     }

@@ -59,13 +59,12 @@ BentChain bent_chain(const files::Network& network, const std::string& function,
   BentChain result;
   std::vector<Matrix>& chain = result.stages;
   for (const std::string& name : names) {
-    const Unit unit = unit_of(files::function_of(parts.at(name)->activation));
-    result.bends.insert(result.bends.end(), parts.at(name)->layers.size() - 1, unit.bend);
     bool joins = true;  // the first layer acts on the selected inputs, and that of rho on the last of phi
+    Unit before;        // of what is between the layer before and this one
     for (const files::Layer& layer : parts.at(name)->layers) {
       Matrix w(layer.outputs, layer.inputs, layer.weights);
       for (Dyadic& entry : w.entries)
-        if (!joins) entry = entry * unit.slope;
+        if (!joins) entry = entry * before.slope;
       if (chain.empty()) {
         chain.push_back(selected_columns(w, coordinates, scale));
       } else if (joins) {
@@ -74,6 +73,9 @@ BentChain bent_chain(const files::Network& network, const std::string& function,
         chain.push_back(w);
       }
       joins = false;
+      if (&layer == &parts.at(name)->layers.back()) continue;
+      before = unit_of(files::function_of(layer.activation));
+      result.bends.push_back(before.bend);
     }
   }
   return result;

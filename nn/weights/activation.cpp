@@ -13,16 +13,30 @@
 namespace swarmcert::files {
 namespace {
 
-/// constant + sum of factor relu(scale x + shift).
+/// constant + sum of factor s(scale x + shift). For every s but ReLU that is s(x).
 struct ActivationTerms {
   struct Term {
     double scale, shift, factor;
   };
   std::vector<Term> terms;
   double constant = 0;
+  Activation s = Activation::kRelu;
+
+  bool is_s_itself() const { return terms.size() == 1; }
+  /// By how much a rounded weight of the layer in front of it, or behind it, grows at most.
+  double share_in_front() const { return norm_of(&Term::scale); }
+  double share_behind() const { return norm_of(&Term::factor); }
+
+ private:
+  double norm_of(double Term::*number) const {
+    double squares = 0;
+    for (const Term& term : terms) squares += term.*number * term.*number;
+    return std::sqrt(squares);
+  }
 };
 
 std::optional<ActivationTerms> terms_of(const std::string& name) {
+  if (const std::optional<Activation> s = activation_called(name)) return ActivationTerms{{{1, 0, 1}}, 0, *s};
   if (name == "relu6") return ActivationTerms{{{1, 0, 1}, {1, -6, -1}}, 0};
   if (name == "hardtanh") return ActivationTerms{{{1, 1, 1}, {1, -1, -1}}, -1};
   constexpr std::string_view kLeaky = "leaky_relu";
@@ -54,9 +68,10 @@ AffineMap map_of(const Layer& layer) {
   return map;
 }
 
-/// The activation of `before`, as a map of a new ReLU layer's outputs.
+/// The activation of `before`, as a map of a new layer's outputs.
 AffineMap activated(ReluChain& chain, const AffineMap& before, const ActivationTerms& activation,
                     const std::string& name) {
+  if (activation.s != Activation::kRelu) return chain.activated(before, activation.s, name);
   std::vector<AffineMap> rows;
   for (const ActivationTerms::Term& term : activation.terms) {
     rows.push_back(before);
@@ -78,74 +93,110 @@ AffineMap activated(ReluChain& chain, const AffineMap& before, const ActivationT
   return sum;
 }
 
+/// The layers with `between` written as what chains know. @throws FoldingLimit.
+std::vector<Layer> rewritten(const Weights& weights, const std::vector<ActivationTerms>& between) {
+  constexpr double kUp = 1 + 1e-6;
+  const std::vector<Layer>& own = weights.layers;
+  ReluChain chain(weights.inputs());
+  AffineMap current = map_of(own.front());
+  for (std::size_t k = 1; k < own.size(); ++k)
+    current = composed(map_of(own[k]), activated(chain, current, between[k - 1], own[k - 1].name));
+  std::vector<Layer> layers = chain.finished(current, own.back().name);
+  for (std::size_t k = 0; k < layers.size(); ++k) {  // what was rounded before enters every copy
+    const double copies = (k < between.size() ? between[k].share_in_front() : 1) *
+                          (k > 0 ? between[k - 1].share_behind() : 1) * kUp;
+    const double constant = k > 0 ? std::fabs(between[k - 1].constant) : 0;
+    layers[k].weight_rounding = (layers[k].weight_rounding + copies * own[k].weight_rounding) * kUp;
+    layers[k].bias_rounding =
+        (layers[k].bias_rounding + copies * own[k].bias_rounding +
+         constant * own[k].weight_rounding * std::sqrt(static_cast<double>(own[k].inputs))) *
+        kUp;
+  }
+  return layers;
+}
+
+/// One for each layer, the last one possibly left out: what `names` say of the layers of `weights`.
+std::vector<std::string> spread(const Weights& weights, const std::vector<std::string>& names) {
+  return names.size() == 1 ? std::vector<std::string>(weights.layers.size() - 1, names.front()) : names;
+}
+
 }  // namespace
 
 std::string activations() {
   return "relu, leaky_relu (slope 0.01), leaky_relu:SLOPE, relu6, hardtanh, " + smooth_activations();
 }
 
-bool is_activation(const std::string& name) {
-  return activation_called(name).has_value() || terms_of(name).has_value();
-}
+bool is_activation(const std::string& name) { return terms_of(name).has_value(); }
 
-bool Weights::has_groups_of(Activation other) const {
-  const int group = function_of(other).group;
-  return std::all_of(layers.begin(), layers.end(), [&](const Layer& layer) {
-    return &layer == &layers.back() || layer.outputs % group == 0;
-  });
-}
-
-Weights with_activation(Weights weights, const std::string& activation) {
-  const std::optional<Activation> as_is = activation_called(activation);
-  const std::optional<ActivationTerms> terms = terms_of(activation);
-  if (!as_is && !terms) throw std::invalid_argument("with_activation: " + activation + " is unknown");
-  if (weights.layers.size() == 1) return weights;  // nothing is between its layers
-  if (weights.states_activation()) {
-    if (as_is == weights.activation) return weights;
-    throw InputError({weights.path, "", "--activation", activation,
-                      (weights.activation_is_given ? "network.toml states " : "the file itself states ") +
-                          function_of(weights.activation).words + " between its layers",
-                      "leave --activation out"});
-  }
-  weights.activation_is_given = true;
-  if (as_is) {
-    if (!weights.has_groups_of(*as_is))
-      throw InputError(
-          {weights.path, "", "--activation", activation,
-           "a hidden layer has no multiple of " + std::to_string(function_of(*as_is).group) + " outputs",
-           "state the size of the groups that the network was trained with"});
-    weights.activation = *as_is;
-    return weights;
-  }
-  double scales = 0, factors = 0;
-  for (const ActivationTerms::Term& term : terms->terms) {
-    scales += term.scale * term.scale;
-    factors += term.factor * term.factor;
-  }
-  try {
-    ReluChain chain(weights.inputs());
-    AffineMap current = map_of(weights.layers.front());
-    for (std::size_t k = 1; k < weights.layers.size(); ++k)
-      current =
-          composed(map_of(weights.layers[k]), activated(chain, current, *terms, weights.layers[k - 1].name));
-    std::vector<Layer> layers = chain.finished(current, weights.layers.back().name);
-    for (std::size_t k = 0; k < layers.size(); ++k) {  // what was rounded before enters every copy
-      constexpr double kUp = 1 + 1e-6;
-      const double copies =
-          std::sqrt(k + 1 < layers.size() ? scales : 1) * std::sqrt(k > 0 ? factors : 1) * kUp;
-      layers[k].weight_rounding =
-          (layers[k].weight_rounding + copies * weights.layers[k].weight_rounding) * kUp;
-      layers[k].bias_rounding = (layers[k].bias_rounding + copies * weights.layers[k].bias_rounding +
-                                 std::fabs(terms->constant) * weights.layers[k].weight_rounding *
-                                     std::sqrt(static_cast<double>(weights.layers[k].inputs))) *
-                                kUp;
+std::vector<std::string> listed_activations(const std::string& text) {
+  std::vector<std::string> names = {""};
+  for (const char c : text) {
+    if (c == ',') {
+      names.emplace_back();
+    } else {
+      names.back() += c;
     }
-    weights.layers = std::move(layers);
+  }
+  return names;
+}
+
+std::string activation_misfit(const Weights& weights, const std::string& text) {
+  const std::vector<std::string> names = spread(weights, listed_activations(text));
+  const std::size_t layers = weights.layers.size();
+  if (weights.states_activation() && layers > 1) {
+    const std::vector<Activation> own = weights.activations();
+    const bool agrees = std::equal(own.begin(), own.end(), names.begin(), names.end(),
+                                   [](Activation s, const auto& name) { return function_of(s).op == name; });
+    if (agrees) return "";
+    return std::string(weights.activation_is_given ? "network.toml states " : "the file itself states ") +
+           weights.activation_names() + " between its layers";
+  }
+  if (names.size() + 1 != layers && names.size() != layers)
+    return "names " + std::to_string(names.size()) + " activations for " + std::to_string(layers) +
+           (layers == 1 ? " layer: name one"
+                        : " layers: name one, or " + std::to_string(layers - 1) +
+                              " for those between the layers, or " + std::to_string(layers) +
+                              " with one after the last layer");
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const std::optional<Activation> s = activation_called(names[k]);
+    const int group = s ? function_of(*s).group : 1;
+    if (weights.layers[k].outputs % group != 0)
+      return names[k] + " follows the layer " + in_quotes(weights.layers[k].name) + " of " +
+             std::to_string(weights.layers[k].outputs) + " outputs, no multiple of " + std::to_string(group);
+  }
+  return "";
+}
+
+Weights with_activation(Weights weights, const std::string& text) {
+  std::vector<ActivationTerms> between;
+  for (const std::string& name : spread(weights, listed_activations(text))) {
+    const std::optional<ActivationTerms> terms = terms_of(name);
+    if (!terms) throw std::invalid_argument("with_activation: " + in_quotes(name) + " is unknown");
+    between.push_back(*terms);
+  }
+  const std::string misfit = activation_misfit(weights, text);
+  if (!misfit.empty()) {
+    const bool is_other = weights.states_activation();
+    throw InputError({weights.path, "", "--activation", text, misfit,
+                      is_other ? "leave --activation out" : "state what the network was trained with"});
+  }
+  if (weights.states_activation() || between.empty()) return weights;  // as stated, or nothing is between
+  weights.activation_is_given = true;
+  if (between.size() == weights.layers.size()) {
+    weights.end_in(between.back().s);
+    weights.notes.push_back("the network ends in " + listed_activations(text).back() +
+                            ", which an identity layer follows");
+  }
+  for (std::size_t k = 0; k < between.size(); ++k) weights.layers[k].activation = between[k].s;
+  const auto is_itself = [](const ActivationTerms& terms) { return terms.is_s_itself(); };
+  if (std::all_of(between.begin(), between.end(), is_itself)) return weights;
+  try {
+    weights.layers = rewritten(weights, between);
   } catch (const FoldingLimit& limit) {
-    throw InputError({weights.path, "", "--activation", activation, limit.what, "certify a smaller network"});
+    throw InputError({weights.path, "", "--activation", text, limit.what, "certify a smaller network"});
   }
   if (weights.precision == Precision::kFloat32) weights.precision = least_precision(weights.layers);
-  weights.notes.push_back(activation + " between the layers is written with ReLU");
+  weights.notes.push_back("piecewise linear activations of " + text + " are written with ReLU");
   return weights;
 }
 

@@ -11,9 +11,9 @@ std::vector<ChainStep> chain(const Network& network, const std::string& name) {
   std::vector<ChainStep> result;
   if (network.clamp && is_clamped(name)) result.push_back({"clamp", "", weights.inputs(), weights.inputs()});
   for (const Layer& layer : weights.layers) {
-    if (&layer != &weights.layers.front())
-      result.push_back({function_of(weights.activation).op, "", layer.inputs, layer.inputs});
     result.push_back({"linear", layer.name, layer.inputs, layer.outputs});
+    if (&layer != &weights.layers.back())
+      result.push_back({function_of(layer.activation).op, "", layer.outputs, layer.outputs});
   }
   return result;
 }

@@ -15,7 +15,7 @@ struct ChainStep {
   int inputs = 0, outputs = 0;
 };
 
-/// The operations of part `name` of NET, first applied first: the clamp where one acts on it, then its layers with its
+/// The operations of part `name` of NET, first applied first: the clamp where one acts on it, then its layers with an
 /// activation after each but the last.
 /// @throws std::out_of_range if NET has no such part.
 std::vector<ChainStep> chain(const Network& network, const std::string& name);

@@ -43,9 +43,10 @@ Weights as_float32(Weights weights) {
 }
 
 template <typename Scalar>
-Evaluator<Scalar>::Evaluator(const Weights& weights) : activation_(weights.activation) {
-  if (sizeof(Scalar) < sizeof(double) && !weights.is_relu())
-    throw InputError({weights.path, "", "activation", function_of(activation_).op,
+Evaluator<Scalar>::Evaluator(const Weights& weights)
+    : is_relu_(weights.is_relu()), activations_(weights.activations()) {
+  if (sizeof(Scalar) < sizeof(double) && !is_relu_)
+    throw InputError({weights.path, "", "activation", weights.activation_names(),
                       "float32 evaluates ReLU networks only", "evaluate this network in float64"});
   arrays_.reserve(2 * weights.layers.size());
   for (const Layer& layer : weights.layers) {
@@ -58,19 +59,19 @@ Evaluator<Scalar>::Evaluator(const Weights& weights) : activation_(weights.activ
 
 template <typename Scalar>
 nn::Mlp<Scalar> Evaluator<Scalar>::mlp() const {
-  if (activation_ != Activation::kRelu) throw std::logic_error("Evaluator: this is no ReLU network");
+  if (!is_relu_) throw std::logic_error("Evaluator: this is no ReLU network");
   return {layers_.data(), static_cast<int>(layers_.size())};
 }
 
-/// Layer by layer, for any activation.
+/// Layer by layer, for any activations.
 template <typename Scalar>
 std::vector<Scalar> Evaluator<Scalar>::smooth_value(const std::vector<Scalar>& input) const {
   std::vector<Scalar> x = input;
-  for (const nn::DenseLayer<Scalar>& layer : layers_) {
-    std::vector<Scalar> y(static_cast<std::size_t>(layer.outputs));
-    nn::apply<1>(layer, x.data(), y.data(), nn::Activation::kNone);
-    if (&layer != &layers_.back()) {
-      const std::vector<double> after = activated(activation_, {y.begin(), y.end()});
+  for (std::size_t k = 0; k < layers_.size(); ++k) {
+    std::vector<Scalar> y(static_cast<std::size_t>(layers_[k].outputs));
+    nn::apply<1>(layers_[k], x.data(), y.data(), nn::Activation::kNone);
+    if (k < activations_.size()) {
+      const std::vector<double> after = activated(activations_[k], {y.begin(), y.end()});
       for (std::size_t i = 0; i < y.size(); ++i) y[i] = static_cast<Scalar>(after[i]);
     }
     x = std::move(y);
@@ -85,7 +86,7 @@ std::vector<Scalar> Evaluator<Scalar>::operator()(const std::vector<Scalar>& inp
                                 " entries, the network has " + std::to_string(layers_.front().inputs) +
                                 " inputs");
   }
-  if (activation_ != Activation::kRelu) return smooth_value(input);
+  if (!is_relu_) return smooth_value(input);
   const nn::Mlp<Scalar> network = mlp();
   std::vector<Scalar> output(static_cast<std::size_t>(network.outputs()));
   std::vector<Scalar> scratch(static_cast<std::size_t>(nn::scratch_size(network)));

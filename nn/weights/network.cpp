@@ -114,20 +114,28 @@ class NetworkReader {
       Weights read = load_((folder / file).string(), order);
       if (entry.has("activation")) {
         const std::string activation = activation_of(entry);
-        const std::string stated = function_of(read.activation).op;
-        if (read.layers.size() > 1 && read.states_activation() && activation != stated)
-          entry.refuse("activation", in_quotes(activation), "the weight file itself states " + stated);
+        const std::string misfit = activation_misfit(read, activation);
+        if (!misfit.empty()) entry.refuse("activation", in_quotes(activation), misfit);
         read = with_activation(std::move(read), activation);
       }
       weights.emplace(kind, std::move(read));
     }
   }
 
-  /// As certificates name it: what is written with ReLU instead is stated by --activation.
+  /// A name, or a list of them, separated by commas. As certificates name them: what is written with ReLU instead is
+  /// stated by --activation.
   static std::string activation_of(const TomlTable& entry) {
-    const std::string activation = entry.text("activation");
-    if (!activation_called(activation))
-      entry.refuse("activation", in_quotes(activation), "must be one of relu, " + smooth_activations());
+    const std::vector<std::string> names = entry.is_list("activation")
+                                               ? entry.texts("activation")
+                                               : std::vector<std::string>{entry.text("activation")};
+    std::string activation;
+    for (const std::string& name : names) {
+      if (!activation_called(name))
+        entry.refuse("activation", in_quotes(name), "must be one of relu, " + smooth_activations());
+      activation += (activation.empty() ? "" : ",") + name;
+    }
+    if (names.empty())
+      entry.refuse("activation", "[]", "is empty", "leave it out, or name one per layer but the last");
     return activation;
   }
 
@@ -279,7 +287,7 @@ Network load_as_stated(const NetworkArguments& arguments) {
 void require_relu(const Network& network, const std::string& what) {
   for (const auto& [part, weights] : parts(network)) {
     if (weights->is_relu()) continue;
-    throw InputError({weights->path, "", "activation", in_quotes(function_of(weights->activation).op),
+    throw InputError({weights->path, "", "activation", in_quotes(weights->activation_names()),
                       "is between the layers of " + part + ", but " + what,
                       "bounds for all inputs are what can be said of this network: certify it"});
   }

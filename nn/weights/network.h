@@ -69,7 +69,7 @@ struct NetworkArguments {
   /// Orders of layers as load_weights() takes them: of `file`, where that is one plain weight file, of `phi` and `rho`.
   std::vector<std::string> order = {}, phi_order = {}, rho_order = {};
   std::string activation =
-      {};  ///< between the layers of every weight file: see with_activation(); empty: not stated
+      {};  ///< names, for the layers of every weight file: see with_activation(); empty: not stated
 };
 
 /// @throws InputError that names the part, if a part of NET has another activation than ReLU; `what` says what is for

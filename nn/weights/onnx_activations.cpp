@@ -30,7 +30,6 @@ std::vector<Enclosed> negated(std::vector<Enclosed> numbers) {
 /// Adds a ReLU layer; every value that a later node takes is carried along.
 AffineMap OnnxGraph::relu(const Node& node, const AffineMap& rows, const std::string& name,
                           const std::vector<AffineMap*>& also_carried) {
-  require_activation(node, Activation::kRelu);
   std::vector<AffineMap*> carried = also_carried;
   for (AffineMap* const needed : needed_after(node)) carried.push_back(needed);
   const std::string layer = layer_name(name);

@@ -57,13 +57,14 @@ Weights OnnxGraph::run() {
     refuse(0, in_quotes(model_.output), "the graph's output is not where its chain of nodes ends");
   OnnxValue& last = output->second;
   if (!chain_.has_layers() && last.map.is_identity()) refuse(0, "", "the graph has no linear layer");
-  if (chain_.has_layers() && last.map.is_identity())
-    notes_.insert(std::string("the network ends in a ") + function_of(activation_).words +
+  const bool ends_in_activation = chain_.has_layers() && last.map.is_identity();
+  if (ends_in_activation)
+    notes_.insert(std::string("the network ends in a ") + function_of(chain_.last_activation()).words +
                   ", which an identity layer follows");
   Weights weights;
-  weights.activation = activation_;
   try {
     weights.layers = chain_.finished(last.map, layer_name(last.name));
+    weights.layers.back().is_added = ends_in_activation;
   } catch (const FoldingLimit& limit) {
     refuse(0, in_quotes(model_.output), limit.what, "certify a smaller network");
   }

@@ -75,7 +75,6 @@ class OnnxGraph {
   OnnxValue sorted_by_concat(const Node& node);
   OnnxValue sorted_by_top(const Node& node);
   std::vector<AffineMap*> needed_after(const Node& node);
-  void require_activation(const Node& node, Activation activation);
   std::string layer_name(const std::string& weight);
   void require_finite(const Node& node, const AffineMap& map) const;
 
@@ -89,8 +88,6 @@ class OnnxGraph {
   std::set<std::string> notes_;
   /// Of a Concat that stands for MaxMin, by its output: the Split, or ReduceMax and ReduceMin, before it.
   std::map<std::string, std::vector<OnnxNode>> joined_;
-  Activation activation_ = Activation::kRelu;
-  std::string activated_by_;  ///< the first node with an activation; empty: none yet
 };
 
 }  // namespace swarmcert::files

@@ -118,25 +118,13 @@ std::vector<AffineMap*> OnnxGraph::needed_after(const Node& node) {
   return needed;
 }
 
-void OnnxGraph::require_activation(const Node& node, Activation activation) {
-  if (activated_by_.empty()) {
-    activation_ = activation;
-    activated_by_ = node.label();
-  }
-  if (activation_ == activation) return;
-  throw OperatorRefusal{"is another activation than " + activated_by_ + " before it, which stands for " +
-                            function_of(activation_).words,
-                        "use one activation in all layers of a network"};
-}
-
 OnnxValue OnnxGraph::computed_smooth(const Node& node) {
   const OnnxValue x = value(node, 0);
   const Activation activation = smooth_activation(node);
-  require_activation(node, activation);
   if (!needed_after(node).empty())
     throw OperatorRefusal{"has a skip connection beside it, which can be read beside ReLU only",
                           "leave the skip connection out, or train with ReLU"};
-  const AffineMap activated = chain_.activated(x.map, layer_name(x.name));
+  const AffineMap activated = chain_.activated(x.map, activation, layer_name(x.name));
   for (auto& [value_name, value] : values_) value.name.clear();
   return {activated, x.shape, ""};
 }

@@ -78,12 +78,10 @@ void OnnxGraph::join_sorting() {
 
 /// The activation of the whole value `x`, as it lies in memory.
 OnnxValue OnnxGraph::sorted(const Node& node, const OnnxValue& x, Activation activation) {
-  require_activation(node, activation);
   if (!needed_after(node).empty())
     throw OperatorRefusal{"has a skip connection beside it, which can be read beside ReLU only",
                           "leave the skip connection out, or train with ReLU"};
-  const AffineMap result = chain_.activated(x.map, layer_name(x.name));
-  require_sorting(result.is_identity(), "takes a number twice");
+  const AffineMap result = chain_.activated(x.map, activation, layer_name(x.name));
   for (auto& [value_name, value] : values_) value.name.clear();
   return {result, x.shape, ""};
 }

@@ -45,6 +45,7 @@ bool ReluChain::is_never_negative(const AffineMap::Row& row, const Enclosed& shi
   const auto is_at_least_0 = [](const Enclosed& number) { return number.value >= number.radius; };
   if (!is_at_least_0(shift)) return false;
   if (layers_.empty()) return row.empty();
+  if (last_activation() != Activation::kRelu) return false;
   return std::all_of(row.begin(), row.end(),
                      [&](const AffineEntry& entry) { return is_at_least_0(entry.factor); });
 }
@@ -73,7 +74,7 @@ AffineMap ReluChain::relu(const AffineMap& rows, const std::vector<AffineMap*>& 
     }
     rewritten.push_back(std::move(map));
   }
-  append(taken.map, name);
+  append(taken.map, Activation::kRelu, name);
   result.inputs = width_;
   result.shift.assign(result.rows.size(), {});
   for (std::size_t k = 0; k < carried.size(); ++k) {
@@ -86,13 +87,19 @@ AffineMap ReluChain::relu(const AffineMap& rows, const std::vector<AffineMap*>& 
   return result;
 }
 
-void ReluChain::append(const AffineMap& map, const std::string& name) {
+AffineMap ReluChain::activated(const AffineMap& rows, Activation activation, const std::string& name) {
+  append(rows, activation, name);
+  return identity_map(width_);
+}
+
+void ReluChain::append(const AffineMap& map, Activation activation, const std::string& name) {
   const std::uint64_t size = static_cast<std::uint64_t>(map.outputs()) * static_cast<std::uint64_t>(width_);
   if (size > kMostElements - elements_)
     throw FoldingLimit{"the network as a chain of dense layers has more than 2^25 numbers"};
   elements_ += size;
   Layer layer;
   layer.name = name;
+  layer.activation = activation;
   layer.inputs = width_;
   layer.outputs = map.outputs();
   layer.weights.assign(size, 0.0);
@@ -113,7 +120,7 @@ void ReluChain::append(const AffineMap& map, const std::string& name) {
 }
 
 std::vector<Layer> ReluChain::finished(const AffineMap& output, const std::string& name) {
-  append(output, name);
+  append(output, Activation::kRelu, name);
   return std::move(layers_);
 }
 

@@ -1,4 +1,4 @@
-/// @file Builds a ReLU chain out of affine maps and piecewise linear functions, so that it is the same function.
+/// @file Builds a chain of layers and activations out of affine maps and functions, so that it is the same function.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +10,14 @@
 
 namespace swarmcert::files {
 
-/// Every value is an affine map of the chain's last ReLU layer, or of the network's input before the first. A further
+/// Every value is an affine map of the chain's last activated layer, or of the network's input before the first. A
 /// ReLU layer takes along what is still needed: x = relu(x), where x is known not to be negative, else relu(x) -
 /// relu(-x).
 class ReluChain {
  public:
   explicit ReluChain(int inputs) : inputs_(inputs), width_(inputs) {}
 
-  /// Outputs of the last ReLU layer; the network's inputs before the first.
+  /// Outputs of the last activated layer; the network's inputs before the first.
   int width() const { return width_; }
   bool has_layers() const { return !layers_.empty(); }
 
@@ -26,10 +26,12 @@ class ReluChain {
   /// @throws FoldingLimit.
   AffineMap relu(const AffineMap& rows, const std::vector<AffineMap*>& carried, const std::string& name);
 
-  /// Adds a layer with any activation s that acts entry by entry. @return s(rows) as a map of the new layer's outputs;
-  /// all values before it are given up.
+  /// Adds the layer `rows` with any activation, which may act on the layer as a whole. @return the map of its outputs,
+  /// x -> x; all values before it are given up.
   /// @throws FoldingLimit.
-  AffineMap activated(const AffineMap& rows, const std::string& name) { return relu(rows, {}, name); }
+  AffineMap activated(const AffineMap& rows, Activation activation, const std::string& name);
+  /// Of the last layer that was added. Precondition: has_layers().
+  Activation last_activation() const { return layers_.back().activation; }
 
   /// The chain that ends in `output`.
   /// @throws FoldingLimit.
@@ -37,7 +39,7 @@ class ReluChain {
 
  private:
   bool is_never_negative(const AffineMap::Row& row, const Enclosed& shift) const;
-  void append(const AffineMap& map, const std::string& name);
+  void append(const AffineMap& map, Activation activation, const std::string& name);
 
   int inputs_;
   int width_;

@@ -200,7 +200,7 @@ Weights parse_safetensors(const std::string& bytes, const std::string& path,
 
 std::string safetensors_bytes(const Weights& weights) {
   if (!weights.is_relu())
-    throw InputError({weights.path, "", "activation", in_quotes(function_of(weights.activation).op),
+    throw InputError({weights.path, "", "activation", in_quotes(weights.activation_names()),
                       "cannot be stated by this format", "write ReLU networks only"});
   Json header = Json::object();
   Json names = Json::array();

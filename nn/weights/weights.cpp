@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
+#include <stdexcept>
 #include <string_view>
 
 #include "nn/base/file_io.h"
@@ -70,6 +72,57 @@ const char* name(Precision precision) {
   return "float64";
 }
 
+std::vector<Activation> Weights::activations() const {
+  std::vector<Activation> result;
+  for (std::size_t k = 0; k + 1 < layers.size(); ++k) result.push_back(layers[k].activation);
+  return result;
+}
+
+std::string Weights::activation_names() const {
+  const std::vector<Activation> all = activations();
+  const bool are_alike = std::adjacent_find(all.begin(), all.end(), std::not_equal_to<>()) == all.end();
+  std::string names;
+  for (const Activation activation : all) {
+    names += (names.empty() ? "" : ", ") + function_of(activation).op;
+    if (are_alike) break;
+  }
+  return names;
+}
+
+bool Weights::is_relu() const {
+  const std::vector<Activation> all = activations();
+  return std::all_of(all.begin(), all.end(), [](Activation one) { return one == Activation::kRelu; });
+}
+
+void Weights::set_activations(const std::vector<Activation>& between) {
+  if (between.size() + 1 != layers.size())
+    throw std::invalid_argument("Weights: there is not one activation for each layer but the last");
+  for (std::size_t k = 0; k < between.size(); ++k) layers[k].activation = between[k];
+}
+
+void Weights::set_activation(Activation everywhere) {
+  for (Layer& layer : layers) layer.activation = everywhere;
+}
+
+void Weights::end_in(Activation activation) {
+  Layer identity;
+  const auto has = [this](const std::string& taken) {
+    return std::any_of(layers.begin(), layers.end(), [&](const Layer& layer) { return layer.name == taken; });
+  };
+  const std::string number = "layer" + std::to_string(layers.size() + 1);
+  identity.name = number;
+  identity.is_added = true;
+  while (has(identity.name)) identity.name = number + "_" + identity.name;
+  const int size = outputs();
+  identity.outputs = identity.inputs = size;
+  identity.weights.assign(static_cast<std::size_t>(size) * static_cast<std::size_t>(size), 0.0);
+  for (std::size_t i = 0; i < identity.weights.size(); i += static_cast<std::size_t>(size) + 1)
+    identity.weights[i] = 1;
+  identity.biases.assign(static_cast<std::size_t>(size), 0.0);
+  layers.back().activation = activation;
+  layers.push_back(std::move(identity));
+}
+
 double rounding_of_slope(const Weights& weights) {
   constexpr double kUp = 1 + 0x1p-26;  // covers the rounding of as many layers as a file can hold
   double product = 1, share = 0;       // of |W|_F; sum of weight_rounding / |W|_F
@@ -77,8 +130,9 @@ double rounding_of_slope(const Weights& weights) {
     const double norm = norm_up(layer.weights);
     product *= norm * kUp;
     if (layer.weight_rounding > 0) share += layer.weight_rounding / norm * kUp;
-    if (&layer != &weights.layers.front()) product *= function_of(weights.activation).steepest() * kUp;
   }
+  for (const Activation activation : weights.activations())
+    product *= function_of(activation).steepest() * kUp;
   if (!(share > 0)) return 0;
   return product * std::expm1(share * kUp) * kUp * kUp;  // 1 + s <= exp(s)
 }

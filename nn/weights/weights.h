@@ -40,33 +40,43 @@ struct Layer {
   /// `weights`, and within this Euclidean norm of `biases`. 0: they are the file's own.
   double weight_rounding = 0;
   double bias_rounding = 0;
+  Activation activation =
+      Activation::kRelu;  ///< between this layer and the next; of the last one without meaning
+  bool is_added = false;  ///< no layer of the file: the identity behind an activation that ends the network
 };
 
-/// A multilayer perceptron: the activation, ReLU unless stated otherwise, after every layer but the last.
+/// A multilayer perceptron: after every layer but the last an activation, ReLU unless stated otherwise. One that ends
+/// in an activation has an identity layer behind it.
 /// Class invariant after load_weights(): at least one layer, every size positive, layers[k].inputs ==
-/// layers[k - 1].outputs, all entries finite; the activation is ReLU where there is one layer.
+/// layers[k - 1].outputs, all entries finite.
 struct Weights {
   std::string path;    ///< as the user gave it
   std::string sha256;  ///< of the file's bytes, lower-case hex
   Precision precision = Precision::kFloat32;
   std::vector<Layer> layers;
   OrderSource order_source = OrderSource::kFile;
-  Activation activation = Activation::kRelu;
   bool activation_is_given = false;  ///< by `activation` in network.toml, or by --activation
   std::vector<std::string> notes;    ///< what was folded, rewritten, left out or assumed; one clause each
 
   int inputs() const { return layers.front().inputs; }
   int outputs() const { return layers.back().outputs; }
-  bool is_relu() const { return activation == Activation::kRelu; }
-  /// Whether every hidden layer has a whole number of groups of `other`, which 1 divides unless it sorts.
-  bool has_groups_of(Activation other) const;
+  /// What follows each layer but the last, first layer first.
+  std::vector<Activation> activations() const;
+  /// Their names as chains state them, each once where all are alike: "tanh", "relu, relu, tanh".
+  std::string activation_names() const;
+  bool is_relu() const;  ///< whether all of them are ReLU
+  /// Sets what lies between all layers. @throws std::invalid_argument unless there is one for each layer but the last.
+  void set_activations(const std::vector<Activation>& between);
+  void set_activation(Activation everywhere);
+  /// Puts a layer of weights 1 and biases 0 behind the last one, which `activation` then follows.
+  void end_in(Activation activation);
   /// Whether the file itself, network.toml or the user states the activation.
   bool states_activation() const { return order_source == OrderSource::kFile || activation_is_given; }
 };
 
 /// Reads a weight file. The format is found from the content, not from the name: PyTorch state dicts (`.pth`, zip
 /// and legacy pickle, strided views, weights under spectral_norm and weight_norm), safetensors, ONNX models of affine
-/// and piecewise linear operations or with one smooth activation, NumPy's .npz, MATLAB's .mat (version 5), .nnet, and
+/// and piecewise linear operations and smooth activations, NumPy's .npz, MATLAB's .mat (version 5), .nnet, and
 /// the C source that the networks' authors generate.
 /// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`. Which layer follows which, ONNX models,
 /// .nnet and our safetensors state; for other files see decide_layer_order().
@@ -83,7 +93,7 @@ Weights parse_weights(const std::string& bytes, const std::string& path, const s
                       const std::vector<std::string>& order = {});
 
 /// Writes safetensors with tensors `<name>.weight` and `<name>.bias` in the network's precision.
-/// @throws InputError if the file exists and `overwrite` is false, if the name of a layer is not UTF-8, or if the
+/// @throws InputError if the file exists and `overwrite` is false, if the name of a layer is not UTF-8, or if an
 ///   activation is not ReLU, which this format states.
 void save_safetensors(const Weights& weights, const std::string& path, bool overwrite);
 
@@ -104,13 +114,13 @@ Weights as_float32(Weights weights);
 template <typename Scalar>
 class Evaluator {
  public:
-  /// @throws InputError if a weight is beyond the range of Scalar, or Scalar is float and the activation not ReLU.
+  /// @throws InputError if a weight is beyond the range of Scalar, or Scalar is float and an activation not ReLU.
   explicit Evaluator(const Weights& weights);
   Evaluator(const Evaluator&) = delete;
   Evaluator& operator=(const Evaluator&) = delete;
   Evaluator(Evaluator&&) = default;
 
-  /// The ReLU network. @throws std::logic_error if the activation is another one.
+  /// The ReLU network. @throws std::logic_error if an activation is another one.
   nn::Mlp<Scalar> mlp() const;
 
   /// f(x); `input` has as many entries as the network has inputs, the result as many as it has outputs.
@@ -120,7 +130,8 @@ class Evaluator {
  private:
   std::vector<Scalar> smooth_value(const std::vector<Scalar>& input) const;
 
-  Activation activation_;
+  bool is_relu_;
+  std::vector<Activation> activations_;  ///< after each layer but the last
   std::vector<std::vector<Scalar>> arrays_;
   std::vector<nn::DenseLayer<Scalar>> layers_;
 };

@@ -144,6 +144,31 @@ TEST_F(CertifiedChain, ASmoothActivationIsCertifiedCheckedAndHeldAgainstSamples)
   expect("certify " + net + " --activation relu --samples tanh.csv", 3, {"--activation"});
 }
 
+TEST_F(CertifiedChain, SeveralActivationsAndOneAtTheEndAreCertifiedCheckedAndHeldAgainstSamples) {
+  write_square("turn", "steep");
+  const std::string net = "net.pth --order head,steep,turn,tail",
+                    given = " --activation relu,tanh,relu,sigmoid";
+  const std::string chain = "for head - ReLU - steep - tanh - turn - ReLU - tail - sigmoid - layer5";
+  // sigmoid(10 relu(10 tanh(10 relu(10 x)))), whose largest slope is 10^4 / 4, at 0.
+  expect("certify " + net + given + " --max-lipschitz 2501 -o cert.json --json out.json", 0,
+         {"verdict: proved", "activation as given", "ends in sigmoid, which an identity layer follows"});
+  const Json bound = Json::parse(read_text(folder_ / "out.json"))["bounds"][0];
+  EXPECT_GE(bound["upper"].get<double>(), 2500);
+  EXPECT_LE(bound["slope_estimate"].get<double>(), bound["upper"].get<double>() * (1 + 1e-9));
+  expect("certify " + net + given + " --max-lipschitz 2499", 4, {"verdict: inconclusive"});
+  expect("check cert.json " + net, 0, {"accepted", chain});
+  expect("check cert.json " + net + given, 0, {"accepted", chain});
+  expect("check cert.json " + net + " --activation tanh,relu,relu,sigmoid", 1, {"rejected", "chain"});
+  expect("check cert.json " + net + " --activation relu,tanh,relu", 1, {"rejected"});
+  write_text(folder_ / "ends.csv", "0,0.5\n-1,0.5\n0.0001,0.7310520251105632\n");
+  expect("certify " + net + given + " --samples ends.csv", 0, {"reproduces 3"});
+  expect("certify " + net + " --activation relu,tanh,relu --samples ends.csv", 3, {"--activation"});
+  expect("certify " + net + " --activation relu,tanh", 3,
+         {"net.pth", "names 2 activations for 4 layers: name one, or 3 for those between the layers, or 4"});
+  expect("certify " + net + " --activation relu,mish,relu", 2, {"\"mish\"", "silu"});
+  expect("inspect " + net + given, 0, {"2 -> 2, tanh", "2 -> 1, sigmoid", "layer5"});
+}
+
 TEST_F(CertifiedChain, TheTextShowsHowFarTheBoundOfASmoothNetworkIsFromTheSlopeFound) {
   write_square("turn", "steep");
   const Outcome outcome =

@@ -23,7 +23,7 @@ using tests::layer;
 constexpr Activation kBent[] = {Activation::kSilu, Activation::kGelu};
 
 Network bent_network(Weights weights, Activation activation) {
-  weights.activation = activation;
+  weights.set_activation(activation);
   return tests::plain(std::move(weights));
 }
 
@@ -36,7 +36,7 @@ double bound_of(const Network& network) {
 double product_of(const Network& network) {
   double product = 1;
   for (const files::Layer& each : network.plain->layers) product *= spectral_norm(each).norm.upper.value();
-  const double c = files::function_of(network.plain->activation).steepest();
+  const double c = files::function_of(network.plain->activations().front()).steepest();
   return product * std::pow(c, static_cast<double>(network.plain->layers.size() - 1));
 }
 
@@ -70,7 +70,7 @@ TEST(BentBound, IsAtMostTheProductAndAboveThatOfRelu) {
       const double upper = bound_of(network);
       EXPECT_LT(upper, 0.9 * product_of(network));
       Network relu = network;
-      relu.plain->activation = Activation::kRelu;  // [0, 1] lies in [1 - c, c]
+      relu.plain->set_activation(Activation::kRelu);  // [0, 1] lies in [1 - c, c]
       EXPECT_GT(upper, tests::proved(sdp_bound(check::stages(relu, "network"))));
     }
   }
@@ -111,8 +111,8 @@ TEST(BentChain, HasOneBendPerHiddenLayerAndZeroWhereSlopesAreDivided) {
   std::mt19937 generator(45);
   Weights phi = tests::random_network({3, 4, 5}, generator),
           rho = tests::random_network({5, 6, 7, 1}, generator);
-  phi.activation = Activation::kSigmoid;
-  rho.activation = Activation::kGelu;
+  phi.set_activation(Activation::kSigmoid);
+  rho.set_activation(Activation::kGelu);
   const check::BentChain chain = check::bent_chain(tests::deep_set(phi, rho), "set:default:default");
   ASSERT_EQ(chain.stages.size(), 4u);
   ASSERT_EQ(chain.bends.size(), 3u);

@@ -3,7 +3,8 @@
 library only; trees of parts also in double with numpy, where it is installed. It shares no line with the C++ checker,
 reads the weight files itself, and must accept and reject the same certificates.
 
-    check_certificate.py CERTIFICATE NET | --phi F --rho F  [--key KEY] [--order A,B,C | PART=A,B,C] [--activation OP]
+    check_certificate.py CERTIFICATE NET | --phi F --rho F  [--key KEY] [--order A,B,C | PART=A,B,C]
+        [--activation OP,...]
 
 Exit 0: accepted; 1: rejected, with the reason; 2: usage; 3: a weight file or network.toml that cannot be read.
 
@@ -234,6 +235,10 @@ class Layer:
         return Layer(self.name, self.outputs, self.inputs, list(map(f32, self.weights)), list(map(f32, self.biases)))
 
 
+def identity_layer(name, size):
+    return Layer(name, size, size, [float(i == j) for i in range(size) for j in range(size)], [0.0] * size)
+
+
 def numbered_before(a, b):
     """Whether the names first differ in a number, and that of `a` is smaller."""
     for x, y in zip(natural(a), natural(b)):
@@ -296,13 +301,35 @@ class Weights:
         require_input(all(a.outputs == b.inputs for a, b in zip(self.layers, self.layers[1:])),
                       "a layer does not take what the one before gives")
         self.precision = "float32" if precision in ("float16", "bfloat16") else precision
-        # None: the file does not state it. One that states the order of the layers states ReLU unless its reader says
-        # more.
-        self.activation = "relu" if listing == "evaluation" and len(self.layers) > 1 else None
+        # Of each layer but the last. None: the file does not state them. One that states the order of the layers states
+        # ReLU unless its reader says more.
+        self.activations = ["relu"] * (len(self.layers) - 1) if listing == "evaluation" else None
         self.sha256 = hashlib.sha256(data).hexdigest()
 
-    def has_groups_of(self, activation):
-        return all(layer.outputs % SORTING.get(activation, 1) == 0 for layer in self.layers[:-1])
+    def between(self):
+        return ["relu"] * (len(self.layers) - 1) if self.activations is None else self.activations
+
+    def is_relu(self):
+        return set(self.between()) <= {"relu"}
+
+    def state(self, names):
+        """One name for all, or one for each layer but the last, or one more, which an identity layer follows."""
+        if len(names) == 1:
+            names = names * (len(self.layers) - 1)
+        require_input(all(name in STEEPEST for name in names), f"an activation of {names} is unknown")
+        if self.activations is not None and len(self.layers) > 1:
+            require_input(names == self.activations, f"others are stated already: {self.activations}")
+            return
+        require_input(len(names) in (len(self.layers) - 1, len(self.layers)),
+                      f"{len(names)} activations for {len(self.layers)} layers")
+        require_input(all(layer.outputs % SORTING.get(name, 1) == 0 for name, layer in zip(names, self.layers)),
+                      "the outputs of a layer are no multiple of the group's size")
+        if len(names) == len(self.layers):
+            name = numbered = f"layer{len(self.layers) + 1}"
+            while any(layer.name == name for layer in self.layers):
+                name = f"{numbered}_{name}"
+            self.layers.append(identity_layer(name, self.layers[-1].outputs))
+        self.activations = names
 
     def round_to_float32(self):
         self.layers = [layer.rounded() for layer in self.layers]
@@ -538,13 +565,13 @@ def with_groups_joined(nodes):
 
 
 class OnnxChain:
-    """Linear layers with one activation between them, which take one another's results."""
+    """Linear layers with an activation behind each, the last one possibly not, which take one another's results."""
 
     def __init__(self, stored, value, shape):
         """`shape` of the input; its last size is None where the file leaves it open."""
         self.stored, self.value, self.shape = stored, value, shape
         self.layers = []  # [name, rows of the stored matrix, biases]
-        self.kinds, self.activations, self.is_activated = set(), set(), False
+        self.kinds, self.activations, self.is_activated = set(), [], False
         self.order = None  # in which the next layer takes what is sorted, where it is another
 
     def follow(self, node):
@@ -602,8 +629,7 @@ class OnnxChain:
 
     def activate(self, activation):
         require_input(self.layers and not self.is_activated, "an activation does not follow a linear layer")
-        self.activations.add(activation)
-        require_input(len(self.activations) == 1, "this checker reads ONNX models with one activation")
+        self.activations.append(activation)
         self.is_activated = True
 
     def layer_name(self, weight):
@@ -711,8 +737,7 @@ def read_onnx(data, order):
         parts += [] if biases is None else [(f"{name}.bias", [len(biases)], biases)]
     require_input(chain.kinds <= {"float32", "float64"}, "weights are neither float32 nor float64")
     result = Weights(parts, "float64" if "float64" in chain.kinds else "float32", data, "evaluation", order)
-    if len(result.layers) > 1:
-        (result.activation,) = chain.activations
+    result.activations = chain.activations
     return result
 
 
@@ -739,14 +764,10 @@ def read_c_source(data, key, order):
 
 
 def read_weights(path, key="", order=None, activation=None):
-    """`activation` is what network.toml or the user states."""
+    """`activation` is what network.toml or the user states: names separated by commas."""
     weights = read_file(path, key, order)
-    require_input(activation in (None, *STEEPEST), f"there is no activation {activation}")
-    require_input(activation in (None, weights.activation) or weights.activation is None,
-                  f"the file states another activation, {weights.activation}")
-    if len(weights.layers) > 1:
-        weights.activation = weights.activation or activation
-        require_input(weights.has_groups_of(weights.activation), "a hidden layer is no multiple of the group's size")
+    if activation is not None:
+        weights.state(activation.split(","))
     return weights
 
 
@@ -785,13 +806,15 @@ class Network:
             clamp = document.get("input", {}).get("clamp")
             self.clamp = clamp and (clamp["lower"], clamp["upper"])
 
-            def activation_of(entry):
-                stated = entry.get("activation", activation)
-                require_input(activation in (None, stated), f"{net} states another activation, {stated}")
-                return stated
+            def part(entry):
+                stated = entry.get("activation")
+                stated = ",".join(stated) if isinstance(stated, list) else stated
+                weights = read_weights(Path(net).parent / entry["weights"], key, entry.get("order"), stated)
+                if activation is not None:
+                    weights.state(activation.split(","))
+                return weights
 
-            self.parts = {f"{role}:{kind}": read_weights(Path(net).parent / entry["weights"], key, entry.get("order"),
-                                                          activation_of(entry))
+            self.parts = {f"{role}:{kind}": part(entry)
                           for role in ("phi", "rho") for kind, entry in sorted(document[role].items())}
         else:
             self.parts = {"network": read_weights(net, key, orders.get("network"), activation)}
@@ -801,9 +824,9 @@ class Network:
         layers = self.parts[part].layers
         clamps = self.clamp and part != "phi:ground" and not part.startswith("rho:")
         result = [("clamp", None, layers[0].inputs, layers[0].inputs)] if clamps else []
-        for k, layer in enumerate(layers):
-            result += [(self.parts[part].activation, None, layer.inputs, layer.inputs)] * (k > 0)
+        for layer, op in zip(layers, self.parts[part].between() + [None]):
             result.append(("linear", layer.name, layer.inputs, layer.outputs))
+            result += [(op, None, layer.outputs, layer.outputs)] * (op is not None)
         return result
 
     def input_names(self, part):
@@ -871,7 +894,7 @@ def stages(network, function, block, scale):
             if index == 0:
                 chain[-1] = w @ chain[-1]
             else:
-                b = MONOTONE.get(network.parts[name].activation, Fraction(1))
+                b = MONOTONE.get(network.parts[name].between()[index - 1], Fraction(1))
                 chain.append(Matrix([[x * b.numerator for x in row] for row in w.rows],
                                     w.exponent + 1 - b.denominator.bit_length()))
     return chain
@@ -920,8 +943,7 @@ def lmi(chain, rho, t):
 def bends(network, function):
     """Per hidden layer c (c - 1) where slopes lie in [1 - c, c], c > 1; 0 where stages() makes them lie in [0, 1]."""
     return [0 if op in MONOTONE else STEEPEST[op] * (STEEPEST[op] - 1)
-            for part in (network.parts[name] for name in networks_of(function))
-            for op in [part.activation or "relu"] * (len(part.layers) - 1)]
+            for part in (network.parts[name] for name in networks_of(function)) for op in part.between()]
 
 
 def bent_lmi(chain, gs, rho, t):
@@ -1527,11 +1549,12 @@ class Checker:
             require_keys(entry, ["sha256", "precision", "chain", "samples"], where)
             require((entry["sha256"], entry["precision"]) == (weights.sha256, weights.precision),
                     f"{where} is of another file")
-            if weights.activation is None and len(weights.layers) > 1:  # the file does not state it: the chain does
+            if weights.activations is None and len(weights.layers) > 1:  # the file does not state them: the chain does
                 ops = [step["op"] for step in entry["chain"] if step["op"] not in ("clamp", "linear")]
-                require(ops and ops[0] in STEEPEST, f"{where}: unknown activation")
-                require(weights.has_groups_of(ops[0]), f"{where}: no whole number of groups")
-                weights.activation = ops[0]
+                try:
+                    weights.state(ops)
+                except BadInput as fault:
+                    raise Rejected(f"{where}: {fault}") from None
             self.check_chain(entry["chain"], name, where)
             self.check_samples(entry["samples"], where)
 
@@ -1613,8 +1636,8 @@ class Checker:
         upper = number(bound["upper"], bound["upper_hex"], where)
         require(bound["status"] in ("finished", "interrupted"), f"{where}: unknown status")
         require(all(name in self.network.parts for name in names), f"{where}: no such function")
-        activations = {self.network.parts[name].activation or "relu" for name in names}
-        if activations != {"relu"}:
+        activations = {op for name in names for op in self.network.parts[name].between()}
+        if not activations <= {"relu"}:
             require(not boxed and bound["upper_method"] != "branch", f"{where}: a bound on a box is for ReLU only")
             require(bound["lower"] is None and bound["lower_hex"] is None and bound["lower_witness"] is None,
                     f"{where}: a lower bound is for ReLU only")
@@ -1630,8 +1653,7 @@ class Checker:
             require(all(name in self.norms for name in names), f"{where}: no such function")
             total = Fraction(max(scale)) if scale else Fraction(1)
             for name in names:
-                weights = self.network.parts[name]
-                total *= self.norms[name] * STEEPEST[weights.activation or "relu"] ** (len(weights.layers) - 1)
+                total *= self.norms[name] * math.prod(STEEPEST[op] for op in self.network.parts[name].between())
             require(Fraction(upper) >= total, f"{where}: claims less than the product of the norms")
         if not scale:
             key = (function, block, frozenset(neighbours.items()))
@@ -1835,7 +1857,7 @@ class Checker:
             grounds = [n for n in [names[0]] + [o for o, _ in others] if n == "phi:ground"]
             require(len(grounds) == ("phi:ground" in self.network.parts), f"{where}: the ground enters exactly once")
         neighbours, there = self.neighbours_of(bound, where), [names[0]] + [o for o, _ in others]
-        require(all(self.network.parts[part].activation in (None, "relu") for part in there + names[1:]),
+        require(all(self.network.parts[part].is_relu() for part in there + names[1:]),
                 f"{where}: a part is no ReLU network")
         require(not neighbours or all(there.count(o) <= neighbours.get(o[4:], 0) for o in there if o != "phi:ground"),
                 f"{where}: has more neighbours than listed")
@@ -1898,7 +1920,7 @@ class Checker:
         inputs = names[:1] + ["phi:ground"] * (is_set and "phi:ground" in self.network.parts)
         used = inputs + names[1:]
         require(all(name in self.network.parts for name in used), f"{where}: no such function")
-        require(all(self.network.parts[name].activation in (None, "relu") for name in used),
+        require(all(self.network.parts[name].is_relu() for name in used),
                 f"{where}: values are for ReLU only")
         require(isinstance(entry["networks"], dict) and set(entry["networks"]) == set(used),
                 f"{where}: networks lists others")

@@ -56,13 +56,16 @@ def onnx(nodes, sizes, generator):
 
 
 def smooth_models(folder, generator):
-    """ONNX models with activations: one that ends in its activation, SiLU as PyTorch exports it, and ReLU."""
+    """ONNX models with activations: some end in one, SiLU as PyTorch exports it, several in one model."""
     layer = lambda k, x, y: ("MatMul", [x, f"w{k}"], y)
     models = {
         "tanh": ([layer(1, "x", "a"), ("Tanh", ["a"], "b"), layer(2, "b", "c"), ("Tanh", ["c"], "y")], [3, 5, 2]),
         "silu": ([layer(1, "x", "a"), ("Sigmoid", ["a"], "s"), ("Mul", ["a", "s"], "b"), layer(2, "b", "y")],
                  [3, 5, 2]),
         "sigmoid": ([layer(1, "x", "a"), ("Sigmoid", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2]),
+        "actor": ([layer(1, "x", "a"), ("Relu", ["a"], "b"), layer(2, "b", "c"), ("Tanh", ["c"], "y")], [3, 5, 2]),
+        "several": ([layer(1, "x", "a"), ("Sigmoid", ["a"], "s"), ("Mul", ["a", "s"], "b"), layer(2, "b", "c"),
+                     ("Relu", ["c"], "d"), layer(3, "d", "e"), ("Sigmoid", ["e"], "y")], [3, 5, 4, 2]),
         "elu": ([layer(1, "x", "a"), ("Celu", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2]),
         "swish": ([layer(1, "x", "a"), ("Swish", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2])}
     for name, (nodes, sizes) in models.items():
@@ -96,11 +99,12 @@ weights = "rho.safetensors"
 
 
 def smooth(folder):
-    """A network.toml with the parts of heterogeneous(), each with another activation between its layers."""
+    """A network.toml with the parts of heterogeneous(), each with other activations."""
     net, text = folder / "smooth.toml", (folder / "network.toml").read_text()
-    for part, activation in (("small", "tanh"), ("large", "sigmoid"), ("ground", "softplus"), ("rho", "selu")):
+    for part, activation in (("small", '["tanh", "sigmoid"]'), ("large", '["relu", "sigmoid"]'),
+                             ("ground", '"softplus"'), ("rho", '"selu"')):
         text = text.replace(f'weights = "{part}.safetensors"',
-                            f'weights = "{part}.safetensors"\nactivation = "{activation}"')
+                            f'weights = "{part}.safetensors"\nactivation = {activation}')
     net.write_text(text)
     return net
 
@@ -298,7 +302,7 @@ def check_activations(certificate, net, folder):
     def copy():
         return json.loads(json.dumps(certificate))
 
-    stated = {part for part, weights in second.Network(**arguments(net)).parts.items() if weights.activation}
+    stated = {part for part, weights in second.Network(**arguments(net)).parts.items() if weights.activations}
     for part, entry in certificate["network"]["weights"].items():
         own = {step["op"] for step in entry["chain"]} - {"linear", "clamp"}
         for op in set(second.STEEPEST) - own:
@@ -363,12 +367,13 @@ def run():
             second.Network(smooth_net, activation="silu")
             raise SystemExit("an activation beside another one in network.toml is taken")
         except second.BadInput as refusal:
-            assert "states another activation" in str(refusal), refusal
+            assert "others are stated already" in str(refusal), refusal
         nets += [([smooth_net], ["--blocks=position", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"])]
         beside_net = str(beside(folder))
         nets += [([beside_net], ["--method", "product"])]
         nets += [(net, []) for net in smooth_models(folder, generator)]
-        nets += [([str(tiny)], ["--activation", op]) for op in ("silu", "gelu", "sigmoid")]
+        nets += [([str(tiny)], ["--activation", ops])
+                 for ops in ("silu", "gelu", "sigmoid", "tanh,relu", "relu,silu,sigmoid", "elu,relu,relu")]
         tried = rejected = 0
         for index, (net, options) in enumerate(nets):
             path = folder / f"certificate{index}.json"

@@ -51,9 +51,9 @@ def contradictory_inputs(folder, generator):
     ordered = [square, "--order", "first,after,last"]
     model = next(net for net in common.smooth_models(folder, generator) if "elu" in net[0])
     unknown = written(folder / "unknown.toml", smooth.read_bytes().replace(b'"tanh"', b'"mish"'))
-    yield [smooth], [smooth, "--activation", "silu"], "states another activation"
-    yield [smooth], [unknown], "there is no activation mish"
-    yield model, [*model, "--activation", "tanh"], "states another activation"
+    yield [smooth], [smooth, "--activation", "silu"], "others are stated already"
+    yield [smooth], [unknown], "is unknown"
+    yield model, [*model, "--activation", "tanh"], "others are stated already"
     yield model, [*model, "--order", "layer3_w2,w1"], "order"
     yield ordered, [square], "order of the layers is not stated"
     yield ordered, [square, "--order", "first,last"], "does not name every layer once"

@@ -24,7 +24,7 @@ constexpr Activation kSmooth[] = {Activation::kTanh, Activation::kSigmoid, Activ
                                   Activation::kGelu};
 
 files::Weights with(files::Weights weights, Activation activation) {
-  weights.activation = activation;
+  weights.set_activation(activation);
   return weights;
 }
 
@@ -124,7 +124,8 @@ TEST(SmoothBounds, TheSampledEstimateLiesBelowTheBoundAndAboveBlindSampling) {
   // tanh(tanh(x0 + 3 x1) + s), whose largest slopes are 1, 3 and sqrt 10, where x0 + 3 x1 = s = 0.
   Network set = tests::deep_set(tests::weights({tests::layer(1, 2, {1, 3}), tests::layer(1, 1, {1})}),
                                 tests::weights({tests::layer(1, 1, {1}), tests::layer(1, 1, {1})}));
-  set.phi.at("default").activation = set.rho.at("default").activation = Activation::kTanh;
+  set.phi.at("default").set_activation(Activation::kTanh);
+  set.rho.at("default").set_activation(Activation::kTanh);
   const auto estimate_of = [&set](const std::string& block, const std::vector<double>& scale) {
     return lipschitz::slope_estimate(set, {"set:default:default", block, scale}, {}).value();
   };
@@ -348,12 +349,12 @@ TEST(SmoothCertificate, OfTheProductIsRejectedForABlockThatIsNone) {
 TEST(SmoothCertificate, StatesTheActivationForFilesThatDoNot) {
   Network unstated = smooth_set();
   for (files::Weights* const weights : {&unstated.phi.at("default"), &unstated.rho.at("default")}) {
-    weights->activation = Activation::kRelu;  // as it is assumed
+    weights->set_activation(Activation::kRelu);  // as it is assumed
     weights->order_source = files::OrderSource::kNames;
   }
   EXPECT_FALSE(checked(smooth_certificate(), unstated).accepted) << "check() itself takes NET as it is";
   const Network adopted = check::with_stated_activations(smooth_certificate(), unstated);
-  EXPECT_EQ(adopted.phi.at("default").activation, Activation::kTanh);
+  EXPECT_EQ(adopted.phi.at("default").activation_names(), "tanh");
   EXPECT_TRUE(checked(smooth_certificate(), adopted).accepted);
   unstated.phi.at("default").activation_is_given = true;
   EXPECT_TRUE(check::with_stated_activations(smooth_certificate(), unstated).phi.at("default").is_relu());

@@ -204,7 +204,7 @@ def refuses_what_only_relu_has(folder, generator):
     assert check(certificate, net, "--activation", "mish").returncode == 2
     mixed = copy.deepcopy(certificate)
     next(s for s in mixed["network"]["weights"]["network"]["chain"] if s["op"] == "tanh")["op"] = "sigmoid"
-    refused(mixed, net, "chain is not the one of this network")
+    refused(mixed, net, "the factor does not show")  # it claims something of another network
 
 
 def products_count_the_activations(folder, generator):
@@ -264,7 +264,69 @@ def sorting_layers_have_products_only(folder, generator):
     for op in "groupsort:3", "maxmin", "groupsort:65":
         assert check(certificate, net, "--activation", op).returncode in (2, 3)
     done = check(certificate, net, "--coq")
-    assert "(Sorted Pairs)" in done.stdout, done
+    assert "[(Sorted Pairs);(Sorted Pairs)]" in done.stdout, done
+
+
+def decided_alike(certificate, net, *options):
+    """The exit code of all three."""
+    done = check(certificate, net, *options)
+    checked = net.parent / "checked.json"
+    others = [run(SWARMCERT, "check", checked, net, *options).returncode,
+              run(sys.executable, SOURCE / "tests/lipschitz/check_certificate.py", checked, net, *options).returncode]
+    assert [done.returncode] * 2 == others, f"{done}, {others}"
+    assert "not checked" not in done.stdout.replace("0 not checked", ""), done
+    return done.returncode
+
+
+def several_activations_in_one_network(folder, generator):
+    """Accepted with each activation where it is; with another one anywhere, with two exchanged, with one less, and with
+    a smaller claim the three checkers decide alike."""
+    net = folder / "several.safetensors"
+    net.write_bytes(safetensors(layers([3, 4, 6, 2], generator)))
+    decided = accepted = 0
+    for ops in "tanh,relu", "relu,silu", "sigmoid,selu", "relu,tanh,sigmoid", "gelu,relu,silu", "maxmin:pairs,sigmoid":
+        certificate = certify(net, "--activation", ops)
+        assert certificate["bounds"][0]["upper_method"] == ("product" if "maxmin" in ops else "sdp")
+        assert decided_alike(certificate, net) == decided_alike(certificate, net, "--activation", ops) == 0
+        exchanged = ",".join(reversed(ops.split(",")))
+        assert decided_alike(certificate, net, "--activation", exchanged) == 1
+        assert decided_alike(certificate, net, "--activation", ops + ",relu,relu") == 3
+        steps = certificate["network"]["weights"]["network"]["chain"]
+        places = [k for k, step in enumerate(steps) if step["op"] != "linear"]
+        assert [steps[k]["op"] for k in places] == ops.split(",")
+        for place in places:
+            for op in "relu", "sigmoid", "selu", "gelu", "maxmin:halves", "mish":
+                changed = copy.deepcopy(certificate)
+                changed["network"]["weights"]["network"]["chain"][place]["op"] = op
+                code = decided_alike(changed, net)
+                assert code == 1 or op != "mish"
+                decided, accepted = decided + 1, accepted + (code == 0)
+        shorter = copy.deepcopy(certificate)
+        del shorter["network"]["weights"]["network"]["chain"][places[-1]:places[-1] + 2]
+        assert decided_alike(shorter, net) == 1
+        smaller = copy.deepcopy(certificate)
+        with_upper(smaller["bounds"][0], 0.999 * smaller["bounds"][0]["upper"])
+        assert decided_alike(smaller, net) == 1
+        product = certify(net, "--activation", ops, "--method", "product")
+        norms = [Fraction(float.fromhex(layer["spectral_norm_hex"][1])) for layer in product["layers"]]
+        upper = least_double(math.prod(norms) * math.prod(Fraction(LARGEST_SLOPE.get(op, 1)) for op in ops.split(",")))
+        with_upper(product["bounds"][0], upper)
+        assert decided_alike(product, net) == 0
+        with_upper(product["bounds"][0], math.nextafter(upper, 0))
+        assert decided_alike(product, net) == 1
+    assert accepted < decided / 2, (accepted, decided)  # those of a smaller slope, where the file does not say which
+
+
+def onnx_files_state_each_activation(folder, generator):
+    net = folder / "several.onnx"
+    network = weight_files.layers([3, 4, 3, 2], generator)
+    net.write_bytes(weight_files.onnx(network, "Tanh", first="Relu"))
+    certificate = certify(net)
+    ops = [step["op"] for step in certificate["network"]["weights"]["network"]["chain"]]
+    assert ops == ["linear", "relu", "linear", "tanh", "linear"] and decided_alike(certificate, net) == 0
+    for other in "tanh", "relu":
+        refused(with_activations_again(certificate, other), net,
+                "chain is not the one of this network: fc1 - ReLU - fc2 - tanh - fc3")
 
 
 PARTS = {"phi:small": [6, 3, 2], "phi:large": [6, 2, 3, 2], "phi:ground": [4, 3, 2], "rho:small": [2, 3, 1]}
@@ -303,7 +365,7 @@ def each_part_has_its_own_activation(folder, generator):
         done = check(certificate, net)
         assert done.returncode == 0, done
     done = check(certificate, net, "--coq")
-    for word in ("Part", " Tanh.\n", " Sigmoid.\n", " Selu.\n"):
+    for word in ("Part", " [Tanh].\n", " [Sigmoid;Sigmoid].\n", " [Selu].\n"):
         assert word in done.stdout, done.stdout[:1000]
     for part, other in ("phi:small", "relu"), ("phi:large", "tanh"), ("rho:small", "elu"):
         refused(with_op(certificate, part, other), net, f"network.weights.{part}.chain is not the one of this network")
@@ -377,7 +439,7 @@ def onnx_files_state_their_activation(folder, generator):
         return weight_files.field(5, weight_files.field(1, name) + value)
     half = b"\x15" + struct.pack("<f", 0.5) + weight_files.field(20, 1)
     in_words = weight_files.field(4, "tanh") + weight_files.field(20, 3)
-    for model in (weight_files.onnx(network, "Tanh", first="Relu"), weight_files.onnx(network, "Mish"),
+    for model in (weight_files.onnx(network, "Mish"),
                   weight_files.onnx(network, "Selu"),  # its constants are float32 numbers
                   weight_files.onnx(network, "Elu", attributes=attribute("alpha", half)),
                   weight_files.onnx(network, "Swish", attributes=attribute("alpha", half)),
@@ -463,7 +525,8 @@ def main():
                       each_part_has_its_own_activation,
                       terms_that_stand_still_must_be_relu, onnx_files_state_their_activation,
                       onnx_files_state_what_they_sort,
-                      weights_behind_a_descending_sort_are_those_behind_an_ascending_one):
+                      weights_behind_a_descending_sort_are_those_behind_an_ascending_one,
+                      several_activations_in_one_network, onnx_files_state_each_activation):
             claim(folder, generator)
             print(claim.__name__.replace("_", " "))
 

@@ -114,6 +114,8 @@ def kinds(folder, generator):
         ("tanh", [tiny], ["--activation", "tanh"], 0.05),
         ("silu", [tiny], ["--activation", "silu", "--blocks"], 0.05),
         ("gelu, factors left out", [deep], ["--activation", "gelu"], 0.01),
+        ("tanh, relu, sigmoid", [tiny], ["--activation", "tanh,relu,sigmoid"], 0.05),
+        ("relu, silu", [tiny], ["--activation", "relu,silu"], 0.05),
         ("activations of parts", [common.smooth(folder)], ["--blocks=position", "--neighbours", "large=2,small=1"],
          0.03),
         ("cover by parts", [tiny], parts, 0.03),
@@ -150,7 +152,7 @@ def mutate(name, net, certificate, folder, generator, count):
     chosen += [generator.choice(by_pattern[p])
                for p in generator.choices(list(by_pattern), k=max(0, count - len(chosen)))]
     network = second.Network(**arguments(net))
-    stated = {part: weights.activation for part, weights in network.parts.items()}
+    stated = {part: (weights.activations, len(weights.layers)) for part, weights in network.parts.items()}
     words = list(map(str, net))
     pair = words[:1] == ["--phi"]
     one_command = [MANY, words[1], words[3], "--pair"] if pair else [MANY, words[0], *words[2:]]
@@ -165,7 +167,8 @@ def mutate(name, net, certificate, folder, generator, count):
                 network = second.Network(**arguments(net))  # the second checker rounds it in place
             # the second checker takes what no file states from a certificate
             for part, weights in network.parts.items():
-                weights.activation = stated[part]
+                weights.activations, count = stated[part]
+                del weights.layers[count:]
             reason = second.check(mutation, network) if mutation.get("schema") == certificate["schema"] else "schema"
             (code, words_of_one), (code_of_three, words_of_three) = one.answer(), three.answer()
             assert code in (0, 1, 3) and code_of_three in (0, 1, 3, 4), (words_of_one, words_of_three)

@@ -40,7 +40,7 @@ struct InspectOptions {
 
 /// What follows layer `k`: the activation, after the last one nothing.
 std::string activation_after(const files::Weights& weights, std::size_t k) {
-  return k + 1 < weights.layers.size() ? files::function_of(weights.activation).op : "";
+  return k + 1 < weights.layers.size() ? files::function_of(weights.layers[k].activation).op : "";
 }
 
 files::Json describe(const files::Weights& weights) {
@@ -56,7 +56,7 @@ files::Json describe(const files::Weights& weights) {
   return {{"file", weights.path},
           {"sha256", weights.sha256},
           {"precision", files::name(weights.precision)},
-          {"activation", files::function_of(weights.activation).op},
+          {"activation", weights.layers.size() > 1 ? weights.activation_names() : "relu"},
           {"layers", std::move(layers)},
           {"notes", weights.notes},
           {"rounding_of_slope", files::rounding_of_slope(weights)}};

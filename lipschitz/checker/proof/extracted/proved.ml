@@ -878,12 +878,12 @@ type stack = matrixD list * matrixD
 type layerD = matrixD * dyadic list
 
 type part = { hidden : layerD list; outer : layerD;
-              clamp : (dyadic * dyadic) list; between : activation }
+              clamp : (dyadic * dyadic) list; between : activation list }
 
 (** val no_part : part **)
 
 let no_part =
-  { hidden = []; outer = ([], []); clamp = []; between = Relu }
+  { hidden = []; outer = ([], []); clamp = []; between = [] }
 
 (** val part_at : part list -> int -> part **)
 
@@ -1993,29 +1993,50 @@ let check_norm_below w l v =
 let fits_part p =
   forallb (fun l -> (=) (length (snd l)) (length (fst l))) (layers p)
 
+(** val following : activation list -> 'a1 list -> (activation * 'a1) list **)
+
+let rec following between0 = function
+| [] -> []
+| l :: hidden' -> ((hd Relu between0), l) :: (following (tl between0) hidden')
+
+(** val scaled_matrices :
+    dyadic -> activation list -> layerD list -> layerD -> stack **)
+
+let rec scaled_matrices b between0 later last0 =
+  match later with
+  | [] -> ([], (scale_all mul0 b (fst last0)))
+  | l :: later' ->
+    let rest0 =
+      scaled_matrices (unit_of (hd Relu between0)) (tl between0) later' last0
+    in
+    (((scale_all mul0 b (fst l)) :: (fst rest0)), (snd rest0))
+
 (** val matrices : part -> stack **)
 
 let matrices p =
   match p.hidden with
   | [] -> ([], (fst p.outer))
   | first0 :: later ->
-    let scaled = fun l -> scale_all mul0 (unit_of p.between) (fst l) in
-    (((fst first0) :: (map scaled later)), (scaled p.outer))
+    let rest0 =
+      scaled_matrices (unit_of (hd Relu p.between)) (tl p.between) later
+        p.outer
+    in
+    (((fst first0) :: (fst rest0)), (snd rest0))
 
 (** val bends_of : part -> dyadic list **)
 
 let bends_of p =
-  map (fun _ -> bend_of p.between) p.hidden
+  map (fun l -> bend_of (fst l)) (following p.between p.hidden)
 
 (** val relu_between : part -> bool **)
 
 let relu_between p =
-  is_relu p.between
+  forallb is_relu p.between
 
 (** val entrywise_between : part -> bool **)
 
 let entrywise_between p =
-  is_entrywise p.between
+  forallb is_entrywise p.between
 
 (** val parts_of : part list -> function0 -> part list **)
 
@@ -2073,17 +2094,17 @@ let rec norms accepted p layer = function
       | None -> None)
    | None -> None)
 
-(** val with_slopes : dyadic -> 'a1 list -> dyadic -> dyadic **)
+(** val with_slopes : activation list -> 'a1 list -> dyadic -> dyadic **)
 
-let with_slopes c hidden0 u =
-  fold_right (fun _ v -> mul0 c v) u hidden0
+let with_slopes between0 hidden0 u =
+  fold_right (fun l v -> mul0 (steepest (fst l)) v) u
+    (following between0 hidden0)
 
 (** val norm_of : part list -> claim list -> int -> dyadic option **)
 
 let norm_of ps accepted p =
   let q = part_at ps p in
-  option_map (with_slopes (steepest q.between) q.hidden)
-    (norms accepted p 0 (layers q))
+  option_map (with_slopes q.between q.hidden) (norms accepted p 0 (layers q))
 
 (** val largest : dyadic -> dyadic list -> dyadic **)
 

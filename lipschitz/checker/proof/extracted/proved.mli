@@ -249,7 +249,7 @@ type stack = matrixD list * matrixD
 type layerD = matrixD * dyadic list
 
 type part = { hidden : layerD list; outer : layerD;
-              clamp : (dyadic * dyadic) list; between : activation }
+              clamp : (dyadic * dyadic) list; between : activation list }
 
 val no_part : part
 
@@ -539,6 +539,11 @@ val check_norm_below : matrixD -> dyadic -> dyadic list -> bool
 
 val fits_part : part -> bool
 
+val following : activation list -> 'a1 list -> (activation * 'a1) list
+
+val scaled_matrices :
+  dyadic -> activation list -> layerD list -> layerD -> stack
+
 val matrices : part -> stack
 
 val bends_of : part -> dyadic list
@@ -559,7 +564,7 @@ val find_norm : claim list -> int -> int -> dyadic option
 
 val norms : claim list -> int -> int -> layerD list -> dyadic option
 
-val with_slopes : dyadic -> 'a1 list -> dyadic -> dyadic
+val with_slopes : activation list -> 'a1 list -> dyadic -> dyadic
 
 val norm_of : part list -> claim list -> int -> dyadic option
 

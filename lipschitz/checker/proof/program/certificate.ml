@@ -25,11 +25,11 @@ let rec inside path json = match path, json with
 let with_stated_activations (net : Network.t) json =
   let activation_of step = match inside [ "op" ] step with Some (Text op) -> Activation.called op | _ -> None in
   let stated part = match inside [ "network"; "weights"; part; "chain" ] json with
-    | Some (Array steps) -> List.find_map activation_of steps
-    | _ -> None in
-  let adopted (part, (w : Weights.t)) =
-    let activation = Option.bind (stated part) (fun a -> if Weights.has_groups_of a w.layers then Some a else None) in
-    part, if w.activation = None then { w with activation } else w in
+    | Some (Array steps) -> List.filter_map activation_of steps
+    | _ -> [] in
+  let adopted (part, (w : Weights.t)) = match w.activations, stated part with
+    | None, (_ :: _ as activations) -> part, Option.value (Weights.with_activations w activations) ~default:w
+    | _ -> part, w in
   { net with parts = List.map adopted net.parts }
 
 let is_hash = function
@@ -92,7 +92,7 @@ let check net json =
     [ "schema"; "tool"; "statement"; "network"; "box"; "layers"; "bounds"; "laws"; "values"; "content_sha256" ] json;
   let member key = find "certificate" key json in
   let net = with_stated_activations net json in
-  let sorts (_, w) = Activation.sorts (Functions.activation w) in
+  let sorts (_, w) = List.exists Activation.sorts (Weights.between w) in
   require (member "statement" = Text (Statement.text (List.exists sorts net.parts)))
     "statement is not the one that is checked";
   let rest = List.filter (fun (key, _) -> key <> "content_sha256") (members "certificate" json) in

@@ -153,9 +153,8 @@ let check_product state where names claim scale upper =
   let largest = match scale with [] -> 1. | first :: rest -> List.fold_left Float.max first rest in
   let total = List.fold_left (fun total name -> match Hashtbl.find_opt state.norms name with
       | Some norm ->
-        let weights = Functions.weights state.net name in
-        let steepest = Proved.steepest (Functions.activation weights) in
-        List.fold_left (fun total _ -> times total steepest) (times total norm) (List.tl weights.layers)
+        List.fold_left (fun total activation -> times total (Proved.steepest activation)) (times total norm)
+          (Weights.between (Functions.weights state.net name))
       | None -> rejected "%s: there is no network %s" where (shown name)) (Exact.of_float largest) names in
   require (at_most total upper) "%s: claims less than the product of the norms" where;
   prove state claim Proved.By_product (where ^ ": claims less than the product of the norms");
@@ -177,8 +176,8 @@ let check_parts state where bound names ~func ~moves ~scale ~exact_scale ~upper 
 
 (* What is not stated of functions with other activations than ReLU. *)
 let check_activations state where bound names =
-  List.iter (fun name ->
-      let activation = Functions.activation (Functions.weights state.net name) in
+  let activations = List.concat_map (fun name -> Weights.between (Functions.weights state.net name)) names in
+  List.iter (fun activation ->
       if activation <> Proved.Relu then begin
         let of_ = " of a network with " ^ Activation.words activation in
         let by method_ = find where "upper_method" bound = Text method_ in
@@ -187,7 +186,7 @@ let check_activations state where bound names =
           "%s: a lower bound%s" where of_;
         require (not (Activation.sorts activation) || find where "upper_method" bound = Text "product")
           "%s: a bound from slopes of single numbers%s" where of_
-      end) names
+      end) activations
 
 let check_bound state bound =
   require_keys "bound" (bound_keys @ if has "neighbours" bound then [ "neighbours" ] else []) bound;

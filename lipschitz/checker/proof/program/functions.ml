@@ -17,11 +17,7 @@ let index (net : Network.t) part =
   let rec go k = function [] -> rejected "there is no network %s" (shown part) | (name, _) :: rest ->
       if name = part then k else go (k + 1) rest in
   go 0 net.parts
-(* Between the layers of a part; a single layer is as well one of a ReLU network. *)
-let activation (w : Weights.t) = match w.activation with
-  | Some activation when List.length w.layers > 1 -> activation
-  | _ -> Proved.Relu
-let is_relu net part = activation (weights net part) = Proved.Relu
+let is_relu net part = Weights.is_relu (weights net part)
 let inputs net part = Weights.inputs (Weights.first_layer (weights net part))
 let has_ground (net : Network.t) = List.mem_assoc "phi:ground" net.parts
 
@@ -62,11 +58,11 @@ let chain (net : Network.t) part =
   let n = inputs net part in
   let clamp = if net.clamp <> [] && Network.is_clamped part then [ { op = "clamp"; layer = None; from = n; onto = n } ]
       else [] in
-  let layer k (l : Weights.layer) =
-    let from = Weights.inputs l in
-    (if k = 0 then [] else [ { op = Activation.name (activation w); layer = None; from; onto = from } ])
-    @ [ { op = "linear"; layer = Some l.name; from; onto = Weights.outputs l } ] in
-  clamp @ List.concat (List.mapi layer w.layers)
+  let linear (l : Weights.layer) =
+    { op = "linear"; layer = Some l.name; from = Weights.inputs l; onto = Weights.outputs l } in
+  let activated a (l : Weights.layer) =  (* in front of l *)
+    [ { op = Activation.name a; layer = None; from = Weights.inputs l; onto = Weights.inputs l }; linear l ] in
+  clamp @ linear (List.hd w.layers) :: List.concat (List.map2 activated (Weights.between w) (List.tl w.layers))
 
 let chain_words steps =
   String.concat " - " (List.map (fun step -> match step.op, step.layer with
@@ -94,5 +90,5 @@ let part (net : Network.t) (name, (w : Weights.t)) =
   let hidden, outer = cut layers in
   let clamp = if Network.is_clamped name then List.map (fun (a, b) -> Exact.of_float a, Exact.of_float b) net.clamp
       else [] in
-  { Proved.hidden; outer; clamp; between = activation w }
+  { Proved.hidden; outer; clamp; between = Weights.between w }
 let parts (net : Network.t) = List.map (part net) net.parts

@@ -23,7 +23,7 @@ let activation out a = Buffer.add_string out (match a with
     | Sorted Pairs -> "(Sorted Pairs)" | Sorted (Groups k) -> Printf.sprintf "(Sorted (Groups %d))" k)
 let part out { Proved.hidden; outer; clamp; between } =
   Printf.bprintf out "Part %a %a %a %a" (list layer) hidden layer outer (list (pair number number)) clamp
-    activation between
+    (list activation) between
 let func out = function
   | Proved.Alone p -> Printf.bprintf out "(Alone %a)" natural p
   | Set_of (phi, rho) -> Printf.bprintf out "(Set_of %a %a)" natural phi natural rho

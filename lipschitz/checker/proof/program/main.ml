@@ -10,7 +10,7 @@ let help =
   \  --phi FILE --rho FILE   phi and rho\n\
   \  --key KEY               key of the state dict inside a nested checkpoint\n\
   \  --order A,B,C           layers in the order of evaluation; with --phi and --rho phi=A,B and rho=A,B\n\
-  \  --activation OP         what lies between the layers, where neither the weight files nor network.toml say \
+  \  --activation OP,...     what lies between the layers, where neither the weight files nor network.toml say \
       it; without it,\n\
   \                          the certificate says it\n\
   \  --coq                   write the certificate as a Coq file to standard output; coqc then accepts it in \
@@ -38,8 +38,9 @@ let rec options (args : Network.arguments) mode positional = function
   | "--rho" :: file :: rest -> options { args with rho = file } mode positional rest
   | "--key" :: key :: rest -> options { args with key } mode positional rest
   | "--activation" :: activation :: rest ->
-    if Activation.called activation = None then
-      raise (Usage ("--activation: there is no activation " ^ shown activation));
+    let known name = if Activation.called name = None then
+        raise (Usage ("--activation: there is no activation " ^ shown name)) in
+    List.iter known (String.split_on_char ',' activation);
     options { args with activation } mode positional rest
   | "--order" :: word :: rest ->
     let part, names = match String.index_opt word '=' with

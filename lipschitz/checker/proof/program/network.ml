@@ -16,7 +16,7 @@ type arguments = {
   rho : string;
   key : string;
   orders : (string * string list) list;
-  activation : string;  (* "": not stated *)
+  activation : string;  (* names, separated by commas; "": not stated *)
 }
 
 let load_bytes path bytes ~key ~order =
@@ -100,15 +100,18 @@ let read_gamma path members =
   | Some (Json.Number { value; _ }) when value > 0. -> ()
   | _ -> bad_input "%s: gamma.value must be positive" path
 
-(* What `field` states beside the weights. Nothing lies between the layers of a network that has only one. *)
-let with_activation field (weights : Weights.t) name =
-  match Activation.called name, weights.activation with
-  | None, _ -> bad_input "%s: there is no activation %s" field (shown name)
-  | Some stated, Some other when stated <> other && List.length weights.layers > 1 ->
-    bad_input "%s: %s: %s is stated already" weights.path field (Activation.name other)
-  | Some stated, _ when not (Weights.has_groups_of stated weights.layers) ->
-    bad_input "%s: %s: a hidden layer is no multiple of the group's size" weights.path field
-  | activation, _ -> { weights with activation }
+(* What `field` states beside the weights. *)
+let with_activations field (weights : Weights.t) names =
+  let called name = match Activation.called name with
+    | Some activation -> activation | None -> bad_input "%s: there is no activation %s" field (shown name) in
+  if names = [] then bad_input "%s: names no activation" field;
+  match Weights.with_activations weights (List.map called names), weights.activations with
+  | Some weights, _ -> weights
+  | None, Some (_ :: _ as others) ->
+    bad_input "%s: %s: %s is stated already" weights.path field (String.concat ", " (List.map Activation.name others))
+  | None, _ ->
+    bad_input "%s: %s: %d activations do not fit the %d layers, or a group the size of its layer" weights.path field
+      (List.length names) (List.length weights.layers)
 
 let read_kinds path ~key role members =
   if members = [] then bad_input "%s: %s names no kind of vehicle" path role;
@@ -126,8 +129,10 @@ let read_kinds path ~key role members =
       let weights = load file ~key ~order in
       let weights = match List.assoc_opt "activation" entry with
         | None -> weights
-        | json ->
-          with_activation (path ^ ": " ^ where ^ ".activation") weights (text path (where ^ ".activation") json) in
+        | Some json ->
+          let here = where ^ ".activation" in
+          let names = match json with Json.Array _ -> texts path here json | _ -> [ text path here (Some json) ] in
+          with_activations (path ^ ": " ^ here) weights names in
       role ^ ":" ^ kind, weights) members
 
 let check_sizes path ~order ~clamp ~components phis rhos =
@@ -177,7 +182,8 @@ let read_stated { net; phi; rho; key; orders; _ } =
   else plain [ "network", load net ~key ~order:(order "network") ]
 let read arguments =
   let net = read_stated arguments in
-  let stated (name, weights) = name, with_activation "--activation" weights arguments.activation in
+  let names = String.split_on_char ',' arguments.activation in
+  let stated (name, weights) = name, with_activations "--activation" weights names in
   if arguments.activation = "" then net else { net with parts = List.map stated net.parts }
 
 let as_float32 net = { net with parts = List.map (fun (name, w) -> name, Weights.as_float32 w) net.parts }

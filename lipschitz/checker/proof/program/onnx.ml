@@ -1,4 +1,4 @@
-(* ONNX models that are a chain of linear layers with one activation between them: of every number, or MaxMin and
+(* ONNX models that are a chain of linear layers with an activation behind each, the last one possibly not, MaxMin and
    GroupSort as exporters write them, in several nodes. *)
 
 open Refusal
@@ -83,7 +83,7 @@ let integer_of node name otherwise = match List.assoc_opt name node.attributes w
 type state = {
   mutable layers : affine list;
   mutable is_activated : bool;
-  mutable activation : Proved.activation option;
+  mutable activations : Proved.activation list;  (* the last one first *)
   mutable shape : int list;  (* of the value; the last size is 0 where the file leaves that of the input open *)
   mutable order : int array option;  (* in which the next layer takes what is sorted, where it is another *)
 }
@@ -218,9 +218,7 @@ let follow path kept state current node =
     | _ -> refuse "adds where no layer takes a bias" in
   let activate activation =
     if state.layers = [] || state.is_activated then refuse "does not follow a linear layer";
-    if state.activation <> None && state.activation <> Some activation then
-      refuse "is another activation than that before it";
-    state.activation <- Some activation;
+    state.activations <- activation :: state.activations;
     state.is_activated <- true in
   if node.op <> "TopK" && List.length node.outputs <> 1 then refuse "has not exactly one output";
   match node.op, node.inputs with
@@ -309,17 +307,18 @@ let read path bytes ~order =
   require_single_names path
     (name_of input :: Hashtbl.fold (fun name _ names -> name :: names) kept []
      @ List.concat_map (fun node -> node.outputs) nodes);
-  let state = { layers = []; is_activated = false; activation = None; shape = input_shape path input; order = None } in
+  let state = { layers = []; is_activated = false; activations = []; shape = input_shape path input; order = None } in
   let constants, others = List.partition (fun node -> node.op = "Constant") nodes in
   let end_of_chain = List.fold_left (follow path kept state) (name_of input) (constants @ with_groups_joined others) in
   if List.map name_of (texts path 12 graph) <> [ end_of_chain ] then bad_input
       "%s: the graph's output is not where its chain of nodes ends" path;
-  if state.layers = [] || state.is_activated then bad_input "%s: has no linear layer, or ends in an activation" path;
+  if state.layers = [] then bad_input "%s: has no linear layer" path;
   let names = Hashtbl.create 16 in
   let tensors = List.concat (List.mapi (fun k layer ->
       let name = layer_name names k layer.weight.name in
       declared ?order:layer.order layer.weight (name ^ ".weight") layer.transposed
       :: (match layer.bias with Some b -> [ declared b (name ^ ".bias") false ] | None -> []))
           (List.rev state.layers)) in
-  Weights.assemble ?activation:state.activation ~path ~sha256:(Sha256.to_hex (Sha256.string bytes))
-    Layer_order.Evaluation ~order tensors
+  let w = Weights.assemble ~path ~sha256:(Sha256.to_hex (Sha256.string bytes)) Layer_order.Evaluation ~order tensors in
+  let w = if state.is_activated then Weights.with_identity ?order:state.order w else w in
+  { w with activations = Some (List.rev state.activations) }

@@ -8,16 +8,41 @@ type t = {
   sha256 : string;
   precision : string;
   layers : layer list;
-  activation : Proved.activation option;  (* between the layers; None: neither the file nor network.toml states it *)
+  activations : Proved.activation list option;  (* of each layer but the last; None: not stated *)
 }
 
 let outputs layer = Array.length layer.weights
 let inputs layer = Array.length layer.weights.(0)
 let first_layer w = List.hd w.layers
-let rec has_groups_of activation = function
-  | layer :: (_ :: _ as rest) -> outputs layer mod Activation.group activation = 0 && has_groups_of activation rest
-  | _ -> true
 let last_layer w = List.nth w.layers (List.length w.layers - 1)
+(* ReLU where nothing is stated. *)
+let between w = Option.value w.activations ~default:(List.map (fun _ -> Proved.Relu) (List.tl w.layers))
+let is_relu w = List.for_all (( = ) Proved.Relu) (between w)
+
+(* Weights 1 and biases 0 behind the last layer, under a name that is free; with an order, number i is number order.(i)
+   of what is in front. *)
+let with_identity ?order w =
+  let size = outputs (last_layer w) and numbered = Printf.sprintf "layer%d" (List.length w.layers + 1) in
+  let rec free name = if List.exists (fun l -> l.name = name) w.layers then free (numbered ^ "_" ^ name) else name in
+  let taken i = match order with Some order -> order.(i) | None -> i in
+  let row i = Array.init size (fun j -> if taken i = j then 1. else 0.) in
+  { w with layers = w.layers @ [ { name = free numbered; weights = Array.init size row;
+                                   biases = Array.make size 0. } ] }
+
+(* What is stated: one for all, one for each layer but the last, or one more, which an identity layer follows. None: it
+   fits neither the layers nor what is stated already. *)
+let with_activations w stated =
+  let count = List.length w.layers in
+  let stated = match stated with [ one ] -> List.init (count - 1) (fun _ -> one) | several -> several in
+  let rec fit stated layers = match stated, layers with
+    | [], _ -> true
+    | a :: stated, layer :: layers -> outputs layer mod Activation.group a = 0 && fit stated layers
+    | _ :: _, [] -> false in
+  if w.activations <> None && count > 1 then (if w.activations = Some stated then Some w else None)
+  else if List.length stated < count - 1 || not (fit stated w.layers) then None
+  else
+    let w = if List.length stated = count then with_identity w else w in
+    Some { w with activations = Some stated }
 
 (* Every number rounded to the nearest float32. *)
 let as_float32 w =
@@ -51,8 +76,8 @@ let contains part text =
   go 0
 
 (* A chain of linear layers of what a file holds, `listing` being what the order of the tensors in it means. A file that
-   states the order of evaluation states the activation as well. *)
-let assemble ?(activation = Proved.Relu) ~path ~sha256 listing ~order tensors =
+   states the order of evaluation states ReLU unless its reader says more. *)
+let assemble ~path ~sha256 listing ~order tensors =
   let refuse t what = bad_input "%s: %s: %s" path (shown t.tensor) what in
   if List.length tensors > 4096 then bad_input "%s: holds more than 4096 tensors" path;
   let check t =
@@ -89,8 +114,9 @@ let assemble ?(activation = Proved.Relu) ~path ~sha256 listing ~order tensors =
     { name;
       weights = Array.init outputs (fun i -> Array.sub flat (i * inputs) inputs);
       biases = (match List.assoc_opt name biases with Some t -> finite t | None -> Array.make outputs 0.) } in
-  { path; sha256; precision; layers = List.map layer (Layer_order.decide path listing ~stated:order shapes);
-    activation = if listing = Layer_order.Evaluation then Some activation else None }
+  let layers = List.map layer (Layer_order.decide path listing ~stated:order shapes) in
+  let relu = List.map (fun _ -> Proved.Relu) (List.tl layers) in
+  { path; sha256; precision; layers; activations = if listing = Layer_order.Evaluation then Some relu else None }
 
 let width = function "float32" -> 4 | _ -> 8
 (* The k-th little-endian number. *)

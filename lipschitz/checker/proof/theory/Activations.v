@@ -81,8 +81,12 @@ Definition act (a : activation) (x : R) : R :=
   | Selu => selu_scale * relu x + selu_scale * selu_alpha * falling x
   | Silu => x / (1 + exp (- x))
   | Gelu => x / 2 * (1 + erf (x / sqrt 2))
-  | Sorted _ => x  (* by number it does nothing; see `value` of Meaning.v *)
+  | Sorted _ => x  (* by number it does nothing; see `activated` *)
   end.
+
+(** Of a whole layer. *)
+Definition activated (a : activation) (y : list R) : list R :=
+  match a with Sorted s => sort_layer s y | _ => map (act a) y end.
 
 (** Every slope of f lies in [a, b]. *)
 Definition slopes (f : R -> R) (a b : R) : Prop := forall x y, x <= y -> a * (y - x) <= f y - f x <= b * (y - x).

@@ -27,18 +27,29 @@ Definition check_norm_below (w : matrixD) (l : dyadic) (v : list dyadic) : bool 
 
 (** Slopes by a matrix inequality. *)
 Definition fits_part (p : part) : bool := forallb (fun l => length (snd l) =? length (fst l))%nat (layers p).
-(** Of the network whose functions are divided by b = unit_of: M_1, b M_2, b M_3, ... *)
+(** Each hidden layer with what follows it. *)
+Fixpoint following {A} (between : list activation) (hidden : list A) : list (activation * A) :=
+  match hidden with [] => [] | l :: hidden' => (hd Relu between, l) :: following (tl between) hidden' end.
+(** Of the network whose functions are divided by b_k = unit_of: M_1, b_1 M_2, b_2 M_3, ... `b`: of the function in
+    front. *)
+Fixpoint scaled_matrices (b : dyadic) (between : list activation) (later : list layerD) (last : layerD) : stack :=
+  match later with
+  | [] => ([], scale_all mul b (fst last))
+  | l :: later' =>
+      let rest := scaled_matrices (unit_of (hd Relu between)) (tl between) later' last in
+      (scale_all mul b (fst l) :: fst rest, snd rest)
+  end.
 Definition matrices (p : part) : stack :=
   match hidden p with
   | [] => ([], fst (outer p))
   | first :: later =>
-      let scaled l := scale_all mul (unit_of (between p)) (fst l) in
-      (fst first :: map scaled later, scaled (outer p))
+      let rest := scaled_matrices (unit_of (hd Relu (between p))) (tl (between p)) later (outer p) in
+      (fst first :: fst rest, snd rest)
   end.
 (** Of each hidden layer. *)
-Definition bends_of (p : part) : list dyadic := map (fun _ => bend_of (between p)) (hidden p).
-Definition relu_between (p : part) : bool := is_relu (between p).
-Definition entrywise_between (p : part) : bool := is_entrywise (between p).
+Definition bends_of (p : part) : list dyadic := map (fun l => bend_of (fst l)) (following (between p) (hidden p)).
+Definition relu_between (p : part) : bool := forallb is_relu (between p).
+Definition entrywise_between (p : part) : bool := forallb is_entrywise (between p).
 Definition parts_of (ps : list part) (f : function) : list part :=
   match f with Alone p => [part_at ps p] | Set_of phi rho => [part_at ps phi; part_at ps rho] end.
 (** Every network's biases fit; rho has no clamp; `moves` and a scale that is stated have one entry per input. *)
@@ -67,11 +78,11 @@ Fixpoint norms (accepted : list claim) (p layer : nat) (ls : list layerD) : opti
       | _, _ => None
       end
   end.
-(** Times the largest slope for each function between layers. *)
-Definition with_slopes {A} (c : dyadic) (hidden : list A) (u : dyadic) : dyadic :=
-  fold_right (fun _ v => mul c v) u hidden.
+(** Times the largest slope of each function between layers. *)
+Definition with_slopes {A} (between : list activation) (hidden : list A) (u : dyadic) : dyadic :=
+  fold_right (fun l v => mul (steepest (fst l)) v) u (following between hidden).
 Definition norm_of (ps : list part) (accepted : list claim) (p : nat) : option dyadic :=
-  let q := part_at ps p in option_map (with_slopes (steepest (between q)) (hidden q)) (norms accepted p O (layers q)).
+  let q := part_at ps p in option_map (with_slopes (between q) (hidden q)) (norms accepted p O (layers q)).
 Fixpoint largest (m : dyadic) (scale : list dyadic) : dyadic :=
   match scale with [] => m | s :: scale' => largest (if at_most m s then s else m) scale' end.
 Definition product_of (ps : list part) (accepted : list claim) (f : function) : option dyadic :=

@@ -213,7 +213,7 @@ Proof.
   assert (length (snd (outer p)) = length (fst (outer p))) as Fo
     by (apply (fits_layer p); auto; apply in_or_app; right; now left).
   assert (forall z, value p z = network (relu_layers (hidden p)) (real_layer (outer p)) (clamped c z)) as V.
-  { intros z. unfold value, unclamped. rewrite (relu_part p Rp). reflexivity. }
+  { intros z. unfold value. now rewrite relu_network. }
   set (g z := network (relu_layers (hidden p)) (real_layer (outer p)) z) in *.
   assert (forall q, covers q = true -> forall (G : list R -> list R) n, (forall z, length (G z) = n) ->
     (forall z w, square (minus (G z) (G w)) <= measured q (minus (g z) (g w))) ->

@@ -357,8 +357,7 @@ Lemma form_holds p q ts u v s : relu_between p = true -> clamp p = [] -> fits_pa
   length u = inputs_of p -> length v = inputs_of p ->
   square (minus (value p (plusR u s)) (value p (plusR v s))) <= triangle q (minus u v) (minus u v).
 Proof.
-  intros Hr Hc Hf T N L L'. apply relu_part in Hr. unfold value, unclamped. rewrite Hr, Hc. simpl clamped.
-  cbv iota beta.
+  intros Hr Hc Hf T N L L'. unfold value. rewrite !relu_network, Hc by auto. simpl clamped.
   rewrite forallb_forall, <- Forall_forall in T. set (d := minus u v).
   assert (length d = inputs_of p) as Ld by (unfold d; rewrite length_minus; congruence).
   unfold form_inequality in N. rewrite <- Ld in N.

@@ -8,9 +8,12 @@ Import ListNotations.
 
 (** Weights by rows, biases. *)
 Definition layerD := (matrixD * list dyadic)%type.
-(** One network as stored; with an input clamp, an interval per input, else []; and the function between its layers. *)
-Record part := Part { hidden : list layerD; outer : layerD; clamp : list (dyadic * dyadic); between : activation }.
-Definition no_part := Part [] ([], []) [] Relu.
+(** One network as stored; with an input clamp, an interval per input, else []; and what follows each hidden layer, Relu
+    where `between` is too short. *)
+Record part := Part { hidden : list layerD; outer : layerD; clamp : list (dyadic * dyadic);
+  between : list activation }.
+Definition no_part := Part [] ([], []) [] [].
+Definition all_relu (p : part) : Prop := Forall (eq Relu) (between p).
 Definition part_at (ps : list part) (k : nat) : part := nth k ps no_part.
 Definition layers (p : part) : list layerD := hidden p ++ [outer p].
 Definition inputs_of (p : part) : nat := length (hd [] (fst (hd (outer p) (hidden p)))).
@@ -22,17 +25,14 @@ Fixpoint clamped (c : list (dyadic * dyadic)) (x : list R) : list R :=
   | (low, high) :: c', a :: x' => Rmin (Rmax a (real low)) (real high) :: clamped c' x'
   | _, _ => x
   end.
-(** What is between layers by number, or sorts. *)
-Fixpoint sorting_network (s : sorting) (hidden : list layer) (last : layer) (x : list R) : list R :=
+Fixpoint layer_by_layer (between : list activation) (hidden : list layer) (last : layer) (x : list R) : list R :=
   match hidden with
   | [] => affine (fst last) (snd last) x
-  | l :: hidden' => sorting_network s hidden' last (sort_layer s (affine (fst l) (snd l) x))
+  | l :: hidden' =>
+      layer_by_layer (tl between) hidden' last (activated (hd Relu between) (affine (fst l) (snd l) x))
   end.
 Definition unclamped (p : part) : list R -> list R :=
-  match between p with
-  | Sorted s => sorting_network s (map real_layer (hidden p)) (real_layer (outer p))
-  | a => network (map (fun l => (act a, real_layer l)) (hidden p)) (real_layer (outer p))
-  end.
+  layer_by_layer (between p) (map real_layer (hidden p)) (real_layer (outer p)).
 Definition value (p : part) (x : list R) : list R := unclamped p (clamped (clamp p) x).
 Definition vector_sum (us : list (list R)) : list R := fold_right plusR [] us.
 
@@ -164,11 +164,11 @@ Definition holds (ps : list part) (c : claim) : Prop :=
         norm (minus (value (part_at ps rho) (plusR (value (part_at ps phi) x) rest)) (value (part_at ps rho) rest))
           <= real u
   | Float_error p b r e u =>
-      between (part_at ps p) = Relu /\
+      all_relu (part_at ps p) /\
       forall x v, within b x -> evaluates (part_at ps p) r x v ->
         close e (value (part_at ps p) x) v /\ norm (minus v (value (part_at ps p) x)) <= real u
   | Sum_float_error terms rho u =>
-      between (part_at ps rho) = Relu /\ Forall (fun t => between (part_at ps (phi (fst t))) = Relu) terms /\
+      all_relu (part_at ps rho) /\ Forall (fun t => all_relu (part_at ps (phi (fst t)))) terms /\
       forall inputs computed s v, Forall2 may_stand (map fst terms) inputs ->
         Forall2 (fun t_xs vs => Forall2 (evaluates (part_at ps (phi (fst (fst t_xs)))) (snd (fst t_xs))) (snd t_xs)
           vs)

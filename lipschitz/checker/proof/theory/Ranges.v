@@ -69,7 +69,7 @@ Proof.
 Qed.
 Lemma within_sound ps p b bounds v : check_within ps p b bounds v = true -> holds ps (Within p b v).
 Proof.
-  unfold check_within. intros H x Hx. both H. apply relu_part in H. unfold value, unclamped. rewrite H.
+  unfold check_within. intros H x Hx. both H. unfold value. rewrite relu_network by auto.
   eapply layers_within; eauto. now apply within_clamped.
 Qed.
 Lemma find_within_sound ps accepted p b v : Forall (holds ps) accepted -> find_within accepted p b = Some v ->

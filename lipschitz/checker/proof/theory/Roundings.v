@@ -100,10 +100,10 @@ Qed.
 Lemma error_sound ps p b r e u bounds errors : check_error ps p b r e u bounds errors = true ->
   holds ps (Float_error p b r e u).
 Proof.
-  unfold check_error. intros H. do 3 both H. apply relu_part in H. split; auto. intros x v Hx (h & C & F).
+  unfold check_error. intros H. do 3 both H. split; [now apply relu_part|]. intros x v Hx (h & C & F).
   apply real_nonnegative in H1. apply at_most_real in H0.
   assert (close e (value (part_at ps p) x) v) as K.
-  { unfold value, unclamped. rewrite H. eapply roundings_close; eauto. now apply within_clamped. }
+  { unfold value. rewrite relu_network by auto. eapply roundings_close; eauto. now apply within_clamped. }
   split; auto. apply sqrt_below; auto. rewrite real_square, real_mul in H0. pose proof (close_square _ _ _ K). lra.
 Qed.
 Lemma find_error_sound ps accepted p b r e u : Forall (holds ps) accepted ->
@@ -226,7 +226,7 @@ Proof.
       eapply Rle_trans; [apply Rabs_triang|]. lra.
 Qed.
 Lemma terms_relu ps accepted n terms sums : Forall (holds ps) accepted -> sum_errors accepted n terms = Some sums ->
-  Forall (fun t => between (part_at ps (phi (fst t))) = Relu) terms.
+  Forall (fun t => all_relu (part_at ps (phi (fst t)))) terms.
 Proof.
   intros HA. revert sums. induction terms as [|[[p b low high] r] terms IH]; intros sums; [constructor|]. simpl.
   destruct (find_within accepted p b); [|discriminate].

@@ -52,50 +52,89 @@ Proof.
 Qed.
 
 (** Slopes by a matrix inequality *)
-(** Part p with its functions divided by b, and the later matrices multiplied by it. *)
+(** Part p with each function divided by its b, and the matrix behind it multiplied by that. *)
 Definition scaled_layer (b : R) (l : layer) : layer := (scale_allR b (fst l), snd l).
-Definition scaled_network (b : R) (f : R -> R) (hidden : list layer) (last : layer) : real_stack :=
-  match hidden with
-  | [] => ([], last)
-  | first :: later =>
-      let g x := / b * f x in ((g, first) :: map (fun l => (g, scaled_layer b l)) later, scaled_layer b last)
+Definition divided_act (a : activation) (t : R) : R := / real (unit_of a) * act a t.
+Fixpoint scaled_layers (b : R) (between : list activation) (later : list layer) (last : layer) : real_stack :=
+  match later with
+  | [] => ([], scaled_layer b last)
+  | l :: later' =>
+      let a := hd Relu between in
+      let rest := scaled_layers (real (unit_of a)) (tl between) later' last in
+      ((divided_act a, scaled_layer b l) :: fst rest, snd rest)
   end.
 Definition stack_of (p : part) : real_stack :=
-  scaled_network (real (unit_of (between p))) (act (between p)) (map real_layer (hidden p)) (real_layer (outer p)).
+  match hidden p with
+  | [] => ([], real_layer (outer p))
+  | first :: later =>
+      let a := hd Relu (between p) in
+      let rest := scaled_layers (real (unit_of a)) (tl (between p)) (map real_layer later) (real_layer (outer p)) in
+      ((divided_act a, real_layer first) :: fst rest, snd rest)
+  end.
+(** Without division. *)
+Definition functions_and_layers (between : list activation) (hidden : list layer) : list ((R -> R) * layer) :=
+  map (fun l => (act (fst l), snd l)) (following between hidden).
 Lemma affine_scaled b (l : layer) x :
   affine (fst (scaled_layer b l)) (snd (scaled_layer b l)) x = affine (fst l) (snd l) (scaleR b x).
 Proof.
   unfold affine. f_equal. simpl. rewrite apply_scale_all. unfold apply, scale. rewrite map_map. apply map_ext. intros r.
   symmetry. apply dot_scale_r.
 Qed.
-Lemma scale_divided b (f : R -> R) x : b <> 0 -> scaleR b (map (fun t => / b * f t) x) = map f x.
-Proof. intros H. unfold scale. rewrite map_map. apply map_ext. intros t. field. auto. Qed.
-Lemma scaled_later b f later last x : b <> 0 ->
-  network (map (fun l => (fun t => / b * f t, scaled_layer b l)) later) (scaled_layer b last) x =
-  network (map (fun l => (f, l)) later) last (scaleR b x).
+Lemma scale_divided a x : scaleR (real (unit_of a)) (map (divided_act a) x) = map (act a) x.
 Proof.
-  intros H. revert x. induction later as [|[m c] later IH]; intros x; [apply (affine_scaled b last)|]. simpl.
-  rewrite IH, scale_divided by auto. f_equal. f_equal. apply (affine_scaled b (m, c)).
+  destruct (function_bent a) as [P _]. unfold scale, divided_act. rewrite map_map. apply map_ext. intros t. field. lra.
 Qed.
-Lemma scaled_run b f hidden last x : b <> 0 ->
-  run (scaled_network b f hidden last) x = network (map (fun l => (f, l)) hidden) last x.
+Lemma scaled_run b between later last x : run (scaled_layers b between later last) x =
+  network (functions_and_layers between later) last (scaleR b x).
 Proof.
-  intros H. destruct hidden as [|[m c] later]; [reflexivity|]. unfold run. simpl.
-  now rewrite scaled_later, scale_divided.
+  revert b between x. induction later as [|[m c] later IH]; intros b between x; [apply (affine_scaled b last)|].
+  unfold run in *. simpl. rewrite IH, scale_divided. unfold functions_and_layers. f_equal. f_equal.
+  apply (affine_scaled b (m, c)).
 Qed.
+Lemma entrywise_first between : forallb is_entrywise between = true ->
+  is_entrywise (hd Relu between) = true /\ forallb is_entrywise (tl between) = true.
+Proof. destruct between; simpl; auto. intros H. now apply andb_prop in H. Qed.
 Lemma unclamped_network p x : entrywise_between p = true -> unclamped p x =
-  network (map (fun l => (act (between p), l)) (map real_layer (hidden p))) (real_layer (outer p)) x.
-Proof. unfold entrywise_between, unclamped. rewrite map_map. now destruct (between p). Qed.
+  network (functions_and_layers (between p) (map real_layer (hidden p))) (real_layer (outer p)) x.
+Proof.
+  unfold entrywise_between, unclamped, functions_and_layers. generalize (between p) as s. revert x.
+  induction (map real_layer (hidden p)) as [|[m c] ls IH]; intros x s H; simpl; auto.
+  destruct (entrywise_first s H) as [E H']. rewrite IH by auto. f_equal.
+  destruct (hd Relu s); try discriminate; reflexivity.
+Qed.
 Lemma value_run p x : entrywise_between p = true -> value p x = run (stack_of p) (clamped (clamp p) x).
 Proof.
-  intros H. destruct (function_bent (between p)) as [P _]. unfold stack_of. rewrite scaled_run by lra.
-  now apply unclamped_network.
+  intros H. unfold value. rewrite unclamped_network by auto. unfold stack_of, functions_and_layers.
+  destruct (hidden p) as [|[m c] later]; [reflexivity|].
+  set (a := hd Relu (between p)). set (y := clamped (clamp p) x).
+  pose proof (scaled_run (real (unit_of a)) (tl (between p)) (map real_layer later) (real_layer (outer p))
+    (map (divided_act a) (affine (fst (real_layer (m, c))) (snd (real_layer (m, c))) y))) as R.
+  rewrite scale_divided in R. symmetry. exact R.
+Qed.
+Lemma relu_entrywise p : relu_between p = true -> entrywise_between p = true.
+Proof.
+  unfold relu_between, entrywise_between. rewrite !forallb_forall. intros H a Ha. specialize (H a Ha).
+  now destruct a.
+Qed.
+Lemma relu_part p : relu_between p = true -> all_relu p.
+Proof.
+  unfold relu_between, all_relu. rewrite forallb_forall, Forall_forall. intros H a Ha. specialize (H a Ha).
+  now destruct a.
+Qed.
+Lemma relu_network p x : relu_between p = true ->
+  unclamped p x = network (relu_layers (hidden p)) (real_layer (outer p)) x.
+Proof.
+  intros H. rewrite unclamped_network by now apply relu_entrywise. f_equal. apply relu_part in H. unfold all_relu in H.
+  unfold functions_and_layers, relu_layers. generalize (between p) as s, H. clear H.
+  induction (hidden p) as [|l ls IH]; intros s H; simpl; auto. destruct H as [|a s <- H]; simpl; f_equal.
+  - apply IH. constructor.
+  - now apply IH.
 Qed.
 Lemma bends_hold p : Forall2 has_bend (bends_of p) (functions (stack_of p)).
 Proof.
-  destruct (function_bent (between p)) as [_ B]. unfold bends_of, functions, stack_of, scaled_network.
-  destruct (hidden p) as [|first later]; simpl; constructor; [exact B|]. rewrite !map_map. simpl.
-  induction later as [|l later IH]; simpl; constructor; auto.
+  unfold bends_of, functions, stack_of. destruct (hidden p) as [|first later]; [constructor|]. simpl.
+  constructor; [apply function_bent|]. generalize (real (unit_of (hd Relu (between p)))) as b, (tl (between p)) as s.
+  induction later as [|l later IH]; intros b s; simpl; constructor; [apply function_bent|]. apply IH.
 Qed.
 Lemma fits_layer p l : fits_part p = true -> In l (layers p) -> length (snd l) = length (fst l).
 Proof. unfold fits_part. rewrite forallb_forall. intros H G. now apply Nat.eqb_eq, H. Qed.
@@ -104,30 +143,33 @@ Proof.
   intros H.
   assert (forall l, In l (layers p) -> of_matrix (fst l) (real_layer l)) as F.
   { intros l Hl. split; [reflexivity|]. simpl. rewrite map_length. now apply (fits_layer p). }
-  set (b := unit_of (between p)) in *.
-  assert (forall l, In l (layers p) -> of_matrix (scale_all mul b (fst l)) (scaled_layer (real b) (real_layer l))) as Q.
-  { intros l Hl. destruct (F l Hl) as [_ B]. split; simpl in *.
+  assert (forall b l, In l (layers p) ->
+    of_matrix (scale_all mul b (fst l)) (scaled_layer (real b) (real_layer l))) as Q.
+  { intros b l Hl. destruct (F l Hl) as [_ B]. split; simpl in *.
     - symmetry. apply (f_scale_all mul Rmult real real_mul).
     - rewrite B. unfold scale_all. now rewrite map_length. }
-  unfold matrices, stack_of, layers in *. fold b. destruct (hidden p) as [|first later]; simpl.
+  unfold matrices, stack_of, layers in *. destruct (hidden p) as [|first later]; simpl.
   - split; [constructor|]. apply F. now left.
-  - split; [|apply Q; right; apply in_or_app; right; now left].
-    simpl. constructor; [apply F; now left|].
-    assert (forall l, In l later -> of_matrix (scale_all mul b (fst l)) (scaled_layer (real b) (real_layer l))) as Q'
-      by (intros; apply Q; right; apply in_or_app; now left).
-    clear - Q'. induction later as [|l later IH]; simpl; constructor; [apply Q'; now left|].
-    apply IH. intros. apply Q'. now right.
+  - assert (of_matrix (fst first) (real_layer first)) as F1 by (apply F; now left).
+    assert (forall b l, In l (later ++ [outer p]) ->
+      of_matrix (scale_all mul b (fst l)) (scaled_layer (real b) (real_layer l))) as Q'
+      by (intros; apply Q; now right).
+    clear F Q. generalize (unit_of (hd Relu (between p))) as b, (tl (between p)) as s.
+    assert (forall b s, instance (scaled_matrices b s later (outer p))
+      (scaled_layers (real b) s (map real_layer later) (real_layer (outer p)))) as I.
+    { induction later as [|l later IH]; intros b s; simpl.
+      - split; [constructor|]. apply Q'. now left.
+      - destruct (IH ltac:(intros; apply Q'; now right) (unit_of (hd Relu s)) (tl s)) as [I1 I2].
+        split; [|exact I2]. constructor; [|exact I1]. apply Q'. now left. }
+    intros b s. destruct (I b s) as [I1 I2]. split; [|exact I2]. constructor; [exact F1|exact I1].
 Qed.
 Lemma length_value p x : fits_part p = true -> length (value p x) = length (fst (outer p)).
 Proof.
   intros H. assert (length (snd (outer p)) = length (fst (outer p))) as L
     by (apply (fits_layer p); auto; apply in_or_app; right; now left).
-  unfold value. destruct (entrywise_between p) eqn:E.
-  - rewrite unclamped_network, network_end, length_affine by (simpl; rewrite ?map_length; auto). simpl.
-    now rewrite map_length.
-  - unfold entrywise_between, unclamped in *. destruct (between p); try discriminate.
-    generalize (clamped (clamp p) x). induction (hidden p) as [|l ls IH]; intros y; simpl; auto.
-    rewrite length_affine by (simpl; now rewrite !map_length). simpl. now rewrite map_length.
+  unfold value, unclamped. generalize (between p) as s, (clamped (clamp p) x) as y.
+  induction (map real_layer (hidden p)) as [|l ls IH]; intros s y; simpl; auto.
+  rewrite length_affine by (simpl; now rewrite !map_length). simpl. now rewrite map_length.
 Qed.
 Lemma distance_nonneg scale x y : 0 <= distance scale x y. Proof. apply sqrt_pos. Qed.
 
@@ -207,14 +249,34 @@ Lemma affine_bound l u x y : norm_bound_of l u -> length (snd l) = length (fst l
   norm (minus (affine (fst (real_layer l)) (snd (real_layer l)) x) (affine (fst (real_layer l)) (snd (real_layer l)) y))
       <= u * norm (minus x y).
 Proof. intros [_ H] L. rewrite minus_affine by (simpl; now rewrite !map_length). apply H. Qed.
-Definition with_slopes_R {A} (c : R) (hidden : list A) (u : R) : R := fold_right (fun _ v => c * v) u hidden.
-Lemma with_slopes_nonneg {A} c (hidden : list A) u : 0 <= c -> 0 <= u -> 0 <= with_slopes_R c hidden u.
-Proof. intros Hc Hu. induction hidden as [|h hidden IH]; simpl; auto. now apply Rmult_le_pos. Qed.
-Lemma real_with_slopes {A} c (hidden : list A) u :
-  real (with_slopes c hidden u) = with_slopes_R (real c) hidden (real u).
-Proof. induction hidden as [|h hidden IH]; simpl; auto. now rewrite real_mul, IH. Qed.
-Lemma with_slopes_times {A} c (hidden : list A) a u : with_slopes_R c hidden (a * u) = a * with_slopes_R c hidden u.
-Proof. induction hidden as [|h hidden IH]; simpl; auto. rewrite IH. ring. Qed.
+Definition with_slopes_R {A} (between : list activation) (hidden : list A) (u : R) : R :=
+  fold_right (fun l v => real (steepest (fst l)) * v) u (following between hidden).
+Lemma with_slopes_nonneg {A} between (hidden : list A) u : 0 <= u -> 0 <= with_slopes_R between hidden u.
+Proof.
+  intros Hu. revert between. induction hidden as [|h hidden IH]; intros between; simpl; auto.
+  apply Rmult_le_pos; [apply all_slopes|apply IH].
+Qed.
+Lemma real_with_slopes {A} between (hidden : list A) u :
+  real (with_slopes between hidden u) = with_slopes_R between hidden (real u).
+Proof.
+  revert between. induction hidden as [|h hidden IH]; intros between; simpl; auto.
+  unfold with_slopes, with_slopes_R in *. simpl. now rewrite real_mul, IH.
+Qed.
+Lemma with_slopes_times {A} between (hidden : list A) a u :
+  with_slopes_R between hidden (a * u) = a * with_slopes_R between hidden u.
+Proof.
+  revert between. induction hidden as [|h hidden IH]; intros between; simpl; auto.
+  unfold with_slopes_R in *. simpl. rewrite IH. ring.
+Qed.
+Lemma activated_contracts a p q : length p = length q ->
+  norm (minus (activated a p) (activated a q)) <= real (steepest a) * norm (minus p q).
+Proof.
+  intros E. destruct (all_slopes a) as [C S].
+  assert (norm (minus (map (act a) p) (map (act a) q)) <= real (steepest a) * norm (minus p q)) as M.
+  { unfold norm. rewrite <- (sqrt_square (real (steepest a))) at 1 by auto. rewrite <- sqrt_mult_alt by nra.
+    apply sqrt_le_1_alt. now apply slopes_contract. }
+  destruct a; try exact M. simpl. rewrite real_one, Rmult_1_l. apply norm_le. now apply sorting_contracts.
+Qed.
 (** One layer and what follows it: `step` lengthens no difference by more than c. *)
 Lemma layer_bound (step : list R -> list R) c w k u : 0 <= c -> 0 <= w ->
   (forall p q, length p = length q -> norm (minus (step p) (step q)) <= c * norm (minus p q)) ->
@@ -229,45 +291,32 @@ Proof.
   replace (c * (u * w) * norm (minus x y)) with (w * (c * (u * norm (minus x y)))) by ring.
   apply Rmult_le_compat_l; auto. eapply Rle_trans; [now apply Hs|]. now apply Rmult_le_compat_l.
 Qed.
-Lemma network_bound f c hs l us : 0 <= c -> slopes f (- c) c -> Forall2 norm_bound_of (hs ++ [l]) us ->
+Lemma layers_bound between hs l us : Forall2 norm_bound_of (hs ++ [l]) us ->
   (forall k, In k (hs ++ [l]) -> length (snd k) = length (fst k)) -> forall x y,
-  let g := network (map (fun k => (f, real_layer k)) hs) (real_layer l) in
-  norm (minus (g x) (g y)) <= with_slopes_R c hs (product_R us) * norm (minus x y).
+  let g := layer_by_layer between (map real_layer hs) (real_layer l) in
+  norm (minus (g x) (g y)) <= with_slopes_R between hs (product_R us) * norm (minus x y).
 Proof.
-  intros Hc S. revert us. induction hs as [|k hs IH]; intros us H L x y; simpl in *.
-  - inversion H as [|? u ? us' Hu Hus]; subst. inversion Hus; subst. simpl. rewrite Rmult_1_r. apply affine_bound; auto.
+  revert between us. induction hs as [|k hs IH]; intros between us H L x y; simpl in *.
+  - inversion H as [|? u ? us' Hu Hus]; subst. inversion Hus; subst. simpl. unfold with_slopes_R. simpl.
+    rewrite Rmult_1_r. apply affine_bound; auto.
   - inversion H as [|? u ? us' Hu Hus]; subst.
-    eapply Rle_trans; [apply (IH us'); auto|]. simpl. rewrite with_slopes_times.
-    apply (layer_bound (map f) c _ k u); auto.
-    + apply with_slopes_nonneg; auto. eapply product_nonneg; eauto.
-    + intros p q E. unfold norm. rewrite <- (sqrt_square c) at 1 by auto. rewrite <- sqrt_mult_alt by nra.
-      apply sqrt_le_1_alt. now apply slopes_contract.
-Qed.
-Lemma sorting_bound s hs l us : Forall2 norm_bound_of (hs ++ [l]) us ->
-  (forall k, In k (hs ++ [l]) -> length (snd k) = length (fst k)) -> forall x y,
-  let g := sorting_network s (map real_layer hs) (real_layer l) in
-  norm (minus (g x) (g y)) <= with_slopes_R 1 hs (product_R us) * norm (minus x y).
-Proof.
-  revert us. induction hs as [|k hs IH]; intros us H L x y; simpl in *.
-  - inversion H as [|? u ? us' Hu Hus]; subst. inversion Hus; subst. simpl. rewrite Rmult_1_r. apply affine_bound; auto.
-  - inversion H as [|? u ? us' Hu Hus]; subst.
-    eapply Rle_trans; [apply (IH us'); auto|]. simpl. rewrite with_slopes_times.
-    apply (layer_bound (sort_layer s) 1 _ k u); auto; [lra| |].
-    + apply with_slopes_nonneg; [lra|]. eapply product_nonneg; eauto.
-    + intros p q E. rewrite Rmult_1_l. apply norm_le. now apply sorting_contracts.
+    eapply Rle_trans; [apply (IH (tl between) us'); auto|]. unfold with_slopes_R. simpl.
+    change (fold_right _ (u * product_R us') _) with (with_slopes_R (tl between) hs (u * product_R us')).
+    rewrite with_slopes_times.
+    apply (layer_bound (activated (hd Relu between)) (real (steepest (hd Relu between))) _ k u); auto.
+    + apply all_slopes.
+    + apply with_slopes_nonneg. eapply product_nonneg; eauto.
+    + intros p q E. now apply activated_contracts.
 Qed.
 Lemma part_bound ps accepted p v : Forall (holds ps) accepted -> fits_part (part_at ps p) = true ->
   norm_of ps accepted p = Some v -> 0 <= real v /\ forall x y,
   norm (minus (unclamped (part_at ps p) x) (unclamped (part_at ps p) y)) <= real v * norm (minus x y).
 Proof.
   unfold norm_of. intros HA Hf Hv. destruct (norms accepted p 0 _) as [w|] eqn:Hw; [|discriminate].
-  inversion Hv. destruct (all_slopes (between (part_at ps p))) as [C S].
-  destruct (norms_sound ps accepted p w HA _ [] eq_refl Hw) as (us & B & E). rewrite real_with_slopes, E. split.
-  - apply with_slopes_nonneg; auto. eapply product_nonneg; eauto.
-  - intros x y. destruct (entrywise_between (part_at ps p)) eqn:W.
-    + rewrite !unclamped_network, map_map by auto. apply network_bound; auto. intros k. now apply fits_layer.
-    + unfold entrywise_between, unclamped in *. destruct (between (part_at ps p)); try discriminate.
-      simpl steepest. rewrite real_one. apply sorting_bound; auto. intros k. now apply fits_layer.
+  inversion Hv. destruct (norms_sound ps accepted p w HA _ [] eq_refl Hw) as (us & B & E).
+  rewrite real_with_slopes, E. split.
+  - apply with_slopes_nonneg. eapply product_nonneg; eauto.
+  - apply layers_bound; auto. intros k. now apply fits_layer.
 Qed.
 Lemma square_in_largest m scale d : (scale = [] \/ length d = length scale) -> positive_scale scale = true ->
   real (hd one scale) <= m -> Forall (fun s => real s <= m) scale -> square d <= m * m * square_in scale d.

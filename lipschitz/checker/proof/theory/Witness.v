@@ -16,10 +16,8 @@ Proof.
   - apply at_most_real in E. destruct (Rle_dec _ _); lra.
   - apply at_most_false in E. destruct (Rle_dec _ _); lra.
 Qed.
-Lemma relu_part p : relu_between p = true -> between p = Relu.
-Proof. unfold relu_between. now destruct (between p). Qed.
 Lemma real_value p x : relu_between p = true -> reals (valueD p x) = value p (reals x).
-Proof. intros H. unfold valueD, value, unclamped. now rewrite real_network, real_clamped, (relu_part p H). Qed.
+Proof. intros H. unfold valueD, value. now rewrite real_network, real_clamped, relu_network. Qed.
 Lemma real_value_of ps f rest x : forallb relu_between (parts_of ps f) = true ->
   reals (value_ofD ps f rest x) = value_of ps f (reals rest) (reals x).
 Proof.
