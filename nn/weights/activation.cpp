@@ -187,7 +187,9 @@ Weights with_activation(Weights weights, const std::string& text) {
     weights.notes.push_back("the network ends in " + listed_activations(text).back() +
                             ", which an identity layer follows");
   }
-  for (std::size_t k = 0; k < between.size(); ++k) weights.layers[k].activation = between[k].s;
+  std::vector<Activation> functions;
+  for (const ActivationTerms& terms : between) functions.push_back(terms.s);
+  weights.set_activations(functions);
   const auto is_itself = [](const ActivationTerms& terms) { return terms.is_s_itself(); };
   if (std::all_of(between.begin(), between.end(), is_itself)) return weights;
   try {

@@ -100,10 +100,6 @@ void Weights::set_activations(const std::vector<Activation>& between) {
   for (std::size_t k = 0; k < between.size(); ++k) layers[k].activation = between[k];
 }
 
-void Weights::set_activation(Activation everywhere) {
-  for (Layer& layer : layers) layer.activation = everywhere;
-}
-
 void Weights::end_in(Activation activation) {
   Layer identity;
   const auto has = [this](const std::string& taken) {

@@ -67,7 +67,6 @@ struct Weights {
   bool is_relu() const;  ///< whether all of them are ReLU
   /// Sets what lies between all layers. @throws std::invalid_argument unless there is one for each layer but the last.
   void set_activations(const std::vector<Activation>& between);
-  void set_activation(Activation everywhere);
   /// Puts a layer of weights 1 and biases 0 behind the last one, which `activation` then follows.
   void end_in(Activation activation);
   /// Whether the file itself, network.toml or the user states the activation.

@@ -23,7 +23,7 @@ using tests::layer;
 constexpr Activation kBent[] = {Activation::kSilu, Activation::kGelu};
 
 Network bent_network(Weights weights, Activation activation) {
-  weights.set_activation(activation);
+  tests::set_activation(weights, activation);
   return tests::plain(std::move(weights));
 }
 
@@ -70,7 +70,7 @@ TEST(BentBound, IsAtMostTheProductAndAboveThatOfRelu) {
       const double upper = bound_of(network);
       EXPECT_LT(upper, 0.9 * product_of(network));
       Network relu = network;
-      relu.plain->set_activation(Activation::kRelu);  // [0, 1] lies in [1 - c, c]
+      tests::set_activation(*relu.plain, Activation::kRelu);  // [0, 1] lies in [1 - c, c]
       EXPECT_GT(upper, tests::proved(sdp_bound(check::stages(relu, "network"))));
     }
   }
@@ -111,8 +111,8 @@ TEST(BentChain, HasOneBendPerHiddenLayerAndZeroWhereSlopesAreDivided) {
   std::mt19937 generator(45);
   Weights phi = tests::random_network({3, 4, 5}, generator),
           rho = tests::random_network({5, 6, 7, 1}, generator);
-  phi.set_activation(Activation::kSigmoid);
-  rho.set_activation(Activation::kGelu);
+  tests::set_activation(phi, Activation::kSigmoid);
+  tests::set_activation(rho, Activation::kGelu);
   const check::BentChain chain = check::bent_chain(tests::deep_set(phi, rho), "set:default:default");
   ASSERT_EQ(chain.stages.size(), 4u);
   ASSERT_EQ(chain.bends.size(), 3u);

@@ -310,7 +310,7 @@ TEST(MixedCertificate, StatesTheActivationsForFilesThatDoNot) {
   Weights& phi = unstated.phi.at("default");
   phi.layers.pop_back();  // the identity is no layer of the file
   for (Weights* const weights : {&phi, &unstated.rho.at("default")}) {
-    weights->set_activation(Activation::kRelu);
+    tests::set_activation(*weights, Activation::kRelu);
     weights->order_source = files::OrderSource::kNames;
   }
   // The name of the identity layer is that of the certificate's, because the file's layers have the same names.

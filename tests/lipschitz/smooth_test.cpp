@@ -24,7 +24,7 @@ constexpr Activation kSmooth[] = {Activation::kTanh, Activation::kSigmoid, Activ
                                   Activation::kGelu};
 
 files::Weights with(files::Weights weights, Activation activation) {
-  weights.set_activation(activation);
+  tests::set_activation(weights, activation);
   return weights;
 }
 
@@ -124,8 +124,8 @@ TEST(SmoothBounds, TheSampledEstimateLiesBelowTheBoundAndAboveBlindSampling) {
   // tanh(tanh(x0 + 3 x1) + s), whose largest slopes are 1, 3 and sqrt 10, where x0 + 3 x1 = s = 0.
   Network set = tests::deep_set(tests::weights({tests::layer(1, 2, {1, 3}), tests::layer(1, 1, {1})}),
                                 tests::weights({tests::layer(1, 1, {1}), tests::layer(1, 1, {1})}));
-  set.phi.at("default").set_activation(Activation::kTanh);
-  set.rho.at("default").set_activation(Activation::kTanh);
+  tests::set_activation(set.phi.at("default"), Activation::kTanh);
+  tests::set_activation(set.rho.at("default"), Activation::kTanh);
   const auto estimate_of = [&set](const std::string& block, const std::vector<double>& scale) {
     return lipschitz::slope_estimate(set, {"set:default:default", block, scale}, {}).value();
   };
@@ -349,7 +349,7 @@ TEST(SmoothCertificate, OfTheProductIsRejectedForABlockThatIsNone) {
 TEST(SmoothCertificate, StatesTheActivationForFilesThatDoNot) {
   Network unstated = smooth_set();
   for (files::Weights* const weights : {&unstated.phi.at("default"), &unstated.rho.at("default")}) {
-    weights->set_activation(Activation::kRelu);  // as it is assumed
+    tests::set_activation(*weights, Activation::kRelu);  // as it is assumed
     weights->order_source = files::OrderSource::kNames;
   }
   EXPECT_FALSE(checked(smooth_certificate(), unstated).accepted) << "check() itself takes NET as it is";

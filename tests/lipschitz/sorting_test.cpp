@@ -22,7 +22,7 @@ const Activation kSorting[] = {Activation::kMaxMinHalves, Activation::kMaxMinPai
                                files::group_sort(4), files::group_sort(8)};
 
 files::Weights sorting(files::Weights weights, Activation activation) {
-  weights.set_activation(activation);
+  tests::set_activation(weights, activation);
   return weights;
 }
 

@@ -178,9 +178,9 @@ TEST(SmoothActivation, RoundedWeightsCountTimesTheSteepestSlopes) {
   Weights weights = unstated();
   weights.layers[0].weight_rounding = 1e-12;
   const double with_relu = rounding_of_slope(weights);
-  weights.set_activation(Activation::kSigmoid);  // two of them: 1/16
+  tests::set_activation(weights, Activation::kSigmoid);  // two of them: 1/16
   EXPECT_NEAR(rounding_of_slope(weights), with_relu / 16, 1e-6 * with_relu);
-  weights.set_activation(Activation::kSilu);
+  tests::set_activation(weights, Activation::kSilu);
   EXPECT_GT(rounding_of_slope(weights), with_relu * 1.2);
 }
 
