@@ -16,7 +16,8 @@ namespace swarmcert::files {
 inline constexpr std::uint64_t kNoAddress = ~std::uint64_t{0};
 
 /// What mends a file that uses more of HDF5 than is read here.
-inline constexpr char kSaveAsVersion7[] = "load it in MATLAB, then save('net.mat', 'weights', '-v7')";
+inline constexpr char kSaveAsVersion7[] =
+    "load it in MATLAB, then save('net.mat', 'weights', '-v7'), or write it with scipy.io.savemat";
 
 /// A piece of a file, read from front to back. Whatever lies beyond its end is refused.
 class Hdf5Piece {
