@@ -294,7 +294,8 @@ Weights network_of_variables(std::vector<MatVariable>& variables, const std::str
 }  // namespace
 
 std::vector<double> rows_first(std::vector<double> columns_first, const std::vector<std::uint64_t>& shape) {
-  if (shape.size() != 2) return columns_first;
+  if (shape.size() != 2 || columns_first.empty())
+    return columns_first;  // 2^60 rows of no columns are no work
   std::vector<double> numbers;
   numbers.reserve(columns_first.size());
   for (std::uint64_t i = 0; i < shape[0]; ++i)

@@ -145,6 +145,12 @@ TEST(Mat73, MoreNumbersThanTheFileCanHoldAreRefusedUnread) {
   EXPECT_TRUE(refused(hdf5_chunked(48, {0, 2}), {2, 2}, {"shape of chunks = [0, 2]", "empty or too large"}));
 }
 
+TEST(Mat73, AMatrixOfManyRowsWithoutColumnsCostsNoTime) {
+  Mat73Writer writer;
+  EXPECT_TRUE(is_refused(file_of(writer, hdf5_contiguous(48, 0), "", {0, std::uint64_t{1} << 60}),
+                         {"layer1.weight = [1152921504606846976, 0]", "dimension of size 0"}));
+}
+
 TEST(Mat73, ABombOfZerosIsRefused) {
   // A chunk of 1 MiB in 1 KiB, which 200 matrices of four numbers refer to.
   Mat73Writer writer;
