@@ -181,7 +181,7 @@ inline Prediction<Scalar> predict_from_zero(const nn::DeepSet<Scalar>& set,
   };
   if (num_tracks < 0 || num_tracks > kMostNeighbours) return failed(PredictionStatus::kTooManyNeighbours);
   const bool fits = set.inputs() == kNeighbourInputs && set.outputs() == 1 &&
-                    (set.ground == nullptr || set.ground->inputs() == kOwnInputs);
+                    (set.ground == nullptr || set.own_inputs() == kOwnInputs);
   if (!fits) return failed(PredictionStatus::kWrongNetwork);
   if (!is_within(own_position_W_m, Scalar(kFarthestPosition_m)) || !is_finite(own_velocity_W_m_s)) {
     return failed(PredictionStatus::kOwnStateInvalid);

@@ -11,6 +11,7 @@
 #include "lipschitz/work_progress.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -25,10 +26,13 @@ check::Dyadic power(double base, std::size_t exponent) {
   return result;
 }
 
-/// Bounds on a box and branch and bound are for ReLU. @throws std::invalid_argument.
-void require_relu_on_a_box(const std::map<std::string, const Weights*>& parts,
+/// Bounds on a box and branch and bound are for ReLU, and relative states. @throws std::invalid_argument.
+void require_relu_on_a_box(const Network& network, const std::map<std::string, const Weights*>& parts,
                            const CertifyOptions& options) {
   if (options.domain.empty() && options.method != UpperMethod::kBranch) return;
+  if (network.invariants)
+    throw std::invalid_argument(std::string(options.domain.empty() ? "--method branch" : "bounds on a box") +
+                                ": for networks of relative states only, and these are rotation invariants");
   for (const auto& [name, weights] : parts) {
     if (weights->is_relu()) continue;
     throw std::invalid_argument(std::string(options.domain.empty() ? "--method branch" : "bounds on a box") +
@@ -168,11 +172,13 @@ void judge_gamma(const std::map<std::string, const Weights*>& parts, Certificati
   }
 }
 
-/// The product of norms, of the scale and of the steepest slopes between the layers: the first upper bound.
-void multiply_norms(const std::map<std::string, const Weights*>& parts,
+/// The product of norms, of the slope of the map to invariants, of the scale and of the steepest slopes between the
+/// layers: the first upper bound.
+void multiply_norms(const Network& network, const std::map<std::string, const Weights*>& parts,
                     const std::vector<CertifiedLayer>& layers, CertifiedBound& bound) {
   std::vector<UpperBound> norms;
   if (!bound.scale.empty()) norms.emplace_back(*std::max_element(bound.scale.begin(), bound.scale.end()));
+  norms.emplace_back(files::slope_of_inputs(network, bound.function));
   for (const std::string& name : files::networks_of(bound.function)) {
     for (const CertifiedLayer& layer : layers) {
       if (layer.network == name) norms.push_back(layer.norm.norm.upper);
@@ -184,7 +190,7 @@ void multiply_norms(const std::map<std::string, const Weights*>& parts,
       bound.is_monotone = bound.is_monotone && function.is_monotone();
     }
   }
-  bound.is_relu = has_witness(parts, bound.function);
+  bound.is_relu = has_witness(parts, bound.function) && !files::maps_to_invariants(network, bound.function);
   bound.product = bound.upper = product_up(norms);
 }
 
@@ -198,7 +204,7 @@ Certification certify(const Network& network, const CertifyOptions& options) {
     throw std::invalid_argument("certify: gamma must be positive");
   require_moderate(network);
   const std::map<std::string, const Weights*> parts = files::parts(network);
-  require_relu_on_a_box(parts, options);
+  require_relu_on_a_box(network, parts, options);
   std::vector<const files::Layer*> layers;
   for (const auto& [name, weights] : parts) {
     for (const files::Layer& layer : weights->layers) {
@@ -214,7 +220,7 @@ Certification certify(const Network& network, const CertifyOptions& options) {
       options.progress);
   enclose_norms(layers, options.jobs, progress, result);
   judge_gamma(parts, result);
-  for (CertifiedBound& bound : result.bounds) multiply_norms(parts, result.layers, bound);
+  for (CertifiedBound& bound : result.bounds) multiply_norms(network, parts, result.layers, bound);
   find_bounds(network, options, stop, progress, result.bounds);
   for (CertifiedLaw& law : result.laws) {
     settle(network, result.bounds, law);

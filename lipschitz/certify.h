@@ -53,7 +53,7 @@ struct CertifiedLayer {
 };
 
 struct CertifiedBound : Claim {
-  bool is_relu = true;      ///< otherwise there are no witness and no branch and bound
+  bool is_relu = true;      ///< of relative states; otherwise there are no witness and no branch and bound
   bool has_slopes = true;   ///< number by number; otherwise a layer is sorted, and the product is the bound
   bool is_monotone = true;  ///< otherwise the layer-wise bound is that of the product
   UpperBound upper{0};
@@ -107,10 +107,12 @@ std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const st
 /// over every box; lower bounds are exact slopes between two float32 points. The clamp of NET, which never increases
 /// a distance, leaves the upper bounds valid. Functions with other activations than ReLU, and set functions where any
 /// phi has one, get upper bounds only: by the same matrix inequality where the activation is monotone
-/// (checker/stages.h), else, up to the size that bent_bound.h states, by its extension. Branch and bound runs on what
-/// the clamp lets through of the box, or on a projective cover of all inputs where there is no box.
+/// (checker/stages.h), else, up to the size that bent_bound.h states, by its extension. Set functions of rotation
+/// invariants get upper bounds only, too: those of rho(sum phi) times the Lipschitz constant of the map to invariants.
+/// Branch and bound runs on what the clamp lets through of the box, or on a projective cover of all inputs where there
+/// is no box.
 /// @throws std::invalid_argument if gamma is not positive, if there is a domain or branch and bound is asked for and an
-///   activation is not ReLU, or as claims() and law_claims().
+///   activation is not ReLU or NET has invariants, or as claims() and law_claims().
 Certification certify(const files::Network& network, const CertifyOptions& options);
 
 /// What the law gives from verified bounds of its terms, rounded up.

@@ -7,6 +7,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/toml.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -18,8 +19,10 @@ bool contains(const std::vector<std::string>& list, const std::string& text) {
 /// Whether `function` takes inputs of NET rather than hidden values.
 bool takes_inputs(const std::string& function) { return !files::is_rho(function); }
 
-int inputs_of(const files::Network& network, const std::string& function) {
-  return files::parts(network).at(files::networks_of(function).front())->inputs();
+/// Whether there are claims of `function` with weights of its inputs.
+bool takes_scale(const files::Network& network, const std::string& function, std::size_t scales) {
+  return takes_inputs(function) && !files::maps_to_invariants(network, function) &&
+         static_cast<std::size_t>(files::inputs(network, function)) == scales;
 }
 
 /// The groups of neighbours that the options name.
@@ -95,8 +98,7 @@ std::vector<Claim> claims(const files::Network& network, const ClaimOptions& opt
       result.push_back(claim);
     }
     claim.block = "all";
-    if (options.scale.empty() || !takes_inputs(function)) continue;
-    if (static_cast<std::size_t>(inputs_of(network, function)) != options.scale.size()) continue;
+    if (options.scale.empty() || !takes_scale(network, function, options.scale.size())) continue;
     scale_fits = true;
     claim.scale = options.scale;
     result.push_back(claim);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -33,7 +34,8 @@ class SampledFunction {
     for (const auto& [name, weights] : files::parts(network))
       evaluators_.emplace(name, Evaluator<double>(*weights));
     first_ = names.front();
-    inputs_ = files::parts(network).at(first_)->inputs();
+    inputs_ = files::inputs(network, claim.function);
+    maps_ = files::maps_to_invariants(network, claim.function);
     if (names.size() == 2) last_ = names.back();
     block_ = files::block_coordinates(network, claim.function, claim.block);
     for (const int k : block_)
@@ -92,7 +94,7 @@ class SampledFunction {
   VectorXd random_point_of(const std::string& part, Index size, std::mt19937_64& generator) const {
     const double scale = std::exp2(static_cast<double>(generator() % 8) - 4);
     VectorXd x(size);
-    const bool is_clamped = network_.clamp && files::is_clamped(part);
+    const bool is_clamped = network_.clamp && files::is_clamped(part) && !maps_;
     for (Index k = 0; k < size; ++k) {
       const double r = random_number(generator);
       const auto i = static_cast<std::size_t>(k);
@@ -104,7 +106,7 @@ class SampledFunction {
   }
 
   void add_other(const std::string& part, std::mt19937_64& generator) {
-    const Index size = files::parts(network_).at(part)->inputs();
+    const Index size = files::inputs(network_, files::set_name(files::kind_of(part), files::kind_of(*last_)));
     others_ += term(part, random_point_of(part, size, generator));
   }
 
@@ -114,6 +116,10 @@ class SampledFunction {
   }
 
   VectorXd term(const std::string& part, VectorXd x) const {
+    if (maps_) {
+      const std::vector<double> seen = files::invariants_of(part, {x.data(), x.data() + x.size()});
+      x = VectorXd::Map(seen.data(), static_cast<Index>(seen.size()));
+    }
     if (network_.clamp && files::is_clamped(part))
       for (Index k = 0; k < x.size(); ++k)
         x[k] = std::min(std::max(x[k], network_.clamp->lower[static_cast<std::size_t>(k)]),
@@ -142,6 +148,7 @@ class SampledFunction {
   std::string first_;
   std::optional<std::string> last_;
   Index inputs_ = 0;
+  bool maps_ = false;  ///< to invariants, before the clamp
   std::vector<int> block_;
   std::vector<double> scale_;
   double work_ = 0;

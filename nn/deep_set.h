@@ -2,11 +2,13 @@
 ///
 ///   f(own, {x_j, c_j}) = rho(phi_ground(own) + sum_j phi_{c_j}(clamp(x_j)))
 ///
+/// A set of invariants sees J(x_j) in place of x_j, and K(own) in place of own (invariants.h).
+///
 /// Addition of floats is not associative: the same neighbours, summed in another order, give other bits. The order in
 /// which radio packets arrive would then be an input of the controller, one that no certificate covers and no log
 /// replays. So the sum has one order, a function of the set alone: first the ground, then the kinds by index, and
-/// within a kind by the clamped inputs, compared number by number as unsigned bit patterns. Any total order would do;
-/// this one needs no case for zeros of either sign. Neighbours that compare equal have equal inputs and are
+/// within a kind by the clamped inputs of phi, compared number by number as unsigned bit patterns. Any total order
+/// would do; this one needs no case for zeros of either sign. Neighbours that compare equal have equal inputs and are
 /// interchangeable. Neighbours that follow one another in this order and are of one kind go through phi together, a few
 /// at a time; what is added when does not change.
 #pragma once
@@ -14,6 +16,7 @@
 #include <cstdint>
 
 #include "nn/arithmetic.h"
+#include "nn/invariants.h"
 #include "nn/mlp.h"
 
 namespace swarmcert::nn {
@@ -26,15 +29,23 @@ struct DeepSet {
   const Mlp<Scalar>* phi;     ///< [num_kinds], by the neighbour's kind
   int num_kinds;
   Mlp<Scalar> rho;      ///< of the vehicle's own kind
-  const Scalar* lower;  ///< [inputs()] each; nullptr: no clamp. The ground's input is not clamped.
+  const Scalar* lower;  ///< [phi_inputs()] each; nullptr: no clamp. The ground's input is not clamped.
   const Scalar* upper;
+  bool of_invariants = false;
 
-  constexpr int inputs() const { return phi[0].inputs(); }
+  /// Numbers per neighbour; not those of phi in a set of invariants.
+  constexpr int inputs() const { return of_invariants ? kRelativeState : phi_inputs(); }
+  constexpr int phi_inputs() const { return phi[0].inputs(); }
+  /// Of the vehicle's own state; 0 without a ground term.
+  constexpr int own_inputs() const {
+    return ground == nullptr ? 0 : of_invariants ? kOwnState : ground->inputs();
+  }
   constexpr int hidden() const { return rho.inputs(); }
   constexpr int outputs() const { return rho.outputs(); }
 };
 
-/// True if all phi have the same number of inputs, phi and ground have rho.inputs() outputs, and all are chains.
+/// True if all phi have the same number of inputs, phi and ground have rho.inputs() outputs, and all are chains; in a
+/// set of invariants, phi and ground take as many as there are.
 template <typename Scalar>
 constexpr bool fits_together(const DeepSet<Scalar>& set) {
   if (set.num_kinds < 1 || !is_chain(set.rho)) return false;
@@ -42,9 +53,11 @@ constexpr bool fits_together(const DeepSet<Scalar>& set) {
     return false;
   for (int kind = 0; kind < set.num_kinds; ++kind) {
     const Mlp<Scalar>& phi = set.phi[kind];
-    if (!is_chain(phi) || phi.inputs() != set.inputs() || phi.outputs() != set.hidden()) return false;
+    if (!is_chain(phi) || phi.inputs() != set.phi_inputs() || phi.outputs() != set.hidden()) return false;
   }
-  return true;
+  if (!set.of_invariants) return true;
+  return set.phi_inputs() == kNeighbourInvariants &&
+         (set.ground == nullptr || set.ground->inputs() == kOwnInvariants);
 }
 
 /// One neighbour as the vehicle sees it.
@@ -66,7 +79,7 @@ enum class DeepSetStatus : std::uint8_t {
 /// Memory for one evaluation; the caller owns it and need not clear it.
 template <typename Scalar>
 struct DeepSetWorkspace {
-  Scalar* inputs;      ///< [capacity x DeepSet::inputs()], copies of the clamped inputs
+  Scalar* inputs;      ///< [capacity x DeepSet::phi_inputs()], copies of the clamped inputs of phi
   int* order;          ///< [capacity]
   int capacity;        ///< most neighbours
   Scalar* hidden_sum;  ///< [DeepSet::hidden()]
@@ -83,7 +96,7 @@ constexpr int scratch_size(const DeepSet<Scalar>& set) {
   if (set.ground != nullptr && scratch_size(*set.ground) > largest) largest = scratch_size(*set.ground);
   for (int kind = 0; kind < set.num_kinds; ++kind) {
     const int size =
-        scratch_size(set.phi[kind], kMostTogether) + kMostTogether * (set.inputs() + set.hidden());
+        scratch_size(set.phi[kind], kMostTogether) + kMostTogether * (set.phi_inputs() + set.hidden());
     if (size > largest) largest = size;
   }
   return largest;
@@ -99,21 +112,52 @@ inline bool comes_before(const Scalar* a, const Scalar* b, int size) {
   return false;
 }
 
-/// Copies the clamped inputs: a position that another task updates between sort and sum cannot break the order.
+/// Copies the inputs of phi before the clamp: a position that another task updates between sort and sum cannot break
+/// the order.
+/// @returns whether they are finite.
+template <typename Scalar>
+inline bool take_input(const DeepSet<Scalar>& set, const Scalar* input, Scalar* copy) {
+  if (set.of_invariants) {
+    neighbour_invariants(input, copy);  // of an input that is not finite, some are not
+  } else {
+    for (int i = 0; i < set.phi_inputs(); ++i) copy[i] = input[i];
+  }
+  for (int i = 0; i < set.phi_inputs(); ++i) {
+    if (!is_finite(copy[i])) return false;
+  }
+  return true;
+}
+
+/// copies = the clamped inputs of phi.
 template <typename Scalar>
 inline DeepSetStatus take_inputs(const DeepSet<Scalar>& set, const Neighbour<Scalar>* neighbours,
                                  int num_neighbours, Scalar* copies) {
+  const int size = set.phi_inputs();
   for (int j = 0; j < num_neighbours; ++j) {
     if (neighbours[j].kind < 0 || neighbours[j].kind >= set.num_kinds) return DeepSetStatus::kUnknownKind;
-    Scalar* const copy = copies + static_cast<long>(j) * set.inputs();
-    for (int i = 0; i < set.inputs(); ++i) {
-      Scalar x = neighbours[j].input[i];
-      if (!is_finite(x)) return DeepSetStatus::kInputNotFinite;
-      if (set.lower != nullptr) x = x < set.lower[i] ? set.lower[i] : x > set.upper[i] ? set.upper[i] : x;
-      copy[i] = x;
+    Scalar* const copy = copies + static_cast<long>(j) * size;
+    if (!take_input(set, neighbours[j].input, copy)) return DeepSetStatus::kInputNotFinite;
+    for (int i = 0; set.lower != nullptr && i < size; ++i) {
+      const Scalar x = copy[i];
+      copy[i] = x < set.lower[i] ? set.lower[i] : x > set.upper[i] ? set.upper[i] : x;
     }
   }
   return DeepSetStatus::kOk;
+}
+
+/// hidden_sum = phi_ground(own).
+/// @returns whether its input is finite.
+template <typename Scalar>
+inline bool add_ground(const DeepSet<Scalar>& set, const Scalar* own,
+                       const DeepSetWorkspace<Scalar>& workspace) {
+  Scalar invariants[kOwnInvariants] = {};
+  if (set.of_invariants) own_invariants(own, invariants);
+  const Scalar* const x = set.of_invariants ? invariants : own;
+  for (int i = 0; i < set.ground->inputs(); ++i) {
+    if (!is_finite(x[i])) return false;
+  }
+  evaluate(*set.ground, x, workspace.hidden_sum, workspace.scratch);
+  return true;
 }
 
 /// order = the neighbours in the canonical order of this file's head. Insertion sort: short, in place, and the number
@@ -121,7 +165,7 @@ inline DeepSetStatus take_inputs(const DeepSet<Scalar>& set, const Neighbour<Sca
 template <typename Scalar>
 inline void sort_canonically(const DeepSet<Scalar>& set, const Neighbour<Scalar>* neighbours,
                              int num_neighbours, const Scalar* copies, int* order) {
-  const int size = set.inputs();
+  const int size = set.phi_inputs();
   for (int j = 0; j < num_neighbours; ++j) {
     int at = j;
     for (; at > 0; --at) {
@@ -143,7 +187,7 @@ inline void sort_canonically(const DeepSet<Scalar>& set, const Neighbour<Scalar>
 template <int Together, typename Scalar>
 inline void add_phi(const DeepSet<Scalar>& set, int kind, const int* order,
                     const DeepSetWorkspace<Scalar>& workspace) {
-  const int inputs = set.inputs();
+  const int inputs = set.phi_inputs();
   Scalar* const x = workspace.scratch;
   Scalar* const hidden = x + static_cast<long>(Together) * inputs;
   Scalar* const scratch = hidden + static_cast<long>(Together) * set.hidden();
@@ -169,12 +213,7 @@ inline DeepSetStatus evaluate_checked(const DeepSet<Scalar>& set, const Scalar* 
   sort_canonically(set, neighbours, num_neighbours, workspace.inputs, workspace.order);
 
   for (int i = 0; i < set.hidden(); ++i) workspace.hidden_sum[i] = Scalar(0);
-  if (set.ground != nullptr) {
-    for (int i = 0; i < set.ground->inputs(); ++i) {
-      if (!is_finite(own[i])) return DeepSetStatus::kInputNotFinite;
-    }
-    evaluate(*set.ground, own, workspace.hidden_sum, workspace.scratch);
-  }
+  if (set.ground != nullptr && !add_ground(set, own, workspace)) return DeepSetStatus::kInputNotFinite;
   for (int begin = 0; begin < num_neighbours;) {
     const int* const order = workspace.order + begin;
     const int kind = neighbours[order[0]].kind;
@@ -198,7 +237,7 @@ inline DeepSetStatus evaluate_checked(const DeepSet<Scalar>& set, const Scalar* 
 }  // namespace detail
 
 /// Evaluates `set`.
-/// @param own        [set.ground->inputs()]; ignored where there is no ground term.
+/// @param own        [set.own_inputs()]; ignored where there is no ground term.
 /// @param neighbours [num_neighbours], in any order: every order gives the same bits.
 /// @param output     [set.outputs()]; zeros unless the status is kOk: no compensation rather than a wrong one.
 template <typename Scalar>

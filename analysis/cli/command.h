@@ -58,9 +58,11 @@ void declare_activation(CLI::App& app, files::NetworkArguments& arguments);
 /// Declares NET: a positional FILE, or --phi with --rho, --key and --order.
 void declare_network(CLI::App& app, files::NetworkArguments& arguments);
 
-/// Loads NET, whose activation is ReLU, or takes the host's. @throws UsageError if nothing was named, or an order for a
-/// file that was not; files::InputError as files::load_network() does.
+/// Loads NET, whose activation is ReLU and whose inputs are relative states, or takes the host's. @throws UsageError if
+/// nothing was named, or an order for a file that was not; files::InputError as files::load_network() does.
 files::Network load_net(const files::NetworkArguments& arguments);
+/// The same of relative states or invariants: what the evaluator runs (nn/deep_set.h).
+files::Network load_evaluated_net(const files::NetworkArguments& arguments);
 /// The same of networks with any activation.
 files::Network load_any_net(const files::NetworkArguments& arguments);
 

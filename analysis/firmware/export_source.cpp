@@ -13,6 +13,7 @@
 #include "nn/base/json.h"
 #include "nn/deep_set.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
 #include "nn/weights/record_samples.h"
 
 namespace swarmcert::firmware {
@@ -127,9 +128,7 @@ std::uint32_t weights_hash(const files::Network& network) {
 
 /// True if the inputs are relative position, then relative velocity, as flight code has them.
 bool takes_relative_state(const files::Network& network, int inputs) {
-  static const std::vector<std::string> order = {"dp_x_m",   "dp_y_m",   "dp_z_m",
-                                                 "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"};
-  return network.input_order.empty() ? inputs == 6 : network.input_order == order;
+  return network.input_order.empty() ? inputs == 6 : network.input_order == files::relative_state();
 }
 
 std::string parameter_line(const ExportOptions& options) {
@@ -195,7 +194,7 @@ SelfTest self_test(int* failed);
 
 std::string header_text(const files::Network& network, const ExportOptions& options) {
   const std::vector<std::string> kinds = neighbour_kinds(network);
-  const int inputs = network.phi.at(kinds.front()).inputs();
+  const int inputs = files::inputs(network, files::set_name(kinds.front(), network.rho.begin()->first));
   std::string neighbour_list, own_list, input_list;
   for (std::size_t i = 0; i < kinds.size(); ++i)
     neighbour_list += fmt::format("///   {}: {}\n", i, comment(kinds[i]));
@@ -311,9 +310,9 @@ std::string source_text(const files::Network& network, const ExportOptions& opti
             array("static constexpr float upper", narrow(network.clamp->upper));
   }
   for (const auto& [kind, weights] : network.rho)
-    sets += fmt::format("    {{{}, phi, swarmcert_network::kNeighbourKinds, {}, {}}},\n",
+    sets += fmt::format("    {{{}, phi, swarmcert_network::kNeighbourKinds, {}, {}, {}}},\n",
                         has_ground ? "&ground" : "nullptr", mlp(ids.at(files::rho_name(kind)), weights),
-                        network.clamp ? "lower, upper" : "nullptr, nullptr");
+                        network.clamp ? "lower, upper" : "nullptr, nullptr", network.invariants);
   text += fmt::format(
       R"(static constexpr DeepSet<float> sets[swarmcert_network::kOwnKinds] = {{
 {sets}}};

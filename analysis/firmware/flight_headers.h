@@ -9,6 +9,6 @@ struct FlightHeader {
 };
 
 /// Made at build time from nn/: the same bytes.
-extern const FlightHeader kFlightHeaders[4];
+extern const FlightHeader kFlightHeaders[5];
 
 }  // namespace swarmcert::firmware

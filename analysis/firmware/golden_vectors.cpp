@@ -18,7 +18,7 @@ constexpr float kMostPosition_m = 1, kMostVelocity_m_s = 2;
 class FlightEvaluator {
  public:
   FlightEvaluator(const files::Network& network, int most_neighbours)
-      : most_(most_neighbours), scale_(newton_per_unit(network)) {
+      : most_(most_neighbours), scale_(newton_per_unit(network)), of_invariants_(network.invariants) {
     for (const auto& [part, weights] : files::parts(network)) evaluators_.emplace(part, *weights);
     for (const std::string& kind : neighbour_kinds(network))
       phi_.push_back(evaluators_.at(files::phi_name(kind)).mlp());
@@ -39,11 +39,12 @@ class FlightEvaluator {
                                  static_cast<int>(phi_.size()),
                                  evaluators_.at(files::rho_name(rho_kind)).mlp(),
                                  lower_.empty() ? nullptr : lower_.data(),
-                                 upper_.empty() ? nullptr : upper_.data()};
+                                 upper_.empty() ? nullptr : upper_.data(),
+                                 of_invariants_};
     std::vector<nn::Neighbour<float>> neighbours;
     for (std::size_t j = 0; j < vector.inputs.size(); ++j)
       neighbours.push_back({vector.inputs[j].data(), vector.kinds[j]});
-    std::vector<float> copies(static_cast<std::size_t>(most_ * set.inputs()));
+    std::vector<float> copies(static_cast<std::size_t>(most_ * set.phi_inputs()));
     std::vector<int> order(static_cast<std::size_t>(most_));
     std::vector<float> sum(static_cast<std::size_t>(set.hidden()));
     std::vector<float> scratch(static_cast<std::size_t>(scratch_size(set)));
@@ -57,6 +58,7 @@ class FlightEvaluator {
  private:
   int most_;
   float scale_;
+  bool of_invariants_;
   std::map<std::string, files::Evaluator<float>> evaluators_;
   std::vector<nn::Mlp<float>> phi_;
   nn::Mlp<float> ground_{};
@@ -82,7 +84,7 @@ float newton_per_unit(const files::Network& network) {
 std::vector<GoldenVector> golden_vectors(const files::Network& network, int count, int most_neighbours,
                                          std::uint64_t seed) {
   const std::vector<std::string> kinds = neighbour_kinds(network);
-  const int inputs = network.phi.at(kinds.front()).inputs();
+  const int inputs = files::inputs(network, files::set_name(kinds.front(), network.rho.begin()->first));
   const FlightEvaluator evaluator(network, most_neighbours);
   files::Random random(seed);
   const auto within = [&](float range) { return range * static_cast<float>(random.symmetric()); };
@@ -97,11 +99,11 @@ std::vector<GoldenVector> golden_vectors(const files::Network& network, int coun
       vector.inputs.resize(static_cast<std::size_t>(g % (most_neighbours + 1)));
       for (std::vector<float>& input : vector.inputs) {
         for (int i = 0; i < inputs; ++i) {
+          const bool has_clamp = network.clamp && !network.invariants;  // one of invariants limits no state
           const double side =
-              !network.clamp ? 0
-                             : std::max(std::abs(network.clamp->lower[i]), std::abs(network.clamp->upper[i]));
-          const float range = network.clamp ? static_cast<float>(1.5 * std::min(side, 1e3))
-                                            : (i < 3 ? kMostPosition_m : kMostVelocity_m_s);
+              !has_clamp ? 0 : std::max(std::abs(network.clamp->lower[i]), std::abs(network.clamp->upper[i]));
+          const float range = has_clamp ? static_cast<float>(1.5 * std::min(side, 1e3))
+                                        : (i < 3 ? kMostPosition_m : kMostVelocity_m_s);
           input.push_back(within(range));
         }
         vector.kinds.push_back(static_cast<int>(random.below(kinds.size())));

@@ -27,7 +27,7 @@ std::vector<std::string> neighbour_kinds(const files::Network& network);
 float newton_per_unit(const files::Network& network);
 
 /// `count` random vectors for each kind of vehicle, with no neighbours to `most_neighbours`; inputs reach half as far
-/// again as the clamp, or +-1 m and +-2 m/s. Computed by the evaluator that flies.
+/// again as the clamp of states, or +-1 m and +-2 m/s. Computed by the evaluator that flies.
 /// Precondition: every weight is a float32; the network is a deep set.
 std::vector<GoldenVector> golden_vectors(const files::Network& network, int count, int most_neighbours,
                                          std::uint64_t seed);

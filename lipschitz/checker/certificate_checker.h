@@ -45,6 +45,8 @@ class CertificateChecker {
   /// What is stated of functions with other activations than ReLU: nothing on a box, no witness.
   void check_activations(const Json& bound, const std::vector<std::string>& names,
                          const std::string& where) const;
+  /// Of functions of rotation invariants: nothing on a box, no witness, no scale.
+  void check_invariants(const Json& bound, const std::string& function, const std::string& where) const;
   /// Of a set function, at most how many of each kind there are; empty: any number.
   Neighbours neighbours_of(const Json& bound, const std::string& where) const;
   static std::string key(const std::string& function, const std::string& block, const Neighbours& neighbours);

@@ -6,6 +6,7 @@
 #include "nn/weights/activation.h"
 #include "nn/weights/chain.h"
 #include "nn/weights/function_names.h"
+#include "nn/weights/invariants.h"
 
 namespace swarmcert::check {
 namespace {
@@ -175,6 +176,7 @@ void CertificateChecker::check_bound(const Json& bound) {
   const double upper = number(bound["upper"], bound["upper_hex"], where + " upper");
   check_status(bound, where);
   check_activations(bound, names, where);
+  check_invariants(bound, function, where);
   files::block_coordinates(network_, function, block);  // refuses what is no block of the function
   if (bound["upper_method"] == "sdp" || bound["upper_method"] == "eclipse_fast") {
     check_upper(bent_chain(network_, function, block, scale), bound["proof"], upper, where);
@@ -201,6 +203,7 @@ void CertificateChecker::check_product(const Json& bound, const std::vector<std:
                                        const std::vector<double>& scale, const std::string& where) const {
   require(bound["upper_method"] == "product" && bound["proof"].is_null(), where + ": unknown upper_method");
   Dyadic total = scale.empty() ? 1.0 : *std::max_element(scale.begin(), scale.end());
+  total = total * files::slope_of_inputs(network_, bound["function"].get<std::string>());
   for (const std::string& name : names) {
     require(norms_.count(name) == 1, where + ": there is no network " + name);
     total = total * norms_.at(name);
@@ -226,6 +229,17 @@ void CertificateChecker::check_activations(const Json& bound, const std::vector<
               where + ": a bound from slopes of single numbers" + with);
     }
   }
+}
+
+void CertificateChecker::check_invariants(const Json& bound, const std::string& function,
+                                          const std::string& where) const {
+  if (!files::maps_to_invariants(network_, function)) return;
+  const std::string of = " of a function of rotation invariants";
+  require(bound["domain"] == "global" && bound["upper_method"] != "branch",
+          where + ": a bound on a box" + of);
+  require(bound["lower"].is_null() && bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
+          where + ": a lower bound" + of);
+  require(bound["scale"].empty(), where + ": a scale" + of);
 }
 
 CertificateChecker::Neighbours CertificateChecker::neighbours_of(const Json& bound,
@@ -294,7 +308,8 @@ std::string statement_for(const files::Network& network) {
     const std::vector<files::Activation> all = part.second->activations();
     return std::any_of(all.begin(), all.end(), [](auto one) { return files::function_of(one).sorts(); });
   });
-  return std::string(kStatement) + (sorts ? kSortingStatement : "");
+  return std::string(kStatement) + (sorts ? kSortingStatement : "") +
+         (network.invariants ? kInvariantsStatement : "");
 }
 
 namespace {

@@ -80,6 +80,7 @@ void CertificateChecker::check_values(const Json& entry) {
   const bool is_set = names.size() == 2;
   for (const std::string& name : names)
     require(parts_.count(name) == 1 && parts_.at(name)->is_relu(), where + ": only of ReLU networks");
+  require(!network_.invariants, where + ": values of a function of rotation invariants");
   require(is_set ? names[0] != files::kGroundPhi : function == "network",
           where + ": only of the network, or of a sum over neighbours");
   const bool has_ground = is_set && parts_.count(files::kGroundPhi) == 1;

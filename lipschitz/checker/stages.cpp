@@ -5,6 +5,7 @@
 
 #include "lipschitz/checker/lipschitz_lmi.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
 
 namespace swarmcert::check {
 namespace {
@@ -19,6 +20,12 @@ Matrix selected_columns(const Matrix& w, const std::vector<int>& inputs, const s
           scale.empty() ? w(i, input) : w(i, input) * Dyadic(scale[static_cast<std::size_t>(input)]);
   }
   return result;
+}
+
+/// W, times the Lipschitz constant of the map to what it sees.
+Matrix of_invariants(Matrix w, const Dyadic& slope) {
+  for (Dyadic& entry : w.entries) entry = entry * slope;
+  return w;
 }
 
 /// What an activation is divided by, and g of BentChain for the quotient, whose slopes lie in [0, 1] or [1 - c, c].
@@ -52,6 +59,9 @@ BentChain bent_chain(const files::Network& network, const std::string& function,
   const std::vector<std::string> names = files::networks_of(function);
   const std::vector<int> coordinates = files::block_coordinates(network, function, block);
   const int inputs = parts.at(names.front())->inputs();
+  const bool maps = files::maps_to_invariants(network, function);
+  if (maps && !scale.empty())
+    throw std::invalid_argument(function + " takes states, whose invariants have no scale");
   if (!scale.empty() && scale.size() != static_cast<std::size_t>(inputs)) {
     throw std::invalid_argument("scale has " + std::to_string(scale.size()) + " numbers, " + function +
                                 " has " + std::to_string(inputs) + " inputs");
@@ -66,7 +76,8 @@ BentChain bent_chain(const files::Network& network, const std::string& function,
       for (Dyadic& entry : w.entries)
         if (!joins) entry = entry * before.slope;
       if (chain.empty()) {
-        chain.push_back(selected_columns(w, coordinates, scale));
+        chain.push_back(maps ? of_invariants(w, files::slope_of_inputs(network, function))
+                             : selected_columns(w, coordinates, scale));
       } else if (joins) {
         chain.back() = product(w, chain.back());
       } else {

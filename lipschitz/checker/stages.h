@@ -16,7 +16,8 @@ namespace swarmcert::check {
 /// on the input coordinates of `block`, each in units of its `scale` (empty: 1). In a set function the last layer of
 /// phi and the first of rho, which no activation separates, are one stage: their product.
 /// An activation s of slopes in [0, b] is b times one of slopes in [0, 1]: the stage behind it is multiplied by b. ReLU
-/// has b = 1.
+/// has b = 1. Where `function` maps its inputs to invariants, the first stage acts on those, and is multiplied by the
+/// map's Lipschitz constant: every bound of the chain is one of the function.
 /// @throws std::domain_error if an activation of `function` sorts, or is not monotone: see bent_chain();
 ///   std::out_of_range or std::invalid_argument if NET has no such function or block, or `scale` has
 ///   not one number per input.

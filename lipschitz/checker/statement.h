@@ -38,6 +38,13 @@ inline constexpr const char* kSortingStatement =
     "maxmin:halves, of 2 h numbers, is max(t_i, t_(i+h)) for i = 1 .. h and then min(t_i, t_(i+h)); "
     "maxmin:pairs is max(t_(2i-1), t_(2i)) for i = 1 .. h and then min(t_(2i-1), t_(2i)).";
 
+/// What is added for networks of rotation invariants.
+inline constexpr const char* kInvariantsStatement =
+    " A set function takes of each neighbour its relative position p in m and velocity v in m/s, whose "
+    "vertical components are p_z and v_z, and of the vehicle -z in m and -v in m/s; phi sees their "
+    "invariants: of a neighbour |p_xy|, 3/2 p_z, |v_xy|, 3/2 v_z, |p_xy + v_xy / 2|, and the ground's phi "
+    "-z, |v_xy|, -v_z. So the input clamp is one of invariants, and phi alone is a function of them.";
+
 /// The statement of a certificate for NET.
 std::string statement_for(const files::Network& network);
 

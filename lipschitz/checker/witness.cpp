@@ -8,6 +8,7 @@
 #include <string>
 
 #include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -205,6 +206,7 @@ SlopeFunction slope_function(const files::Network& network, const std::string& f
                              const std::vector<std::string>& others) {
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const std::vector<std::string> names = files::networks_of(function);
+  if (files::maps_to_invariants(network, function)) refuse(function + " maps to rotation invariants");
   if (!files::is_relu(network, function)) refuse(function + " is no ReLU network");
   const auto term = [&](const std::string& name) {
     if (!parts.at(name)->is_relu()) refuse(name + " is no ReLU network");
@@ -230,6 +232,7 @@ std::vector<mpq_class> value(const files::Network& network, const std::string& f
                              const std::vector<std::vector<float>>& points) {
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const std::vector<std::string> names = files::networks_of(function);
+  if (files::maps_to_invariants(network, function)) refuse(function + " maps to rotation invariants");
   if (names.size() == 1 && networks.size() != 1) refuse("a plain network has one point");
   if (networks.size() != points.size()) refuse("there is not one point per network");
   DyadicVector sum;

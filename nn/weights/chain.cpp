@@ -57,7 +57,7 @@ std::string chain_words(const Network& network) {
   if (network.plain) return chains.front().first;
   std::string text;
   for (const auto& [words, names] : chains) text += (text.empty() ? "" : "; ") + names + ": " + words;
-  return text;
+  return text + (network.invariants ? "; phi of rotation invariants" : "");
 }
 
 }  // namespace swarmcert::files

@@ -27,7 +27,7 @@ Json chain_json(const std::vector<ChainStep>& chain);
 std::string chain_words(const std::vector<ChainStep>& chain);
 
 /// Of all parts: "fc1 - ReLU - fc2" for a plain network; else one entry per chain with the parts that have it,
-/// "phi:large, phi:small: clamp - fc1 - ReLU - fc2; rho:small: ...".
+/// "phi:large, phi:small: clamp - fc1 - ReLU - fc2; rho:small: ...", and whether phi sees invariants.
 std::string chain_words(const Network& network);
 
 }  // namespace swarmcert::files

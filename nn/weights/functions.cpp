@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "nn/weights/invariants.h"
+
 namespace swarmcert::files {
 namespace {
 
@@ -28,9 +30,12 @@ std::vector<std::string> ground_names() {
 }
 
 /// Names that show which inputs are positions and which velocities; empty where nobody knows.
-std::vector<std::string> input_names(const Network& network, const std::string& part, int inputs) {
-  if (part == kGroundPhi) return ground_names();
-  if (is_rho(part)) return {};
+std::vector<std::string> input_names(const Network& network, const std::string& function, int inputs) {
+  if (is_rho(function)) return {};
+  const bool is_ground = networks_of(function).front() == kGroundPhi;
+  if (network.invariants && is_phi(function))
+    return is_ground ? own_invariant_names() : neighbour_invariant_names();
+  if (is_ground) return ground_names();
   if (!network.input_order.empty()) return network.input_order;
   if (inputs != 6) return {};
   return {"dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"};
@@ -64,17 +69,27 @@ std::vector<std::string> functions(const Network& network) {
   return names;
 }
 
+int inputs(const Network& network, const std::string& function) {
+  const std::string first = networks_of(function).front();
+  if (maps_to_invariants(network, function)) return first == kGroundPhi ? nn::kOwnState : nn::kRelativeState;
+  return parts(network).at(first)->inputs();
+}
+
 bool is_clamped(const std::string& name) {
   return name == kPlainNetwork || (is_phi(name) && name != kGroundPhi);
 }
 
 std::vector<int> block_coordinates(const Network& network, const std::string& function,
                                    const std::string& block) {
-  const std::string first = networks_of(function).front();
-  const int inputs = parts(network).at(first)->inputs();
-  const std::vector<std::string> names = input_names(network, first, inputs);
+  const int count = inputs(network, function);
+  const std::vector<std::string> names = input_names(network, function, count);
   std::vector<int> result;
-  for (int k = 0; k < inputs; ++k) {
+  if (maps_to_invariants(network, function) && block != "all") {
+    throw std::invalid_argument("block_coordinates: " + function +
+                                " is bounded for all inputs together, not for \"" + block +
+                                "\": its phi sees invariants of them");
+  }
+  for (int k = 0; k < count; ++k) {
     const bool named = static_cast<std::size_t>(k) < names.size();
     const bool is_velocity = named && ends_with(names[k], "_m_s");
     const bool is_position = named && ends_with(names[k], "_m");
@@ -89,24 +104,22 @@ std::vector<int> block_coordinates(const Network& network, const std::string& fu
 }
 
 std::vector<std::string> blocks(const Network& network, const std::string& function) {
-  const std::string first = networks_of(function).front();
-  const int inputs = parts(network).at(first)->inputs();
-  if (is_rho(first) || inputs == 1) return {};
+  const int count = inputs(network, function);
+  if (is_rho(function) || count == 1 || maps_to_invariants(network, function)) return {};
   std::vector<std::string> result;
-  const std::vector<std::string> names = input_names(network, first, inputs);
+  const std::vector<std::string> names = input_names(network, function, count);
   const auto has = [&names](const char* suffix) {
     return std::any_of(names.begin(), names.end(), [&](const auto& n) { return ends_with(n, suffix); });
   };
   if (has("_m") && has("_m_s")) result = {"position", "velocity"};
-  for (int k = 0; k < inputs; ++k) result.push_back("x" + std::to_string(k));
+  for (int k = 0; k < count; ++k) result.push_back("x" + std::to_string(k));
   return result;
 }
 
 std::string unit(const Network& network, const std::string& function, const std::string& block) {
   const std::string output = network.output_unit.empty() ? "output" : network.output_unit;
-  const std::string first = networks_of(function).front();
   std::vector<std::string> moved;  // stays empty where NET states no names: then their units are unknown
-  if (!network.input_order.empty()) moved = input_names(network, first, parts(network).at(first)->inputs());
+  if (!network.input_order.empty()) moved = input_names(network, function, inputs(network, function));
   if (block != "all" && !moved.empty()) {
     std::vector<std::string> names;
     for (const int k : block_coordinates(network, function, block)) names.push_back(moved.at(k));

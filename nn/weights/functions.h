@@ -21,12 +21,17 @@ std::vector<std::string> networks_of(const std::string& function);
 /// Every function of NET: its parts, then every set function, in order of names.
 std::vector<std::string> functions(const Network& network);
 
+/// The numbers that `function` takes: of a set function of a network with invariants those of the state, of its phi
+/// the invariants.
+int inputs(const Network& network, const std::string& function);
+
 /// True if NET's input clamp acts on the input of part `name`: on every phi but the ground's, and on a plain network.
 bool is_clamped(const std::string& name);
 
 /// Input coordinates of `function` that belong to `block`, ascending: "all"; "x<k>", the k-th alone, counted from 0;
 /// "position" and "velocity", the inputs whose names end in "_m" and "_m_s". Where NET does not name its inputs, six
-/// are taken as three of each; the ground's four are one position (-z) and three velocities.
+/// are taken as three of each; the ground's four are one position (-z) and three velocities. A set function of a
+/// network with invariants has "all" only: what is proved of J holds for all inputs together.
 /// @throws std::invalid_argument if the function has no such block.
 std::vector<int> block_coordinates(const Network& network, const std::string& function,
                                    const std::string& block);

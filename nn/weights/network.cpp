@@ -9,6 +9,7 @@
 #include "nn/base/toml.h"
 #include "nn/weights/activation.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
 
 namespace swarmcert::files {
 namespace {
@@ -61,7 +62,7 @@ class NetworkReader {
   }
 
   void read_input(const TomlTable& input) {
-    input.allow_only({"order", "clamp"});
+    input.allow_only({"order", "invariants", "clamp"});
     if (input.has("order")) {
       network_.input_order = input.texts("order");
       std::vector<std::string> sorted = network_.input_order;
@@ -70,11 +71,14 @@ class NetworkReader {
       if (twice != sorted.end()) input.refuse("order", in_quotes(*twice), "appears twice");
       if (sorted.empty()) input.refuse("order", "", "is empty");
     }
+    if (input.has("invariants")) read_invariants(input);
     if (!input.has("clamp")) return;
     const TomlTable clamp = input.table("clamp");
     clamp.allow_only({"lower", "upper"});
     InputClamp box = {clamp.numbers("lower"), clamp.numbers("upper")};
-    const std::size_t inputs = network_.input_order.empty() ? box.lower.size() : network_.input_order.size();
+    const std::size_t inputs = network_.invariants            ? nn::kNeighbourInvariants
+                               : network_.input_order.empty() ? box.lower.size()
+                                                              : network_.input_order.size();
     check_length(clamp, "lower", box.lower, inputs, "inputs");
     check_length(clamp, "upper", box.upper, inputs, "inputs");
     for (std::size_t i = 0; i < box.lower.size(); ++i) {
@@ -84,6 +88,19 @@ class NetworkReader {
       }
     }
     network_.clamp = std::move(box);
+  }
+
+  /// Other quantities than a vertical force turn with the vehicles; and another order of the inputs would be another J.
+  void read_invariants(const TomlTable& input) {
+    input.choice("invariants", {"rotation"});
+    if (network_.input_order != relative_state())
+      input.refuse(
+          "order", "", "invariants are made from a relative state",
+          "write order = [\"dp_x_m\", \"dp_y_m\", \"dp_z_m\", \"dv_x_m_s\", \"dv_y_m_s\", \"dv_z_m_s\"]");
+    if (network_.output_quantity != "force_z")
+      input.refuse("invariants", "\"rotation\"", "are for a vertical force, which no turn changes",
+                   "write output = { quantity = \"force_z\", ... }, or leave invariants out");
+    network_.invariants = true;
   }
 
   static void check_length(const TomlTable& table, const std::string& key, const std::vector<double>& numbers,
@@ -151,7 +168,10 @@ class NetworkReader {
     const auto& [first_kind, first] = *network_.phi.begin();
     std::size_t inputs = network_.input_order.size();
     std::string because = "input.order names as many";
-    if (inputs == 0 && network_.clamp) {
+    if (network_.invariants) {
+      inputs = nn::kNeighbourInvariants;
+      because = "input.invariants are as many";
+    } else if (inputs == 0 && network_.clamp) {
       inputs = network_.clamp->lower.size();
       because = "input.clamp has as many";
     }
@@ -159,7 +179,11 @@ class NetworkReader {
       check_size("phi", kind, "outputs", phi.outputs(), static_cast<std::size_t>(first.outputs()),
                  "all phi are summed, and phi." + first_kind + " has as many");
       if (kind == kGround) {
-        check_size("phi", kind, "inputs", phi.inputs(), kGroundInputs, "the vehicle's own -z and -v");
+        if (network_.invariants)
+          check_size("phi", kind, "inputs", phi.inputs(), nn::kOwnInvariants,
+                     "input.invariants: -z, |v_xy|, -v_z");
+        else
+          check_size("phi", kind, "inputs", phi.inputs(), kGroundInputs, "the vehicle's own -z and -v");
         continue;
       }
       if (inputs == 0) {
@@ -300,9 +324,15 @@ bool is_relu(const Network& network, const std::string& function) {
                      [&stored](const std::string& name) { return stored.at(name)->is_relu(); });
 }
 
-Network load_network(const NetworkArguments& arguments) {
+Network load_evaluated_network(const NetworkArguments& arguments) {
   Network network = load_any_network(arguments);
   require_relu(network, "this command is for ReLU networks");
+  return network;
+}
+
+Network load_network(const NetworkArguments& arguments) {
+  Network network = load_evaluated_network(arguments);
+  require_relative_states(network, "this command is for networks of relative states");
   return network;
 }
 

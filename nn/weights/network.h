@@ -20,8 +20,8 @@ struct GammaStatement {
   Mode mode = Mode::kClip;  ///< kClip: at most `value`; kEqual: equal to it up to the stored precision
 };
 
-/// A neighbour's inputs are clamped to [lower, upper] before phi sees them; part of the function. The ground's
-/// phi, which sees the vehicle's own state, has no clamp.
+/// What phi sees of a neighbour, the inputs or their invariants, is clamped to [lower, upper] before; part of the
+/// function. The ground's phi, which sees the vehicle's own state, has no clamp.
 struct InputClamp {
   std::vector<double> lower, upper;
 };
@@ -33,11 +33,13 @@ inline constexpr int kGroundInputs = 4;
 ///
 /// Deep set of a vehicle of kind r with neighbours x_1..x_n of kinds c_1..c_n:
 ///   f(x) = rho_r(phi_ground(own) + sum_j phi_{c_j}(x_j)),
-/// where the ground term is present iff phi has the kind "ground".
+/// where the ground term is present iff phi has the kind "ground". With `invariants`, J(x_j) stands in place of x_j and
+/// K(own) in place of own (nn/invariants.h): see invariants.h.
 /// Class invariant after load: every phi but "ground" has the same number of inputs, which is the length of
-/// `input_order` and of the clamp where they are given; "ground" has kGroundInputs; all phi have the same number of
-/// outputs, which is every rho's number of inputs; all rho have the same number of outputs, components(output_quantity)
-/// where that is stated.
+/// `input_order`, unless there are invariants, and of the clamp where they are given; "ground" has kGroundInputs; all
+/// phi have the same number of outputs, which is every rho's number of inputs; all rho have the same number of outputs,
+/// components(output_quantity) where that is stated. With invariants: phi has kNeighbourInvariants inputs and "ground"
+/// kOwnInvariants, `input_order` is the state that they are made from, and the output a vertical force.
 struct Network {
   std::string path;    ///< of network.toml; empty where weight files were named directly
   std::string sha256;  ///< of network.toml; empty likewise
@@ -48,6 +50,7 @@ struct Network {
   std::string output_quantity;           ///< "force_z", "force" or "torque"; empty if not stated
   std::string output_unit;               ///< "gf" or "N", of torques "mN_m" or "N_m"; empty if not stated
   std::vector<std::string> input_order;  ///< "dp_x_m", ...; empty if not stated
+  bool invariants = false;               ///< `invariants = "rotation"`
   std::optional<InputClamp> clamp;
   std::optional<GammaStatement> gamma;
 };
@@ -83,15 +86,19 @@ bool is_relu(const Network& network, const std::string& function);
 /// with_activation() of every part (activation.h).
 Network with_activation(Network network, const std::string& activation);
 
-/// load_network() of networks with any activation. What evaluates, exports or searches a network is for ReLU: call
-/// load_network() there.
+/// load_network() of networks with any activation, and with invariants. What evaluates, exports or searches a network
+/// is for ReLU and for relative states: call load_network() there.
 Network load_any_network(const NetworkArguments& arguments);
 
-/// Loads NET, whose activation must be ReLU. A `file` is a network.toml if its name ends in ".toml" or its text names
-/// that schema. Weight files named in a network.toml are relative to its folder, which also states the order of their
-/// layers.
+/// What the evaluator runs (nn/deep_set.h): ReLU networks, of relative states or invariants.
+/// @throws as load_any_network() and require_relu().
+Network load_evaluated_network(const NetworkArguments& arguments);
+
+/// Loads NET, whose activation must be ReLU and whose inputs relative states. A `file` is a network.toml if its name
+/// ends in ".toml" or its text names that schema. Weight files named in a network.toml are relative to its folder,
+/// which also states the order of their layers.
 /// @throws InputError with line, field, value and hint; unknown keys are errors that suggest a known one. Throws what
-///   require_relu() throws as well.
+///   require_relu() and require_relative_states() throw as well.
 Network load_network(const NetworkArguments& arguments);
 
 /// as_float32() of every part.

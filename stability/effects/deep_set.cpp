@@ -15,7 +15,7 @@ files::Network load(const EffectSpec& spec, const EffectContext& context) {
     throw files::InputError({"", "", "effect.network", "", "the effect deep_set names no network",
                              "add network = \"network.toml\""});
   }
-  return files::load_network(
+  return files::load_evaluated_network(
       {(std::filesystem::path(context.path).parent_path() / spec.network).string(), "", "", ""});
 }
 

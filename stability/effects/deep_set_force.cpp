@@ -84,6 +84,7 @@ DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
     set_.lower = network_.clamp->lower.data();
     set_.upper = network_.clamp->upper.data();
   }
+  set_.of_invariants = network_.invariants;
   if (set_.inputs() > static_cast<int>(kInputs.size())) {
     refuse(network_, "phi." + names.front(), std::to_string(set_.inputs()) + " inputs",
            "must be at most 6: relative position and velocity", "");
@@ -101,7 +102,7 @@ DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
 void DeepSetForce::reserve(int neighbours) {
   const auto count = static_cast<std::size_t>(neighbours);
   inputs_.resize(count * input_.size());
-  clamped_.resize(count * input_.size());
+  clamped_.resize(count * static_cast<std::size_t>(set_.phi_inputs()));
   order_.resize(count);
   neighbours_.resize(count);
 }

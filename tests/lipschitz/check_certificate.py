@@ -57,6 +57,15 @@ SORTING_STATEMENT = (
     " Of the numbers t_1, t_2, ... of a layer, groupsort:k sorts each k side by side, the smallest first; "
     "maxmin:halves, of 2 h numbers, is max(t_i, t_(i+h)) for i = 1 .. h and then min(t_i, t_(i+h)); "
     "maxmin:pairs is max(t_(2i-1), t_(2i)) for i = 1 .. h and then min(t_(2i-1), t_(2i)).")
+# Added for networks of rotation invariants.
+INVARIANTS_STATEMENT = (
+    " A set function takes of each neighbour its relative position p in m and velocity v in m/s, whose vertical "
+    "components are p_z and v_z, and of the vehicle -z in m and -v in m/s; phi sees their invariants: of a neighbour "
+    "|p_xy|, 3/2 p_z, |v_xy|, 3/2 v_z, |p_xy + v_xy / 2|, and the ground's phi -z, |v_xy|, -v_z. So the input clamp is "
+    "one of invariants, and phi alone is a function of them.")
+# The map to a neighbour's is 3/2-Lipschitz: the three norms change by at most the square root of the largest eigenvalue
+# of I + (1, 1/2)' (1, 1/2), which is 1 + 1 + 1/4; the ground's is 1-Lipschitz.
+SLOPE_OF_INVARIANTS, SLOPE_OF_GROUND_INVARIANTS = Fraction(3, 2), Fraction(1)
 
 
 # What lies between layers, by the name that a chain gives it: its slopes are in [0, steepest] where it is monotone,
@@ -787,13 +796,16 @@ def read_file(path, key, order):
     return read_c_source(data, key, order)
 
 
+RELATIVE_STATE = ["dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"]
+
+
 class Network:
     """parts by name ("network", "phi:<kind>", "rho:<kind>"), and what network.toml states."""
 
     def __init__(self, net="", phi="", rho="", key="", orders=None, activation=None):
         """orders: of layers, by "network", "phi" and "rho"; those of a network.toml stand there."""
         orders = orders or {}
-        self.sha256, self.unit, self.order, self.clamp = "", "", [], None
+        self.sha256, self.unit, self.order, self.clamp, self.invariants = "", "", [], None, False
         if phi:
             self.parts = {f"{role}:default": read_weights(file, key, orders.get(role), activation)
                           for role, file in (("phi", phi), ("rho", rho))}
@@ -803,6 +815,12 @@ class Network:
             self.sha256 = hashlib.sha256(data).hexdigest()
             self.unit = document.get("output", {}).get("unit", "")
             self.order = document.get("input", {}).get("order", [])
+            invariants = document.get("input", {}).get("invariants")
+            require_input(invariants in (None, "rotation"), f"{net}: unknown invariants")
+            self.invariants = invariants is not None
+            require_input(not self.invariants or (self.order == RELATIVE_STATE and
+                                                  document.get("output", {}).get("quantity") == "force_z"),
+                          f"{net}: invariants are of a relative state and for a vertical force")
             clamp = document.get("input", {}).get("clamp")
             self.clamp = clamp and (clamp["lower"], clamp["upper"])
 
@@ -816,6 +834,10 @@ class Network:
 
             self.parts = {f"{role}:{kind}": part(entry)
                           for role in ("phi", "rho") for kind, entry in sorted(document[role].items())}
+            for part, weights in self.parts.items():
+                inputs = 3 if part == "phi:ground" else 5
+                require_input(not self.invariants or part.startswith("rho:") or weights.layers[0].inputs == inputs,
+                              f"{net}: {part} must have {inputs} inputs, as there are invariants")
         else:
             self.parts = {"network": read_weights(net, key, orders.get("network"), activation)}
 
@@ -829,13 +851,24 @@ class Network:
             result += [(op, None, layer.outputs, layer.outputs)] * (op is not None)
         return result
 
+    def maps_to_invariants(self, function):
+        return self.invariants and function.startswith("set:")
+
+    def slope_of_inputs(self, function):
+        """Lipschitz constant of the map from the function's inputs to what its first layer sees."""
+        if not self.maps_to_invariants(function):
+            return Fraction(1)
+        return SLOPE_OF_GROUND_INVARIANTS if function.startswith("set:ground:") else SLOPE_OF_INVARIANTS
+
     def input_names(self, part):
+        if self.invariants and not part.startswith("rho:"):
+            return (["minus_z_m", "v_xy_m_s", "minus_v_z_m_s"] if part == "phi:ground" else
+                    ["dp_xy_m", "scaled_dp_z_m", "dv_xy_m_s", "scaled_dv_z_m_s", "dp_xy_ahead_m"])
         if part == "phi:ground":
             return ["minus_z_m", "minus_v_x_m_s", "minus_v_y_m_s", "minus_v_z_m_s"]
         if part.startswith("rho:"):
             return []
-        six = ["dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"]
-        return self.order or (six if self.parts[part].layers[0].inputs == 6 else [])
+        return self.order or (RELATIVE_STATE if self.parts[part].layers[0].inputs == 6 else [])
 
 
 def networks_of(function):
@@ -878,7 +911,7 @@ def unit_of(network, function, block):
 def stages(network, function, block, scale):
     """The matrices between the activations, from the block's inputs in units of their scale to the output. An
     activation of slopes in [0, b] is b times one of slopes in [0, 1]: b goes to the matrix behind it. Others stay as
-    they are."""
+    they are. Of a function of rotation invariants, the inputs are those, times the slope of the map to them."""
     names = networks_of(function)
     require(all(name in network.parts for name in names), f"there is no {function}")
     inputs = network.parts[names[0]].layers[0].inputs
@@ -886,7 +919,7 @@ def stages(network, function, block, scale):
     require(not scale or len(scale) == inputs, "scale has another size")
     selector = [0.0] * (inputs * len(coordinates))
     for j, k in enumerate(coordinates):
-        selector[k * len(coordinates) + j] = scale[k] if scale else 1.0
+        selector[k * len(coordinates) + j] = scale[k] if scale else float(network.slope_of_inputs(function))
     chain = [Matrix.of(selector, len(coordinates))]
     for name in names:
         for index, layer in enumerate(network.parts[name].layers):
@@ -1519,7 +1552,8 @@ class Checker:
         require(self.c["schema"] == "swarmcert/certificate/1", "another schema")
         sorting = any(step["op"] in SORTING for weights in self.c["network"]["weights"].values()
                       for step in weights["chain"])
-        require(self.c["statement"] == STATEMENT + SORTING_STATEMENT * sorting, "another statement")
+        require(self.c["statement"] == STATEMENT + SORTING_STATEMENT * sorting +
+                INVARIANTS_STATEMENT * self.network.invariants, "another statement")
         require(self.c["content_sha256"] == content_sha256(self.c), "content_sha256 does not match")
         require(isinstance(self.c["tool"], str), "tool is not text")
         self.check_network(self.c["network"])
@@ -1643,6 +1677,11 @@ class Checker:
                     f"{where}: a lower bound is for ReLU only")
             require(activations.isdisjoint(SORTING) or bound["upper_method"] == "product",
                     f"{where}: a bound from slopes of single numbers")
+        if self.network.maps_to_invariants(function):
+            require(not boxed and bound["upper_method"] != "branch" and not scale and block == "all",
+                    f"{where}: of rotation invariants, only bounds for all inputs together")
+            require(bound["lower"] is None and bound["lower_hex"] is None and bound["lower_witness"] is None,
+                    f"{where}: a lower bound of a function of rotation invariants")
         if bound["upper_method"] in ("sdp", "eclipse_fast"):
             self.check_upper(stages(self.network, function, block, scale), bound["proof"], upper, where,
                              bends(self.network, function))
@@ -1651,7 +1690,7 @@ class Checker:
         else:
             require(bound["upper_method"] == "product" and bound["proof"] is None, f"{where}: unknown upper_method")
             require(all(name in self.norms for name in names), f"{where}: no such function")
-            total = Fraction(max(scale)) if scale else Fraction(1)
+            total = (Fraction(max(scale)) if scale else Fraction(1)) * self.network.slope_of_inputs(function)
             for name in names:
                 total *= self.norms[name] * math.prod(STEEPEST[op] for op in self.network.parts[name].between())
             require(Fraction(upper) >= total, f"{where}: claims less than the product of the norms")
@@ -1911,6 +1950,7 @@ class Checker:
                              "jump", "jump_hex", "float32_error", "float32_error_hex"], "values")
         require(isinstance(entry["function"], str), "values: function is not text")
         where, names = f"values of {entry['function']}", networks_of(entry["function"])
+        require(not self.network.invariants, f"{where}: of a function of rotation invariants")
         is_set, is_float32 = len(names) == 2, entry["input_error"] is not None
         require(names[0] != "phi:ground" if is_set else names == ["network"],
                 f"{where}: only of the network, or of a sum")

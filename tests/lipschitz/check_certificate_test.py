@@ -109,6 +109,55 @@ def smooth(folder):
     return net
 
 
+def of_invariants(folder, generator):
+    """A network.toml with two kinds and ground, whose phi see rotation invariants."""
+    for name, sizes in (("five", [5, 5, 4]), ("more", [5, 4, 4, 4]), ("three", [3, 5, 4])):
+        (folder / f"{name}.safetensors").write_bytes(safetensors(sizes, generator))
+    net, text = folder / "invariants.toml", (folder / "network.toml").read_text()
+    text = text.replace("clamp = { lower = [-1,-1,-1,-2,-2,-2], upper = [1,1,1,2,2,2] }",
+                        'invariants = "rotation"\nclamp = { lower = [0,-1,0,-2,0], upper = [1,1,1,2,2] }')
+    for old, new in (("small", "five"), ("large", "more"), ("ground", "three")):
+        text = text.replace(f'"{old}.safetensors"', f'"{new}.safetensors"')
+    net.write_text(text)
+    return net
+
+
+def check_invariants(certificate, net, folder):
+    """Bounds of set functions need the slope of the map to invariants, and hold for all inputs together only."""
+    def refused(i, **fields):
+        changed = json.loads(json.dumps(certificate))
+        changed["bounds"][i].update(fields)
+        changed["content_sha256"] = second.content_sha256(changed)
+        accepted, said = first_checker(changed, net, folder, 0)
+        reason = second.check(changed, second.Network(**arguments(net)))
+        assert not accepted and reason, f"{fields}: first says {said!r}, second says {reason!r}"
+
+    changed = json.loads(json.dumps(certificate))
+    changed["statement"] = second.STATEMENT
+    changed["content_sha256"] = second.content_sha256(changed)
+    assert not first_checker(changed, net, folder, 0)[0] and second.check(changed, second.Network(**arguments(net)))
+    sets = [i for i, bound in enumerate(certificate["bounds"]) if bound["function"].startswith("set:")]
+    assert len(sets) == 3
+    norms = {}
+    for layer in certificate["layers"]:
+        norms[layer["network"]] = norms.get(layer["network"], 1.0) * layer["spectral_norm"][1]
+    for i in sets:
+        bound = certificate["bounds"][i]
+        assert bound["unit"] == "gf/(m, m/s)" and bound["lower"] is None, bound
+        phi, rho = second.networks_of(bound["function"])
+        of_network = norms[phi] * norms[rho]  # without the slope
+        slope = 1 if phi == "phi:ground" else 1.5
+        for product in (of_network * slope * 0.999,) + (of_network,) * (slope > 1):
+            refused(i, upper=product, upper_hex=product.hex(), upper_method="product", proof=None)
+        less = bound["upper"] / 1.01
+        refused(i, upper=less, upper_hex=less.hex())
+        refused(i, block="position")
+        refused(i, scale=["0x1p+0"] * 6, norm="weighted_l2")
+        point = ["0x0p+0"] * 5
+        refused(i, lower=0.0, lower_hex="0x0p+0",
+                lower_witness={"x": point, "y": ["0x1p+0"] + point[1:], "others": []})
+
+
 def beside(folder):
     """The network.toml of heterogeneous(), with another activation in the ground only."""
     net = folder / "beside.toml"
@@ -371,6 +420,8 @@ def run():
         nets += [([smooth_net], ["--blocks=position", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"])]
         beside_net = str(beside(folder))
         nets += [([beside_net], ["--method", "product"])]
+        invariant_net = str(of_invariants(folder, generator))
+        nets += [([invariant_net], ["--blocks", "--neighbours", "large=2,small=1"])]
         nets += [(net, []) for net in smooth_models(folder, generator)]
         nets += [([str(tiny)], ["--activation", ops])
                  for ops in ("silu", "gelu", "sigmoid", "tanh,relu", "relu,silu,sigmoid", "elu,relu,relu")]
@@ -387,6 +438,8 @@ def run():
             check_fixed(certificate, net, folder)
             if net[0] in (smooth_net, beside_net) or net[0].endswith(".onnx") or "--activation" in options:
                 check_activations(certificate, net, folder)
+            if net[0] == invariant_net:
+                check_invariants(certificate, net, folder)
             paths = list(leaves(certificate))
             chosen = [generator.choice(paths) for _ in range(MUTATIONS if index == 1 else MUTATIONS // 5)]
             changed, longer = zip(*(forged(certificate, p, generator) for p in chosen))

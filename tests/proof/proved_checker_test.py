@@ -118,6 +118,7 @@ def kinds(folder, generator):
         ("relu, silu", [tiny], ["--activation", "relu,silu"], 0.05),
         ("activations of parts", [common.smooth(folder)], ["--blocks=position", "--neighbours", "large=2,small=1"],
          0.03),
+        ("rotation invariants", [common.of_invariants(folder, generator)], ["--neighbours", "large=2,small=1"], 0.03),
         ("cover by parts", [tiny], parts, 0.03),
         ("pair and cover by parts", pair, parts, 0.02),
     ] + slow * (MUTATIONS > 0)
@@ -128,8 +129,8 @@ def arguments(net):
 
 
 def is_beyond(name):
-    """Whether some of what is proved by parts is beyond the proved checker."""
-    return name == "kinds by parts for a number of neighbours"
+    """Whether some of what is proved is beyond the proved checker."""
+    return name in ("kinds by parts for a number of neighbours", "rotation invariants")
 
 
 def decided_alike(code, accepted, second_accepts, by_parts):

@@ -21,6 +21,7 @@
 #include "nn/base/parallel.h"
 #include "nn/weights/chain.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
 #include "nn/weights/samples.h"
 
 namespace swarmcert::analysis {
@@ -245,14 +246,16 @@ void parse_map(const CertifyOptions& options, const files::Network& network,
   }
 }
 
-/// Of other activations bounds for all inputs are proved, and nothing else.
+/// Of other activations, and of rotation invariants, bounds for all inputs are proved, and nothing else.
 void refuse_what_is_for_relu(const files::Network& network, const CertifyOptions& options) {
   const std::pair<bool, const char*> asked[] = {{!options.domain.empty(), "--domain"},
                                                 {options.range, "--range"},
                                                 {options.explain, "--explain"},
                                                 {options.method == "branch", "--method branch"}};
   for (const auto& [is_asked, option] : asked) {
-    if (is_asked) files::require_relu(network, std::string(option) + " is for ReLU networks");
+    if (!is_asked) continue;
+    files::require_relu(network, std::string(option) + " is for ReLU networks");
+    files::require_relative_states(network, std::string(option) + " is for networks of relative states");
   }
 }
 

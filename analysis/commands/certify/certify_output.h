@@ -35,10 +35,11 @@ struct CertifyOutput {
   bool is_interrupted() const { return lipschitz::is_interrupted(found) || ranges_cut_short; }
 };
 
-/// Said of networks that have another activation than ReLU.
+/// Said of networks that have another activation than ReLU, or rotation invariants.
 inline constexpr char kForReluOnly[] =
-    "lower bounds and bounds on a box are for ReLU networks: of other activations upper bounds for all "
-    "inputs are proved";
+    "lower bounds and bounds on a box are for ReLU networks of relative states: of other activations, and of "
+    "functions "
+    "of rotation invariants, upper bounds for all inputs are proved";
 
 /// Unit of the network's outputs; "output" where NET states none.
 std::string output_unit(const files::Network& network);

@@ -48,6 +48,9 @@ std::string certificate_of(const files::Network& network, const std::string& pat
       refuse("network.weights." + part + ".chain", "",
              "is not the chain that is exported: " + files::chain_words(files::chain(network, part)));
   }
+  if (network.invariants && certificate["network"].value("description_sha256", "") != network.sha256)
+    refuse("network.description_sha256", "",
+           "is not the hash of " + network.path + ", which states what phi sees");
   const bool certified_as_float32 = certificate["network"].value("as", files::Json()) == "float32";
   if (as_float32 && !certified_as_float32)
     refuse("network.as", "null",

@@ -24,6 +24,7 @@
 #include "nn/base/parallel.h"
 #include "nn/base/toml.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
 #include "stability/model.h"
 
 namespace swarmcert::analysis {
@@ -80,7 +81,10 @@ files::Json description(const files::Network& network) {
   if (network.clamp) clamp = {{"lower", network.clamp->lower}, {"upper", network.clamp->upper}};
   return {{"output", {{"quantity", network.output_quantity}, {"unit", network.output_unit}}},
           {"gamma", std::move(gamma)},
-          {"input", {{"order", network.input_order}, {"clamp", std::move(clamp)}}}};
+          {"input",
+           {{"order", network.input_order},
+            {"invariants", network.invariants ? files::Json("rotation") : files::Json()},
+            {"clamp", std::move(clamp)}}}};
 }
 
 void print_description(const files::Network& network) {
@@ -95,8 +99,11 @@ void print_description(const files::Network& network) {
                is_layer ? "layer" : "network");
   }
   fmt::print("\n");
-  for (std::size_t k = 0; k < network.input_order.size(); ++k) {
-    fmt::print("  input {}: {}", k, network.input_order[k]);
+  if (network.invariants) fmt::print("  phi sees rotation invariants of dp and dv, in this order:\n");
+  const std::vector<std::string>& order =
+      network.invariants ? files::neighbour_invariant_names() : network.input_order;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    fmt::print("  input {}: {}", k, order[k]);
     if (network.clamp) fmt::print(", clamped to {} .. {}", network.clamp->lower[k], network.clamp->upper[k]);
     fmt::print("\n");
   }

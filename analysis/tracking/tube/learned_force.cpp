@@ -6,6 +6,7 @@
 
 #include "nn/base/input_error.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
 #include "stability/effects/deep_set_force.h"
 
 namespace swarmcert::analysis {
@@ -80,6 +81,7 @@ Index component(const std::string& name) {
 }  // namespace
 
 LearnedForce::LearnedForce(const files::Network& network, const std::string& kind, int neighbours) {
+  files::require_relative_states(network, "a tube is of networks of relative states");
   stability::DeepSetForce(network, kind, {kind});  // refuses what no flight could use
   std::vector<std::string> kinds;
   for (const auto& [name, weights] : network.phi)

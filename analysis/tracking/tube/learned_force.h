@@ -23,7 +23,8 @@ inline int state_size(int neighbours) { return neighbours * kPerNeighbour + kOwn
 class LearnedForce {
  public:
   /// Networks are chosen as stability::DeepSetForce does.
-  /// @throws files::InputError as DeepSetForce, and if its phi differ in depth and cannot be brought to one.
+  /// @throws files::InputError as DeepSetForce, if the network has invariants, and if its phi differ in depth and
+  ///   cannot be brought to one.
   LearnedForce(const files::Network& network, const std::string& kind, int neighbours);
   LearnedForce(const LearnedForce&) = delete;  // forms refer to its layers
   LearnedForce& operator=(const LearnedForce&) = delete;

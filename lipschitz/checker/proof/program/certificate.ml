@@ -93,7 +93,8 @@ let check net json =
   let member key = find "certificate" key json in
   let net = with_stated_activations net json in
   let sorts (_, w) = List.exists Activation.sorts (Weights.between w) in
-  require (member "statement" = Text (Statement.text (List.exists sorts net.parts)))
+  let text = Statement.text ~sorts:(List.exists sorts net.parts) ~of_invariants:net.invariants in
+  require (member "statement" = Text text)
     "statement is not the one that is checked";
   let rest = List.filter (fun (key, _) -> key <> "content_sha256") (members "certificate" json) in
   require (member "content_sha256" = Text (Sha256.to_hex (Sha256.string (encode (Object rest)))))

@@ -188,22 +188,20 @@ let check_activations state where bound names =
           "%s: a bound from slopes of single numbers%s" where of_
       end) activations
 
-let check_bound state bound =
-  require_keys "bound" (bound_keys @ if has "neighbours" bound then [ "neighbours" ] else []) bound;
-  let f = text "bound" (find "bound" "function" bound) and block = text "bound" (find "bound" "block" bound) in
-  let where = Printf.sprintf "bound %s %s" (shown f) (shown block) in
-  let names = Functions.networks_of f in
-  let scale = Exact.hex_floats where (find where "scale" bound) in
-  require (List.for_all (fun s -> s > 0.) scale) "%s: scale is not positive" where;
-  List.iter (fun (key, text) -> require (find where key bound = Text text) "%s: %s is not %s" where key text)
-      (meaning state where bound names scale);
-  require (scale = [] || List.length scale = Functions.inputs state.net (List.hd names))
-      "%s: scale has another size" where;
-  let neighbours = neighbours_of state where bound in
-  let upper = Exact.of_float (Exact.number (where ^ " upper") (find where "upper" bound)
-      (find where "upper_hex" bound)) in
-  check_status where bound;
-  check_activations state where bound names;
+(* The map to rotation invariants is in no theorem. What a certificate may state of its functions at all, is checked. *)
+let check_of_invariants state bound f where ~scale ~neighbours upper =
+  let of_ = " of a function of rotation invariants" in
+  require (find where "domain" bound = Text "global" && find where "upper_method" bound <> Text "branch")
+    "%s: a bound on a box%s" where of_;
+  require (List.for_all (fun key -> find where key bound = Null) [ "lower"; "lower_hex"; "lower_witness" ])
+    "%s: a lower bound%s" where of_;
+  require (scale = []) "%s: a scale%s" where of_;
+  require (find where "block" bound = Text "all") "%s is bounded for all inputs together" where;
+  not_checked state (Printf.sprintf "%s <= %s:%s" where (text where (find where "upper_hex" bound)) of_);
+  Hashtbl.replace state.uppers (f, "all", neighbours) (upper, Not_checked)
+
+(* The proof of a bound of function `f`, and of the lower one where there is a witness. *)
+let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~upper =
   let moves = Functions.moves state.net f block and func = function_of state names in
   let exact_scale = List.map Exact.of_float scale in
   let claim = Proved.Slope_at_most (func, moves, exact_scale, upper) in
@@ -233,6 +231,25 @@ let check_bound state bound =
     prove state (Slope_at_least (func, moves, exact_scale, lower)) proof
         (where ^ ": lower_witness: claims more than the slope between x and y");
     state.lower_bounds <- state.lower_bounds + 1
+
+let check_bound state bound =
+  require_keys "bound" (bound_keys @ if has "neighbours" bound then [ "neighbours" ] else []) bound;
+  let f = text "bound" (find "bound" "function" bound) and block = text "bound" (find "bound" "block" bound) in
+  let where = Printf.sprintf "bound %s %s" (shown f) (shown block) in
+  let names = Functions.networks_of f in
+  let scale = Exact.hex_floats where (find where "scale" bound) in
+  require (List.for_all (fun s -> s > 0.) scale) "%s: scale is not positive" where;
+  List.iter (fun (key, text) -> require (find where key bound = Text text) "%s: %s is not %s" where key text)
+      (meaning state where bound names scale);
+  require (scale = [] || List.length scale = Functions.inputs state.net (List.hd names))
+      "%s: scale has another size" where;
+  let neighbours = neighbours_of state where bound in
+  let upper = Exact.of_float (Exact.number (where ^ " upper") (find where "upper" bound)
+      (find where "upper_hex" bound)) in
+  check_status where bound;
+  check_activations state where bound names;
+  if Functions.maps_to_invariants state.net f then check_of_invariants state bound f where ~scale ~neighbours upper
+  else check_bound_by_theorems state bound names f block where ~scale ~neighbours ~upper
 
 (* Laws *)
 

@@ -6,6 +6,7 @@ type t = {
   sha256 : string;  (* of network.toml; else "" *)
   unit : string;
   order : string list;
+  invariants : bool;  (* the phi of set functions see rotation invariants *)
   clamp : (float * float) list;  (* [] : none *)
   parts : (string * Weights.t) list;  (* by name, sorted *)
 }
@@ -70,26 +71,36 @@ let read_output path members =
     | "force_z" | "force" -> [ "gf"; "N" ] | "torque" -> [ "mN_m"; "N_m" ]
     | _ -> bad_input "%s: output.quantity is not one of the possible values" path in
   if not (List.mem unit units) then bad_input "%s: output.unit is not one of the possible values" path;
-  unit, Some (if quantity = "force_z" then 1 else 3)
+  unit, Some quantity
+
+let relative_state = [ "dp_x_m"; "dp_y_m"; "dp_z_m"; "dv_x_m_s"; "dv_y_m_s"; "dv_z_m_s" ]
+let invariants_of_neighbour = 5
+let invariants_of_ground = 3
 
 let read_input path members =
-  allow_only path "input." [ "order"; "clamp" ] members;
+  allow_only path "input." [ "order"; "invariants"; "clamp" ] members;
   let order = match List.assoc_opt "order" members with None -> [] | Some json ->
     let names = texts path "input.order" json in
     if names = [] || List.length (List.sort_uniq compare names) <> List.length names then
       bad_input "%s: input.order is empty or names an input twice" path;
     names in
+  let invariants = match List.assoc_opt "invariants" members with
+    | None -> false
+    | Some (Json.Text "rotation") when order = relative_state -> true
+    | Some (Json.Text "rotation") -> bad_input "%s: input.order: invariants are made from a relative state" path
+    | _ -> bad_input "%s: input.invariants is not one of the possible values" path in
   let clamp = match List.assoc_opt "clamp" members with None -> [] | json ->
     let members = table path "input.clamp" json in
     allow_only path "input.clamp." [ "lower"; "upper" ] members;
     let lower = numbers path "input.clamp.lower" (List.assoc_opt "lower" members) in
     let upper = numbers path "input.clamp.upper" (List.assoc_opt "upper" members) in
-    let count = if order = [] then List.length lower else List.length order in
+    let count = if invariants then invariants_of_neighbour
+      else if order = [] then List.length lower else List.length order in
     if count = 0 || List.length lower <> count || List.length upper <> count then
       bad_input "%s: input.clamp needs %d numbers each" path count;
     if not (List.for_all2 ( <= ) lower upper) then bad_input "%s: input.clamp: lower is above upper" path;
     List.combine lower upper in
-  order, clamp
+  order, invariants, clamp
 
 let read_gamma path members =
   allow_only path "gamma." [ "value"; "scope"; "mode" ] members;
@@ -135,15 +146,19 @@ let read_kinds path ~key role members =
           with_activations (path ^ ": " ^ here) weights names in
       role ^ ":" ^ kind, weights) members
 
-let check_sizes path ~order ~clamp ~components phis rhos =
+let check_sizes path ~order ~invariants ~clamp ~components phis rhos =
   let refuse name what = bad_input "%s: %s: does not fit the other networks (%s)" path name what in
   let hidden = snd (sizes (snd (List.hd phis))) and outputs = snd (sizes (snd (List.hd rhos))) in
-  let stated = if order <> [] then List.length order else List.length clamp in
+  let stated = if invariants then invariants_of_neighbour
+    else if order <> [] then List.length order else List.length clamp in
   let inputs = ref stated in
   List.iter (fun (name, w) ->
       let i, o = sizes w in
       if o <> hidden then refuse name "outputs";
-      if name = "phi:ground" then (if i <> 4 then refuse name "the ground's network has 4 inputs")
+      if name = "phi:ground" then begin
+        let inputs = if invariants then invariants_of_ground else 4 in
+        if i <> inputs then refuse name (Printf.sprintf "the ground's network has %d inputs" inputs)
+      end
       else (if !inputs = 0 then inputs := i; if i <> !inputs then refuse name "inputs")) phis;
   List.iter (fun (name, w) ->
       let i, o = sizes w in
@@ -157,17 +172,19 @@ let read_toml path bytes ~key =
   allow_only path "" [ "schema"; "output"; "gamma"; "input"; "phi"; "rho" ] members;
   let optional name absent read = match List.assoc_opt name members with
     | None -> absent | json -> read path (table path name json) in
-  let unit, components = optional "output" ("", None) read_output in
+  let unit, quantity = optional "output" ("", None) read_output in
+  let components = Option.map (fun quantity -> if quantity = "force_z" then 1 else 3) quantity in
   optional "gamma" () read_gamma;
-  let order, clamp = optional "input" ([], []) read_input in
+  let order, invariants, clamp = optional "input" ([], false, []) read_input in
+  if invariants && quantity <> Some "force_z" then bad_input "%s: input.invariants are for a vertical force" path;
   let kinds role = read_kinds path ~key role (table path role (List.assoc_opt role members)) in
   let phis = kinds "phi" in
   let rhos = kinds "rho" in
-  check_sizes path ~order ~clamp ~components phis rhos;
+  check_sizes path ~order ~invariants ~clamp ~components phis rhos;
   let sorted = List.sort (fun (a, _) (b, _) -> String.compare a b) (phis @ rhos) in
-  { sha256 = Sha256.to_hex (Sha256.string bytes); unit; order; clamp; parts = sorted }
+  { sha256 = Sha256.to_hex (Sha256.string bytes); unit; order; invariants; clamp; parts = sorted }
 
-let plain parts = { sha256 = ""; unit = ""; order = []; clamp = []; parts }
+let plain parts = { sha256 = ""; unit = ""; order = []; invariants = false; clamp = []; parts }
 let read_stated { net; phi; rho; key; orders; _ } =
   let order part = Option.value ~default:[] (List.assoc_opt part orders) in
   if phi <> "" then begin

@@ -31,4 +31,12 @@ let sorting =
    maxmin:halves, of 2 h numbers, is max(t_i, t_(i+h)) for i = 1 .. h and then min(t_i, t_(i+h)); \
    maxmin:pairs is max(t_(2i-1), t_(2i)) for i = 1 .. h and then min(t_(2i-1), t_(2i))."
 
-let text sorts = if sorts then common ^ sorting else common
+(* What is added for networks of rotation invariants. *)
+let invariants =
+  " A set function takes of each neighbour its relative position p in m and velocity v in m/s, whose vertical \
+   components are p_z and v_z, and of the vehicle -z in m and -v in m/s; phi sees their invariants: of a neighbour \
+   |p_xy|, 3/2 p_z, |v_xy|, 3/2 v_z, |p_xy + v_xy / 2|, and the ground's phi -z, |v_xy|, -v_z. So the input clamp \
+   is one of invariants, and phi alone is a function of them."
+
+let text ~sorts ~of_invariants =
+  common ^ (if sorts then sorting else "") ^ if of_invariants then invariants else ""

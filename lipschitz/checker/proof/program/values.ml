@@ -81,6 +81,7 @@ let check (state : Claims.t) entry =
   let require_relu = List.iter (fun name ->
       require (Functions.is_relu state.net name) "%s: only of ReLU networks" where) in
   require_relu names;
+  require (not state.net.invariants) "%s: values of a function of rotation invariants" where;
   require (if is_set then List.hd names <> "phi:ground" else f = "network")
     "%s: only of the network, or of a sum over neighbours" where;
   let count = match find where "neighbours" entry with
