@@ -5,11 +5,13 @@
 #include <map>
 #include <mutex>
 #include <set>
+#include <stdexcept>
 
 #include "analysis/residuals/force_residual.h"
 #include "analysis/residuals/torque_residual.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
+#include "nn/invariants.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::learning {
@@ -18,7 +20,7 @@ namespace {
 using Eigen::Index;
 using residuals::Track;
 
-constexpr int kNeighbourInputs = 6;
+constexpr int kNeighbourInputs = nn::kRelativeState;
 constexpr double kBlock_s = 2, kPurge_s = 0.15;
 
 /// Samples of one track before the kinds of all flights are known.
@@ -131,11 +133,17 @@ training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vecto
     all.push_back(outputs);
     parts.push_back({part, std::move(all), 0, std::move(horizontal)});
   };
-  if (sizes.ground) {
+  if (sizes.ground && sizes.invariants) {
+    add(files::kGroundPhi, nn::kOwnInvariants, sizes.phi, sizes.features, {});
+  } else if (sizes.ground) {
     add(files::kGroundPhi, files::kGroundInputs, sizes.phi, sizes.features, {Plane{1, 2}});
   }
-  for (const std::string& kind : neighbours)
-    add(files::phi_name(kind), kNeighbourInputs, sizes.phi, sizes.features, {Plane{0, 1}, Plane{3, 4}});
+  for (const std::string& kind : neighbours) {
+    if (sizes.invariants)
+      add(files::phi_name(kind), nn::kNeighbourInvariants, sizes.phi, sizes.features, {});
+    else
+      add(files::phi_name(kind), kNeighbourInputs, sizes.phi, sizes.features, {Plane{0, 1}, Plane{3, 4}});
+  }
   for (const std::string& kind : own)
     add(files::rho_name(kind), sizes.features, sizes.rho, info(target).components, {});
   return training::Layout(std::move(parts));
@@ -168,9 +176,12 @@ void append(LearningData& data, const RawTrack& raw, const std::vector<std::stri
   std::vector<int> phi;
   for (const std::string& kind : kinds) phi.push_back(data.layout.find(files::phi_name(kind)));
   for (std::size_t i = from; i < to; ++i) {
-    if (ground >= 0) data.samples.add_input(ground, {raw.own[i].begin(), raw.own[i].end()});
+    if (ground >= 0)
+      data.samples.add_input(ground, seen_of_own({raw.own[i].begin(), raw.own[i].end()}, data.invariants));
     for (std::size_t j = raw.first[i]; j < raw.first[i + 1]; ++j)
-      data.samples.add_input(phi[raw.neighbour_kind[j]], {raw.neighbour[j].begin(), raw.neighbour[j].end()});
+      data.samples.add_input(
+          phi[raw.neighbour_kind[j]],
+          seen_of_neighbour({raw.neighbour[j].begin(), raw.neighbour[j].end()}, data.invariants));
     const Eigen::Vector3f& y = raw.target[i];
     if (data.samples.outputs == 1)
       data.samples.add_sample(rho, {y.z()});
@@ -206,6 +217,20 @@ const TargetInfo& info(Target target) {
       {"torque", "mN_m", "torque", 3, 1e-3},
   };
   return kInfo[static_cast<int>(target)];
+}
+
+std::vector<float> seen_of_neighbour(const std::vector<float>& state, bool invariants) {
+  if (!invariants) return state;
+  std::vector<float> seen(nn::kNeighbourInvariants);
+  nn::neighbour_invariants(state.data(), seen.data());
+  return seen;
+}
+
+std::vector<float> seen_of_own(const std::vector<float>& state, bool invariants) {
+  if (!invariants) return state;
+  std::vector<float> seen(nn::kOwnInvariants);
+  nn::own_invariants(state.data(), seen.data());
+  return seen;
 }
 
 const char* name(Use use) { return use == Use::kFit ? "fit" : use == Use::kSelect ? "select" : "test"; }
@@ -261,8 +286,12 @@ void append_if_known(LearningData& data, const RawTrack& track, const std::vecto
 
 LearningData load_learning_data(const LearningFlights& named, const NetworkSizes& sizes, SplitBy split,
                                 int jobs, const Progress& progress, Target target) {
+  if (sizes.invariants && target != Target::kForceZ)
+    throw std::invalid_argument(
+        "load_learning_data: only a vertical force is a function of rotation invariants");
   LearningData data;
   data.target = target;
+  data.invariants = sizes.invariants;
   data.samples.outputs = info(target).components;
   data.samples.target_is_axial = target == Target::kTorque;
   const residuals::Inputs& inputs = *named.fit;

@@ -37,7 +37,8 @@ struct NetworkSizes {
   std::vector<int> phi = {25, 40, 40};
   std::vector<int> rho = {40, 40, 40};
   int features = 40;
-  bool ground = true;  ///< a phi of the vehicle's own height and velocity, always in the sum
+  bool ground = true;       ///< a phi of the vehicle's own height and velocity, always in the sum
+  bool invariants = false;  ///< every phi sees invariants under turns about the vertical (nn/invariants.h)
 };
 
 /// Samples of one vehicle in one flight.
@@ -53,6 +54,7 @@ struct TrackSamples {
 
 struct LearningData {
   Target target = Target::kForceZ;
+  bool invariants = false;  ///< inputs of the samples are invariants of the states
   training::Layout layout;  ///< parts "phi:<kind>", with "phi:ground", and "rho:<kind>"
   training::Dataset samples;
   std::vector<TrackSamples> tracks;
@@ -61,6 +63,12 @@ struct LearningData {
 
   std::vector<Eigen::Index> indices(Use use) const;
 };
+
+/// What phi sees of a neighbour's relative state, and the ground's phi of the vehicle's own: the state, or its
+/// invariants as nn/deep_set.h computes them.
+/// @param state [nn::kRelativeState] and [nn::kOwnState].
+std::vector<float> seen_of_neighbour(const std::vector<float>& state, bool invariants);
+std::vector<float> seen_of_own(const std::vector<float>& state, bool invariants);
 
 /// Shows progress: flights done of all.
 using Progress = std::function<void(int done, int total)>;
@@ -80,14 +88,16 @@ struct LearningFlights {
 };
 
 /// Loads flights. The target of a sample is what the vehicle's model leaves of the force or torque; inputs are relative
-/// positions and velocities of the neighbours in the world frame (paper, section V-B), and own (-z, -v) for the ground.
+/// positions and velocities of the neighbours in the world frame (paper, section V-B), and own (-z, -v) for the ground;
+/// or, as `sizes` says, invariants of them, as the evaluator computes them in float32.
 /// Among the samples to fit, every group, which is a scenario and a composition of kinds, gets the same total weight:
 /// ten flights of one task say no more of another than one does. The others have weight 1.
 ///
 /// What `select` and `test` do not name is held back from `fit`: of every five flights, in order of names and runs, the
 /// third selects and the fifth tests; of three or four flights the last two do. By blocks: of every five blocks of a
 /// flight, likewise. Which networks there are, and what is fitted, does not depend on the records that test.
-/// @throws files::InputError if no record to fit of a vehicle with a model is left, or none has a neighbour.
+/// @throws files::InputError if no record to fit of a vehicle with a model is left, or none has a neighbour;
+///   std::invalid_argument for invariants with another target than the vertical force.
 LearningData load_learning_data(const LearningFlights& flights, const NetworkSizes& sizes, SplitBy split,
                                 int jobs, const Progress& progress, Target target = Target::kForceZ);
 

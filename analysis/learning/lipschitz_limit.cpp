@@ -9,6 +9,7 @@
 #include "lipschitz/spectral_norm.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/function_names.h"
+#include "nn/weights/invariants.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::learning {
@@ -18,8 +19,9 @@ namespace {
 constexpr double kScalingHeadroom = 0x1p-20;
 constexpr int kMostScalings = 8;
 
-lipschitz::UpperBound product_of_norms(const files::Weights& phi, const files::Weights& rho) {
-  std::vector<lipschitz::UpperBound> norms;
+lipschitz::UpperBound product_of_norms(const files::Weights& phi, const files::Weights& rho,
+                                       double slope_of_inputs) {
+  std::vector<lipschitz::UpperBound> norms = {lipschitz::UpperBound(slope_of_inputs)};
   for (const files::Weights* const weights : {&phi, &rho}) {
     for (const files::Layer& layer : weights->layers)
       norms.push_back(lipschitz::spectral_norm(layer).norm.upper);
@@ -29,9 +31,10 @@ lipschitz::UpperBound product_of_norms(const files::Weights& phi, const files::W
 
 }  // namespace
 
-std::vector<JointBound> joint_bounds(const training::Layout& layout, const training::Vector& theta,
-                                     int jobs) {
+std::vector<JointBound> joint_bounds(const training::Layout& layout, const training::Vector& theta, int jobs,
+                                     bool invariants) {
   files::Network network;
+  network.invariants = invariants;
   std::vector<JointBound> bounds;
   const auto count = static_cast<int>(layout.parts().size());
   const auto kind = [&](int part) { return files::kind_of(layout.parts()[part].name); };
@@ -45,19 +48,23 @@ std::vector<JointBound> joint_bounds(const training::Layout& layout, const train
   files::parallel_for(static_cast<int>(bounds.size()), jobs, [&](int i) {
     JointBound& bound = bounds[static_cast<std::size_t>(i)];
     const std::string phi = kind(bound.phi), rho = kind(bound.rho);
-    const lipschitz::SdpBound found = lipschitz::sdp_bound(check::stages(network, files::set_name(phi, rho)));
-    bound.upper = product_of_norms(network.phi.at(phi), network.rho.at(rho)).value();
+    const std::string function = files::set_name(phi, rho);
+    const lipschitz::SdpBound found = lipschitz::sdp_bound(check::stages(network, function));
+    bound.upper =
+        product_of_norms(network.phi.at(phi), network.rho.at(rho), files::slope_of_inputs(network, function))
+            .value();
     if (found.proof) bound.upper = std::min(bound.upper, found.proof->upper.value());
   });
   return bounds;
 }
 
-Tightening scale_to(double limit, const training::Layout& layout, int jobs, training::Vector& theta) {
+Tightening scale_to(double limit, const training::Layout& layout, int jobs, training::Vector& theta,
+                    bool invariants) {
   const std::size_t count = layout.parts().size();
   Tightening result;
   result.shares.assign(count, 1.0);
   std::vector<double> ratio(count, 0.0);
-  for (const JointBound& bound : joint_bounds(layout, theta, jobs)) {
+  for (const JointBound& bound : joint_bounds(layout, theta, jobs, invariants)) {
     result.largest = std::max(result.largest, bound.upper);
     const int layers = layout.parts()[bound.phi].layers() + layout.parts()[bound.rho].layers();
     for (const int part : {bound.phi, bound.rho}) {
@@ -76,9 +83,10 @@ Tightening scale_to(double limit, const training::Layout& layout, int jobs, trai
   return result;
 }
 
-void limit_joint_bounds(double limit, const training::Layout& layout, int jobs, training::Vector& theta) {
+void limit_joint_bounds(double limit, const training::Layout& layout, int jobs, training::Vector& theta,
+                        bool invariants) {
   for (int tries = 0; tries < kMostScalings; ++tries) {
-    if (scale_to(limit, layout, jobs, theta).largest <= limit) return;
+    if (scale_to(limit, layout, jobs, theta, invariants).largest <= limit) return;
   }
   throw std::runtime_error("no proof that the joint Lipschitz bounds keep their limit");
 }

@@ -19,7 +19,9 @@ struct JointBound {
 };
 
 /// All pairs of a phi, that of the ground among them, and a rho.
-std::vector<JointBound> joint_bounds(const training::Layout& layout, const training::Vector& theta, int jobs);
+/// @param invariants whether phi sees invariants of the inputs (nn/invariants.h), whose map's slope is in the bounds.
+std::vector<JointBound> joint_bounds(const training::Layout& layout, const training::Vector& theta, int jobs,
+                                     bool invariants = false);
 
 /// What one look at the bounds asks for.
 struct Tightening {
@@ -31,10 +33,12 @@ struct Tightening {
 /// Scales the last weights of each rho, and with them what the network says of differences, so that its bounds keep
 /// the limit up to rounding. Bounds grow with the product of the norms over the layers of phi and rho: shares are
 /// (limit / bound)^(1 / layers) for the largest bound that the part has a hand in, above one where there is room.
-Tightening scale_to(double limit, const training::Layout& layout, int jobs, training::Vector& theta);
+Tightening scale_to(double limit, const training::Layout& layout, int jobs, training::Vector& theta,
+                    bool invariants = false);
 
 /// Scales until every bound is proved to keep the limit.
 /// @throws std::runtime_error if that takes more than a few tries.
-void limit_joint_bounds(double limit, const training::Layout& layout, int jobs, training::Vector& theta);
+void limit_joint_bounds(double limit, const training::Layout& layout, int jobs, training::Vector& theta,
+                        bool invariants = false);
 
 }  // namespace swarmcert::learning

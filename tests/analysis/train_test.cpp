@@ -253,6 +253,44 @@ TEST_F(Train, KeepsTheLipschitzLimitThatItWasGiven) {
   EXPECT_EQ(execute(train("--epochs 1 --max-lipschitz 100 --gamma-mode equal -o out")).exit_code, 2);
 }
 
+TEST_F(Train, ExactSymmetryIsTrainedCertifiedSimulatedAndExportedAndRefusedWhereItIsNotKnown) {
+  const Outcome trained =
+      execute(train("--symmetry exact --epochs 25 --batch 256 --rate 3e-3 --max-lipschitz 60 -o out "
+                    "--json out.json"));
+  ASSERT_EQ(trained.exit_code, 0) << trained.output;
+  const Json result = files::read_json(folder_ / "out.json", "swarmcert/train/1");
+  EXPECT_LT(result["test_rmse"].get<double>(), 0.8 * result["test_rmse_of_nothing"].get<double>());
+  EXPECT_LE(result["lipschitz"].get<double>(), 60);
+  EXPECT_NE(read_text(folder_ / "out/network.toml").find("invariants = \"rotation\""), std::string::npos);
+  EXPECT_EQ(execute("swarmcert check out/certificate.json out/network.toml").exit_code, 0);
+  // The effect of the model and the controller evaluate the same network.
+  const auto rmse = [&](const std::string& model) {
+    const Outcome compared = execute("swarmcert compare " + model + " flights --force --json compared.json");
+    EXPECT_EQ(compared.exit_code, 0) << compared.output;
+    return files::read_json(folder_ / "compared.json", "swarmcert/compare/1")["overall"]["rmse"]["z"]
+        .get<double>();
+  };
+  EXPECT_LT(rmse("out/model-small.toml"), 0.8 * rmse("nominal.toml"));
+  const Outcome flown = execute(
+      "swarmcert simulate swap --vehicles 2 --model truth.toml --network out/network.toml "
+      "--gains '" +
+      std::string(SWARMCERT_SOURCE_DIR) + "/controller/gains/crazyflie-small.toml' -o flown");
+  EXPECT_EQ(flown.exit_code, 0) << flown.output;
+  EXPECT_EQ(
+      execute("swarmcert export out/network.toml --certificate out/certificate.json -o firmware").exit_code,
+      0);
+  EXPECT_EQ(execute("swarmcert match out/network.toml firmware").exit_code, 0);
+  EXPECT_EQ(execute("swarmcert inspect out/network.toml").exit_code, 0);
+  write_text(folder_ / "box.toml",
+             "schema = \"swarmcert/box/1\"\nlower = [0,-1,0,-1,0]\nupper = [1,1,1,1,1]\n");
+  for (const std::string option : {"--domain box.toml", "--range", "--method branch", "--explain"}) {
+    const Outcome refused = execute("swarmcert certify out/network.toml " + option);
+    EXPECT_NE(refused.exit_code, 0) << option;
+    EXPECT_NE(refused.output.find("relative states"), std::string::npos) << refused.output;
+  }
+  EXPECT_EQ(execute(train("--symmetry exact --quantity force -o other")).exit_code, 2);
+}
+
 TEST_F(Train, SameSeedGivesTheSameFilesWhateverTheJobs) {
   ASSERT_EQ(execute(train("--epochs 3 --max-lipschitz 100 -o one -j 1")).exit_code, 0);
   ASSERT_EQ(execute(train("--epochs 3 --max-lipschitz 100 -o two -j 2")).exit_code, 0);

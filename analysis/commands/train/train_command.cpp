@@ -118,6 +118,10 @@ void refuse_twice(const learning::LearningFlights& flights) {
 /// Sets the options of the trainer that the command line gives as words.
 void choose_trainer(const CommonOptions& common, TrainOptions& options) {
   options.sizes.ground = !options.no_ground;
+  options.sizes.invariants = options.symmetry == "exact";
+  if (options.sizes.invariants && options.quantity != "force_z")
+    throw UsageError("--symmetry exact is for the vertical force; with --quantity " + options.quantity +
+                     " use --symmetry vertical");
   training::TrainerOptions& trainer = options.run.trainer;
   trainer.gamma.scope = options.gamma_scope == "layer" ? files::GammaStatement::Scope::kLayer
                                                        : files::GammaStatement::Scope::kNetwork;

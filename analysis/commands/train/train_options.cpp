@@ -45,8 +45,9 @@ void declare_samples(CLI::App& app, TrainOptions& options) {
       ->capture_default_str();
   app.add_option("--symmetry", options.symmetry,
                  "vertical: every epoch turns every sample about the vertical and mirrors it, its force or "
-                 "torque included; none: samples as recorded")
-      ->check(CLI::IsMember({"vertical", "none"}))
+                 "torque included; exact: the networks see what no turn changes (vertical force only); none: "
+                 "samples as recorded")
+      ->check(CLI::IsMember({"vertical", "exact", "none"}))
       ->capture_default_str();
 }
 
