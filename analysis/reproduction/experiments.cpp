@@ -14,6 +14,8 @@ const std::vector<Experiment>& experiments() {
       {"validation", "fig:validation: force and prediction in a swap of four", figure_validation},
       {"superposition", "f(a,b) - f(a) - f(b): truth, network, recorded flights", superposition},
       {"lipschitz", "test error, certified bound and tracking error over gamma", lipschitz_tradeoff},
+      {"symmetry", "exact symmetry, turned samples or none: test error over data and over the bound",
+       symmetry},
       {"real-flights", "the published flights: beside the published networks; physics first", real_flights},
       {"gains-in-flight", "errors of gains that flew, predicted from the gains: --calibrate, --flights",
        gains_in_flight},

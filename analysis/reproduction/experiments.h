@@ -25,6 +25,10 @@ Finding figure_validation(const Setting& setting);
 Finding superposition(const Setting& setting);
 /// Test error against certified Lipschitz bound over gamma, and the tracking error predicted from it.
 Finding lipschitz_tradeoff(const Setting& setting);
+/// Test errors of networks with exact symmetry about the vertical, with turned samples and with none, from all flights
+/// and from half of them; test error over the proved joint bound, where the norms of layers are limited and where the
+/// bound itself is.
+Finding symmetry(const Setting& setting);
 /// Training on the published flights beside the published networks; then physics first.
 Finding real_flights(const Setting& setting);
 /// Peak tracking errors of gains that flew, bounded from the gains with a stated coverage: calibrated on the flights of

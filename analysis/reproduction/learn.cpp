@@ -23,6 +23,8 @@ std::string text_of(const LearnOptions& options) {
                                  static_cast<int>(options.gamma.mode), options.max_lipschitz, options.turns,
                                  options.rate, options.batch, options.steps, options.epochs, options.seed,
                                  options.teachers, options.sizes.features, options.sizes.ground);
+  if (options.sizes.invariants) text += " invariants";
+  if (options.tight_bounds) text += " tight bounds";
   for (const int size : options.sizes.phi) text += fmt::format(" phi {}", size);
   for (const int size : options.sizes.rho) text += fmt::format(" rho {}", size);
   return text;
@@ -31,7 +33,7 @@ std::string text_of(const LearnOptions& options) {
 Learned read_back(const files::Json& file, const std::string& folder) {
   Learned learned;
   learned.folder = folder;
-  learned.network = files::load_network({(fs::path(folder) / "network.toml").string(), "", "", ""});
+  learned.network = files::load_evaluated_network({(fs::path(folder) / "network.toml").string(), "", "", ""});
   for (const files::Json& bound : file.at("set_bounds"))
     learned.set_bounds.emplace_back(bound.at(0).get<std::string>(), bound.at(1).get<double>());
   learned.bound = file.at("bound").get<double>();
@@ -77,7 +79,7 @@ files::Json train(const Setting& setting, const LearnOptions& options, const std
   lipschitz::CertifyOptions certify;
   certify.jobs = setting.jobs;
   certify.lower.rounds = 0;  // only upper bounds are shown
-  if (!setting.full && options.max_lipschitz == 0)
+  if (!setting.full && options.max_lipschitz == 0 && !options.tight_bounds)
     certify.method = lipschitz::UpperMethod::kProduct;  // looser, but at once
   const learning::Certified certified = learning::write_certificate(network, folder, certify);
   files::Json bounds = files::Json::array(), epochs = files::Json::array(), scores = files::Json::array();

@@ -20,7 +20,8 @@ struct LearnOptions {
   int steps = 0;   ///< of the optimiser: as many whole epochs as come nearest, at least one
   int epochs = 0;  ///< where steps is 0
   std::uint64_t seed = 1;
-  int teachers = 0;  ///< see learning::run_with_teachers()
+  int teachers = 0;           ///< see learning::run_with_teachers()
+  bool tight_bounds = false;  ///< LipSDP at the small size as well, not only products of norms
 };
 
 /// A trained network and what was measured of it. Read back from its folder where that was made by the same call.

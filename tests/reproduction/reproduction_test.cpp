@@ -88,6 +88,15 @@ TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
   ASSERT_EQ(curve.size(), 2u);
   EXPECT_LT(curve[0]["bound_gf_per_unit"].get<double>(), curve[1]["bound_gf_per_unit"].get<double>());
 
+  reproduce("symmetry -o out");
+  const Json symmetry = result("symmetry");
+  ASSERT_EQ(symmetry["data"].size(), 6u);
+  ASSERT_EQ(symmetry["bounds"].size(), 8u);
+  for (const Json& row : symmetry["bounds"]) {
+    if (row["limited"] == "joint bound")
+      EXPECT_LE(row["bound_gf_per_unit"][0].get<double>(), row["limit"].get<double>()) << row;
+  }
+
   // Made anew elsewhere, the same bytes.
   reproduce("intro -o again -j 1");
   EXPECT_EQ(read_text(folder_ / "out/small/flights-0/stage1/network/phi_small.safetensors"),
