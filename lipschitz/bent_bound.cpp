@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "lipschitz/chain_newton.h"
 #include "lipschitz/dense_kernels.h"
 #include "lipschitz/live_chain.h"
 
@@ -138,15 +139,15 @@ SdpBound bent_bound(const check::BentChain& chain, const SdpOptions& options) {
     return result;
   }
   const ScaledBentChain scaled = scaled_to_one(live.live(), largest_slopes(chain));
-  if (scaled.size() > kMostBentVariables) return result;
   InteriorPointOptions solver;
   solver.stop = options.stop;
-  const InteriorPointResult found = minimise(BentInequality(scaled), product_start(scaled), solver);
-  result.stop = found.stop;
-  result.iterations = found.iterations;
-  for (auto point = found.points.rbegin(); point != found.points.rend() && !result.proof; ++point) {
+  std::optional<InteriorPointResult> found = minimise_long_chain(ChainSlack(scaled.stages, scaled.c), solver);
+  if (!found) found = minimise(BentInequality(scaled), product_start(scaled), solver);
+  result.stop = found->stop;
+  result.iterations = found->iterations;
+  for (auto point = found->points.rbegin(); point != found->points.rend() && !result.proof; ++point) {
     const VectorXd y = unscaled(scaled, *point);
-    if (point == found.points.rbegin()) result.optimum = Estimate(std::sqrt(y(0)));
+    if (point == found->points.rbegin()) result.optimum = Estimate(std::sqrt(y(0)));
     if (options.known && !(y(0) < options.known->value() * options.known->value())) break;
     const std::vector<double> t = live.multipliers(y.tail(y.size() - 1));
     for (const double slack : {0.0, 1e-9, 1e-8, 1e-7}) {

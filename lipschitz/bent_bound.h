@@ -5,17 +5,13 @@
 
 namespace swarmcert::lipschitz {
 
-/// The program is dense: chains with more variables (inputs, after those of a wide first stage are reduced to its rows,
-/// and neurons) are left to the product of norms.
-inline constexpr int kMostBentVariables = 1400;
-
 /// sdp_bound() of such a chain, whose optimum is at most the product of the norms and of the c.
 ///
-/// In the variables u = z - (1 - c) y, where y enters a neuron and z leaves it, the constraint of a neuron is
-/// u ((2 c - 1) y - u) >= 0, of rank two in a single u: the form of RankTwoInequality, for which minimise() is made.
-/// The matrix over (x, u) is dense, because y depends on all layers before.
+/// Long chains go to minimise_chain(). Short ones are solved in the variables u = z - (1 - c) y, where y enters a neuron
+/// and z leaves it: the constraint of a neuron is u ((2 c - 1) y - u) >= 0, of rank two in a single u, which is the form
+/// of RankTwoInequality, for which minimise() is made. The matrix over (x, u) is dense, because y depends on all layers
+/// before.
 /// @param chain at least one g positive.
-/// @returns no proof where the chain has more than kMostBentVariables.
 SdpBound bent_bound(const check::BentChain& chain, const SdpOptions& options = {});
 
 }  // namespace swarmcert::lipschitz

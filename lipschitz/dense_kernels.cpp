@@ -5,9 +5,12 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <mutex>
+#include <optional>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
+
+#include "nn/base/random.h"
 
 extern "C" {
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
@@ -194,7 +197,45 @@ void add_symmetric_product(VectorXd& y, double factor, const MatrixXd& x, const 
   cblas_dsymv(CblasColMajor, CblasLower, n, factor, x.data(), n, v.data(), 1, 1.0, y.data(), 1);
 }
 
+namespace {
+
+/// Lanczos' method with full reorthogonalisation; nothing where it has not converged.
+std::optional<double> largest_by_lanczos(const MatrixXd& m) {
+  constexpr Eigen::Index kSteps = 200, kBetweenLooks = 10;
+  constexpr double kResidual = 1e-8;  // the error of the eigenvalue is of its square's order
+  const Eigen::Index n = m.rows(), steps = std::min(n, kSteps);
+  MatrixXd basis(n, steps + 1);
+  VectorXd alpha(steps), beta(steps);
+  files::Random random(1);
+  for (double& x : basis.col(0)) x = random.symmetric();
+  basis.col(0).normalize();
+  for (Eigen::Index k = 0; k < steps; ++k) {
+    VectorXd w = VectorXd::Zero(n);
+    add_symmetric_product(w, 1, m, basis.col(k));
+    alpha(k) = basis.col(k).dot(w);
+    for (int again = 0; again < 2; ++again)
+      w -= basis.leftCols(k + 1) * (basis.leftCols(k + 1).transpose() * w);
+    beta(k) = w.norm();
+    if (k % kBetweenLooks == kBetweenLooks - 1 || k + 1 == steps) {
+      Eigen::SelfAdjointEigenSolver<MatrixXd> eigen;
+      eigen.computeFromTridiagonal(alpha.head(k + 1), beta.head(k), Eigen::ComputeEigenvectors);
+      const double value = eigen.eigenvalues()(k);
+      if (beta(k) * std::abs(eigen.eigenvectors()(k, k)) <= kResidual * value) return value;
+    }
+    if (!(beta(k) > 0)) break;
+    basis.col(k + 1) = w / beta(k);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 double largest_eigenvalue(const MatrixXd& m) {
+  constexpr Eigen::Index kMostDirect = 64;  // beyond, iterations cost less
+  if (m.rows() > kMostDirect) {
+    const std::optional<double> found = largest_by_lanczos(m);
+    if (found) return std::max(0.0, *found);
+  }
   return std::max(
       0.0, Eigen::SelfAdjointEigenSolver<MatrixXd>(m, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff());
 }

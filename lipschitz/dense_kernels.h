@@ -69,7 +69,8 @@ void solve_cholesky(const Eigen::MatrixXd& l, Eigen::VectorXd& b);
 void add_symmetric_product(Eigen::VectorXd& y, double factor, const Eigen::MatrixXd& x,
                            const Eigen::VectorXd& v);
 
-/// Largest eigenvalue of a symmetric positive semidefinite matrix, an estimate; at least 0.
+/// Largest eigenvalue of a symmetric positive semidefinite matrix (its lower triangle is read), an estimate to about
+/// twelve digits; at least 0.
 double largest_eigenvalue(const Eigen::MatrixXd& m);
 
 }  // namespace swarmcert::lipschitz

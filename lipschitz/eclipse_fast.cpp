@@ -1,9 +1,9 @@
 #include "lipschitz/eclipse_fast.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 
+#include "lipschitz/chain_slack.h"
 #include "lipschitz/dense_kernels.h"
 #include "lipschitz/live_chain.h"
 #include "lipschitz/sdp_bound.h"
@@ -23,14 +23,14 @@ struct LayerMultipliers {
 
 LayerMultipliers layer_multipliers(const ReluChain& chain) {
   LayerMultipliers result;
-  MatrixXd x = MatrixXd::Identity(chain[0].cols(), chain[0].cols());
-  for (std::size_t k = 0; k + 1 < chain.size(); ++k) {
-    const MatrixXd through = chain[k] * x.llt().solve(chain[k].transpose());
-    const double tau = 1 / largest_eigenvalue(through);
-    result.tau.push_back(tau);
-    x = 2 * tau * MatrixXd::Identity(through.rows(), through.rows()) - tau * tau * through;
+  MatrixXd gram = MatrixXd::Zero(chain[0].rows(), chain[0].rows());
+  add_lower_gram(gram, 1, chain[0]);
+  for (std::size_t k = 1; k < chain.size(); ++k) {
+    result.tau.push_back(1 / largest_eigenvalue(gram));
+    gram = layerwise_gram(chain[k], gram, result.tau.back());
+    if (gram.size() == 0) return result;  // cannot be: the least eigenvalue of what is inverted is tau
   }
-  result.rho = largest_eigenvalue(chain.back() * x.llt().solve(chain.back().transpose()));
+  result.rho = largest_eigenvalue(gram);
   return result;
 }
 
@@ -38,6 +38,7 @@ LayerMultipliers layer_multipliers(const ReluChain& chain) {
 
 std::optional<UpperProof> eclipse_fast(const std::vector<check::Matrix>& stages) {
   if (stages.size() == 1) return sdp_bound(stages).proof;
+  use_one_blas_thread();
   const LiveChain live(stages);
   if (live.is_constant())
     return prove(stages, std::numeric_limits<double>::min(), live.multipliers(VectorXd()));

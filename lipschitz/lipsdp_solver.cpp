@@ -1,11 +1,11 @@
 #include "lipschitz/lipsdp_solver.h"
 
-#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "lipschitz/chain_newton.h"
+#include "lipschitz/chain_slack.h"
 #include "lipschitz/dense_kernels.h"
 
 namespace swarmcert::lipschitz {
@@ -33,7 +33,7 @@ int nearest_exponent(double x) {
 
 /// Scales layer by layer so that rho = 1 and all t = 1 is nearly optimal among multipliers that are equal within a
 /// layer: t_k = 1 / lambda_max(M_k X_{k-1}^-1 M_k') with X_k = 2 t_k I - t_k^2 M_k X_{k-1}^-1 M_k' >= t_k I
-/// (the recursion of Xu and Sivaranjani 2024). Blocks of S are then of order one, and 2 (rho, t) is well inside.
+/// (layerwise_gram()). Blocks of S are then of order one, and 2 (rho, t) is well inside.
 ScaledProblem scale(const ReluChain& chain) {
   ScaledProblem problem;
   problem.stages = chain;
@@ -45,19 +45,21 @@ ScaledProblem scale(const ReluChain& chain) {
     first = r.transpose();
   }
   problem.begin = {0, first.cols()};
-  MatrixXd x_inverse = MatrixXd::Identity(first.cols(), first.cols());
+  MatrixXd g = MatrixXd::Zero(first.rows(), first.rows());
+  add_lower_gram(g, 1, first);
   int unit_before = 0;  // z_{k-1} is measured in units of 2^unit_before
   for (std::size_t k = 0; k < problem.stages.size(); ++k) {
     MatrixXd& m = problem.stages[k];
     problem.begin.push_back(problem.begin.back() + m.rows());
-    const MatrixXd g = m * x_inverse * m.transpose();
     const double largest = largest_eigenvalue(g);
     const int unit = largest > 0 ? nearest_exponent(std::sqrt(largest)) : unit_before;
     problem.exponents.push_back(unit - unit_before);
     m *= std::ldexp(1.0, unit_before - unit);
     unit_before = unit;
     const double t = largest > 0 ? 1 / largest : std::ldexp(1.0, -2 * unit);  // nothing comes: of its units
-    x_inverse = (2 * t * MatrixXd::Identity(m.rows(), m.rows()) - t * t * g).inverse();
+    if (k + 1 == problem.stages.size()) break;
+    g = layerwise_gram(problem.stages[k + 1], g, t);
+    if (g.size() == 0) g = MatrixXd::Zero(problem.stages[k + 1].rows(), problem.stages[k + 1].rows());
   }
   problem.begin.pop_back();  // the output is no variable
   return problem;
@@ -134,25 +136,13 @@ class ChainInequality final : public RankTwoInequality {
   MatrixXd last_gram_;
 };
 
-/// Long chains by minimise_chain(), whose steps cost less; short ones, and what stops there short of the optimum, by
-/// minimise(), whose steps gain more.
 InteriorPointResult minimise(const ScaledProblem& problem, const LipSdpOptions& options) {
-  constexpr Index kMostDense = 300, kMostAgain = 1500;
-  constexpr int kMoreIterations = 3;
-  constexpr double kEnough = 1e-6, kLongGap = 5e-7;
   InteriorPointOptions inner;
   inner.relative_gap = options.relative_gap;
-  inner.stop = options.stop;
-  if (problem.neurons() > kMostDense) {
-    inner.max_iterations = kMoreIterations * options.max_iterations;
-    inner.relative_gap = std::max(options.relative_gap, kLongGap);
-    InteriorPointResult found = minimise_chain(problem.stages, inner);
-    const bool is_enough =
-        found.stop == LipSdpStop::kGapReached || (!found.gaps.empty() && found.gaps.back() < kEnough);
-    if (is_enough || is_interrupted(found.stop) || problem.size() > kMostAgain) return found;
-  }
-  inner.relative_gap = options.relative_gap;
   inner.max_iterations = options.max_iterations;
+  inner.stop = options.stop;
+  if (std::optional<InteriorPointResult> found = minimise_long_chain(ChainSlack(problem.stages), inner))
+    return *std::move(found);
   const ChainInequality inequality(problem);
 
   // Within rounding to powers of two all-ones is feasible or nearly so; scaling (rho, t) up moves inside the cone.

@@ -6,8 +6,10 @@
 #include <stdexcept>
 
 #include "lipschitz/certify.h"
+#include "lipschitz/chain_newton.h"
 #include "lipschitz/checker/check.h"
 #include "lipschitz/checker/stages.h"
+#include "lipschitz/live_chain.h"
 #include "lipschitz/networks.h"
 #include "nn/base/content_hash.h"
 #include "nn/base/json.h"
@@ -100,11 +102,37 @@ TEST(BentBound, StandsForWeightsFarFromOne) {
               1e-6 * std::ldexp(upper, -30));
 }
 
-TEST(BentBound, IsLeftToTheProductWhereTheProgramIsTooLarge) {
+/// The two methods see the program in different variables: a dense matrix of z - (1 - c) y, blocks of z.
+TEST(BentBound, OfAChainByBlocksIsThatOfTheDenseProgram) {
   std::mt19937 generator(44);
+  for (const Activation activation : kBent) {
+    for (const std::vector<int>& sizes :
+         {std::vector<int>{3, 12, 2}, {9, 4, 6, 5}, {4, 8, 8, 8, 8, 8, 8, 1}, {2, 30, 10, 20, 3}}) {
+      const Network network = bent_network(tests::random_network(sizes, generator), activation);
+      const check::BentChain chain = check::bent_chain(network, "network");
+      const std::vector<Eigen::MatrixXd> stages = rounded(chain.stages);
+      const double c = files::function_of(activation).steepest();
+      InteriorPointOptions options;
+      options.relative_gap = 5e-7;
+      const InteriorPointResult found =
+          minimise_chain(ChainSlack(stages, std::vector<double>(chain.bends.size(), c)), options);
+      ASSERT_EQ(found.stop, LipSdpStop::kGapReached) << name(found.stop);
+      const double dense = bent_bound(chain).optimum.value();
+      EXPECT_NEAR(std::sqrt(found.points.back()(0)), dense, 5e-7 * dense);
+      EXPECT_LE(std::sqrt(found.best_dual), dense * (1 + 1e-8));
+    }
+  }
+}
+
+TEST(BentBound, OfManyNeuronsIsProvedFarBelowTheProduct) {
+  std::mt19937 generator(48);
   const Network network =
-      bent_network(tests::random_network({1, kMostBentVariables, 1}, generator), Activation::kSilu);
-  EXPECT_FALSE(bent_bound(check::bent_chain(network, "network")).proof.has_value());
+      bent_network(tests::random_network({3, 64, 64, 64, 64, 64, 2}, generator), Activation::kSilu);
+  const SdpBound found = bent_bound(check::bent_chain(network, "network"));
+  ASSERT_TRUE(found.proof.has_value());
+  EXPECT_EQ(found.stop, LipSdpStop::kGapReached) << name(found.stop);
+  EXPECT_LT(found.proof->upper.value(), product_of(network) / 3);
+  EXPECT_LT(tests::sampled_slope(*network.plain, generator, 300), found.proof->upper.value());
 }
 
 TEST(BentChain, HasOneBendPerHiddenLayerAndZeroWhereSlopesAreDivided) {

@@ -25,7 +25,7 @@ InteriorPointOptions options() {
 }
 
 double best_rho(const std::vector<MatrixXd>& stages) {
-  const InteriorPointResult found = minimise_chain(stages, options());
+  const InteriorPointResult found = minimise_chain(ChainSlack(stages), options());
   EXPECT_EQ(found.stop, LipSdpStop::kGapReached) << name(found.stop);
   return found.points.back()(0);
 }
@@ -87,7 +87,7 @@ TEST(ChainNewton, ItsMultipliersAreProvedAndThoseOfASmallerRhoAreNot) {
     stages.push_back(m);
     exact.push_back(dyadic);
   }
-  const VectorXd y = minimise_chain(stages, options()).points.back();
+  const VectorXd y = minimise_chain(ChainSlack(stages), options()).points.back();
   const std::vector<double> t(y.data() + 1, y.data() + y.size());
   EXPECT_TRUE(prove(exact, y(0) * (1 + 1e-8), t));
   EXPECT_FALSE(prove(exact, y(0) * (1 - 1e-4), t));
@@ -97,8 +97,8 @@ TEST(ChainNewton, EndsAtOnceWhereItIsCancelled) {
   InteriorPointOptions none = options();
   const std::atomic<bool> cancelled{true};
   none.stop = Stop(&cancelled);
-  const MatrixXd stage = MatrixXd::Identity(5, 5);
-  const InteriorPointResult found = minimise_chain({stage, stage}, none);
+  const std::vector<MatrixXd> stages(2, MatrixXd::Identity(5, 5));
+  const InteriorPointResult found = minimise_chain(ChainSlack(stages), none);
   EXPECT_EQ(found.stop, LipSdpStop::kCancelled);
   EXPECT_EQ(found.iterations, 0);
 }

@@ -48,5 +48,31 @@ TEST(DenseKernels, ThreadsThatWorkAtTheSameTimeGetTheBitsOfOneAlone) {
   EXPECT_EQ(different, 0) << "of " << kThreads * kRounds;
 }
 
+/// Q diag(values) Q' for an orthogonal Q of many reflections.
+MatrixXd with_eigenvalues(const VectorXd& values) {
+  MatrixXd m = values.asDiagonal();
+  for (int i = 0; i < 20; ++i) {
+    const VectorXd v = VectorXd::Random(values.size()).normalized();
+    m -= 2 * v * (v.transpose() * m);
+    m -= 2 * (m * v) * v.transpose();
+  }
+  return m;
+}
+
+TEST(DenseKernels, FindTheLargestEigenvalueOfMatricesOfKnownOnes) {
+  for (const Eigen::Index n : {1, 10, 64, 65, 90, 300}) {
+    const VectorXd spread = VectorXd::LinSpaced(n, 0, 3);
+    VectorXd twice = spread, close = spread;
+    twice(0) = 3;
+    close(0) = 3 * (1 - 1e-7);
+    for (const VectorXd& values : {spread, twice, close, VectorXd(VectorXd::Constant(n, 2)),
+                                   VectorXd(5 * VectorXd::Unit(n, n / 2)), VectorXd(VectorXd::Zero(n))}) {
+      MatrixXd m = with_eigenvalues(values);
+      m.triangularView<Eigen::StrictlyUpper>().setConstant(99);  // is not read
+      EXPECT_NEAR(largest_eigenvalue(m), values.maxCoeff(), 1e-12 * values.maxCoeff()) << n;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace swarmcert::lipschitz
