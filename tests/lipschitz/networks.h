@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "lipschitz/checker/stages.h"
+#include "lipschitz/checker/witness.h"
 #include "lipschitz/sdp_bound.h"
 #include "nn/random_network.h"
 #include "nn/weights/network.h"
