@@ -13,10 +13,11 @@ namespace swarmcert::lipschitz {
 /// minimisers of rho / mu - log det S as mu goes to zero.
 ///
 /// S is block tridiagonal with one block per layer, so that its factor and the blocks of its inverse that the gradient
-/// needs cost time and memory that grow linearly with depth. Newton's matrix H is dense over the n neurons. It is built
-/// block column by block column from those of S^-1, for at most 4 n^2 times the width, and factorised in place. One H per
-/// step serves the correction towards the path, the extrapolation along the path, and the test how far that may go.
-/// It starts from multipliers that are equal within each layer, with steps that H limits while the path is far.
+/// needs cost time and memory that grow linearly with depth. Newton's matrix H is dense over the n neurons. It is
+/// built block column by block column from those of S^-1, for at most 4 n^2 times the width, and factorised in place.
+/// One H per step serves the correction towards the path, the extrapolation along the path, and the test how far that
+/// may go. It starts from multipliers that are equal within each layer, with steps that H limits while the path is
+/// far.
 ///
 /// Compared with minimise(): a fifth of the memory, a quarter to a twentieth of the time per step, at the price of less
 /// accuracy near the optimum: meant for a relative gap of 1e-6.

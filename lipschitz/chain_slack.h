@@ -1,4 +1,4 @@
-/// @file The matrix S of LipSDP-Neuron of a chain, block tridiagonal, with log det S and its derivatives. Not for users.
+/// @file The block tridiagonal matrix S of LipSDP-Neuron of a chain, log det S and its derivatives. Not for users.
 #pragma once
 
 #include <Eigen/Core>
@@ -64,10 +64,10 @@ std::optional<ChainPoint> chain_point(const ChainSlack& chain, Eigen::VectorXd y
 
 /// The negative Hessian of log det S, H_ij = tr(S^-1 A_i S^-1 A_j), its lower triangle.
 ///
-/// For neurons i and j it is 2 (p_i' Y p_j) (q_i' Y q_j) + 2 (p_i' Y q_j) (q_i' Y p_j) with Y = S^-1: sums of products of
-/// Y, M Y, Y M' and M Y M', of which block column after block column is computed. S Y = I gives Y M' in all columns and
-/// M Y in the last rows without the blocks of Y before; and H y = tr(Y A Y S) + ..., Euler's identity, the row of rho.
-/// Cost: at most 4 n^2 times the width for n neurons.
+/// For neurons i and j it is 2 (p_i' Y p_j) (q_i' Y q_j) + 2 (p_i' Y q_j) (q_i' Y p_j) with Y = S^-1: sums of products
+/// of Y, M Y, Y M' and M Y M', of which block column after block column is computed. S Y = I gives Y M' in all columns
+/// and M Y in the last rows without the blocks of Y before; and H y = tr(Y A Y S) + ..., Euler's identity, the row of
+/// rho. Cost: at most 4 n^2 times the width for n neurons.
 /// @returns less than that if it has to stop.
 Eigen::MatrixXd negative_hessian(const ChainSlack& chain, const ChainPoint& at, const Stop& stop);
 
