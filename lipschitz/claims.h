@@ -65,7 +65,7 @@ std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptio
 /// Reads a box.toml: `schema = "swarmcert/box/1"`, `lower` and `upper`, one number per input of the plain network or
 /// of the neighbours' phi; a table `ground` with the same keys for the ground's inputs (-z and -v), which otherwise
 /// get the last four intervals.
-/// @throws files::InputError with line, field, value and mend.
+/// @throws files::InputError with line, field, value and hint.
 std::map<std::string, Box> read_domain(const std::string& path, const files::Network& network);
 
 }  // namespace swarmcert::lipschitz

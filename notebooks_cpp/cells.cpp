@@ -37,8 +37,8 @@ std::string bare(const std::string& line) {
 }
 
 [[noreturn]] void refuse(const std::string& path, int line, const std::string& what,
-                         const std::string& mend) {
-  throw files::InputError({path, "line " + std::to_string(line), "", "", what, mend});
+                         const std::string& hint) {
+  throw files::InputError({path, "line " + std::to_string(line), "", "", what, hint});
 }
 
 }  // namespace

@@ -54,7 +54,7 @@ struct Gains {
 ///   [attitude] law = "lee" | "robust"; KR, Kw, KI: three numbers about the body's axes, or one for all; KI may be left
 ///              out. [lag] motor_s, attitude_s, body_rate_s, delay_s;  [network] rate_hz, latency_s: optional.
 /// Whether Lambda and K fit the theorem is not asked here.
-/// @throws files::InputError with line, key, value and mend: unknown keys, both forms or neither, negative or
+/// @throws files::InputError with line, key, value and hint: unknown keys, both forms or neither, negative or
 ///   non-finite numbers, times above one second, rates outside 1 Hz .. 100 kHz, gains that no vehicle follows (Kp
 ///   above 1e7 1/s^2, ...), an integrator step without a rate.
 Gains load_gains(const std::string& path);

@@ -142,7 +142,7 @@ void set_thrust_curve(const std::array<double, 3>& curve_N, Model& model);
 void refuse_other_rotors(const Model& model, const std::string& what);
 
 /// Reads a model file.
-/// @throws files::InputError with line, key, value and mend; unknown keys, effects and parameters get a did-you-mean.
+/// @throws files::InputError with line, key, value and hint; unknown keys, effects and parameters get a did-you-mean.
 Model read_model(const std::string& path);
 
 /// Why the vehicle cannot be at `battery_V`, with range and probable unit; empty if it can.

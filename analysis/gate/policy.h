@@ -53,7 +53,7 @@ struct Policy {
 };
 
 /// Reads a policy (schema swarmcert/policy/1): [release] and one table per check.
-/// @throws files::InputError with line, key, value and mend: unknown tables and keys, limits that are no numbers, a
+/// @throws files::InputError with line, key, value and hint: unknown tables and keys, limits that are no numbers, a
 ///   table without a limit, a check whose file is not named in [release].
 Policy read_policy(const std::string& path);
 

@@ -50,18 +50,18 @@ std::string other_formats() {
 }
 
 [[noreturn]] void refuse_unknown(const std::string& head, const std::string& path) {
-  std::string what = "is not a flight log", mend = "known are micro-SD logs, CSV" + other_formats();
+  std::string what = "is not a flight log", hint = "known are micro-SD logs, CSV" + other_formats();
   if (head.empty()) {
     what = "the file is empty";
-    mend = "the recording failed; leave it out";
+    hint = "the recording failed; leave it out";
   } else if (head.compare(0, 2, "\x1F\x8B") == 0) {
     what = "is compressed";
-    mend = "unpack it with gunzip";
+    hint = "unpack it with gunzip";
   } else if (head.compare(0, 2, "\xFF\xFE") == 0 || head.compare(0, 2, "\xFE\xFF") == 0) {
     what = "is text in UTF-16";
-    mend = "save it as UTF-8";
+    hint = "save it as UTF-8";
   }
-  throw files::InputError({path, "offset 0", "", "", what, mend});
+  throw files::InputError({path, "offset 0", "", "", what, hint});
 }
 
 /// Micro-SD logs and CSV are streams of records; formats/formats.h knows the others.
@@ -121,7 +121,7 @@ Log read_log(const std::string& path, const SignalMap& map) {
     return log;
   } catch (const files::InputError& error) {
     files::InputFault fault = error.fault();
-    for (const std::string& note : named) fault.mend = note + "; " + fault.mend;
+    for (const std::string& note : named) fault.hint = note + "; " + fault.hint;
     throw files::InputError(fault);
   }
 }

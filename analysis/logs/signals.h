@@ -49,7 +49,7 @@ using SignalMap = std::vector<SignalSource>;
 const SignalMap& known_columns();
 
 /// columns.toml: one table per signal, `[position_x] column = "x_mm", unit = "mm", frame = "world"`.
-/// @throws files::InputError with line, key and mend; signals, units and frames get a did-you-mean.
+/// @throws files::InputError with line, key and hint; signals, units and frames get a did-you-mean.
 SignalMap read_columns(const std::string& path);
 SignalMap parse_columns(const std::string& text, const std::string& path);
 

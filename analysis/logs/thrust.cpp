@@ -202,8 +202,8 @@ void derive_battery(Draft& draft) {
   }
 }
 
-/// Rotors whose speed is halved or drops out are mended from the others, and named.
-void mend_rotor_speeds(Draft& draft) {
+/// Replaces speeds of rotors that are halved or drop out by the mean of the others, and names these rotors.
+void replace_broken_rotor_speeds(Draft& draft) {
   SignalTable& t = draft.table;
   std::array<double, kFour> middle{};
   std::vector<double> all;
@@ -267,7 +267,7 @@ void settle_thrust(Draft& draft) {
     }
   }
   if (t.has_group(kRotorSpeed, kFour)) {
-    mend_rotor_speeds(draft);
+    replace_broken_rotor_speeds(draft);
     draft.add_measured("rotor_speed", kRotorSpeed);
   }
   const int commands = number_of_commands(t);

@@ -13,8 +13,8 @@ constexpr std::size_t kLongestName_bytes = 64;
 constexpr std::size_t kChecksum_bytes = 4;
 
 [[noreturn]] void refuse(const std::string& path, std::size_t offset, const std::string& field,
-                         const std::string& value, const std::string& what, const std::string& mend) {
-  throw files::InputError({path, "offset " + std::to_string(offset), field, value, what, mend});
+                         const std::string& value, const std::string& what, const std::string& hint) {
+  throw files::InputError({path, "offset " + std::to_string(offset), field, value, what, hint});
 }
 
 std::uint32_t checksum(const unsigned char* bytes, std::size_t size, std::uint32_t before = 0) {

@@ -28,7 +28,7 @@ void translate(std::exception_ptr pointer) {
   } catch (const files::InputError& error) {
     const files::InputFault& fault = error.fault();
     raise("InputError", py::make_tuple(error.what(), fault.file, fault.where, fault.field, fault.value,
-                                       fault.what, fault.mend));
+                                       fault.what, fault.hint));
   } catch (const analysis::UsageError& error) {
     raise("UsageError", py::make_tuple(error.what()));
   } catch (const std::filesystem::filesystem_error& error) {

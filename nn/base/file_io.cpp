@@ -16,8 +16,8 @@
 namespace swarmcert::files {
 namespace {
 
-[[noreturn]] void refuse(const std::string& path, const std::string& what, const std::string& mend = "") {
-  throw InputError({path, "", "", "", what, mend});
+[[noreturn]] void refuse(const std::string& path, const std::string& what, const std::string& hint = "") {
+  throw InputError({path, "", "", "", what, hint});
 }
 
 [[noreturn]] void refuse_with_errno(const std::string& path, const std::string& what) {

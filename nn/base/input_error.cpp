@@ -15,7 +15,7 @@ std::string one_line(const InputFault& fault) {
   part(fault.where);
   part(fault.value.empty() ? fault.field : fault.field + " = " + fault.value);
   part(fault.what);
-  if (!fault.mend.empty()) text += "; " + fault.mend;
+  if (!fault.hint.empty()) text += "; " + fault.hint;
   for (char& c : text) {
     const auto byte = static_cast<unsigned char>(c);
     if (byte < 0x20 || byte == 0x7f) c = '?';

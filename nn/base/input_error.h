@@ -7,14 +7,14 @@
 
 namespace swarmcert::files {
 
-/// What is wrong with an input, in the parts a user needs to mend it. Empty parts are left out of the message.
+/// What is wrong with an input, in the parts a user needs to correct it. Empty parts are left out of the message.
 struct InputFault {
   std::string file;   ///< path as the user gave it
   std::string where;  ///< "offset 132" in a binary file, "line 7" in a text file
   std::string field;  ///< tensor name, archive entry or key, e.g. "fc2.weight" or "gamma.value"
   std::string value;  ///< the offending value as text
   std::string what;   ///< the rule that it breaks
-  std::string mend;   ///< what the user can do
+  std::string hint;   ///< what the user can do
 };
 
 /// Thrown by every reader. what() is one line: "FILE: WHERE: FIELD = VALUE: WHAT; MEND"; control characters, which
@@ -28,7 +28,7 @@ class InputError : public std::runtime_error {
   InputFault fault_;
 };
 
-/// How to mend a binary file that ends early or contradicts itself.
+/// How to correct a binary file that ends early or contradicts itself.
 inline constexpr char kCopyAgain[] = "the file is truncated or damaged: copy it again";
 
 /// `text` in double quotes, cut with "..." after 80 bytes: for text that comes from a file of unknown origin.

@@ -155,12 +155,12 @@ std::vector<std::string> TomlTable::keys() const {
 }
 
 void TomlTable::refuse(const std::string& key, const std::string& value, const std::string& what,
-                       const std::string& mend) const {
+                       const std::string& hint) const {
   const toml::node* const found = key.empty() ? table_ : table_->get(key);
   const std::string where = line_words((found == nullptr ? table_ : found)->source());
   std::string field = prefix_ + key;
   if (key.empty() && !field.empty()) field.pop_back();
-  throw InputError({path_, where, field, value, what, mend});
+  throw InputError({path_, where, field, value, what, hint});
 }
 
 const toml::node& TomlTable::node(const std::string& key) const {

@@ -50,7 +50,7 @@ class TomlTable {
 
   /// Throws InputError about the value of `key`, or about the table itself where `key` is empty.
   [[noreturn]] void refuse(const std::string& key, const std::string& value, const std::string& what,
-                           const std::string& mend = "") const;
+                           const std::string& hint = "") const;
 
  private:
   TomlTable(const toml::table& table, std::string path, std::string prefix)

@@ -30,10 +30,10 @@ class Scanner {
   bool at_end() const { return at_ == text_.size(); }
 
   [[noreturn]] void refuse(const std::string& field, const std::string& what,
-                           const std::string& mend = "") const {
+                           const std::string& hint = "") const {
     std::size_t line = 1;
     for (std::size_t i = 0; i < at_; ++i) line += text_[i] == '\n' ? 1 : 0;
-    throw InputError({path_, "line " + std::to_string(line), field, "", what, mend});
+    throw InputError({path_, "line " + std::to_string(line), field, "", what, hint});
   }
 
   bool accept(char c) {

@@ -50,8 +50,8 @@ void Hdf5Piece::require(const char* field, std::uint64_t number, std::uint64_t e
 }
 
 void Hdf5Piece::refuse(const std::string& field, const std::string& value, const std::string& what,
-                       const std::string& mend) const {
-  throw InputError({*path_, "offset " + std::to_string(offset()), field, value, what, mend});
+                       const std::string& hint) const {
+  throw InputError({*path_, "offset " + std::to_string(offset()), field, value, what, hint});
 }
 
 std::optional<Hdf5Piece> Hdf5Object::find(Hdf5Kind kind) const {

@@ -15,7 +15,7 @@ namespace swarmcert::files {
 /// An address that leads nowhere.
 inline constexpr std::uint64_t kNoAddress = ~std::uint64_t{0};
 
-/// What mends a file that uses more of HDF5 than is read here.
+/// What to do about a file that uses more of HDF5 than is read here.
 inline constexpr char kSaveAsVersion7[] =
     "load it in MATLAB, then save('net.mat', 'weights', '-v7'), or write it with scipy.io.savemat";
 
@@ -39,10 +39,10 @@ class Hdf5Piece {
 
   /// @throws InputError unless the next bytes are `signature`.
   void expect(std::string_view signature);
-  /// @throws InputError unless `number` is `expected`; what mends it is to save the file in an older version.
+  /// @throws InputError unless `number` is `expected`; the hint is to save the file in an older version.
   void require(const char* field, std::uint64_t number, std::uint64_t expected) const;
   [[noreturn]] void refuse(const std::string& field, const std::string& value, const std::string& what,
-                           const std::string& mend) const;
+                           const std::string& hint) const;
 
  private:
   std::string_view data_;

@@ -177,8 +177,8 @@ class OrderDecision {
   }
 
  private:
-  [[noreturn]] void refuse(const std::string& value, const std::string& what, const std::string& mend) const {
-    throw InputError({path_, "", "order", value, what, mend});
+  [[noreturn]] void refuse(const std::string& value, const std::string& what, const std::string& hint) const {
+    throw InputError({path_, "", "order", value, what, hint});
   }
 
   std::string words(const Order& order) const {
@@ -209,7 +209,7 @@ class OrderDecision {
     return true;
   }
 
-  void check_chain(const Order& order, const std::string& mend) const {
+  void check_chain(const Order& order, const std::string& hint) const {
     for (std::size_t k = 1; k < order.size(); ++k) {
       const LayerShape& before = layers_[order[k - 1]];
       const LayerShape& layer = layers_[order[k]];
@@ -222,7 +222,7 @@ class OrderDecision {
            "[" + std::to_string(layer.outputs) + ", " + std::to_string(layer.inputs) + "]",
            "takes " + std::to_string(layer.inputs) + " inputs, but " + weight(before) + " before it gives " +
                std::to_string(before.outputs) + " outputs",
-           mend.empty() ? "the layers must follow one another in the order of evaluation" : mend});
+           hint.empty() ? "the layers must follow one another in the order of evaluation" : hint});
     }
   }
 

@@ -65,8 +65,8 @@ class MatElements {
   }
 
   [[noreturn]] void refuse(std::size_t offset, const std::string& what,
-                           const std::string& mend = kCopyAgain) const {
-    throw InputError({path_, "offset " + std::to_string(offset), "", "", what, mend});
+                           const std::string& hint = kCopyAgain) const {
+    throw InputError({path_, "offset " + std::to_string(offset), "", "", what, hint});
   }
 
  private:
@@ -115,8 +115,8 @@ class MatReader {
 
  private:
   [[noreturn]] void refuse(std::size_t offset, const std::string& name, const std::string& what,
-                           const std::string& mend = kSaveAgain) const {
-    throw InputError({path_, "offset " + std::to_string(offset), name, "", what, mend});
+                           const std::string& hint = kSaveAgain) const {
+    throw InputError({path_, "offset " + std::to_string(offset), name, "", what, hint});
   }
 
   /// At most what the largest network needs, however much the file claims.

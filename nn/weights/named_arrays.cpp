@@ -82,8 +82,8 @@ std::vector<std::string> names_by_place(const std::vector<const NamedArray*>& ar
 
 Weights network_of_arrays(const std::vector<NamedArray>& arrays, const std::string& path,
                           const std::vector<std::string>& order) {
-  const auto refuse = [&path](const std::string& name, const std::string& what, const std::string& mend) {
-    throw InputError({path, "", in_quotes(name), "", what, mend});
+  const auto refuse = [&path](const std::string& name, const std::string& what, const std::string& hint) {
+    throw InputError({path, "", in_quotes(name), "", what, hint});
   };
   std::vector<const NamedArray*> listed;
   for (const NamedArray& array : arrays) listed.push_back(&array);

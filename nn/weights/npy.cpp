@@ -56,8 +56,8 @@ class NpyHeader {
 
  private:
   [[noreturn]] void refuse(const std::string& key, const std::string& value, const std::string& what,
-                           const std::string& mend = kCopyAgain) const {
-    throw InputError({path_, "", entry_ + (key.empty() ? "" : ": " + in_quotes(key)), value, what, mend});
+                           const std::string& hint = kCopyAgain) const {
+    throw InputError({path_, "", entry_ + (key.empty() ? "" : ": " + in_quotes(key)), value, what, hint});
   }
 
   void once(bool is_known, const std::string& key) const {
@@ -125,8 +125,8 @@ class NpyHeader {
 }  // namespace
 
 NpyArray parse_npy(const std::string& bytes, const std::string& path, const std::string& entry) {
-  const auto refuse = [&](const std::string& value, const std::string& what, const std::string& mend) {
-    throw InputError({path, "", entry, value, what, mend});
+  const auto refuse = [&](const std::string& value, const std::string& what, const std::string& hint) {
+    throw InputError({path, "", entry, value, what, hint});
   };
   if (bytes.size() < 12 || bytes.compare(0, kMagic.size(), kMagic) != 0)
     refuse("", "is not a .npy array", "save with numpy.savez");

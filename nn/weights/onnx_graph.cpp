@@ -38,8 +38,8 @@ OnnxGraph::OnnxGraph(OnnxModel model, const std::string& path)
     : model_(std::move(model)), path_(path), chain_(0) {}
 
 void OnnxGraph::refuse(std::size_t offset, const std::string& field, const std::string& what,
-                       const std::string& mend) const {
-  throw InputError({path_, "offset " + std::to_string(offset), field, "", what, mend});
+                       const std::string& hint) const {
+  throw InputError({path_, "offset " + std::to_string(offset), field, "", what, hint});
 }
 
 Weights OnnxGraph::run() {
@@ -155,7 +155,7 @@ void OnnxGraph::follow(const Node& node) {
       refuse(node.offset, node.label(), "its output " + in_quotes(name) + " already exists");
     values_[name] = std::move(result);
   } catch (const OperatorRefusal& refusal) {
-    refuse(node.offset, node.label(), refusal.what, refusal.mend);
+    refuse(node.offset, node.label(), refusal.what, refusal.hint);
   } catch (const FoldingLimit& limit) {
     refuse(node.offset, node.label(), limit.what, "certify a smaller network, or fold before exporting");
   }

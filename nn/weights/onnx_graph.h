@@ -32,7 +32,7 @@ class OnnxGraph {
   using Node = OnnxNode;
 
   [[noreturn]] void refuse(std::size_t offset, const std::string& field, const std::string& what,
-                           const std::string& mend = kReexportOnnx) const;
+                           const std::string& hint = kReexportOnnx) const;
 
   OnnxShape input_shape() const;
   std::int64_t inputs_by_first_node() const;

@@ -62,8 +62,8 @@ class OnnxModelReader {
 
  private:
   [[noreturn]] void refuse(std::size_t offset, const std::string& field, const std::string& what,
-                           const std::string& mend = kReexportOnnx) const {
-    throw InputError({path_, "offset " + std::to_string(offset), field, "", what, mend});
+                           const std::string& hint = kReexportOnnx) const {
+    throw InputError({path_, "offset " + std::to_string(offset), field, "", what, hint});
   }
 
   ProtobufReader fields(const ProtobufField& message) const {

@@ -18,7 +18,7 @@ using OnnxShape = std::vector<std::int64_t>;  ///< every size at least 1; the ba
 /// Thrown by the functions here; the reader adds file, offset and node.
 struct OperatorRefusal {
   std::string what;
-  std::string mend = kReexportOnnx;
+  std::string hint = kReexportOnnx;
 };
 
 /// A tensor that the network computes, row-major, as an affine map of the last ReLU layer's outputs.

@@ -41,9 +41,9 @@ class Machine {
   }
 
  private:
-  [[noreturn]] void refuse(const std::string& what, const std::string& mend = "",
+  [[noreturn]] void refuse(const std::string& what, const std::string& hint = "",
                            const std::string& value = "") {
-    throw InputError({path_, "offset " + std::to_string(opcode_at_), entry_, value, what, mend});
+    throw InputError({path_, "offset " + std::to_string(opcode_at_), entry_, value, what, hint});
   }
 
   // --- bytes

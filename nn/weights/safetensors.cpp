@@ -64,8 +64,8 @@ class Reader {
 
  private:
   [[noreturn]] void refuse(const std::string& field, const std::string& value, const std::string& what,
-                           const std::string& mend = "") const {
-    throw InputError({path_, "", field, value, what, mend});
+                           const std::string& hint = "") const {
+    throw InputError({path_, "", field, value, what, hint});
   }
 
   Entry entry(const std::string& name, const Json& value) const {

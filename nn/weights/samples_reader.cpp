@@ -58,8 +58,8 @@ class CsvSamples {
 
  private:
   [[noreturn]] void refuse(const std::string& field, const std::string& value, const std::string& what,
-                           const std::string& mend) const {
-    throw InputError({samples_.path, "line " + std::to_string(line_), field, value, what, mend});
+                           const std::string& hint) const {
+    throw InputError({samples_.path, "line " + std::to_string(line_), field, value, what, hint});
   }
 
   void read(std::string_view line) {

@@ -70,7 +70,7 @@ class Selector {
     }
   }
 
-  /// The mend: other keys that lead to a dict with tensors.
+  /// The hint: other keys that lead to a dict with tensors.
   std::string choose(const std::string& key) const {
     std::vector<std::string> keys = keys_of_state_dicts();
     if (keys.empty()) return "save one with torch.save(model.state_dict(), ...)";

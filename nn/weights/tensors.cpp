@@ -58,8 +58,8 @@ class Assembler {
 
  private:
   [[noreturn]] void refuse(std::size_t i, const std::string& value, const std::string& what,
-                           const std::string& mend = "") const {
-    throw InputError({path_, "", tensors_[i].name, value, what, mend});
+                           const std::string& hint = "") const {
+    throw InputError({path_, "", tensors_[i].name, value, what, hint});
   }
 
   /// Tensors that only layers of other kinds have, with the kind's name and what to do.
@@ -67,7 +67,7 @@ class Assembler {
     struct Hint {
       const char* ending;
       const char* kind;
-      const char* mend;
+      const char* hint;
     };
     constexpr Hint kHints[] = {
         {"running_mean", "batch normalisation", kFold},
@@ -87,7 +87,7 @@ class Assembler {
           refuse(i, shape_text(tensors_[i].shape),
                  std::string("belongs to ") + hint.kind +
                      ", so the network is no chain of linear layers and ReLU",
-                 hint.mend);
+                 hint.hint);
       }
     }
   }

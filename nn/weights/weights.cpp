@@ -32,23 +32,23 @@ bool looks_like_hdf5(const std::string& bytes) {
 [[noreturn]] void refuse_format(const std::string& bytes, const std::string& path) {
   std::string what =
       "is neither a PyTorch state dict (.pth), safetensors, ONNX, .npz, .mat, .nnet nor generated C weights";
-  std::string mend = "save one with torch.save(model.state_dict(), ...)";
+  std::string hint = "save one with torch.save(model.state_dict(), ...)";
   if (bytes.empty()) {
     what = "is empty";
-    mend = "copy it again";
+    hint = "copy it again";
   } else if (bytes[0] == '\x80') {
     what = "is a bare pickle, which torch.save does not write";
   } else if (bytes.compare(0, 24, "version https://git-lfs.") == 0) {
     what = "is a Git LFS pointer, not the file itself";
-    mend = "fetch it: git lfs pull";
+    hint = "fetch it: git lfs pull";
   } else if (bytes.compare(std::min<std::size_t>(4, bytes.size()), 4, "TFL3") == 0) {
     what = "is a TensorFlow Lite model (.tflite), which is not read";
-    mend = "convert it to ONNX: python -m tf2onnx.convert --tflite net.tflite --output net.onnx";
+    hint = "convert it to ONNX: python -m tf2onnx.convert --tflite net.tflite --output net.onnx";
   } else if (looks_like_hdf5(bytes)) {
     what = "is an HDF5 file (.h5, .hdf5), which is not read";
-    mend = "export the model to ONNX, or write W1, b1, W2, b2, ... [outputs x inputs] with numpy.savez";
+    hint = "export the model to ONNX, or write W1, b1, W2, b2, ... [outputs x inputs] with numpy.savez";
   }
-  throw InputError({path, "offset 0", "", "", what, mend});
+  throw InputError({path, "offset 0", "", "", what, hint});
 }
 
 void refuse_key(const std::string& key, const std::string& path, const std::string& format) {

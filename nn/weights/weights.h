@@ -83,7 +83,7 @@ struct Weights {
 /// @param key for nested checkpoints: the dotted path of the state dict inside it, e.g. "model"; empty: the top. For C
 ///   source: the name of one of its networks.
 /// @param order every layer of the file once, first evaluated first; empty: not stated.
-/// @throws InputError for anything that is not such a network: it names offset, field, value and mend.
+/// @throws InputError for anything that is not such a network: it names offset, field, value and hint.
 Weights load_weights(const std::string& path, const std::string& key = "",
                      const std::vector<std::string>& order = {});
 

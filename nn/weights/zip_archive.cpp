@@ -77,8 +77,8 @@ bool ZipArchive::has(const std::string& name) const {
 }
 
 std::string ZipArchive::read(const std::string& name, std::uint64_t limit_bytes) const {
-  const auto refuse = [&](const std::string& what, const std::string& mend) {
-    throw InputError({path_, "", name, "", what, mend});
+  const auto refuse = [&](const std::string& what, const std::string& hint) {
+    throw InputError({path_, "", name, "", what, hint});
   };
   const auto found = std::find(names_.begin(), names_.end(), name);
   if (found == names_.end()) refuse("the archive has no such entry", kCopyAgain);

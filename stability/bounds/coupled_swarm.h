@@ -19,7 +19,7 @@ struct CoupledSwarm {
 
 /// Reads swarm.toml (schema swarmcert/swarm/1): vehicles = N, [[coupling]] on, by, position_N_m, velocity_N_s_m,
 /// speed_m_s, acceleration_m_s2, cross_rate_N_s, direction = "apart" | "together" where the force's sign is known.
-/// @throws files::InputError with line, key, value and mend.
+/// @throws files::InputError with line, key, value and hint.
 CoupledSwarm read_coupled_swarm(const std::string& path);
 
 /// A class without any force.

@@ -11,8 +11,8 @@ namespace {
 const std::vector<std::string> kInputs = {"dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"};
 
 [[noreturn]] void refuse(const files::Network& network, const std::string& field, const std::string& value,
-                         const std::string& what, const std::string& mend) {
-  throw files::InputError({network.path, "", field, value, what, mend});
+                         const std::string& what, const std::string& hint) {
+  throw files::InputError({network.path, "", field, value, what, hint});
 }
 
 /// Which component of (dp, dv) each input of phi is.

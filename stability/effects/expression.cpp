@@ -86,8 +86,8 @@ struct ExpressionEffect::Formulas {
   std::vector<Formula> formulas;
 
   [[noreturn]] void refuse(const std::string& target, const std::string& value, const std::string& what,
-                           const std::string& mend) const {
-    throw files::InputError({path, "", "effect " + name + ", " + target, value, what, mend});
+                           const std::string& hint) const {
+    throw files::InputError({path, "", "effect " + name + ", " + target, value, what, hint});
   }
 
   void add(std::size_t target, const std::string& text, const EffectInfo& info) {

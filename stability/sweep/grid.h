@@ -61,7 +61,7 @@ const std::vector<Quantity>& grid_quantities();
 ///   [axes.NAME] from, to, steps, scale = "linear" | "log"
 ///   [limits.QUANTITY] least, most
 ///   [disturbance] amplitude_N, rate_N_s, variation_N, impulse_N_s
-/// @throws files::InputError with line, key, value and mend; more than ten million cells are refused.
+/// @throws files::InputError with line, key, value and hint; more than ten million cells are refused.
 Grid load_grid(const std::string& path);
 
 /// What one cell gives.

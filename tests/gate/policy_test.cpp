@@ -1,4 +1,4 @@
-// Policies: what is refused, with which line and mend; and what each check's limits mean.
+// Policies: what is refused, with which line and hint; and what each check's limits mean.
 #include "analysis/gate/policy.h"
 
 #include <gtest/gtest.h>

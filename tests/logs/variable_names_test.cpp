@@ -163,7 +163,7 @@ TEST_F(BagBesideYaml, NamesOfAnotherNumberOfValuesAreNotTaken) {
     read("/cf2/motion", kYaml);
     FAIL() << "two names cannot stand for six values";
   } catch (const files::InputError& error) {
-    EXPECT_NE(error.fault().mend.find("crazyflies.yaml names 2 variables of /cf2/motion, which has 6 values"),
+    EXPECT_NE(error.fault().hint.find("crazyflies.yaml names 2 variables of /cf2/motion, which has 6 values"),
               std::string::npos)
         << error.what();
   }

@@ -103,10 +103,10 @@ TEST(PthRefusal, ParametrizationsThatLackATensorWithTheCallThatMendsThem) {
       {"fc1.weight_u", "torch.nn.utils.remove_spectral_norm(layer)"},
       {"fc1.parametrizations.weight.original", "remove_parametrizations(layer, \"weight\")"},
       {"fc1.weight_g", "torch.nn.utils.remove_weight_norm(layer)"}};
-  for (const auto& [name, mend] : names_and_mends) {
+  for (const auto& [name, hint] : names_and_mends) {
     std::vector<TensorSpec> tensors = small_tensors();
     tensors[0].name = name;
-    EXPECT_TRUE(pth_is_refused(tensors, {name, "parametrised", mend}));
+    EXPECT_TRUE(pth_is_refused(tensors, {name, "parametrised", hint}));
   }
 }
 

@@ -257,7 +257,7 @@ files::Json inspect_other(const std::string& path, const InspectOptions& options
     files::InputFault fault = error.fault();
     if (fault.file != path || fault.what.rfind("is neither", 0) != 0) throw;
     fault.what += ", nor a flight log of a known format";
-    fault.mend += "; a CSV of a flight ends in .csv";
+    fault.hint += "; a CSV of a flight ends in .csv";
     throw files::InputError(fault);
   }
 }

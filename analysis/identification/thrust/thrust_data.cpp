@@ -84,8 +84,8 @@ class Reader {
 
  private:
   [[noreturn]] void refuse(const std::string& field, const std::string& value, const std::string& what,
-                           const std::string& mend) const {
-    throw files::InputError({data_.path, fmt::format("line {}", line_number_), field, value, what, mend});
+                           const std::string& hint) const {
+    throw files::InputError({data_.path, fmt::format("line {}", line_number_), field, value, what, hint});
   }
 
   bool next_line(std::string& line) {

@@ -38,7 +38,7 @@ struct ThrustData {
 ///   run     `run`, `ramp`, `sweep`: optional whole number; rows of one ramp of the motors carry the same
 /// Examples: "pwm,vbat,thrust_gf", "# PWM[counts]; battery_voltage(mV); force (N)". Other columns are not read.
 /// @param rotors_together how many rotors pushed on the load cell: the forces are divided by it.
-/// @throws files::InputError with line, column, value and mend: a missing, repeated or ambiguous column, a cell that
+/// @throws files::InputError with line, column, value and hint: a missing, repeated or ambiguous column, a cell that
 ///   is not a finite number, a missing cell, a PWM, voltage or force that cannot be, no rows.
 ThrustData load_thrust_data(const std::string& path, int rotors_together);
 

@@ -41,8 +41,8 @@ std::string read_all(std::istream& in, const std::string& path) {
 }
 
 void refuse_at(const std::string& path, std::size_t offset, const std::string& field,
-               const std::string& value, const std::string& what, const std::string& mend) {
-  throw files::InputError({path, "offset " + std::to_string(offset), field, value, what, mend});
+               const std::string& value, const std::string& what, const std::string& hint) {
+  throw files::InputError({path, "offset " + std::to_string(offset), field, value, what, hint});
 }
 
 std::size_t size_of(Scalar type) {

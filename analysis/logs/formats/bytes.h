@@ -23,7 +23,7 @@ std::string read_all(std::istream& in, const std::string& path);
 
 /// @throws files::InputError, always.
 [[noreturn]] void refuse_at(const std::string& path, std::size_t offset, const std::string& field,
-                            const std::string& value, const std::string& what, const std::string& mend);
+                            const std::string& value, const std::string& what, const std::string& hint);
 
 /// Types of numbers that logs store.
 enum class Scalar : unsigned char {
