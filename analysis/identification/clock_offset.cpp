@@ -17,7 +17,9 @@ namespace {
 
 using residuals::Track;
 
-/// Of what is explained by one of the clocks' vehicles, on average, that its offset has to add.
+/// Of what two vehicles explain of each other, that the offset of their clocks has to add. Among n clocks a tie of two
+/// puts these apart by the offset d and, at best, half way to the others, by d / 2 in 2 (n - 2) pairs: of all n (n - 1)
+/// / 2 pairs, d^2 / (n - 1) on average where the loss goes with the square.
 constexpr double kLeastGain = 0.05;
 constexpr double kLeastZ = 3;
 constexpr double kStudent90 = 1.833;  ///< nine degrees of freedom
@@ -70,18 +72,21 @@ std::vector<int> circle(ClockSearch& search, const ClockSteps& steps, int clocks
   return largest;
 }
 
-/// The clock that most logs share; of several, that in the middle of those of `around`, else the first.
-int reference_of(const Clocks& clocks, const std::vector<int>& around, const Eigen::VectorXd& offsets_s) {
-  const auto away_s = [&](int clock) {
-    double sum = 0;
-    for (const int other : around) sum += std::abs(offsets_s(other) - offsets_s(clock));
-    return sum;
+/// The clocks of `around`: those that more logs share first, of these those in the middle first.
+std::vector<int> from_the_middle(const Clocks& clocks, std::vector<int> around,
+                                 const Eigen::VectorXd& offsets_s) {
+  const std::vector<int> all = around;
+  // In nanoseconds, so that rounding decides nothing.
+  const auto away_ns = [&](int clock) {
+    double sum_s = 0;
+    for (const int other : all) sum_s += std::abs(offsets_s(other) - offsets_s(clock));
+    return std::llround(1e9 * sum_s);
   };
-  return *std::min_element(around.begin(), around.end(), [&](int a, int b) {
-    constexpr double kAlike_s = 1e-9;
+  std::stable_sort(around.begin(), around.end(), [&](int a, int b) {
     if (clocks.logs(a) != clocks.logs(b)) return clocks.logs(a) > clocks.logs(b);
-    return away_s(a) < away_s(b) - kAlike_s;
+    return away_ns(a) < away_ns(b);
   });
+  return around;
 }
 
 /// The offsets of all clocks without each tenth of the flight.
@@ -118,53 +123,66 @@ std::vector<Suspect> suspects(ClockSearch& search, const ClockSteps& steps, cons
       continue;
     const ClockSteps alike = search.best({std::min(clock, reference), std::max(clock, reference)});
     const double alike_N2 = search.value(alike);
-    if (all_N2 - alike_N2 > 2.0 / clocks * kLeastGain * all_N2) found.push_back({clock, alike_N2});
+    if (all_N2 - alike_N2 > kLeastGain / (clocks - 1) * all_N2) found.push_back({clock, alike_N2});
   }
+  return found;
+}
+
+/// Of a flight whose clocks are estimated.
+struct Estimate {
+  ClockSteps steps;
+  Eigen::VectorXd offsets_s;
+  std::array<Eigen::VectorXd, kClockTenths> without_s;  ///< each tenth
+};
+
+ClockOffset offset_of(const Clocks& clocks, ClockSearch& search, const Estimate& estimate,
+                      const Suspect& suspect, int reference) {
+  const double squares_N2 = search.squares_N2(), n = search.records();
+  const auto rmse_N = [&](double explained_N2) {
+    return std::sqrt(std::max(0.0, squares_N2 - explained_N2) / n);
+  };
+  const auto first = [&](int clock) {
+    return clocks.tracks[static_cast<std::size_t>(std::find(clocks.of.begin(), clocks.of.end(), clock) -
+                                                  clocks.of.begin())];
+  };
+  ClockOffset found;
+  found.offset_s = estimate.offsets_s(suspect.clock) - estimate.offsets_s(reference);
+  const double deviation_s = jackknife_s(estimate.without_s, suspect.clock, reference);
+  found.interval = {found.offset_s - kStudent90 * deviation_s, found.offset_s + kStudent90 * deviation_s};
+  found.delay_s = estimate.steps.delay * kClockStep_s;
+  found.records = search.records();
+  found.z = std::abs(found.offset_s) / deviation_s;
+  found.rmse_before_N = rmse_N(suspect.alike_N2);
+  found.rmse_after_N = rmse_N(search.value(estimate.steps));
+  found.logs = static_cast<int>(clocks.tracks.size());
+  const Track &own = *first(suspect.clock), &other = *first(reference);
+  found.flight = own.flight;
+  found.vehicle = own.vehicle;
+  found.kind = own.kind;
+  found.path = own.path;
+  found.against = other.path;
+  found.against_vehicle = other.vehicle;
+  found.correction_s = own.clock_offset_s + found.offset_s;
   return found;
 }
 
 std::vector<ClockOffset> offsets_of(const Clocks& clocks, ClockSearch search) {
   if (!search.is_rich()) return {};
-  const ClockSteps steps = search.best();
-  const std::vector<int> around = circle(search, steps, clocks.count);
+  Estimate estimate = {search.best(), {}, {}};
+  const std::vector<int> around = circle(search, estimate.steps, clocks.count);
   if (around.size() < 2) return {};
-  const Eigen::VectorXd offsets_s = search.offsets_s(steps, -1);
-  const int reference = reference_of(clocks, around, offsets_s);
-  const std::vector<Suspect> suspected = suspects(search, steps, around, reference, clocks.count);
-  if (suspected.empty()) return {};
-  const std::array<Eigen::VectorXd, kClockTenths> without = left_out(search, steps);
-  const double squares_N2 = search.squares_N2(), n = search.records();
-  const auto rmse_N = [&](double explained_N2) {
-    return std::sqrt(std::max(0.0, squares_N2 - explained_N2) / n);
-  };
-  std::vector<ClockOffset> result;
-  for (const Suspect& suspect : suspected) {
-    ClockOffset found;
-    found.offset_s = offsets_s(suspect.clock) - offsets_s(reference);
-    const double deviation_s = jackknife_s(without, suspect.clock, reference);
-    found.interval = {found.offset_s - kStudent90 * deviation_s, found.offset_s + kStudent90 * deviation_s};
-    found.delay_s = steps.delay * kClockStep_s;
-    found.records = search.records();
-    found.z = std::abs(found.offset_s) / deviation_s;
-    found.rmse_before_N = rmse_N(suspect.alike_N2);
-    found.rmse_after_N = rmse_N(search.value(steps));
-    found.logs = static_cast<int>(clocks.tracks.size());
-    if (!(found.z > kLeastZ)) continue;
-    const auto first = [&](int clock) {
-      return clocks.tracks[static_cast<std::size_t>(std::find(clocks.of.begin(), clocks.of.end(), clock) -
-                                                    clocks.of.begin())];
-    };
-    const Track &own = *first(suspect.clock), &other = *first(reference);
-    found.flight = own.flight;
-    found.vehicle = own.vehicle;
-    found.kind = own.kind;
-    found.path = own.path;
-    found.against = other.path;
-    found.against_vehicle = other.vehicle;
-    found.correction_s = own.clock_offset_s + found.offset_s;
-    result.push_back(std::move(found));
+  estimate.offsets_s = search.offsets_s(estimate.steps, -1);
+  // Clocks on both sides of the one in the middle may differ though neither surely differs from it.
+  for (const int reference : from_the_middle(clocks, around, estimate.offsets_s)) {
+    std::vector<ClockOffset> result;
+    for (const Suspect& suspect : suspects(search, estimate.steps, around, reference, clocks.count)) {
+      if (estimate.without_s[0].size() == 0) estimate.without_s = left_out(search, estimate.steps);
+      ClockOffset found = offset_of(clocks, search, estimate, suspect, reference);
+      if (found.z > kLeastZ) result.push_back(std::move(found));
+    }
+    if (!result.empty()) return result;
   }
-  return result;
+  return {};
 }
 
 ClockSearch search_of(const residuals::Inputs& inputs, const Clocks& clocks) {

@@ -30,8 +30,9 @@ struct ClockOffset {
 
 /// Of flights of two and more vehicles some of whose clocks nothing else relates: no absolute times, no common starts
 /// of their set points. All clocks of a flight are estimated together, and compared with the one that most logs share,
-/// else with that in the middle. Empty where the vehicles hardly disturb each other, one of them feels no other one or
-/// none feels it, or the offset is within three standard deviations of zero.
+/// else with that in the middle, else with the next of which another one surely differs. Empty where the vehicles
+/// hardly disturb each other, one of them feels no other one or none feels it, or no two clocks differ by more than
+/// three standard deviations and by what matters to how the vehicles disturb each other.
 std::vector<ClockOffset> clock_offsets(const residuals::Inputs& inputs, int jobs);
 
 /// Lets the logs of `inputs` be read with these offsets.

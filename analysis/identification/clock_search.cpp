@@ -133,7 +133,16 @@ ClockSteps ClockSearch::best(const Tie& tie) {
   if (tie.first == 0) placed[static_cast<std::size_t>(tie.second)] = 1;
   for (int k = 1; k < clocks_; ++k) place_best(steps, placed, tie, false);
   for (int round = 0; round < 2 * clocks_; ++round) place_best(steps, placed, tie, true);
-  return climbed(steps, -1, tie);
+  steps = climbed(steps, -1, tie);
+  if (tie.first != tie.second) return steps;
+  // One clock at a time ends below the top where two have to move together: also from where each two are alike.
+  for (int a = 0; a < clocks_; ++a) {
+    for (int b = a + 1; b < clocks_; ++b) {
+      const ClockSteps other = climbed(best({a, b}), -1);
+      if (value(other) > value(steps)) steps = other;
+    }
+  }
+  return steps;
 }
 
 ClockSteps ClockSearch::climbed(ClockSteps from, int without, const Tie& tie) {

@@ -31,7 +31,7 @@ class ClockSearch {
 
   /// J, N^2; minus infinity where two clocks are further apart than the grid. @param without a tenth; -1: none
   double value(const ClockSteps& steps, int without = -1);
-  /// From the pairs of vehicles, each by itself, then of all together.
+  /// From the pairs of vehicles, each by itself, then of all together; without a tie also from the best of each tie.
   ClockSteps best(const Tie& tie = {0, 0});
   /// The nearest maximum.
   ClockSteps climbed(ClockSteps from, int without, const Tie& tie = {0, 0});

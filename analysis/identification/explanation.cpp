@@ -199,13 +199,15 @@ void drop_doubtful_names(const Passes& passes, Explained& explained) {
              [&](const Missing& missing) { return is_doubtful(missing, explained, weight_N); });
 }
 
-/// Whether a lag or delay takes little away and may as well be none: its interval reaches down to where it ends.
-bool may_be_no_lag(const Missing& missing) {
+/// Whether a lag or delay takes little away and may as well be none: its interval reaches down to where it ends, or it
+/// was found beside a name or a formula without which what is left, and the thrust answers, dominates.
+bool may_be_no_lag(const Missing& missing, const Remainder& rest) {
   constexpr double kLittle = 0.1;  // of the mean square
   if (!is_of_library(missing.effect)) return false;
   const stability::EffectInfo& info = stability::effect_info(missing.effect);
   const double before = missing.finding.rmse_before_N;
   if (!info.remembers || info.shape.empty() || taken_N2(missing) >= kLittle * before * before) return false;
+  if (rest.ratio > kLoudRatio) return true;
   const auto interval = missing.intervals.find(info.shape[0].name);
   return interval != missing.intervals.end() && interval->second.lower <= info.shape[0].lower;
 }
@@ -367,7 +369,8 @@ Explained explain(const Passes& passes, const Coverage& covered) {
   Explained explained = explain_by_formulas(passes, covered);
   drop_doubtful_names(passes, explained);
   correct_memories(passes, explained);
-  drop_names(passes, explained, may_be_no_lag);
+  drop_names(passes, explained,
+             [&](const Missing& missing) { return may_be_no_lag(missing, explained.settled.rest); });
   return explained;
 }
 

@@ -22,6 +22,9 @@ from foreign_simulator import fly  # noqa: E402
 CASES = [(0.15, 0.0), (-0.1, 0.0), (0.2, 0.15), (0.0, 0.2), (0.0, 0.0)]
 # Flights that begin in mid air: seed, when the logs begin, s. Thrust that answers the wakes looks like a lag.
 MID_AIR = [(922, 5.0), (929, 6.0)]
+# Fleets where two clocks lie on both sides of the one in the middle, or late wakes looked like a small delay: seed,
+# from which their clocks are drawn (None: all alike), vehicles, how late wakes arrive, s.
+FLEETS = [(215, 204, 4, 0.15), (113, None, 3, 0.2)]
 LAGS = {"delay", "motor_lag", "sensor_delay"}
 LEAST_OFFSET_S = 0.06  # below it the interval may hold zero
 
@@ -115,6 +118,8 @@ def main():
                       for k, (ahead_s, delay_s) in enumerate(CASES)]
     if not options.fleets and not options.add:
         right += [case(options, seed, (0.0, 0.0), 0.2, from_s) for seed, from_s in MID_AIR]
+        right += [case(options, seed, random_clocks(clocks, vehicles) if clocks else (0.0,) * vehicles, delay_s)
+                  for seed, clocks, vehicles, delay_s in FLEETS]
     if not options.keep:
         shutil.rmtree(options.folder, ignore_errors=True)
     print(f"{sum(map(bool, right))} of {len(right)} right")
