@@ -13,6 +13,8 @@ namespace swarmcert::identification {
 namespace {
 
 constexpr std::size_t kTooManyToRefine = 400'000;
+constexpr int kMostSteps = 7;
+constexpr int kStepsOfRefit = 2;      ///< from where the fit of an excerpt ended, which is close
 constexpr double kDifference = 0.05;  ///< of a shape's scale, for derivatives
 constexpr double kLargestStep = 0.5;  ///< of a shape's scale
 constexpr double kSettled = 0.01;
@@ -72,11 +74,11 @@ class Refinement {
     start_.push_back(theta);
   }
 
-  std::vector<Refined> run() {
+  std::vector<Refined> run(int most_steps = kMostSteps) {
     Point best = evaluate(start_);
     const bool moves =
         std::any_of(unknowns_.begin(), unknowns_.end(), [](const Unknown& u) { return u.is_shape; });
-    const int steps = !moves ? 0 : passes_.records > kTooManyToRefine ? 1 : 7;
+    const int steps = !moves ? 0 : passes_.records > kTooManyToRefine ? 1 : most_steps;
     double radius = kLargestStep;
     for (int i = 0; i < steps; ++i) {
       double length = 0;
@@ -343,14 +345,15 @@ void widen_by_answers(const std::vector<Refined>& by_squares, std::vector<Refine
 
 /// Lags and delays from whitened columns, then everything else beside them from the plain ones.
 std::vector<Refined> with_whitened_memories(const Passes& passes, const Noise& noise,
-                                            const std::vector<Refined>& refined) {
+                                            const std::vector<Refined>& refined,
+                                            int most_steps = kMostSteps) {
   Refinement of_innovations(passes, noise), of_others(passes);
   for (const Refined& effect : refined) of_innovations.add(effect.candidate, effect.theta, Moves::kMemories);
-  const std::vector<Refined> memories = of_innovations.run();
+  const std::vector<Refined> memories = of_innovations.run(most_steps);
   const auto remembers = [&](std::size_t i) { return memories[i].candidate.info.remembers; };
   for (std::size_t i = 0; i < refined.size(); ++i)
     of_others.add(refined[i].candidate, remembers(i) ? memories[i].theta : refined[i].theta, Moves::kOthers);
-  std::vector<Refined> result = of_others.run();
+  std::vector<Refined> result = of_others.run(most_steps);
   for (std::size_t i = 0; i < result.size(); ++i) {
     const std::vector<Interval>& known =
         remembers(i) ? memories[i].shape_intervals : refined[i].shape_intervals;
@@ -374,10 +377,11 @@ std::vector<Refined> freed(std::vector<Refined> refined) {
   return refined;
 }
 
-std::vector<Refined> fitted_from(const Passes& passes, const std::vector<Refined>& refined) {
+std::vector<Refined> fitted_from(const Passes& passes, const std::vector<Refined>& refined,
+                                 int most_steps = kMostSteps) {
   Refinement refinement(passes);
   for (const Refined& effect : refined) refinement.add(effect.candidate, effect.theta, Moves::kAll);
-  return refinement.run();
+  return refinement.run(most_steps);
 }
 
 bool has_memory(const std::vector<Refined>& refined) {
@@ -420,8 +424,8 @@ std::vector<Refined> refit(const Passes& all, const Passes& seen, const std::vec
   const std::vector<Refined> refined = freed(found);
   if (refined.empty()) return {};
   const Noise noise = has_memory(refined) ? noise_beside(seen, refined) : Noise();
-  if (!(noise.forget_s > 0)) return fitted_from(all, refined);
-  std::vector<Refined> whitened = with_whitened_memories(all, noise, refined);
+  if (!(noise.forget_s > 0)) return fitted_from(all, refined, kStepsOfRefit);
+  std::vector<Refined> whitened = with_whitened_memories(all, noise, refined, kStepsOfRefit);
   // What whitening moves is known well enough from the excerpt.
   std::vector<Refined> by_squares = fitted_from(seen, refined);
   for (std::size_t i = 0; i < whitened.size(); ++i) {

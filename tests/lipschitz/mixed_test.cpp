@@ -200,7 +200,9 @@ TEST(MixedBounds, TheStageBehindEachActivationIsMultipliedByItsOwnSlope) {
   const double c = 0x1.211p+0, selu = files::function_of(Activation::kSelu).steepest();
   const double factors[] = {1, 0.25, 1, selu}, bends[] = {0, c * (c - 1), 0};
   for (std::size_t k = 0; k < 4; ++k) {
-    if (k < 3) EXPECT_EQ((chain.bends[k] - check::Dyadic(bends[k])).sign(), 0);
+    if (k < 3) {
+      EXPECT_EQ((chain.bends[k] - check::Dyadic(bends[k])).sign(), 0);
+    }
     for (std::size_t i = 0; i < weights.layers[k].weights.size(); ++i)
       EXPECT_EQ(
           (chain.stages[k].entries[i] - check::Dyadic(weights.layers[k].weights[i]) * factors[k]).sign(), 0);
