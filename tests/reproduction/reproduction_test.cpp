@@ -93,8 +93,9 @@ TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
   ASSERT_EQ(symmetry["data"].size(), 6u);
   ASSERT_EQ(symmetry["bounds"].size(), 8u);
   for (const Json& row : symmetry["bounds"]) {
-    if (row["limited"] == "joint bound")
+    if (row["limited"] == "joint bound") {
       EXPECT_LE(row["bound_gf_per_unit"][0].get<double>(), row["limit"].get<double>()) << row;
+    }
   }
 
   // Made anew elsewhere, the same bytes.
