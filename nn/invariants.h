@@ -3,11 +3,12 @@
 /// A vertical force is the same for neighbours that are turned about the vertical, or mirrored in a vertical plane. A
 /// network that sees invariants in place of the state (p, v) of a neighbour has that symmetry exactly:
 ///   J(p, v) = (|p_xy|, 3/2 p_z, |v_xy|, 3/2 v_z, |p_xy + 1/2 s v_xy|),   K(-z, -v) = (-z, |v_xy|, -v_z),
-/// J for neighbours, in m and m/s, K for the vehicle's own state. The five numbers of J determine |p_xy|, |v_xy| and the
-/// product p_xy . v_xy, thus (p, v) up to a turn and a reflection: nothing else is lost.
+/// J for neighbours, in m and m/s, K for the vehicle's own state. The five numbers of J determine |p_xy|, |v_xy| and
+/// the product p_xy . v_xy, thus (p, v) up to a turn and a reflection: nothing else is lost.
 ///
-/// Lipschitz constants in Euclidean norms, both attained: 3/2 of J, 1 of K. Proof for J: a norm changes by at most the
-/// norm of the change. With a = |dp_xy| and b = |dv_xy|, the squares of the changes of the three norms sum up to at most
+/// Lipschitz constants in Euclidean norms, both attained: 3/2 of J, 1 of K. Proof for J: a norm changes by at most
+/// the norm of the change. With a = |dp_xy| and b = |dv_xy|, the squares of the changes of the three norms sum up to
+/// at most
 ///   a^2 + b^2 + (a + b / 2)^2 = (a, b) G (a, b)',   G = I + (1, 1/2)' (1, 1/2),
 /// and the eigenvalues of G are 1 and 1 + 1 + 1/4 = (3/2)^2. The vertical components change by 3/2 of their changes.
 /// The factor of the vertical components makes use of what the horizontal ones cost.
