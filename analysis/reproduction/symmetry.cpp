@@ -132,7 +132,7 @@ void add_data(const Setting& setting, const Source& source, Finding& finding) {
                         : fmt::format("{:.3f}", group.mean_test_gf()));
       files::Json json = json_of(group);
       json.update({{"flights", source.name}, {"symmetry", symmetry.name}, {"half", half}});
-      finding.json["data"].push_back(std::move(json));
+      finding.json["by_data"].push_back(std::move(json));
     }
     table.rows.push_back(std::move(row));
   }
@@ -165,7 +165,7 @@ void add_bounds(const Setting& setting, const Source& source, Finding& finding) 
         files::Json json = json_of(group);
         json.update(
             {{"flights", source.name}, {"limited", method}, {"symmetry", symmetry.name}, {"limit", limit}});
-        finding.json["bounds"].push_back(std::move(json));
+        finding.json["by_bound"].push_back(std::move(json));
         data += fmt::format("{} {}\n", group.mean_bound(), group.mean_test_gf());
       }
       data += "\n\n";
@@ -176,12 +176,10 @@ void add_bounds(const Setting& setting, const Source& source, Finding& finding) 
   finding.figures.push_back(
       {name, data,
        fmt::format(
-           "set logscale x\nset grid\nset key top right\nset xlabel 'proved joint Lipschitz bound [gf per m "
-           "or "
-           "m/s]'\nset ylabel 'test RMSE [gf]'\nt = \"'norm of each layer' 'norm of each layer, exact' "
-           "'joint "
-           "bound' 'joint bound, exact'\"\nplot for [i=0:3] '{}.dat' index i with linespoints lw 2 title "
-           "word(t, i + 1)\n",
+           "set logscale x\nset grid\nset key top right\n"
+           "set xlabel 'proved joint Lipschitz bound [gf per m or m/s]'\nset ylabel 'test RMSE [gf]'\n"
+           "t = \"'norm of each layer' 'norm of each layer, exact' 'joint bound' 'joint bound, exact'\"\n"
+           "plot for [i=0:3] '{}.dat' index i with linespoints lw 2 title word(t, i + 1)\n",
            name),
        "Test error over the proved joint bound, " + source.name + " flights."});
 }
@@ -196,7 +194,7 @@ void add_inputs(const Recorded& recorded, Finding& finding) {
 
 Finding symmetry(const Setting& setting) {
   Finding finding;
-  finding.json["data"] = finding.json["bounds"] = files::Json::array();
+  finding.json["by_data"] = finding.json["by_bound"] = files::Json::array();
   std::vector<Source> sources = {simulated(setting)};
   if (!setting.recorded.empty()) sources.push_back(recorded(setting));
   for (const Source& source : sources) {
@@ -206,8 +204,7 @@ Finding symmetry(const Setting& setting) {
   if (!setting.recorded.empty()) add_inputs(sources.back().flights.at(false), finding);
   finding.notes.push_back(
       "Epochs are chosen on the selecting flights, and nothing on those that test. Exact: every phi sees "
-      "invariants "
-      "under turns about the vertical, and the slope of the map to them is in the bound.");
+      "invariants under turns about the vertical, and the slope of the map to them is in the bound.");
   return finding;
 }
 

@@ -90,9 +90,9 @@ TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
 
   reproduce("symmetry -o out");
   const Json symmetry = result("symmetry");
-  ASSERT_EQ(symmetry["data"].size(), 6u);
-  ASSERT_EQ(symmetry["bounds"].size(), 8u);
-  for (const Json& row : symmetry["bounds"]) {
+  ASSERT_EQ(symmetry["by_data"].size(), 6u);
+  ASSERT_EQ(symmetry["by_bound"].size(), 8u);
+  for (const Json& row : symmetry["by_bound"]) {
     if (row["limited"] == "joint bound") {
       EXPECT_LE(row["bound_gf_per_unit"][0].get<double>(), row["limit"].get<double>()) << row;
     }
