@@ -16,7 +16,7 @@
 using namespace swarmcert::reproduction;
 
 int main() {
-  for (const Experiment& one : experiments()) fmt::print("{:<14}{}\n", one.name, one.summary);
+  for (const Experiment& one : experiments()) fmt::print("{:<16}{}\n", one.name, one.summary);
 
   // %% [markdown]
   // ## Two truths
