@@ -103,7 +103,7 @@ class Centring {
     return std::sqrt(std::max(0.0, scale_ * r.dot(newton_.solve(r))));
   }
 
-  /// Iterates until the estimated distance from the path is below `enough`, for at most so many steps.
+  /// Iterates until the estimated distance from the path is below `enough`, for `steps` steps at most.
   ChainPoint run(ChainPoint at, double enough, int steps, const Stop& stop) const {
     constexpr double kFarthest = 8;  // from far away a whole step leads out of the cone
     std::vector<VectorXd> moves, changes;

@@ -232,7 +232,8 @@ std::string stored_bytes(Hdf5File& file, const Hdf5Object& dataset, const std::v
   const std::uint64_t size = *element_count(shape) * element_bytes;
   if (size == 0) return "";
   if (size / kMostExpansion > file.size_bytes())
-    message->refuse("shape", shape_text(shape), "the file is too small for so many elements", kCopyAgain);
+    message->refuse("shape", shape_text(shape), "the file is too small for this number of elements",
+                    kCopyAgain);
   file.count_bytes(8 * (size / element_bytes), *message);
   const Layout layout = layout_of(*message);
   if (layout.kind == kChunked) return Chunks(file, dataset, *message, layout, shape, element_bytes).run();

@@ -16,7 +16,7 @@ from struct import pack
 import check_certificate as second
 
 SWARMCERT, SOURCE = Path(sys.argv[1]).resolve(), Path(sys.argv[2])
-MUTATIONS = int(sys.argv[3]) if len(sys.argv) > 3 else 40
+MUTATIONS = int(sys.argv[3]) if len(sys.argv) > 3 else 100
 
 
 def safetensors(sizes, generator, names=()):

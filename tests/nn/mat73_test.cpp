@@ -139,7 +139,8 @@ TEST(Mat73, MoreNumbersThanTheFileCanHoldAreRefusedUnread) {
   };
   const std::uint64_t most = ~std::uint64_t{0};
   EXPECT_TRUE(refused(hdf5_contiguous(48, most), {most, most}, {"more than 33554432 numbers"}));
-  EXPECT_TRUE(refused(hdf5_contiguous(48, 8 << 20), {1 << 10, 1 << 10}, {"too small for so many elements"}));
+  EXPECT_TRUE(
+      refused(hdf5_contiguous(48, 8 << 20), {1 << 10, 1 << 10}, {"too small for this number of elements"}));
   EXPECT_TRUE(refused(hdf5_chunked(48, {1, 1}), {300, 300}, {"too small for such chunks"}));
   EXPECT_TRUE(refused(hdf5_chunked(48, {1 << 12, 1 << 12}), {2, 2}, {"too small for such chunks"}));
   EXPECT_TRUE(refused(hdf5_chunked(48, {0, 2}), {2, 2}, {"shape of chunks = [0, 2]", "empty or too large"}));

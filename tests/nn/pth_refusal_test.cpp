@@ -98,12 +98,12 @@ TEST(PthRefusal, TensorsThatAppearTwice) {
 }
 
 TEST(PthRefusal, ParametrizationsThatLackATensorWithTheCallThatMendsThem) {
-  const std::vector<std::pair<std::string, std::string>> names_and_mends = {
+  const std::vector<std::pair<std::string, std::string>> names_and_hints = {
       {"fc1.weight_orig", "torch.nn.utils.remove_spectral_norm(layer)"},
       {"fc1.weight_u", "torch.nn.utils.remove_spectral_norm(layer)"},
       {"fc1.parametrizations.weight.original", "remove_parametrizations(layer, \"weight\")"},
       {"fc1.weight_g", "torch.nn.utils.remove_weight_norm(layer)"}};
-  for (const auto& [name, hint] : names_and_mends) {
+  for (const auto& [name, hint] : names_and_hints) {
     std::vector<TensorSpec> tensors = small_tensors();
     tensors[0].name = name;
     EXPECT_TRUE(pth_is_refused(tensors, {name, "parametrised", hint}));

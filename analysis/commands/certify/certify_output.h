@@ -38,8 +38,7 @@ struct CertifyOutput {
 /// Said of networks that have another activation than ReLU, or rotation invariants.
 inline constexpr char kForReluOnly[] =
     "lower bounds and bounds on a box are for ReLU networks of relative states: of other activations, and of "
-    "functions "
-    "of rotation invariants, upper bounds for all inputs are proved";
+    "functions of rotation invariants, upper bounds for all inputs are proved";
 
 /// Unit of the network's outputs; "output" where NET states none.
 std::string output_unit(const files::Network& network);
