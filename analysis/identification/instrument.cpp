@@ -134,7 +134,7 @@ void scale_stages(const std::vector<Candidate>& effects, const Grams& columns, E
 /// A shape that is estimated as well: its derivative is a difference of columns.
 struct FreeShape {
   std::size_t effect, index;
-  std::size_t lower, upper;  ///< thetas of the effect's candidate
+  std::size_t neighbour;  ///< theta of the effect's candidate; the shape itself is the first
   double width;
 };
 
@@ -229,7 +229,7 @@ std::vector<std::vector<InstrumentedValue>> instrument(const Passes& passes,
 
 std::vector<InstrumentedShape> instrument_with_shapes(const Passes& passes,
                                                       const std::vector<Refined>& refined) {
-  constexpr double kToEachSide = 0.05;  // of the shape, to both sides
+  constexpr double kDifference = 0.02;  // of the shape
   std::vector<Candidate> around;
   std::vector<FreeShape> free;
   for (std::size_t e = 0; e < refined.size(); ++e) {
@@ -241,11 +241,9 @@ std::vector<InstrumentedShape> instrument_with_shapes(const Passes& passes,
     for (std::size_t i = 0; i < effect.theta.size(); ++i) {
       const bool varies = effect.shape_intervals[i].lower < effect.shape_intervals[i].upper;
       if (!varies || effect.theta[i] == 0) continue;
-      free.push_back({e, i, thetas.size(), thetas.size() + 1, 2 * kToEachSide * std::abs(effect.theta[i])});
-      for (const double sign : {-1.0, 1.0}) {
-        thetas.push_back(effect.theta);
-        thetas.back()[i] += sign * kToEachSide * std::abs(effect.theta[i]);
-      }
+      free.push_back({e, i, thetas.size(), kDifference * effect.theta[i]});
+      thetas.push_back(effect.theta);
+      thetas.back()[i] += free.back().width;
     }
   }
   if (free.empty()) return {};
@@ -261,8 +259,8 @@ std::vector<InstrumentedShape> instrument_with_shapes(const Passes& passes,
   for (const FreeShape& shape : free) {
     for (int c = 0; c < around[shape.effect].columns(); ++c) {
       const double slope = refined[shape.effect].coefficients[static_cast<std::size_t>(c)] / shape.width;
-      mix(columns.first_column[shape.effect][shape.upper] + c, at) += slope;
-      mix(columns.first_column[shape.effect][shape.lower] + c, at) -= slope;
+      mix(columns.first_column[shape.effect][shape.neighbour] + c, at) += slope;
+      mix(columns.first_column[shape.effect][0] + c, at) -= slope;
     }
     ++at;
   }

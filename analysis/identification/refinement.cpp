@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kTooManyToRefine = 400'000;
 constexpr int kMostSteps = 7;
 constexpr int kStepsOfRefit = 2;      ///< from where the fit of an excerpt ended, which is close
-constexpr double kDifference = 0.05;  ///< of a shape's scale, for derivatives
+constexpr double kDifference = 0.02;  ///< of a shape's scale, for derivatives
 constexpr double kLargestStep = 0.5;  ///< of a shape's scale
 constexpr double kSettled = 0.01;
 
@@ -121,8 +121,8 @@ class Refinement {
     return point;
   }
 
-  /// Gives each member of `around` its shapes, followed by two neighbours per unknown shape, for derivatives.
-  /// @return by unknown: the distance between its two neighbours; 0 for coefficients.
+  /// Gives each member of `around` its shapes, followed by a neighbour per unknown shape, for derivatives.
+  /// @return by unknown: how far away its neighbour is, upwards where there is room; 0 for coefficients.
   std::vector<double> add_neighbours(const std::vector<std::vector<double>>& thetas,
                                      std::vector<Candidate>& around) const {
     std::vector<double> widths(unknowns_.size(), 0);
@@ -132,11 +132,10 @@ class Refinement {
       if (!u.is_shape) continue;
       const double at = thetas[u.member][u.index], h = kDifference * u.scale;
       const double lower = std::max(at - h, parameter(u).lower), upper = std::min(at + h, parameter(u).upper);
-      widths[k] = upper - lower;
-      for (const double value : {lower, upper}) {
-        around[u.member].thetas.push_back(thetas[u.member]);
-        around[u.member].thetas.back()[u.index] = value;
-      }
+      const double neighbour = upper - at >= at - lower ? upper : lower;
+      widths[k] = neighbour - at;
+      around[u.member].thetas.push_back(thetas[u.member]);
+      around[u.member].thetas.back()[u.index] = neighbour;
     }
     return widths;
   }
@@ -161,10 +160,10 @@ class Refinement {
         mix(columns[0] + static_cast<int>(u.index), column) = 1;
         continue;
       }
-      const std::size_t lower = next_theta[u.member]++, upper = next_theta[u.member]++;
+      const int neighbour = columns[next_theta[u.member]++];
       for (int i = 0; i < around[u.member].columns(); ++i) {
-        mix(columns[upper] + i, column) = c[first + i] / widths[k];
-        mix(columns[lower] + i, column) = -c[first + i] / widths[k];
+        mix(neighbour + i, column) = c[first + i] / widths[k];
+        mix(columns[0] + i, column) = -c[first + i] / widths[k];
       }
     }
     std::vector<const Candidate*> effects;

@@ -80,19 +80,23 @@ void Downwash::columns(const Instant& now, const double* shape, Wrench* columns)
   // The same arithmetic as for a whole swarm, a handful of neighbours at a time.
   constexpr int kMost = 4 * kRowLength;
   alignas(kRowLength * sizeof(double)) double rows[6][kMost], power[kMost];
-  double sum = 0;
-  for (int first = 0; first < now.num_neighbours; first += kMost) {
-    const int count = std::min(kMost, now.num_neighbours - first);
-    for (int k = 0; k < count; ++k) {
-      const Neighbour& neighbour = now.neighbours[first + k];
+  double sum = 0, last_mass_kg = 0;
+  for (int next = 0; next < now.num_neighbours;) {
+    int count = 0;
+    for (; next < now.num_neighbours && count < kMost; ++next) {
+      const Neighbour& neighbour = now.neighbours[next];
+      if (neighbour.dp_W_m.z() <= kWakeTouching_m) continue;  // does nothing, as in the kernel
+      const int k = count++;
       rows[0][k] = neighbour.dp_W_m.x();
       rows[1][k] = neighbour.dp_W_m.y();
       rows[2][k] = neighbour.dp_W_m.z();
       rows[3][k] = neighbour.v_W_m_s.x();
       rows[4][k] = neighbour.v_W_m_s.y();
-      const bool is_as_before = k > 0 && neighbour.mass_kg == now.neighbours[first + k - 1].mass_kg;
+      const bool is_as_before = k > 0 && neighbour.mass_kg == last_mass_kg;
       rows[5][k] = is_as_before ? rows[5][k - 1] : pair_constant(neighbour.mass_kg, shape);
+      last_mass_kg = neighbour.mass_kg;
     }
+    if (count == 0) break;
     for (auto& row : rows) std::fill(row + count, row + round_up(count, kRowLength), row[count - 1]);
     const Kernel& kernel = kernel_for(count);
     kernel.strengths({rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]}, round_up(count, kernel.block),
