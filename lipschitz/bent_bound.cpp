@@ -15,26 +15,44 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// c of each hidden layer, from g = c (c - 1).
-std::vector<double> largest_slopes(const check::BentChain& chain) {
-  std::vector<double> result;
-  for (const check::Dyadic& g : chain.bends) result.push_back((1 + std::sqrt(1 + 4 * to_double(g))) / 2);
-  return result;
-}
-
-/// The chain with stages of norm about one, and what its own are: M_k = stages[k] 2^exponents[k].
+/// The chain with stages of norm about one, and what its own are: M_k = stages[k] 2^exponents[k]. Slopes of neuron i of
+/// a hidden layer lie in [low_i, low_i + width_i].
 struct ScaledBentChain {
   ReluChain stages;
-  std::vector<double> c;
+  std::vector<VectorXd> low, width;
   std::vector<int> exponents;
   Index inputs = 0, neurons = 0;
   Index size() const { return inputs + neurons; }
+  std::size_t hidden_layers() const { return low.size(); }
+  /// The largest |slope| of each neuron of a layer.
+  VectorXd steepest(std::size_t k) const {
+    return low[k].cwiseAbs().cwiseMax((low[k] + width[k]).cwiseAbs());
+  }
 };
 
 double norm_of(const MatrixXd& m) { return std::sqrt(largest_eigenvalue(m * m.transpose())); }
 
-ScaledBentChain scaled_to_one(ReluChain chain, std::vector<double> c) {
-  ScaledBentChain result{std::move(chain), std::move(c), {}, 0, 0};
+/// The slopes of the neurons that are live.
+void set_slopes(const check::BentChain& chain, const LiveChain& live, ScaledBentChain& result) {
+  std::size_t before = 0;
+  for (std::size_t k = 0; k < live.neurons().size(); ++k) {
+    const std::vector<Index>& neurons = live.neurons()[k];
+    VectorXd low(static_cast<Index>(neurons.size())), width = low;
+    for (std::size_t i = 0; i < neurons.size(); ++i) {
+      const check::SlopeRange& range = chain.slopes[before + static_cast<std::size_t>(neurons[i])];
+      low(static_cast<Index>(i)) = to_double(range.low);
+      width(static_cast<Index>(i)) = to_double(range.high - range.low);
+    }
+    before += static_cast<std::size_t>(chain.stages[k].rows);
+    result.low.push_back(std::move(low));
+    result.width.push_back(std::move(width));
+  }
+}
+
+ScaledBentChain scaled_to_one(const check::BentChain& chain, const LiveChain& live) {
+  ScaledBentChain result;
+  result.stages = live.live();
+  set_slopes(chain, live, result);
   MatrixXd& first = result.stages.front();
   if (first.cols() > first.rows()) {  // an orthogonal change of inputs drops the null space
     const Eigen::HouseholderQR<MatrixXd> qr(first.transpose());
@@ -44,28 +62,29 @@ ScaledBentChain scaled_to_one(ReluChain chain, std::vector<double> c) {
   result.inputs = first.cols();
   for (std::size_t k = 0; k < result.stages.size(); ++k) {
     MatrixXd& m = result.stages[k];
-    const double norm = norm_of(m) * (k < result.c.size() ? result.c[k] : 1.0);
+    const bool is_hidden = k < result.hidden_layers();
+    const double norm = norm_of(m) * (is_hidden ? result.steepest(k).maxCoeff() : 1.0);
     result.exponents.push_back(
         norm > 0 && std::isfinite(norm) ? static_cast<int>(std::lround(std::log2(norm))) : 0);
     m *= std::ldexp(1.0, -result.exponents.back());
-    if (k < result.c.size()) result.neurons += m.rows();
+    if (is_hidden) result.neurons += m.rows();
   }
   return result;
 }
 
-/// S(rho, t) in the variables (x, u_1, ..., u_{K-1}).
+/// S(rho, t) in the variables (x, w_1, ..., w_{K-1}).
 class BentInequality final : public RankTwoInequality {
  public:
   explicit BentInequality(const ScaledBentChain& chain)
       : inputs_(chain.inputs), a_(chain.size(), chain.neurons) {
-    MatrixXd z = MatrixXd::Identity(inputs_, chain.size());  // what leaves the layer at hand, of (x, u)
+    MatrixXd z = MatrixXd::Identity(inputs_, chain.size());  // what leaves the layer at hand, of (x, w)
     Index begin = 0;
-    for (std::size_t k = 0; k < chain.c.size(); ++k) {
+    for (std::size_t k = 0; k < chain.hidden_layers(); ++k) {
       const MatrixXd y = chain.stages[k] * z;
-      const double c = chain.c[k];
-      z = (1 - c) * y;
-      z.middleCols(inputs_ + begin, y.rows()).diagonal().array() += 1;
-      a_.middleCols(begin, y.rows()) = (2 * c - 1) * y.transpose();
+      const VectorXd root = chain.width[k].cwiseSqrt();
+      z = chain.low[k].asDiagonal() * y;
+      z.middleCols(inputs_ + begin, y.rows()).diagonal() += root;
+      a_.middleCols(begin, y.rows()) = y.transpose() * root.asDiagonal();
       a_.block(inputs_ + begin, begin, y.rows(), y.rows()).diagonal().array() -= 1;
       begin += y.rows();
     }
@@ -95,23 +114,57 @@ class BentInequality final : public RankTwoInequality {
 };
 
 /// The multipliers that prove the product of norms, well inside: with |dz_k|^2 weighted by l_k, backwards
-/// l_{k-1} = 2 l_k c^2 |M_k|^2, and t_k = l_k c / (2 c - 1), for which l_k |z|^2 + 2 t_k (z (y - z) + g y^2) is at
-/// most l_k c^2 |y|^2.
+/// l_{k-1} = 2 l_k max c^2 |M_k|^2, c the steepest slope of a neuron, and t = l_k c / (b - a), for which
+/// l_k z^2 + 2 t (z - a y) (b y - z) is at most l_k c^2 y^2. In w it is t (b - a).
 VectorXd product_start(const ScaledBentChain& chain) {
   constexpr double kInside = 2;
   VectorXd y(1 + chain.neurons);
   const double last = norm_of(chain.stages.back());
   double weight = kInside * last * last;
   Index end = y.size();
-  for (std::size_t k = chain.c.size(); k-- > 0;) {
-    const double c = chain.c[k], norm = norm_of(chain.stages[k]);
-    const Index rows = chain.stages[k].rows();
-    end -= rows;
-    y.segment(end, rows).setConstant(weight * c / (2 * c - 1));
+  for (std::size_t k = chain.hidden_layers(); k-- > 0;) {
+    const VectorXd steepest = chain.steepest(k);
+    const double c = steepest.maxCoeff(), norm = norm_of(chain.stages[k]);
+    end -= steepest.size();
+    y.segment(end, steepest.size()) = weight * steepest;
     weight *= kInside * c * c * norm * norm;
   }
   y(0) = weight;
   return y;
+}
+
+/// c of each layer if all its neurons have slopes in one [1 - c, c], as they have for all inputs.
+std::optional<std::vector<double>> slopes_of_layers(const ScaledBentChain& chain) {
+  std::vector<double> result;
+  for (std::size_t k = 0; k < chain.hidden_layers(); ++k) {
+    const double low = chain.low[k](0), width = chain.width[k](0);
+    const bool is_one = (chain.low[k].array() == low).all() && (chain.width[k].array() == width).all();
+    if (!is_one || low > 0 || width != 1 - 2 * low) return std::nullopt;
+    result.push_back(1 - low);
+  }
+  return result;
+}
+
+/// By blocks where that is faster, else by the dense program; nothing where that is too large.
+std::optional<InteriorPointResult> minimise(const ScaledBentChain& chain,
+                                            const InteriorPointOptions& options) {
+  if (const std::optional<std::vector<double>> slopes = slopes_of_layers(chain)) {
+    std::optional<InteriorPointResult> found =
+        minimise_long_chain(ChainSlack(chain.stages, *slopes), options);
+    if (found) {
+      for (VectorXd& y : found->points) {  // to multipliers in w
+        Index next = 1;
+        for (const VectorXd& width : chain.width) {
+          y.segment(next, width.size()).array() *= width.array();
+          next += width.size();
+        }
+      }
+      return found;
+    }
+  } else if (chain.size() > kMostBentVariables) {
+    return std::nullopt;
+  }
+  return minimise(BentInequality(chain), product_start(chain), options);
 }
 
 /// (rho, t) in the units of the chain itself.
@@ -120,10 +173,10 @@ VectorXd unscaled(const ScaledBentChain& chain, VectorXd y) {
   for (const int e : chain.exponents) total += e;
   y(0) = std::ldexp(y(0), 2 * total);
   Index next = 1;
-  for (std::size_t k = 0; k < chain.c.size(); ++k) {
+  for (std::size_t k = 0; k < chain.hidden_layers(); ++k) {
     up_to += chain.exponents[k];
     for (Index i = 0; i < chain.stages[k].rows(); ++i, ++next)
-      y(next) = std::ldexp(y(next), 2 * (total - up_to));
+      y(next) = std::ldexp(y(next), 2 * (total - up_to)) / chain.width[k](i);
   }
   return y;
 }
@@ -138,11 +191,11 @@ SdpBound bent_bound(const check::BentChain& chain, const SdpOptions& options) {
     result.proof = prove(chain, std::numeric_limits<double>::min(), live.multipliers(VectorXd()));
     return result;
   }
-  const ScaledBentChain scaled = scaled_to_one(live.live(), largest_slopes(chain));
+  const ScaledBentChain scaled = scaled_to_one(chain, live);
   InteriorPointOptions solver;
   solver.stop = options.stop;
-  std::optional<InteriorPointResult> found = minimise_long_chain(ChainSlack(scaled.stages, scaled.c), solver);
-  if (!found) found = minimise(BentInequality(scaled), product_start(scaled), solver);
+  const std::optional<InteriorPointResult> found = minimise(scaled, solver);
+  if (!found) return result;
   result.stop = found->stop;
   result.iterations = found->iterations;
   for (auto point = found->points.rbegin(); point != found->points.rend() && !result.proof; ++point) {

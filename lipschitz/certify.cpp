@@ -26,18 +26,18 @@ check::Dyadic power(double base, std::size_t exponent) {
   return result;
 }
 
-/// Bounds on a box and branch and bound are for ReLU, and relative states. @throws std::invalid_argument.
-void require_relu_on_a_box(const Network& network, const std::map<std::string, const Weights*>& parts,
-                           const CertifyOptions& options) {
+/// Bounds on a box are of relative states; branch and bound is for ReLU as well. @throws std::invalid_argument.
+void require_what_is_bounded(const Network& network, const std::map<std::string, const Weights*>& parts,
+                             const CertifyOptions& options) {
   if (options.domain.empty() && options.method != UpperMethod::kBranch) return;
   if (network.invariants)
     throw std::invalid_argument(std::string(options.domain.empty() ? "--method branch" : "bounds on a box") +
                                 ": for networks of relative states only, and these are rotation invariants");
+  if (options.method != UpperMethod::kBranch) return;
   for (const auto& [name, weights] : parts) {
     if (weights->is_relu()) continue;
-    throw std::invalid_argument(std::string(options.domain.empty() ? "--method branch" : "bounds on a box") +
-                                ": for ReLU networks only; " + name + " has " + weights->activation_names() +
-                                " between its layers, so that only bounds for all inputs can be proved");
+    throw std::invalid_argument("--method branch: for ReLU networks only; " + name + " has " +
+                                weights->activation_names() + " between its layers");
   }
 }
 
@@ -122,6 +122,10 @@ const char* name(UpperMethod method) {
       return "eclipse_fast";
     case UpperMethod::kSdp:
       return "sdp";
+    case UpperMethod::kLocalProduct:
+      return "local_product";
+    case UpperMethod::kLocalSdp:
+      return "local_sdp";
     case UpperMethod::kBranch:
       break;
   }
@@ -189,6 +193,7 @@ void multiply_norms(const Network& network, const std::map<std::string, const We
       bound.has_slopes = bound.has_slopes && !function.sorts();
       bound.is_monotone = bound.is_monotone && function.is_monotone();
     }
+    bound.has_local_slopes = bound.has_local_slopes || (bound.domain == "box" && !parts.at(name)->is_relu());
   }
   bound.is_relu = has_witness(parts, bound.function) && !files::maps_to_invariants(network, bound.function);
   bound.product = bound.upper = product_up(norms);
@@ -204,7 +209,7 @@ Certification certify(const Network& network, const CertifyOptions& options) {
     throw std::invalid_argument("certify: gamma must be positive");
   require_moderate(network);
   const std::map<std::string, const Weights*> parts = files::parts(network);
-  require_relu_on_a_box(network, parts, options);
+  require_what_is_bounded(network, parts, options);
   std::vector<const files::Layer*> layers;
   for (const auto& [name, weights] : parts) {
     for (const files::Layer& layer : weights->layers) {
@@ -221,11 +226,11 @@ Certification certify(const Network& network, const CertifyOptions& options) {
   enclose_norms(layers, options.jobs, progress, result);
   judge_gamma(parts, result);
   for (CertifiedBound& bound : result.bounds) multiply_norms(network, parts, result.layers, bound);
-  find_bounds(network, options, stop, progress, result.bounds);
+  find_bounds(network, options, stop, progress, result.layers, result.bounds);
   for (CertifiedLaw& law : result.laws) {
     settle(network, result.bounds, law);
     for (const CertifiedBound& bound : result.bounds)
-      if (bound.method == UpperMethod::kBranch && bound.domain == "box") law.domain = "box";
+      if (is_local(bound.method) && bound.domain == "box") law.domain = "box";
   }
   return result;
 }

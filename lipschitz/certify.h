@@ -23,10 +23,12 @@
 namespace swarmcert::lipschitz {
 
 enum class UpperMethod {
-  kAuto,         ///< the smallest of the three below
-  kProduct,      ///< product of the layers' spectral norms
-  kEclipseFast,  ///< layer by layer in closed form; what the semidefinite program starts from
-  kSdp,          ///< LipSDP-Neuron
+  kAuto,     ///< the smallest of the next three; with a box, of activations besides ReLU, of the two after
+  kProduct,  ///< product of the layers' spectral norms
+  kEclipseFast,   ///< layer by layer in closed form; what the semidefinite program starts from
+  kSdp,           ///< LipSDP-Neuron
+  kLocalProduct,  ///< the product with the steepest slopes that the activations have on the box
+  kLocalSdp,      ///< LipSDP-Neuron with the slopes that they have on the box
   kBranch,  ///< branch and bound on the claim's box, or, for all inputs, on a projective cover; kAuto for rho
 };
 
@@ -53,12 +55,13 @@ struct CertifiedLayer {
 };
 
 struct CertifiedBound : Claim {
-  bool is_relu = true;      ///< of relative states; otherwise there are no witness and no branch and bound
-  bool has_slopes = true;   ///< number by number; otherwise a layer is sorted, and the product is the bound
-  bool is_monotone = true;  ///< otherwise the layer-wise bound is that of the product
+  bool is_relu = true;     ///< of relative states; otherwise there are no witness and no branch and bound
+  bool has_slopes = true;  ///< number by number; otherwise a layer is sorted, and the product is the bound
+  bool has_local_slopes = false;  ///< a box, and an activation besides ReLU: its slopes there may be smaller
+  bool is_monotone = true;        ///< otherwise the layer-wise bound is that of the product
   UpperBound upper{0};
   UpperMethod method = UpperMethod::kProduct;
-  std::optional<UpperProof> proof;  ///< where method is kSdp
+  std::optional<UpperProof> proof;  ///< where method is kEclipseFast, kSdp or kLocalSdp
   std::optional<LocalProof> local;  ///< where method is kBranch
   int nodes = 0;                    ///< boxes that branch and bound looked at
   BranchStop branch_stop = BranchStop::kNothingRun;
@@ -107,12 +110,13 @@ std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const st
 /// over every box; lower bounds are exact slopes between two float32 points. The clamp of NET, which never increases
 /// a distance, leaves the upper bounds valid. Functions with other activations than ReLU, and set functions where any
 /// phi has one, get upper bounds only: by the same matrix inequality where the activation is monotone
-/// (checker/stages.h), else, up to the size that bent_bound.h states, by its extension. Set functions of rotation
-/// invariants get upper bounds only, too: those of rho(sum phi) times the Lipschitz constant of the map to invariants.
-/// Branch and bound runs on what the clamp lets through of the box, or on a projective cover of all inputs where there
-/// is no box.
-/// @throws std::invalid_argument if gamma is not positive, if there is a domain or branch and bound is asked for and an
-///   activation is not ReLU or NET has invariants, or as claims() and law_claims().
+/// (checker/stages.h), else, up to the size that bent_bound.h states, by its extension; on a box also from the slopes
+/// that the activations have there. Set functions of rotation invariants get upper bounds only, too: those of
+/// rho(sum phi) times the Lipschitz constant of the map to invariants. Branch and bound is for ReLU. It runs on what
+/// the clamp lets through of the box, or on a projective cover of all inputs where there is no box.
+/// @throws std::invalid_argument if gamma is not positive, if branch and bound is asked for and an activation is not
+///   ReLU, if there is a domain or branch and bound is asked for and NET has invariants, or as claims() and
+///   law_claims().
 Certification certify(const files::Network& network, const CertifyOptions& options);
 
 /// What the law gives from verified bounds of its terms, rounded up.
@@ -131,7 +135,13 @@ bool is_interrupted(const Certification& certification);
 /// "finished" or "interrupted".
 const char* status(bool is_interrupted);
 
-/// "auto", "product", "eclipse_fast", "sdp", "branch".
+/// "auto", "product", "eclipse_fast", "sdp", "local_product", "local_sdp", "branch".
 const char* name(UpperMethod method);
+
+/// Whether bounds by this method hold on the box only, where there is one.
+constexpr bool is_local(UpperMethod method) {
+  return method == UpperMethod::kBranch || method == UpperMethod::kLocalProduct ||
+         method == UpperMethod::kLocalSdp;
+}
 
 }  // namespace swarmcert::lipschitz

@@ -6,6 +6,7 @@
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/eclipse_fast.h"
 #include "lipschitz/range.h"
+#include "lipschitz/rounding.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/functions.h"
 
@@ -61,6 +62,49 @@ void solve_program(const Network& network, const CertifyOptions& options, const 
   bound.method = UpperMethod::kSdp;
   bound.proof = std::move(bound.sdp.proof);
   bound.sdp.proof.reset();
+}
+
+/// Of the inputs that the bound is about, as they leave the clamp.
+check::Intervals box_of(const Network& network, const CertifyOptions& options, const CertifiedBound& bound) {
+  const Box box = clamped(network, options.domain).at(files::networks_of(bound.function).front());
+  return {{box.lower.begin(), box.lower.end()}, {box.upper.begin(), box.upper.end()}};
+}
+
+/// The product, with the steepest slopes on the box in place of those of all inputs.
+void multiply_local_slopes(const Network& network, const check::Intervals& box,
+                           const std::vector<CertifiedLayer>& layers, CertifiedBound& bound) {
+  const std::vector<std::string> names = files::networks_of(bound.function);
+  const auto parts = files::parts(network);
+  check::Dyadic total = bound.scale.empty() ? 1.0 : *std::max_element(bound.scale.begin(), bound.scale.end());
+  for (const CertifiedLayer& layer : layers)
+    if (std::find(names.begin(), names.end(), layer.network) != names.end())
+      total = total * check::Dyadic(layer.norm.norm.upper.value());
+  total = total * check::steepest_on_box(*parts.at(names.front()), box);
+  if (names.size() == 2)
+    for (const files::Activation activation : parts.at(names.back())->activations())
+      total = total * check::Dyadic(files::function_of(activation).steepest());
+  const double upper = rounded_up(total);
+  if (!(upper < bound.upper.value())) return;
+  bound.upper = UpperBound(upper);
+  bound.method = UpperMethod::kLocalProduct;
+  bound.proof.reset();
+}
+
+/// Smaller bounds for the box, where the slopes on it give any. Whether the program was solved.
+bool solve_on_box(const Network& network, const CertifyOptions& options, const Stop& stop,
+                  const std::vector<CertifiedLayer>& layers, CertifiedBound& bound) {
+  const check::Intervals box = box_of(network, options, bound);
+  multiply_local_slopes(network, box, layers, bound);
+  if (!has_program(options, bound)) return false;
+  bound.sdp = bent_bound(check::chain_on_box(network, bound.function, bound.block, bound.scale, box),
+                         {stop, bound.upper});
+  if (!bound.sdp.proof || !(bound.sdp.proof->upper.value() < bound.upper.value()))
+    return bound.sdp.proof.has_value();
+  bound.upper = bound.sdp.proof->upper;
+  bound.method = UpperMethod::kLocalSdp;
+  bound.proof = std::move(bound.sdp.proof);
+  bound.sdp.proof.reset();
+  return true;
 }
 
 void search_below(const Network& network, const CertifyOptions& options, const Stop& stop,
@@ -150,7 +194,8 @@ int pieces_of_work(const CertifyOptions& options, int bounds) {
 }
 
 void find_bounds(const Network& network, const CertifyOptions& options, const Stop& stop,
-                 WorkProgress& progress, std::vector<CertifiedBound>& bounds) {
+                 WorkProgress& progress, const std::vector<CertifiedLayer>& layers,
+                 std::vector<CertifiedBound>& bounds) {
   const auto count = static_cast<int>(bounds.size());
   files::parallel_for(count, options.jobs, [&](int i) {
     CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
@@ -171,7 +216,8 @@ void find_bounds(const Network& network, const CertifyOptions& options, const St
       });
     } else {
       progress.run("semidefinite program of " + called(bound), [&] {
-        if (has_program(options, bound)) solve_program(network, options, share, bound);
+        const bool is_solved = bound.has_local_slopes && solve_on_box(network, options, share, layers, bound);
+        if (!is_solved && has_program(options, bound)) solve_program(network, options, share, bound);
       });
     }
   });

@@ -22,6 +22,9 @@ class LiveChain {
   /// Whether no neuron is live, so that the function is constant.
   bool is_constant() const { return !neurons_.empty() && neurons_.front().empty(); }
 
+  /// The live neurons of each hidden layer.
+  const std::vector<std::vector<Eigen::Index>>& neurons() const { return neurons_; }
+
   /// Multipliers of the whole chain, one per hidden neuron. A neuron that does not reach the output gets 0, which
   /// empties its row of the inequality. A neuron that does, but has no input, gets a multiplier so large, larger in
   /// earlier layers, that its coupling to the next layer does not matter.

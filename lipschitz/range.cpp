@@ -6,8 +6,10 @@
 #include <memory>
 #include <optional>
 
+#include "lipschitz/attained_values.h"
 #include "lipschitz/extremes.h"
 #include "lipschitz/sum_support.h"
+#include "lipschitz/value_bounds.h"
 #include "nn/base/doubles.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/functions.h"
@@ -287,6 +289,38 @@ std::vector<CertifiedRange> ranges_of(const Network& network, const std::map<std
   return found;
 }
 
+/// Whether branch and bound on values can follow `function`, and the ground's term with it.
+bool is_of_relu(const Network& network, const std::string& function) {
+  const auto ground = network.phi.find(files::kGroundKind);
+  return files::is_relu(network, function) && (ground == network.phi.end() || ground->second.is_relu());
+}
+
+/// What a certificate states of a function with other activations, and values that it takes.
+std::vector<CertifiedRange> stated_ranges(const Network& network, const std::map<std::string, Box>& domain,
+                                          const std::string& function,
+                                          const std::map<std::string, double>& rho_bound,
+                                          const RangeOptions& options) {
+  std::vector<CertifiedRange> result;
+  for (const CertifiedValues& values :
+       certified_values(network, domain, rho_bound, {options.neighbours, false, false, 0}, function)) {
+    const std::vector<AttainedEnds> ends =
+        attained_ends(network, domain, function, std::max(1, values.neighbours));
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      CertifiedRange range;
+      range.function = function;
+      range.output = static_cast<int>(i);
+      range.neighbours_at_most = values.neighbours;
+      range.lower = values.output().lower[i];
+      range.upper = values.output().upper[i];
+      range.least = ends[i].least;
+      range.greatest = ends[i].greatest;
+      range.jump = values.jump.value_or(0);
+      result.push_back(std::move(range));
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 std::map<std::string, Box> clamped(const Network& network, const std::map<std::string, Box>& domain) {
@@ -330,6 +364,7 @@ std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::s
   int done = 0, total = 0;
   const std::vector<std::string> functions = value_functions(network);
   for (const std::string& function : functions) {
+    if (!is_of_relu(network, function)) continue;
     const int outputs = files::parts(network).at(files::networks_of(function).back())->outputs();
     total += outputs * (files::is_set(function) ? 2 * (1 + options.neighbours) : 2);
   }
@@ -338,7 +373,8 @@ std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::s
   };
   for (const std::string& function : functions) {
     const std::vector<CertifiedRange> found =
-        ranges_of(network, inner, function, rho_bound, options, searched);
+        is_of_relu(network, function) ? ranges_of(network, inner, function, rho_bound, options, searched)
+                                      : stated_ranges(network, inner, function, rho_bound, options);
     result.insert(result.end(), found.begin(), found.end());
   }
   return result;

@@ -15,7 +15,7 @@
 
 namespace swarmcert::lipschitz {
 
-/// A value that the function takes, exactly evaluated at float32 points of the box and rounded inwards.
+/// A value that the function takes, at float32 points of the box: evaluated exactly, or enclosed, and rounded inwards.
 struct Attained {
   double value = 0;
   std::vector<std::string> networks;       ///< "phi:<kind>" per point, or "network"
@@ -53,6 +53,8 @@ std::vector<std::string> value_functions(const files::Network& network);
 /// One neighbour: branch and bound over its box, the ground's term as an interval. More: a linear form a s + c above
 /// rho on the sums s, whose neurons are bounded by such forms too (sum_support.h); f <= c + sum_j max a phi(x_j), each
 /// maximum by branch and bound.
+///
+/// Of functions with other activations than ReLU: what certified_values() states, and no branch and bound.
 /// @param domain by part, finite.
 /// @param rho_bound a proved Lipschitz bound of rho, by its kind; for the jump |f - f'| <= L |phi(x)|.
 std::vector<CertifiedRange> ranges(const files::Network& network, const std::map<std::string, Box>& domain,

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "lipschitz/range.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
 
@@ -29,7 +30,9 @@ constexpr double kMostWork = 2e9;
 /// x -> rho(phi(x) + s) or one part of NET, in double, with the clamp.
 class SampledFunction {
  public:
-  SampledFunction(const files::Network& network, const Claim& claim) : network_(network) {
+  /// @param domain as it leaves the clamp.
+  SampledFunction(const files::Network& network, const Claim& claim, std::map<std::string, Box> domain)
+      : network_(network), domain_(std::move(domain)) {
     const std::vector<std::string> names = files::networks_of(claim.function);
     for (const auto& [name, weights] : files::parts(network))
       evaluators_.emplace(name, Evaluator<double>(*weights));
@@ -38,6 +41,7 @@ class SampledFunction {
     maps_ = files::maps_to_invariants(network, claim.function);
     if (names.size() == 2) last_ = names.back();
     block_ = files::block_coordinates(network, claim.function, claim.block);
+    narrow_steps(claim);
     for (const int k : block_)
       scale_.push_back(claim.scale.empty() ? 1.0 : claim.scale[static_cast<std::size_t>(k)]);
     for (const std::string& name : names)
@@ -49,7 +53,18 @@ class SampledFunction {
   /// Multiplications of one slope().
   double work() const { return 2 * work_ * static_cast<double>(block_.size() + 1); }
 
-  /// A point at one of several scales, inside the clamp where there is one.
+  /// 0, or the middle of the box.
+  VectorXd middle() const {
+    VectorXd x = VectorXd::Zero(inputs_);
+    const auto box = domain_.find(first_);
+    for (Index k = 0; box != domain_.end() && k < inputs_; ++k)
+      x[k] =
+          (box->second.lower[static_cast<std::size_t>(k)] + box->second.upper[static_cast<std::size_t>(k)]) /
+          2;
+    return x;
+  }
+
+  /// A point at one of several scales, inside the box or the clamp where there is one.
   VectorXd random_point(std::mt19937_64& generator) const {
     return random_point_of(first_, inputs_, generator);
   }
@@ -76,6 +91,7 @@ class SampledFunction {
       if (j == 0) jacobian.resize(column.size(), columns);
       jacobian.col(j) = column;
     }
+    if (columns == 0) return 0;
     VectorXd direction = VectorXd::Ones(columns).normalized();
     for (int i = 0; i < 8; ++i) {
       const VectorXd next = jacobian.transpose() * (jacobian * direction);
@@ -87,6 +103,26 @@ class SampledFunction {
   }
 
  private:
+  /// In a box points move neither along inputs that it fixes nor, with the room that random_point() leaves, out of it.
+  void narrow_steps(const Claim& claim) {
+    const auto found = domain_.find(first_);
+    if (found == domain_.end()) return;
+    Box& box = found->second;
+    const auto width = [&box](int k) {
+      return box.upper[static_cast<std::size_t>(k)] - box.lower[static_cast<std::size_t>(k)];
+    };
+    block_.erase(std::remove_if(block_.begin(), block_.end(), [&](int k) { return !(width(k) > 0); }),
+                 block_.end());
+    const auto scale = [&claim](int k) {
+      return claim.scale.empty() ? 1.0 : claim.scale[static_cast<std::size_t>(k)];
+    };
+    for (const int k : block_) half_step_ = std::min(half_step_, width(k) / (8 * scale(k)));
+    for (const int k : block_) {
+      box.lower[static_cast<std::size_t>(k)] += half_step_ * scale(k);
+      box.upper[static_cast<std::size_t>(k)] -= half_step_ * scale(k);
+    }
+  }
+
   static double random_number(std::mt19937_64& generator) {
     return std::ldexp(static_cast<double>(generator() >> 11), -52) - 1;
   }
@@ -94,13 +130,15 @@ class SampledFunction {
   VectorXd random_point_of(const std::string& part, Index size, std::mt19937_64& generator) const {
     const double scale = std::exp2(static_cast<double>(generator() % 8) - 4);
     VectorXd x(size);
+    const auto box = domain_.find(part);
     const bool is_clamped = network_.clamp && files::is_clamped(part) && !maps_;
     for (Index k = 0; k < size; ++k) {
       const double r = random_number(generator);
       const auto i = static_cast<std::size_t>(k);
-      x[k] = is_clamped ? network_.clamp->lower[i] +
-                              (network_.clamp->upper[i] - network_.clamp->lower[i]) * (r + 1) / 2
-                        : scale * r;
+      const auto between = [r](double low, double high) { return low + (high - low) * (r + 1) / 2; };
+      x[k] = box != domain_.end() ? between(box->second.lower[i], box->second.upper[i])
+             : is_clamped         ? between(network_.clamp->lower[i], network_.clamp->upper[i])
+                                  : scale * r;
     }
     return x;
   }
@@ -131,7 +169,7 @@ class SampledFunction {
   VectorXd quotient(const VectorXd& x, const VectorXd& direction) const {
     VectorXd ahead = x, behind = x;
     for (std::size_t j = 0; j < block_.size(); ++j) {
-      const double step = kHalfStep * scale_[j] * direction[static_cast<Index>(j)];
+      const double step = half_step_ * scale_[j] * direction[static_cast<Index>(j)];
       ahead[block_[j]] += step;
       behind[block_[j]] -= step;
     }
@@ -140,10 +178,12 @@ class SampledFunction {
       above = evaluated(*last_, above + others_);
       below = evaluated(*last_, below + others_);
     }
-    return (above - below) / (2 * kHalfStep);
+    return (above - below) / (2 * half_step_);
   }
 
   const files::Network& network_;
+  std::map<std::string, Box> domain_;
+  double half_step_ = kHalfStep;
   std::map<std::string, Evaluator<double>> evaluators_;
   std::string first_;
   std::optional<std::string> last_;
@@ -159,7 +199,7 @@ class SampledFunction {
 
 Estimate slope_estimate(const files::Network& network, const Claim& claim,
                         const SlopeEstimateOptions& options) {
-  SampledFunction f(network, claim);
+  SampledFunction f(network, claim, clamped(network, options.domain));
   std::mt19937_64 generator(options.seed);
   const double affordable = kMostWork / (f.work() * kClimbs);
   const int starts = std::clamp(static_cast<int>(std::min(affordable, 1e6)), 1, options.starts);
@@ -167,7 +207,7 @@ Estimate slope_estimate(const files::Network& network, const Claim& claim,
   for (int start = 0; start < starts && !options.stop.now(); ++start) {
     f.place_others(generator);
     VectorXd x = f.random_point(generator);
-    if (start == 0) x.setZero();  // where many activations are steepest
+    if (start == 0) x = f.middle();  // 0 is where many activations are steepest
     double slope = f.slope(x), share = 1;
     for (int climb = 0; climb < kClimbs && !options.stop.now(); ++climb) {
       const VectorXd moved = x + share * (f.random_point(generator) - x);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lipschitz/checker/centred_form.h"
 #include "lipschitz/checker/values.h"
 #include "lipschitz/float32_error.h"
 #include "lipschitz/range.h"
@@ -88,6 +89,14 @@ class Values {
 
   bool through_layers(const std::string& name, Bounded& values, CertifiedValues& found) const {
     std::vector<VectorBounds>& layers = found.layers[name];
+    if (!parts_.at(name)->is_relu()) {
+      for (const check::Intervals& exact : check::layers_on_box(*parts_.at(name), values.values)) {
+        const std::optional<VectorBounds> bounds = rounded(exact, std::nullopt, values);
+        if (!bounds) return false;
+        layers.push_back(*bounds);
+      }
+      return true;
+    }
     for (const files::Layer& layer : parts_.at(name)->layers) {
       if (!layers.empty()) values.values = check::relu_intervals(std::move(values.values));
       const check::Intervals exact = check::layer_intervals(layer, values.values);
@@ -114,15 +123,15 @@ const VectorBounds& CertifiedValues::output() const {
 std::vector<CertifiedValues> certified_values(const files::Network& network,
                                               const std::map<std::string, Box>& domain,
                                               const std::map<std::string, double>& rho_bound,
-                                              const ValueOptions& options) {
+                                              const ValueOptions& options, const std::string& only) {
   const std::map<std::string, Box> inner = clamped(network, domain);
   ValueOptions exact_only = options;
   exact_only.float32 = false;
   const Values values(network, inner, options), without_float32(network, inner, exact_only);
   std::vector<CertifiedValues> result;
-  for (const std::string& function : files::functions(network)) {
+  for (const std::string& function : value_functions(network)) {
+    if (!only.empty() && function != only) continue;
     const bool is_set = files::is_set(function);
-    if (function != "network" && (!is_set || files::networks_of(function)[0] == files::kGroundPhi)) continue;
     for (int n = is_set ? 1 : 0; n <= (is_set ? options.neighbours : 0); ++n) {
       std::optional<CertifiedValues> found = values.of(function, n, rho_bound);
       if (!found && options.float32) found = without_float32.of(function, n, rho_bound);

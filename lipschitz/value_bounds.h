@@ -17,8 +17,9 @@ struct VectorBounds {
   std::vector<double> error;  ///< of the float32 evaluation, entry by entry; empty: not bounded
 };
 
-/// What a certificate states of one function's values over a box (checker/statement.h). By intervals, layer by layer:
-/// wider than range.h and float32_error.h find by branch and bound, and as easy to verify.
+/// What a certificate states of one function's values over a box (checker/statement.h). By intervals, layer by layer,
+/// of other activations than ReLU also by linear forms (checker/centred_form.h): wider than range.h and float32_error.h
+/// find by branch and bound, and as easy to verify.
 struct CertifiedValues {
   std::string function;                                     ///< "network" or "set:<phi kind>:<rho kind>"
   int neighbours = 0;                                       ///< at most, of the kind; 0 for a plain network
@@ -35,7 +36,8 @@ struct CertifiedValues {
 struct ValueOptions {
   int neighbours = 1;     ///< 1, 2, ... up to this many
   bool in_clamp = false;  ///< `domain` is clamp_domain() of the network
-  bool float32 = false;   ///< with errors of the float32 evaluation: all weights are stored in float32
+  /// With errors of the float32 evaluation: all weights are stored in float32, all activations are ReLU.
+  bool float32 = false;
   double input_step = 0;  ///< inputs are multiples of this, rounded to nearest; 0: only rounded to float32
 };
 
@@ -43,9 +45,10 @@ struct ValueOptions {
 /// float32 errors where float32 might overflow.
 /// @param domain by part, finite, of every input.
 /// @param rho_bound a proved Lipschitz bound of rho, by its kind, which the certificate contains.
+/// @param function only of this one; empty: of all.
 std::vector<CertifiedValues> certified_values(const files::Network& network,
                                               const std::map<std::string, Box>& domain,
                                               const std::map<std::string, double>& rho_bound,
-                                              const ValueOptions& options);
+                                              const ValueOptions& options, const std::string& function = "");
 
 }  // namespace swarmcert::lipschitz

@@ -39,14 +39,17 @@ class CertificateChecker {
   static void check_samples(const Json& samples, const std::string& where);
   void check_layer(const Json& entry, const std::string& network, const files::Layer& layer);
   void check_bound(const Json& bound);
-  /// By the product of the norms and of the activations' steepest slopes.
+  /// By the product of the norms and of the activations' steepest slopes; local_product: those on the box.
   void check_product(const Json& bound, const std::vector<std::string>& names, double upper,
                      const std::vector<double>& scale, const std::string& where) const;
-  /// What is stated of functions with other activations than ReLU: nothing on a box, no witness.
+  /// What is stated of functions with other activations than ReLU: nothing by parts of a box, no witness.
   void check_activations(const Json& bound, const std::vector<std::string>& names,
                          const std::string& where) const;
   /// Of functions of rotation invariants: nothing on a box, no witness, no scale.
   void check_invariants(const Json& bound, const std::string& function, const std::string& where) const;
+  /// The box that the slopes of a bound are taken on: of the inputs of `part`, as they leave the clamp. Refuses
+  /// networks of rotation invariants.
+  Intervals local_inputs(const Json& bound, const std::string& part, const std::string& where) const;
   /// Of a set function, at most how many of each kind there are; empty: any number.
   Neighbours neighbours_of(const Json& bound, const std::string& where) const;
   static std::string key(const std::string& function, const std::string& block, const Neighbours& neighbours);

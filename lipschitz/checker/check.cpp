@@ -17,6 +17,11 @@ Dyadic squared_norm(const Matrix& m) {
   return sum;
 }
 
+/// Bounds from the slopes that activations have on the box.
+bool is_from_local_slopes(const files::Json& bound) {
+  return bound["upper_method"] == "local_sdp" || bound["upper_method"] == "local_product";
+}
+
 /// The status says whether a search ended by itself. Nothing rests on it.
 void check_status(const files::Json& entry, const std::string& where) {
   require(entry["status"] == "finished" || entry["status"] == "interrupted", where + ": unknown status");
@@ -180,6 +185,9 @@ void CertificateChecker::check_bound(const Json& bound) {
   files::block_coordinates(network_, function, block);  // refuses what is no block of the function
   if (bound["upper_method"] == "sdp" || bound["upper_method"] == "eclipse_fast") {
     check_upper(bent_chain(network_, function, block, scale), bound["proof"], upper, where);
+  } else if (bound["upper_method"] == "local_sdp") {
+    check_upper(chain_on_box(network_, function, block, scale, local_inputs(bound, names.front(), where)),
+                bound["proof"], upper, where);
   } else if (bound["upper_method"] == "branch") {
     check_local(bound, upper, scale, where);
   } else {
@@ -187,7 +195,7 @@ void CertificateChecker::check_bound(const Json& bound) {
   }
   if (scale.empty()) {
     proved_[key(function, block, neighbours)] = upper;
-    if (bound["upper_method"] == "branch" && bound["domain"] == "box")
+    if ((bound["upper_method"] == "branch" || is_from_local_slopes(bound)) && bound["domain"] == "box")
       local_.insert(key(function, block, neighbours));
   }
   ++upper_bounds_;
@@ -201,12 +209,18 @@ void CertificateChecker::check_bound(const Json& bound) {
 
 void CertificateChecker::check_product(const Json& bound, const std::vector<std::string>& names, double upper,
                                        const std::vector<double>& scale, const std::string& where) const {
-  require(bound["upper_method"] == "product" && bound["proof"].is_null(), where + ": unknown upper_method");
+  const bool is_local = bound["upper_method"] == "local_product";
+  require((is_local || bound["upper_method"] == "product") && bound["proof"].is_null(),
+          where + ": unknown upper_method");
   Dyadic total = scale.empty() ? 1.0 : *std::max_element(scale.begin(), scale.end());
   total = total * files::slope_of_inputs(network_, bound["function"].get<std::string>());
   for (const std::string& name : names) {
     require(norms_.count(name) == 1, where + ": there is no network " + name);
     total = total * norms_.at(name);
+    if (is_local && name == names.front()) {
+      total = total * steepest_on_box(*parts_.at(name), local_inputs(bound, name, where));
+      continue;
+    }
     for (const files::Activation activation : parts_.at(name)->activations())
       total = total * files::function_of(activation).steepest();
   }
@@ -221,12 +235,12 @@ void CertificateChecker::check_activations(const Json& bound, const std::vector<
       if (activation == files::Activation::kRelu) continue;
       const files::ActivationFunction& function = files::function_of(activation);
       const std::string with = " of a network with " + function.words;
-      require(bound["domain"] == "global" && bound["upper_method"] != "branch",
-              where + ": a bound on a box" + with);
+      require(bound["upper_method"] != "branch", where + ": a bound by parts of a box" + with);
       require(bound["lower"].is_null() && bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
               where + ": a lower bound" + with);
-      require(!function.sorts() || bound["upper_method"] == "product",
-              where + ": a bound from slopes of single numbers" + with);
+      require(
+          !function.sorts() || bound["upper_method"] == "product" || bound["upper_method"] == "local_product",
+          where + ": a bound from slopes of single numbers" + with);
     }
   }
 }
@@ -240,6 +254,16 @@ void CertificateChecker::check_invariants(const Json& bound, const std::string& 
   require(bound["lower"].is_null() && bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
           where + ": a lower bound" + of);
   require(bound["scale"].empty(), where + ": a scale" + of);
+}
+
+Intervals CertificateChecker::local_inputs(const Json& bound, const std::string& part,
+                                           const std::string& where) const {
+  require(bound["domain"] == "box" && !files::is_rho(part),
+          where + ": slopes on a box of a bound without one");
+  require(!network_.invariants, where + ": slopes on a box of a network of rotation invariants");
+  Row lower, upper;
+  read_box(part, lower, upper, where);
+  return {{lower.begin(), lower.end()}, {upper.begin(), upper.end()}};
 }
 
 CertificateChecker::Neighbours CertificateChecker::neighbours_of(const Json& bound,

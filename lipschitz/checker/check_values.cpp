@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "lipschitz/checker/centred_form.h"
 #include "lipschitz/checker/certificate_checker.h"
 #include "lipschitz/checker/values.h"
 
@@ -39,11 +40,24 @@ void require_encloses(const Bounded& stated, const Intervals& values,
     require(error && at_most(*error, stated.error), where + ": claims less than the float32 error");
 }
 
+/// Verifies what is stated of every layer of a network with other activations than ReLU.
+void check_enclosed_layers(const files::Weights& weights, const files::Json& json, const Intervals& input,
+                           const std::string& where) {
+  const std::vector<Intervals> found = layers_on_box(weights, input);
+  for (std::size_t k = 0; k < found.size(); ++k)
+    require_encloses(stated(json[k], found[k].lower.size(), false, where), found[k], std::nullopt, where);
+}
+
 /// Verifies what is stated of every layer of a network; returns that of the last one.
 Bounded check_layers(const files::Weights& weights, const files::Json& json, Bounded input,
                      const std::string& where) {
   require(json.is_array() && json.size() == weights.layers.size(), where + ": needs one entry per layer");
   const bool with_error = !input.error.empty();
+  if (!weights.is_relu()) {
+    require(!with_error, where + ": a float32 error of a network with other activations than ReLU");
+    check_enclosed_layers(weights, json, input.values, where);
+    return stated(json.back(), static_cast<std::size_t>(weights.outputs()), false, where);
+  }
   for (std::size_t k = 0; k < weights.layers.size(); ++k) {
     const files::Layer& layer = weights.layers[k];
     if (k > 0) input.values = relu_intervals(std::move(input.values));
@@ -79,7 +93,7 @@ void CertificateChecker::check_values(const Json& entry) {
   const std::vector<std::string> names = files::networks_of(function);
   const bool is_set = names.size() == 2;
   for (const std::string& name : names)
-    require(parts_.count(name) == 1 && parts_.at(name)->is_relu(), where + ": only of ReLU networks");
+    require(parts_.count(name) == 1, where + ": there is no network " + name);
   require(!network_.invariants, where + ": values of a function of rotation invariants");
   require(is_set ? names[0] != files::kGroundPhi : function == "network",
           where + ": only of the network, or of a sum over neighbours");
@@ -100,7 +114,6 @@ void CertificateChecker::check_values(const Json& entry) {
   Bounded result;
   std::vector<SumTerm> terms;
   for (const std::string& name : inputs) {
-    require(parts_.count(name) == 1 && parts_.at(name)->is_relu(), where + ": only of ReLU networks");
     Bounded input = values_input(entry, name, where);
     result =
         check_layers(*parts_.at(name), entry["networks"].at(name), std::move(input), where + ": " + name);
@@ -108,10 +121,7 @@ void CertificateChecker::check_values(const Json& entry) {
     terms.push_back({result, is_ground ? 1 : 0, is_ground ? 1 : neighbours});
   }
   require(entry["sum"].is_null() != is_set, where + ": a sum of set functions, and only of those");
-  if (is_set) {
-    require(parts_.count(names[1]) == 1, where + ": there is no network " + names[1]);
-    result = check_sum(entry, terms, *parts_.at(names[1]), names[1], where);
-  }
+  if (is_set) result = check_sum(entry, terms, *parts_.at(names[1]), names[1], where);
   const std::vector<Dyadic> lower = exact(files::parse_hex_floats(entry["lower"]));
   const std::vector<Dyadic> upper = exact(files::parse_hex_floats(entry["upper"]));
   require(at_most(lower, result.values.lower) && at_most(result.values.upper, upper),

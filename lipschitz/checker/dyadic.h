@@ -43,7 +43,10 @@ struct Dyadic {
     return {a.mantissa * b.mantissa, a.exponent + b.exponent};
   }
   friend bool operator>=(const Dyadic& a, const Dyadic& b) { return (a - b).sign() >= 0; }
+  friend bool operator<(const Dyadic& a, const Dyadic& b) { return !(a >= b); }
 };
+
+inline Dyadic absolute(const Dyadic& x) { return x.sign() < 0 ? -x : x; }
 
 /// [rows x cols], row-major.
 struct Matrix {

@@ -169,27 +169,37 @@ Matrix quadratic_lmi(const std::vector<Matrix>& stages, const Matrix& q, const s
 }
 
 bool BentChain::is_bent() const {
-  return std::any_of(bends.begin(), bends.end(), [](const Dyadic& g) { return g.sign() > 0; });
+  return std::any_of(slopes.begin(), slopes.end(), [](const SlopeRange& range) {
+    return range.low.sign() != 0 || (range.high - Dyadic(1.0)).sign() != 0;
+  });
 }
 
 SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const std::vector<Dyadic>& t) {
-  if (chain.bends.size() + 1 != chain.stages.size())
-    throw std::invalid_argument("lipschitz_lmi: there is not one bend per hidden layer");
+  if (chain.slopes.size() != hidden_neurons(chain.stages))
+    throw std::invalid_argument("lipschitz_lmi: there is not one range of slopes per hidden neuron");
   if (!chain.is_bent()) return lipschitz_lmi(chain.stages, rho, t);
   Matrix q(chain.stages.front().cols, chain.stages.front().cols);
   for (int i = 0; i < q.rows; ++i) q(i, i) = rho;
-  Matrix p = quadratic_lmi(chain.stages, q, t);
-  int before = 0, next = 0;  // index of the first variable that enters stage k, and of its first neuron
-  for (std::size_t k = 0; k < chain.bends.size(); ++k) {
+  std::vector<Matrix> weighted = chain.stages;  // a + b times each hidden row
+  std::size_t next = 0;                         // the first neuron of a stage
+  for (std::size_t k = 0; k + 1 < weighted.size(); ++k)
+    for (int i = 0; i < weighted[k].rows; ++i, ++next)
+      for (int j = 0; j < weighted[k].cols; ++j)
+        weighted[k](i, j) = (chain.slopes[next].low + chain.slopes[next].high) * weighted[k](i, j);
+  Matrix p = quadratic_lmi(weighted, q, t);
+  int before = 0;  // index of the first variable that enters a stage
+  next = 0;
+  for (std::size_t k = 0; k + 1 < chain.stages.size(); ++k) {
     const Matrix& m = chain.stages[k];
-    Matrix weighted = m;  // 2 g T M
-    for (int i = 0; i < m.rows; ++i)
-      for (int j = 0; j < m.cols; ++j) weighted(i, j) = Dyadic(2.0) * chain.bends[k] * t[next + i] * m(i, j);
-    const Matrix bend = product(transposed(m), weighted);
+    Matrix bent = m;  // 2 t a b times each row
+    for (int i = 0; i < m.rows; ++i, ++next) {
+      const Dyadic factor = Dyadic(2.0) * chain.slopes[next].low * chain.slopes[next].high * t[next];
+      for (int j = 0; j < m.cols; ++j) bent(i, j) = factor * m(i, j);
+    }
+    const Matrix square = product(transposed(m), bent);
     for (int i = 0; i < m.cols; ++i)
-      for (int j = 0; j < m.cols; ++j) p(before + i, before + j) += -bend(i, j);
+      for (int j = 0; j < m.cols; ++j) p(before + i, before + j) += square(i, j);
     before += m.cols;
-    next += m.rows;
   }
   return p;
 }

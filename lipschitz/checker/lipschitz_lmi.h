@@ -66,19 +66,25 @@ std::size_t hidden_neurons(const std::vector<Matrix>& stages);
 SymmetricMatrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho,
                               const std::vector<Dyadic>& t);
 
-/// M_1 .. M_K with what lies between them: per hidden layer g >= 0, which is zero for functions of slopes in [0, 1] and
-/// c (c - 1) for those of slopes in [1 - c, c], as SiLU and GELU have.
-struct BentChain {
-  std::vector<Matrix> stages;
-  std::vector<Dyadic> bends;
-
-  bool is_bent() const;  ///< whether a g is positive
+/// The slopes of a function between two stages lie in [low, high].
+struct SlopeRange {
+  Dyadic low, high;
 };
 
-/// lipschitz_lmi() of such a chain. Slopes in [1 - c, c] give (dz - (1 - c) dy) (c dy - dz) =
-/// dz (dy - dz) + g dy^2 >= 0 for each neuron. Where a g is positive, nothing is minimised out, and the matrix over
-/// (dx, dz_1, ..., dz_{K-1}) is quadratic_lmi() with Q = rho I, less 2 g_k M_k' T_k M_k in the block (k - 1, k - 1).
-/// @throws std::invalid_argument if there is not one g per hidden layer.
+/// M_1 .. M_K with what lies between them: a range of slopes per hidden neuron, first layer first.
+struct BentChain {
+  std::vector<Matrix> stages;
+  std::vector<SlopeRange> slopes;
+
+  bool is_bent() const;  ///< whether a range is another one than [0, 1]
+};
+
+/// lipschitz_lmi() of such a chain. Slopes in [a, b] give (dz - a dy) (b dy - dz) >= 0 for each neuron, that is
+/// dz ((a + b) dy - dz) - a b dy^2 >= 0. If all are [0, 1], this is the matrix above. Else nothing is minimised out,
+/// and the matrix over (dx, dz_1, ..., dz_{K-1}) is quadratic_lmi() with Q = rho I and with a + b times each row of a
+/// hidden stage in place of the row, and 2 t a b m m' is added for each neuron, in the block of what its row m' acts
+/// on.
+/// @throws std::invalid_argument if there is not one range per hidden neuron.
 SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const std::vector<Dyadic>& t);
 
 /// The symmetric matrix whose positive semidefiniteness proves |g(v) - g(w)|^2 <= (v - w)' Q (v - w) for the same kind

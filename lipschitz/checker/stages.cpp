@@ -1,8 +1,11 @@
 #include "lipschitz/checker/stages.h"
 
+#include <algorithm>
+#include <functional>
 #include <map>
 #include <stdexcept>
 
+#include "lipschitz/checker/centred_form.h"
 #include "lipschitz/checker/lipschitz_lmi.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
@@ -28,19 +31,63 @@ Matrix of_invariants(Matrix w, const Dyadic& slope) {
   return w;
 }
 
-/// What an activation is divided by, and g of BentChain for the quotient, whose slopes lie in [0, 1] or [1 - c, c].
+/// What an activation is divided by, and between which slopes the quotient lies: in [0, 1] or [1 - c, c].
 struct Unit {
-  Dyadic slope, bend;
+  Dyadic slope;
+  SlopeRange range;
 };
 
 Unit unit_of(const files::ActivationFunction& function) {
   if (function.sorts())
     throw std::domain_error(function.words + " acts on whole layers: it has no slopes of single numbers");
-  if (function.is_monotone()) return {function.greatest_slope, {}};
-  const Dyadic c = function.greatest_slope;
+  if (function.is_monotone()) return {function.greatest_slope, {0.0, 1.0}};
   if (function.least_slope != 1 - function.greatest_slope)
     throw std::logic_error(function.op + ": slopes that do not add up to 1");
-  return {1.0, c * (c + -Dyadic(1.0))};
+  return {1.0, {function.least_slope, function.greatest_slope}};
+}
+
+/// Of layer k.
+using FactorOf = std::function<Dyadic(const files::Weights& weights, std::size_t k)>;
+
+/// The stages of `function`, with `factor` of each layer in front of its activation multiplied to the stage behind it.
+std::vector<Matrix> chained(const files::Network& network, const std::string& function,
+                            const std::string& block, const std::vector<double>& scale,
+                            const FactorOf& factor) {
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const std::vector<std::string> names = files::networks_of(function);
+  const std::vector<int> coordinates = files::block_coordinates(network, function, block);
+  const int inputs = parts.at(names.front())->inputs();
+  const bool maps = files::maps_to_invariants(network, function);
+  if (maps && !scale.empty())
+    throw std::invalid_argument(function + " takes states, whose invariants have no scale");
+  if (!scale.empty() && scale.size() != static_cast<std::size_t>(inputs)) {
+    throw std::invalid_argument("scale has " + std::to_string(scale.size()) + " numbers, " + function +
+                                " has " + std::to_string(inputs) + " inputs");
+  }
+  std::vector<Matrix> chain;
+  for (const std::string& name : names) {
+    const files::Weights& weights = *parts.at(name);
+    for (std::size_t k = 0; k < weights.layers.size(); ++k) {
+      const files::Layer& layer = weights.layers[k];
+      Matrix w(layer.outputs, layer.inputs, layer.weights);
+      if (chain.empty()) {  // the first layer acts on the selected inputs, and that of rho on the last of phi
+        chain.push_back(maps ? of_invariants(std::move(w), files::slope_of_inputs(network, function))
+                             : selected_columns(w, coordinates, scale));
+      } else if (k == 0) {
+        chain.back() = product(w, chain.back());
+      } else {
+        const Dyadic before = factor(weights, k - 1);
+        for (Dyadic& entry : w.entries) entry = entry * before;
+        chain.push_back(std::move(w));
+      }
+    }
+  }
+  return chain;
+}
+
+/// What is between layer k and the next one.
+const files::ActivationFunction& function_after(const files::Weights& weights, std::size_t k) {
+  return files::function_of(weights.layers.at(k).activation);
 }
 
 }  // namespace
@@ -55,41 +102,52 @@ std::vector<Matrix> stages(const files::Network& network, const std::string& fun
 
 BentChain bent_chain(const files::Network& network, const std::string& function, const std::string& block,
                      const std::vector<double>& scale) {
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
-  const std::vector<std::string> names = files::networks_of(function);
-  const std::vector<int> coordinates = files::block_coordinates(network, function, block);
-  const int inputs = parts.at(names.front())->inputs();
-  const bool maps = files::maps_to_invariants(network, function);
-  if (maps && !scale.empty())
-    throw std::invalid_argument(function + " takes states, whose invariants have no scale");
-  if (!scale.empty() && scale.size() != static_cast<std::size_t>(inputs)) {
-    throw std::invalid_argument("scale has " + std::to_string(scale.size()) + " numbers, " + function +
-                                " has " + std::to_string(inputs) + " inputs");
-  }
   BentChain result;
-  std::vector<Matrix>& chain = result.stages;
-  for (const std::string& name : names) {
-    bool joins = true;  // the first layer acts on the selected inputs, and that of rho on the last of phi
-    Unit before;        // of what is between the layer before and this one
-    for (const files::Layer& layer : parts.at(name)->layers) {
-      Matrix w(layer.outputs, layer.inputs, layer.weights);
-      for (Dyadic& entry : w.entries)
-        if (!joins) entry = entry * before.slope;
-      if (chain.empty()) {
-        chain.push_back(maps ? of_invariants(w, files::slope_of_inputs(network, function))
-                             : selected_columns(w, coordinates, scale));
-      } else if (joins) {
-        chain.back() = product(w, chain.back());
-      } else {
-        chain.push_back(w);
-      }
-      joins = false;
-      if (&layer == &parts.at(name)->layers.back()) continue;
-      before = unit_of(files::function_of(layer.activation));
-      result.bends.push_back(before.bend);
-    }
+  result.stages = chained(network, function, block, scale, [](const files::Weights& weights, std::size_t k) {
+    return unit_of(function_after(weights, k)).slope;
+  });
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  for (const std::string& name : files::networks_of(function)) {
+    const files::Weights& weights = *parts.at(name);
+    for (std::size_t k = 0; k + 1 < weights.layers.size(); ++k)
+      result.slopes.insert(result.slopes.end(), static_cast<std::size_t>(weights.layers[k].outputs),
+                           unit_of(function_after(weights, k)).range);
   }
   return result;
+}
+
+BentChain chain_on_box(const files::Network& network, const std::string& function, const std::string& block,
+                       const std::vector<double>& scale, const Intervals& box) {
+  if (files::is_rho(function)) throw std::domain_error(function + " has no box");
+  if (network.invariants) throw std::domain_error(function + " is of rotation invariants, which have no box");
+  BentChain result;
+  result.stages = chained(network, function, block, scale,
+                          [](const files::Weights&, std::size_t) { return Dyadic(1.0); });
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const std::vector<std::string> names = files::networks_of(function);
+  for (const std::string& name : names)
+    for (std::size_t k = 0; k + 1 < parts.at(name)->layers.size(); ++k)
+      unit_of(function_after(*parts.at(name), k));  // refuses one that sorts
+  for (const std::vector<Interval>& layer : slopes_on_box(*parts.at(names.front()), box))
+    for (const Interval& slopes : layer) result.slopes.push_back({slopes.lower, slopes.upper});
+  if (names.size() == 1) return result;
+  const files::Weights& behind = *parts.at(names.back());
+  for (std::size_t k = 0; k + 1 < behind.layers.size(); ++k) {
+    const files::ActivationFunction& after = function_after(behind, k);
+    result.slopes.insert(result.slopes.end(), static_cast<std::size_t>(behind.layers[k].outputs),
+                         {after.least_slope, after.greatest_slope});
+  }
+  return result;
+}
+
+Dyadic steepest_on_box(const files::Weights& weights, const Intervals& box) {
+  Dyadic total = 1.0;
+  for (const std::vector<Interval>& layer : slopes_on_box(weights, box)) {
+    Dyadic steepest = layer.empty() ? 1.0 : 0.0;  // one that sorts
+    for (const Interval& slopes : layer) steepest = std::max({steepest, slopes.upper, -slopes.lower});
+    total = total * steepest;
+  }
+  return total;
 }
 
 namespace {

@@ -8,6 +8,7 @@
 #include "lipschitz/checker/dyadic.h"
 #include "lipschitz/checker/lipschitz_lmi.h"
 #include "lipschitz/checker/tree_proof.h"
+#include "lipschitz/checker/values.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::check {
@@ -24,11 +25,22 @@ namespace swarmcert::check {
 std::vector<Matrix> stages(const files::Network& network, const std::string& function,
                            const std::string& block = "all", const std::vector<double>& scale = {});
 
-/// The same for any activations, with the bend of each hidden layer. Functions of slopes in [1 - c, c], 1 < c, are not
-/// divided by their largest slope.
+/// The same for any activations, with the slopes of each hidden neuron: [0, 1], and [1 - c, c] where they are such,
+/// 1 < c; those are not divided by their largest slope.
 /// @throws as stages(), but for monotony.
 BentChain bent_chain(const files::Network& network, const std::string& function,
                      const std::string& block = "all", const std::vector<double>& scale = {});
+
+/// The same for inputs in `box`, no activation divided by its largest slope: the neurons of the part that takes them
+/// have the slopes of slopes_on_box(), those of rho behind it all that their activation has, because other terms of the
+/// sum may be anything.
+/// @param box of the inputs of "network" or "phi:<kind>", as they leave the clamp.
+/// @throws as bent_chain(); std::domain_error for "rho:<kind>", which has no box.
+BentChain chain_on_box(const files::Network& network, const std::string& function, const std::string& block,
+                       const std::vector<double>& scale, const Intervals& box);
+
+/// At least the product of the steepest slopes between all layers of `weights`, layer by layer, for inputs in `box`.
+Dyadic steepest_on_box(const files::Weights& weights, const Intervals& box);
 
 /// "network" or "phi:<kind>" in front of |.|^2, or of the form Q, exactly, as a proof on a box sees it.
 /// @param q [outputs x outputs]; no rows: the identity.

@@ -3,7 +3,6 @@
 namespace swarmcert::check {
 namespace {
 
-Dyadic absolute(const Dyadic& x) { return x.sign() < 0 ? -x : x; }
 Dyadic largest_absolute(const Dyadic& lower, const Dyadic& upper) {
   const Dyadic a = absolute(lower), b = absolute(upper);
   return a >= b ? a : b;

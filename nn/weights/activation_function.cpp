@@ -71,26 +71,9 @@ const ActivationFunction& function_of(Activation activation) {
 
 std::vector<double> activated(Activation activation, std::vector<double> layer) {
   const ActivationFunction& function = function_of(activation);
-  if (!function.sorts()) {
-    for (double& t : layer) t = function.value(t);
-    return layer;
-  }
-  const auto group = static_cast<std::size_t>(function.group);
-  if (layer.size() % group != 0) throw std::invalid_argument("activated: no whole number of groups");
-  if (activation != Activation::kMaxMinHalves && activation != Activation::kMaxMinPairs) {
-    for (auto first = layer.begin(); first != layer.end(); first += function.group)
-      std::sort(first, first + function.group);
-    return layer;
-  }
-  const std::size_t half = layer.size() / 2;
-  std::vector<double> result(layer.size());
-  for (std::size_t i = 0; i < half; ++i) {
-    const bool is_halves = activation == Activation::kMaxMinHalves;
-    const double a = layer[is_halves ? i : 2 * i], b = layer[is_halves ? i + half : 2 * i + 1];
-    result[i] = std::max(a, b);
-    result[i + half] = std::min(a, b);
-  }
-  return result;
+  if (function.sorts()) return rearranged(activation, std::move(layer));
+  for (double& t : layer) t = function.value(t);
+  return layer;
 }
 
 std::optional<Activation> activation_called(const std::string& op) {

@@ -1,7 +1,9 @@
 /// @file The activation functions that a network can have between its layers, with their slopes.
 #pragma once
 
+#include <algorithm>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -47,6 +49,28 @@ struct ActivationFunction {
 };
 
 const ActivationFunction& function_of(Activation activation);
+
+/// A layer as an activation that sorts leaves it, for numbers of any kind that < compares.
+/// @throws std::invalid_argument if its width is no multiple of the group.
+template <class Number>
+std::vector<Number> rearranged(Activation activation, std::vector<Number> layer) {
+  const auto group = static_cast<std::size_t>(function_of(activation).group);
+  if (layer.size() % group != 0) throw std::invalid_argument("rearranged: no whole number of groups");
+  if (activation != Activation::kMaxMinHalves && activation != Activation::kMaxMinPairs) {
+    for (std::size_t first = 0; first < layer.size(); first += group)
+      std::sort(&layer[first], &layer[first] + group);
+    return layer;
+  }
+  const std::size_t half = layer.size() / 2;
+  std::vector<Number> result(layer.size());
+  for (std::size_t i = 0; i < half; ++i) {
+    const bool is_halves = activation == Activation::kMaxMinHalves;
+    const Number &a = layer[is_halves ? i : 2 * i], &b = layer[is_halves ? i + half : 2 * i + 1];
+    result[i] = std::max(a, b);
+    result[i + half] = std::min(a, b);
+  }
+  return result;
+}
 
 /// s of a whole layer. @throws std::invalid_argument if its width is no multiple of the group.
 std::vector<double> activated(Activation activation, std::vector<double> layer);

@@ -120,9 +120,8 @@ TEST_F(CertifiedChain, ASmoothActivationIsCertifiedCheckedAndHeldAgainstSamples)
   write_square("turn", "steep");
   const std::string net = "net.pth --order head,steep,turn,tail";
   const std::string chain = "for head - tanh - steep - tanh - turn - tanh - tail";
-  expect(
-      "certify " + net + " --activation tanh -o cert.json --json out.json", 0,
-      {"verdict: proved " + chain, "activation as given", "lower bounds and bounds on a box are for ReLU"});
+  expect("certify " + net + " --activation tanh -o cert.json --json out.json", 0,
+         {"verdict: proved " + chain, "activation as given", "branch and bound are for ReLU networks"});
   const Json result = Json::parse(read_text(folder_ / "out.json"));
   EXPECT_EQ(result["chain"][1]["op"], "tanh");
   EXPECT_EQ(result["chain_source"]["network"]["activation"], "user");
@@ -196,11 +195,35 @@ TEST_F(CertifiedChain, InspectShowsTheActivationAfterEveryLayerButTheLast) {
   expect(inspect + "mish", 2, {"--activation mish", "silu"});
 }
 
+TEST_F(CertifiedChain, OnABoxASmoothNetworkHasASmallerBoundAndARange) {
+  write_square("turn", "steep");
+  // Far from the origin each tanh is flat: the first one between 10 and 11, where its slope is at most 8.3e-9.
+  write_text(folder_ / "box.toml", "schema = \"swarmcert/box/1\"\nlower = [1]\nupper = [1.1]\n");
+  const std::string net = "net.pth --order head,steep,turn,tail --activation tanh";
+  expect("certify " + net + " --domain box.toml -o cert.json --json out.json", 0,
+         {"over the box", "local_sdp", "Range over the box", "Nothing is said of a float32 evaluation"});
+  const Json result = Json::parse(read_text(folder_ / "out.json")), bound = result["bounds"][0];
+  EXPECT_EQ(bound["domain"], "box");
+  EXPECT_LT(bound["upper"].get<double>(), 1e-2);
+  const Json range = result["range"][0];
+  // 10 tanh(10 tanh(10 tanh(10 x))) = 10 to 8 digits
+  EXPECT_NEAR(range["lower"].get<double>(), 10, 1e-6);
+  EXPECT_NEAR(range["upper"].get<double>(), 10, 1e-6);
+  EXPECT_LE(range["lower"].get<double>(), range["lower_witness"]["value"].get<double>());
+  EXPECT_GE(range["upper"].get<double>(), range["upper_witness"]["value"].get<double>());
+  EXPECT_TRUE(result["float32_error"].empty());
+  expect("check cert.json " + net, 0, {"accepted"});
+  // Another behind each layer, and one at the end.
+  const std::string mixed = "net.pth --order head,steep,turn,tail --activation relu,tanh,gelu,sigmoid";
+  expect("certify " + mixed + " --domain box.toml -o mixed.json", 0, {"local_sdp", "Range over the box"});
+  expect("check mixed.json " + mixed, 0, {"accepted"});
+}
+
 TEST_F(CertifiedChain, WhatIsForReluRefusesASmoothActivation) {
   write_square("turn", "steep");
   write_text(folder_ / "box.toml", "schema = \"swarmcert/box/1\"\nlower = [-1]\nupper = [1]\n");
   const std::string net = " net.pth --order head,steep,turn,tail --activation tanh";
-  for (const char* const option : {"--domain box.toml", "--range", "--explain", "--method branch"})
+  for (const char* const option : {"--map x0,x1", "--input-step 0.1", "--explain", "--method branch"})
     expect("certify" + net + " " + option, 3, {"\"tanh\"", "net.pth", "is for ReLU networks"});
   expect("export" + net + " -o firmware", 3, {"\"tanh\"", "ReLU networks"});
 }

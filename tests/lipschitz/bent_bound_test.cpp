@@ -1,4 +1,4 @@
-/// The matrix inequality of activations whose slopes lie in [1 - c, c]: values that are known, proofs and refusals.
+/// The matrix inequality of neurons whose slopes lie in any [a, b]: values that are known, proofs and refusals.
 #include "lipschitz/bent_bound.h"
 
 #include <algorithm>
@@ -63,6 +63,30 @@ TEST(BentBound, OfADifferenceCountsTheNegativeSlopes) {
   EXPECT_NEAR(tests::proved(sdp_bound(check::stages(tests::plain(difference), "network"))), 1, 1e-6);
 }
 
+/// Slopes of almost one number: the function is almost linear, and its constant the norm of the product of matrices.
+/// With slopes in [0, 1] the bound is larger.
+TEST(BentBound, OfNarrowSlopesIsTheNormOfALinearMap) {
+  std::mt19937 generator(48);
+  const Network network = tests::plain(tests::random_network({3, 8, 7, 2}, generator));
+  check::BentChain chain = check::bent_chain(network, "network");
+  const double relu = tests::proved(sdp_bound(chain.stages));
+  files::Layer product{"fc", 2, 3, std::vector<double>(6), std::vector<double>(2)};
+  const check::Matrix all = check::product(chain.stages[2], check::product(chain.stages[1], chain.stages[0]));
+  for (std::size_t i = 0; i < 6; ++i) product.weights[i] = to_double(all.entries[i]) / 4;
+  const double norm = spectral_norm(product).norm.upper.value();
+  double before = relu;
+  for (const double width : {1.0, 0.25, 0x1p-8, 0x1p-16, 0x1p-24}) {
+    for (check::SlopeRange& range : chain.slopes) range = {0.5 - width / 2, 0.5 + width / 2};
+    const SdpBound found = bent_bound(chain);
+    ASSERT_TRUE(found.proof.has_value()) << width;
+    EXPECT_GE(found.proof->upper.value(), norm * (1 - 1e-9)) << width;
+    EXPECT_LE(found.proof->upper.value(), before * (1 + 1e-6)) << width;
+    before = found.proof->upper.value();
+  }
+  EXPECT_NEAR(before, norm, 1e-4 * norm);
+  EXPECT_GT(relu, 1.2 * norm);
+}
+
 TEST(BentBound, IsAtMostTheProductAndAboveThatOfRelu) {
   std::mt19937 generator(41);
   for (const Activation activation : kBent) {
@@ -102,7 +126,17 @@ TEST(BentBound, StandsForWeightsFarFromOne) {
               1e-6 * std::ldexp(upper, -30));
 }
 
-/// The two methods see the program in different variables: a dense matrix of z - (1 - c) y, blocks of z.
+TEST(BentBound, IsLeftToTheProductWhereNeuronsDifferAndTheProgramIsTooLarge) {
+  std::mt19937 generator(49);
+  const Network network =
+      bent_network(tests::random_network({1, kMostBentVariables, 1}, generator), Activation::kSilu);
+  check::BentChain chain = check::bent_chain(network, "network");
+  chain.slopes.front() = {0.0, 0.5};
+  EXPECT_FALSE(bent_bound(chain).proof.has_value());
+}
+
+/// The two methods see the program in different variables: a dense matrix of (z - (1 - c) y) / sqrt(2 c - 1), blocks of
+/// z.
 TEST(BentBound, OfAChainByBlocksIsThatOfTheDenseProgram) {
   std::mt19937 generator(44);
   for (const Activation activation : kBent) {
@@ -115,7 +149,7 @@ TEST(BentBound, OfAChainByBlocksIsThatOfTheDenseProgram) {
       InteriorPointOptions options;
       options.relative_gap = 5e-7;
       const InteriorPointResult found =
-          minimise_chain(ChainSlack(stages, std::vector<double>(chain.bends.size(), c)), options);
+          minimise_chain(ChainSlack(stages, std::vector<double>(chain.stages.size() - 1, c)), options);
       ASSERT_EQ(found.stop, LipSdpStop::kGapReached) << name(found.stop);
       const double dense = bent_bound(chain).optimum.value();
       EXPECT_NEAR(std::sqrt(found.points.back()(0)), dense, 5e-7 * dense);
@@ -135,7 +169,7 @@ TEST(BentBound, OfManyNeuronsIsProvedFarBelowTheProduct) {
   EXPECT_LT(tests::sampled_slope(*network.plain, generator, 300), found.proof->upper.value());
 }
 
-TEST(BentChain, HasOneBendPerHiddenLayerAndZeroWhereSlopesAreDivided) {
+TEST(BentChain, HasTheSlopesOfEachHiddenNeuronAndZeroToOneWhereTheyAreDivided) {
   std::mt19937 generator(45);
   Weights phi = tests::random_network({3, 4, 5}, generator),
           rho = tests::random_network({5, 6, 7, 1}, generator);
@@ -143,11 +177,14 @@ TEST(BentChain, HasOneBendPerHiddenLayerAndZeroWhereSlopesAreDivided) {
   tests::set_activation(rho, Activation::kGelu);
   const check::BentChain chain = check::bent_chain(tests::deep_set(phi, rho), "set:default:default");
   ASSERT_EQ(chain.stages.size(), 4u);
-  ASSERT_EQ(chain.bends.size(), 3u);
+  ASSERT_EQ(chain.slopes.size(), 4u + 6 + 7);
   const double c = 0x1.211p+0;
-  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(to_double(chain.bends[k]), k == 0 ? 0 : c * (c - 1));
+  for (std::size_t i = 0; i < chain.slopes.size(); ++i) {
+    EXPECT_EQ(to_double(chain.slopes[i].low), i < 4 ? 0 : 1 - c);
+    EXPECT_EQ(to_double(chain.slopes[i].high), i < 4 ? 1 : c);
+  }
   check::BentChain wrong = chain;
-  wrong.bends.pop_back();
+  wrong.slopes.pop_back();
   EXPECT_THROW(check::lipschitz_lmi(wrong, 1.0, {}), std::invalid_argument);
 }
 
@@ -180,9 +217,8 @@ TEST(BentCertificate, IsAcceptedAndRefusedForOtherNumbersAndActivations) {
 
   const check::BentChain silu = check::bent_chain(network, "network");
   check::BentChain gelu = silu, relu = silu;
-  const check::Dyadic c = 0x1.211p+0;
-  std::fill(gelu.bends.begin(), gelu.bends.end(), c * (c - 1.0));
-  std::fill(relu.bends.begin(), relu.bends.end(), check::Dyadic());
+  std::fill(gelu.slopes.begin(), gelu.slopes.end(), check::SlopeRange{1 - 0x1.211p+0, 0x1.211p+0});
+  std::fill(relu.slopes.begin(), relu.slopes.end(), check::SlopeRange{0.0, 1.0});
   const SdpBound for_gelu = bent_bound(gelu), for_relu = sdp_bound(relu.stages);
   EXPECT_TRUE(prove(silu, for_gelu.proof->rho, for_gelu.proof->t));
   EXPECT_FALSE(prove(silu, for_relu.proof->rho, for_relu.proof->t));

@@ -908,10 +908,11 @@ def unit_of(network, function, block):
 
 # --- the mathematics -----------------------------------------------------------------------------------------------
 
-def stages(network, function, block, scale):
+def stages(network, function, block, scale, divided=True):
     """The matrices between the activations, from the block's inputs in units of their scale to the output. An
-    activation of slopes in [0, b] is b times one of slopes in [0, 1]: b goes to the matrix behind it. Others stay as
-    they are. Of a function of rotation invariants, the inputs are those, times the slope of the map to them."""
+    activation of slopes in [0, b] is b times one of slopes in [0, 1]: b goes to the matrix behind it. Others, and all
+    if not `divided`, stay as they are. Of a function of rotation invariants, the inputs are those, times the slope of
+    the map to them."""
     names = networks_of(function)
     require(all(name in network.parts for name in names), f"there is no {function}")
     inputs = network.parts[names[0]].layers[0].inputs
@@ -927,7 +928,8 @@ def stages(network, function, block, scale):
             if index == 0:
                 chain[-1] = w @ chain[-1]
             else:
-                b = MONOTONE.get(network.parts[name].between()[index - 1], Fraction(1))
+                op = network.parts[name].between()[index - 1]
+                b = MONOTONE.get(op, Fraction(1)) if divided else Fraction(1)
                 chain.append(Matrix([[x * b.numerator for x in row] for row in w.rows],
                                     w.exponent + 1 - b.denominator.bit_length()))
     return chain
@@ -973,23 +975,31 @@ def lmi(chain, rho, t):
     return Matrix(p, exponent)
 
 
-def bends(network, function):
-    """Per hidden layer c (c - 1) where slopes lie in [1 - c, c], c > 1; 0 where stages() makes them lie in [0, 1]."""
-    return [0 if op in MONOTONE else STEEPEST[op] * (STEEPEST[op] - 1)
-            for part in (network.parts[name] for name in networks_of(function)) for op in part.between()]
+def slope_ranges(network, function):
+    """Per hidden neuron: slopes of stages() lie in [0, 1], or in [1 - c, c], c > 1, where they are not divided by c."""
+    return [(Fraction(0), Fraction(1)) if op in MONOTONE else (1 - STEEPEST[op], STEEPEST[op])
+            for part in (network.parts[name] for name in networks_of(function))
+            for op, layer in zip(part.between(), part.layers[:-1]) for _ in range(layer.outputs)]
 
 
-def bent_lmi(chain, gs, rho, t):
-    """The matrix over (dx, dz) of rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_i t_i (dz_i (dy_i - dz_i) + g_i dy_i^2) >= 0:
-    each square (row m_i of a stage times what enters) gives - 2 t_i g_i m_i' m_i."""
+def bent_lmi(chain, slopes, rho, t):
+    """The matrix over (dx, dz) of rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_i t_i (dz_i - a_i dy_i) (b_i dy_i - dz_i) >= 0
+    for slopes in [a_i, b_i]. With dy_i = m_i' dz of the layer before, neuron i gives 2 t_i at (i, i), - t_i (a_i + b_i)
+    m_i beside it, and 2 t_i a_i b_i m_i m_i' where the layer before stands."""
     (integer,), exponent = dyadics([rho])
-    inputs = range(len(chain[0].rows[0]))
-    p = quadratic_lmi(chain, Matrix([[integer * (i == j) for j in inputs] for i in inputs], exponent), t)
-    before, neuron = 0, 0
-    for m, g in zip(chain, gs):
+    inputs, neuron, weighted = range(len(chain[0].rows[0])), 0, []
+    for m in chain[:-1]:
+        sums, by = dyadics([a + b for a, b in slopes[neuron:neuron + len(m.rows)]])
+        weighted.append(Matrix([[s * x for x in row] for s, row in zip(sums, m.rows)], m.exponent + by))
+        neuron += len(m.rows)
+    q = Matrix([[integer * (i == j) for j in inputs] for i in inputs], exponent)
+    p = quadratic_lmi(weighted + chain[-1:], q, t)
+    before = neuron = 0
+    for m in chain[:-1]:
         width = len(m.rows[0])
-        if g:
-            weights, exponent = dyadics([-2 * g * Fraction(t[neuron + i]) for i in range(len(m.rows))])
+        multipliers = t[neuron:neuron + len(m.rows)]
+        weights, exponent = dyadics([2 * a * b * Fraction(s) for (a, b), s in zip(slopes[neuron:], multipliers)])
+        if any(weights):
             square = m.transposed() @ Matrix([[w * x for x in row] for w, row in zip(weights, m.rows)],
                                              m.exponent + exponent)
             common = min(square.exponent, p.exponent)
@@ -1484,6 +1494,250 @@ def add(a, b):
     return [shifted(x, a[1] - exponent) + shifted(y, b[1] - exponent) for x, y in zip(a[0], b[0])], exponent
 
 
+# --- activations on intervals --------------------------------------------------------------------------------------
+# No value of a mathematical library is used. A number is enclosed as a pair of integers over 2^BITS; each operation
+# rounds outwards. The series are others than those of the C++ checker.
+
+BITS = 384
+ONE = 1 << BITS
+VALUE_UNIT, SLOPE_UNIT = power(-64), power(-24)
+
+
+def enclosed(x):
+    """Of a fraction."""
+    x = Fraction(x) * ONE
+    return math.floor(x), math.ceil(x)
+
+
+def plus(a, b):
+    return a[0] + b[0], a[1] + b[1]
+
+
+def negative(a):
+    return -a[1], -a[0]
+
+
+def times(a, b):
+    products = [x * y for x in a for y in b]
+    return min(products) >> BITS, -(-max(products) >> BITS)
+
+
+def inverse(a):
+    """Of a positive number."""
+    return ONE * ONE // a[1], -(-ONE * ONE // a[0])
+
+
+def over(a, n):
+    return a[0] // n, -(-a[1] // n)
+
+
+def exponential_of_minus(x):
+    """e^-x of a fraction x >= 0: 1 - y + y^2/2 - ..., y = x / 2^k <= 1/2, whose terms fall, squared k times."""
+    if x >= 267:
+        return 0, 1
+    halvings = max(0, math.ceil(x)).bit_length() + 8
+    y = enclosed(Fraction(x) / 2 ** halvings)
+    total = term = (ONE, ONE)
+    k = 0
+    while term[1] > 1:
+        k += 1
+        term = over(times(term, y), k)
+        total = plus(total, negative(term) if k % 2 else term)
+    total = total[0] - term[1], total[1] + term[1]
+    for _ in range(halvings):
+        total = times(total, total)
+    return max(total[0], 0), total[1]
+
+
+def sigmoid_of(t):
+    e = exponential_of_minus(abs(t))
+    return times((ONE, ONE) if t >= 0 else e, inverse(plus((ONE, ONE), e)))
+
+
+def log_of_one_plus(e):
+    """-ln(1 - u) = u + u^2/2 + ..., u = e / (1 + e) <= 1/2; the rest is at most the last power."""
+    u = times(e, inverse(plus((ONE, ONE), e)))
+    total, p, k = (0, 0), u, 1
+    while p[1] > 1:
+        total, p, k = plus(total, over(p, k)), times(p, u), k + 1
+    return total[0], total[1] + 2 * p[1]
+
+
+def arctangent(x):
+    """Of a fraction between 0 and 1/2: x - x^3/3 + ..."""
+    p, square, total, k = enclosed(x), enclosed(x * x), (0, 0), 0
+    while p[1] > 1:
+        term = over(p, 2 * k + 1)
+        total, p, k = plus(total, negative(term) if k % 2 else term), times(p, square), k + 1
+    return total[0] - p[1], total[1] + p[1]
+
+
+# Euler: pi = 20 artan(1/7) + 8 artan(3/79)
+PI = tuple(20 * a + 8 * b for a, b in zip(arctangent(Fraction(1, 7)), arctangent(Fraction(3, 79))))
+ROOT_OF_TWO_PI = math.isqrt(2 * PI[0] << BITS), math.isqrt(2 * PI[1] << BITS) + 1
+
+
+def normal_density(t):
+    return times(exponential_of_minus(Fraction(t) ** 2 / 2), inverse(ROOT_OF_TWO_PI))
+
+
+def normal_probability(t):
+    """1/2 + (t - t^3/(2 3) + t^5/(4 2! 5) - ...) / sqrt(2 pi); with |t| >= 14 it is within e^-98 / 2 of 0 or 1."""
+    if t <= -14:
+        return 0, ONE >> 141
+    if t >= 14:
+        return ONE - (ONE >> 141), ONE
+    x, half_square = enclosed(t), enclosed(Fraction(t) ** 2 / 2)
+    p, total, k = x, x, 0
+    while max(map(abs, p)) > 1 or k < 2 * half_square[1] >> BITS:
+        k += 1
+        p = negative(over(times(p, half_square), k))
+        total = plus(total, over(p, 2 * k + 1))
+    rest = 1 + max(map(abs, p))
+    return plus((ONE // 2, ONE // 2), times((total[0] - rest, total[1] + rest), inverse(ROOT_OF_TWO_PI)))
+
+
+SELU_SCALE = Fraction("1.0507009873554805")
+SELU_SLOPE = SELU_SCALE * Fraction("1.6732632423543772")
+
+
+def value_of(op, t):
+    if op == "tanh":  # 2 sigmoid(2 t) - 1
+        s = sigmoid_of(2 * t)
+        return plus(plus(s, s), (-ONE, -ONE))
+    if op == "sigmoid":
+        return sigmoid_of(t)
+    if op == "softplus":
+        return plus(enclosed(max(t, 0)), log_of_one_plus(exponential_of_minus(abs(t))))
+    if op in ("elu", "selu"):
+        slopes = (1, 1) if op == "elu" else (SELU_SCALE, SELU_SLOPE)
+        if t >= 0:
+            return enclosed(slopes[0] * t)
+        return times(enclosed(slopes[1]), plus(exponential_of_minus(-t), (-ONE, -ONE)))
+    return times(enclosed(t), sigmoid_of(t) if op == "silu" else normal_probability(t))
+
+
+def slope_of(op, t):
+    """The derivative; at 0 that of ELU and SELU from below."""
+    if op in ("elu", "selu"):
+        slopes = (1, 1) if op == "elu" else (SELU_SCALE, SELU_SLOPE)
+        return enclosed(slopes[0]) if t > 0 else times(enclosed(slopes[1]), exponential_of_minus(-t))
+    if op == "gelu":
+        return plus(normal_probability(t), times(enclosed(t), normal_density(t)))
+    s = sigmoid_of(2 * t if op == "tanh" else t)
+    falls = times(s, plus((ONE, ONE), negative(s)))  # sigmoid'
+    return {"tanh": times((4 * ONE, 4 * ONE), falls), "sigmoid": falls, "softplus": s,
+            "silu": plus(s, times(enclosed(t), falls))}[op]
+
+
+# SiLU and GELU: around the place of the minimum, a number below it, and around the place of the steepest slope.
+BENT_PLACES = {op: tuple(map(Fraction, map(float.fromhex, places))) for op, places in {
+    "silu": ("-0x1.47498p+0", "-0x1.47497p+0", "-0x1.1d26p-2", "0x1.331p+1", "0x1.332p+1"),
+    "gelu": ("-0x1.80eaep-1", "-0x1.80eacp-1", "-0x1.5c19ep-3", "0x1.6ap+0", "0x1.6a1p+0")}.items()}
+
+
+def meets(low, high, first, last):
+    return low <= last and first <= high
+
+
+def values_between(op, low, high):
+    """Between which the values lie of t between low and high."""
+    if op == "relu":
+        return max(low, Fraction(0)), max(high, Fraction(0))
+    ends = [value_of(op, t) for t in {low, high}]
+    least, greatest = (Fraction(f(e[i] for e in ends), ONE) for i, f in enumerate((min, max)))
+    if op in BENT_PLACES and meets(low, high, *BENT_PLACES[op][:2]):
+        least = BENT_PLACES[op][2]
+    return math.floor(least / VALUE_UNIT) * VALUE_UNIT, math.ceil(greatest / VALUE_UNIT) * VALUE_UNIT
+
+
+def slopes_between(op, low, high):
+    """Between which the slopes lie of t between low and high: of tanh and sigmoid steepest nearest to 0, of SiLU and
+    GELU at the ends or at one place each, of the others rising (SELU's falls once, at 0)."""
+    least_of_all = Fraction(0) if op in MONOTONE else 1 - STEEPEST[op]
+    if op == "relu":
+        ends = (Fraction(low >= 0 and high > 0), Fraction(high > 0))
+    else:
+        points = {low, high}
+        if low < 0 < high and op not in BENT_PLACES:
+            points.add(Fraction(0))
+        found = [slope_of(op, t) for t in points] + [enclosed(SELU_SCALE)] * (op == "selu" and high > 0)
+        ends = Fraction(min(a for a, _ in found), ONE), Fraction(max(b for _, b in found), ONE)
+        if op in BENT_PLACES:
+            first, last = BENT_PLACES[op][3:]
+            ends = (least_of_all if meets(low, high, -last, -first) else ends[0],
+                    STEEPEST[op] if meets(low, high, first, last) else ends[1])
+    return (max((math.ceil(ends[0] / SLOPE_UNIT) - 1) * SLOPE_UNIT, least_of_all),
+            min((math.floor(ends[1] / SLOPE_UNIT) + 1) * SLOPE_UNIT, STEEPEST[op]))
+
+
+def sorted_layer(op, values):
+    group = SORTING[op]
+    if op.startswith("groupsort"):
+        return [x for i in range(0, len(values), group) for x in sorted(values[i:i + group])]
+    half = len(values) // 2
+    pairs = list(zip(values[:half], values[half:])) if op == "maxmin:halves" else list(zip(values[::2], values[1::2]))
+    return list(map(max, pairs)) + list(map(min, pairs))
+
+
+def applied(w, values):
+    integers, exponent = dyadics(values)
+    unit = power(w.exponent + exponent)
+    return [sum(map(mul, row, integers)) * unit for row in w.rows]
+
+
+def down(x):
+    return math.floor(x / VALUE_UNIT) * VALUE_UNIT
+
+
+def up(x):
+    return math.ceil(x / VALUE_UNIT) * VALUE_UNIT
+
+
+def layers_on_box(weights, low, high):
+    """Per layer the ends (low, high) of what leaves it before its activation, and the slopes of the activation there:
+    intervals, intersected with a linear form G (x - c) + m, off by at most E, c the middle of the box. For slopes in
+    [a, b] around a point p of [l, u], |s(y) - s(p) - (a + b)/2 (y - p)| <= (b - a)/2 max(u - p, p - l)."""
+    radius = [(h - l) / 2 for l, h in zip(low, high)]
+    rounding = VALUE_UNIT * (1 + sum(radius))
+    columns = [[Fraction(i == j) for i in range(len(low))] for j in range(len(low))]
+    middle, error, result = [(l + h) / 2 for l, h in zip(low, high)], [Fraction(0)] * len(low), []
+    for k, layer in enumerate(weights.layers):
+        w = Matrix.of(layer.weights, layer.inputs)
+        sizes = Matrix([list(map(abs, row)) for row in w.rows], w.exponent)
+        rises = Matrix([[max(x, 0) for x in row] for row in w.rows], w.exponent)
+        falls = Matrix([[min(x, 0) for x in row] for row in w.rows], w.exponent)
+        bias = list(map(Fraction, layer.biases))
+        columns = [list(map(down, applied(w, column))) for column in columns]
+        middle = [down(b + y) for b, y in zip(bias, applied(w, middle))]
+        error = [up(e + rounding) for e in applied(sizes, error)]
+        spread = [e + sum(abs(column[i]) * r for column, r in zip(columns, radius)) for i, e in enumerate(error)]
+        ends = [[b + x + y for b, x, y in zip(bias, applied(rises, p), applied(falls, q))]
+                for p, q in ((low, high), (high, low))]
+        low = [max(l, m - s) for l, m, s in zip(ends[0], middle, spread)]
+        high = [min(h, m + s) for h, m, s in zip(ends[1], middle, spread)]
+        slopes = []
+        result.append((low, high, slopes))
+        if k + 1 == len(weights.layers):
+            return result
+        op = weights.between()[k]
+        if op in SORTING:
+            low, high = sorted_layer(op, low), sorted_layer(op, high)
+            columns = [[Fraction(0)] * len(low) for _ in radius]
+            middle = [down((l + h) / 2) for l, h in zip(low, high)]
+            error = [up((h - l) / 2) + VALUE_UNIT for l, h in zip(low, high)]
+            continue
+        slopes += [slopes_between(op, l, h) for l, h in zip(low, high)]
+        for i, (l, h, (a, b)) in enumerate(zip(low, high, slopes)):
+            p = max(l, min(middle[i], h))
+            value = values_between(op, p, p)
+            for column in columns:
+                column[i] = down((a + b) / 2 * column[i])
+            error[i] = up(abs(a + b) / 2 * error[i] + (b - a) / 2 * max(h - p, p - l) + value[1] - value[0] + rounding)
+            middle[i] = down(value[0] + (a + b) / 2 * (middle[i] - p))
+        low, high = map(list, zip(*(values_between(op, l, h) for l, h in zip(low, high))))
+
+
 # --- values over boxes ---------------------------------------------------------------------------------------------
 
 class Bounded:
@@ -1639,13 +1893,13 @@ class Checker:
         self.check_upper([w], entry["proof"]["upper"], upper, where)
         self.norms[name] = self.norms.get(name, 1) * Fraction(upper)
 
-    def check_upper(self, chain, proof, upper, where, gs=()):
+    def check_upper(self, chain, proof, upper, where, slopes=()):
         require_keys(proof, ["rho", "t", "factor"], where)
         rho, t, factor = hex_float(proof["rho"]), hex_floats(proof["t"]), proof["factor"]
         require(rho > 0 and all(x >= 0 for x in t), f"{where}: rho is not positive, or a t negative")
         require(len(t) == sum(len(m.rows) for m in chain[:-1]), f"{where}: needs one t per hidden neuron")
         require(Fraction(upper) ** 2 >= Fraction(rho), f"{where}: claims less than sqrt(rho)")
-        require(shows_or_finds(bent_lmi(chain, gs, rho, t) if any(gs) else lmi(chain, rho, t),
+        require(shows_or_finds(bent_lmi(chain, slopes, rho, t) if set(slopes) - {(0, 1)} else lmi(chain, rho, t),
                                parse_factor(factor, where)),
                 f"{where}: the factor does not show that the matrix inequality holds")
 
@@ -1672,10 +1926,10 @@ class Checker:
         require(all(name in self.network.parts for name in names), f"{where}: no such function")
         activations = {op for name in names for op in self.network.parts[name].between()}
         if not activations <= {"relu"}:
-            require(not boxed and bound["upper_method"] != "branch", f"{where}: a bound on a box is for ReLU only")
+            require(bound["upper_method"] != "branch", f"{where}: a bound by parts of a box is for ReLU only")
             require(bound["lower"] is None and bound["lower_hex"] is None and bound["lower_witness"] is None,
                     f"{where}: a lower bound is for ReLU only")
-            require(activations.isdisjoint(SORTING) or bound["upper_method"] == "product",
+            require(activations.isdisjoint(SORTING) or bound["upper_method"] in ("product", "local_product"),
                     f"{where}: a bound from slopes of single numbers")
         if self.network.maps_to_invariants(function):
             require(not boxed and bound["upper_method"] != "branch" and not scale and block == "all",
@@ -1684,26 +1938,49 @@ class Checker:
                     f"{where}: a lower bound of a function of rotation invariants")
         if bound["upper_method"] in ("sdp", "eclipse_fast"):
             self.check_upper(stages(self.network, function, block, scale), bound["proof"], upper, where,
-                             bends(self.network, function))
+                             slope_ranges(self.network, function))
+        elif bound["upper_method"] == "local_sdp":
+            slopes = [s for layer in self.slopes_on_box(names[0], boxed, where) for s in layer]
+            if len(names) == 2:
+                behind = self.network.parts[names[1]]
+                slopes += [(Fraction(0) if op in MONOTONE else 1 - STEEPEST[op], STEEPEST[op])
+                           for op, layer in zip(behind.between(), behind.layers[:-1]) for _ in range(layer.outputs)]
+            self.check_upper(stages(self.network, function, block, scale, divided=False), bound["proof"], upper, where,
+                             slopes)
         elif bound["upper_method"] == "branch":
             self.check_local(bound, upper, scale, where)
         else:
-            require(bound["upper_method"] == "product" and bound["proof"] is None, f"{where}: unknown upper_method")
+            is_local = bound["upper_method"] == "local_product"
+            require((is_local or bound["upper_method"] == "product") and bound["proof"] is None,
+                    f"{where}: unknown upper_method")
             require(all(name in self.norms for name in names), f"{where}: no such function")
             total = (Fraction(max(scale)) if scale else Fraction(1)) * self.network.slope_of_inputs(function)
             for name in names:
-                total *= self.norms[name] * math.prod(STEEPEST[op] for op in self.network.parts[name].between())
+                part = self.network.parts[name]
+                total *= self.norms[name]
+                if is_local and name == names[0]:
+                    for layer in self.slopes_on_box(name, boxed, where):
+                        total *= max((max(b, -a) for a, b in layer), default=Fraction(1))
+                else:
+                    total *= math.prod(STEEPEST[op] for op in part.between())
             require(Fraction(upper) >= total, f"{where}: claims less than the product of the norms")
         if not scale:
             key = (function, block, frozenset(neighbours.items()))
             self.proved[key] = Fraction(upper)
-            if bound["upper_method"] == "branch" and boxed:
+            if bound["upper_method"] in ("branch", "local_sdp", "local_product") and boxed:
                 self.local.add(key)
         if bound["lower_witness"] is None:
             require(bound["lower"] is None and bound["lower_hex"] is None, f"{where}: lower without a witness")
             return
         lower = number(bound["lower"], bound["lower_hex"], where)
         self.check_lower(bound, Fraction(lower), scale, boxed, where)
+
+    def slopes_on_box(self, part, boxed, where):
+        """Per hidden layer the slopes of its neurons over the box; none of one that is sorted."""
+        require(boxed and part[:4] != "rho:", f"{where}: slopes on a box of a bound without one")
+        require(not self.network.invariants, f"{where}: slopes on a box of a network of rotation invariants")
+        low, high = self.box_of(part, where, limited=False)
+        return [slopes for _, _, slopes in layers_on_box(self.network.parts[part], low, high)[:-1]]
 
     def neighbours_of(self, bound, where):
         """Of a set function, at most how many of each kind; empty: any number."""
@@ -1960,8 +2237,6 @@ class Checker:
         inputs = names[:1] + ["phi:ground"] * (is_set and "phi:ground" in self.network.parts)
         used = inputs + names[1:]
         require(all(name in self.network.parts for name in used), f"{where}: no such function")
-        require(all(self.network.parts[name].is_relu() for name in used),
-                f"{where}: values are for ReLU only")
         require(isinstance(entry["networks"], dict) and set(entry["networks"]) == set(used),
                 f"{where}: networks lists others")
         if is_float32:
@@ -1969,6 +2244,8 @@ class Checker:
                     f"{where}: input_error is not of the function's inputs")
             require(all(self.network.parts[name].precision == "float32" for name in used),
                     f"{where}: a float32 error of weights that are not float32")
+            require(all(self.network.parts[name].is_relu() for name in used),
+                    f"{where}: a float32 error is for ReLU only")
         require((entry["sum"] is not None) == is_set, f"{where}: a sum of set functions, and only of those")
         terms = []
         for name in inputs:
@@ -2034,6 +2311,11 @@ class Checker:
         layers = self.network.parts[name].layers
         require(isinstance(entry["networks"][name], list) and len(entry["networks"][name]) == len(layers),
                 f"{where}: {name} needs one entry per layer")
+        if not self.network.parts[name].is_relu():
+            found = layers_on_box(self.network.parts[name], inputs.lower, inputs.upper)
+            for layer, stated, (low, high, _) in zip(layers, entry["networks"][name], found):
+                result = self.stated(stated, layer.outputs, (low, high, None), False, f"{where}: {name}")
+            return result
         for k, (layer, stated) in enumerate(zip(layers, entry["networks"][name])):
             if k > 0:
                 inputs = Bounded([max(x, Fraction(0)) for x in inputs.lower],

@@ -132,6 +132,18 @@ def check_invariants(certificate, net, folder):
         reason = second.check(changed, second.Network(**arguments(net)))
         assert not accepted and reason, f"{fields}: first says {said!r}, second says {reason!r}"
 
+    # Not even of a part, which is a function of invariants: however large the claim.
+    part = next(i for i, bound in enumerate(certificate["bounds"]) if bound["function"] == "phi:small")
+    changed = json.loads(json.dumps(certificate))
+    changed["box"] = {"phi:small": {"lower": ["0x0p+0"] * 5, "upper": ["0x1p+0"] * 5}}
+    changed["bounds"] = [dict(changed["bounds"][part], domain="box", upper=1e9, upper_hex=(1e9).hex(), proof=None,
+                              upper_method="local_product")]
+    changed["laws"] = []
+    changed["content_sha256"] = second.content_sha256(changed)
+    accepted, said = first_checker(changed, net, folder, 0)
+    reason = second.check(changed, second.Network(**arguments(net)))
+    assert not accepted, said
+    assert "slopes on a box of a network of rotation invariants" in reason, reason
     changed = json.loads(json.dumps(certificate))
     changed["statement"] = second.STATEMENT
     changed["content_sha256"] = second.content_sha256(changed)
@@ -374,15 +386,12 @@ def check_activations(certificate, net, folder):
                  ("upper_method", "sdp")]
         if any(step["op"] not in ("clamp", "linear", "relu") for name in names
                for step in certificate["network"]["weights"][name]["chain"]):
-            tried += [("domain", "box"), ("lower", 0.0)]
+            tried += [("upper_method", "local_sdp"), ("lower", 0.0)]
         for key, value in tried:
             changed = copy()
             changed["bounds"][i][key] = value
             if key in ("upper", "lower"):
                 changed["bounds"][i][key + "_hex"] = value.hex()
-            if key == "domain":
-                changed["box"] = {part: {side: ["0x0p+0"] * entry["chain"][0]["inputs"] for side in ("lower", "upper")}
-                                  for part, entry in certificate["network"]["weights"].items() if part[:4] != "rho:"}
             assert not both(changed) or bound[key] == value, f"{bound['function']}: {key} = {value} is accepted"
 
 
@@ -417,7 +426,8 @@ def run():
             raise SystemExit("an activation beside another one in network.toml is taken")
         except second.BadInput as refusal:
             assert "others are stated already" in str(refusal), refusal
-        nets += [([smooth_net], ["--blocks=position", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"])]
+        nets += [([smooth_net], ["--blocks=position", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"]),
+                 ([smooth_net], ["--blocks=position", "--neighbours", "2", "--domain", str(folder / "part.toml")])]
         beside_net = str(beside(folder))
         nets += [([beside_net], ["--method", "product"])]
         invariant_net = str(of_invariants(folder, generator))
@@ -425,6 +435,13 @@ def run():
         nets += [(net, []) for net in smooth_models(folder, generator)]
         nets += [([str(tiny)], ["--activation", ops])
                  for ops in ("silu", "gelu", "sigmoid", "tanh,relu", "relu,silu,sigmoid", "elu,relu,relu")]
+        (folder / "plane.toml").write_text('schema = "swarmcert/box/1"\nlower = [-0.5, 0.25]\nupper = [1, 0.75]\n')
+        nets += [([str(tiny)], ["--activation", ops, "--domain", str(folder / "plane.toml"), *options])
+                 for ops, *options in (("tanh",), ("sigmoid", "--method", "product"), ("softplus",), ("elu",),
+                                       ("selu",), ("silu",), ("gelu",), ("tanh,relu",), ("relu,silu,sigmoid",),
+                                       ("selu,gelu,relu", "--method", "product"))]
+        nets += [([str(square), *order], ["--activation", "groupsort:3", "--domain", str(folder / "cube.toml")])]
+        (folder / "cube.toml").write_text('schema = "swarmcert/box/1"\nlower = [-1, -1, 0]\nupper = [1, 0, 0.5]\n')
         tried = rejected = 0
         for index, (net, options) in enumerate(nets):
             path = folder / f"certificate{index}.json"

@@ -196,13 +196,15 @@ TEST(MixedBounds, TheStageBehindEachActivationIsMultipliedByItsOwnSlope) {
   const Weights weights = mixed({3, 4, 5, 6, 2}, between, 56);
   const check::BentChain chain = check::bent_chain(tests::plain(weights), "network");
   ASSERT_EQ(chain.stages.size(), 4u);
-  ASSERT_EQ(chain.bends.size(), 3u);
+  ASSERT_EQ(chain.slopes.size(), 4u + 5 + 6);
   const double c = 0x1.211p+0, selu = files::function_of(Activation::kSelu).steepest();
-  const double factors[] = {1, 0.25, 1, selu}, bends[] = {0, c * (c - 1), 0};
+  for (std::size_t i = 0; i < chain.slopes.size(); ++i) {
+    const bool is_gelu = 4 <= i && i < 4 + 5;
+    EXPECT_EQ(to_double(chain.slopes[i].low), is_gelu ? 1 - c : 0);
+    EXPECT_EQ(to_double(chain.slopes[i].high), is_gelu ? c : 1);
+  }
+  const double factors[] = {1, 0.25, 1, selu};
   for (std::size_t k = 0; k < 4; ++k) {
-    if (k < 3) {
-      EXPECT_EQ((chain.bends[k] - check::Dyadic(bends[k])).sign(), 0);
-    }
     for (std::size_t i = 0; i < weights.layers[k].weights.size(); ++i)
       EXPECT_EQ(
           (chain.stages[k].entries[i] - check::Dyadic(weights.layers[k].weights[i]) * factors[k]).sign(), 0);
@@ -327,7 +329,7 @@ TEST(MixedCertificate, StatesTheActivationsForFilesThatDoNot) {
   EXPECT_FALSE(check_mixed(fewer, check::with_stated_activations(fewer, unstated)).accepted);
 }
 
-TEST(MixedCertificate, IsRejectedWithALowerBoundOrABox) {
+TEST(MixedCertificate, IsRejectedWithALowerBoundOrABoundByParts) {
   const Network network = tests::plain(mixed({2, 4, 4, 1}, {Activation::kRelu, Activation::kTanh}, 59));
   const Json made = lipschitz::certificate(network, certify_mixed(network));
   EXPECT_TRUE(made["bounds"][0]["lower"].is_null());
@@ -337,10 +339,10 @@ TEST(MixedCertificate, IsRejectedWithALowerBoundOrABox) {
             std::string::npos);
   changed = made;
   changed["bounds"][0]["upper_method"] = "branch";
-  EXPECT_NE(check_mixed(changed, network).reason.find("a bound on a box of a network with tanh"),
+  EXPECT_NE(check_mixed(changed, network).reason.find("a bound by parts of a box of a network with tanh"),
             std::string::npos);
   CertifyOptions options;
-  options.domain["network"] = {{-1, -1}, {1, 1}};
+  options.method = UpperMethod::kBranch;
   EXPECT_THROW(certify(network, options), std::invalid_argument);
 }
 

@@ -177,7 +177,6 @@ TEST(SmoothBounds, WhatIsForReluRefusesOtherActivations) {
   CertifyOptions options;
   options.method = UpperMethod::kBranch;
   EXPECT_THROW(certify(network, options), std::invalid_argument);
-  options.method = UpperMethod::kAuto;
   options.domain["network"] = {{-1, -1}, {1, 1}};
   EXPECT_THROW(certify(network, options), std::invalid_argument);
   EXPECT_ANY_THROW(lipschitz::slope_function(network, "network", {}));
@@ -268,7 +267,7 @@ TEST(SmoothCertificate, OfTheProductCountsTheSlopesExactly) {
   }
 }
 
-TEST(SmoothCertificate, IsRejectedWithLowerBoundsBoxesOrValues) {
+TEST(SmoothCertificate, IsRejectedWithLowerBoundsOrBoundsByParts) {
   const auto rejects = [](const std::function<void(Json&)>& change, const std::string& reason) {
     Json changed = smooth_certificate();
     change(changed);
@@ -277,9 +276,6 @@ TEST(SmoothCertificate, IsRejectedWithLowerBoundsBoxesOrValues) {
     EXPECT_NE(result.reason.find(reason), std::string::npos) << result.reason;
   };
   const std::vector<std::string> x = {"0x0p+0", "0x0p+0", "0x0p+0"}, y = {"0x1p+0", "0x0p+0", "0x0p+0"};
-  const Json box = {
-      {"phi:default",
-       {{"lower", {"-0x1p+0", "-0x1p+0", "-0x1p+0"}}, {"upper", {"0x1p+0", "0x1p+0", "0x1p+0"}}}}};
   rejects(
       [&](Json& c) {
         c["bounds"][0].update({{"lower", 0.0},
@@ -287,26 +283,9 @@ TEST(SmoothCertificate, IsRejectedWithLowerBoundsBoxesOrValues) {
                                {"lower_witness", {{"x", x}, {"y", y}, {"others", Json::array()}}}});
       },
       "a lower bound of a network with tanh");
-  rejects([&](Json& c) { c["bounds"][0]["upper_method"] = "branch"; }, "a bound on a box");
-  rejects(
-      [&](Json& c) {
-        c["box"] = box;
-        c["bounds"][0]["domain"] = "box";
-      },
-      "a bound on a box");
-  const Json values = {{"function", "set:default:default"},
-                       {"neighbours", 1},
-                       {"domain", "box"},
-                       {"input_error", nullptr},
-                       {"networks", Json::object()},
-                       {"sum", nullptr},
-                       {"lower", Json::array()},
-                       {"upper", Json::array()},
-                       {"jump", nullptr},
-                       {"jump_hex", nullptr},
-                       {"float32_error", nullptr},
-                       {"float32_error_hex", nullptr}};
-  rejects([&](Json& c) { c["values"] = {values}; }, "only of ReLU networks");
+  rejects([&](Json& c) { c["bounds"][0]["upper_method"] = "branch"; }, "a bound by parts of a box");
+  rejects([&](Json& c) { c["bounds"][0]["upper_method"] = "local_sdp"; },
+          "slopes on a box of a bound without one");
 }
 
 TEST(SmoothCertificate, OfASetFunctionBesideAnotherActivationHasNoWitness) {

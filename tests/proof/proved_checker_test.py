@@ -119,6 +119,8 @@ def kinds(folder, generator):
         ("activations of parts", [common.smooth(folder)], ["--blocks=position", "--neighbours", "large=2,small=1"],
          0.03),
         ("rotation invariants", [common.of_invariants(folder, generator)], ["--neighbours", "large=2,small=1"], 0.03),
+        ("gelu, slopes on a box", [tiny], ["--activation", "gelu", "--domain", folder / "plane.toml"], 0.03),
+        ("relu, silu, slopes on a box", [tiny], ["--activation", "relu,silu", "--domain", folder / "plane.toml"], 0.03),
         ("cover by parts", [tiny], parts, 0.03),
         ("pair and cover by parts", pair, parts, 0.02),
     ] + slow * (MUTATIONS > 0)
@@ -130,7 +132,7 @@ def arguments(net):
 
 def is_beyond(name):
     """Whether some of what is proved is beyond the proved checker."""
-    return name in ("kinds by parts for a number of neighbours", "rotation invariants")
+    return name in ("kinds by parts for a number of neighbours", "rotation invariants") or "slopes on a box" in name
 
 
 def decided_alike(code, accepted, second_accepts, by_parts):

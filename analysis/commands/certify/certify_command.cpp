@@ -173,6 +173,7 @@ void add_slope_estimates(const files::Network& network, const lipschitz::Certify
     if (bound.is_relu) return;
     lipschitz::SlopeEstimateOptions sampling;
     sampling.seed = options.lower.seed;
+    sampling.domain = options.domain;
     sampling.stop = lipschitz::Stop(options.cancelled);
     output.slope_estimates[static_cast<std::size_t>(i)] = lipschitz::slope_estimate(network, bound, sampling);
   });
@@ -201,12 +202,12 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Pr
   output.ranges = lipschitz::ranges(network, domain, rho_bounds, range);
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const bool is_float32 = std::all_of(parts.begin(), parts.end(), [](const auto& part) {
-    return part.second->precision == files::Precision::kFloat32;
+    return part.second->precision == files::Precision::kFloat32 && part.second->is_relu();
   });
   output.found.values =
       lipschitz::certified_values(network, domain, rho_bounds,
                                   {range.neighbours, options.domain.empty(), is_float32, options.input_step});
-  if (!is_float32) return;  // what flies are other weights: --as float32
+  if (!is_float32) return;  // what flies are other weights (--as float32), or functions of unknown rounding
   lipschitz::Float32Options float32;
   float32.neighbours = range.neighbours;
   float32.input_step = options.input_step;
@@ -246,16 +247,25 @@ void parse_map(const CertifyOptions& options, const files::Network& network,
   }
 }
 
-/// Of other activations, and of rotation invariants, bounds for all inputs are proved, and nothing else.
+/// Branch and bound and float32 errors are for ReLU. Of rotation invariants, bounds for all inputs are proved, and
+/// nothing else.
 void refuse_what_is_for_relu(const files::Network& network, const CertifyOptions& options) {
-  const std::pair<bool, const char*> asked[] = {{!options.domain.empty(), "--domain"},
-                                                {options.range, "--range"},
-                                                {options.explain, "--explain"},
-                                                {options.method == "branch", "--method branch"}};
-  for (const auto& [is_asked, option] : asked) {
-    if (!is_asked) continue;
-    files::require_relu(network, std::string(option) + " is for ReLU networks");
-    files::require_relative_states(network, std::string(option) + " is for networks of relative states");
+  struct Asked {
+    bool is_asked;
+    const char* option;
+    bool is_for_relu;
+  };
+  const Asked all[] = {{!options.domain.empty(), "--domain", false},
+                       {options.range, "--range", false},
+                       {!options.map.empty(), "--map", true},
+                       {options.explain, "--explain", true},
+                       {options.input_step > 0, "--input-step, for the float32 error,", true},
+                       {options.method == "branch", "--method branch", true}};
+  for (const Asked& one : all) {
+    if (!one.is_asked) continue;
+    const std::string option = one.option;
+    if (one.is_for_relu) files::require_relu(network, option + " is for ReLU networks");
+    files::require_relative_states(network, option + " is for networks of relative states");
   }
 }
 
@@ -377,7 +387,8 @@ void declare_function(CLI::App& app, CertifyOptions& options) {
   app.add_option("--method", options.method,
                  "Upper bound: product (of spectral norms), sdp (LipSDP-Neuron; the layer-wise eclipse_fast "
                  "where its search is interrupted), auto (the smallest of the three), or branch (branch and "
-                 "bound over the box of --domain; without --domain over all inputs)")
+                 "bound over the box of --domain; without --domain over all inputs; ReLU networks). Of other "
+                 "activations, product and sdp use the slopes that they have on the box of --domain")
       ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
       ->capture_default_str();
   app.add_option(

@@ -37,8 +37,9 @@ struct CertifyOutput {
 
 /// Said of networks that have another activation than ReLU, or rotation invariants.
 inline constexpr char kForReluOnly[] =
-    "lower bounds and bounds on a box are for ReLU networks of relative states: of other activations, and of "
-    "functions of rotation invariants, upper bounds for all inputs are proved";
+    "lower bounds and the search by branch and bound are for ReLU networks of relative states: of other "
+    "activations upper bounds are proved, on a box from the slopes that they have there, and of functions of "
+    "rotation invariants upper bounds for all inputs";
 
 /// Unit of the network's outputs; "output" where NET states none.
 std::string output_unit(const files::Network& network);

@@ -181,10 +181,10 @@ let check_activations state where bound names =
       if activation <> Proved.Relu then begin
         let of_ = " of a network with " ^ Activation.words activation in
         let by method_ = find where "upper_method" bound = Text method_ in
-        require (find where "domain" bound = Text "global" && not (by "branch")) "%s: a bound on a box%s" where of_;
+        require (not (by "branch")) "%s: a bound by parts of a box%s" where of_;
         require (List.for_all (fun key -> find where key bound = Null) [ "lower"; "lower_hex"; "lower_witness" ])
           "%s: a lower bound%s" where of_;
-        require (not (Activation.sorts activation) || find where "upper_method" bound = Text "product")
+        require (not (Activation.sorts activation) || by "product" || by "local_product")
           "%s: a bound from slopes of single numbers%s" where of_
       end) activations
 
@@ -200,6 +200,16 @@ let check_of_invariants state bound f where ~scale ~neighbours upper =
   not_checked state (Printf.sprintf "%s <= %s:%s" where (text where (find where "upper_hex" bound)) of_);
   Hashtbl.replace state.uppers (f, "all", neighbours) (upper, Not_checked)
 
+(* From the slopes that activations have on the box: beyond the theorems. *)
+let local_methods = [ Text "local_sdp"; Text "local_product" ]
+let check_local state where bound names =
+  require (find where "domain" bound = Text "box" && not (Functions.starts_with "rho:" (List.hd names)))
+    "%s: slopes on a box of a bound without one" where;
+  require (not state.net.invariants) "%s: slopes on a box of a network of rotation invariants" where;
+  let upper = text where (find where "upper_hex" bound) in
+  not_checked state (Printf.sprintf "%s <= %s: from the slopes that activations have on a box" where upper);
+  Not_checked
+
 (* The proof of a bound of function `f`, and of the lower one where there is a witness. *)
 let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~upper =
   let moves = Functions.moves state.net f block and func = function_of state names in
@@ -210,12 +220,14 @@ let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~
       let neurons = hidden_neurons state names in
       let proofs = inequality state claim where ~neurons ~upper (find where "proof" bound) in
       prove_by state claim proofs (no_factor where); Proved_here
+    | method_ when List.mem method_ local_methods -> check_local state where bound names
     | Text "branch" -> check_parts state where bound names ~func ~moves ~scale ~exact_scale ~upper
     | Text "product" when find where "proof" bound = Null -> check_product state where names claim scale upper
     | _ -> rejected "%s: unknown upper_method" where in
   if scale = [] then begin
     Hashtbl.replace state.uppers (f, block, neighbours) (upper, source);
-    if find where "upper_method" bound = Text "branch" && find where "domain" bound = Text "box" && neighbours = [] then
+    if List.mem (find where "upper_method" bound) (Text "branch" :: local_methods)
+       && find where "domain" bound = Text "box" && neighbours = [] then
       Hashtbl.replace state.in_box (f, block) ()
   end;
   if source <> Not_checked then state.upper_bounds <- state.upper_bounds + 1;

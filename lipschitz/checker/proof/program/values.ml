@@ -72,16 +72,9 @@ let check_jump (state : Claims.t) where phi ~box ~values rho jump =
   require (Claims.at_most (Claims.times (Claims.times slope slope) square) (Claims.times jump jump)) "%s" reason;
   Claims.prove state (Jump_at_most (phi, box, Functions.index state.net rho, jump)) Proved.By_norm reason
 
-let check (state : Claims.t) entry =
-  require_keys "values" keys entry;
-  let f = text "values" (find "values" "function" entry) in
+let check_relu (state : Claims.t) entry f names =
   let where = "values of " ^ shown f in
-  let names = Functions.networks_of f in
   let is_set = List.length names = 2 in
-  let require_relu = List.iter (fun name ->
-      require (Functions.is_relu state.net name) "%s: only of ReLU networks" where) in
-  require_relu names;
-  require (not state.net.invariants) "%s: values of a function of rotation invariants" where;
   require (if is_set then List.hd names <> "phi:ground" else f = "network")
     "%s: only of the network, or of a sum over neighbours" where;
   let count = match find where "neighbours" entry with
@@ -90,7 +83,6 @@ let check (state : Claims.t) entry =
   require (if is_set then 1 <= count && count <= Claims.most_neighbours else count = 0)
     "%s: impossible number of neighbours" where;
   let inputs = List.hd names :: if is_set && Functions.has_ground state.net then [ "phi:ground" ] else [] in
-  require_relu inputs;
   let rho = List.tl names in
   let weights name = Functions.weights state.net name in
   let networks = find where "networks" entry in
@@ -147,3 +139,13 @@ let check (state : Claims.t) entry =
        Claims.prove state (Sum_float_error (List.map (fun (t, errors, _) -> t, errors) terms, r, norm))
          (Proved.By_rounded_sum (sums, sum_errors)) (too_little where));
   state.values <- state.values + 1
+
+(* Of other activations: beyond the theorems. *)
+let check (state : Claims.t) entry =
+  require_keys "values" keys entry;
+  let f = text "values" (find "values" "function" entry) in
+  require (not state.net.invariants) "values of %s: of a function of rotation invariants" (shown f);
+  let names = Functions.networks_of f in
+  let used = names @ if List.length names = 2 && Functions.has_ground state.net then [ "phi:ground" ] else [] in
+  if List.for_all (Functions.is_relu state.net) used then check_relu state entry f names
+  else Claims.not_checked state (Printf.sprintf "values of %s: of activations that are not ReLU" (shown f))

@@ -1,0 +1,163 @@
+#include "lipschitz/attained_values.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "lipschitz/checker/centred_form.h"
+#include "lipschitz/rounding.h"
+#include "nn/weights/functions.h"
+
+namespace swarmcert::lipschitz {
+namespace {
+
+constexpr float kInfinityF = std::numeric_limits<float>::infinity();
+constexpr int kValueSamples = 400, kValueClimbs = 200;
+
+/// The inputs of the terms of a function, in the box.
+struct BoxPoint {
+  std::vector<std::string> networks;
+  std::vector<std::vector<float>> inputs;
+};
+
+class ValueSearch {
+ public:
+  ValueSearch(const files::Network& network, const std::map<std::string, Box>& domain,
+              const std::string& function, int neighbours, std::uint64_t seed)
+      : parts_(files::parts(network)),
+        domain_(domain),
+        names_(files::networks_of(function)),
+        neighbours_(neighbours),
+        generator_(seed) {
+    for (const auto& [name, weights] : parts_) evaluators_.emplace(name, files::Evaluator<double>(*weights));
+  }
+
+  int outputs() const { return parts_.at(names_.back())->outputs(); }
+
+  /// About the point where sign * f_output is largest; no inputs where the box holds no float32.
+  BoxPoint best(int output, double sign) {
+    BoxPoint best;
+    double largest = -std::numeric_limits<double>::infinity();
+    for (int i = 0; i < kValueSamples + kValueClimbs; ++i) {
+      const bool climbs = i >= kValueSamples;
+      const BoxPoint point =
+          climbs ? moved(best, std::exp2(-8.0 * (i - kValueSamples) / kValueClimbs)) : random_point();
+      if (point.inputs.empty()) return {};
+      const double value = sign * in_double(point)[static_cast<std::size_t>(output)];
+      if (!(value > largest)) continue;
+      largest = value;
+      best = point;
+    }
+    return best;
+  }
+
+  /// Contains f(point).
+  check::Intervals enclosed(const BoxPoint& point) const {
+    check::Intervals sum;
+    for (std::size_t j = 0; j < point.inputs.size(); ++j) {
+      const std::vector<float>& x = point.inputs[j];
+      check::Intervals at;
+      for (const float coordinate : x) at.lower.emplace_back(static_cast<double>(coordinate));
+      at.upper = at.lower;
+      const check::Intervals term = check::layers_on_box(*parts_.at(point.networks[j]), at).back();
+      for (std::size_t i = 0; i < term.lower.size(); ++i) {
+        if (j == 0) continue;
+        sum.lower[i] += term.lower[i];
+        sum.upper[i] += term.upper[i];
+      }
+      if (j == 0) sum = term;
+    }
+    return names_.size() == 1 ? sum : check::layers_on_box(*parts_.at(names_.back()), sum).back();
+  }
+
+ private:
+  double share() { return std::ldexp(static_cast<double>(generator_() >> 11), -53); }
+
+  /// The nearest float32 in the interval; NaN where there is none.
+  static float in_interval(double x, double low, double high) {
+    auto value = static_cast<float>(x);
+    if (static_cast<double>(value) < low) value = std::nextafter(value, kInfinityF);
+    if (static_cast<double>(value) > high) value = std::nextafter(value, -kInfinityF);
+    return static_cast<double>(value) < low ? std::numeric_limits<float>::quiet_NaN() : value;
+  }
+
+  /// Each coordinate at random, a third of them at an end.
+  BoxPoint random_point() {
+    BoxPoint point;
+    if (names_.size() == 2) {
+      const int count = 1 + static_cast<int>(generator_() % static_cast<std::uint64_t>(neighbours_));
+      point.networks.assign(static_cast<std::size_t>(count), names_[0]);
+      if (parts_.count(files::kGroundPhi) == 1) point.networks.emplace_back(files::kGroundPhi);
+    } else {
+      point.networks = {names_[0]};
+    }
+    for (const std::string& name : point.networks) {
+      const Box& box = domain_.at(name);
+      std::vector<float> x;
+      for (std::size_t k = 0; k < box.lower.size(); ++k) {
+        const double r = std::clamp(1.5 * share() - 0.25, 0.0, 1.0);
+        x.push_back(
+            in_interval(box.lower[k] + r * (box.upper[k] - box.lower[k]), box.lower[k], box.upper[k]));
+        if (std::isnan(x.back())) return {};
+      }
+      point.inputs.push_back(std::move(x));
+    }
+    return point;
+  }
+
+  BoxPoint moved(BoxPoint point, double scale) {
+    for (std::size_t j = 0; j < point.inputs.size(); ++j) {
+      const Box& box = domain_.at(point.networks[j]);
+      for (std::size_t k = 0; k < box.lower.size(); ++k) {
+        const double step = scale * (2 * share() - 1) * (box.upper[k] - box.lower[k]);
+        const double x =
+            std::clamp(static_cast<double>(point.inputs[j][k]) + step, box.lower[k], box.upper[k]);
+        point.inputs[j][k] = in_interval(x, box.lower[k], box.upper[k]);
+      }
+    }
+    return point;
+  }
+
+  std::vector<double> in_double(const BoxPoint& point) const {
+    std::vector<double> sum;
+    for (std::size_t j = 0; j < point.inputs.size(); ++j) {
+      const std::vector<float>& x = point.inputs[j];
+      const std::vector<double> term = evaluators_.at(point.networks[j])({x.begin(), x.end()});
+      if (sum.empty()) sum.resize(term.size());
+      for (std::size_t i = 0; i < term.size(); ++i) sum[i] += term[i];
+    }
+    return names_.size() == 1 ? sum : evaluators_.at(names_.back())(sum);
+  }
+
+  std::map<std::string, const files::Weights*> parts_;
+  const std::map<std::string, Box>& domain_;
+  std::vector<std::string> names_;
+  int neighbours_;
+  std::mt19937_64 generator_;
+  std::map<std::string, files::Evaluator<double>> evaluators_;
+};
+
+}  // namespace
+
+std::vector<AttainedEnds> attained_ends(const files::Network& network,
+                                        const std::map<std::string, Box>& domain, const std::string& function,
+                                        int neighbours, std::uint64_t seed) {
+  ValueSearch search(network, domain, function, neighbours, seed);
+  std::vector<AttainedEnds> result;
+  for (int output = 0; output < search.outputs(); ++output) {
+    const auto index = static_cast<std::size_t>(output);
+    AttainedEnds ends;
+    for (const double sign : {-1.0, 1.0}) {
+      const BoxPoint point = search.best(output, sign);
+      if (point.inputs.empty()) continue;
+      const check::Intervals values = search.enclosed(point);
+      const double value = sign > 0 ? rounded_down(values.lower[index]) : rounded_up(values.upper[index]);
+      (sign > 0 ? ends.greatest : ends.least) = {value, point.networks, point.inputs};
+    }
+    result.push_back(std::move(ends));
+  }
+  return result;
+}
+
+}  // namespace swarmcert::lipschitz
