@@ -45,6 +45,11 @@ def refused(certificate, net, reason):
     assert done.returncode == 1 and reason in done.stdout, f"expected {reason!r}: {done}"
 
 
+def not_checked(certificate, net, claim):
+    done = check(certificate, net)
+    assert done.returncode == 4 and f"{claim}\n" in done.stdout, done
+
+
 def layers(sizes, generator):
     """Weights are powers of two, so that they stay exact when they are multiplied by a slope."""
     def number():
@@ -194,10 +199,12 @@ def refuses_what_only_relu_has(folder, generator):
     box.write_text('schema = "swarmcert/box/1"\nlower = [-1, -1, -1]\nupper = [1, 1, 1]\n')
     on_box = certify(net, "--domain", box, "--range", "--method", "sdp")
     assert on_box["values"]
-    refused(with_activations(on_box, {"network": "tanh"}), net, "a bound on a box of a network with tanh")
-    values = with_activations(on_box, {"network": "tanh"})
-    values["bounds"] = certificate["bounds"]
-    refused(values, net, "values of network: only of ReLU networks")
+    not_checked(with_activations(on_box, {"network": "tanh"}), net, "values of network: of activations that are not ReLU")
+    local = certify(net, "--activation", "tanh", "--domain", box)
+    assert local["bounds"][0]["upper_method"] == "local_sdp"
+    not_checked(local, net, "from the slopes that activations have on a box")
+    local["bounds"][0]["domain"] = "global"
+    refused(local, net, "slopes on a box of a bound without one")
     assert check(certificate, net, "--activation", "tanh").returncode == 0
     done = check(certificate, net, "--activation", "relu")
     assert done.returncode == 1 and "chain is not the one of this network: fc1 - ReLU - fc2" in done.stdout, done
