@@ -294,8 +294,8 @@ TEST(LocalSlopes, OfSeveralActivationsAreAboveAllSampledOnesAndCheckedAgain) {
   EXPECT_GE(by_program, with_slopes) << "the slopes on the box hardly ever serve";
 }
 
-/// A chain of single neurons behind weights w_k has derivatives in prod |w_k| [prod a_k, prod b_k], [a_k, b_k] the slopes
-/// on the box, here positive: nothing is lost but the width of those, however many activations there are.
+/// A chain of single neurons behind weights w_k has derivatives in prod |w_k| [prod a_k, prod b_k], [a_k, b_k] the
+/// slopes on the box, here positive: nothing is lost but the width of those, however many activations there are.
 TEST(LocalSlopes, OfAChainOfSingleNeuronsLieBetweenTheProductsOfLeastAndGreatestSlopes) {
   std::mt19937 generator(96);
   std::vector<Activation> between(std::begin(kSmooth), std::end(kSmooth));
