@@ -200,14 +200,15 @@ void drop_doubtful_names(const Passes& passes, Explained& explained) {
 }
 
 /// Whether a lag or delay takes little away and may as well be none: its interval reaches down to where it ends, or it
-/// was found beside a name or a formula without which what is left, and the thrust answers, dominates.
+/// was found beside a name or a formula without which what is left, and the thrust answers, dominates, or it takes no
+/// more than the trace of such answers.
 bool may_be_no_lag(const Missing& missing, const Remainder& rest) {
-  constexpr double kLittle = 0.1;  // of the mean square
+  constexpr double kLittle = 0.1;  // of the mean square, or of what is left above the noise
   if (!is_of_library(missing.effect)) return false;
   const stability::EffectInfo& info = stability::effect_info(missing.effect);
   const double before = missing.finding.rmse_before_N;
   if (!info.remembers || info.shape.empty() || taken_N2(missing) >= kLittle * before * before) return false;
-  if (rest.ratio > kLoudRatio) return true;
+  if (rest.ratio > kLoudRatio || (rest.flag && taken_N2(missing) < kLittle * rest.excess_N2)) return true;
   const auto interval = missing.intervals.find(info.shape[0].name);
   return interval != missing.intervals.end() && interval->second.lower <= info.shape[0].lower;
 }

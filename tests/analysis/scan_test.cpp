@@ -69,6 +69,45 @@ struct Flights {
   }
 };
 
+/// Two vehicles that are never far apart in height.
+Flights of_two_vehicles(std::uint64_t seed) {
+  Flights flights(seed);
+  flights.samples.neighbours.lateral_m.setConstant(0.5F);
+  flights.samples.neighbours.height_m.setConstant(0.2F);
+  return flights;
+}
+
+TEST(Scan, FindsALiftBesideANeighbourWithItsFormula) {
+  Flights flights = of_two_vehicles(41);
+  flights.push(2, [&](Eigen::Index i) {
+    const double dx = flights.at(i, V::kNeighbourX) - 0.3, dy = flights.at(i, V::kNeighbourY);
+    return 0.02 * std::exp(-(dx * dx + dy * dy) / (2 * 0.25 * 0.25));
+  });
+  const Scan found = scan(flights.samples, 1);
+  ASSERT_FALSE(found.entries.empty());
+  EXPECT_EQ(found.entries[0].variable, "neighbour_xy");
+  EXPECT_EQ(found.entries[0].axis, "z");
+  const std::vector<Formula> formulas = find_formulas(flights.samples, found, 1, 1);
+  ASSERT_EQ(formulas.size(), 1U);
+  const stability::EffectSpec& effect = formulas[0].effect;
+  EXPECT_TRUE(effect.expression.per_neighbour);
+  EXPECT_EQ(formulas[0].form, "gaussian");
+  EXPECT_NEAR(effect.parameters.at("a_N"), 0.02, 0.002);
+  EXPECT_NEAR(effect.parameters.at("x_centre_m"), 0.3, 0.03);
+  EXPECT_NEAR(effect.parameters.at("y_centre_m"), 0, 0.03);
+  EXPECT_NEAR(effect.parameters.at("width_m"), 0.25, 0.03);
+}
+
+TEST(Scan, FindsAForceAlongTheMotionOfANeighbour) {
+  Flights flights = of_two_vehicles(42);
+  flights.push(1, [&](Eigen::Index i) { return 0.01 * flights.at(i, V::kNeighbourVy); });
+  const Scan found = scan(flights.samples, 1);
+  ASSERT_FALSE(found.entries.empty());
+  EXPECT_EQ(found.entries[0].variable, "neighbour_vy");
+  EXPECT_EQ(found.entries[0].axis, "y");
+  EXPECT_GT(found.entries[0].share, 0.8);
+}
+
 TEST(Scan, FindsAPullTowardsANeighbourThatPassesAllAround) {
   Flights flights(40);
   ScanSamples& samples = flights.samples;

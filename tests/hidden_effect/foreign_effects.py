@@ -162,6 +162,15 @@ def suction(a=0.03, reach=0.3):
     return force
 
 
+def upwash(a=0.03, ahead=0.3, width=0.25):
+    """A lift beside every neighbour, on one side of it."""
+    def force(s):
+        places = [other(0.0) for other in s.others]
+        return (0, 0, sum(a * math.exp(-((p[0] - s.p[0] - ahead) ** 2 + (p[1] - s.p[1]) ** 2) / (2 * width * width))
+                          for p in places))
+    return force
+
+
 def slow_drain(a=0.04, at=15.0, width=2.0):
     return lambda s: (0, 0, -a / (1 + math.exp(-(s.t - at) / width)))
 
@@ -214,6 +223,8 @@ EFFECTS = {
     "lane": dict(force=lane(), variables={"y", "xy"}),
     "suction": dict(force=suction(), variables={"neighbour"}, vehicles=2, formula=pull(
         "a_N * exp(-sqrt(dx^2 + dy^2 + dz^2) / reach_m) * {} / sqrt(dx^2 + dy^2 + dz^2)", a_N=0.03, reach_m=0.3)),
+    "upwash": dict(force=upwash(), variables={"neighbour_xy"}, vehicles=2, formula=expression(
+        "force_z_N", "a_N * exp(-((dx - 0.3)^2 + dy^2) / 0.125)", a_N=0.03) + "per_neighbour = true\n"),
     "flapping": dict(force=flapping(), variables={"rate_y"}, speed=1.6, formula=expression(
         "force_b1_N", "a_N * wy", a_N=0.03)),
     "slow drain": dict(force=slow_drain(), variables={"time", "battery"}, names={"payload_step"}),

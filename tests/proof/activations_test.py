@@ -199,7 +199,8 @@ def refuses_what_only_relu_has(folder, generator):
     box.write_text('schema = "swarmcert/box/1"\nlower = [-1, -1, -1]\nupper = [1, 1, 1]\n')
     on_box = certify(net, "--domain", box, "--range", "--method", "sdp")
     assert on_box["values"]
-    not_checked(with_activations(on_box, {"network": "tanh"}), net, "values of network: of activations that are not ReLU")
+    not_checked(with_activations(on_box, {"network": "tanh"}), net,
+                "values of network: of activations that are not ReLU")
     local = certify(net, "--activation", "tanh", "--domain", box)
     assert local["bounds"][0]["upper_method"] == "local_sdp"
     not_checked(local, net, "from the slopes that activations have on a box")

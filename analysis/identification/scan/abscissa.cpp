@@ -4,7 +4,9 @@ namespace swarmcert::identification {
 
 std::vector<Abscissa> abscissas(const ScanSamples& samples) {
   std::vector<Abscissa> all;
-  for (int v = 0; v < kNumScanVariables; ++v) {
+  const bool has_neighbours = samples.has_neighbours();
+  const int variables = has_neighbours ? kNumScanVariables : static_cast<int>(ScanVariable::kNeighbourX);
+  for (int v = 0; v < variables; ++v) {
     const auto variable = static_cast<ScanVariable>(v);
     const ScanVariableInfo& info = scan_variable(variable);
     if (!info.in_world && !info.in_body) continue;
@@ -13,12 +15,26 @@ std::vector<Abscissa> abscissas(const ScanSamples& samples) {
     all.push_back({info.name, {variable}, 0, info.is_answer, info.in_world, info.in_body, knots});
   }
   all.push_back({"xy", {ScanVariable::kX, ScanVariable::kY}, 0, false, true, false, {4, 7}});
-  if (samples.has_neighbours()) {
+  if (has_neighbours) {
+    const std::vector<ScanVariable> place = {ScanVariable::kNeighbourX, ScanVariable::kNeighbourY};
+    all.push_back({"neighbour_xy", place, 0, false, true, false, {5, 9}});
     for (int lag = 0; lag < NeighbourPlaces::kLags; ++lag)
       all.push_back({"neighbour", {}, lag, false, true, false, {7}});
   }
   return all;
 }
+
+namespace {
+
+/// Of neighbours nearer than 0.8 m along each axis; further ones count as at the edge.
+Knots knots_nearby(int count) {
+  constexpr double kReach_m = 0.8;
+  Knots knots;
+  for (int k = 0; k < count; ++k) knots.push_back(kReach_m * (2.0 * k / (count - 1) - 1));
+  return knots;
+}
+
+}  // namespace
 
 Curve curve_over(const ScanSamples& samples, const Abscissa& abscissa, int knots) {
   Curve curve;
@@ -38,7 +54,8 @@ Curve curve_over(const ScanSamples& samples, const Abscissa& abscissa, int knots
     return curve;
   }
   const auto a = static_cast<Eigen::Index>(abscissa.variables[0]);
-  curve.knots = {knots_over(samples.values.col(a), knots)};
+  const bool is_nearby = abscissa.variables[0] == ScanVariable::kNeighbourX;
+  curve.knots = {is_nearby ? knots_nearby(knots) : knots_over(samples.values.col(a), knots)};
   if (curve.knots[0].empty()) return {};
   const auto asks = [&](Eigen::Index v) { return samples.commanded.col(v).allFinite(); };
   if (abscissa.variables.size() == 1) {
@@ -48,7 +65,7 @@ Curve curve_over(const ScanSamples& samples, const Abscissa& abscissa, int knots
     return curve;
   }
   const auto b = static_cast<Eigen::Index>(abscissa.variables[1]);
-  curve.knots.push_back(knots_over(samples.values.col(b), knots));
+  curve.knots.push_back(is_nearby ? knots_nearby(knots) : knots_over(samples.values.col(b), knots));
   if (curve.knots[1].empty()) return {};
   curve.columns = knots * knots;
   curve.rows = hat_rows(samples.values.col(a), curve.knots[0], samples.values.col(b), curve.knots[1]);

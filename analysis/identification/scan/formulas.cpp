@@ -71,10 +71,20 @@ Eigen::VectorXd factor_of(const ScanSamples& samples, const std::vector<Eigen::I
   return values;
 }
 
+bool is_of_neighbours(const ScanEntry& entry) {
+  return !entry.variables.empty() && entry.variables[0] == ScanVariable::kNeighbourX;
+}
+
 std::vector<Form> forms_of(const ScanEntry& entry, const EntryData& data) {
   std::vector<Form> forms;
-  if (entry.variables.size() == 2)
-    return forms_over_place(range_of(data.few.inputs.col(0)), range_of(data.few.inputs.col(1)));
+  if (entry.variables.size() == 2) {
+    forms = forms_over_place(range_of(data.few.inputs.col(0)), range_of(data.few.inputs.col(1)));
+    // Neighbours far away do nothing.
+    const auto reaches_far = [](const Form& form) { return form.name == "plane" || form.name == "beyond"; };
+    if (is_of_neighbours(entry))
+      forms.erase(std::remove_if(forms.begin(), forms.end(), reaches_far), forms.end());
+    return forms;
+  }
   forms = forms_over(range_of(data.few.inputs.col(0)), is_velocity(entry.variables[0]));
   for (Form& form : forms) {
     if (form.name != "sinusoid") continue;
@@ -167,7 +177,9 @@ stability::EffectSpec spec_of(const ScanEntry& entry, const char* target, const 
     if (trial.factor != ScanVariable::kCount) of += std::string("_per_") + scan_variable(trial.factor).unit;
     add(letters[k], text, trial.fit.coefficients[static_cast<Eigen::Index>(k)], of);
   }
-  if (trial.form.has_offset)
+  // Beside neighbours it is what acts without them.
+  spec.expression.per_neighbour = is_of_neighbours(entry);
+  if (trial.form.has_offset && !spec.expression.per_neighbour)
     add("offset", "", trial.fit.coefficients[trial.fit.coefficients.size() - 1], entry.unit);
   spec.expression.formulas[target] = formula;
   spec.name = fmt::format("{}{}_{}{}_of_{}", kFormulaPrefix, trial.form.name,

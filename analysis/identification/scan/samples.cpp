@@ -87,6 +87,33 @@ void set_motion(const Instant& now, Values& to) {
   at(to, V::kTime) = now.time_s;
 }
 
+/// Laterally nearest to a place among those within kHeightOfNeighbours_m of it in height; null where there is none.
+const stability::Neighbour* nearest_neighbour(const Instant& then, const Eigen::Vector3d& to_W_m) {
+  const stability::Neighbour* nearest = nullptr;
+  double least_m = std::numeric_limits<double>::infinity();
+  for (int j = 0; j < then.num_neighbours; ++j) {
+    const Eigen::Vector3d dp_m = then.p_W_m + then.neighbours[j].dp_W_m - to_W_m;
+    const double distance_m = dp_m.head<2>().norm();
+    if (std::abs(dp_m.z()) > kHeightOfNeighbours_m || !(distance_m < least_m)) continue;
+    least_m = distance_m;
+    nearest = &then.neighbours[j];
+  }
+  return nearest;
+}
+
+void set_neighbour(const Instant& now, Values& to) {
+  using V = ScanVariable;
+  const stability::Neighbour* const nearest = nearest_neighbour(now, now.p_W_m);
+  const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  const Eigen::Vector3d dp_m = nearest == nullptr ? unknown : nearest->dp_W_m;
+  const Eigen::Vector3d dv_m_s = nearest == nullptr ? unknown : nearest->dv_W_m_s;
+  at(to, V::kNeighbourX) = dp_m.x();
+  at(to, V::kNeighbourY) = dp_m.y();
+  at(to, V::kNeighbourVx) = dv_m_s.x();
+  at(to, V::kNeighbourVy) = dv_m_s.y();
+  at(to, V::kNeighbourVz) = dv_m_s.z();
+}
+
 /// What is left of the force at each record, [6 x records].
 Eigen::MatrixXd force_columns(const stability::Model& model, const residuals::Inputs& inputs,
                               const Track& track) {
@@ -139,6 +166,7 @@ class TrackSampler {
     Values values{}, commanded;
     commanded.fill(std::numeric_limits<double>::quiet_NaN());
     set_motion(now, values);
+    set_neighbour(now, values);
     at(values, V::kAirspeed) = (now.v_W_m_s - wind_m_s_).norm();
     for (std::size_t r = 0; r < 4; ++r) values[static_cast<std::size_t>(V::kDuty1) + r] = track_.duty[i][r];
     for (const V setpoint : {V::kSetpointX, V::kSetpointY, V::kSetpointZ})
@@ -205,16 +233,14 @@ class TrackSampler {
           track_.instants[i].time_s - static_cast<double>(lag) * NeighbourPlaces::kLag_s + 1e-3;
       while (past > 0 && track_.instants[past].time_s > then_s && track_.restarts[past] == 0) --past;
       const Instant& then = track_.instants[past];
-      double nearest_m = std::numeric_limits<double>::infinity();
-      for (int j = 0; j < then.num_neighbours; ++j) {
-        const Eigen::Vector3d dp_m = then.p_W_m + then.neighbours[j].dp_W_m - track_.instants[i].p_W_m;
-        const double distance_m = dp_m.head<2>().norm();
-        if (std::abs(dp_m.z()) > kHeightOfNeighbours_m || !(distance_m < nearest_m)) continue;
-        nearest_m = distance_m;
-        lateral_m[lag] = static_cast<float>(distance_m);
-        height_m[lag] = static_cast<float>(dp_m.z());
-        if (lag == 0 && distance_m > 0) toward = (dp_m.head<2>() / distance_m).cast<float>();
-      }
+      const Eigen::Vector3d& own_W_m = track_.instants[i].p_W_m;
+      const stability::Neighbour* const nearest = nearest_neighbour(then, own_W_m);
+      if (nearest == nullptr) continue;
+      const Eigen::Vector3d dp_m = then.p_W_m + nearest->dp_W_m - own_W_m;
+      const double distance_m = dp_m.head<2>().norm();
+      lateral_m[lag] = static_cast<float>(distance_m);
+      height_m[lag] = static_cast<float>(dp_m.z());
+      if (lag == 0 && distance_m > 0) toward = (dp_m.head<2>() / distance_m).cast<float>();
     }
     result_.lateral_m.push_back(lateral_m);
     result_.height_m.push_back(height_m);
@@ -312,21 +338,40 @@ const std::vector<ScanColumn>& scan_columns(ScanQuantity quantity) {
 }
 
 const ScanVariableInfo& scan_variable(ScanVariable variable) {
+  // Places of neighbours are a map. Formulas over their velocities would not vanish where they are far away.
   static const std::array<ScanVariableInfo, static_cast<std::size_t>(kNumScanVariables)> all = {{
-      {"x", "x", "m", false, true, true},           {"y", "y", "m", false, true, true},
-      {"z", "z", "m", false, true, true},           {"vx", "vx", "m_s", false, true, false},
-      {"vy", "vy", "m_s", false, true, false},      {"vz", "vz", "m_s", false, true, true},
-      {"vx", "vbx", "m_s", false, false, true},     {"vy", "vby", "m_s", false, false, true},
+      {"x", "x", "m", false, true, true},
+      {"y", "y", "m", false, true, true},
+      {"z", "z", "m", false, true, true},
+      {"vx", "vx", "m_s", false, true, false},
+      {"vy", "vy", "m_s", false, true, false},
+      {"vz", "vz", "m_s", false, true, true},
+      {"vx", "vbx", "m_s", false, false, true},
+      {"vy", "vby", "m_s", false, false, true},
       {"vz", "vbz", "m_s", false, false, false},  // the same as `climb`
-      {"speed", "speed", "m_s", false, true, true}, {"airspeed", "", "m_s", false, true, true},
-      {"climb", "climb", "m_s", false, true, true}, {"heading", "heading", "rad", false, true, true},
-      {"tilt", "tilt", "rad", true, true, true},    {"thrust", "T", "N", true, true, true},
-      {"duty_1", "", "", true, true, true},         {"duty_2", "", "", true, true, true},
-      {"duty_3", "", "", true, true, true},         {"duty_4", "", "", true, true, true},
-      {"battery", "V", "V", false, true, true},     {"time", "t", "s", false, true, true},
-      {"set_point_x", "", "m", false, true, true},  {"set_point_y", "", "m", false, true, true},
-      {"set_point_z", "", "m", false, true, true},  {"rate_x", "wx", "rad_s", true, true, true},
-      {"rate_y", "wy", "rad_s", true, true, true},  {"rate_z", "wz", "rad_s", true, true, true},
+      {"speed", "speed", "m_s", false, true, true},
+      {"airspeed", "", "m_s", false, true, true},
+      {"climb", "climb", "m_s", false, true, true},
+      {"heading", "heading", "rad", false, true, true},
+      {"tilt", "tilt", "rad", true, true, true},
+      {"thrust", "T", "N", true, true, true},
+      {"duty_1", "", "", true, true, true},
+      {"duty_2", "", "", true, true, true},
+      {"duty_3", "", "", true, true, true},
+      {"duty_4", "", "", true, true, true},
+      {"battery", "V", "V", false, true, true},
+      {"time", "t", "s", false, true, true},
+      {"set_point_x", "", "m", false, true, true},
+      {"set_point_y", "", "m", false, true, true},
+      {"set_point_z", "", "m", false, true, true},
+      {"rate_x", "wx", "rad_s", true, true, true},
+      {"rate_y", "wy", "rad_s", true, true, true},
+      {"rate_z", "wz", "rad_s", true, true, true},
+      {"neighbour_x", "dx", "m", false, false, false},
+      {"neighbour_y", "dy", "m", false, false, false},
+      {"neighbour_vx", "", "m_s", false, true, false},
+      {"neighbour_vy", "", "m_s", false, true, false},
+      {"neighbour_vz", "", "m_s", false, true, false},
   }};
   return all[static_cast<std::size_t>(variable)];
 }

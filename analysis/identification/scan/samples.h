@@ -39,6 +39,11 @@ enum class ScanVariable : int {
   kRateX,
   kRateY,
   kRateZ,
+  kNeighbourX,  ///< place and velocity of the laterally nearest neighbour minus the vehicle's, as NeighbourPlaces
+  kNeighbourY,
+  kNeighbourVx,
+  kNeighbourVy,
+  kNeighbourVz,
   kCount
 };
 inline constexpr int kNumScanVariables = static_cast<int>(ScanVariable::kCount);

@@ -333,8 +333,8 @@ void prefer_rotor(std::vector<ScanEntry>& entries) {
                 entries.end());
 }
 
-/// Best first. What vehicles do comes before what they were asked to do, and before the duties of rotors, where both
-/// explain about as much; a rotor's own duty comes before anything else of the thrust.
+/// Best first. What vehicles do comes before what they were asked to do, before how neighbours move, and before the
+/// duties of rotors, where both explain about as much; a rotor's own duty comes before anything else of the thrust.
 void sort_entries(std::vector<ScanEntry>& entries) {
   constexpr double kAlike = 0.95;
   const auto weight = [](const ScanEntry& entry) {
@@ -342,6 +342,7 @@ void sort_entries(std::vector<ScanEntry>& entries) {
     const bool is_own =
         is_duty && entry.quantity == "rotor_force" && entry.variable.back() == entry.axis.back();
     const bool is_proxy = entry.variable.rfind("set_point", 0) == 0 || (is_duty && !is_own) ||
+                          entry.variable.rfind("neighbour_v", 0) == 0 ||
                           (entry.quantity == "rotor_force" && entry.variable == "thrust");
     return (is_proxy ? kAlike : 1) * entry.share;
   };
