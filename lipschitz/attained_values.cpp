@@ -12,7 +12,6 @@
 namespace swarmcert::lipschitz {
 namespace {
 
-constexpr float kInfinityF = std::numeric_limits<float>::infinity();
 constexpr int kValueSamples = 400, kValueClimbs = 200;
 
 /// The inputs of the terms of a function, in the box.
@@ -74,14 +73,6 @@ class ValueSearch {
  private:
   double share() { return std::ldexp(static_cast<double>(generator_() >> 11), -53); }
 
-  /// The nearest float32 in the interval; NaN where there is none.
-  static float in_interval(double x, double low, double high) {
-    auto value = static_cast<float>(x);
-    if (static_cast<double>(value) < low) value = std::nextafter(value, kInfinityF);
-    if (static_cast<double>(value) > high) value = std::nextafter(value, -kInfinityF);
-    return static_cast<double>(value) < low ? std::numeric_limits<float>::quiet_NaN() : value;
-  }
-
   /// Each coordinate at random, a third of them at an end.
   BoxPoint random_point() {
     BoxPoint point;
@@ -97,9 +88,10 @@ class ValueSearch {
       std::vector<float> x;
       for (std::size_t k = 0; k < box.lower.size(); ++k) {
         const double r = std::clamp(1.5 * share() - 0.25, 0.0, 1.0);
-        x.push_back(
-            in_interval(box.lower[k] + r * (box.upper[k] - box.lower[k]), box.lower[k], box.upper[k]));
-        if (std::isnan(x.back())) return {};
+        const std::optional<float> there =
+            nearest_float(box.lower[k] + r * (box.upper[k] - box.lower[k]), box.lower[k], box.upper[k]);
+        if (!there) return {};
+        x.push_back(*there);
       }
       point.inputs.push_back(std::move(x));
     }
@@ -111,9 +103,8 @@ class ValueSearch {
       const Box& box = domain_.at(point.networks[j]);
       for (std::size_t k = 0; k < box.lower.size(); ++k) {
         const double step = scale * (2 * share() - 1) * (box.upper[k] - box.lower[k]);
-        const double x =
-            std::clamp(static_cast<double>(point.inputs[j][k]) + step, box.lower[k], box.upper[k]);
-        point.inputs[j][k] = in_interval(x, box.lower[k], box.upper[k]);
+        float& x = point.inputs[j][k];  // one is in the box, so that there is a nearest
+        x = nearest_float(static_cast<double>(x) + step, box.lower[k], box.upper[k]).value_or(x);
       }
     }
     return point;

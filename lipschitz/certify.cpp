@@ -41,17 +41,6 @@ void require_what_is_bounded(const Network& network, const std::map<std::string,
   }
 }
 
-/// Whether a witness of `function` can be evaluated: the terms of a set function besides the one that moves are of any
-/// kind.
-bool has_witness(const std::map<std::string, const Weights*>& parts, const std::string& function) {
-  const std::vector<std::string> names = files::networks_of(function);
-  return std::all_of(parts.begin(), parts.end(), [&names](const auto& part) {
-    const bool enters = std::find(names.begin(), names.end(), part.first) != names.end() ||
-                        (names.size() == 2 && files::is_phi(part.first));
-    return part.second->is_relu() || !enters;
-  });
-}
-
 /// The largest slopes of what lies between the layers of `weights`; nothing where they are 1.
 void add_steepest_slopes(const Weights& weights, std::vector<UpperBound>& factors) {
   for (const files::Activation activation : weights.activations()) {
@@ -195,7 +184,8 @@ void multiply_norms(const Network& network, const std::map<std::string, const We
     }
     bound.has_local_slopes = bound.has_local_slopes || (bound.domain == "box" && !parts.at(name)->is_relu());
   }
-  bound.is_relu = has_witness(parts, bound.function) && !files::maps_to_invariants(network, bound.function);
+  bound.has_witness = !files::maps_to_invariants(network, bound.function);
+  bound.is_relu = bound.has_witness && has_relu_only(network, bound.function);
   bound.product = bound.upper = product_up(norms);
 }
 

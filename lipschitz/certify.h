@@ -55,8 +55,9 @@ struct CertifiedLayer {
 };
 
 struct CertifiedBound : Claim {
-  bool is_relu = true;     ///< of relative states; otherwise there are no witness and no branch and bound
-  bool has_slopes = true;  ///< number by number; otherwise a layer is sorted, and the product is the bound
+  bool has_witness = true;  ///< of relative states; otherwise there is no lower bound
+  bool is_relu = true;      ///< of relative states, by ReLU alone; otherwise there is no branch and bound
+  bool has_slopes = true;   ///< number by number; otherwise a layer is sorted, and the product is the bound
   bool has_local_slopes = false;  ///< a box, and an activation besides ReLU: its slopes there may be smaller
   bool is_monotone = true;        ///< otherwise the layer-wise bound is that of the product
   UpperBound upper{0};
@@ -107,12 +108,12 @@ inline constexpr double kEqualTolerance = 0x1p-20;
 std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const std::vector<Enclosure>& norms);
 
 /// Certifies NET as a whole. Upper bounds hold in exact arithmetic for the weights as stored, over all inputs and so
-/// over every box; lower bounds are exact slopes between two float32 points. The clamp of NET, which never increases
-/// a distance, leaves the upper bounds valid. Functions with other activations than ReLU, and set functions where any
-/// phi has one, get upper bounds only: by the same matrix inequality where the activation is monotone
+/// over every box; lower bounds are slopes between two float32 points, exact or, of smooth activations, rounded down
+/// (checker/witness.h). The clamp of NET, which never increases a distance, leaves the upper bounds valid. Functions
+/// with other activations than ReLU are bounded above by the same matrix inequality where the activation is monotone
 /// (checker/stages.h), else, up to the size that bent_bound.h states, by its extension; on a box also from the slopes
-/// that the activations have there. Set functions of rotation invariants get upper bounds only, too: those of
-/// rho(sum phi) times the Lipschitz constant of the map to invariants. Branch and bound is for ReLU. It runs on what
+/// that the activations have there. Set functions of rotation invariants get upper bounds only: those of rho(sum phi)
+/// times the Lipschitz constant of the map to invariants. Branch and bound is for ReLU. It runs on what
 /// the clamp lets through of the box, or on a projective cover of all inputs where there is no box.
 /// @throws std::invalid_argument if gamma is not positive, if branch and bound is asked for and an activation is not
 ///   ReLU, if there is a domain or branch and bound is asked for and NET has invariants, or as claims() and

@@ -212,7 +212,7 @@ void find_bounds(const Network& network, const CertifyOptions& options, const St
     const Stop share = shares.next();
     if (i < count) {
       progress.run("search for steep slopes of " + called(bound), [&] {
-        if (bound.is_relu) search_below(network, options, share, options.lower.starts, bound);
+        if (bound.has_witness) search_below(network, options, share, options.lower.starts, bound);
       });
     } else {
       progress.run("semidefinite program of " + called(bound), [&] {

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "lipschitz/checker/witness.h"
+#include "lipschitz/rounding.h"
+#include "lipschitz/slope_estimate.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
@@ -107,13 +110,98 @@ SlopeWitness search_scaled(const SlopeFunction& f, const Claim& claim, SlopeSear
   return found;
 }
 
+/// Points of a box as float32, nothing being a box that holds none.
+class FloatPoints {
+ public:
+  explicit FloatPoints(const std::map<std::string, Box>& domain) : domain_(domain) {}
+
+  /// The nearest to x in the box of `part`.
+  std::optional<std::vector<float>> nearest(const std::string& part, const Eigen::VectorXd& x) const {
+    constexpr double kMost = std::numeric_limits<float>::max();
+    const auto box = domain_.find(part);
+    std::vector<float> result;
+    for (Eigen::Index k = 0; k < x.size(); ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const double low = box == domain_.end() ? -kMost : std::max(box->second.lower[i], -kMost),
+                   high = box == domain_.end() ? kMost : std::min(box->second.upper[i], kMost);
+      const std::optional<float> there = nearest_float(x[k], low, high);
+      if (!there) return std::nullopt;
+      result.push_back(*there);
+    }
+    return result;
+  }
+
+ private:
+  const std::map<std::string, Box>& domain_;
+};
+
+/// The steepest of several pairs around a place. Short ones are steeper where the function is smooth, long ones keep
+/// their direction when they are rounded to float32.
+void try_pairs(const SlopeFunction& f, const std::string& moved, const SteepPlace& place, const Claim& claim,
+               const std::vector<int>& block, const FloatPoints& points, SlopePoints& pair,
+               FoundSlope& found) {
+  constexpr double kLengths[] = {0.125, 1, 8, 64, 512, 8192};  // of half a step
+  for (const double length : kLengths) {
+    const Eigen::VectorXd step = length * place.half_step * place.direction;
+    const auto x = points.nearest(moved, place.x + step), y = points.nearest(moved, place.x - step);
+    if (!x || !y || *x == *y) continue;
+    pair.x = *x;
+    pair.y = *y;
+    const LowerBound slope_of_pair = slope(f, pair, block, claim.scale);
+    if (found.witness && found.witness->slope.value() >= slope_of_pair.value()) continue;
+    found.witness.emplace();
+    static_cast<SlopePoints&>(*found.witness) = pair;
+    found.witness->slope = slope_of_pair;
+  }
+}
+
+/// Of functions that are not linear by parts, or whose parts search_slope() does not know.
+FoundSlope sampled_lower_bound(const Network& network, const Claim& claim,
+                               const std::map<std::string, Box>& domain, const LowerBoundOptions& options,
+                               int rounds) {
+  const std::map<std::string, Box> boxes = claim.domain == "box" ? domain : std::map<std::string, Box>();
+  SlopeEstimateOptions search;
+  search.seed = options.seed;
+  search.domain = boxes;
+  search.starts = rounds;
+  search.stop = Stop(options.cancelled, options.seconds);
+  const SteepPlace place = steep_place(network, claim, search);
+  FoundSlope found;
+  found.rounds = place.starts;
+  found.interrupted = place.interrupted;
+  const FloatPoints points(boxes);
+  SlopePoints pair;
+  for (std::size_t j = 0; j < place.others.size(); ++j) {
+    std::optional<std::vector<float>> other = points.nearest(place.other_networks[j], place.others[j]);
+    if (!other) return found;
+    pair.others.push_back(std::move(*other));
+  }
+  found.other_networks = place.other_networks;
+  try_pairs(slope_function(network, claim.function, place.other_networks),
+            files::networks_of(claim.function).front(), place, claim,
+            files::block_coordinates(network, claim.function, claim.block), points, pair, found);
+  return found;
+}
+
 }  // namespace
+
+bool has_relu_only(const Network& network, const std::string& function) {
+  const std::vector<std::string> names = files::networks_of(function);
+  const std::map<std::string, const Weights*> parts = files::parts(network);
+  return std::all_of(parts.begin(), parts.end(), [&names](const auto& part) {
+    const bool enters = std::find(names.begin(), names.end(), part.first) != names.end() ||
+                        (names.size() == 2 && files::is_phi(part.first));
+    return part.second->is_relu() || !enters;
+  });
+}
 
 FoundSlope lower_bound(const Network& network, const Claim& claim, const std::map<std::string, Box>& domain,
                        const LowerBoundOptions& options) {
   FoundSlope best;
   const int rounds = options.rounds.value_or(default_rounds(network, claim.function));
   if (rounds == 0) return best;
+  if (!has_relu_only(network, claim.function))
+    return sampled_lower_bound(network, claim, domain, options, rounds);
   const std::vector<std::string> names = files::networks_of(claim.function);
   const int cases = names.size() == 2 ? kMostNeighbours : 1;  // they share the rounds and the seconds
   for (int neighbours = 1; neighbours <= cases; ++neighbours) {

@@ -18,7 +18,7 @@ namespace swarmcert::lipschitz {
 struct LowerBoundOptions {
   std::uint64_t seed = 1;
   /// Per claim; 0: no lower bounds. Nothing: kDefaultSearchRounds, fewer for networks much larger than the paper's,
-  /// for which a round takes longer.
+  /// for which a round takes longer. With other activations than ReLU a round is a start of steep_place().
   std::optional<int> rounds;
   double seconds = 0;  ///< per claim, as SlopeSearchOptions has it; 0: no limit
   const std::atomic<bool>* cancelled = nullptr;
@@ -33,9 +33,15 @@ struct FoundSlope {
   bool interrupted = false;  ///< stopped before all rounds were done
 };
 
-/// Searches for the steepest pair of points within the claim's block and domain, exactly as steep in the claim's norm
-/// as `slope` says. A set function is tried with one to three neighbours, of every kind and with the ground.
+/// Whether all networks that enter `function` are ReLU networks: those that it passes through, and of a set function,
+/// whose other terms are of any kind, every phi.
+bool has_relu_only(const files::Network& network, const std::string& function);
+
+/// Searches for the steepest pair of points within the claim's block and domain, as steep in the claim's norm as
+/// slope() proves. Of ReLU networks by search_slope(), a set function with one to three neighbours, of every kind and
+/// with the ground; of others around the steep_place().
 /// @param domain the boxes of a claim whose domain is "box", by part.
+/// @throws std::invalid_argument as slope_function(): of functions of rotation invariants there is no such proof.
 FoundSlope lower_bound(const files::Network& network, const Claim& claim,
                        const std::map<std::string, Box>& domain, const LowerBoundOptions& options);
 

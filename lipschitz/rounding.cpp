@@ -50,4 +50,13 @@ double sqrt_up(const Dyadic& square) {
   return root;
 }
 
+std::optional<float> nearest_float(double x, double low, double high) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  auto value = static_cast<float>(std::max(low, std::min(x, high)));
+  if (static_cast<double>(value) < low) value = std::nextafter(value, kInfinity);
+  if (static_cast<double>(value) > high) value = std::nextafter(value, -kInfinity);
+  if (static_cast<double>(value) < low) return std::nullopt;
+  return value;
+}
+
 }  // namespace swarmcert::lipschitz

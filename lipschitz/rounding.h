@@ -1,6 +1,8 @@
 /// @file Exact numbers rounded to doubles that stay bounds.
 #pragma once
 
+#include <optional>
+
 #include "lipschitz/checker/dyadic.h"
 
 namespace swarmcert::lipschitz {
@@ -13,5 +15,9 @@ double rounded_down(const check::Dyadic& x);
 /// The smallest double u >= 0 with u^2 >= square, in exact arithmetic; infinite beyond the doubles.
 /// @param square not negative
 double sqrt_up(const check::Dyadic& square);
+
+/// A float32 in [low, high], the nearest to x or one next to it; nothing where there is none.
+/// @param x within the range of float32 once it is in [low, high]; low and high not NaN.
+std::optional<float> nearest_float(double x, double low, double high);
 
 }  // namespace swarmcert::lipschitz

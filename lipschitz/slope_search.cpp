@@ -42,6 +42,7 @@ void check_box(const Box& box, const Term& term, const std::string& name) {
 /// The boxes of (x, x_1, x_2, ...).
 std::vector<std::optional<Box>> check(const SlopeFunction& f, const SlopeSearchOptions& options) {
   check_function(f);
+  if (!is_relu(f)) refuse("an activation is not ReLU");
   if (options.rounds < 1) refuse("rounds = " + std::to_string(options.rounds) + " is below 1");
   if (!(options.seconds >= 0)) refuse("seconds = " + std::to_string(options.seconds) + " is negative");
   for (const VectorXd& start : options.starts) {

@@ -53,7 +53,7 @@ class BoxValues {
 
   void activate(Activation activation) {
     if (files::function_of(activation).sorts()) {
-      values_ = sorted(activation);
+      values_ = activated_intervals(activation, values_);
       form_ = constant_form();
       return;
     }
@@ -102,11 +102,6 @@ class BoxValues {
     const Interval all = values_between(activation, {low, high});
     low = all.lower;
     high = all.upper;
-  }
-
-  /// Sorting, maxima and minima do not decrease when a number grows: each end by itself.
-  Intervals sorted(Activation activation) const {
-    return {files::rearranged(activation, values_.lower), files::rearranged(activation, values_.upper)};
   }
 
   /// The intervals as a form that does not depend on x.

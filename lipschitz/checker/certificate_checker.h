@@ -42,7 +42,7 @@ class CertificateChecker {
   /// By the product of the norms and of the activations' steepest slopes; local_product: those on the box.
   void check_product(const Json& bound, const std::vector<std::string>& names, double upper,
                      const std::vector<double>& scale, const std::string& where) const;
-  /// What is stated of functions with other activations than ReLU: nothing by parts of a box, no witness.
+  /// What is stated of functions with other activations than ReLU: nothing by parts of a box.
   void check_activations(const Json& bound, const std::vector<std::string>& names,
                          const std::string& where) const;
   /// Of functions of rotation invariants: nothing on a box, no witness, no scale.

@@ -236,8 +236,6 @@ void CertificateChecker::check_activations(const Json& bound, const std::vector<
       const files::ActivationFunction& function = files::function_of(activation);
       const std::string with = " of a network with " + function.words;
       require(bound["upper_method"] != "branch", where + ": a bound by parts of a box" + with);
-      require(bound["lower"].is_null() && bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
-              where + ": a lower bound" + with);
       require(
           !function.sorts() || bound["upper_method"] == "product" || bound["upper_method"] == "local_product",
           where + ": a bound from slopes of single numbers" + with);

@@ -1,5 +1,7 @@
 #include "lipschitz/checker/values.h"
 
+#include "lipschitz/checker/activation_bounds.h"
+
 namespace swarmcert::check {
 namespace {
 
@@ -42,6 +44,27 @@ Intervals relu_intervals(Intervals intervals) {
     for (Dyadic& x : *ends)
       if (x.sign() < 0) x = Dyadic();
   return intervals;
+}
+
+Intervals activated_intervals(files::Activation activation, const Intervals& layer) {
+  // Sorting, maxima and minima do not decrease when a number grows: each end by itself.
+  if (files::function_of(activation).sorts())
+    return {files::rearranged(activation, layer.lower), files::rearranged(activation, layer.upper)};
+  Intervals result;
+  for (std::size_t i = 0; i < layer.lower.size(); ++i) {
+    Interval values = values_between(activation, {layer.lower[i], layer.upper[i]});
+    result.lower.push_back(std::move(values.lower));
+    result.upper.push_back(std::move(values.upper));
+  }
+  return result;
+}
+
+Intervals network_intervals(const files::Weights& weights, Intervals inputs) {
+  for (std::size_t k = 0; k < weights.layers.size(); ++k) {
+    if (k > 0) inputs = activated_intervals(weights.layers[k - 1].activation, inputs);
+    inputs = layer_intervals(weights.layers[k], inputs);
+  }
+  return inputs;
 }
 
 Intervals sum_intervals(const std::vector<SumTerm>& terms, std::size_t size) {

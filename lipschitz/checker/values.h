@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "lipschitz/checker/dyadic.h"
+#include "nn/weights/activation_function.h"
 #include "nn/weights/weights.h"
 
 namespace swarmcert::check {
@@ -25,6 +26,10 @@ struct Bounded {
 /// @param inputs as many as the layer takes.
 Intervals layer_intervals(const files::Layer& layer, const Intervals& inputs);
 Intervals relu_intervals(Intervals intervals);
+/// Of a layer behind its activation, number by number (values_between()) or sorted.
+Intervals activated_intervals(files::Activation activation, const Intervals& layer);
+/// Of what leaves the last layer of `weights`. At a point exact, without width, where all activations are ReLU or sort.
+Intervals network_intervals(const files::Weights& weights, Intervals inputs);
 
 /// Between `fewest` and `most` vectors of which all the same is known.
 struct SumTerm : Bounded {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "lipschitz/checker/values.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
 
@@ -85,7 +86,9 @@ DyadicVector apply(const files::Layer& layer, const DyadicVector& x) {
   return y;
 }
 
+/// Of a ReLU network.
 DyadicVector evaluate(const files::Weights& network, DyadicVector x) {
+  if (!network.is_relu()) throw std::invalid_argument("only ReLU networks are evaluated in integers");
   for (std::size_t k = 0; k < network.layers.size(); ++k) {
     x = apply(network.layers[k], x);
     if (k + 1 == network.layers.size()) break;
@@ -96,14 +99,19 @@ DyadicVector evaluate(const files::Weights& network, DyadicVector x) {
   return x;
 }
 
-DyadicVector evaluate(const Term& term, const std::vector<float>& x) {
+/// What the network of `term` sees of x.
+std::vector<double> seen(const Term& term, const std::vector<float>& x) {
   std::vector<double> clamped(x.begin(), x.end());
   if (term.clamp != nullptr) {
     for (std::size_t k = 0; k < x.size(); ++k) {
       clamped[k] = std::clamp(clamped[k], term.clamp->lower[k], term.clamp->upper[k]);
     }
   }
-  return evaluate(*term.network, exactly(clamped));
+  return clamped;
+}
+
+DyadicVector evaluate(const Term& term, const std::vector<float>& x) {
+  return evaluate(*term.network, exactly(seen(term, x)));
 }
 
 /// The value before rho: moved(x) + sum of the others.
@@ -111,6 +119,17 @@ DyadicVector evaluate(const SlopeFunction& f, const std::vector<float>& x, const
   DyadicVector value = evaluate(f.moved, x);
   if (others_sum != nullptr) add(value, *others_sum);
   return f.rho == nullptr ? value : evaluate(*f.rho, std::move(value));
+}
+
+/// integer 2^exponent.
+mpq_class scaled(const mpz_class& integer, long exponent) {
+  mpq_class result(integer);
+  if (exponent >= 0) {
+    mpq_mul_2exp(result.get_mpq_t(), result.get_mpq_t(), static_cast<mp_bitcnt_t>(exponent));
+  } else {
+    mpq_div_2exp(result.get_mpq_t(), result.get_mpq_t(), static_cast<mp_bitcnt_t>(-exponent));
+  }
+  return result;
 }
 
 /// |a - b|_2^2 as a rational number.
@@ -121,14 +140,71 @@ mpq_class squared_distance(DyadicVector a, DyadicVector b) {
     const mpz_class difference = a.integers[i] - b.integers[i];
     sum += difference * difference;
   }
-  mpq_class result(sum);
-  const long exponent = 2 * a.exponent;
-  if (exponent >= 0) {
-    mpq_mul_2exp(result.get_mpq_t(), result.get_mpq_t(), static_cast<mp_bitcnt_t>(exponent));
-  } else {
-    mpq_div_2exp(result.get_mpq_t(), result.get_mpq_t(), static_cast<mp_bitcnt_t>(-exponent));
+  return scaled(sum, 2 * a.exponent);
+}
+
+using check::Dyadic;
+using check::Intervals;
+
+/// Contains the term's value at x.
+Intervals enclosed(const Term& term, const std::vector<float>& x) {
+  Intervals at;
+  for (const double coordinate : seen(term, x)) at.lower.emplace_back(coordinate);
+  at.upper = at.lower;
+  return check::network_intervals(*term.network, std::move(at));
+}
+
+void add(Intervals& sum, const Intervals& term) {
+  for (std::size_t i = 0; i < sum.lower.size(); ++i) {
+    sum.lower[i] += term.lower[i];
+    sum.upper[i] += term.upper[i];
   }
-  return result;
+}
+
+Intervals enclosed(const SlopeFunction& f, const std::vector<float>& x, const Intervals* others_sum) {
+  Intervals value = enclosed(f.moved, x);
+  if (others_sum != nullptr) add(value, *others_sum);
+  return f.rho == nullptr ? value : check::network_intervals(*f.rho, std::move(value));
+}
+
+/// At most |a - b|_2^2, whatever a and b are in their enclosures.
+mpq_class least_squared_distance(const Intervals& a, const Intervals& b) {
+  Dyadic sum;
+  for (std::size_t i = 0; i < a.lower.size(); ++i) {
+    const Dyadic least = std::max<Dyadic>(a.lower[i] - b.upper[i], b.lower[i] - a.upper[i]);
+    if (least.sign() > 0) sum += least * least;
+  }
+  return scaled(sum.mantissa, sum.exponent);
+}
+
+/// |f(x) - f(y)|_2^2 of a ReLU function.
+mpq_class exact_rise(const SlopeFunction& f, const SlopePoints& points) {
+  DyadicVector others_sum;
+  for (std::size_t j = 0; j < f.others.size(); ++j) {
+    DyadicVector value = evaluate(f.others[j], points.others[j]);
+    if (j == 0) {
+      others_sum = std::move(value);
+    } else {
+      add(others_sum, std::move(value));
+    }
+  }
+  const DyadicVector* const sum = f.others.empty() ? nullptr : &others_sum;
+  return squared_distance(evaluate(f, points.x, sum), evaluate(f, points.y, sum));
+}
+
+/// At most |f(x) - f(y)|_2^2.
+mpq_class least_rise(const SlopeFunction& f, const SlopePoints& points) {
+  Intervals others_sum;
+  for (std::size_t j = 0; j < f.others.size(); ++j) {
+    const Intervals value = enclosed(f.others[j], points.others[j]);
+    if (j == 0) {
+      others_sum = value;
+    } else {
+      add(others_sum, value);
+    }
+  }
+  const Intervals* const sum = f.others.empty() ? nullptr : &others_sum;
+  return least_squared_distance(enclosed(f, points.x, sum), enclosed(f, points.y, sum));
 }
 
 [[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument("slope: " + what); }
@@ -159,6 +235,12 @@ void check_point(const std::vector<float>& x, const Term& term, const std::strin
 }
 
 }  // namespace
+
+bool is_relu(const SlopeFunction& f) {
+  return f.moved.network->is_relu() && (f.rho == nullptr || f.rho->is_relu()) &&
+         std::all_of(f.others.begin(), f.others.end(),
+                     [](const Term& other) { return other.network->is_relu(); });
+}
 
 void check_function(const SlopeFunction& f) {
   check_term(f.moved, "the moved term");
@@ -207,9 +289,7 @@ SlopeFunction slope_function(const files::Network& network, const std::string& f
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const std::vector<std::string> names = files::networks_of(function);
   if (files::maps_to_invariants(network, function)) refuse(function + " maps to rotation invariants");
-  if (!files::is_relu(network, function)) refuse(function + " is no ReLU network");
   const auto term = [&](const std::string& name) {
-    if (!parts.at(name)->is_relu()) refuse(name + " is no ReLU network");
     const bool clamped = network.clamp && files::is_clamped(name);
     return Term{parts.at(name), clamped ? &*network.clamp : nullptr};
   };
@@ -245,15 +325,7 @@ std::vector<mpq_class> value(const files::Network& network, const std::string& f
   }
   if (names.size() == 2) sum = evaluate(*parts.at(names[1]), std::move(sum));
   std::vector<mpq_class> result;
-  for (const mpz_class& integer : sum.integers) {
-    mpq_class exact(integer);
-    if (sum.exponent >= 0) {
-      mpq_mul_2exp(exact.get_mpq_t(), exact.get_mpq_t(), static_cast<mp_bitcnt_t>(sum.exponent));
-    } else {
-      mpq_div_2exp(exact.get_mpq_t(), exact.get_mpq_t(), static_cast<mp_bitcnt_t>(-sum.exponent));
-    }
-    result.push_back(exact);
-  }
+  for (const mpz_class& integer : sum.integers) result.push_back(scaled(integer, sum.exponent));
   return result;
 }
 
@@ -279,18 +351,9 @@ mpq_class slope_squared(const SlopeFunction& f, const SlopePoints& points, const
   }
   if (points.x == points.y) refuse("x == y");
 
-  DyadicVector others_sum;
-  for (std::size_t j = 0; j < f.others.size(); ++j) {
+  for (std::size_t j = 0; j < f.others.size(); ++j)
     check_point(points.others[j], f.others[j], "fixed point " + std::to_string(j));
-    DyadicVector value = evaluate(f.others[j], points.others[j]);
-    if (j == 0) {
-      others_sum = std::move(value);
-    } else {
-      add(others_sum, std::move(value));
-    }
-  }
-  const DyadicVector* const sum = f.others.empty() ? nullptr : &others_sum;
-  const mpq_class rise = squared_distance(evaluate(f, points.x, sum), evaluate(f, points.y, sum));
+  const mpq_class rise = is_relu(f) ? exact_rise(f, points) : least_rise(f, points);
   if (!scale.empty() && scale.size() != points.x.size()) refuse("scale needs one number per input");
   mpq_class run = 0;
   for (std::size_t k = 0; k < points.x.size(); ++k) {

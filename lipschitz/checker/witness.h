@@ -1,5 +1,4 @@
-/// @file Two points as proof of a lower bound on a Lipschitz constant: the slope between them, in exact
-/// arithmetic.
+/// @file Two points as proof of a lower bound on a Lipschitz constant: the slope between them, in exact arithmetic.
 #pragma once
 
 #include <gmpxx.h>
@@ -44,14 +43,17 @@ SlopeFunction slope_function(const files::Network& network, const std::string& f
 
 /// The value of "network" at one point, or of a set function at the sum of its terms: exact. `networks` names the part
 /// of each point; a set function may have none.
-/// @throws std::invalid_argument or std::out_of_range as slope_function(), or if a point does not fit its network.
+/// @throws std::invalid_argument or std::out_of_range as slope_function(), or if a point does not fit its network, or
+///   an activation is not ReLU.
 std::vector<mpq_class> value(const files::Network& network, const std::string& function,
                              const std::vector<std::string>& networks,
                              const std::vector<std::vector<float>>& points);
 
-/// |f(x) - f(y)|_2^2 / |x - y|_2^2 for the weights as stored, as a rational number: nothing is rounded. By
-/// the definition of a Lipschitz constant its root is a lower bound on that of f over any convex set that
-/// holds x and y, whether or not they lie on kinks. With a `block`, x and y agree outside of it, so that the
+/// |f(x) - f(y)|_2^2 / |x - y|_2^2 for the weights as stored, as a rational number. Where all activations are ReLU or
+/// sort, nothing is rounded. Elsewhere f(x) and f(y) are enclosed, to about 2^-64 times the gains of the layers behind
+/// an activation (network_intervals()), and the number is the least that the enclosures allow. By the definition of a
+/// Lipschitz constant its root is a lower bound on that of f over any convex set that holds x and y, whether or not
+/// they lie on kinks. With a `block`, x and y agree outside of it, so that the
 /// same number bounds the constant with respect to those coordinates alone.
 /// @param block input coordinates that may differ between x and y; empty: all.
 /// @param scale empty, or one positive number per input: |x - y|^2 is then sum_k ((x_k - y_k) / scale_k)^2.
@@ -69,6 +71,9 @@ LowerBound slope(const SlopeFunction& f, const SlopePoints& points, const std::v
 /// The largest double whose square is at most `square` >= 0, or one next to it; never above.
 /// @throws std::invalid_argument if `square` is negative.
 double sqrt_down(const mpq_class& square);
+
+/// Whether all its networks are ReLU networks.
+bool is_relu(const SlopeFunction& f);
 
 /// @throws std::invalid_argument unless networks are given, their sizes compose, the clamps have one interval
 ///   lower <= upper per input, and `others` is empty where `rho` is null.

@@ -1555,10 +1555,10 @@ def sigmoid_of(t):
 
 
 def log_of_one_plus(e):
-    """-ln(1 - u) = u + u^2/2 + ..., u = e / (1 + e) <= 1/2; the rest is at most the last power."""
+    """-ln(1 - u) = u + u^2/2 + ..., u = e / (1 + e) <= 1/2; the rest is at most twice the next power."""
     u = times(e, inverse(plus((ONE, ONE), e)))
     total, p, k = (0, 0), u, 1
-    while p[1] > 1:
+    while p[1] > 2:  # rounded up, half of 2 may be 2 again
         total, p, k = plus(total, over(p, k)), times(p, u), k + 1
     return total[0], total[1] + 2 * p[1]
 
@@ -1661,7 +1661,10 @@ def slopes_between(op, low, high):
         points = {low, high}
         if low < 0 < high and op not in BENT_PLACES:
             points.add(Fraction(0))
-        found = [slope_of(op, t) for t in points] + [enclosed(SELU_SCALE)] * (op == "selu" and high > 0)
+        if op == "selu" and low == 0:  # its slope from below is none of these
+            points.remove(0)
+        found = [slope_of(op, t) for t in points]
+        found += [enclosed(SELU_SCALE)] * (op == "selu" and (low == 0 or high > 0))
         ends = Fraction(min(a for a, _ in found), ONE), Fraction(max(b for _, b in found), ONE)
         if op in BENT_PLACES:
             first, last = BENT_PLACES[op][3:]
@@ -1694,6 +1697,15 @@ def up(x):
     return math.ceil(x / VALUE_UNIT) * VALUE_UNIT
 
 
+def layer_ends(layer, low, high):
+    """Between which W h + b lies for h between low and high."""
+    w = Matrix.of(layer.weights, layer.inputs)
+    rises = Matrix([[max(x, 0) for x in row] for row in w.rows], w.exponent)
+    falls = Matrix([[min(x, 0) for x in row] for row in w.rows], w.exponent)
+    return [[Fraction(b) + x + y for b, x, y in zip(layer.biases, applied(rises, p), applied(falls, q))]
+            for p, q in ((low, high), (high, low))]
+
+
 def layers_on_box(weights, low, high):
     """Per layer the ends (low, high) of what leaves it before its activation, and the slopes of the activation there:
     intervals, intersected with a linear form G (x - c) + m, off by at most E, c the middle of the box. For slopes in
@@ -1705,15 +1717,12 @@ def layers_on_box(weights, low, high):
     for k, layer in enumerate(weights.layers):
         w = Matrix.of(layer.weights, layer.inputs)
         sizes = Matrix([list(map(abs, row)) for row in w.rows], w.exponent)
-        rises = Matrix([[max(x, 0) for x in row] for row in w.rows], w.exponent)
-        falls = Matrix([[min(x, 0) for x in row] for row in w.rows], w.exponent)
         bias = list(map(Fraction, layer.biases))
         columns = [list(map(down, applied(w, column))) for column in columns]
         middle = [down(b + y) for b, y in zip(bias, applied(w, middle))]
         error = [up(e + rounding) for e in applied(sizes, error)]
         spread = [e + sum(abs(column[i]) * r for column, r in zip(columns, radius)) for i, e in enumerate(error)]
-        ends = [[b + x + y for b, x, y in zip(bias, applied(rises, p), applied(falls, q))]
-                for p, q in ((low, high), (high, low))]
+        ends = layer_ends(layer, low, high)
         low = [max(l, m - s) for l, m, s in zip(ends[0], middle, spread)]
         high = [min(h, m + s) for h, m, s in zip(ends[1], middle, spread)]
         slopes = []
@@ -1736,6 +1745,19 @@ def layers_on_box(weights, low, high):
             error[i] = up(abs(a + b) / 2 * error[i] + (b - a) / 2 * max(h - p, p - l) + value[1] - value[0] + rounding)
             middle[i] = down(value[0] + (a + b) / 2 * (middle[i] - p))
         low, high = map(list, zip(*(values_between(op, l, h) for l, h in zip(low, high))))
+
+
+def enclosed_values(weights, low, high):
+    """Between which the outputs lie of inputs between low and high, layer by layer."""
+    for k, layer in enumerate(weights.layers):
+        if k > 0:
+            op = weights.between()[k - 1]
+            if op in SORTING:
+                low, high = sorted_layer(op, low), sorted_layer(op, high)
+            else:
+                low, high = map(list, zip(*(values_between(op, l, h) for l, h in zip(low, high))))
+        low, high = layer_ends(layer, low, high)
+    return low, high
 
 
 # --- values over boxes ---------------------------------------------------------------------------------------------
@@ -1927,8 +1949,6 @@ class Checker:
         activations = {op for name in names for op in self.network.parts[name].between()}
         if not activations <= {"relu"}:
             require(bound["upper_method"] != "branch", f"{where}: a bound by parts of a box is for ReLU only")
-            require(bound["lower"] is None and bound["lower_hex"] is None and bound["lower_witness"] is None,
-                    f"{where}: a lower bound is for ReLU only")
             require(activations.isdisjoint(SORTING) or bound["upper_method"] in ("product", "local_product"),
                     f"{where}: a bound from slopes of single numbers")
         if self.network.maps_to_invariants(function):
@@ -2153,11 +2173,15 @@ class Checker:
             require(all(a <= x <= b for a, x, b in zip(low, values, high)), f"{where}: a point is outside of the box")
         return values
 
-    def term(self, part, values):
+    def seen(self, part, values):
+        """What the clamp lets through."""
         if self.network.clamp and (part == "network" or (part.startswith("phi:") and part != "phi:ground")):
             low, high = self.network.clamp
             values = [float(min(max(x, a), b)) for x, a, b in zip(values, low, high)]
-        return evaluate(self.network.parts[part], *dyadics(values))
+        return values
+
+    def term(self, part, values):
+        return evaluate(self.network.parts[part], *dyadics(self.seen(part, values)))
 
     def check_lower(self, bound, lower, scale, boxed, where):
         witness, function = bound["lower_witness"], bound["function"]
@@ -2173,8 +2197,6 @@ class Checker:
             grounds = [n for n in [names[0]] + [o for o, _ in others] if n == "phi:ground"]
             require(len(grounds) == ("phi:ground" in self.network.parts), f"{where}: the ground enters exactly once")
         neighbours, there = self.neighbours_of(bound, where), [names[0]] + [o for o, _ in others]
-        require(all(self.network.parts[part].is_relu() for part in there + names[1:]),
-                f"{where}: a part is no ReLU network")
         require(not neighbours or all(there.count(o) <= neighbours.get(o[4:], 0) for o in there if o != "phi:ground"),
                 f"{where}: has more neighbours than listed")
         block = block_coordinates(self.network, function, bound["block"])
@@ -2183,6 +2205,12 @@ class Checker:
                   for a, b, s in zip(x, y, scale or x))
         require(run > 0, f"{where}: x == y")
         require(not scale or len(scale) == len(x), f"{where}: scale has another size")
+        is_relu = all(self.network.parts[part].is_relu() for part in there + names[1:])
+        rise = (self.exact_rise if is_relu else self.least_rise)(names, x, y, others)
+        require(lower ** 2 * run <= rise, f"{where}: claims more than the slope between x and y")
+
+    def exact_rise(self, names, x, y, others):
+        """|f(x) - f(y)|^2 of ReLU networks."""
         outputs = []
         for moved in (x, y):
             value = self.term(names[0], moved)
@@ -2190,8 +2218,17 @@ class Checker:
                 value = add(value, self.term(part, fixed))
             outputs.append(evaluate(self.network.parts[names[1]], *value) if len(names) == 2 else value)
         difference, exponent = add(outputs[0], ([-v for v in outputs[1][0]], outputs[1][1]))
-        rise = sum(v * v for v in difference) * power(2 * exponent)
-        require(lower ** 2 * run <= rise, f"{where}: claims more than the slope between x and y")
+        return sum(v * v for v in difference) * power(2 * exponent)
+
+    def least_rise(self, names, x, y, others):
+        """At most |f(x) - f(y)|^2, from enclosures of both."""
+        ends = []
+        for moved in (x, y):
+            terms = [enclosed_values(self.network.parts[part], *[list(map(Fraction, self.seen(part, point)))] * 2)
+                     for part, point in [(names[0], moved)] + others]
+            low, high = ([sum(column) for column in zip(*side)] for side in zip(*terms))
+            ends.append(enclosed_values(self.network.parts[names[1]], low, high) if len(names) == 2 else (low, high))
+        return sum(max(a - d, c - b, 0) ** 2 for a, b, c, d in zip(*ends[0], *ends[1]))
 
     def check_law(self, law):
         require_keys(law, ["rho", "neighbours", "domain", "block", "law", "status", "upper", "upper_hex"], "law")

@@ -351,6 +351,10 @@ def check_fixed(certificate, net, folder):
     assert second.main(positional) == 3
 
 
+def is_in_box(box, point):
+    return all(a <= x <= b for a, x, b in zip(*map(second.hex_floats, (box["lower"], point, box["upper"]))))
+
+
 def check_activations(certificate, net, folder):
     """Another activation in a chain, lower bounds or boxes of it, a smaller claim: the checkers agree on each."""
     def both(changed):
@@ -379,14 +383,17 @@ def check_activations(certificate, net, folder):
         names = second.networks_of(bound["function"])
         others = ([{"network": "phi:ground", "x": point("phi:ground")}]
                   if len(names) == 2 and names[0] != "phi:ground" else [])
+        unit = ["0x1p+0"] + point(names[0])[1:]
         changed["bounds"][i].update(lower=0.0, lower_hex="0x0p+0", lower_witness={
-            "x": point(names[0]), "y": ["0x1p+0"] + point(names[0])[1:], "others": others})
-        assert both(changed) == (bound["lower"] is not None), f"{bound['function']}: a lower bound"
+            "x": point(names[0]), "y": unit, "others": others})
+        used = [(names[0], point(names[0])), (names[0], unit)] + [(other["network"], other["x"]) for other in others]
+        fits = bound["domain"] != "box" or all(is_in_box(certificate["box"][part], x) for part, x in used)
+        assert both(changed) == fits, f"{bound['function']}: a lower bound"
         tried = [("block", "ll"), ("upper", second.math.nextafter(bound["upper"], 0)), ("upper_method", "branch"),
                  ("upper_method", "sdp")]
         if any(step["op"] not in ("clamp", "linear", "relu") for name in names
                for step in certificate["network"]["weights"][name]["chain"]):
-            tried += [("upper_method", "local_sdp"), ("lower", 0.0)]
+            tried += [("upper_method", "local_sdp"), ("lower", 1.00000001 * bound["lower"])]
         for key, value in tried:
             changed = copy()
             changed["bounds"][i][key] = value
@@ -395,7 +402,15 @@ def check_activations(certificate, net, folder):
             assert not both(changed) or bound[key] == value, f"{bound['function']}: {key} = {value} is accepted"
 
 
+def check_enclosures():
+    """Softplus next to 0, where the terms of its series are halved: it ends, around ln 2."""
+    for t in 0.0, 5e-324, -5e-324, 2.0 ** -80:
+        low, high = second.values_between("softplus", second.Fraction(t), second.Fraction(t))
+        assert low <= second.Fraction("0.693147180559945309417232121458") <= high <= low + 2 * second.VALUE_UNIT, t
+
+
 def run():
+    check_enclosures()
     generator = random.Random(1)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -170,7 +170,7 @@ void add_slope_estimates(const files::Network& network, const lipschitz::Certify
   output.slope_estimates.resize(bounds.size());
   files::parallel_for(static_cast<int>(bounds.size()), options.jobs, [&](int i) {
     const CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
-    if (bound.is_relu) return;
+    if (bound.has_witness) return;
     lipschitz::SlopeEstimateOptions sampling;
     sampling.seed = options.lower.seed;
     sampling.domain = options.domain;
@@ -487,7 +487,8 @@ Command certify_command() {
           "Upper bounds are proved in exact arithmetic for the weights as stored; the certificate (-o) holds "
           "the proofs\n"
           "and 'swarmcert check' verifies them without an optimiser. Lower bounds are slopes between two "
-          "float32 points.\n"
+          "float32 points,\n"
+          "exact or, with smooth activations, rounded down.\n"
           "Verdict: proved (exit 0), refuted (1) or inconclusive (4), of --gamma and --max-lipschitz where "
           "given, and of\n"
           "the gamma that a network.toml states.\n\n"

@@ -227,6 +227,9 @@ void print_bounds(const files::Network& network, const CertifyOutput& output) {
   if (std::any_of(found.bounds.begin(), found.bounds.end(),
                   [](const CertifiedBound& bound) { return !bound.is_relu; }))
     fmt::print("  {}\n", kForReluOnly);
+  if (std::any_of(found.bounds.begin(), found.bounds.end(),
+                  [](const CertifiedBound& bound) { return !bound.has_witness; }))
+    fmt::print("  {}\n", kNoLowerBound);
   if (!network.rho.empty()) {
     fmt::print("  set: one neighbour moves; any number of other neighbours, anywhere\n");
     const auto is_counted = [](const CertifiedBound& bound) { return !bound.neighbours.empty(); };

@@ -20,7 +20,7 @@ struct CertifyOutput {
   lipschitz::Certification found;
   std::vector<std::optional<lipschitz::Comparison>>
       comparisons;  ///< per bound of `found`; empty where not asked for
-  /// Per bound of `found`, where its activation is not ReLU; empty where none was asked for.
+  /// Per bound of `found`, where it has no witness; empty where none was asked for.
   std::vector<std::optional<lipschitz::Estimate>> slope_estimates;
   std::vector<lipschitz::CertifiedRange> ranges;
   std::vector<lipschitz::Float32Error> float32_errors;
@@ -35,11 +35,14 @@ struct CertifyOutput {
   bool is_interrupted() const { return lipschitz::is_interrupted(found) || ranges_cut_short; }
 };
 
-/// Said of networks that have another activation than ReLU, or rotation invariants.
+/// Said of bounds of functions that have another activation than ReLU, or rotation invariants.
 inline constexpr char kForReluOnly[] =
-    "lower bounds and the search by branch and bound are for ReLU networks of relative states: of other "
-    "activations upper bounds are proved, on a box from the slopes that they have there, and of functions of "
-    "rotation invariants upper bounds for all inputs";
+    "branch and bound is for ReLU networks of relative states: with other activations bounds on a box are "
+    "proved from the slopes that they have there";
+
+/// Said of functions of rotation invariants.
+inline constexpr char kNoLowerBound[] =
+    "of functions of rotation invariants upper bounds for all inputs are proved, and no lower bounds";
 
 /// Unit of the network's outputs; "output" where NET states none.
 std::string output_unit(const files::Network& network);

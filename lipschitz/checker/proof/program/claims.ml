@@ -182,8 +182,6 @@ let check_activations state where bound names =
         let of_ = " of a network with " ^ Activation.words activation in
         let by method_ = find where "upper_method" bound = Text method_ in
         require (not (by "branch")) "%s: a bound by parts of a box%s" where of_;
-        require (List.for_all (fun key -> find where key bound = Null) [ "lower"; "lower_hex"; "lower_witness" ])
-          "%s: a lower bound%s" where of_;
         require (not (Activation.sorts activation) || by "product" || by "local_product")
           "%s: a bound from slopes of single numbers%s" where of_
       end) activations
@@ -238,11 +236,15 @@ let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~
     let lower = Exact.of_float (Exact.number (where ^ " lower") (find where "lower" bound)
         (find where "lower_hex" bound)) in
     let in_box = find where "domain" bound = Text "box" in
-    let proof = Witness.read state.net state.json (where ^ ": lower_witness") names ~in_box ~neighbours ~moves
+    let proof, is_relu = Witness.read state.net state.json (where ^ ": lower_witness") names ~in_box ~neighbours ~moves
         witness in
-    prove state (Slope_at_least (func, moves, exact_scale, lower)) proof
-        (where ^ ": lower_witness: claims more than the slope between x and y");
-    state.lower_bounds <- state.lower_bounds + 1
+    if is_relu then begin
+      prove state (Slope_at_least (func, moves, exact_scale, lower)) proof
+          (where ^ ": lower_witness: claims more than the slope between x and y");
+      state.lower_bounds <- state.lower_bounds + 1
+    end else
+      not_checked state (Printf.sprintf "%s >= %s: of activations that are not ReLU" where
+          (text where (find where "lower_hex" bound)))
 
 let check_bound state bound =
   require_keys "bound" (bound_keys @ if has "neighbours" bound then [ "neighbours" ] else []) bound;
