@@ -59,12 +59,14 @@ class SteepSearch {
   /// The steepest place from a start, the first one in the middle: 0 is where many activations are steepest. With
   /// points closer together after some way, where the function bends within the first distance.
   Place next(bool is_first) {
-    constexpr double kCloser = 0x1p-6, kMoreThanNoise = 1 + 1e-6;
+    constexpr double kCloser = 0x1p-6, kMoreThanNoise = 1 + 1e-6, kNear = 0.5;
+    constexpr int kClimbsWhereFlat = 8;
     f_.place_others(generator_);
     const VectorXd random = f_.random_point(generator_);
     Place place = at(f_, is_first ? f_.middle() : random);
-    climb(place);
-    ascend(place);
+    climb(1, place);
+    if (!ascend(place))
+      for (int i = 0; i < kClimbsWhereFlat; ++i) climb(kNear, place);
     const double half_step = f_.half_step();
     f_.set_half_step(kCloser * half_step);
     Place closer = at(f_, place.x);
@@ -75,8 +77,7 @@ class SteepSearch {
 
  private:
   /// Towards random points, by ever smaller shares of the way.
-  void climb(Place& place) {
-    double share = 1;
+  void climb(double share, Place& place) {
     for (int i = 0; i < effort_.climbs && !stop_.now(); ++i) {
       Place next = at(f_, place.x + share * (f_.random_point(generator_) - place.x));
       if (next.steepness.slope > place.steepness.slope) {
@@ -87,14 +88,14 @@ class SteepSearch {
     }
   }
 
-  /// Along the gradient, by steps that grow while they help.
-  void ascend(Place& place) const {
-    constexpr double kFirst = 0.05, kLeast = 1e-7, kGrow = 2, kShrink = 0.25;
+  /// Along the gradient, by steps that grow while they help. Whether there is any, as inside a linear region is not.
+  bool ascend(Place& place) const {
+    constexpr double kFirst = 0.05, kLeast = 1e-7, kGrow = 2, kShrink = 0.25, kNoise = 1e-8;
     double length = kFirst;
     VectorXd uphill;
     for (int i = 0; i < effort_.ascents && length > kLeast && !stop_.now(); ++i) {
       if (uphill.size() == 0) uphill = f_.gradient(place.x, place.steepness.direction);
-      if (!(uphill.norm() > 0)) return;
+      if (!(uphill.norm() > kNoise * place.steepness.slope)) return false;
       Place next = at(f_, f_.moved(place.x, length * uphill.normalized()));
       if (next.steepness.slope > place.steepness.slope) {
         place = std::move(next);
@@ -104,6 +105,7 @@ class SteepSearch {
         length *= kShrink;
       }
     }
+    return true;
   }
 
   SampledFunction f_;
