@@ -87,28 +87,36 @@ AccelerometerFilter::AccelerometerFilter(double cutoff_hz, int channels)
 
 // y'' = w^2 (u - y) - sqrt(2) w y' with a = w / sqrt(2). For u = u0 + s t the particular solution is u0 + s t - s / a;
 // the rest decays as e^{-a t} (e0 cos a t + (e0' + a e0) / a sin a t).
-void AccelerometerFilter::advance(double time_s, Eigen::Ref<Eigen::Matrix3Xd> values) {
+AccelerometerFilter::Response AccelerometerFilter::response_to(double step_s) const {
+  const double a = rate_1_s_, decay = std::exp(-a * step_s);
+  const double c = decay * std::cos(a * step_s), s = decay * std::sin(a * step_s);
+  return {step_s, 1 / step_s, c + s, s * (1 / a), 2 * a * s, c - s};
+}
+
+/// Of kCount numbers side by side, which the compiler keeps in registers.
+template <int kCount>
+void AccelerometerFilter::advance_block(Eigen::Index first, double* values) {
+  using Numbers = Eigen::Array<double, kCount, 1>;
+  const Eigen::Map<const Numbers> u(values + first), last(input_.data() + first);
+  Eigen::Map<Numbers> y(output_.data() + first), slope(slope_.data() + first);
+  const Numbers ramp = (u - last) * response_.inverse_step_1_s, delayed = ramp * (1 / rate_1_s_);
+  const Numbers start = y - last + delayed, bend = slope - ramp;
+  y = u - delayed + response_.start_to_output * start + response_.bend_to_output * bend;
+  slope = ramp + response_.bend_to_slope * bend - response_.start_to_slope * start;
+}
+
+void AccelerometerFilter::advance(double time_s, Eigen::Matrix3Xd& values) {
   if (!has_past_) {
     output_ = values;
     slope_.setZero();
   } else {
-    const double h = time_s - time_s_;
-    const double a = rate_1_s_, inverse_a = 1 / a, inverse_h = 1 / h;
-    const double decay = std::exp(-a * h), c = decay * std::cos(a * h), s = decay * std::sin(a * h);
-    const double start_to_output = c + s, bend_to_output = s * inverse_a;
-    const double start_to_slope = 2 * a * s, bend_to_slope = c - s;
+    const double step_s = time_s - time_s_;
+    if (step_s != response_.step_s) response_ = response_to(step_s);
     // One pass over the signals, without temporary matrices and divisions: every record of every fit comes here.
-    for (Eigen::Index k = 0; k < values.cols(); ++k) {
-      for (int axis = 0; axis < 3; ++axis) {
-        const double u = values(axis, k), last = input_(axis, k);
-        double& y = output_(axis, k);
-        double& slope = slope_(axis, k);
-        const double ramp = (u - last) * inverse_h, delayed = ramp * inverse_a;
-        const double start = y - last + delayed, bend = slope - ramp;
-        y = u - delayed + start_to_output * start + bend_to_output * bend;
-        slope = ramp + bend_to_slope * bend - start_to_slope * start;
-      }
-    }
+    constexpr int kBlock = 4;
+    Eigen::Index next = 0;
+    for (; next + kBlock <= values.size(); next += kBlock) advance_block<kBlock>(next, values.data());
+    for (; next < values.size(); ++next) advance_block<1>(next, values.data());
   }
   has_past_ = true;
   time_s_ = time_s;

@@ -24,10 +24,20 @@ class AccelerometerFilter {
   /// The next record starts in equilibrium.
   void restart() { has_past_ = false; }
   /// Replaces the inputs by the outputs. @param values [3 x channels]
-  void advance(double time_s, Eigen::Ref<Eigen::Matrix3Xd> values);
+  void advance(double time_s, Eigen::Matrix3Xd& values);
 
  private:
+  /// What a step of this length does.
+  struct Response {
+    double step_s = 0, inverse_step_1_s = 0;
+    double start_to_output = 0, bend_to_output = 0, start_to_slope = 0, bend_to_slope = 0;
+  };
+  Response response_to(double step_s) const;
+  template <int kCount>
+  void advance_block(Eigen::Index first, double* values);
+
   const double rate_1_s_;
+  Response response_;
   bool has_past_ = false;
   double time_s_ = 0;
   Eigen::Matrix3Xd input_, output_, slope_;
