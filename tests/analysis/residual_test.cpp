@@ -367,6 +367,35 @@ TEST(Budget, FallsToTheNoiseOnFlightsWhoseEffectsItKnowsAndItsModelsReproduceThe
   }
 }
 
+TEST(Budget, ItsModelsLeaveTheVehiclesOutWhosePositionAloneIsKnown) {
+  const ScratchFolder folder;
+  const std::string nominal = source_path("stability/models/crazyflie-small.toml");
+  write_text(folder / "flights.toml", "schema = \"swarmcert/flights/1\"\n[vehicle.cf1]\nmodel = \"" +
+                                          nominal + "\"\n[vehicle.cf2]\nmodel = \"" + nominal +
+                                          "\"\nuse = \"position\"\n");
+  for (const std::string seed : {"1", "2"}) {
+    ASSERT_EQ(run_shell("swarmcert simulate random-walk --vehicles 2 --duration 15 --seed " + seed +
+                            " --model " + source_path("stability/models/crazyflie-small-effects.toml") +
+                            " --gains " + source_path("controller/gains/crazyflie-small.toml") + " -o " +
+                            (seed == "2" ? "test/" : "fit/") + seed,
+                        folder.path())
+                  .exit_code,
+              0);
+  }
+  const Outcome outcome = run_shell(
+      "swarmcert compare --flights flights.toml test --budget fit --fitted fitted --json budget.json",
+      folder.path());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  ASSERT_EQ(run_shell("swarmcert compare test --flights fitted/flights.toml --json again.json", folder.path())
+                .exit_code,
+            0);
+  const files::Json again = files::read_json(folder / "again.json", "swarmcert/compare/1");
+  EXPECT_TRUE(again["vehicles"].contains("cf1")) << again["vehicles"].dump(1);
+  EXPECT_FALSE(again["vehicles"].contains("cf2")) << again["vehicles"].dump(1);
+  const files::Json budget = files::read_json(folder / "budget.json", "swarmcert/compare/1")["budget"];
+  EXPECT_NEAR(again["overall"]["rmse"]["z"].get<double>(), rmse_z_N(budget, "rest", "all"), 1e-9);
+}
+
 TEST(Budget, OfThePublishedFlightsFallsByHalfAndReachesTheNetworks_slow) {
   SWARMCERT_NEEDS_DATA();
   const ScratchFolder folder;

@@ -87,17 +87,27 @@ void print(const Budget& budget) {
     fmt::print("nominal mass {}: {:.1f} g\n", kind, 1000 * mass_kg);
 }
 
-void write_fitted(const Budget& budget, const std::string& folder, bool overwrite) {
+void write_fitted(const Budget& budget, const residuals::Fleet& fleet, const std::string& folder,
+                  bool overwrite) {
   std::filesystem::create_directories(folder);
   const std::filesystem::path path(folder);
-  std::string fleet = "schema = \"swarmcert/flights/1\"\n";
+  std::string text = "schema = \"swarmcert/flights/1\"\n";
+  std::map<std::string, std::string> of_kind;  // a vehicle whose model was fitted, by kind
   for (const auto& [vehicle, model] : budget.fitted) {
+    const auto use = fleet.find(vehicle);
+    if (use != fleet.end() && use->second.position_only) continue;
     files::write_file((path / (vehicle + ".toml")).string(),
                       stability::to_toml(model, {"Fitted jointly to flights by swarmcert compare --budget."}),
                       overwrite);
-    fleet += "\n[vehicle." + vehicle + "]\nmodel = \"" + vehicle + ".toml\"\n";
+    text += "\n[vehicle." + vehicle + "]\nmodel = \"" + vehicle + ".toml\"\n";
+    of_kind.emplace(model.kind, vehicle);
   }
-  files::write_file((path / "flights.toml").string(), fleet, overwrite);
+  for (const auto& [vehicle, use] : fleet) {
+    const auto same = of_kind.find(use.kind);
+    if (use.position_only && same != of_kind.end())
+      text += "\n[vehicle." + vehicle + "]\nmodel = \"" + same->second + ".toml\"\nuse = \"position\"\n";
+  }
+  files::write_file((path / "flights.toml").string(), text, overwrite);
 }
 
 }  // namespace swarmcert::analysis

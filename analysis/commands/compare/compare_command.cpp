@@ -268,7 +268,7 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   if (!options.budget.empty()) {
     budget = budget_of(options, inputs, common);
     result["budget"] = json_of(*budget);
-    if (!options.fitted.empty()) write_fitted(*budget, options.fitted, common.force);
+    if (!options.fitted.empty()) write_fitted(*budget, inputs.fleet, options.fitted, common.force);
   }
   if (!options.inject.empty()) result["injected"] = inject(inputs, options.inject, common.force);
   if (!options.promise.empty()) result["promise"] = kept_promise_json(inputs, options.promise, common.jobs);
