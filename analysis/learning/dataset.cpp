@@ -149,22 +149,6 @@ training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vecto
   return training::Layout(std::move(parts));
 }
 
-/// Every group that is fitted weighs the same in total, and all together as many as there are samples.
-void balance(LearningData& data) {
-  std::map<std::string, double> counts;
-  for (const TrackSamples& track : data.tracks) {
-    if (track.use == Use::kFit) counts[track.group()] += static_cast<double>(track.end - track.begin);
-  }
-  double total = 0;
-  for (const auto& [group, count] : counts) total += count;
-  for (const TrackSamples& track : data.tracks) {
-    const auto found = counts.find(track.group());
-    if (track.use != Use::kFit || found == counts.end()) continue;
-    const double weight = total / (static_cast<double>(counts.size()) * found->second);
-    for (Index s = track.begin; s < track.end; ++s) data.samples.weight[s] = static_cast<float>(weight);
-  }
-}
-
 void append(LearningData& data, const RawTrack& raw, const std::vector<std::string>& kinds, std::size_t from,
             std::size_t to, Use use) {
   if (from >= to) return;  // a block without records
@@ -242,6 +226,21 @@ std::vector<Index> LearningData::indices(Use use) const {
     for (Index s = track.begin; s < track.end; ++s) result.push_back(s);
   }
   return result;
+}
+
+void balance(LearningData& data) {
+  std::map<std::string, double> counts;
+  for (const TrackSamples& track : data.tracks) {
+    if (track.use == Use::kFit) counts[track.group()] += static_cast<double>(track.end - track.begin);
+  }
+  double total = 0;
+  for (const auto& [group, count] : counts) total += count;
+  for (const TrackSamples& track : data.tracks) {
+    const auto found = counts.find(track.group());
+    if (track.use != Use::kFit || found == counts.end()) continue;
+    const double weight = total / (static_cast<double>(counts.size()) * found->second);
+    for (Index s = track.begin; s < track.end; ++s) data.samples.weight[s] = static_cast<float>(weight);
+  }
 }
 
 namespace {

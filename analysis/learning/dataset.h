@@ -70,6 +70,10 @@ struct LearningData {
 std::vector<float> seen_of_neighbour(const std::vector<float>& state, bool invariants);
 std::vector<float> seen_of_own(const std::vector<float>& state, bool invariants);
 
+/// Sets the weights of the samples to fit: every group weighs the same in total, and all together as many as there are
+/// samples. Others keep theirs.
+void balance(LearningData& data);
+
 /// Shows progress: flights done of all.
 using Progress = std::function<void(int done, int total)>;
 

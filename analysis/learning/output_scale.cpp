@@ -17,21 +17,18 @@ struct Products {
   double samples = 0;
 };
 
-std::map<std::string, Products> selecting_products(const LearningData& data, const training::Vector& theta) {
+std::map<std::string, Products> products_of(const LearningData& data, const training::Matrix& outputs,
+                                            Use use) {
   std::map<std::string, Products> result;
   for (const TrackSamples& track : data.tracks) {
-    if (track.use != Use::kSelect) continue;
-    std::vector<Eigen::Index> samples;
-    for (Eigen::Index s = track.begin; s < track.end; ++s) samples.push_back(s);
-    const training::Matrix outputs = training::predict(data.layout, theta, data.samples, samples.data(),
-                                                       static_cast<Eigen::Index>(samples.size()));
+    if (track.use != use) continue;
     Products& sum = result[track.composition];
-    for (std::size_t i = 0; i < samples.size(); ++i) {
-      const Eigen::VectorXd f = outputs.col(static_cast<Eigen::Index>(i)).cast<double>();
-      sum.yf += data.samples.target_of(samples[i]).cast<double>().dot(f);
+    for (Eigen::Index s = track.begin; s < track.end; ++s) {
+      const Eigen::VectorXd f = outputs.col(s).cast<double>();
+      sum.yf += data.samples.target_of(s).cast<double>().dot(f);
       sum.ff += f.squaredNorm();
     }
-    sum.samples += static_cast<double>(samples.size());
+    sum.samples += static_cast<double>(track.end - track.begin);
   }
   return result;
 }
@@ -40,12 +37,13 @@ std::string kind_of(const std::string& composition) { return composition.substr(
 
 }  // namespace
 
-std::map<std::string, double> output_scales(const LearningData& data, const training::Vector& theta) {
+std::map<std::string, double> output_scales(const LearningData& data, const training::Matrix& outputs,
+                                            Use use) {
   struct Sums {
     double yf = 0, ff = 0, limit = 1;
   };
   std::map<std::string, Sums> kinds;
-  for (const auto& [composition, products] : selecting_products(data, theta)) {
+  for (const auto& [composition, products] : products_of(data, outputs, use)) {
     if (!(products.ff > 0)) continue;
     Sums& kind = kinds[kind_of(composition)];
     kind.yf += products.yf / products.samples;
@@ -56,6 +54,15 @@ std::map<std::string, double> output_scales(const LearningData& data, const trai
   for (const auto& [kind, sums] : kinds)
     result[kind] = std::clamp(sums.yf / sums.ff, 0.0, std::max(0.0, sums.limit));
   return result;
+}
+
+void scale_outputs(const LearningData& data, const std::map<std::string, double>& scales,
+                   training::Matrix& outputs) {
+  for (const TrackSamples& track : data.tracks) {
+    const auto scale = scales.find(kind_of(track.composition));
+    if (scale != scales.end())
+      outputs.middleCols(track.begin, track.end - track.begin) *= static_cast<float>(scale->second);
+  }
 }
 
 void scale_outputs(const training::Layout& layout, const std::map<std::string, double>& scales,

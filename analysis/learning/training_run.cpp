@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -86,8 +87,17 @@ State read_checkpoint(const std::string& key, const std::string& path) {
   return state;
 }
 
-/// The earliest epoch with the least error on the selecting flights.
-int best_of(const std::vector<Epoch>& epochs) {
+/// Samples that are predicted at a time: few enough for the cache, many enough for matrix products.
+constexpr std::size_t kPredicted = 4096;
+
+void set_targets(const training::Matrix& targets, Use use, LearningData& data) {
+  for (const Eigen::Index s : data.indices(use))
+    std::copy_n(targets.col(s).data(), targets.rows(), data.samples.target.begin() + s * targets.rows());
+}
+
+}  // namespace
+
+int best_epoch(const std::vector<Epoch>& epochs) {
   int best = 0;
   for (std::size_t e = 1; e < epochs.size(); ++e) {
     if (epochs[e].select_rmse < epochs[best].select_rmse) best = static_cast<int>(e);
@@ -95,31 +105,18 @@ int best_of(const std::vector<Epoch>& epochs) {
   return best;
 }
 
-/// Samples that are predicted at a time: few enough for the cache, many enough for matrix products.
-constexpr std::size_t kPredicted = 4096;
-
-/// Adds the outputs for the samples of `use` to the places of their targets in `sum`.
-void add_outputs(const LearningData& data, const Vector& theta, Use use, Vector& sum) {
+training::Matrix outputs_for(const LearningData& data, const Vector& theta, Use use) {
+  training::Matrix result = training::Matrix::Zero(data.samples.outputs, data.samples.samples());
   const std::vector<Eigen::Index> samples = data.indices(use);
   for (std::size_t at = 0; at < samples.size(); at += kPredicted) {
     const auto count = static_cast<Eigen::Index>(std::min(kPredicted, samples.size() - at));
     const training::Matrix outputs =
         training::predict(data.layout, theta, data.samples, samples.data() + at, count);
     for (Eigen::Index i = 0; i < count; ++i)
-      sum.segment(samples[at + static_cast<std::size_t>(i)] * data.samples.outputs, data.samples.outputs) +=
-          outputs.col(i);
+      result.col(samples[at + static_cast<std::size_t>(i)]) = outputs.col(i);
   }
+  return result;
 }
-
-void set_targets(const Vector& targets, Use use, LearningData& data) {
-  const Eigen::Index outputs = data.samples.outputs;
-  for (const Eigen::Index s : data.indices(use)) {
-    for (Eigen::Index k = s * outputs; k < (s + 1) * outputs; ++k)
-      data.samples.target[static_cast<std::size_t>(k)] = targets[k];
-  }
-}
-
-}  // namespace
 
 Run run_training(const LearningData& data, const RunOptions& options) {
   const std::string key = fingerprint(data, options);
@@ -139,7 +136,7 @@ Run run_training(const LearningData& data, const RunOptions& options) {
   }
   Run run;
   for (int epoch = static_cast<int>(state.epochs.size()); epoch < options.epochs; ++epoch) {
-    if (!state.epochs.empty() && epoch - best_of(state.epochs) > options.patience) break;
+    if (!state.epochs.empty() && epoch - best_epoch(state.epochs) > options.patience) break;
     if (options.cancelled != nullptr && *options.cancelled) {
       run.was_cancelled = true;
       break;
@@ -161,7 +158,7 @@ Run run_training(const LearningData& data, const RunOptions& options) {
     }
     const double select = mean_rmse(data, candidate, Use::kSelect, chosen.jobs);
     state.epochs.push_back({fit, std::isnan(select) ? fit : select});
-    if (best_of(state.epochs) == epoch) state.best = std::move(candidate);
+    if (best_epoch(state.epochs) == epoch) state.best = std::move(candidate);
     state.trainer = trainer.state();
     if (!options.checkpoint.empty()) write_checkpoint(state, key, options.checkpoint);
     if (options.progress) options.progress(epoch + 1, options.epochs, state.epochs.back().select_rmse);
@@ -169,7 +166,7 @@ Run run_training(const LearningData& data, const RunOptions& options) {
   run.seed = chosen.seed;
   run.theta = std::move(state.best);
   run.epochs = std::move(state.epochs);
-  run.best_epoch = run.epochs.empty() ? 0 : best_of(run.epochs);
+  run.best_epoch = run.epochs.empty() ? 0 : best_epoch(run.epochs);
   project(data.layout, chosen.gamma, run.theta);
   if (options.max_lipschitz > 0)
     limit_joint_bounds(options.max_lipschitz, data.layout, chosen.jobs, run.theta, data.invariants);
@@ -186,7 +183,7 @@ std::string checkpoint_of(const RunOptions& options, std::uint64_t seed) {
 TaughtRun run_with_teachers(const LearningData& data, const RunOptions& options, int teachers) {
   TaughtRun taught;
   const bool selects = !data.indices(Use::kSelect).empty();
-  Vector said = Vector::Zero(data.samples.target.size());
+  training::Matrix said = training::Matrix::Zero(data.samples.outputs, data.samples.samples());
   LearningData of_teachers;
   for (int i = 1; i <= teachers + 1; ++i) {
     const bool is_last = i > teachers;
@@ -208,7 +205,7 @@ TaughtRun run_with_teachers(const LearningData& data, const RunOptions& options,
       taught.run = std::move(run);
       break;
     }
-    if (!is_last) add_outputs(data, run.theta, Use::kFit, said);
+    if (!is_last) said += outputs_for(data, run.theta, Use::kFit);
     const Score score = {run.seed, run.best_epoch,
                          run.epochs[static_cast<std::size_t>(run.best_epoch)].select_rmse};
     const bool is_first = taught.scores.empty();

@@ -29,6 +29,9 @@ struct Epoch {
   double fit_rmse = 0, select_rmse = 0;
 };
 
+/// The earliest epoch with the least error on the selecting flights; 0 without any.
+int best_epoch(const std::vector<Epoch>& epochs);
+
 struct Run {
   std::uint64_t seed = 0;
   training::Vector
@@ -44,6 +47,9 @@ struct Run {
 /// clipped at less than gamma in the next epoch.
 /// @throws files::InputError if the checkpoint cannot be read, or is of other networks, data or options.
 Run run_training(const LearningData& data, const RunOptions& options);
+
+/// [outputs x samples] What theta says of the samples of `use`, in the unit of the targets; 0 for the others.
+training::Matrix outputs_for(const LearningData& data, const training::Vector& theta, Use use);
 
 struct Score {
   std::uint64_t seed;

@@ -5,6 +5,7 @@
 
 #include "analysis/learning/lipschitz_limit.h"
 #include "analysis/learning/output_scale.h"
+#include "analysis/learning/training_run.h"
 #include "analysis/learning/weighing.h"
 #include "analysis/reproduction/nearest_labels.h"
 #include "nn/base/random.h"
@@ -116,7 +117,7 @@ TEST(OutputScale, MinimisesTheErrorOfTheSelectingFlightsAndLeavesNoCompositionWo
   const training::Vector theta = training::initial_parameters(two_compositions().layout, 3);
   // Half of the output is right for large vehicles; for small ones the output points the wrong way.
   const LearningData data = selecting(theta, {{"small>large", 0.5}, {"small>small", -0.3}});
-  const std::map<std::string, double> scales = output_scales(data, theta);
+  const std::map<std::string, double> scales = output_scales(data, outputs_for(data, theta, Use::kSelect));
   EXPECT_NEAR(scales.at("large"), 0.5, 0.02);
   EXPECT_EQ(scales.at("small"), 0);
 
@@ -145,7 +146,7 @@ TEST(OutputScale, OneCompositionThatTheOutputHarmsLimitsTheWholeKind) {
   data.tracks[0].end = harmed.begin;
   for (Index s = harmed.begin; s < harmed.end; ++s) data.samples.target[static_cast<std::size_t>(s)] *= 0.1f;
   data.tracks.push_back(harmed);
-  const std::map<std::string, double> scales = output_scales(data, theta);
+  const std::map<std::string, double> scales = output_scales(data, outputs_for(data, theta, Use::kSelect));
   EXPECT_LT(scales.at("large"), 0.25) << "twice 0.1, where the error is that of no network, and the noise";
   EXPECT_GT(scales.at("large"), 0.15);
   EXPECT_NEAR(scales.at("small"), 1, 0.02);

@@ -302,6 +302,27 @@ TEST_F(Train, SameSeedGivesTheSameFilesWhateverTheJobs) {
   }
 }
 
+TEST_F(Train, FoldsGiveOneCertifiedNetworkAndErrorsOfFlightsThatEachMemberDidNotSee) {
+  const Outcome folded = execute(
+      "swarmcert train nominal.toml flights/1 flights/2 --test flights/3 --phi 12,12 --rho 12 --features 8 "
+      "--folds 2 --epochs 12 --batch 256 --rate 5e-3 --report page -o out --json result.json");
+  ASSERT_EQ(folded.exit_code, 0) << folded.output;
+  const Json result = files::read_json(folder_ / "result.json", "swarmcert/train/1");
+  ASSERT_EQ(result["folds"].size(), 2u);
+  EXPECT_EQ(result["folds"][1]["seed"], 2);
+  EXPECT_EQ(result["samples"]["select"], 0) << "every flight that does not test is fitted";
+  EXPECT_LT(result["select_rmse"].get<double>(), result["select_rmse_of_nothing"].get<double>());
+  EXPECT_LT(result["test_rmse"].get<double>(), 0.7 * result["test_rmse_of_nothing"].get<double>());
+  for (const Json& row : result["select"]) EXPECT_FALSE(row["worse_than_none"].get<bool>()) << row.dump();
+  EXPECT_EQ(result["gamma_verdict"], "proved");
+  EXPECT_EQ(execute("swarmcert check out/certificate.json out/network.toml").exit_code, 0);
+  for (const char* const file : {"out/checkpoint.json", "out/checkpoint-2.json"})
+    EXPECT_FALSE(std::filesystem::exists(folder_ / file)) << file;
+  for (const std::string refused : {"--folds 1", "--folds 2 --teachers 2", "--folds 2 --gamma-mode equal",
+                                    "--folds 2 --select flights/3"})
+    EXPECT_EQ(execute(train(refused + " -o refused")).exit_code, 2) << refused;
+}
+
 TEST_F(Train, TeachersAreTheNetworksOfTheirSeedsAndTheSelectingFlightsDecide) {
   const auto learn = [&](const std::string& options) {
     const Outcome outcome =

@@ -14,8 +14,8 @@ files::Json json_of(const identification::Budget& budget);
 
 void print(const identification::Budget& budget);
 
-/// `FOLDER/<vehicle>.toml` for each vehicle whose force is judged, and a flights.toml that names them. What `fleet` takes
-/// the position of only stays so there, as a vehicle of its kind: its sensors would teach `train` false forces.
+/// `FOLDER/<vehicle>.toml` for each vehicle whose force is judged, and a flights.toml that names them. What `fleet`
+/// takes the position of only stays so there, as a vehicle of its kind: its sensors would teach `train` false forces.
 void write_fitted(const identification::Budget& budget, const residuals::Fleet& fleet,
                   const std::string& folder, bool overwrite);
 

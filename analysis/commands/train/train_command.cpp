@@ -15,6 +15,7 @@
 #include "analysis/commands/train/train_options.h"
 #include "analysis/commands/train/train_output.h"
 #include "analysis/commands/train/train_report.h"
+#include "analysis/learning/cross_fit.h"
 #include "analysis/learning/output_scale.h"
 #include "analysis/learning/trained_network.h"
 #include "analysis/learning/training_run.h"
@@ -34,39 +35,51 @@ const std::map<std::string, learning::SplitBy> kSplits = {{"auto", learning::Spl
                                                           {"flights", learning::SplitBy::kFlights},
                                                           {"blocks", learning::SplitBy::kBlocks}};
 
-std::map<std::string, Scores> scores_by_composition(const LearningData& data, const training::Vector& theta,
-                                                    Use use, int jobs) {
-  std::map<std::string, std::vector<Eigen::Index>> members;
+/// Sums of squares of some targets, and of what the outputs leave of them.
+struct Squares {
+  double nothing = 0, network = 0, samples = 0;
+  Scores scores() const { return {std::sqrt(nothing / samples), std::sqrt(network / samples)}; }
+};
+
+/// Of the samples of `use`, by composition; NaN for `all` where there are none.
+/// @param outputs [outputs x samples] what the network says of them.
+std::map<std::string, Scores> scores_by_composition(const LearningData& data, const training::Matrix& outputs,
+                                                    Use use, Scores& all) {
+  std::map<std::string, Squares> sums;
+  Squares total;
   for (const learning::TrackSamples& track : data.tracks) {
     if (track.use != use) continue;
-    for (Eigen::Index s = track.begin; s < track.end; ++s) members[track.composition].push_back(s);
+    Squares& sum = sums[track.composition];
+    for (Eigen::Index s = track.begin; s < track.end; ++s) {
+      const Eigen::VectorXd y = data.samples.target_of(s).cast<double>();
+      const double nothing = y.squaredNorm(), network = (y - outputs.col(s).cast<double>()).squaredNorm();
+      for (Squares* const some : {&sum, &total}) {
+        some->nothing += nothing;
+        some->network += network;
+        some->samples += 1;
+      }
+    }
   }
+  all = total.scores();
   std::map<std::string, Scores> result;
-  for (const auto& [composition, samples] : members) {
-    double squares = 0;
-    for (const Eigen::Index s : samples) squares += data.samples.target_of(s).cast<double>().squaredNorm();
-    result[composition] = {std::sqrt(squares / static_cast<double>(samples.size())),
-                           std::sqrt(training::mean_loss(data.layout, theta, data.samples, samples, jobs))};
-  }
+  for (const auto& [composition, sum] : sums) result[composition] = sum.scores();
   return result;
 }
 
 /// Of each component of the target, over all samples that test.
-std::vector<Scores> scores_by_component(const LearningData& data, const training::Vector& theta) {
-  const std::vector<Eigen::Index> samples = data.indices(Use::kTest);
-  const training::Matrix predicted = training::predict(data.layout, theta, data.samples, samples.data(),
-                                                       static_cast<Eigen::Index>(samples.size()));
-  Eigen::VectorXd nothing = Eigen::VectorXd::Zero(data.samples.outputs), network = nothing;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    const training::Vector target = data.samples.target_of(samples[i]);
-    nothing += target.cast<double>().cwiseAbs2();
-    network += (target - predicted.col(static_cast<Eigen::Index>(i))).cast<double>().cwiseAbs2();
+std::vector<Scores> scores_by_component(const LearningData& data, const training::Matrix& outputs) {
+  std::vector<Squares> sums(static_cast<std::size_t>(data.samples.outputs));
+  for (const Eigen::Index s : data.indices(Use::kTest)) {
+    const Eigen::VectorXd y = data.samples.target_of(s).cast<double>();
+    const Eigen::VectorXd left = y - outputs.col(s).cast<double>();
+    for (std::size_t c = 0; c < sums.size(); ++c) {
+      sums[c].nothing += y[static_cast<Eigen::Index>(c)] * y[static_cast<Eigen::Index>(c)];
+      sums[c].network += left[static_cast<Eigen::Index>(c)] * left[static_cast<Eigen::Index>(c)];
+      sums[c].samples += 1;
+    }
   }
   std::vector<Scores> result;
-  for (Eigen::Index c = 0; c < nothing.size(); ++c) {
-    result.push_back({std::sqrt(nothing[c] / static_cast<double>(samples.size())),
-                      std::sqrt(network[c] / static_cast<double>(samples.size()))});
-  }
+  for (const Squares& sum : sums) result.push_back(sum.scores());
   return result;
 }
 
@@ -80,7 +93,8 @@ void choose_beginning(const CommonOptions& common, TrainOptions& options) {
     options.run.resumes = false;
     return;
   }
-  const std::uint64_t first = options.run.trainer.seed + (options.teachers > 0 ? 1 : 0);
+  const std::uint64_t first =
+      options.run.trainer.seed + (options.teachers > 0 ? 1 : 0);  // folds begin with it
   if (options.run.resumes && !fs::exists(learning::checkpoint_of(options.run, first)))
     throw files::InputError({options.output, "", "--resume", "",
                              fmt::format("the folder holds no interrupted run of seed {}", first),
@@ -115,6 +129,17 @@ void refuse_twice(const learning::LearningFlights& flights) {
   }
 }
 
+/// With folds, the flights that are left out select.
+void check_folds(const TrainOptions& options) {
+  if (options.folds == 0) return;
+  if (options.folds == 1) throw UsageError("--folds 1 leaves no flight to fit: give at least 2");
+  if (options.teachers > 0 || !options.select.empty())
+    throw UsageError(std::string(options.teachers > 0 ? "--teachers" : "--select") +
+                     " and --folds are two ways to select: give one of them");
+  if (options.gamma_mode == "equal")
+    throw UsageError("--folds averages networks, which --gamma-mode equal forbids");
+}
+
 /// Sets the options of the trainer that the command line gives as words.
 void choose_trainer(const CommonOptions& common, TrainOptions& options) {
   options.sizes.ground = !options.no_ground;
@@ -143,10 +168,24 @@ void certify_and_score(const TrainOptions& options, int jobs, const LearningData
   certify_options.jobs = jobs;
   certify_options.lower.seed = options.run.trainer.seed;
   outcome.certified = learning::write_certificate(network, options.output, certify_options);
-  outcome.all = {learning::rmse_of_nothing(data, Use::kTest),
-                 learning::rmse(data, run.theta, Use::kTest, jobs)};
-  if (data.samples.outputs > 1) outcome.components = scores_by_component(data, run.theta);
-  outcome.compositions = scores_by_composition(data, run.theta, Use::kTest, jobs);
+  const training::Matrix outputs = learning::outputs_for(data, run.theta, Use::kTest);
+  outcome.compositions = scores_by_composition(data, outputs, Use::kTest, outcome.all);
+  if (data.samples.outputs > 1) outcome.components = scores_by_component(data, outputs);
+}
+
+/// What selects: flights of their own, or with folds every flight, of which only the network speaks that was not
+/// fitted to it. Scales the outputs by it, unless told not to.
+void select_and_scale(const TrainOptions& options, const LearningData& data, training::Matrix unseen,
+                      Outcome& outcome) {
+  training::Vector& theta = outcome.trained.run.theta;
+  const Use use = options.folds > 0 ? Use::kFit : Use::kSelect;
+  if (options.folds == 0) unseen = learning::outputs_for(data, theta, use);
+  if (options.run.trainer.gamma.mode == files::GammaStatement::Mode::kClip && !options.allow_worse) {
+    outcome.scales = learning::output_scales(data, unseen, use);
+    learning::scale_outputs(data.layout, outcome.scales, theta);
+    learning::scale_outputs(data, outcome.scales, unseen);
+  }
+  outcome.select_compositions = scores_by_composition(data, unseen, use, outcome.select);
 }
 
 /// Every file that was read, each once.
@@ -166,13 +205,14 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   choose_beginning(common, options);
   refuse_folder(common, options.report);
   choose_trainer(common, options);
+  check_folds(options);
   const residuals::Inputs inputs = read_flights(options.flights, true, false, true);
   const std::optional<residuals::Inputs> select = others(options, options.select);
   const std::optional<residuals::Inputs> test = others(options, options.test);
   const learning::LearningFlights flights = {&inputs, select ? &*select : nullptr, test ? &*test : nullptr};
   refuse_twice(flights);
   Progress loading(common.quiet);
-  const LearningData data = learning::load_learning_data(
+  LearningData data = learning::load_learning_data(
       flights, options.sizes, kSplits.at(options.split), common.jobs,
       [&](int done, int total) { loading.show(done, total, "flights"); }, kTargets.at(options.quantity));
   fs::create_directories(options.output);
@@ -184,23 +224,25 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   const CancelOnInterrupt interrupt;
   options.run.cancelled = interrupt.flag();
   Outcome outcome;
-  outcome.trained = learning::run_with_teachers(data, options.run, options.teachers);
-  learning::Run& run = outcome.trained.run;
+  training::Matrix unseen;
+  if (options.folds > 0) {
+    learning::CrossFit fit = learning::cross_fit(options.run, options.folds, data);
+    outcome.trained.run = std::move(fit.run);
+    outcome.members = std::move(fit.members);
+    unseen = std::move(fit.unseen);
+  } else {
+    outcome.trained = learning::run_with_teachers(data, options.run, options.teachers);
+  }
+  const learning::Run& run = outcome.trained.run;
   if (run.was_cancelled) {
     note(fmt::format("stopped after {} epochs{}; --resume goes on", run.epochs.size(),
-                     options.teachers > 0 ? fmt::format(" of seed {}", run.seed) : ""));
+                     options.teachers + options.folds > 0 ? fmt::format(" of seed {}", run.seed) : ""));
     return kInconclusive;
   }
 
-  if (options.run.trainer.gamma.mode == files::GammaStatement::Mode::kClip && !options.allow_worse) {
-    outcome.scales = learning::output_scales(data, run.theta);
-    learning::scale_outputs(data.layout, outcome.scales, run.theta);
-  }
+  select_and_scale(options, data, std::move(unseen), outcome);
   const files::Network network =
       learning::write_network(data, run.theta, options.run.trainer.gamma, options.output);
-  outcome.select = {learning::rmse_of_nothing(data, Use::kSelect),
-                    learning::rmse(data, run.theta, Use::kSelect, common.jobs)};
-  outcome.select_compositions = scores_by_composition(data, run.theta, Use::kSelect, common.jobs);
   learning::write_models(inputs, data.layout, options.output, outcome.kept());
   certify_and_score(options, common.jobs, data, network, outcome);
 
@@ -211,8 +253,9 @@ int run_train(TrainOptions options, const CommonOptions& common) {
     const std::string path = write_train_report(data, run, result, options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
-  for (const learning::Score& score : outcome.trained.scores)
-    fs::remove(learning::checkpoint_of(options.run, score.seed));
+  for (const std::vector<learning::Score>* scores : {&outcome.trained.scores, &outcome.members}) {
+    for (const learning::Score& score : *scores) fs::remove(learning::checkpoint_of(options.run, score.seed));
+  }
   return kDone;
 }
 
@@ -224,7 +267,8 @@ Command train_command() {
       "The network learns what the vehicles' models leave of the vertical force, of the force, or of the "
       "torque. A phi per kind\nof neighbour, a rho per kind of vehicle, and a phi of the own state for the "
       "ground. Flights are split as wholes into fit,\nselect and test; the epoch with the least error on "
-      "the selecting flights is kept, and projected so that gamma holds in\nexact arithmetic. An "
+      "the selecting flights is kept, and projected so that gamma holds in\nexact arithmetic. With --folds "
+      "every flight that does not test is fitted. An "
       "interrupted run goes on with --resume. What is flown is the vertical force; networks of a force or\n"
       "torque act as effects of models, in simulation and in compare; simulate --torque-network flies a "
       "torque.\n\n"

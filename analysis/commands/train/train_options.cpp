@@ -91,6 +91,13 @@ void declare_run(CLI::App& app, TrainOptions& options) {
                  "selecting flights is written")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
+  app.add_option(
+         "--folds", options.folds,
+         "Deal the flights that do not test out to this many folds, train one network without each "
+         "fold, which selects its epoch, and write their mean as one network, this many times as wide; "
+         "what each network says of the fold that it has not seen takes the place of selecting flights")
+      ->check(CLI::Range(0, 100))
+      ->capture_default_str();
   leave_out_of_record(
       app.add_flag("--resume", options.run.resumes, "Go on with an interrupted run in the same folder"));
   app.add_flag("--published-filter", options.flights.published_filter,

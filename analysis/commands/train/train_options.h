@@ -20,7 +20,7 @@ struct TrainOptions {
   std::string gamma_scope = "layer", gamma_mode = "clip";
   std::string weights = "errors", symmetry = "vertical";
   bool no_ground = false, allow_worse = false;
-  int teachers = 0;
+  int teachers = 0, folds = 0;
 };
 
 /// Declares the options of `train`, with their defaults.

@@ -28,8 +28,9 @@ void add_selection(const Outcome& outcome, double SI, files::Json& json) {
   }
 }
 
-void add_runs(const learning::TaughtRun& trained, const std::string& unit, files::Json& json) {
-  json["teachers"] = files::Json::array();
+void add_runs(const Outcome& outcome, const std::string& unit, files::Json& json) {
+  const learning::TaughtRun& trained = outcome.trained;
+  json["teachers"] = json["folds"] = files::Json::array();
   const auto json_of = [&unit](const learning::Score& score) {
     return files::Json{{"seed", score.seed},
                        {"best_epoch", score.best_epoch + 1},
@@ -38,7 +39,8 @@ void add_runs(const learning::TaughtRun& trained, const std::string& unit, files
   for (std::size_t i = 0; i + 1 < trained.scores.size(); ++i)
     json["teachers"].push_back(json_of(trained.scores[i]));
   json["taught"] = trained.scores.size() > 1 ? json_of(trained.scores.back()) : files::Json();
-  json["kept_seed"] = trained.kept_score().seed;
+  for (const learning::Score& member : outcome.members) json["folds"].push_back(json_of(member));
+  json["kept_seed"] = trained.run.seed;
   json["best_epoch"] = trained.run.best_epoch + 1;
   json["epochs"] = files::Json::array();
   for (const learning::Epoch& epoch : trained.run.epochs)
@@ -83,7 +85,7 @@ files::Json train_json(const TrainOptions& options, const std::vector<std::strin
                               {"unit", fmt::format("{} per unit of input", target.unit)}});
   json["lipschitz"] = outcome.certified.largest();
   json["gamma_verdict"] = name(outcome.certified.gamma);
-  add_runs(outcome.trained, target.unit, json);
+  add_runs(outcome, target.unit, json);
   json["problems"] = data.problems;
   return json;
 }
@@ -125,6 +127,9 @@ void print_training(const TrainOptions& options, const LearningData& data, const
                i + 1 < trained.scores.size() ? "teacher" : "taught", score.seed, score.select_rmse,
                target.unit, i == trained.kept ? ", kept" : "");
   }
+  for (const learning::Score& member : outcome.members)
+    fmt::print("seed {}: {:.3f} {} on the fold that it left out, best of its epochs: {}\n", member.seed,
+               member.select_rmse, target.unit, member.best_epoch + 1);
   fmt::print("best of {} epochs: {}\n\n", trained.run.epochs.size(), trained.run.best_epoch + 1);
   fmt::print("{:<34}{:>18}{:>18}\n", fmt::format("{} on test flights", target.words),
              fmt::format("no network [{}]", target.unit), fmt::format("network [{}]", target.unit));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "analysis/commands/train/train_options.h"
+#include "analysis/learning/cross_fit.h"
 #include "analysis/learning/dataset.h"
 #include "analysis/learning/trained_network.h"
 #include "analysis/learning/training_run.h"
@@ -24,10 +25,13 @@ struct Scores {
 
 struct Outcome {
   learning::TaughtRun trained;
+  std::vector<learning::Score>
+      members;  ///< of --folds, each on the fold that it left out; `trained` is their mean
   Scores all;
   std::vector<Scores> components;  ///< x, y, z; empty where the target is one number
   std::map<std::string, Scores> compositions;
-  Scores select;  ///< of the flights that decide whether there is to be a network
+  Scores
+      select;  ///< of the flights that decide whether there is to be a network; with folds, unseen all of them
   std::map<std::string, Scores> select_compositions;
   std::map<std::string, double> scales;  ///< of each kind's output, see learning::output_scales()
   learning::Certified certified;
