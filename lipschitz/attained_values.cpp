@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-#include "lipschitz/checker/centred_form.h"
+#include "lipschitz/checker/values.h"
 #include "lipschitz/rounding.h"
 #include "nn/weights/functions.h"
 
@@ -53,21 +53,17 @@ class ValueSearch {
 
   /// Contains f(point).
   check::Intervals enclosed(const BoxPoint& point) const {
-    check::Intervals sum;
+    std::vector<check::SumTerm> terms;
     for (std::size_t j = 0; j < point.inputs.size(); ++j) {
-      const std::vector<float>& x = point.inputs[j];
       check::Intervals at;
-      for (const float coordinate : x) at.lower.emplace_back(static_cast<double>(coordinate));
+      for (const float coordinate : point.inputs[j]) at.lower.emplace_back(static_cast<double>(coordinate));
       at.upper = at.lower;
-      const check::Intervals term = check::layers_on_box(*parts_.at(point.networks[j]), at).back();
-      for (std::size_t i = 0; i < term.lower.size(); ++i) {
-        if (j == 0) continue;
-        sum.lower[i] += term.lower[i];
-        sum.upper[i] += term.upper[i];
-      }
-      if (j == 0) sum = term;
+      const files::Weights& network = *parts_.at(point.networks[j]);
+      terms.push_back({{check::network_intervals(network, std::move(at)), {}}, 1, 1});
     }
-    return names_.size() == 1 ? sum : check::layers_on_box(*parts_.at(names_.back()), sum).back();
+    if (names_.size() == 1) return std::move(terms.front().values);
+    const files::Weights& rho = *parts_.at(names_.back());
+    return check::network_intervals(rho, check::sum_intervals(terms, static_cast<std::size_t>(rho.inputs())));
   }
 
  private:

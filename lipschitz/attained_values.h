@@ -17,9 +17,9 @@ struct AttainedEnds {
   Attained least, greatest;
 };
 
-/// Searches the box in double and encloses the values of the two best points (checker/centred_form.h): `value` of the
-/// greatest is not above the function there, that of the least not below. One per output; empty points where the box
-/// holds no float32.
+/// Searches the box in double and encloses the values of the two best points (check::network_intervals()): `value` of
+/// the greatest is not above the function there, that of the least not below. One per output; empty points where the
+/// box holds no float32.
 /// @param function "network" or "set:<phi kind>:<rho kind>", with 1 to `neighbours` of the kind and the ground's input.
 /// @param domain by part, finite, as it leaves the clamp.
 std::vector<AttainedEnds> attained_ends(const files::Network& network,

@@ -16,7 +16,7 @@ double rounded_down(const check::Dyadic& x);
 /// @param square not negative
 double sqrt_up(const check::Dyadic& square);
 
-/// A float32 in [low, high], the nearest to x or one next to it; nothing where there is none.
+/// A float32 in [low, high], the nearest to x or one next to it; nothing if the interval holds no float32.
 /// @param x within the range of float32 once it is in [low, high]; low and high not NaN.
 std::optional<float> nearest_float(double x, double low, double high);
 

@@ -15,7 +15,7 @@
 namespace swarmcert::learning {
 namespace {
 
-/// The fold of each flight that does not test, dealt out in the order of the tracks.
+/// The fold of each flight that does not test, assigned in turn, in the order of the tracks.
 std::map<std::string, int> folds_of_flights(const LearningData& data, int folds) {
   std::map<std::string, int> result;
   for (const TrackSamples& track : data.tracks) {
@@ -23,7 +23,7 @@ std::map<std::string, int> folds_of_flights(const LearningData& data, int folds)
   }
   if (static_cast<int>(result.size()) < folds)
     throw files::InputError({"", "", "--folds", fmt::format("{}", folds),
-                             fmt::format("{} flights cannot be dealt out to so many folds", result.size()),
+                             fmt::format("{} flights are too few: each fold requires one", result.size()),
                              "name more flights, or fewer folds"});
   return result;
 }

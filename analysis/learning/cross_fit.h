@@ -16,8 +16,8 @@ struct CrossFit {
   training::Matrix unseen;
 };
 
-/// Cross-fitting (Breiman 1996, Chernozhukov et al. 2018): the flights that do not test are dealt out in their order to
-/// `folds` folds. Network k, of seed options.trainer.seed + k, is fitted to all but fold k, which selects its epoch.
+/// Cross-fitting (Breiman 1996, Chernozhukov et al. 2018): the flights that do not test are assigned in turn to `folds`
+/// folds. Network k, of seed options.trainer.seed + k, is fitted to all but fold k, which selects its epoch.
 /// The result is the mean of the networks as one deep set (mean_network()), so that errors in which they differ average
 /// out, every flight is fitted, and yet `unseen` says of every flight how well flights like it are predicted: slightly
 /// too well, since the flight chose the epoch, and slightly too badly, since it is what one network says and not their

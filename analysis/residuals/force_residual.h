@@ -29,7 +29,7 @@ class AccelerometerFilter {
  private:
   /// What a step of this length does.
   struct Response {
-    double step_s = 0, inverse_step_1_s = 0;
+    double step_s = -1, inverse_step_1_s = 0;  ///< negative: none yet
     double start_to_output = 0, bend_to_output = 0, start_to_slope = 0, bend_to_slope = 0;
   };
   Response response_to(double step_s) const;

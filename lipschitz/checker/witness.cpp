@@ -154,17 +154,13 @@ Intervals enclosed(const Term& term, const std::vector<float>& x) {
   return check::network_intervals(*term.network, std::move(at));
 }
 
-void add(Intervals& sum, const Intervals& term) {
-  for (std::size_t i = 0; i < sum.lower.size(); ++i) {
-    sum.lower[i] += term.lower[i];
-    sum.upper[i] += term.upper[i];
-  }
-}
-
-Intervals enclosed(const SlopeFunction& f, const std::vector<float>& x, const Intervals* others_sum) {
+/// @param terms those that do not move
+Intervals enclosed(const SlopeFunction& f, const std::vector<float>& x, std::vector<check::SumTerm> terms) {
   Intervals value = enclosed(f.moved, x);
-  if (others_sum != nullptr) add(value, *others_sum);
-  return f.rho == nullptr ? value : check::network_intervals(*f.rho, std::move(value));
+  if (f.rho == nullptr) return value;
+  terms.push_back({{std::move(value), {}}, 1, 1});
+  return check::network_intervals(*f.rho,
+                                  check::sum_intervals(terms, static_cast<std::size_t>(f.rho->inputs())));
 }
 
 /// At most |a - b|_2^2, whatever a and b are in their enclosures.
@@ -194,17 +190,10 @@ mpq_class exact_rise(const SlopeFunction& f, const SlopePoints& points) {
 
 /// At most |f(x) - f(y)|_2^2.
 mpq_class least_rise(const SlopeFunction& f, const SlopePoints& points) {
-  Intervals others_sum;
-  for (std::size_t j = 0; j < f.others.size(); ++j) {
-    const Intervals value = enclosed(f.others[j], points.others[j]);
-    if (j == 0) {
-      others_sum = value;
-    } else {
-      add(others_sum, value);
-    }
-  }
-  const Intervals* const sum = f.others.empty() ? nullptr : &others_sum;
-  return least_squared_distance(enclosed(f, points.x, sum), enclosed(f, points.y, sum));
+  std::vector<check::SumTerm> others;
+  for (std::size_t j = 0; j < f.others.size(); ++j)
+    others.push_back({{enclosed(f.others[j], points.others[j]), {}}, 1, 1});
+  return least_squared_distance(enclosed(f, points.x, others), enclosed(f, points.y, others));
 }
 
 [[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument("slope: " + what); }

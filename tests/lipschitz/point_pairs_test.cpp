@@ -2,7 +2,7 @@
 #include <cmath>
 #include <optional>
 
-#include "lipschitz/certify.h"
+#include "lipschitz/boxes.h"
 #include "lipschitz/checker/check.h"
 #include "lipschitz/checker/witness.h"
 #include "lipschitz/lower_bound.h"
@@ -54,15 +54,6 @@ Weights made(const PairedNetwork& one, std::mt19937& generator) {
   return weights;
 }
 
-Box around(int inputs, double radius) {
-  Box box;
-  for (int k = 0; k < inputs; ++k) {
-    box.lower.push_back(0.3 - 0.2 * k - radius);
-    box.upper.push_back(0.3 - 0.2 * k + radius);
-  }
-  return box;
-}
-
 Certification certified_pairs(const Network& network, std::map<std::string, Box> domain = {},
                               lipschitz::UpperMethod method = lipschitz::UpperMethod::kAuto) {
   CertifyOptions options;
@@ -110,7 +101,7 @@ TEST(PointPairs, AreBelowEveryProvedBoundAndAsSteepAsTheirValuesInDouble) {
     for (const double radius : {0.0, 0.02, 1.0}) {
       const Network network = tests::plain(made(one, generator));
       std::map<std::string, Box> domain;
-      if (radius > 0) domain["network"] = around(one.sizes.front(), radius);
+      if (radius > 0) domain["network"] = tests::cube(one.sizes.front(), radius);
       const CertifiedBound bound = certified_pairs(network, domain).bounds.front();
       const std::string where = network.plain->activation_names() + " " + std::to_string(radius);
       ASSERT_TRUE(bound.lower.witness) << where;
@@ -244,7 +235,7 @@ TEST(PointPairCertificate, IsRefusedWithAnyLowerBoundAboveItsPairAndPointsThatDo
   std::mt19937 generator(37);
   for (const PairedNetwork& one : paired_networks()) {
     const Network network = tests::plain(made(one, generator));
-    const std::map<std::string, Box> domain = {{"network", around(one.sizes.front(), 0.25)}};
+    const std::map<std::string, Box> domain = {{"network", tests::cube(one.sizes.front(), 0.25)}};
     const Json found =
         lipschitz::certificate(network, certified_pairs(network, domain, lipschitz::UpperMethod::kProduct));
     const std::string where = network.plain->activation_names();

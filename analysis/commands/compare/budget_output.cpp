@@ -92,19 +92,25 @@ void write_fitted(const Budget& budget, const residuals::Fleet& fleet, const std
   std::filesystem::create_directories(folder);
   const std::filesystem::path path(folder);
   std::string text = "schema = \"swarmcert/flights/1\"\n";
-  std::map<std::string, std::string> of_kind;  // a vehicle whose model was fitted, by kind
-  for (const auto& [vehicle, model] : budget.fitted) {
-    const auto use = fleet.find(vehicle);
-    if (use != fleet.end() && use->second.position_only) continue;
+  std::map<std::string, std::string> of_kind;  // the vehicle whose model stands for its kind
+  const auto write_model = [&](const std::string& vehicle, const stability::Model& model) {
     files::write_file((path / (vehicle + ".toml")).string(),
                       stability::to_toml(model, {"Fitted jointly to flights by swarmcert compare --budget."}),
                       overwrite);
-    text += "\n[vehicle." + vehicle + "]\nmodel = \"" + vehicle + ".toml\"\n";
     of_kind.emplace(model.kind, vehicle);
+  };
+  for (const auto& [vehicle, model] : budget.fitted) {
+    const auto use = fleet.find(vehicle);
+    if (use != fleet.end() && use->second.position_only) continue;
+    write_model(vehicle, model);
+    text += "\n[vehicle." + vehicle + "]\nmodel = \"" + vehicle + ".toml\"\n";
   }
   for (const auto& [vehicle, use] : fleet) {
+    if (!use.position_only) continue;
+    const auto own = budget.fitted.find(vehicle);
+    if (of_kind.count(use.kind) == 0 && own != budget.fitted.end()) write_model(vehicle, own->second);
     const auto same = of_kind.find(use.kind);
-    if (use.position_only && same != of_kind.end())
+    if (same != of_kind.end())
       text += "\n[vehicle." + vehicle + "]\nmodel = \"" + same->second + ".toml\"\nuse = \"position\"\n";
   }
   files::write_file((path / "flights.toml").string(), text, overwrite);

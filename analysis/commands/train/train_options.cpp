@@ -93,7 +93,7 @@ void declare_run(CLI::App& app, TrainOptions& options) {
       ->capture_default_str();
   app.add_option(
          "--folds", options.folds,
-         "Deal the flights that do not test out to this many folds, train one network without each "
+         "Divide the flights that do not test into this many folds, train one network without each "
          "fold, which selects its epoch, and write their mean as one network, this many times as wide; "
          "what each network says of the fold that it has not seen takes the place of selecting flights")
       ->check(CLI::Range(0, 100))

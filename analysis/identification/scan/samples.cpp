@@ -87,7 +87,7 @@ void set_motion(const Instant& now, Values& to) {
   at(to, V::kTime) = now.time_s;
 }
 
-/// Laterally nearest to a place among those within kHeightOfNeighbours_m of it in height; null where there is none.
+/// Laterally nearest to a place among those within kHeightOfNeighbours_m of it in height; null without any.
 const stability::Neighbour* nearest_neighbour(const Instant& then, const Eigen::Vector3d& to_W_m) {
   const stability::Neighbour* nearest = nullptr;
   double least_m = std::numeric_limits<double>::infinity();

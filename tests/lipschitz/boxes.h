@@ -1,0 +1,55 @@
+/// @file Networks of other activations than ReLU on boxes, as tests of bounds on a box share them.
+#pragma once
+
+#include <map>
+#include <stdexcept>
+#include <string>
+
+#include "lipschitz/certify.h"
+#include "lipschitz/checker/values.h"
+#include "nn/random_network.h"
+
+namespace swarmcert::tests {
+
+/// By part of NET.
+using Domain = std::map<std::string, lipschitz::Box>;
+
+inline files::Weights with(files::Weights weights, files::Activation activation) {
+  set_activation(weights, activation);
+  return weights;
+}
+
+/// Reaches `radius` to both sides of a point that is not symmetric.
+inline lipschitz::Box cube(int inputs, double radius) {
+  lipschitz::Box box;
+  for (int k = 0; k < inputs; ++k) {
+    const double middle = 0.3 - 0.2 * k;
+    box.lower.push_back(middle - radius);
+    box.upper.push_back(middle + radius);
+  }
+  return box;
+}
+
+inline check::Intervals intervals(const lipschitz::Box& box) {
+  return {{box.lower.begin(), box.lower.end()}, {box.upper.begin(), box.upper.end()}};
+}
+
+inline lipschitz::CertifyOptions on_box(const Domain& domain,
+                                        lipschitz::UpperMethod method = lipschitz::UpperMethod::kAuto) {
+  lipschitz::CertifyOptions options;
+  options.domain = domain;
+  options.method = method;
+  options.lower.rounds = 1;
+  options.jobs = 1;
+  return options;
+}
+
+/// With respect to all inputs.
+inline const lipschitz::CertifiedBound& bound_of(const lipschitz::Certification& found,
+                                                 const std::string& function) {
+  for (const lipschitz::CertifiedBound& bound : found.bounds)
+    if (bound.function == function && bound.block == "all") return bound;
+  throw std::logic_error("no bound of " + function);
+}
+
+}  // namespace swarmcert::tests
