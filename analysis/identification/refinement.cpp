@@ -14,10 +14,11 @@ namespace {
 
 constexpr std::size_t kTooManyToRefine = 400'000;
 constexpr int kMostSteps = 7;
-constexpr int kStepsOfRefit = 2;      ///< from where the fit of an excerpt ended, which is close
-constexpr double kDifference = 0.02;  ///< of a shape's scale, for derivatives
-constexpr double kLargestStep = 0.5;  ///< of a shape's scale
-constexpr double kSettled = 0.01;
+constexpr int kStepsOfRefit = 2;        ///< from where the fit of an excerpt ended, which is close
+constexpr double kDifference = 0.02;    ///< of a shape's scale, for derivatives
+constexpr double kLargestStep = 0.5;    ///< of a shape's scale
+constexpr double kSettled = 0.01;       ///< of a shape's scale
+constexpr double kSettledErrors = 0.1;  ///< of its standard error, where that is larger
 
 /// One number that varies: a coefficient, or a shape of a member.
 struct Unknown {
@@ -42,6 +43,11 @@ double scale_of(const stability::Parameter& parameter, double value) {
   if (!parameter.grid.empty()) typical = std::max(typical, 0.5 * std::abs(parameter.grid.back()));
   return typical;
 }
+
+struct Step {
+  std::vector<std::vector<double>> thetas;
+  double size;  ///< of the shape that moves farthest, in what is negligible
+};
 
 /// Which shapes a refinement may move.
 enum class Moves { kAll, kMemories, kOthers };
@@ -81,10 +87,9 @@ class Refinement {
     const int steps = !moves ? 0 : passes_.records > kTooManyToRefine ? 1 : most_steps;
     double radius = kLargestStep;
     for (int i = 0; i < steps; ++i) {
-      double length = 0;
-      const std::vector<std::vector<double>> next = step(best, radius, &length);
-      if (length < kSettled) break;
-      Point point = evaluate(next);
+      const Step next = step(best, radius);
+      if (next.size < 1) break;
+      Point point = evaluate(next.thetas);
       if (point.error < best.error)
         best = std::move(point);
       else
@@ -94,9 +99,6 @@ class Refinement {
   }
 
  private:
-  double& shape(std::vector<std::vector<double>>& thetas, const Unknown& u) const {
-    return thetas[u.member][u.index];
-  }
   const stability::Parameter& parameter(const Unknown& u) const {
     const stability::EffectInfo& info = candidates_[u.member].info;
     return u.is_shape ? info.shape[u.index] : info.linear[u.index];
@@ -215,7 +217,8 @@ class Refinement {
     return pull;
   }
 
-  std::vector<std::vector<double>> step(const Point& from, double radius, double* length) const {
+  /// Where Gauss and Newton lead.
+  Step step(const Point& from, double radius) const {
     Eigen::VectorXd lower(from.b.size()), upper = lower;
     for (std::size_t k = 0; k < unknowns_.size(); ++k) {
       const Unknown& u = unknowns_[k];
@@ -227,37 +230,46 @@ class Refinement {
       lower[i] = std::max(lower[i] - at, -radius * u.scale);
       upper[i] = std::min(upper[i] - at, radius * u.scale);
     }
+    const Eigen::VectorXd pull = ridge(from);
     Eigen::MatrixXd gram = from.gram;
-    gram.diagonal() += ridge(from);
+    gram.diagonal() += pull;
     const Eigen::VectorXd change = box_least_squares(gram, from.b, lower, upper);
-    std::vector<std::vector<double>> thetas = from.thetas;
-    *length = 0;
+    const Eigen::VectorXd variance =
+        sandwich(from.blocks, free_unknowns(from, pull), from.coefficients, pull).diagonal();
+    Step next = {from.thetas, 0};
     for (std::size_t k = 0; k < unknowns_.size(); ++k) {
       const Unknown& u = unknowns_[k];
       if (!u.is_shape) continue;
-      const double moved = change[static_cast<Eigen::Index>(k)];
-      shape(thetas, u) = std::clamp(shape(thetas, u) + moved, parameter(u).lower, parameter(u).upper);
-      *length = std::max(*length, std::abs(moved) / u.scale);
+      const auto i = static_cast<Eigen::Index>(k);
+      double& value = next.thetas[u.member][u.index];
+      value = std::clamp(value + change[i], parameter(u).lower, parameter(u).upper);
+      const double negligible = std::max(kSettled * u.scale, kSettledErrors * std::sqrt(variance[i]));
+      next.size = std::max(next.size, std::abs(change[i]) / negligible);
     }
-    return thetas;
+    return next;
   }
 
-  std::vector<Refined> result(const Point& best) const {
+  /// Unknowns that are neither held nor at a bound, and that the flights tell something about.
+  std::vector<int> free_unknowns(const Point& at, const Eigen::VectorXd& pull) const {
     // A shape that changes the forces by their rounding only, such as how wakes compose where there is one, is not
     // known at all: its pull alone would make its interval narrow.
     constexpr double kLeastShareOfPull = 1e-6;
-    const Eigen::VectorXd pull = ridge(best);
     std::vector<int> free;
     for (std::size_t k = 0; k < unknowns_.size(); ++k) {
       const Unknown& u = unknowns_[k];
       const auto i = static_cast<Eigen::Index>(k);
-      const double value = u.is_shape ? best.thetas[u.member][u.index] : best.coefficients[i];
+      const double value = u.is_shape ? at.thetas[u.member][u.index] : at.coefficients[i];
       const bool held = parameter(u).lower == parameter(u).upper;
       const bool at_end = u.is_shape && (value <= parameter(u).lower || value >= parameter(u).upper);
-      if (!held && !at_end && best.gram(i, i) > kLeastShareOfPull * pull[i])
+      if (!held && !at_end && at.gram(i, i) > kLeastShareOfPull * pull[i])
         free.push_back(static_cast<int>(k));
     }
-    const Jackknife spread = jackknife(best.blocks, free, best.coefficients, pull);
+    return free;
+  }
+
+  std::vector<Refined> result(const Point& best) const {
+    const Eigen::VectorXd pull = ridge(best);
+    const Jackknife spread = jackknife(best.blocks, free_unknowns(best, pull), best.coefficients, pull);
     std::vector<Refined> refined;
     for (std::size_t m = 0; m < candidates_.size(); ++m) {
       refined.push_back({candidates_[m], {}, best.thetas[m], {}, {}});

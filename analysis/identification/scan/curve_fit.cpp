@@ -10,6 +10,8 @@ namespace {
 
 constexpr int kFewestChunks = 20, kFewestScanFlights = 5;
 
+using RowMajorXd = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
 void group_blocks(const ScanSamples& samples, int blocks_each, Chunks& chunks) {
   chunks.flight.clear();
   chunks.of_sample.clear();
@@ -143,37 +145,37 @@ CurveFit::CurveFit(const std::vector<SparseRow>& rows, int columns, const Chunks
 
 void CurveFit::fit(const Columns& targets) {
   const int size = columns_ + 1;
-  std::array<Eigen::MatrixXd, Chunks::kFolds> inside;
-  for (Eigen::MatrixXd& b : inside) b = Eigen::MatrixXd::Zero(size, targets.cols());
+  std::array<RowMajorXd, Chunks::kFolds> inside;
+  for (RowMajorXd& b : inside) b = RowMajorXd::Zero(size, targets.cols());
+  Eigen::RowVectorXd values;
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const SparseRow& row = rows_[i];
-    Eigen::MatrixXd& b =
+    RowMajorXd& b =
         inside[static_cast<std::size_t>(chunks_.fold[static_cast<std::size_t>(chunks_.of_sample[i])])];
-    for (Eigen::Index m = 0; m < targets.cols(); ++m) {
-      const double value = targets(static_cast<Eigen::Index>(i), m);
-      for (int a = 0; a < row.count; ++a)
-        b(row.index[static_cast<std::size_t>(a)], m) += row.weight[static_cast<std::size_t>(a)] * value;
-      b(columns_, m) += value;
-    }
+    values = targets.row(static_cast<Eigen::Index>(i)).cast<double>();
+    for (std::size_t a = 0; a < static_cast<std::size_t>(row.count); ++a)
+      b.row(row.index[a]) += static_cast<double>(row.weight[a]) * values;
+    b.row(columns_) += values;
   }
-  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(size, targets.cols());
-  for (const Eigen::MatrixXd& b : inside) all += b;
+  RowMajorXd all = RowMajorXd::Zero(size, targets.cols());
+  for (const RowMajorXd& b : inside) all += b;
   for (std::size_t f = 0; f < Chunks::kFolds; ++f) coefficients_[f] = inverses_[f] * (all - inside[f]);
   coefficients_[Chunks::kFolds] = inverses_[Chunks::kFolds] * all;
 }
 
 Columns CurveFit::predictions(const std::vector<SparseRow>& rows) const {
   Columns result(static_cast<Eigen::Index>(rows.size()), coefficients_[0].cols());
+  std::array<RowMajorXd, Chunks::kFolds> coefficients;
+  for (std::size_t f = 0; f < Chunks::kFolds; ++f) coefficients[f] = coefficients_[f];
+  RowMajorXd sum(1, result.cols());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const SparseRow& row = rows[i];
     const int fold = chunks_.fold[static_cast<std::size_t>(chunks_.of_sample[i])];
-    const Eigen::MatrixXd& c = coefficients_[static_cast<std::size_t>(fold)];
-    for (Eigen::Index m = 0; m < c.cols(); ++m) {
-      double sum = c(columns_, m);
-      for (int a = 0; a < row.count; ++a)
-        sum += row.weight[static_cast<std::size_t>(a)] * c(row.index[static_cast<std::size_t>(a)], m);
-      result(static_cast<Eigen::Index>(i), m) = static_cast<float>(sum);
-    }
+    const RowMajorXd& c = coefficients[static_cast<std::size_t>(fold)];
+    sum.row(0) = c.row(columns_);
+    for (std::size_t a = 0; a < static_cast<std::size_t>(row.count); ++a)
+      sum.row(0) += static_cast<double>(row.weight[a]) * c.row(row.index[a]);
+    result.row(static_cast<Eigen::Index>(i)) = sum.row(0).cast<float>();
   }
   return result;
 }
@@ -199,7 +201,7 @@ Columns mean_predictions(const Columns& targets, const Chunks& chunks) {
 }
 
 Eigen::MatrixXd chunk_errors(const Columns& targets, const Columns& predictions, const Chunks& chunks) {
-  Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(chunks.count(), targets.cols());
+  RowMajorXd errors = RowMajorXd::Zero(chunks.count(), targets.cols());
   for (Eigen::Index i = 0; i < targets.rows(); ++i) {
     errors.row(chunks.of_sample[static_cast<std::size_t>(i)]) +=
         (targets.row(i) - predictions.row(i)).cast<double>().cwiseAbs2();

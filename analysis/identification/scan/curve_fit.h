@@ -37,7 +37,8 @@ std::vector<SparseRow> hat_rows(const Eigen::Ref<const Eigen::VectorXf>& values,
 std::vector<SparseRow> hat_rows(const Eigen::Ref<const Eigen::VectorXf>& a, const Knots& a_knots,
                                 const Eigen::Ref<const Eigen::VectorXf>& b, const Knots& b_knots);
 
-using Columns = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic>;
+/// [samples x columns], a sample's values side by side: every pass goes from sample to sample.
+using Columns = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// Fits of all columns of `targets` without one fold each, and of all samples. Each has a constant.
 class CurveFit {
