@@ -44,8 +44,8 @@ struct Diagnosis {
 inline constexpr std::size_t kMostSearched = 500;
 
 /// Diagnoses the model of one kind of vehicle on the flights `which`. Of flights of more than `most_searched` blocks,
-/// names, rivals, formulas and detectable sizes come from an excerpt of about as many, stretches of every flight
-/// (residuals::excerpt_of()); the numbers of the names, their intervals, errors and checks from all of them.
+/// names, rivals, formulas and detectable sizes come from an excerpt of about as many, stretches of the flights
+/// (residuals::TrackStore); the numbers of the names, their intervals, errors and checks from all of them.
 Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, const std::vector<int>& which,
                    int jobs, const residuals::Progress& progress, std::size_t most_searched = kMostSearched);
 

@@ -41,7 +41,7 @@ std::vector<FlightError> flight_errors(const Inputs& inputs, int jobs) {
     error.force = error_of(track, r);
     if (error.force.windows.empty()) return;
     error.places = place_residuals(track, r);
-    if (measures_velocity(*inputs.cache->log(track.path, inputs.map)))
+    if (measures_velocity(inputs.cache->log(track.path, inputs.map)->log))
       error.velocity = error_of(track, velocity_error(track));
     errors.push_back(std::move(error));
   });

@@ -15,7 +15,7 @@ std::size_t bytes_of(const logs::Log& log) {
 
 }  // namespace
 
-std::shared_ptr<const logs::Log> LogCache::log(const std::string& path, const logs::SignalMap& map) {
+std::shared_ptr<const CachedLog> LogCache::log(const std::string& path, const logs::SignalMap& map) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto known = entries_.find(path);
@@ -28,11 +28,12 @@ std::shared_ptr<const logs::Log> LogCache::log(const std::string& path, const lo
   logs::Log read = logs::read_log(path, map);
   if (hover_multiples_) logs::use_hover_multiples(read);
   const std::size_t size = bytes_of(read);
-  const auto log = std::make_shared<const logs::Log>(std::move(read));
+  std::vector<logs::Doubt> doubts = logs::doubts_of(read);
+  const auto log = std::make_shared<const CachedLog>(CachedLog{std::move(read), std::move(doubts)});
   const std::lock_guard<std::mutex> lock(mutex_);
   if (size > most_bytes_ || entries_.count(path) != 0) return log;
   while (held_bytes_ + size > most_bytes_) {
-    held_bytes_ -= bytes_of(*entries_.at(ages_.back()).log);
+    held_bytes_ -= bytes_of(entries_.at(ages_.back()).log->log);
     entries_.erase(ages_.back());
     ages_.pop_back();
   }

@@ -6,11 +6,18 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "analysis/logs/log.h"
+#include "analysis/logs/plausibility.h"
 #include "analysis/logs/signals.h"
 
 namespace swarmcert::residuals {
+
+struct CachedLog {
+  logs::Log log;
+  std::vector<logs::Doubt> doubts;  ///< logs::doubts_of(log)
+};
 
 /// Safe to use from several threads. What was not asked for the longest goes first when the memory is full.
 class LogCache {
@@ -23,14 +30,14 @@ class LogCache {
       : hover_multiples_(hover_multiples), most_bytes_(most_bytes) {}
 
   /// The log, from memory or read. @throws files::InputError as logs::read_log().
-  std::shared_ptr<const logs::Log> log(const std::string& path, const logs::SignalMap& map);
+  std::shared_ptr<const CachedLog> log(const std::string& path, const logs::SignalMap& map);
 
   std::size_t held_bytes() const;
   std::size_t reads() const;  ///< files that were parsed so far
 
  private:
   struct Entry {
-    std::shared_ptr<const logs::Log> log;
+    std::shared_ptr<const CachedLog> log;
     std::list<std::string>::iterator age;
   };
   const bool hover_multiples_;

@@ -214,7 +214,7 @@ void cut_phases(Track& track, const CutRules& rules) {
 }
 
 struct LoadedLog {
-  std::shared_ptr<const logs::Log> log;
+  std::shared_ptr<const CachedLog> cached;
   std::size_t track;
 };
 
@@ -231,7 +231,7 @@ void add_neighbours(Track& track, std::size_t own, const std::vector<LoadedLog>&
       if (j == own) continue;
       const Track& other = tracks[all[j].track];
       const double time_s = now.time_s + (rules.published ? 0 : other.clock_offset_s);
-      const std::optional<State> state = state_at(*all[j].log, time_s, rules.published, from[j]);
+      const std::optional<State> state = state_at(all[j].cached->log, time_s, rules.published, from[j]);
       if (!state) {
         if (track.cut[i] == Cut::kNone) track.cut[i] = Cut::kNeighbour;
         continue;
@@ -282,14 +282,14 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
   std::vector<LoadedLog> all;
   std::vector<std::vector<double>> onsets;
   for (const auto& [vehicle, path] : flight.logs) {
-    std::shared_ptr<const logs::Log> read;
+    std::shared_ptr<const CachedLog> read;
     try {
       read = cache.log(path, map);
     } catch (const files::InputError& error) {
       problems.emplace_back(error.what());
       continue;
     }
-    const logs::Log& log = *read;
+    const logs::Log& log = read->log;
     Track track;
     track.flight = flight.name;
     track.scenario = flight.scenario;
@@ -304,7 +304,7 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
       problems.push_back(path + ": no flight: never armed");
     else if (!log.signals.force && !only_neighbour)
       problems.push_back(path + ": only a neighbour: the log lacks " + log.signals.force_lacks);
-    track.doubts = logs::doubts_of(log);
+    track.doubts = read->doubts;
     for (const logs::Doubt& doubt : track.doubts) {
       if (!doubt.refuses_force || track.position_only || rules.keep) continue;
       track.position_only = true;
@@ -329,9 +329,9 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
     onsets.push_back(onsets_s(log));
     track.has_reference_clock = all.empty();
     track.has_absolute_clock =
-        !rules.published && !all.empty() && log.epoch_s > 0 && all.front().log->epoch_s > 0;
+        !rules.published && !all.empty() && log.epoch_s > 0 && all.front().cached->log.epoch_s > 0;
     if (track.has_absolute_clock)
-      track.clock_offset_s = all.front().log->epoch_s - log.epoch_s;
+      track.clock_offset_s = all.front().cached->log.epoch_s - log.epoch_s;
     else if (flight.clock_offsets_s.count(path) == 1)
       track.clock_offset_s = flight.clock_offsets_s.at(path);
     else if (!rules.published && !all.empty())
@@ -342,7 +342,7 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
   for (std::size_t k = 0; k < all.size(); ++k) {
     Track& track = tracks[k];
     if (track.position_only) continue;
-    fill_instants(track, *all[k].log);
+    fill_instants(track, all[k].cached->log);
     derive_specific_force(track);
     cut_phases(track, rules);
   }

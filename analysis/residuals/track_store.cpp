@@ -53,6 +53,21 @@ std::size_t bytes_of(const Track& track) {
          track.given_thrust.size() * sizeof(double);
 }
 
+/// How long the records without a cut last.
+double used_s(const Track& track) {
+  const auto used = static_cast<double>(std::count(track.cut.begin(), track.cut.end(), Cut::kNone));
+  return used * track.duration_s() / std::max(static_cast<double>(track.instants.size()) - 1, 1.0);
+}
+
+/// Whether an excerpt of many tracks has a stretch of this one. Where the share of a track is shorter than a stretch
+/// may be, so many tracks have one that their sum is the share; which ones follows from the names of flight and vehicle
+/// (with a few more letters behind, as this hash spreads what is in front of it).
+bool takes_part(const Track& track, double share) {
+  const double all_s = used_s(track), stretch_s = std::min(kShortest_s, all_s);
+  return share * all_s >= stretch_s ||
+         number_of(track.flight + "/" + track.vehicle + " takes part") * stretch_s < share * all_s;
+}
+
 /// The stretches of an excerpt, as ranges [first, second) of positions in `used`, the records without a cut.
 std::vector<std::pair<std::size_t, std::size_t>> stretches(const Track& track,
                                                            const std::vector<std::size_t>& used,
@@ -119,8 +134,14 @@ Track excerpt_of(const Track& track, double share) {
 TrackStore::Kept TrackStore::loaded(const Load& load) const {
   Kept all;
   all.tracks = load(all.problems);
+  if (share_ >= 1) return all;
+  const auto is_left_out = [&](const Track& track) {
+    return !track.position_only && !takes_part(track, share_);
+  };
+  all.tracks.erase(std::remove_if(all.tracks.begin(), all.tracks.end(), is_left_out), all.tracks.end());
   for (Track& track : all.tracks) {
-    if (share_ < 1 && !track.position_only) track = excerpt_of(track, share_);
+    own_neighbours(track);  // erasing has moved it
+    if (!track.position_only) track = excerpt_of(track, share_);
   }
   return all;
 }

@@ -24,7 +24,7 @@ class TrackStore {
   static constexpr std::size_t kMost_bytes = std::size_t{256} << 20;
   using Load = std::function<std::vector<Track>(std::vector<std::string>& problems)>;
 
-  /// @param share of each track: see excerpt_of(); 1: all of it.
+  /// @param share of the records, see excerpt_of(); 1: all. Of tracks too short to share, only some have a stretch.
   explicit TrackStore(double share, std::size_t most_bytes = kMost_bytes)
       : share_(share), most_bytes_(most_bytes) {}
 

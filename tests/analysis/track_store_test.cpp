@@ -75,6 +75,34 @@ TEST(Excerpt, OfAShortFlightIsNotShorterThanFourSeconds) {
   EXPECT_EQ(excerpt_of(straight_track(8), 0.01).used, 300u) << "all that is used";
 }
 
+TEST(TrackStore, OfManyShortTracksTakesNoMoreThanTheShare) {
+  constexpr int kTracks = 300;
+  constexpr double kShare = 0.05;  // 1.5 s of each
+  residuals::TrackStore store(kShare);
+  std::size_t used = 0;
+  int taken = 0;
+  for (int k = 0; k < kTracks; ++k) {
+    residuals::FlightFiles flight;
+    flight.logs = {{"cf1", "cf1_" + std::to_string(k)}};
+    const auto load = [&](std::vector<std::string>&) {
+      std::vector<Track> tracks;
+      tracks.push_back(straight_track(35));
+      tracks[0].flight = "a/" + std::to_string(k);
+      return tracks;
+    };
+    std::vector<std::string> problems;
+    for (const Track& track : store.tracks(flight, load, problems)) {
+      EXPECT_NEAR(static_cast<double>(track.used), 400, 2);
+      used += track.used;
+      ++taken;
+    }
+  }
+  // 112 tracks are expected; the names draw them, so that their number has a standard deviation of 8.
+  constexpr double kExpected = kShare * kTracks * 3000, kFourDeviations = 0.3;
+  EXPECT_NEAR(static_cast<double>(used), kExpected, kFourDeviations * kExpected);
+  EXPECT_NEAR(taken, kTracks * 1.5 / 4, kFourDeviations * kTracks * 1.5 / 4);
+}
+
 TEST(TrackStore, GivesEachTimeWhatTheFirstLoadGaveAndStaysBelowItsLimit) {
   int loads = 0;
   const auto load = [&](std::vector<std::string>& problems) {

@@ -133,7 +133,7 @@ void print_diagnosis(const Diagnosis& diagnosis) {
       diagnosis.vehicle.empty() ? diagnosis.kind : diagnosis.vehicle, diagnosis.records, diagnosis.blocks);
   if (diagnosis.searched_blocks < diagnosis.blocks && diagnosis.too_poor.empty())
     fmt::print(
-        "  Names were looked for in {} of the blocks, out of every flight; their numbers are of all.\n",
+        "  Names were looked for in {} of the blocks, spread over the flights; their numbers are of all.\n",
         diagnosis.searched_blocks);
   if (!diagnosis.too_poor.empty()) {
     fmt::print("  No answer: {}.\n", diagnosis.too_poor);
