@@ -14,6 +14,7 @@
 #include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/flight_options.h"
+#include "analysis/commands/shared/label_output.h"
 #include "analysis/commands/shared/output_folder.h"
 #include "analysis/identification/balance_ladder.h"
 #include "analysis/identification/ladder.h"
@@ -142,6 +143,8 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   refuse_missing_folder(options.output);
   if (options.flights.models.size() != 1) throw UsageError("add takes one --model");
   residuals::Inputs inputs = read_flights(options.flights, false, false, true);
+  const std::vector<identification::Mislabelled> labels =
+      identification::find_and_correct_labels(inputs, common.jobs);
   const std::vector<identification::ClockOffset> clocks =
       identification::find_and_correct_clocks(inputs, common.jobs);
   identification::LadderOptions what;
@@ -165,6 +168,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   files::Json result = result_head("add", inputs.files());
   add_ladder(ladder, inputs, result);
   add_clocks(clocks, common.prints_text(), result);
+  add_labels(labels, common.prints_text(), result);
   result["written"] = ladder.any_accepted;
   result["problems"] = ladder.problems;
   if (!ladder.too_poor.empty()) result["reason"] = ladder.too_poor;

@@ -14,6 +14,7 @@
 #include "analysis/commands/diagnose/rotor_output.h"
 #include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/flight_options.h"
+#include "analysis/commands/shared/label_output.h"
 #include "analysis/identification/diagnose.h"
 #include "analysis/identification/verdict.h"
 
@@ -91,6 +92,8 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   residuals::Inputs inputs = read_flights(options.flights, false, false, true);
+  const std::vector<identification::Mislabelled> labels =
+      identification::find_and_correct_labels(inputs, common.jobs);
   const std::vector<identification::ClockOffset> clocks =
       identification::find_and_correct_clocks(inputs, common.jobs);
   const residuals::ForceUnit unit = page_unit(options.flights, inputs);
@@ -98,6 +101,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   std::optional<residuals::Inputs> others;
   if (!options.against.empty()) {
     others = read_others(options.flights, options.against, inputs);
+    identification::find_and_correct_labels(*others, common.jobs);
     identification::find_and_correct_clocks(*others, common.jobs);
     other_files = add_files_of(*others, files);
   }
@@ -112,6 +116,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   const bool names_sensor =
       !others && judge_accelerometers(inputs, common.jobs, common.prints_text(), result);
   const bool names_clock = judge_clocks(clocks, common.prints_text(), result);
+  const bool names_label = judge_labels(labels, common.prints_text(), result);
   if (options.each) add_each(answers.each, result);
   if (options.next) add_next(answers.diagnoses, result);
   if (options.next && common.prints_text()) print_next(answers.diagnoses);
@@ -119,13 +124,16 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   write_result(common, result);
   std::string reason;
   identification::Verdict verdict = identification::verdict_of(answers.diagnoses, reason);
-  if (names_rotor ||
-      ((names_torque || names_sensor || names_clock) && verdict != identification::Verdict::kInconclusive))
+  if (names_rotor || ((names_torque || names_sensor || names_clock || names_label) &&
+                      verdict != identification::Verdict::kInconclusive))
     verdict = identification::Verdict::kMissingEffect;
   if (common.prints_text()) fmt::print("verdict: {}\n", name(verdict));
   if (!options.report.empty()) {
-    const std::string path = write_diagnose_report(answers.diagnoses, answers.differences, answers.each, unit,
-                                                   result, options.report, common.force);
+    std::vector<std::string> notes;
+    for (const identification::Mislabelled& label : labels) notes.push_back(sentence(label));
+    for (const identification::ClockOffset& clock : clocks) notes.push_back(sentence(clock));
+    const std::string path = write_diagnose_report(answers.diagnoses, answers.differences, answers.each,
+                                                   notes, unit, result, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
   if (verdict != identification::Verdict::kInconclusive) return kDone;
@@ -142,7 +150,8 @@ Command diagnose_command() {
           "is significant across blocks of 2 s, and is not contradicted by the set points. The remainder is "
           "analysed separately. Means over a second show a centre of mass off the centre and an "
           "accelerometer\n"
-          "that reads too much.\n\n"
+          "that reads too much. Logs with the set points, path, sensors, name or kind of another vehicle are "
+          "told.\n\n"
           "Example: swarmcert diagnose stability/models/crazyflie-small.toml flights/ --report out\n"
           "         swarmcert diagnose model.toml today/ --against monday/ tuesday/ wednesday/",
           [](CLI::App& app) {

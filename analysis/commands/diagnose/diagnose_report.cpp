@@ -109,11 +109,12 @@ void add_left(Report& report, const Diagnosis& diagnosis, const residuals::Force
 std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses,
                                   const std::vector<identification::Difference>& differences,
                                   const std::vector<identification::Each>& each,
-                                  const residuals::ForceUnit& unit, const files::Json& result,
-                                  const std::string& folder, bool overwrite) {
+                                  const std::vector<std::string>& notes, const residuals::ForceUnit& unit,
+                                  const files::Json& result, const std::string& folder, bool overwrite) {
   Report report(differences.empty() ? "Which physical effect is missing" : "What changed");
   report.made_by(command_to_copy());
   report.result(result);
+  for (const std::string& note : notes) report.paragraph(note);
   for (std::size_t i = 0; i < diagnoses.size(); ++i) {
     const Diagnosis& diagnosis = diagnoses[i];
     report.heading(diagnosis.vehicle.empty() ? "Vehicles of kind " + diagnosis.kind

@@ -17,12 +17,13 @@ namespace swarmcert::analysis {
 /// @param differences that the diagnoses are, in their order; empty where they are of all flights
 /// @param unit of the forces on the page
 /// @param each the tables over flights, by kind; may be empty
+/// @param notes on clocks and labels, one sentence each
 /// @throws as Report::write().
 std::string write_diagnose_report(const std::vector<identification::Diagnosis>& diagnoses,
                                   const std::vector<identification::Difference>& differences,
                                   const std::vector<identification::Each>& each,
-                                  const residuals::ForceUnit& unit, const files::Json& result,
-                                  const std::string& folder, bool overwrite);
+                                  const std::vector<std::string>& notes, const residuals::ForceUnit& unit,
+                                  const files::Json& result, const std::string& folder, bool overwrite);
 
 /// The ranking as a table and as bars. @param name of the figure
 void add_ranking(Report& report, const identification::Diagnosis& diagnosis, const std::string& name,

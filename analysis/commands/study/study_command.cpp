@@ -9,6 +9,7 @@
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/flight_options.h"
+#include "analysis/commands/shared/label_output.h"
 #include "analysis/commands/study/study_output.h"
 #include "analysis/commands/study/study_report.h"
 
@@ -72,13 +73,19 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
   residuals::Inputs inputs = read_flights(words, false, false, true);
   if (inputs.models.size() != 1)
     throw UsageError("study takes one MODEL; study each kind of vehicle by itself");
+  const std::vector<identification::Mislabelled> labels =
+      identification::find_and_correct_labels(inputs, common.jobs);
   const std::vector<identification::ClockOffset> clocks =
       identification::find_and_correct_clocks(inputs, common.jobs);
+  std::vector<std::string> notes;
+  for (const identification::Mislabelled& label : labels) notes.push_back(sentence(label));
+  for (const identification::ClockOffset& clock : clocks) notes.push_back(sentence(clock));
   const residuals::ForceUnit unit = page_unit(options.flights, inputs);
   std::vector<std::string> files = inputs.files(), other_files;
   std::optional<residuals::Inputs> others;
   if (!options.against.empty()) {
     others = read_others(words, options.against, inputs);
+    identification::find_and_correct_labels(*others, common.jobs);
     identification::find_and_correct_clocks(*others, common.jobs);
     other_files = add_files_of(*others, files);
   }
@@ -89,17 +96,18 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
   files::Json result = result_head("study", files);
   add_study(study, inputs, result);
   judge_clocks(clocks, false, result);
+  judge_labels(labels, false, result);
   std::optional<Changes> changes;
   if (others) {
     changes = changes_against(*others, study, inputs, common.jobs);
     add_changes(*changes, other_files, result);
   }
   const std::string page =
-      write_study_folder(study, clocks, changes ? &*changes : nullptr, unit, result, options.output);
+      write_study_folder(study, notes, changes ? &*changes : nullptr, unit, result, options.output);
   write_result(common, result);
   if (common.prints_text()) {
     print_study(study, unit);
-    for (const identification::ClockOffset& clock : clocks) fmt::print("{}\n", sentence(clock));
+    for (const std::string& note : notes) fmt::print("{}\n", note);
     if (changes) print_changes(*changes);
     fmt::print("Page: {}\n", page);
   }

@@ -12,7 +12,6 @@
 #include "analysis/commands/diagnose/diagnose_output.h"
 #include "analysis/commands/diagnose/diagnose_report.h"
 #include "analysis/commands/diagnose/remainder_output.h"
-#include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/time_plots.h"
 #include "analysis/report/report.h"
@@ -101,16 +100,16 @@ void add_changes(Report& report, const Changes& changes, const residuals::ForceU
   }
 }
 
-using ClockOffsets = std::vector<identification::ClockOffset>;
+using Notes = std::vector<std::string>;
 
-std::string write_page(const Study& study, const ClockOffsets& clocks, const Changes* changes,
+std::string write_page(const Study& study, const Notes& notes, const Changes* changes,
                        const residuals::ForceUnit& unit, const files::Json& result,
                        const std::string& folder) {
   Report report("What does the model lack?");
   report.made_by(command_to_copy());
   report.result(result);
   report.paragraph(headline(study, unit));
-  for (const identification::ClockOffset& clock : clocks) report.paragraph(sentence(clock));
+  for (const std::string& note : notes) report.paragraph(note);
   report.heading("Where the model failed");
   add_before_and_after(report, study.before.all, study.after.all, study.pictures.room, unit);
   add_moments(report, study, unit);
@@ -135,7 +134,7 @@ std::string write_page(const Study& study, const ClockOffsets& clocks, const Cha
 
 }  // namespace
 
-std::string write_study_folder(const Study& study, const ClockOffsets& clocks, const Changes* changes,
+std::string write_study_folder(const Study& study, const Notes& notes, const Changes* changes,
                                const residuals::ForceUnit& unit, const files::Json& result,
                                const std::string& folder) {
   const std::filesystem::path path(folder);
@@ -146,7 +145,7 @@ std::string write_study_folder(const Study& study, const ClockOffsets& clocks, c
         stability::to_toml(study.ladder.model, {"Effects fitted to flights by swarmcert study."}), true);
   }
   files::write_file((path / "study.json").string(), files::to_text(result), true);
-  return write_page(study, clocks, changes, unit, result, folder);
+  return write_page(study, notes, changes, unit, result, folder);
 }
 
 }  // namespace swarmcert::analysis
