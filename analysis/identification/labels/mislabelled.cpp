@@ -26,6 +26,7 @@ struct FlightLabels {
 };
 
 FlightLabels labels_of(const residuals::Inputs& inputs, std::size_t flight) {
+  if (inputs.found.flights[flight].logs.size() < 2 && inputs.models.size() < 2) return {};
   std::vector<std::string> problems;  // the diagnosis tells them
   const std::vector<Track> tracks = inputs.load(flight, problems);
   FlightLabels labels;
