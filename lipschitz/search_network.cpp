@@ -3,8 +3,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
+
+#include "nn/base/interval.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -89,18 +90,13 @@ std::vector<SearchStage> chain(const SlopeFunction& f, const std::vector<Term>& 
   return stages;
 }
 
-struct Interval {
-  double lower = -std::numeric_limits<double>::infinity();
-  double upper = std::numeric_limits<double>::infinity();
-};
-
 /// The values that the networks can see: each box through its clamp. `inputs` receives a point of the boxes.
 std::vector<Interval> reachable(const std::vector<Term>& terms, const std::vector<std::optional<Box>>& boxes,
                                 std::vector<double>& inputs) {
   std::vector<Interval> intervals;
   for (std::size_t j = 0; j < terms.size(); ++j) {
     for (int k = 0; k < terms[j].network->inputs(); ++k) {
-      Interval box;
+      Interval box = whole_line();
       if (boxes[j]) box = {boxes[j]->lower[k], boxes[j]->upper[k]};
       Interval seen = box;
       if (terms[j].clamp != nullptr) {
