@@ -36,6 +36,8 @@ struct Flights {
     for (const int k : {0, 4, 8}) samples.axes.col(k).setOnes();
     samples.neighbours.lateral_m = Eigen::MatrixXf::Constant(size, NeighbourPlaces::kLags, std::nanf(""));
     samples.neighbours.height_m = samples.neighbours.lateral_m;
+    samples.neighbours.velocity_m_s =
+        Eigen::MatrixXf::Constant(size, 3 * NeighbourPlaces::kLags, std::nanf(""));
     for (int v = 0; v < kNumScanVariables; ++v) {
       for (int f = 0; f < flights; ++f) {
         const double a = 0.3 + uniform(), b = 0.8 + uniform(), p = 6 * uniform(), q = 6 * uniform();
@@ -68,6 +70,19 @@ struct Flights {
     }
   }
 };
+
+/// Of the neighbour, as many samples of 0.1 s ago as lags; the first samples of a flight take the first one.
+void remember_velocities(ScanSamples& samples) {
+  for (Eigen::Index i = 0; i < samples.size(); ++i) {
+    for (int lag = 0; lag < NeighbourPlaces::kLags; ++lag) {
+      const Eigen::Index first = i - i % 400;
+      for (const V v : {V::kNeighbourVx, V::kNeighbourVy, V::kNeighbourVz}) {
+        samples.neighbours.velocity_m_s(i, NeighbourPlaces::velocity_column(v, lag)) =
+            samples.values(std::max(first, i - lag), static_cast<int>(v));
+      }
+    }
+  }
+}
 
 /// Two vehicles that are never far apart in height.
 Flights of_two_vehicles(std::uint64_t seed) {
@@ -106,6 +121,28 @@ TEST(Scan, FindsAForceAlongTheMotionOfANeighbour) {
   EXPECT_EQ(found.entries[0].variable, "neighbour_vy");
   EXPECT_EQ(found.entries[0].axis, "y");
   EXPECT_GT(found.entries[0].share, 0.8);
+}
+
+TEST(Scan, FindsWhenANeighbourMovedThatDisturbsLater) {
+  Flights flights = of_two_vehicles(43);
+  const auto vy = static_cast<int>(V::kNeighbourVy);
+  double moved = 0;  // forgets within a third of a second, as nothing else here does
+  for (Eigen::Index i = 0; i < flights.samples.size(); ++i) {
+    moved = 0.7 * moved + flights.bell(flights.generator);
+    flights.samples.values(i, vy) = static_cast<float>(moved);
+  }
+  remember_velocities(flights.samples);
+  flights.push(1, [&](Eigen::Index i) {
+    return 0.01 * flights.samples.values(std::max<Eigen::Index>(i - i % 400, i - 3), vy);
+  });
+  const Scan found = scan(flights.samples, 1);
+  ASSERT_FALSE(found.entries.empty());
+  EXPECT_EQ(found.entries[0].variable, "neighbour_vy");
+  EXPECT_EQ(found.entries[0].axis, "y");
+  EXPECT_NEAR(found.entries[0].lag_s, 0.3, 1e-9);
+  EXPECT_GT(found.entries[0].share, 0.8);
+  for (std::size_t e = 1; e < found.entries.size(); ++e)
+    EXPECT_NE(found.entries[e].variable + found.entries[e].axis, "neighbour_vyy") << "of another lag";
 }
 
 TEST(Scan, FindsAPullTowardsANeighbourThatPassesAllAround) {

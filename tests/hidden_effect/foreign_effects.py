@@ -171,6 +171,13 @@ def upwash(a=0.03, ahead=0.3, width=0.25):
     return force
 
 
+def late_draft(k=0.03, delay=0.3):
+    """Along the motion that every neighbour had some time ago."""
+    def force(s):
+        return (0, k * sum((other(delay)[1] - other(delay + 0.02)[1]) / 0.02 - s.v[1] for other in s.others), 0)
+    return force
+
+
 def slow_drain(a=0.04, at=15.0, width=2.0):
     return lambda s: (0, 0, -a / (1 + math.exp(-(s.t - at) / width)))
 
@@ -225,6 +232,7 @@ EFFECTS = {
         "a_N * exp(-sqrt(dx^2 + dy^2 + dz^2) / reach_m) * {} / sqrt(dx^2 + dy^2 + dz^2)", a_N=0.03, reach_m=0.3)),
     "upwash": dict(force=upwash(), variables={"neighbour_xy"}, vehicles=2, formula=expression(
         "force_z_N", "a_N * exp(-((dx - 0.3)^2 + dy^2) / 0.125)", a_N=0.03) + "per_neighbour = true\n"),
+    "late draft": dict(force=late_draft(), variables={"neighbour_vy"}, vehicles=2),
     "flapping": dict(force=flapping(), variables={"rate_y"}, speed=1.6, formula=expression(
         "force_b1_N", "a_N * wy", a_N=0.03)),
     "slow drain": dict(force=slow_drain(), variables={"time", "battery"}, names={"payload_step"}),

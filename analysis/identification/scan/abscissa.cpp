@@ -20,6 +20,12 @@ std::vector<Abscissa> abscissas(const ScanSamples& samples) {
     all.push_back({"neighbour_xy", place, 0, false, true, false, {5, 9}});
     for (int lag = 0; lag < NeighbourPlaces::kLags; ++lag)
       all.push_back({"neighbour", {}, lag, false, true, false, {7}});
+    // Now they are among the variables above.
+    for (int lag = 1; lag < NeighbourPlaces::kLags; ++lag) {
+      for (const auto v :
+           {ScanVariable::kNeighbourVx, ScanVariable::kNeighbourVy, ScanVariable::kNeighbourVz})
+        all.push_back({scan_variable(v).name, {v}, lag, false, true, false, {8}});
+    }
   }
   return all;
 }
@@ -51,6 +57,15 @@ Curve curve_over(const ScanSamples& samples, const Abscissa& abscissa, int knots
     curve.rows = hat_rows(lateral_m, lateral, height_m, height);
     curve.columns = static_cast<int>(lateral.size() * height.size());
     curve.knots = {lateral, height};
+    return curve;
+  }
+  if (abscissa.lag > 0) {
+    const auto velocity_m_s = samples.neighbours.velocity_m_s.col(
+        NeighbourPlaces::velocity_column(abscissa.variables[0], abscissa.lag));
+    curve.knots = {knots_over(velocity_m_s, knots)};
+    if (curve.knots[0].empty()) return {};
+    curve.columns = knots;
+    curve.rows = hat_rows(velocity_m_s, curve.knots[0]);
     return curve;
   }
   const auto a = static_cast<Eigen::Index>(abscissa.variables[0]);

@@ -12,7 +12,7 @@ namespace swarmcert::identification {
 struct Abscissa {
   std::string name;
   std::vector<ScanVariable> variables;  ///< one or two; empty: places of neighbours
-  int lag = 0;
+  int lag = 0;                          ///< of neighbours, in steps of NeighbourPlaces::kLag_s
   bool is_answer = false;
   bool in_world = true, in_body = true;
   std::vector<int> knots;  ///< how many to try, for each variable

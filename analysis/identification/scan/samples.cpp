@@ -40,6 +40,7 @@ struct TrackSamples {
   std::vector<Eigen::VectorXd> residual;
   std::vector<std::array<float, 9>> axes;
   std::vector<std::array<float, NeighbourPlaces::kLags>> lateral_m, height_m;
+  std::vector<std::array<float, std::size_t{3} * NeighbourPlaces::kLags>> velocity_m_s;
   std::vector<Eigen::Vector2f>
       toward;  ///< unit vector to the nearest neighbour, horizontally; zero where there is none
   std::vector<int> block;
@@ -224,8 +225,10 @@ class TrackSampler {
   /// Relative to where the vehicle is at record `i`: where neighbours were some time ago.
   void add_neighbours(std::size_t i) {
     std::array<float, NeighbourPlaces::kLags> lateral_m, height_m;
+    std::array<float, std::size_t{3} * NeighbourPlaces::kLags> velocity_m_s;
     lateral_m.fill(kUnknown);
     height_m.fill(kUnknown);
+    velocity_m_s.fill(kUnknown);
     Eigen::Vector2f toward = Eigen::Vector2f::Zero();
     std::size_t past = i;
     for (std::size_t lag = 0; lag < NeighbourPlaces::kLags; ++lag) {
@@ -240,10 +243,14 @@ class TrackSampler {
       const double distance_m = dp_m.head<2>().norm();
       lateral_m[lag] = static_cast<float>(distance_m);
       height_m[lag] = static_cast<float>(dp_m.z());
+      const Eigen::Vector3d dv_m_s = then.v_W_m_s + nearest->dv_W_m_s - track_.instants[i].v_W_m_s;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        velocity_m_s[3 * lag + axis] = static_cast<float>(dv_m_s[static_cast<Eigen::Index>(axis)]);
       if (lag == 0 && distance_m > 0) toward = (dp_m.head<2>() / distance_m).cast<float>();
     }
     result_.lateral_m.push_back(lateral_m);
     result_.height_m.push_back(height_m);
+    result_.velocity_m_s.push_back(velocity_m_s);
     result_.toward.push_back(toward);
   }
 
@@ -291,6 +298,7 @@ void append(const std::vector<std::vector<TrackSamples>>& pieces, ScanSamples& a
   all.axes.resize(size, 9);
   all.neighbours.lateral_m.resize(size, NeighbourPlaces::kLags);
   all.neighbours.height_m.resize(size, NeighbourPlaces::kLags);
+  all.neighbours.velocity_m_s.resize(size, 3 * NeighbourPlaces::kLags);
   Eigen::MatrixX2f toward(size, 2);
   Eigen::Index row = 0;
   for (const auto& piece : pieces) {
@@ -307,6 +315,8 @@ void append(const std::vector<std::vector<TrackSamples>>& pieces, ScanSamples& a
           all.neighbours.lateral_m(row, k) = track.lateral_m[i][static_cast<std::size_t>(k)];
           all.neighbours.height_m(row, k) = track.height_m[i][static_cast<std::size_t>(k)];
         }
+        for (int k = 0; k < 3 * NeighbourPlaces::kLags; ++k)
+          all.neighbours.velocity_m_s(row, k) = track.velocity_m_s[i][static_cast<std::size_t>(k)];
         all.flight.push_back(all.flights);
         all.block.push_back(all.blocks + track.block[i]);
       }
@@ -402,6 +412,7 @@ ScanSamples thinned(const ScanSamples& samples, Eigen::Index most) {
   few.axes = samples.axes(kept, Eigen::all);
   few.neighbours.lateral_m = samples.neighbours.lateral_m(kept, Eigen::all);
   few.neighbours.height_m = samples.neighbours.height_m(kept, Eigen::all);
+  few.neighbours.velocity_m_s = samples.neighbours.velocity_m_s(kept, Eigen::all);
   return few;
 }
 

@@ -76,12 +76,19 @@ struct ScanVariableInfo {
 };
 const ScanVariableInfo& scan_variable(ScanVariable variable);
 
-/// Place of the laterally nearest neighbour among those within 1.5 m in height, now and up to 0.5 s ago.
+/// Place and velocity of the laterally nearest neighbour among those within 1.5 m in height, now and up to 0.5 s ago.
 struct NeighbourPlaces {
   static constexpr int kLags = 6;
   static constexpr double kLag_s = 0.1;  ///< between one and the next
   /// [samples x kLags]; lateral distance and height above, NaN where there is no such neighbour.
   Eigen::MatrixXf lateral_m, height_m;
+  /// [samples x 3 kLags]: x, y, z of its velocity so long ago, lag by lag, minus the vehicle's now; NaN as above.
+  Eigen::MatrixXf velocity_m_s;
+
+  /// Of them, the column of one component; `variable` is kNeighbourVx .. kNeighbourVz.
+  static Eigen::Index velocity_column(ScanVariable variable, int lag) {
+    return 3 * lag + static_cast<int>(variable) - static_cast<int>(ScanVariable::kNeighbourVx);
+  }
 };
 
 /// One row per 0.1 s of flight in the blocks of cut_into_blocks(). Records that separate a block from the next one

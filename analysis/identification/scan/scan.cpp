@@ -309,7 +309,8 @@ void keep_best_lags(std::vector<ScanEntry>& entries) {
   std::vector<ScanEntry> kept;
   for (ScanEntry& entry : entries) {
     const auto same = std::find_if(kept.begin(), kept.end(), [&](const ScanEntry& other) {
-      return entry.variable == "neighbour" && other.variable == "neighbour" && other.axis == entry.axis;
+      return entry.variable.rfind("neighbour", 0) == 0 && other.variable == entry.variable &&
+             other.axis == entry.axis;
     });
     if (same == kept.end())
       kept.push_back(std::move(entry));
