@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -143,6 +144,27 @@ TEST(Scan, FindsWhenANeighbourMovedThatDisturbsLater) {
   EXPECT_GT(found.entries[0].share, 0.8);
   for (std::size_t e = 1; e < found.entries.size(); ++e)
     EXPECT_NE(found.entries[e].variable + found.entries[e].axis, "neighbour_vyy") << "of another lag";
+}
+
+TEST(Scan, LeavesItToOtherFlightsWhetherAForceOfFewPassesIsAnAccident) {
+  Flights flights(44, 2);
+  for (Eigen::Index i = 0; i < flights.samples.size(); ++i) {
+    const double from_pass_s = flights.at(i, V::kTime) - 20;  // one pass in each flight
+    flights.samples.values(i, static_cast<int>(V::kX)) =
+        static_cast<float>(std::exp(-from_pass_s * from_pass_s / 4));
+  }
+  flights.push(0, [&](Eigen::Index i) { return -0.1 * flights.at(i, V::kX); });
+  const Scan sure = scan(flights.samples, 1), proposed = scan(flights.samples, 1, Judges::kOtherFlights);
+  const auto knows_x = [](const Scan& found) {
+    return std::any_of(found.entries.begin(), found.entries.end(),
+                       [](const ScanEntry& entry) { return entry.variable == "x" && entry.axis == "x"; });
+  };
+  EXPECT_TRUE(knows_x(proposed));
+  EXPECT_GT(sure.least_share, 0.5) << "signs drawn at random look like it, as few passes make it";
+  EXPECT_LT(proposed.least_share, sure.least_share);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed)
+    EXPECT_TRUE(scan(Flights(seed, 2).samples, 1, Judges::kOtherFlights).entries.empty())
+        << "noise, " << seed;
 }
 
 TEST(Scan, FindsAPullTowardsANeighbourThatPassesAllAround) {

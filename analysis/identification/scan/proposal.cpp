@@ -102,7 +102,7 @@ std::optional<stability::EffectSpec> proposal(const Passes& passes,
                                               const std::vector<stability::EffectSpec>& specs,
                                               const std::string& name) {
   const ScanSamples samples = scan_samples(passes, specs);
-  const Scan found = scan(samples, passes.jobs);
+  const Scan found = scan(samples, passes.jobs, Judges::kOtherFlights);
   std::size_t place = place_of_name(name);
   if (name.rfind("shape", 0) == 0) {
     for (const ScanEntry& entry : found.entries) {

@@ -113,8 +113,12 @@ Columns flipped(const Columns& targets, const Chunks& chunks, std::uint64_t seed
   return result;
 }
 
-/// What the largest share is by accident: three standard deviations above its mean over draws of signs.
-double accidental_share(const ScanSamples& all, const std::vector<Abscissa>& tried, int jobs) {
+/// What the largest share is by accident, over draws of signs.
+struct Accidents {
+  double mean = 0, deviation = 0;
+};
+
+Accidents accidental_share(const ScanSamples& all, const std::vector<Abscissa>& tried, int jobs) {
   const ScanSamples samples = thinned(all, kManySamples);
   std::vector<Judged> draws;
   for (int d = 0; d < kFlips; ++d) {
@@ -146,7 +150,15 @@ double accidental_share(const ScanSamples& all, const std::vector<Abscissa>& tri
     squares += most * most;
   }
   const double mean = sum / kFlips;
-  return mean + 3 * std::sqrt(std::max(squares / kFlips - mean * mean, 0.0));
+  return {mean, std::sqrt(std::max(squares / kFlips - mean * mean, 0.0))};
+}
+
+/// The share from which on a curve is reported.
+double least_share_of(const Accidents& accidents, Judges judges) {
+  constexpr double kHalf = 0.5;
+  const double sure = accidents.mean + 3 * accidents.deviation;
+  const double least = judges == Judges::kThisScan ? sure : std::min(sure, std::max(accidents.mean, kHalf));
+  return std::max(kLeastShare, least);
 }
 
 Interval resampled(const Eigen::VectorXd& gains, const std::vector<int>& group, int groups, double total) {
@@ -377,7 +389,7 @@ std::vector<std::size_t> judged_columns(ScanQuantity quantity, const BestOfColum
 
 }  // namespace
 
-Scan scan(const ScanSamples& samples, int jobs) {
+Scan scan(const ScanSamples& samples, int jobs, Judges judges) {
   Scan result;
   if (samples.blocks < static_cast<int>(kFewestBlocks)) return result;
   const Judged judged(samples, samples.residual);
@@ -385,7 +397,7 @@ Scan scan(const ScanSamples& samples, int jobs) {
   for (const Abscissa& a : tried) {
     for (const ScanColumn& column : judged.columns()) result.tried += is_offered(a, column) ? 1 : 0;
   }
-  result.least_share = std::max(kLeastShare, accidental_share(samples, tried, jobs));
+  result.least_share = least_share_of(accidental_share(samples, tried, jobs), judges);
   std::vector<std::vector<ScanEntry>> found(tried.size());
   files::parallel_for(static_cast<int>(tried.size()), jobs, [&](int a) {
     const Abscissa& abscissa = tried[static_cast<std::size_t>(a)];

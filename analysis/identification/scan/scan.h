@@ -56,7 +56,14 @@ struct Scan {
   int tried = 0;                   ///< variables times components
 };
 
-/// @param samples see scan_samples(). The result depends on nothing else.
-Scan scan(const ScanSamples& samples, int jobs);
+/// Who decides whether a curve is an accident.
+enum class Judges {
+  kThisScan,  ///< its share must be beyond three standard deviations of what signs drawn at random give
+  kOtherFlights  ///< half of the variance is enough, if it is more than such draws give in the mean: where a force
+                 ///< acts in a few passes only, a draw can hardly miss it
+};
+
+/// @param samples see scan_samples(). The result depends on nothing but them and `judges`.
+Scan scan(const ScanSamples& samples, int jobs, Judges judges = Judges::kThisScan);
 
 }  // namespace swarmcert::identification
