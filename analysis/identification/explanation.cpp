@@ -34,12 +34,15 @@ std::set<std::string> out_of_bounds(const Selected& selected) {
 
 /// @param rivals that compete with the names that are always candidates
 /// @param start effects where selection begins
+/// @param refuted names that are no candidates
 Settled settle(const Passes& passes, const Coverage& covered, const std::vector<Candidate>& rivals,
-               const std::vector<std::string>& start) {
+               const std::vector<std::string>& start, const std::set<std::string>& refuted = {}) {
   constexpr int kMostRounds = 8;
   std::vector<Candidate> candidates = all_candidates(*passes.inputs.model_of(passes.kind), covered);
   candidates.insert(candidates.end(), rivals.begin(), rivals.end());
+  erase(candidates, refuted);
   Settled result;
+  result.suspected.assign(refuted.begin(), refuted.end());
   bool doubts_slope = false;
   for (int round = 0; round < kMostRounds; ++round) {
     result.selected =
@@ -248,16 +251,45 @@ bool vanishes_somewhere(const Nominal& nominal) {
 
 /// settle() without formulas that only take back what a scale of the thrust says too much.
 Settled settle_with_formulas(const Passes& passes, const Coverage& covered, std::vector<Candidate> rivals,
-                             const std::vector<std::string>& names) {
+                             const std::vector<std::string>& names,
+                             const std::set<std::string>& refuted = {}) {
   constexpr int kMostRounds = 4;
-  Settled result = settle(passes, covered, rivals, names);
+  Settled result = settle(passes, covered, rivals, names, refuted);
   for (int round = 1; round < kMostRounds; ++round) {
     const std::set<std::string> substitutes = substitutes_of_scales(result.selected);
     if (substitutes.empty()) break;
     erase(rivals, substitutes);
-    result = settle(passes, covered, rivals, names);
+    result = settle(passes, covered, rivals, names, refuted);
   }
   return result;
+}
+
+/// Whether the force of a name is a curve over this variable of the scan. A ratio beside a battery shifts its line.
+bool is_curve_over(const std::string& variable, const std::string& effect, bool has_battery) {
+  if (effect == "inflow") return variable == "vz" || variable == "climb";
+  if (effect == "ground" || effect == "ceiling") return variable == "z";
+  if (effect == "thrust_ratio") return has_battery && variable == "battery";
+  return points_to(variable, effect);
+}
+
+/// Names that may be a part of something else, and beside which what is left still varies with their own variable, by a
+/// tenth of what they take: their form is not that of the flights. Of the whole error, noise and all, that may be
+/// little.
+std::set<std::string> refuted_names(const Explained& explained, double weight_N) {
+  constexpr double kOfTaken = 0.1;
+  const std::vector<Missing>& ranking = explained.settled.ranking;
+  const bool has_battery = std::any_of(ranking.begin(), ranking.end(),
+                                       [](const Missing& missing) { return missing.effect == "battery"; });
+  std::set<std::string> names;
+  for (const Missing& missing : ranking) {
+    if (!may_be_part(missing, weight_N)) continue;
+    for (const ScanEntry& entry : explained.scan.entries) {
+      const double left = entry.rmse_before * entry.rmse_before - entry.rmse_after * entry.rmse_after;
+      if (is_curve_over(entry.variable, missing.effect, has_battery) && left > kOfTaken * taken_N2(missing))
+        names.insert(missing.effect);
+    }
+  }
+  return names;
 }
 
 /// Thrust that saturates close to hovering throws the vehicle about, and what its set points ask for hardly reaches
@@ -291,6 +323,22 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   if (rivals.empty() && (formulas.empty() || result.settled.ranking.empty())) return result;
   for (const Formula& formula : formulas) rivals.push_back(candidate_of(formula, model));
   rivals.insert(rivals.end(), loads.begin(), loads.end());
+  const Selection by_names(result.settled.selected.grams);
+  const double left_by_names = by_names.mean_square(result.settled.selected.members);
+  const auto accept = [&](Settled&& other) {
+    other.ranking.erase(std::stable_partition(other.ranking.begin(), other.ranking.end(), is_named),
+                        other.ranking.end());
+    other.rest = remainder(passes, specs_of(other.ranking));
+    result.settled = std::move(other);
+    scan_what_is_left(passes, result);
+    return result;
+  };
+  const std::set<std::string> refuted = refuted_names(result, model.weight_N());
+  if (!refuted.empty()) {
+    Settled other = settle_with_formulas(passes, covered, rivals, {}, refuted);
+    if (Selection(other.selected.grams).mean_square(other.selected.members) < left_by_names)
+      return accept(std::move(other));
+  }
   std::vector<std::string> names;
   for (const Missing& missing : result.settled.ranking) names.push_back(missing.effect);
   Settled again = settle_with_formulas(passes, covered, rivals, names);
@@ -299,18 +347,11 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   };
   if (std::all_of(again.ranking.begin(), again.ranking.end(), is_known)) return result;
   const double left = Selection(again.selected.grams).mean_square(again.selected.members);
-  const Selection by_names(result.settled.selected.grams);
-  const double left_by_names = by_names.mean_square(result.settled.selected.members);
   if (!(left < kClearlyLess * left_by_names)) return result;
   const bool loses_scale = has_plain_scale(result.settled.ranking) && !has_plain_scale(again.ranking);
   const bool is_other = is_only_thrust_ratio(result.settled.ranking) || left < kMuchLess * left_by_names;
   if (loses_scale && !(is_other && vanishes_somewhere(*nominal))) return result;
-  again.ranking.erase(std::stable_partition(again.ranking.begin(), again.ranking.end(), is_named),
-                      again.ranking.end());
-  again.rest = remainder(passes, specs_of(again.ranking));
-  result.settled = std::move(again);
-  scan_what_is_left(passes, result);
-  return result;
+  return accept(std::move(again));
 }
 
 /// Of the names, in their order.

@@ -171,6 +171,14 @@ def upwash(a=0.03, ahead=0.3, width=0.25):
     return force
 
 
+def climb_friction(k=0.08):
+    return lambda s: (0, 0, -k * abs(s.v[2]) * s.v[2])
+
+
+def cells_curve(full=4.15, bend=0.9):
+    return lambda s, k, f: f * (1 - bend * max(0.0, full - s.battery) ** 2)
+
+
 def late_draft(k=0.03, delay=0.3):
     """Along the motion that every neighbour had some time ago."""
     def force(s):
@@ -232,6 +240,8 @@ EFFECTS = {
         "a_N * exp(-sqrt(dx^2 + dy^2 + dz^2) / reach_m) * {} / sqrt(dx^2 + dy^2 + dz^2)", a_N=0.03, reach_m=0.3)),
     "upwash": dict(force=upwash(), variables={"neighbour_xy"}, vehicles=2, formula=expression(
         "force_z_N", "a_N * exp(-((dx - 0.3)^2 + dy^2) / 0.125)", a_N=0.03) + "per_neighbour = true\n"),
+    "climb friction": dict(force=climb_friction(), variables={"vz", "climb"}),
+    "cells curve": dict(rotor=cells_curve(), variables={"battery", "time"}, names={"battery"}),
     "late draft": dict(force=late_draft(), variables={"neighbour_vy"}, vehicles=2),
     "flapping": dict(force=flapping(), variables={"rate_y"}, speed=1.6, formula=expression(
         "force_b1_N", "a_N * wy", a_N=0.03)),
