@@ -405,7 +405,9 @@ Scan scan(const ScanSamples& samples, int jobs, Judges judges) {
     for (const std::size_t k : judged_columns(samples.quantity, best)) {
       if (best[k].share < result.least_share) continue;
       ScanEntry entry = entry_of(judged, abscissa, static_cast<int>(k), best[k].knots);
-      if (entry.share >= result.least_share) found[static_cast<std::size_t>(a)].push_back(std::move(entry));
+      // What a few flights or chunks carry alone is none of all flights.
+      if (entry.share >= result.least_share && entry.share_interval.lower > 0)
+        found[static_cast<std::size_t>(a)].push_back(std::move(entry));
     }
     prefer_rotor(found[static_cast<std::size_t>(a)]);
   });
