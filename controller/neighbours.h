@@ -230,8 +230,10 @@ inline Prediction<Scalar> predict_from_zero(const nn::DeepSet<Scalar>& set,
 ///   f = (1 - w_1) F(N_0) + (w_1 - w_2) F(N_1) + ... + w_k F(N_k),   1 > w_1 > ... > w_k > 0,
 /// where N_i holds the neighbours of weight w_i and more, N_0 those of weight 1 (Lovasz's extension of the set
 /// function F). It is a convex combination of values of F, so every bound on F's range holds; it is continuous in the
-/// weights; and while a weight w moves, f moves by at most |w'| times what that neighbour changes F by. Each distinct
-/// weight costs one more evaluation of the set.
+/// weights; and while a weight w moves, f moves by at most |w'| times what that neighbour changes F by. Where that
+/// neighbour makes or ends a composition in which the set is silent, it changes F by all of F, whose size no
+/// certificate of the set states: largest_force_N is what limits it. Each distinct weight costs one more evaluation of
+/// the set.
 ///
 /// @param previous_W_N f_a_hat of the last execution, for Prediction::jump_N.
 template <typename Scalar>

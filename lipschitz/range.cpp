@@ -12,6 +12,7 @@
 #include "lipschitz/value_bounds.h"
 #include "nn/base/doubles.h"
 #include "nn/base/parallel.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
@@ -358,6 +359,7 @@ std::vector<std::string> value_functions(const Network& network) {
 std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::string, Box>& domain,
                                    const std::map<std::string, double>& rho_bound,
                                    const RangeOptions& options) {
+  files::require_never_silent(network, "ranges are of networks that are silent nowhere");
   const std::map<std::string, Box> inner = clamped(network, domain);
   // One function after the other: each search uses all threads.
   std::vector<CertifiedRange> result;

@@ -57,6 +57,7 @@ std::vector<std::string> value_functions(const files::Network& network);
 /// Of functions with other activations than ReLU: what certified_values() states, and no branch and bound.
 /// @param domain by part, finite.
 /// @param rho_bound a proved Lipschitz bound of rho, by its kind; for the jump |f - f'| <= L |phi(x)|.
+/// @throws files::InputError if NET is silent in some composition, where it jumps by all of f.
 std::vector<CertifiedRange> ranges(const files::Network& network, const std::map<std::string, Box>& domain,
                                    const std::map<std::string, double>& rho_bound,
                                    const RangeOptions& options);

@@ -8,6 +8,7 @@
 #include "lipschitz/float32_error.h"
 #include "lipschitz/range.h"
 #include "lipschitz/rounding.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
@@ -124,6 +125,7 @@ std::vector<CertifiedValues> certified_values(const files::Network& network,
                                               const std::map<std::string, Box>& domain,
                                               const std::map<std::string, double>& rho_bound,
                                               const ValueOptions& options, const std::string& only) {
+  files::require_never_silent(network, "ranges are of networks that are silent nowhere");
   const std::map<std::string, Box> inner = clamped(network, domain);
   ValueOptions exact_only = options;
   exact_only.float32 = false;

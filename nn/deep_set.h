@@ -2,7 +2,10 @@
 ///
 ///   f(own, {x_j, c_j}) = rho(phi_ground(own) + sum_j phi_{c_j}(clamp(x_j)))
 ///
-/// A set of invariants sees J(x_j) in place of x_j, and K(own) in place of own (invariants.h).
+/// A set of invariants sees J(x_j) in place of x_j, and K(own) in place of own (invariants.h). Among neighbours of the
+/// kinds that `silent` lists, f is 0: a network that was no help there does not speak. So f steps by all of its value
+/// where a neighbour comes or goes that makes or ends such a composition; while the neighbours stay the same, f is
+/// either 0 throughout or the function above.
 ///
 /// Addition of floats is not associative: the same neighbours, summed in another order, give other bits. The order in
 /// which radio packets arrive would then be an input of the controller, one that no certificate covers and no log
@@ -32,6 +35,8 @@ struct DeepSet {
   const Scalar* lower;  ///< [phi_inputs()] each; nullptr: no clamp. The ground's input is not clamped.
   const Scalar* upper;
   bool of_invariants = false;
+  const int* silent = nullptr;  ///< [num_silent x num_kinds] neighbours of each kind among which f is 0
+  int num_silent = 0;
 
   /// Numbers per neighbour; not those of phi in a set of invariants.
   constexpr int inputs() const { return of_invariants ? kRelativeState : phi_inputs(); }
@@ -145,6 +150,22 @@ inline DeepSetStatus take_inputs(const DeepSet<Scalar>& set, const Neighbour<Sca
   return DeepSetStatus::kOk;
 }
 
+/// Whether there are as many neighbours of each kind as in one of the silent compositions. Their kinds are known.
+template <typename Scalar>
+inline bool is_silent(const DeepSet<Scalar>& set, const Neighbour<Scalar>* neighbours, int num_neighbours) {
+  for (int s = 0; s < set.num_silent; ++s) {
+    const int* const wanted = set.silent + static_cast<long>(s) * set.num_kinds;
+    bool is_same = true;
+    for (int kind = 0; kind < set.num_kinds && is_same; ++kind) {
+      int count = 0;
+      for (int j = 0; j < num_neighbours; ++j) count += neighbours[j].kind == kind ? 1 : 0;
+      is_same = count == wanted[kind];
+    }
+    if (is_same) return true;
+  }
+  return false;
+}
+
 /// hidden_sum = phi_ground(own).
 /// @returns whether its input is finite.
 template <typename Scalar>
@@ -210,6 +231,10 @@ inline DeepSetStatus evaluate_checked(const DeepSet<Scalar>& set, const Scalar* 
   if (num_neighbours < 0 || num_neighbours > workspace.capacity) return DeepSetStatus::kTooManyNeighbours;
   const DeepSetStatus status = take_inputs(set, neighbours, num_neighbours, workspace.inputs);
   if (status != DeepSetStatus::kOk) return status;
+  if (is_silent(set, neighbours, num_neighbours)) {
+    for (int i = 0; i < set.outputs(); ++i) output[i] = Scalar(0);
+    return DeepSetStatus::kOk;
+  }
   sort_canonically(set, neighbours, num_neighbours, workspace.inputs, workspace.order);
 
   for (int i = 0; i < set.hidden(); ++i) workspace.hidden_sum[i] = Scalar(0);

@@ -1,6 +1,6 @@
 #include "analysis/firmware/export_source.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
@@ -12,6 +12,7 @@
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
 #include "nn/deep_set.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
 #include "nn/weights/record_samples.h"
@@ -119,7 +120,7 @@ std::uint32_t weights_hash(const files::Network& network) {
       for (const float number : narrow(layer.biases)) hash = (hash ^ float_bits(number)) * 16777619u;
     }
   };
-  for (const std::string& kind : neighbour_kinds(network)) add(network.phi.at(kind));
+  for (const std::string& kind : files::neighbour_kinds(network)) add(network.phi.at(kind));
   const auto ground = network.phi.find(files::kGroundKind);
   if (ground != network.phi.end()) add(ground->second);
   for (const auto& [kind, weights] : network.rho) add(weights);
@@ -193,7 +194,7 @@ SelfTest self_test(int* failed);
 )";
 
 std::string header_text(const files::Network& network, const ExportOptions& options) {
-  const std::vector<std::string> kinds = neighbour_kinds(network);
+  const std::vector<std::string> kinds = files::neighbour_kinds(network);
   const int inputs = files::inputs(network, files::set_name(kinds.front(), network.rho.begin()->first));
   std::string neighbour_list, own_list, input_list;
   for (std::size_t i = 0; i < kinds.size(); ++i)
@@ -289,7 +290,7 @@ SelfTest self_test(int* failed) {
 
 std::string source_text(const files::Network& network, const ExportOptions& options) {
   const std::map<std::string, std::string> ids = identifiers(network);
-  const std::vector<std::string> kinds = neighbour_kinds(network);
+  const std::vector<std::string> kinds = files::neighbour_kinds(network);
   std::string text = fmt::format(
       "// {} from certified weights. Do not edit.\n{}\n#include \"{}\"\n\nusing namespace swarmcert::nn;\n\n",
       kGeneratedMark, parameter_line(options), kExportedHeader);
@@ -309,10 +310,20 @@ std::string source_text(const files::Network& network, const ExportOptions& opti
     text += array("static constexpr float lower", narrow(network.clamp->lower)) +
             array("static constexpr float upper", narrow(network.clamp->upper));
   }
-  for (const auto& [kind, weights] : network.rho)
-    sets += fmt::format("    {{{}, phi, swarmcert_network::kNeighbourKinds, {}, {}, {}}},\n",
-                        has_ground ? "&ground" : "nullptr", mlp(ids.at(files::rho_name(kind)), weights),
-                        network.clamp ? "lower, upper" : "nullptr, nullptr", network.invariants);
+  for (const auto& [kind, weights] : network.rho) {
+    const std::string rho = ids.at(files::rho_name(kind));
+    const std::vector<int> silent = files::silent_counts(network, kind);
+    if (!silent.empty())
+      text += fmt::format(
+          "// Neighbours of each kind among which {} is silent.\n"
+          "static constexpr int silent_{}[] = {{{}}};\n",
+          comment(kind), rho, fmt::join(silent, ", "));
+    sets +=
+        fmt::format("    {{{}, phi, swarmcert_network::kNeighbourKinds, {}, {}, {}{}}},\n",
+                    has_ground ? "&ground" : "nullptr", mlp(rho, weights),
+                    network.clamp ? "lower, upper" : "nullptr, nullptr", network.invariants,
+                    silent.empty() ? "" : fmt::format(", silent_{}, {}", rho, silent.size() / kinds.size()));
+  }
   text += fmt::format(
       R"(static constexpr DeepSet<float> sets[swarmcert_network::kOwnKinds] = {{
 {sets}}};
@@ -369,7 +380,7 @@ std::vector<SourceFile> export_source(const files::Network& network, const Expor
                              "flight code takes a deep set, this is one plain network",
                              "name a network.toml, or --phi and --rho"});
   }
-  if (neighbour_kinds(network).empty()) {
+  if (files::neighbour_kinds(network).empty()) {
     throw files::InputError(
         {network.path, "", "phi", "", "has only the ground", "add the phi of a neighbour's kind"});
   }

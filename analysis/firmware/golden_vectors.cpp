@@ -6,6 +6,7 @@
 
 #include "nn/base/input_error.h"
 #include "nn/base/random.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::firmware {
@@ -18,9 +19,9 @@ constexpr float kMostPosition_m = 1, kMostVelocity_m_s = 2;
 class FlightEvaluator {
  public:
   FlightEvaluator(const files::Network& network, int most_neighbours)
-      : most_(most_neighbours), scale_(newton_per_unit(network)), of_invariants_(network.invariants) {
+      : network_(network), most_(most_neighbours), scale_(newton_per_unit(network)) {
     for (const auto& [part, weights] : files::parts(network)) evaluators_.emplace(part, *weights);
-    for (const std::string& kind : neighbour_kinds(network))
+    for (const std::string& kind : files::neighbour_kinds(network))
       phi_.push_back(evaluators_.at(files::phi_name(kind)).mlp());
     if (network.phi.count(files::kGroundKind) != 0) {
       ground_ = evaluators_.at(files::kGroundPhi).mlp();
@@ -34,13 +35,16 @@ class FlightEvaluator {
 
   /// Fills in status and force.
   void run(const std::string& rho_kind, GoldenVector& vector) const {
+    const std::vector<int> silent = files::silent_counts(network_, rho_kind);
     const nn::DeepSet<float> set{has_ground_ ? &ground_ : nullptr,
                                  phi_.data(),
                                  static_cast<int>(phi_.size()),
                                  evaluators_.at(files::rho_name(rho_kind)).mlp(),
                                  lower_.empty() ? nullptr : lower_.data(),
                                  upper_.empty() ? nullptr : upper_.data(),
-                                 of_invariants_};
+                                 network_.invariants,
+                                 silent.data(),
+                                 static_cast<int>(silent.size() / phi_.size())};
     std::vector<nn::Neighbour<float>> neighbours;
     for (std::size_t j = 0; j < vector.inputs.size(); ++j)
       neighbours.push_back({vector.inputs[j].data(), vector.kinds[j]});
@@ -56,9 +60,9 @@ class FlightEvaluator {
   }
 
  private:
+  const files::Network& network_;
   int most_;
   float scale_;
-  bool of_invariants_;
   std::map<std::string, files::Evaluator<float>> evaluators_;
   std::vector<nn::Mlp<float>> phi_;
   nn::Mlp<float> ground_{};
@@ -68,48 +72,68 @@ class FlightEvaluator {
 
 }  // namespace
 
-std::vector<std::string> neighbour_kinds(const files::Network& network) {
-  std::vector<std::string> kinds;
-  for (const auto& [kind, weights] : network.phi) {
-    if (kind != files::kGroundKind) kinds.push_back(kind);
-  }
-  return kinds;
-}
-
 float newton_per_unit(const files::Network& network) {
   files::require_force_z(network);
   return network.output_unit == "N" ? 1.0f : 9.81e-3f;
 }
 
+namespace {
+
+/// Random states of the vehicle and of its neighbours, of random kinds where `kinds` is empty.
+GoldenVector random_vector(const files::Network& network, int neighbours, std::vector<int> kinds,
+                           files::Random& random) {
+  const auto within = [&](float range) { return range * static_cast<float>(random.symmetric()); };
+  const std::vector<std::string> known = files::neighbour_kinds(network);
+  const int inputs = files::inputs(network, files::set_name(known.front(), network.rho.begin()->first));
+  GoldenVector vector;
+  for (int i = 0; i < files::kGroundInputs; ++i)
+    vector.own.push_back(within(i == 0 ? kMostPosition_m : kMostVelocity_m_s));
+  vector.inputs.resize(static_cast<std::size_t>(neighbours));
+  const bool draws_kinds = kinds.empty();
+  for (std::vector<float>& input : vector.inputs) {
+    for (int i = 0; i < inputs; ++i) {
+      const bool has_clamp = network.clamp && !network.invariants;  // one of invariants limits no state
+      const double side =
+          !has_clamp ? 0 : std::max(std::abs(network.clamp->lower[i]), std::abs(network.clamp->upper[i]));
+      const float range = has_clamp ? static_cast<float>(1.5 * std::min(side, 1e3))
+                                    : (i < 3 ? kMostPosition_m : kMostVelocity_m_s);
+      input.push_back(within(range));
+    }
+    if (draws_kinds) kinds.push_back(static_cast<int>(random.below(known.size())));
+  }
+  vector.kinds = std::move(kinds);
+  return vector;
+}
+
+/// The kinds of the neighbours in each silent composition, as indices.
+std::vector<std::vector<int>> silent_kinds(const files::Network& network, const std::string& own) {
+  const std::vector<int> counts = files::silent_counts(network, own);
+  const std::size_t kinds = files::neighbour_kinds(network).size();
+  std::vector<std::vector<int>> result(counts.size() / kinds);
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    result[i / kinds].insert(result[i / kinds].end(), static_cast<std::size_t>(counts[i]),
+                             static_cast<int>(i % kinds));
+  return result;
+}
+
+}  // namespace
+
 std::vector<GoldenVector> golden_vectors(const files::Network& network, int count, int most_neighbours,
                                          std::uint64_t seed) {
-  const std::vector<std::string> kinds = neighbour_kinds(network);
-  const int inputs = files::inputs(network, files::set_name(kinds.front(), network.rho.begin()->first));
   const FlightEvaluator evaluator(network, most_neighbours);
   files::Random random(seed);
-  const auto within = [&](float range) { return range * static_cast<float>(random.symmetric()); };
   std::vector<GoldenVector> result;
   int own_kind = 0;
   for (const auto& [rho_kind, weights] : network.rho) {
-    for (int g = 0; g < count; ++g) {
-      GoldenVector vector;
-      vector.own_kind = own_kind;
-      for (int i = 0; i < files::kGroundInputs; ++i)
-        vector.own.push_back(within(i == 0 ? kMostPosition_m : kMostVelocity_m_s));
-      vector.inputs.resize(static_cast<std::size_t>(g % (most_neighbours + 1)));
-      for (std::vector<float>& input : vector.inputs) {
-        for (int i = 0; i < inputs; ++i) {
-          const bool has_clamp = network.clamp && !network.invariants;  // one of invariants limits no state
-          const double side =
-              !has_clamp ? 0 : std::max(std::abs(network.clamp->lower[i]), std::abs(network.clamp->upper[i]));
-          const float range = has_clamp ? static_cast<float>(1.5 * std::min(side, 1e3))
-                                        : (i < 3 ? kMostPosition_m : kMostVelocity_m_s);
-          input.push_back(within(range));
-        }
-        vector.kinds.push_back(static_cast<int>(random.below(kinds.size())));
-      }
-      evaluator.run(rho_kind, vector);
-      result.push_back(std::move(vector));
+    const auto add = [&](int neighbours, const std::vector<int>& kinds) {
+      result.push_back(random_vector(network, neighbours, kinds, random));
+      result.back().own_kind = own_kind;
+      evaluator.run(rho_kind, result.back());
+    };
+    for (int g = 0; g < count; ++g) add(g % (most_neighbours + 1), {});
+    for (const std::vector<int>& kinds : silent_kinds(network, rho_kind)) {
+      const auto neighbours = static_cast<int>(kinds.size());
+      if (neighbours <= most_neighbours) add(neighbours, kinds);
     }
     ++own_kind;
   }

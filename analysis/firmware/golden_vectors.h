@@ -14,20 +14,18 @@ struct GoldenVector {
   int own_kind = 0;                        ///< index into Network::rho
   std::vector<float> own;                  ///< [files::kGroundInputs]
   std::vector<std::vector<float>> inputs;  ///< of each neighbour
-  std::vector<int> kinds;                  ///< of each neighbour: index into neighbour_kinds()
+  std::vector<int> kinds;                  ///< of each neighbour: index into files::neighbour_kinds()
   nn::DeepSetStatus status = nn::DeepSetStatus::kOk;
   float force_N = 0;
 };
-
-/// The kinds of neighbours, in the order of their indices: without the ground.
-std::vector<std::string> neighbour_kinds(const files::Network& network);
 
 /// Newton per unit of the network's output; gram-force unless it states a unit, as published.
 /// @throws files::InputError if the network states a quantity that is not a vertical force.
 float newton_per_unit(const files::Network& network);
 
 /// `count` random vectors for each kind of vehicle, with no neighbours to `most_neighbours`; inputs reach half as far
-/// again as the clamp of states, or +-1 m and +-2 m/s. Computed by the evaluator that flies.
+/// again as the clamp of states, or +-1 m and +-2 m/s. One more for each composition in which the network is silent and
+/// that has at most so many neighbours. Computed by the evaluator that flies.
 /// Precondition: every weight is a float32; the network is a deep set.
 std::vector<GoldenVector> golden_vectors(const files::Network& network, int count, int most_neighbours,
                                          std::uint64_t seed);

@@ -10,6 +10,7 @@
 #include "analysis/firmware/float_blocks.h"
 #include "analysis/firmware/golden_vectors.h"
 #include "nn/base/input_error.h"
+#include "nn/weights/compositions.h"
 
 namespace swarmcert::firmware {
 namespace {
@@ -95,7 +96,7 @@ CodeMatch run(const std::vector<GoldenVector>& vectors, const ElfImage& image, s
 
 CodeMatch match_code(const files::Network& network, const std::string& bytes, int most_neighbours) {
   CodeMatch result;
-  if (network.plain || neighbour_kinds(network).empty()) {
+  if (network.plain || files::neighbour_kinds(network).empty()) {
     result.why_not = "swarmcert exports deep sets, and this is another network";
     return result;
   }

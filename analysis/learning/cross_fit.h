@@ -20,9 +20,9 @@ struct CrossFit {
 /// folds. Network k, of seed options.trainer.seed + k, is fitted to all but fold k, which selects its epoch.
 /// The result is the mean of the networks as one deep set (mean_network()), so that errors in which they differ average
 /// out, every flight is fitted, and yet `unseen` says of every flight how well flights like it are predicted: slightly
-/// too well, since the flight chose the epoch, and slightly too badly, since it is what one network says and not their
-/// mean. gamma and max_lipschitz are proved of the mean. Afterwards data.layout is that of the mean, and tracks that
-/// do not test have Use::kFit.
+/// too well, since the flight chose the epoch, and too badly, since it is what one network says and not their mean:
+/// output_support() corrects for that. gamma and max_lipschitz are proved of the mean. Afterwards data.layout is that
+/// of the mean, and tracks that do not test have Use::kFit.
 /// @throws files::InputError as run_training(), and where there are fewer flights than folds;
 ///   std::invalid_argument if folds < 2.
 CrossFit cross_fit(const RunOptions& options, int folds, LearningData& data);

@@ -12,6 +12,7 @@
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
 #include "nn/invariants.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::learning {
@@ -55,7 +56,6 @@ RawTrack raw_samples(const Track& track, const residuals::Inputs& inputs, Target
   raw.about = {track.flight, track.scenario, track.vehicle, "", Use::kFit, 0, 0};
   raw.kind = track.kind;
   const std::vector<Eigen::Vector3d> residual = left_by_model(track, inputs, target, problems);
-  std::multiset<std::string> kinds;
   for (std::size_t i = 0; i < residual.size(); ++i) {
     if (track.cut[i] != residuals::Cut::kNone || residual[i].hasNaN()) continue;
     const stability::Instant& now = track.instants[i];
@@ -69,13 +69,9 @@ RawTrack raw_samples(const Track& track, const residuals::Inputs& inputs, Target
       const Eigen::Vector3f dv = other.dv_W_m_s.cast<float>();
       raw.neighbour.push_back({dp.x(), dp.y(), dp.z(), dv.x(), dv.y(), dv.z()});
       raw.neighbour_kind.push_back(other.kind);
-      if (raw.first.size() == 1) kinds.insert(inputs.kinds.names[other.kind]);
     }
     raw.first.push_back(raw.neighbour.size());
   }
-  for (const std::string& kind : kinds)
-    raw.about.composition += (raw.about.composition.empty() ? "" : "+") + kind;
-  raw.about.composition += ">" + track.kind;
   return raw;
 }
 
@@ -149,11 +145,25 @@ training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vecto
   return training::Layout(std::move(parts));
 }
 
-void append(LearningData& data, const RawTrack& raw, const std::vector<std::string>& kinds, std::size_t from,
-            std::size_t to, Use use) {
-  if (from >= to) return;  // a block without records
+/// Records from `from` on that have as many neighbours of each kind as it has; ends before `to` or there.
+std::size_t same_neighbours(const RawTrack& raw, std::size_t from, std::size_t to) {
+  const auto begin = [&raw](std::size_t i) {
+    return raw.neighbour_kind.begin() + static_cast<long>(raw.first[i]);
+  };
+  std::size_t end = from + 1;
+  while (end < to && std::is_permutation(begin(from), begin(from + 1), begin(end), begin(end + 1))) ++end;
+  return end;
+}
+
+/// Records of one composition.
+void append_alike(LearningData& data, const RawTrack& raw, const std::vector<std::string>& kinds,
+                  std::size_t from, std::size_t to, Use use) {
   TrackSamples about = raw.about;
   about.use = use;
+  std::vector<std::string> neighbours;
+  for (std::size_t j = raw.first[from]; j < raw.first[from + 1]; ++j)
+    neighbours.push_back(kinds[raw.neighbour_kind[j]]);
+  about.composition = files::composition_name(std::move(neighbours), raw.kind);
   about.begin = data.samples.samples();
   const int ground = data.layout.find(files::kGroundPhi);
   const int rho = data.layout.find(files::rho_name(raw.kind));
@@ -174,6 +184,15 @@ void append(LearningData& data, const RawTrack& raw, const std::vector<std::stri
   }
   about.end = data.samples.samples();
   data.tracks.push_back(std::move(about));
+}
+
+void append(LearningData& data, const RawTrack& raw, const std::vector<std::string>& kinds, std::size_t from,
+            std::size_t to, Use use) {
+  while (from < to) {
+    const std::size_t end = same_neighbours(raw, from, to);
+    append_alike(data, raw, kinds, from, end, use);
+    from = end;
+  }
 }
 
 /// All of a track, its blocks of 2 s in turn fitted, selecting and testing.

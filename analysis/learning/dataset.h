@@ -41,10 +41,10 @@ struct NetworkSizes {
   bool invariants = false;  ///< every phi sees invariants under turns about the vertical (nn/invariants.h)
 };
 
-/// Samples of one vehicle in one flight.
+/// Samples of one vehicle in one flight, with as many neighbours of each kind throughout.
 struct TrackSamples {
   std::string flight, scenario, vehicle;
-  std::string composition;  ///< kinds of the neighbours, then of the vehicle: "small+small>small"
+  std::string composition;  ///< files::composition_name(): "small+small>small"
   Use use = Use::kFit;
   Eigen::Index begin = 0, end = 0;
 

@@ -1,6 +1,7 @@
 #include "analysis/learning/output_scale.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "nn/training/deep_set_loss.h"
 #include "nn/weights/function_names.h"
@@ -13,20 +14,28 @@ constexpr double kBelowTheLimit = 1 - 1e-4;
 
 /// Sums over the samples of one composition, y the target and f the network's output.
 struct Products {
-  double yf = 0, ff = 0;
+  double yy = 0, yf = 0, ff = 0;
   double samples = 0;
+
+  /// f helps at smaller scales than this.
+  double limit() const { return kBelowTheLimit * 2 * yf / ff; }
+  SupportedErrors errors(double scale) const {
+    const double left = yy - 2 * scale * yf + scale * scale * ff;
+    return {std::sqrt(std::max(left, 0.0) / samples), std::sqrt(yy / samples), samples};
+  }
 };
 
-std::map<std::string, Products> products_of(const LearningData& data, const training::Matrix& outputs,
-                                            Use use) {
+std::map<std::string, Products> products_of(const LearningData& data, const training::Matrix& unseen,
+                                            const training::Matrix& whole, Use use) {
   std::map<std::string, Products> result;
   for (const TrackSamples& track : data.tracks) {
     if (track.use != use) continue;
     Products& sum = result[track.composition];
     for (Eigen::Index s = track.begin; s < track.end; ++s) {
-      const Eigen::VectorXd f = outputs.col(s).cast<double>();
-      sum.yf += data.samples.target_of(s).cast<double>().dot(f);
-      sum.ff += f.squaredNorm();
+      const Eigen::VectorXd y = data.samples.target_of(s).cast<double>();
+      sum.yy += y.squaredNorm();
+      sum.yf += y.dot(unseen.col(s).cast<double>());
+      sum.ff += whole.col(s).cast<double>().squaredNorm();
     }
     sum.samples += static_cast<double>(track.end - track.begin);
   }
@@ -35,33 +44,67 @@ std::map<std::string, Products> products_of(const LearningData& data, const trai
 
 std::string kind_of(const std::string& composition) { return composition.substr(composition.rfind('>') + 1); }
 
-}  // namespace
-
-std::map<std::string, double> output_scales(const LearningData& data, const training::Matrix& outputs,
-                                            Use use) {
-  struct Sums {
-    double yf = 0, ff = 0, limit = 1;
-  };
-  std::map<std::string, Sums> kinds;
-  for (const auto& [composition, products] : products_of(data, outputs, use)) {
-    if (!(products.ff > 0)) continue;
-    Sums& kind = kinds[kind_of(composition)];
-    kind.yf += products.yf / products.samples;
-    kind.ff += products.ff / products.samples;
-    kind.limit = std::min(kind.limit, kBelowTheLimit * 2 * products.yf / products.ff);
+/// Where sum_c min(0, mean |y - s f|^2 - mean |y|^2) is least. At any s those that f helps are the ones with the
+/// largest limits, so that each set of these is tried at its best scale.
+double best_scale(std::vector<Products> compositions) {
+  std::sort(compositions.begin(), compositions.end(),
+            [](const Products& a, const Products& b) { return a.limit() > b.limit(); });
+  double best = 0, least = 0, yf = 0, ff = 0;
+  for (const Products& one : compositions) {
+    if (!(one.limit() > 0)) break;
+    yf += one.yf / one.samples;
+    ff += one.ff / one.samples;
+    const double scale = std::min({yf / ff, one.limit(), 1.0});
+    const double change = scale * (scale * ff - 2 * yf);
+    if (change < least) best = scale, least = change;
   }
-  std::map<std::string, double> result;
-  for (const auto& [kind, sums] : kinds)
-    result[kind] = std::clamp(sums.yf / sums.ff, 0.0, std::max(0.0, sums.limit));
-  return result;
+  return best;
 }
 
-void scale_outputs(const LearningData& data, const std::map<std::string, double>& scales,
-                   training::Matrix& outputs) {
+}  // namespace
+
+std::vector<std::string> OutputSupport::silent_names() const {
+  std::vector<std::string> names;
+  for (const auto& [composition, errors] : silent) names.push_back(composition);
+  return names;
+}
+
+SupportedErrors OutputSupport::all() const {
+  double network = 0, nothing = 0, samples = 0;
+  for (const auto& [composition, errors] : left) {
+    network += errors.samples * errors.network * errors.network;
+    nothing += errors.samples * errors.nothing * errors.nothing;
+    samples += errors.samples;
+  }
+  return {std::sqrt(network / samples), std::sqrt(nothing / samples), samples};
+}
+
+OutputSupport output_support(const LearningData& data, const training::Matrix& unseen,
+                             const training::Matrix& whole, Use use, Support may) {
+  const std::map<std::string, Products> all = products_of(data, unseen, whole, use);
+  OutputSupport support;
+  if (may == Support::kScaleAndSilence) {
+    std::map<std::string, std::vector<Products>> kinds;
+    for (const auto& [composition, products] : all)
+      if (products.ff > 0) kinds[kind_of(composition)].push_back(products);
+    for (const auto& [kind, compositions] : kinds) support.scales[kind] = best_scale(compositions);
+  }
+  for (const auto& [composition, products] : all) {
+    const auto found = support.scales.find(kind_of(composition));
+    const double scale = found == support.scales.end() ? 1 : found->second;
+    // A scale of 0 helps nowhere, and does not where the output is 0 by itself.
+    const bool helps = products.ff == 0 || (scale > 0 && scale <= products.limit());
+    const bool speaks = helps || may == Support::kAsTrained;
+    support.left[composition] = products.errors(speaks ? scale : 0);
+    if (!speaks) support.silent[composition] = products.errors(1);
+  }
+  return support;
+}
+
+void silence(const LearningData& data, const OutputSupport& support, training::Matrix& outputs) {
   for (const TrackSamples& track : data.tracks) {
-    const auto scale = scales.find(kind_of(track.composition));
-    if (scale != scales.end())
-      outputs.middleCols(track.begin, track.end - track.begin) *= static_cast<float>(scale->second);
+    if (support.silent.count(track.composition) == 1)
+      outputs.middleCols(track.begin, track.end - track.begin).setZero();
   }
 }
 

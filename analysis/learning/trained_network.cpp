@@ -25,9 +25,14 @@ std::string file_of(const std::string& part) {
   return name + ".safetensors";
 }
 
-std::string network_toml(const LearningData& data, const files::GammaStatement& gamma) {
-  std::string text = fmt::format(
-      "schema = \"swarmcert/network/1\"\noutput = {{ quantity = \"{}\", unit = \"{}\" }}\n"
+std::string network_toml(const LearningData& data, const files::GammaStatement& gamma,
+                         const std::vector<std::string>& silent) {
+  std::string text = "schema = \"swarmcert/network/1\"\n";
+  if (!silent.empty())
+    text += fmt::format("# Of these vehicles among these neighbours there is no network.\nsilent = {}\n",
+                        files::Json(silent).dump());
+  text += fmt::format(
+      "output = {{ quantity = \"{}\", unit = \"{}\" }}\n"
       "gamma = {{ value = {}, scope = \"{}\", mode = \"{}\" }}\n"
       "[input]\norder = [\"dp_x_m\", \"dp_y_m\", \"dp_z_m\", \"dv_x_m_s\", \"dv_y_m_s\", \"dv_z_m_s\"]\n{}",
       info(data.target).quantity, info(data.target).unit, gamma.value,
@@ -57,14 +62,15 @@ void write_samples(const training::Layout& layout, const training::Vector& theta
 }  // namespace
 
 files::Network write_network(const LearningData& data, const training::Vector& theta,
-                             const files::GammaStatement& gamma, const std::string& folder) {
+                             const files::GammaStatement& gamma, const std::string& folder,
+                             const std::vector<std::string>& silent) {
   const training::Layout& layout = data.layout;
   for (std::size_t p = 0; p < layout.parts().size(); ++p) {
     files::save_safetensors(layout.stored(theta, static_cast<int>(p)),
                             (fs::path(folder) / file_of(layout.parts()[p].name)).string(), true);
   }
   const std::string path = (fs::path(folder) / "network.toml").string();
-  files::write_file(path, network_toml(data, gamma), true);
+  files::write_file(path, network_toml(data, gamma, silent), true);
   files::Network network = files::load_evaluated_network({path, "", "", ""});
   write_samples(layout, theta, network, (fs::path(folder) / kSamplesFile).string());
   return network;

@@ -12,9 +12,11 @@ namespace swarmcert::learning {
 
 /// Writes `phi_<kind>.safetensors`, `rho_<kind>.safetensors`, network.toml and samples.json, outputs that the trainer's
 /// own arithmetic gives, into `folder`, which exists; files of these names are replaced.
+/// @param silent compositions in which the network is 0 (files::Network::silent).
 /// @returns the network as read back.
 files::Network write_network(const LearningData& data, const training::Vector& theta,
-                             const files::GammaStatement& gamma, const std::string& folder);
+                             const files::GammaStatement& gamma, const std::string& folder,
+                             const std::vector<std::string>& silent = {});
 
 /// Writes `model-<kind>.toml` for every kind with a rho: the model of `inputs` with the network in `folder` as one more
 /// effect. With labels from published signals it has their lag (published_lag.h), so that `compare` finds the error

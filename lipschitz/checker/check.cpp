@@ -5,6 +5,7 @@
 #include "nn/base/content_hash.h"
 #include "nn/weights/activation.h"
 #include "nn/weights/chain.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/function_names.h"
 #include "nn/weights/invariants.h"
 
@@ -182,6 +183,9 @@ void CertificateChecker::check_bound(const Json& bound) {
   check_status(bound, where);
   check_activations(bound, names, where);
   check_invariants(bound, function, where);
+  if (files::is_ever_silent(network_, function))
+    require(bound["lower"].is_null() && bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
+            where + ": a lower bound of a function that is 0 in some compositions");
   files::block_coordinates(network_, function, block);  // refuses what is no block of the function
   if (bound["upper_method"] == "sdp" || bound["upper_method"] == "eclipse_fast") {
     check_upper(bent_chain(network_, function, block, scale), bound["proof"], upper, where);
@@ -331,7 +335,7 @@ std::string statement_for(const files::Network& network) {
     return std::any_of(all.begin(), all.end(), [](auto one) { return files::function_of(one).sorts(); });
   });
   return std::string(kStatement) + (sorts ? kSortingStatement : "") +
-         (network.invariants ? kInvariantsStatement : "");
+         (network.invariants ? kInvariantsStatement : "") + (network.silent.empty() ? "" : kSilentStatement);
 }
 
 namespace {

@@ -3,6 +3,7 @@
 #include "lipschitz/checker/centred_form.h"
 #include "lipschitz/checker/certificate_checker.h"
 #include "lipschitz/checker/values.h"
+#include "nn/weights/compositions.h"
 
 namespace swarmcert::check {
 namespace {
@@ -94,6 +95,8 @@ void CertificateChecker::check_values(const Json& entry) {
   const bool is_set = names.size() == 2;
   for (const std::string& name : names)
     require(parts_.count(name) == 1, where + ": there is no network " + name);
+  require(!files::is_ever_silent(network_, function),
+          where + ": values of a function that is 0 in some compositions");
   require(!network_.invariants, where + ": values of a function of rotation invariants");
   require(is_set ? names[0] != files::kGroundPhi : function == "network",
           where + ": only of the network, or of a sum over neighbours");

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "lipschitz/checker/values.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
 
@@ -278,6 +279,7 @@ SlopeFunction slope_function(const files::Network& network, const std::string& f
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const std::vector<std::string> names = files::networks_of(function);
   if (files::maps_to_invariants(network, function)) refuse(function + " maps to rotation invariants");
+  if (files::is_ever_silent(network, function)) refuse(function + " is 0 in some compositions");
   const auto term = [&](const std::string& name) {
     const bool clamped = network.clamp && files::is_clamped(name);
     return Term{parts.at(name), clamped ? &*network.clamp : nullptr};
@@ -302,6 +304,7 @@ std::vector<mpq_class> value(const files::Network& network, const std::string& f
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const std::vector<std::string> names = files::networks_of(function);
   if (files::maps_to_invariants(network, function)) refuse(function + " maps to rotation invariants");
+  if (files::is_ever_silent(network, function)) refuse(function + " is 0 in some compositions");
   if (names.size() == 1 && networks.size() != 1) refuse("a plain network has one point");
   if (networks.size() != points.size()) refuse("there is not one point per network");
   DyadicVector sum;

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::files {
@@ -57,7 +58,9 @@ std::string chain_words(const Network& network) {
   if (network.plain) return chains.front().first;
   std::string text;
   for (const auto& [words, names] : chains) text += (text.empty() ? "" : "; ") + names + ": " + words;
-  return text + (network.invariants ? "; phi of rotation invariants" : "");
+  text += network.invariants ? "; phi of rotation invariants" : "";
+  for (const std::string& composition : silent_compositions(network)) text += "; silent: " + composition;
+  return text;
 }
 
 }  // namespace swarmcert::files

@@ -8,6 +8,7 @@
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
 #include "nn/weights/activation.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
 
@@ -24,7 +25,7 @@ class NetworkReader {
 
   Network run() {
     top_.require_schema(kSchema);
-    top_.allow_only({"schema", "output", "gamma", "input", "phi", "rho"});
+    top_.allow_only({"schema", "output", "gamma", "input", "silent", "phi", "rho"});
     network_.path = path_;
     if (top_.has("output")) read_output(top_.table("output"));
     if (top_.has("gamma")) read_gamma(top_.table("gamma"));
@@ -33,6 +34,7 @@ class NetworkReader {
     read_weights("rho", network_.rho);
     check_phi();
     check_rho();
+    if (top_.has("silent")) read_silent();
     return std::move(network_);
   }
 
@@ -209,6 +211,37 @@ class NetworkReader {
     }
   }
 
+  void read_silent() {
+    const std::vector<std::string> names = top_.texts("silent");
+    if (names.empty()) top_.refuse("silent", "[]", "names no composition", "leave it out");
+    for (const std::string& name : names) {
+      const std::size_t arrow = name.find('>');
+      if (arrow == std::string::npos)
+        top_.refuse("silent", in_quotes(name), "is no composition",
+                    "write the kinds of the neighbours and of the vehicle, e.g. \"large+small>small\"");
+      const std::string own = name.substr(arrow + 1);
+      if (network_.rho.count(own) == 0)
+        top_.refuse("silent", in_quotes(name), "there is no rho." + own, "name kinds that have one");
+      if (!network_.silent[own].insert(neighbours_in(name, arrow)).second)
+        top_.refuse("silent", in_quotes(name), "is named twice");
+    }
+  }
+
+  /// The kinds before the arrow, in order of names.
+  std::vector<std::string> neighbours_in(const std::string& name, std::size_t arrow) const {
+    std::vector<std::string> kinds;
+    for (std::size_t begin = 0; arrow > 0 && begin <= arrow;) {
+      const std::size_t end = std::min(name.find('+', begin), arrow);
+      kinds.push_back(name.substr(begin, end - begin));
+      if (kinds.back() == kGround || network_.phi.count(kinds.back()) == 0)
+        top_.refuse("silent", in_quotes(name), "there is no phi." + kinds.back() + " of a neighbour",
+                    "name kinds that have one");
+      begin = end + 1;
+    }
+    std::sort(kinds.begin(), kinds.end());
+    return kinds;
+  }
+
   const TomlTable& top_;
   const std::string& path_;
   const WeightsLoader& load_;
@@ -333,6 +366,7 @@ Network load_evaluated_network(const NetworkArguments& arguments) {
 Network load_network(const NetworkArguments& arguments) {
   Network network = load_evaluated_network(arguments);
   require_relative_states(network, "this command is for networks of relative states");
+  require_never_silent(network, "this command is for networks that are silent nowhere");
   return network;
 }
 

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -33,8 +34,9 @@ inline constexpr int kGroundInputs = 4;
 ///
 /// Deep set of a vehicle of kind r with neighbours x_1..x_n of kinds c_1..c_n:
 ///   f(x) = rho_r(phi_ground(own) + sum_j phi_{c_j}(x_j)),
-/// where the ground term is present iff phi has the kind "ground". With `invariants`, J(x_j) stands in place of x_j and
-/// K(own) in place of own (nn/invariants.h): see invariants.h.
+/// where the ground term is present iff phi has the kind "ground", or 0 where `silent` lists r among these neighbours
+/// (compositions.h). With `invariants`, J(x_j) stands in place of x_j and K(own) in place of own (nn/invariants.h): see
+/// invariants.h.
 /// Class invariant after load: every phi but "ground" has the same number of inputs, which is the length of
 /// `input_order`, unless there are invariants, and of the clamp where they are given; "ground" has kGroundInputs; all
 /// phi have the same number of outputs, which is every rho's number of inputs; all rho have the same number of outputs,
@@ -53,6 +55,8 @@ struct Network {
   bool invariants = false;               ///< `invariants = "rotation"`
   std::optional<InputClamp> clamp;
   std::optional<GammaStatement> gamma;
+  /// `silent`, by the vehicle's own kind: the kinds of its neighbours, in order of names, among which f is 0.
+  std::map<std::string, std::set<std::vector<std::string>>> silent;
 };
 
 /// Numbers that a quantity has: one for "force_z", the vertical force; three for "force" and "torque", along the axes
@@ -86,19 +90,19 @@ bool is_relu(const Network& network, const std::string& function);
 /// with_activation() of every part (activation.h).
 Network with_activation(Network network, const std::string& activation);
 
-/// load_network() of networks with any activation, and with invariants. What evaluates, exports or searches a network
-/// is for ReLU and for relative states: call load_network() there.
+/// load_network() of networks with any activation, with invariants, and silent in some compositions. What evaluates,
+/// exports or searches a network is for ReLU and for relative states: call load_network() there.
 Network load_any_network(const NetworkArguments& arguments);
 
-/// What the evaluator runs (nn/deep_set.h): ReLU networks, of relative states or invariants.
+/// What the evaluator runs (nn/deep_set.h): ReLU networks, of relative states or invariants, silent or not.
 /// @throws as load_any_network() and require_relu().
 Network load_evaluated_network(const NetworkArguments& arguments);
 
-/// Loads NET, whose activation must be ReLU and whose inputs relative states. A `file` is a network.toml if its name
-/// ends in ".toml" or its text names that schema. Weight files named in a network.toml are relative to its folder,
-/// which also states the order of their layers.
+/// Loads NET, whose activation must be ReLU, whose inputs relative states, and which is silent nowhere. A `file` is a
+/// network.toml if its name ends in ".toml" or its text names that schema. Weight files named in a network.toml are
+/// relative to its folder, which also states the order of their layers.
 /// @throws InputError with line, field, value and hint; unknown keys are errors that suggest a known one. Throws what
-///   require_relu() and require_relative_states() throw as well.
+///   require_relu(), require_relative_states() and require_never_silent() throw as well.
 Network load_network(const NetworkArguments& arguments);
 
 /// as_float32() of every part.

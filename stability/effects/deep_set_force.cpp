@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "nn/base/input_error.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::stability {
@@ -85,6 +86,9 @@ DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
     set_.upper = network_.clamp->upper.data();
   }
   set_.of_invariants = network_.invariants;
+  silent_ = files::silent_counts(network_, rho->first);
+  set_.silent = silent_.data();
+  set_.num_silent = static_cast<int>(silent_.size()) / set_.num_kinds;
   if (set_.inputs() > static_cast<int>(kInputs.size())) {
     refuse(network_, "phi." + names.front(), std::to_string(set_.inputs()) + " inputs",
            "must be at most 6: relative position and velocity", "");

@@ -54,6 +54,7 @@ class DeepSetForce {
   std::vector<nn::Mlp<double>> phi_;  ///< by index in network_.phi without the ground
   nn::Mlp<double> ground_{};
   nn::DeepSet<double> set_{};
+  std::vector<int> silent_;  ///< of set_
   std::vector<int> phi_of_kind_;
   std::vector<int> input_;  ///< 0..2: component of dp, 3..5: of dv
   bool is_torque_ = false;

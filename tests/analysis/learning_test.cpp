@@ -113,43 +113,109 @@ LearningData selecting(const training::Vector& theta, const std::map<std::string
   return data;
 }
 
-TEST(OutputScale, MinimisesTheErrorOfTheSelectingFlightsAndLeavesNoCompositionWorseThanWithout) {
+/// The samples of a track.
+std::vector<Index> samples_of(const TrackSamples& track) {
+  std::vector<Index> samples(static_cast<std::size_t>(track.end - track.begin));
+  std::iota(samples.begin(), samples.end(), track.begin);
+  return samples;
+}
+
+/// Mean squares of the targets of a track, and of what `outputs` leave of them.
+std::pair<double, double> mean_squares(const LearningData& data, const TrackSamples& track,
+                                       const training::Matrix& outputs) {
+  double nothing = 0, network = 0;
+  for (const Index s : samples_of(track)) {
+    nothing += data.samples.target_of(s).cast<double>().squaredNorm();
+    network += (data.samples.target_of(s) - outputs.col(s)).cast<double>().squaredNorm();
+  }
+  const auto count = static_cast<double>(track.end - track.begin);
+  return {nothing / count, network / count};
+}
+
+TEST(OutputSupport, MinimisesTheErrorOfTheSelectingFlightsAndLeavesNoCompositionWorseThanWithout) {
   const training::Vector theta = training::initial_parameters(two_compositions().layout, 3);
   // Half of the output is right for large vehicles; for small ones the output points the wrong way.
   const LearningData data = selecting(theta, {{"small>large", 0.5}, {"small>small", -0.3}});
-  const std::map<std::string, double> scales = output_scales(data, outputs_for(data, theta, Use::kSelect));
-  EXPECT_NEAR(scales.at("large"), 0.5, 0.02);
-  EXPECT_EQ(scales.at("small"), 0);
+  const training::Matrix outputs = outputs_for(data, theta, Use::kSelect);
+  const OutputSupport support = output_support(data, outputs, outputs);
+  EXPECT_NEAR(support.scales.at("large"), 0.5, 0.02);
+  EXPECT_EQ(support.scales.at("small"), 0);
+  EXPECT_EQ(support.silent_names(), std::vector<std::string>{"small>small"});
 
   training::Vector scaled = theta;
-  scale_outputs(data.layout, scales, scaled);
+  scale_outputs(data.layout, support.scales, scaled);
+  training::Matrix kept = outputs_for(data, scaled, Use::kSelect);
+  silence(data, support, kept);
   for (const TrackSamples& track : data.tracks) {
-    std::vector<Index> samples(static_cast<std::size_t>(track.end - track.begin));
-    std::iota(samples.begin(), samples.end(), track.begin);
-    double nothing = 0;
-    for (const Index s : samples) nothing += data.samples.target_of(s).cast<double>().squaredNorm();
-    nothing /= static_cast<double>(samples.size());
-    const double before = training::mean_loss(data.layout, theta, data.samples, samples, 1);
-    const double after = training::mean_loss(data.layout, scaled, data.samples, samples, 1);
-    EXPECT_LT(after, before) << track.composition;
-    EXPECT_LE(after, nothing * (1 + 1e-6)) << track.composition;
+    EXPECT_LT(mean_squares(data, track, kept).second, mean_squares(data, track, outputs).second);
+    EXPECT_LE(mean_squares(data, track, kept).second, mean_squares(data, track, kept).first * (1 + 1e-6));
+    EXPECT_NEAR(std::sqrt(mean_squares(data, track, kept).second), support.left.at(track.composition).network,
+                1e-5);
   }
 }
 
-TEST(OutputScale, OneCompositionThatTheOutputHarmsLimitsTheWholeKind) {
+TEST(OutputSupport, OneCompositionThatTheOutputHarmsIsSilentAndTheOthersKeepTheirs) {
   const training::Vector theta = training::initial_parameters(two_compositions().layout, 3);
-  LearningData data = selecting(theta, {{"small>large", 1.0}, {"small>small", 1.0}});
+  LearningData data = selecting(theta, {{"small>large", 0.9}, {"small>small", 1.0}});
   // Half of the large vehicles' samples become a composition in which only a tenth of the output is right.
   TrackSamples harmed = data.tracks[0];
   harmed.begin = (harmed.begin + harmed.end) / 2;
   harmed.composition = "large+small>large";
   data.tracks[0].end = harmed.begin;
-  for (Index s = harmed.begin; s < harmed.end; ++s) data.samples.target[static_cast<std::size_t>(s)] *= 0.1f;
+  for (const Index s : samples_of(harmed)) data.samples.target[static_cast<std::size_t>(s)] *= 0.1f;
   data.tracks.push_back(harmed);
-  const std::map<std::string, double> scales = output_scales(data, outputs_for(data, theta, Use::kSelect));
-  EXPECT_LT(scales.at("large"), 0.25) << "twice 0.1, where the error is that of no network, and the noise";
-  EXPECT_GT(scales.at("large"), 0.15);
-  EXPECT_NEAR(scales.at("small"), 1, 0.02);
+  const training::Matrix outputs = outputs_for(data, theta, Use::kSelect);
+  const OutputSupport support = output_support(data, outputs, outputs);
+  EXPECT_NEAR(support.scales.at("large"), 0.9, 0.02) << "as if the other did not exist";
+  EXPECT_NEAR(support.scales.at("small"), 1, 0.02);
+  ASSERT_EQ(support.silent_names(), std::vector<std::string>{"large+small>large"});
+  const auto [nothing, network] = mean_squares(data, harmed, outputs);
+  EXPECT_NEAR(support.silent.begin()->second.nothing, std::sqrt(nothing), 1e-6);
+  EXPECT_NEAR(support.silent.begin()->second.network, std::sqrt(network), 1e-6);
+  EXPECT_GT(network, nothing);
+
+  // No other scale, with the compositions that it helps, leaves less over all.
+  const auto left = [&](double scale) {
+    double sum = 0;
+    for (const TrackSamples& track : data.tracks) {
+      if (track.composition.back() != 'e') continue;  // large
+      const auto [none, with] = mean_squares(data, track, static_cast<float>(scale) * outputs);
+      sum += std::min(none, with);
+    }
+    return sum;
+  };
+  for (double scale = 0; scale <= 1; scale += 0.05)
+    EXPECT_LE(left(support.scales.at("large")), left(scale) * (1 + 1e-4)) << scale;
+}
+
+TEST(OutputSupport, WithoutScalesItSilencesWhatAllOfTheOutputHarms) {
+  const training::Vector theta = training::initial_parameters(two_compositions().layout, 3);
+  const LearningData data = selecting(theta, {{"small>large", 0.6}, {"small>small", 0.4}});
+  const training::Matrix outputs = outputs_for(data, theta, Use::kSelect);
+  const OutputSupport support = output_support(data, outputs, outputs, Use::kSelect, Support::kSilence);
+  EXPECT_TRUE(support.scales.empty());
+  EXPECT_EQ(support.silent_names(), std::vector<std::string>{"small>small"}) << "twice 0.4 is below 1";
+}
+
+TEST(OutputSupport, OfAMeanTheErrorsOfSingleNetworksDoNotCount) {
+  const training::Vector theta = training::initial_parameters(two_compositions().layout, 3);
+  const LearningData data = selecting(theta, {{"small>large", 1.0}, {"small>small", 1.0}});
+  const training::Matrix mean = outputs_for(data, theta, Use::kSelect);
+  // What one of many networks says: the mean, and an error of its own as large.
+  training::Matrix one = mean;
+  files::Random random(6);
+  for (Index s = 0; s < one.cols(); ++s)
+    if (random.below(2) == 0)
+      one(0, s) *= 2;
+    else
+      one(0, s) = 0;
+  EXPECT_NEAR(output_support(data, one, one).scales.at("large"), 0.5, 0.05);
+  const OutputSupport support = output_support(data, one, mean);
+  EXPECT_NEAR(support.scales.at("large"), 1, 0.1);
+  const SupportedErrors as_trained =
+      output_support(data, one, one, Use::kSelect, Support::kAsTrained).left.at("small>large");
+  EXPECT_NEAR(as_trained.network, as_trained.nothing, 0.1 * as_trained.nothing) << "of a single network";
+  EXPECT_NEAR(support.left.at("small>large").network, 0.1 / std::sqrt(3), 0.006) << "what the targets err by";
 }
 
 TEST(NearestLabels, SeeTheMeanOfAFlightThroughAnyTurnAndNothingWhereNobodyFlew) {

@@ -79,6 +79,10 @@ TEST_F(Train, KeepsNoNetworkThatIsWorseThanNoneOnTheSelectingFlights) {
   EXPECT_NEAR(result["select_rmse"].get<double>(), result["select_rmse_of_nothing"].get<double>(), 1e-9);
   ASSERT_EQ(result["select"].size(), 1u);
   EXPECT_EQ(result["output_scales"]["small"], 0);
+  ASSERT_EQ(result["silent"].size(), 1u);
+  EXPECT_EQ(result["silent"][0]["vehicles"], "small>small");
+  EXPECT_GT(result["silent"][0]["rmse"].get<double>(), result["silent"][0]["rmse_of_nothing"].get<double>());
+  EXPECT_NE(read_text(folder_ / "out/network.toml").find("silent = [\"small>small\"]"), std::string::npos);
   EXPECT_FALSE(result["select"][0]["worse_than_none"].get<bool>());
   EXPECT_NE(outcome.output.find("no network is kept"), std::string::npos) << outcome.output;
   EXPECT_EQ(read_text(folder_ / "out/model-small.toml").find("deep_set"), std::string::npos);

@@ -171,6 +171,39 @@ TEST_F(NeighboursTest, ForceIsContinuousAcrossEveryCutOff) {
   EXPECT_LE(std::fabs(joining), 0.0101f * whole_jump + 1e-7f);
 }
 
+// A neighbour that makes the composition silent takes all of the force with it: over the fade, or at once.
+TEST_F(NeighboursTest, WhereANeighbourMakesTheSetSilentAllOfTheForceFadesAndTheStepIsNeverMoreThanAllOfIt) {
+  std::vector<NeighbourTrack<float>> two = {track({0.1f, 0.2f, 0.3f}), track({0.5f, 0.1f, 0.2f})};
+  two[0].kind = 0, two[1].kind = 1;
+  constexpr std::array<int, 2> kBoth = {1, 1};
+  nn::DeepSet<float> set = networks_.set();
+  set.silent = kBoth.data(), set.num_silent = 1;
+  const auto force = [&](const std::vector<NeighbourTrack<float>>& tracks) {
+    return predict(set, settings_, {}, {0.1f, 0.2f, -0.1f}, tracks.data(), static_cast<int>(tracks.size()),
+                   10000, {}, networks_.workspace());
+  };
+  const float alone = force({two[0]}).effect_W_N.z;
+  ASSERT_GT(std::fabs(alone), 1e-4f);
+  EXPECT_EQ(alone, predicted({two[0]}).effect_W_N.z);
+  EXPECT_EQ(bits(force(two)), 0u);
+  settings_.cut_offs.fade_m = 0.1f;
+  float last = 0;
+  for (int i = 0; i <= 600; ++i) {  // the second leaves by 1 mm at a time
+    two[1].position_W_m.x = 0.5f + 0.001f * static_cast<float>(i);
+    const float now = force(two).effect_W_N.z;
+    EXPECT_LE(std::fabs(now - last), 0.0101f * std::fabs(alone)) << i;
+    EXPECT_LE(std::fabs(now), std::fabs(alone) * 1.00001f);
+    last = now;
+  }
+  EXPECT_EQ(last, alone);
+  settings_.cut_offs.fade_m = 0, settings_.cut_offs.fade_ms = 0;
+  two[1].position_W_m.x = 0.999f;
+  EXPECT_EQ(predict(set, settings_, {}, {0.1f, 0.2f, -0.1f}, two.data(), 2, 10000, force({two[0]}).effect_W_N,
+                    networks_.workspace())
+                .jump_N,
+            std::fabs(alone));
+}
+
 TEST_F(NeighboursTest, HardCutOffsReportTheirJump) {
   settings_.cut_offs.fade_m = 0;
   settings_.cut_offs.fade_ms = 0;

@@ -61,6 +61,47 @@ TEST_F(Firmware, ANetworkOfInvariantsIsExportedWithThemAndMatchFindsItWithout) {
       << "five inputs are no relative state";
 }
 
+TEST_F(Firmware, ASilentCompositionIsExportedAndMatchFindsItWithout) {
+  std::string toml = read_text(folder_ / "network.toml");
+  toml.insert(toml.find("[input]"), "silent = [\"large+small>small\", \">large\"]\n");
+  write_text(folder_ / "silent.toml", toml);
+  ASSERT_EQ(run("swarmcert export silent.toml -o silent").exit_code, 0);
+  write_text(folder_ / "zero.cpp", R"(#include "swarmcert_network.h"
+int main() {
+  const float own[4] = {-0.5f, 0.1f, 0.2f, 0.3f}, x[6] = {0.1f, 0.2f, 0.3f, 0, 0, 0};
+  const swarmcert::nn::Neighbour<float> both[] = {{x, 1}, {x, 0}};
+  float together = 1, one = 0, large = 0;
+  using swarmcert_network::predict_force_z;
+  predict_force_z(1, own, both, 2, &together), predict_force_z(1, own, both, 1, &one);
+  predict_force_z(0, own, both, 2, &large);
+  return together == 0 && one != 0 && large != 0 ? static_cast<int>(swarmcert_network::self_test(nullptr)) : 9;
+}
+)");
+  for (const std::string compiler : {"g++ -O0", "g++ -O3 -march=native -ffp-contract=fast"}) {
+    const Outcome built =
+        run(compiler +
+            " -std=c++17 -Wall -Wextra -Werror -Isilent silent/swarmcert_network.cpp zero.cpp -o flown");
+    ASSERT_EQ(built.exit_code, 0) << built.output;
+    EXPECT_EQ(run("./flown").exit_code, 0) << compiler;
+  }
+  EXPECT_EQ(run("swarmcert match silent.toml silent").exit_code, 0);
+  EXPECT_EQ(run("swarmcert match network.toml silent").exit_code, 1);
+  std::string source = read_text(folder_ / "silent/swarmcert_network.cpp");
+  const std::string counts = "silent_rho_small[] = {1, 1}";
+  ASSERT_NE(source.find(counts), std::string::npos);
+  source.replace(source.find(counts), counts.size(), "silent_rho_small[] = {1, 2}");
+  write_text(folder_ / "silent/swarmcert_network.cpp", source);
+  EXPECT_EQ(run("swarmcert match silent.toml silent").exit_code, 1);
+  ASSERT_EQ(run("g++ -std=c++17 -Isilent silent/swarmcert_network.cpp main.cpp -o flown").exit_code, 0);
+  EXPECT_EQ(run("./flown").exit_code, 2) << "a golden vector is of this composition";
+
+  // A certificate of the network that always speaks is none of this one.
+  ASSERT_EQ(run("swarmcert certify network.toml --nodes 0 --method product -o cert.json").exit_code, 0);
+  const Outcome other = run("swarmcert export silent.toml --certificate cert.json -o other");
+  EXPECT_EQ(other.exit_code, 3) << other.output;
+  EXPECT_NE(other.output.find("where the network is silent"), std::string::npos) << other.output;
+}
+
 TEST_F(Firmware, LayersThatDoNotFitTheirArraysOrEachOtherDoNotCompile) {
   const std::string source = read_text(folder_ / "out/swarmcert_network.cpp");
   const std::string compile = "g++ -std=c++17 -Iout -c out/changed.cpp -o changed.o";

@@ -63,6 +63,11 @@ INVARIANTS_STATEMENT = (
     "components are p_z and v_z, and of the vehicle -z in m and -v in m/s; phi sees their invariants: of a neighbour "
     "|p_xy|, 3/2 p_z, |v_xy|, 3/2 v_z, |p_xy + v_xy / 2|, and the ground's phi -z, |v_xy|, -v_z. So the input clamp is "
     "one of invariants, and phi alone is a function of them.")
+# Added for networks that are silent in some compositions.
+SILENT_STATEMENT = (
+    " Among neighbours that network.toml calls silent, as many of each kind as it lists and no others, the set "
+    "functions of that kind of vehicle are 0. Their bounds hold while the neighbours stay the same: where one comes "
+    "or goes that makes or ends such a composition they step by all of their value, which nothing here bounds.")
 # The map to a neighbour's is 3/2-Lipschitz: the three norms change by at most the square root of the largest eigenvalue
 # of I + (1, 1/2)' (1, 1/2), which is 1 + 1 + 1/4; the ground's is 1-Lipschitz.
 SLOPE_OF_INVARIANTS, SLOPE_OF_GROUND_INVARIANTS = Fraction(3, 2), Fraction(1)
@@ -806,6 +811,7 @@ class Network:
         """orders: of layers, by "network", "phi" and "rho"; those of a network.toml stand there."""
         orders = orders or {}
         self.sha256, self.unit, self.order, self.clamp, self.invariants = "", "", [], None, False
+        self.silent = set()  # kinds of vehicles with compositions in which they have no network
         if phi:
             self.parts = {f"{role}:default": read_weights(file, key, orders.get(role), activation)
                           for role, file in (("phi", phi), ("rho", rho))}
@@ -821,6 +827,11 @@ class Network:
             require_input(not self.invariants or (self.order == RELATIVE_STATE and
                                                   document.get("output", {}).get("quantity") == "force_z"),
                           f"{net}: invariants are of a relative state and for a vertical force")
+            silent = document.get("silent", [])
+            require_input(isinstance(silent, list) and all(isinstance(one, str) for one in silent) and
+                          all(one.partition(">")[2] in document["rho"] for one in silent),
+                          f"{net}: silent: a list of compositions, e.g. large+small>small")
+            self.silent = {one.partition(">")[2] for one in silent}
             clamp = document.get("input", {}).get("clamp")
             self.clamp = clamp and (clamp["lower"], clamp["upper"])
 
@@ -853,6 +864,9 @@ class Network:
 
     def maps_to_invariants(self, function):
         return self.invariants and function.startswith("set:")
+
+    def is_ever_silent(self, function):
+        return function.startswith("set:") and function.rpartition(":")[2] in self.silent
 
     def slope_of_inputs(self, function):
         """Lipschitz constant of the map from the function's inputs to what its first layer sees."""
@@ -1829,7 +1843,8 @@ class Checker:
         sorting = any(step["op"] in SORTING for weights in self.c["network"]["weights"].values()
                       for step in weights["chain"])
         require(self.c["statement"] == STATEMENT + SORTING_STATEMENT * sorting +
-                INVARIANTS_STATEMENT * self.network.invariants, "another statement")
+                INVARIANTS_STATEMENT * self.network.invariants +
+                SILENT_STATEMENT * bool(self.network.silent), "another statement")
         require(self.c["content_sha256"] == content_sha256(self.c), "content_sha256 does not match")
         require(isinstance(self.c["tool"], str), "tool is not text")
         self.check_network(self.c["network"])
@@ -1956,6 +1971,9 @@ class Checker:
                     f"{where}: of rotation invariants, only bounds for all inputs together")
             require(bound["lower"] is None and bound["lower_hex"] is None and bound["lower_witness"] is None,
                     f"{where}: a lower bound of a function of rotation invariants")
+        if self.network.is_ever_silent(function):
+            require(bound["lower"] is None and bound["lower_hex"] is None and bound["lower_witness"] is None,
+                    f"{where}: a lower bound of a function that is 0 somewhere")
         if bound["upper_method"] in ("sdp", "eclipse_fast"):
             self.check_upper(stages(self.network, function, block, scale), bound["proof"], upper, where,
                              slope_ranges(self.network, function))
@@ -2265,6 +2283,7 @@ class Checker:
         require(isinstance(entry["function"], str), "values: function is not text")
         where, names = f"values of {entry['function']}", networks_of(entry["function"])
         require(not self.network.invariants, f"{where}: of a function of rotation invariants")
+        require(not self.network.is_ever_silent(entry["function"]), f"{where}: of a function that is 0 somewhere")
         is_set, is_float32 = len(names) == 2, entry["input_error"] is not None
         require(names[0] != "phi:ground" if is_set else names == ["network"],
                 f"{where}: only of the network, or of a sum")

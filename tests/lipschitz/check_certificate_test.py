@@ -122,6 +122,34 @@ def of_invariants(folder, generator):
     return net
 
 
+def silent(folder):
+    """The network of heterogeneous(), without a word between a small and a large vehicle."""
+    net = folder / "silent.toml"
+    net.write_text((folder / "network.toml").read_text().replace(
+        "[input]", 'silent = ["large+small>small"]\n[input]', 1))
+    return net
+
+
+def check_silent(certificate, net, folder):
+    """What is 0 in some compositions has no lower bound, and another statement."""
+    def refused(change):
+        changed = json.loads(json.dumps(certificate))
+        change(changed)
+        changed["content_sha256"] = second.content_sha256(changed)
+        accepted, said = first_checker(changed, net, folder, 0)
+        reason = second.check(changed, second.Network(**arguments(net)))
+        assert not accepted and reason, f"first says {said!r}, second says {reason!r}"
+
+    sets = [bound for bound in certificate["bounds"] if bound["function"].startswith("set:")]
+    assert sets and all(bound["lower"] is None for bound in sets), sets
+    refused(lambda changed: changed.update(statement=second.STATEMENT))
+    point = ["0x0p+0"] * 6
+    witness = {"x": point, "y": ["0x1p+0"] + point[1:], "others": [{"network": "phi:ground", "x": point[:4]}]}
+    for i, bound in enumerate(certificate["bounds"]):
+        if bound["function"] in ("set:small:small", "set:large:small"):
+            refused(lambda changed: changed["bounds"][i].update(lower=0.0, lower_hex="0x0p+0", lower_witness=witness))
+
+
 def check_invariants(certificate, net, folder):
     """Bounds of set functions need the slope of the map to invariants, and hold for all inputs together only."""
     def refused(i, **fields):
@@ -447,6 +475,8 @@ def run():
         nets += [([beside_net], ["--method", "product"])]
         invariant_net = str(of_invariants(folder, generator))
         nets += [([invariant_net], ["--blocks", "--neighbours", "large=2,small=1"])]
+        silent_net = str(silent(folder))
+        nets += [([silent_net], ["--neighbours", "large=2,small=1"])]
         nets += [(net, []) for net in smooth_models(folder, generator)]
         nets += [([str(tiny)], ["--activation", ops])
                  for ops in ("silu", "gelu", "sigmoid", "tanh,relu", "relu,silu,sigmoid", "elu,relu,relu")]
@@ -472,6 +502,8 @@ def run():
                 check_activations(certificate, net, folder)
             if net[0] == invariant_net:
                 check_invariants(certificate, net, folder)
+            if net[0] == silent_net:
+                check_silent(certificate, net, folder)
             paths = list(leaves(certificate))
             chosen = [generator.choice(paths) for _ in range(MUTATIONS if index == 1 else MUTATIONS // 5)]
             changed, longer = zip(*(forged(certificate, p, generator) for p in chosen))

@@ -129,6 +129,35 @@ TEST_F(DeepSetTest, TheGroundIsSummedFirstThenKindsByIndex) {
   EXPECT_EQ(bits(f_({by_kind[1], by_kind[0]})), bits(in_order_of_arrival(by_kind)));
 }
 
+TEST_F(DeepSetTest, ItIsZeroAmongExactlyTheNeighboursThatSilentListsInAnyOrderAndElsewhereTheSame) {
+  constexpr std::array<int, 4> kSilent = {1, 2, 0, 1};  // kinds {0, 1, 1} and {1}
+  DeepSet<float> set = f_.set();
+  set.silent = kSilent.data();
+  set.num_silent = 2;
+  const std::vector<Input> inputs = random_inputs(4);
+  int silent = 0;
+  for (int count = 0; count <= 4; ++count) {
+    for (unsigned kinds = 0; kinds < 1u << count; ++kinds) {  // every kind for each of the neighbours
+      std::vector<Neighbour<float>> some;
+      int ones = 0;
+      for (int j = 0; j < count; ++j) {
+        some.push_back({inputs[static_cast<std::size_t>(j)].data(), static_cast<int>(kinds >> j & 1)});
+        ones += some.back().kind;
+      }
+      const bool is_silent = (count == 3 && ones == 2) || (count == 1 && ones == 1);
+      silent += is_silent ? 1 : 0;
+      EXPECT_EQ(bits(f_(set, some)), is_silent ? bits(0.0f) : bits(f_(some))) << count << " " << kinds;
+    }
+  }
+  EXPECT_EQ(silent, 4);
+  // A silent set still refuses what it cannot take.
+  float y = 1;
+  EXPECT_EQ(f_.status(set, {{inputs[0].data(), 2}}, f_.own.data(), y), DeepSetStatus::kUnknownKind);
+  Input broken = inputs[0];
+  broken[3] = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(f_.status(set, {{broken.data(), 1}}, f_.own.data(), y), DeepSetStatus::kInputNotFinite);
+}
+
 TEST_F(DeepSetTest, EqualNeighboursAreInterchangeable) {
   const Input a = random_input();
   const Input same = a;

@@ -7,6 +7,7 @@
 
 #include "data.h"
 #include "nn/base/file_io.h"
+#include "nn/weights/compositions.h"
 #include "random_network.h"
 #include "refusal.h"
 #include "temp_folder.h"
@@ -90,6 +91,36 @@ TEST(NetworkToml, InvariantsAreOfARelativeStateAndOfAVerticalForceAndPhiTakesAsM
       refused("[0, -1, 0, -2, 0]", "[0, -1, 0, -2, 0, 0]", {"input.clamp.lower", "there are 5 inputs"}));
   EXPECT_TRUE(refused("5x20", "6x20", {"phi.small.weights", "must be 5"}));
   EXPECT_TRUE(refused("3x20", "4x20", {"phi.ground.weights", "must be 3"}));
+}
+
+TEST(NetworkToml, SilentCompositionsAreOfKindsThatItHasInAnyOrderAndEachOnce) {
+  const auto silent = [](const std::string& list) {
+    return with("[input]", "[phi.large]\nweights = \"6x20\"\n[input]")
+        .insert(std::string("schema = \"swarmcert/network/1\"\n").size(), "silent = " + list + "\n");
+  };
+  const Network network = parse(silent("[\"small+large+small>large\", \">small\", \"large>small\"]"));
+  const std::vector<std::string> three = {"large", "small", "small"};
+  EXPECT_EQ(network.silent.at("large"), (std::set<std::vector<std::string>>{three}));
+  EXPECT_EQ(network.silent.at("small"), (std::set<std::vector<std::string>>{{}, {"large"}}));
+  EXPECT_EQ(neighbour_kinds(network), (std::vector<std::string>{"large", "small"}));
+  EXPECT_EQ(silent_counts(network, "large"), (std::vector<int>{1, 2}));
+  EXPECT_EQ(silent_counts(network, "small"), (std::vector<int>{0, 0, 1, 0}));
+  EXPECT_EQ(composition_name({"small", "large"}, "small"), "large+small>small");
+  EXPECT_TRUE(is_ever_silent(network, "set:large:small"));
+  EXPECT_FALSE(is_ever_silent(network, "rho:small"));
+  EXPECT_TRUE(parse(kFull).silent.empty());
+  const auto refused = [&](const std::string& list, const std::vector<std::string>& pieces) {
+    return network_is_refused(silent(list), pieces);
+  };
+  EXPECT_TRUE(refused("[]", {"line 2: silent", "names no composition"}));
+  EXPECT_TRUE(refused("[\"small\"]", {"line 2: silent", "\"small\"", "is no composition"}));
+  EXPECT_TRUE(refused("[\"small>tiny\"]", {"there is no rho.tiny"}));
+  EXPECT_TRUE(refused("[\"tiny>small\"]", {"there is no phi.tiny"}));
+  EXPECT_TRUE(refused("[\"ground>small\"]", {"there is no phi.ground of a neighbour"}));
+  EXPECT_TRUE(refused("[\"small+>small\"]", {"there is no phi. of a neighbour"}));
+  EXPECT_TRUE(refused("[\"small+large>small\", \"large+small>small\"]", {"named twice"}));
+  EXPECT_TRUE(refuses([&] { require_never_silent(network, "this is for others"); },
+                      {"nets/network.toml", "silent", "small+small>large", "this is for others"}));
 }
 
 TEST(NetworkToml, EveryKeyIsRead) {

@@ -400,12 +400,22 @@ def every_format(folder, generator):
     print(f"{len(files)} formats of weight files read alike")
 
 
+def refuses_silence(folder):
+    """Compositions without a network are beyond the theorems: refused by name, never ignored."""
+    net, path = [common.silent(folder)], folder / "silent.json"
+    run([common.SWARMCERT, "certify", *net, "--nodes", "0", "--method", "product", "-q", "-o", path])
+    assert first(path, net).returncode == 0
+    refused = proved(path, net)
+    assert refused.returncode == 3 and "silent: compositions without a network" in refused.stderr, refused
+
+
 def main():
     generator = random.Random(23)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         every_format(folder, generator)
         everything = kinds(folder, generator)
+        refuses_silence(folder)
         laws_in_a_box(folder, next(net for name, net, _, _ in everything if name == "pair"))
         total = 0
         for index, (name, net, options, share) in enumerate(everything):

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "nn/base/input_error.h"
 #include "nn/weights/functions.h"
 #include "stability/effects/deep_set_force.h"
 #include "tube/scenes.h"
@@ -107,6 +108,32 @@ TEST(LearnedForce, LiesBetweenItsFormsWithAGroundOfAnotherDepth) {
   }
   network.phi[files::kGroundKind] = ground;
   expect_enclosed(network, 2, 13);
+}
+
+// Simulation and models fly it; a tube, whose force has no steps, does not.
+TEST(DeepSetForce, IsZeroInASilentCompositionAlsoOfNeighboursThatFadeAndNoTubeTakesIt) {
+  files::Network network = tests::demo_network();
+  DeepSetForce always(network, "small", {"small"});
+  network.silent["small"] = {{"small", "small"}};
+  DeepSetForce force(network, "small", {"small"});
+  const Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(state_size(3), -0.3, 0.4);
+  for (int n = 0; n <= 3; ++n) {
+    const Eigen::VectorXd some = x.tail(state_size(n));
+    EXPECT_EQ(flown(force, some, n), n == 2 ? 0 : flown(always, some, n)) << n;
+  }
+  std::vector<Neighbour> two;
+  for (int n = 0; n < 2; ++n)
+    two.push_back({x.segment<3>(n * kPerNeighbour), x.segment<3>(n * kPerNeighbour + 3),
+                   Eigen::Vector3d::Zero(), 0.034, 0});
+  Instant now;
+  now.neighbours = two.data();
+  now.num_neighbours = 1;
+  const double one = always.force_z_N(now);
+  ASSERT_NE(one, 0);
+  now.num_neighbours = 2;
+  const double weights[] = {1, 0.25};
+  EXPECT_NEAR(force.force_z_N(now, weights), 0.75 * one, 1e-15) << "a quarter of what is silent is missing";
+  EXPECT_THROW(LearnedForce(network, "small", 2), files::InputError);
 }
 
 }  // namespace

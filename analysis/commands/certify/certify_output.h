@@ -40,9 +40,11 @@ inline constexpr char kForReluOnly[] =
     "branch and bound is for ReLU networks of relative states: with other activations bounds on a box are "
     "proved from the slopes that they have there";
 
-/// Said of functions of rotation invariants.
+/// Said of functions of rotation invariants, and of those that are silent somewhere.
 inline constexpr char kNoLowerBound[] =
-    "of functions of rotation invariants upper bounds for all inputs are proved, and no lower bounds";
+    "of functions of rotation invariants, or that are silent in some compositions, upper bounds for all "
+    "inputs are "
+    "proved, and no lower bounds";
 
 /// Unit of the network's outputs; "output" where NET states none.
 std::string output_unit(const files::Network& network);

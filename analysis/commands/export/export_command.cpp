@@ -48,9 +48,11 @@ std::string certificate_of(const files::Network& network, const std::string& pat
       refuse("network.weights." + part + ".chain", "",
              "is not the chain that is exported: " + files::chain_words(files::chain(network, part)));
   }
-  if (network.invariants && certificate["network"].value("description_sha256", "") != network.sha256)
+  const bool rests_on_description = network.invariants || !network.silent.empty();
+  if (rests_on_description && certificate["network"].value("description_sha256", "") != network.sha256)
     refuse("network.description_sha256", "",
-           "is not the hash of " + network.path + ", which states what phi sees");
+           "is not the hash of " + network.path +
+               ", which states what phi sees, and where the network is silent");
   const bool certified_as_float32 = certificate["network"].value("as", files::Json()) == "float32";
   if (as_float32 && !certified_as_float32)
     refuse("network.as", "null",

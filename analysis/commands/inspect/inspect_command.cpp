@@ -23,6 +23,7 @@
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
 #include "nn/base/toml.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
 #include "stability/model.h"
@@ -81,6 +82,7 @@ files::Json description(const files::Network& network) {
   if (network.clamp) clamp = {{"lower", network.clamp->lower}, {"upper", network.clamp->upper}};
   return {{"output", {{"quantity", network.output_quantity}, {"unit", network.output_unit}}},
           {"gamma", std::move(gamma)},
+          {"silent", files::silent_compositions(network)},
           {"input",
            {{"order", network.input_order},
             {"invariants", network.invariants ? files::Json("rotation") : files::Json()},
@@ -107,6 +109,8 @@ void print_description(const files::Network& network) {
     if (network.clamp) fmt::print(", clamped to {} .. {}", network.clamp->lower[k], network.clamp->upper[k]);
     fmt::print("\n");
   }
+  for (const std::string& composition : files::silent_compositions(network))
+    fmt::print("  silent: {}\n", composition);
 }
 
 files::Json inspect_network(const std::string& path, files::NetworkArguments arguments, bool print) {

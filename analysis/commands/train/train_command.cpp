@@ -168,24 +168,26 @@ void certify_and_score(const TrainOptions& options, int jobs, const LearningData
   certify_options.jobs = jobs;
   certify_options.lower.seed = options.run.trainer.seed;
   outcome.certified = learning::write_certificate(network, options.output, certify_options);
-  const training::Matrix outputs = learning::outputs_for(data, run.theta, Use::kTest);
+  training::Matrix outputs = learning::outputs_for(data, run.theta, Use::kTest);
+  learning::silence(data, outcome.support, outputs);
   outcome.compositions = scores_by_composition(data, outputs, Use::kTest, outcome.all);
   if (data.samples.outputs > 1) outcome.components = scores_by_component(data, outputs);
 }
 
 /// What selects: flights of their own, or with folds every flight, of which only the network speaks that was not
-/// fitted to it. Scales the outputs by it, unless told not to.
+/// fitted to it. Scales the outputs by it, and finds where there is to be no network, unless told not to.
 void select_and_scale(const TrainOptions& options, const LearningData& data, training::Matrix unseen,
                       Outcome& outcome) {
   training::Vector& theta = outcome.trained.run.theta;
   const Use use = options.folds > 0 ? Use::kFit : Use::kSelect;
-  if (options.folds == 0) unseen = learning::outputs_for(data, theta, use);
-  if (options.run.trainer.gamma.mode == files::GammaStatement::Mode::kClip && !options.allow_worse) {
-    outcome.scales = learning::output_scales(data, unseen, use);
-    learning::scale_outputs(data.layout, outcome.scales, theta);
-    learning::scale_outputs(data, outcome.scales, unseen);
-  }
-  outcome.select_compositions = scores_by_composition(data, unseen, use, outcome.select);
+  const training::Matrix whole = learning::outputs_for(data, theta, use);
+  if (options.folds == 0) unseen = whole;
+  const bool may_scale = options.run.trainer.gamma.mode == files::GammaStatement::Mode::kClip;
+  outcome.support = learning::output_support(data, unseen, whole, use,
+                                             options.allow_worse ? learning::Support::kAsTrained
+                                             : may_scale         ? learning::Support::kScaleAndSilence
+                                                                 : learning::Support::kSilence);
+  learning::scale_outputs(data.layout, outcome.support.scales, theta);
 }
 
 /// Every file that was read, each once.
@@ -241,8 +243,8 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   }
 
   select_and_scale(options, data, std::move(unseen), outcome);
-  const files::Network network =
-      learning::write_network(data, run.theta, options.run.trainer.gamma, options.output);
+  const files::Network network = learning::write_network(data, run.theta, options.run.trainer.gamma,
+                                                         options.output, outcome.support.silent_names());
   learning::write_models(inputs, data.layout, options.output, outcome.kept());
   certify_and_score(options, common.jobs, data, network, outcome);
 
@@ -250,7 +252,8 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   write_result(common, result);
   if (common.prints_text()) print_training(options, data, outcome);
   if (!options.report.empty()) {
-    const std::string path = write_train_report(data, run, result, options.report, common.force);
+    const std::string path =
+        write_train_report(data, run, outcome.support, result, options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
   for (const std::vector<learning::Score>* scores : {&outcome.trained.scores, &outcome.members}) {
@@ -268,7 +271,9 @@ Command train_command() {
       "torque. A phi per kind\nof neighbour, a rho per kind of vehicle, and a phi of the own state for the "
       "ground. Flights are split as wholes into fit,\nselect and test; the epoch with the least error on "
       "the selecting flights is kept, and projected so that gamma holds in\nexact arithmetic. With --folds "
-      "every flight that does not test is fitted. An "
+      "every flight that does not test is fitted. A vehicle among\nneighbours where the selecting flights "
+      "are "
+      "better off without a network gets none: see silent in network.toml. An "
       "interrupted run goes on with --resume. What is flown is the vertical force; networks of a force or\n"
       "torque act as effects of models, in simulation and in compare; simulate --torque-network flies a "
       "torque.\n\n"

@@ -68,9 +68,9 @@ void declare_layers(CLI::App& app, TrainOptions& options) {
 
 void declare_run(CLI::App& app, TrainOptions& options) {
   app.add_flag("--allow-worse", options.allow_worse,
-               "Keep each kind's output as trained; without it, outputs are scaled down until no "
-               "composition of the selecting flights is worse than without the network (not with "
-               "--gamma-mode equal)");
+               "Keep each kind's output as trained; without it, outputs are scaled down as far as suits the "
+               "selecting flights (not with --gamma-mode equal), and compositions that are worse with "
+               "the network than without get none: network.toml lists them as silent");
   app.add_option("--epochs", options.run.epochs, "Maximum number of epochs")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
@@ -95,7 +95,8 @@ void declare_run(CLI::App& app, TrainOptions& options) {
          "--folds", options.folds,
          "Divide the flights that do not test into this many folds, train one network without each "
          "fold, which selects its epoch, and write their mean as one network, this many times as wide; "
-         "what each network says of the fold that it has not seen takes the place of selecting flights")
+         "what each network says of the fold that it has not seen takes the place of selecting flights: "
+         "it decides the scale of the outputs and the compositions without a network")
       ->check(CLI::Range(0, 100))
       ->capture_default_str();
   leave_out_of_record(

@@ -14,17 +14,27 @@ using learning::Use;
 
 namespace {
 
+/// Beyond what the order of two sums of float32 products can change.
+bool worse_than_none(const learning::SupportedErrors& errors) {
+  return errors.network > errors.nothing * (1 + 1e-6);
+}
+
 void add_selection(const Outcome& outcome, double SI, files::Json& json) {
   json["kept"] = outcome.kept();
-  json["output_scales"] = outcome.scales;
-  json["select_rmse"] = files::finite(outcome.select.network * SI);
-  json["select_rmse_of_nothing"] = files::finite(outcome.select.nothing * SI);
+  json["output_scales"] = outcome.support.scales;
+  json["silent"] = files::Json::array();
+  for (const auto& [composition, errors] : outcome.support.silent)
+    json["silent"].push_back(
+        {{"vehicles", composition}, {"rmse", errors.network * SI}, {"rmse_of_nothing", errors.nothing * SI}});
+  const learning::SupportedErrors all = outcome.support.all();
+  json["select_rmse"] = files::finite(all.network * SI);
+  json["select_rmse_of_nothing"] = files::finite(all.nothing * SI);
   json["select"] = files::Json::array();
-  for (const auto& [composition, scores] : outcome.select_compositions) {
+  for (const auto& [composition, scores] : outcome.support.left) {
     json["select"].push_back({{"vehicles", composition},
                               {"rmse", scores.network * SI},
                               {"rmse_of_nothing", scores.nothing * SI},
-                              {"worse_than_none", scores.worse_than_none()}});
+                              {"worse_than_none", worse_than_none(scores)}});
   }
 }
 
@@ -92,16 +102,33 @@ files::Json train_json(const TrainOptions& options, const std::vector<std::strin
 
 namespace {
 
+/// Which part of the output is kept, and why not all of it.
+void print_support(const Outcome& outcome, const std::string& unit) {
+  for (const auto& [kind, scale] : outcome.support.scales) {
+    if (scale == 0) {
+      fmt::print(
+          "no network for {}: none of the compositions of the selecting flights is better off with it\n",
+          kind);
+    } else if (scale < 1) {
+      fmt::print("output for {} scaled by {:.3f}, which suits the selecting flights best\n", kind, scale);
+    }
+  }
+  for (const auto& [composition, errors] : outcome.support.silent)
+    fmt::print(
+        "no network for {}: {:.3f} {} on the selecting flights with the output as trained, {:.3f} without\n",
+        composition, errors.network, unit, errors.nothing);
+}
+
 /// Where the selecting flights are better off without the network.
 void print_worse_than_none(const Outcome& outcome, const std::string& unit) {
   if (!outcome.kept()) {
     fmt::print(
         "no network is kept: on the selecting flights it leaves {:.3f} {}, none {:.3f}; the models written "
         "are without it\n",
-        outcome.select.network, unit, outcome.select.nothing);
+        outcome.support.all().network, unit, outcome.support.all().nothing);
   }
-  for (const auto& [composition, scores] : outcome.select_compositions) {
-    if (!scores.worse_than_none()) continue;
+  for (const auto& [composition, scores] : outcome.support.left) {
+    if (!worse_than_none(scores)) continue;
     fmt::print("warning: worse than none for {}: {:.3f} {} on the selecting flights, {:.3f} without\n",
                composition, scores.network, unit, scores.nothing);
   }
@@ -149,16 +176,7 @@ void print_training(const TrainOptions& options, const LearningData& data, const
   if (options.run.max_lipschitz > 0)
     fmt::print("Lipschitz constants at most {}: {}\n", options.run.max_lipschitz,
                outcome.certified.largest() <= options.run.max_lipschitz ? "proved" : "inconclusive");
-  for (const auto& [kind, scale] : outcome.scales) {
-    if (scale == 0) {
-      fmt::print("no network for {}: the selecting flights have a composition that is better off without\n",
-                 kind);
-    } else if (scale < 1) {
-      fmt::print(
-          "output for {} scaled by {:.3f}: no composition of the selecting flights is worse than without\n",
-          kind, scale);
-    }
-  }
+  print_support(outcome, target.unit);
   for (const std::string& problem : data.problems) fmt::print("left out: {}\n", problem);
   print_worse_than_none(outcome, target.unit);
   fmt::print("written: {}/network.toml, weights, certificate.json, models\n", options.output);

@@ -9,6 +9,7 @@
 #include "analysis/commands/train/train_options.h"
 #include "analysis/learning/cross_fit.h"
 #include "analysis/learning/dataset.h"
+#include "analysis/learning/output_scale.h"
 #include "analysis/learning/trained_network.h"
 #include "analysis/learning/training_run.h"
 #include "nn/base/json.h"
@@ -18,9 +19,6 @@ namespace swarmcert::analysis {
 /// Root mean square errors in the unit of the targets.
 struct Scores {
   double nothing = 0, network = 0;
-
-  /// Beyond what the order of two sums of float32 products can change.
-  bool worse_than_none() const { return network > nothing * (1 + 1e-6); }
 };
 
 struct Outcome {
@@ -30,17 +28,16 @@ struct Outcome {
   Scores all;
   std::vector<Scores> components;  ///< x, y, z; empty where the target is one number
   std::map<std::string, Scores> compositions;
-  Scores
-      select;  ///< of the flights that decide whether there is to be a network; with folds, unseen all of them
-  std::map<std::string, Scores> select_compositions;
-  std::map<std::string, double> scales;  ///< of each kind's output, see learning::output_scales()
+  learning::OutputSupport support;  ///< of the selecting flights; with folds, unseen all of them
   learning::Certified certified;
 
   /// A network that is worse than none on the selecting flights is not kept.
   bool kept() const {
+    const auto& scales = support.scales;
     const bool silent = !scales.empty() && std::all_of(scales.begin(), scales.end(),
                                                        [](const auto& scale) { return scale.second == 0; });
-    return !silent && !(select.network >= select.nothing);
+    const learning::SupportedErrors selecting = support.all();
+    return !silent && !(selecting.network >= selecting.nothing);
   }
 };
 

@@ -8,6 +8,7 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/function_names.h"
 
 namespace swarmcert::analysis {
@@ -42,7 +43,7 @@ void add_curve(Report& report, const LearningData& data, const learning::Run& ru
 }
 
 /// Share of the test samples per bin of one component of the target, before and after.
-void add_histogram(Report& report, const LearningData& data, const learning::Run& run, int component) {
+void add_histogram(Report& report, const LearningData& data, const training::Matrix& outputs, int component) {
   const std::vector<Index> samples = data.indices(Use::kTest);
   if (samples.empty()) return;
   constexpr int kBins = 81, kMiddle = kBins / 2;
@@ -53,12 +54,10 @@ void add_histogram(Report& report, const LearningData& data, const learning::Run
     if (bin >= 0 && bin < kBins)
       share[which][static_cast<std::size_t>(bin)] += 100.0 / static_cast<double>(samples.size());
   };
-  const training::Matrix predicted = training::predict(data.layout, run.theta, data.samples, samples.data(),
-                                                       static_cast<Index>(samples.size()));
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    const auto target = static_cast<double>(data.samples.target_of(samples[i])[component]);
+  for (const Index s : samples) {
+    const auto target = static_cast<double>(data.samples.target_of(s)[component]);
     count(0, target);
-    count(1, target - static_cast<double>(predicted(component, static_cast<Index>(i))));
+    count(1, target - static_cast<double>(outputs(component, s)));
   }
   std::string text;
   for (int b = 0; b < kBins; ++b)
@@ -117,7 +116,8 @@ void add_map(Report& report, const LearningData& data, const learning::Run& run,
 
 }  // namespace
 
-std::string write_train_report(const LearningData& data, const learning::Run& run, const files::Json& result,
+std::string write_train_report(const LearningData& data, const learning::Run& run,
+                               const learning::OutputSupport& support, const files::Json& result,
                                const std::string& folder, bool overwrite) {
   Report report("Training of a deep set");
   report.made_by(command_to_copy());
@@ -127,12 +127,15 @@ std::string write_train_report(const LearningData& data, const learning::Run& ru
   add_curve(report, data, run, was_taught ? result["teachers"].size() : 0);
   report.heading("What is left");
   const int components = data.samples.outputs;
-  for (int c = 0; c < components; ++c) add_histogram(report, data, run, c);
+  training::Matrix outputs = learning::outputs_for(data, run.theta, Use::kTest);
+  learning::silence(data, support, outputs);
+  for (int c = 0; c < components; ++c) add_histogram(report, data, outputs, c);
   report.heading(std::string("The learned ") + learning::info(data.target).words);
-  for (const auto& [kind, scale] : result["output_scales"].items()) {
-    if (scale == 0.0)
-      report.paragraph("No network for " + kind + ": the selecting flights are better off without.");
-  }
+  for (const auto& [composition, errors] : support.silent)
+    report.paragraph(
+        fmt::format("No network for {}: {:.3f} {} on the selecting flights with the output as trained, "
+                    "{:.3f} without.",
+                    composition, errors.network, learning::info(data.target).unit, errors.nothing));
   // By symmetry nothing else can be in the plane y = 0.
   std::vector<int> in_plane = {0};
   if (data.target == learning::Target::kForce) in_plane = {0, 2};
@@ -142,7 +145,11 @@ std::string write_train_report(const LearningData& data, const learning::Run& ru
     if (!files::is_phi(parts[phi].name) || parts[phi].name == files::kGroundPhi) continue;
     for (std::size_t rho = 0; rho < parts.size(); ++rho) {
       if (!files::is_rho(parts[rho].name)) continue;
-      if (result["output_scales"].value(files::kind_of(parts[rho].name), 1.0) == 0) continue;
+      const std::string own = files::kind_of(parts[rho].name);
+      const auto scale = support.scales.find(own);
+      if (scale != support.scales.end() && scale->second == 0) continue;
+      if (support.silent.count(files::composition_name({files::kind_of(parts[phi].name)}, own)) == 1)
+        continue;
       for (const int c : in_plane)
         add_map(report, data, run, static_cast<int>(phi), static_cast<int>(rho), c);
     }

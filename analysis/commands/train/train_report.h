@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "analysis/learning/output_scale.h"
 #include "analysis/learning/training_run.h"
 #include "nn/base/json.h"
 
@@ -10,6 +11,7 @@ namespace swarmcert::analysis {
 
 /// Writes it into `folder`, with the command's result inside; returns the path of the HTML file.
 std::string write_train_report(const learning::LearningData& data, const learning::Run& run,
-                               const files::Json& result, const std::string& folder, bool overwrite);
+                               const learning::OutputSupport& support, const files::Json& result,
+                               const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

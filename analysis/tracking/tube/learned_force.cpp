@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "nn/base/input_error.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
 #include "stability/effects/deep_set_force.h"
@@ -82,6 +83,7 @@ Index component(const std::string& name) {
 
 LearnedForce::LearnedForce(const files::Network& network, const std::string& kind, int neighbours) {
   files::require_relative_states(network, "a tube is of networks of relative states");
+  files::require_never_silent(network, "a tube is of networks that are silent nowhere");
   stability::DeepSetForce(network, kind, {kind});  // refuses what no flight could use
   std::vector<std::string> kinds;
   for (const auto& [name, weights] : network.phi)

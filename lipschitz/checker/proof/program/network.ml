@@ -169,6 +169,8 @@ let read_toml path bytes ~key =
   let members = match Toml.parse path bytes with Json.Object m -> m | _ -> assert false in
   if List.assoc_opt "schema" members <> Some (Json.Text "swarmcert/network/1") then
     bad_input "%s: schema must be \"swarmcert/network/1\"" path;
+  if List.mem_assoc "silent" members then
+    bad_input "%s: silent: compositions without a network are beyond the theorems; swarmcert check takes them" path;
   allow_only path "" [ "schema"; "output"; "gamma"; "input"; "phi"; "rho" ] members;
   let optional name absent read = match List.assoc_opt name members with
     | None -> absent | json -> read path (table path name json) in
