@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/learning/output_scale.h"
 #include "analysis/learning/training_run.h"
 #include "analysis/reproduction/setting.h"
 #include "nn/weights/network.h"
@@ -20,7 +21,9 @@ struct LearnOptions {
   int steps = 0;   ///< of the optimiser: as many whole epochs as come nearest, at least one
   int epochs = 0;  ///< where steps is 0
   std::uint64_t seed = 1;
-  int teachers = 0;           ///< see learning::run_with_teachers()
+  int patience = 0;  ///< epochs without improvement; 0: all are run
+  int teachers = 0;  ///< see learning::run_with_teachers()
+  int folds = 0;     ///< see learning::cross_fit(); what it has not seen scales and silences the outputs
   bool tight_bounds = false;  ///< LipSDP at the small size as well, not only products of norms
 };
 
@@ -33,9 +36,11 @@ struct Learned {
   bool keeps_gamma = false;                                ///< proved
   double test_gf = 0, nothing_gf = 0;  ///< RMSE on the test flights, with and without the network
   int samples = 0, epochs = 0, best_epoch = 0;
-  /// Seed and error on the selecting flights, gf, of every network that was trained: teachers, and the taught one last.
+  /// Seed and error on the selecting flights, gf, of every network that was trained: teachers, and the taught one last;
+  /// or those of the folds.
   std::vector<std::pair<std::uint64_t, double>> scores;
-  std::uint64_t kept_seed = 0;  ///< of the one that stands here
+  std::uint64_t kept_seed = 0;      ///< of the one that stands here
+  learning::OutputSupport support;  ///< with folds, in gf
 };
 
 /// Trains on what `load` returns, which is called only where there is something to do, and writes network, certificate

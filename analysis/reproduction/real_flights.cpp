@@ -17,25 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 using TestBlocks = std::vector<ResidualBlock>;
 
-/// network.toml of the published weights, which stay where they are.
-std::string published_network(const Setting& setting) {
-  const fs::path weights = fs::absolute(fs::path(setting.recorded) / "weights/zip_f32");
-  std::string text =
-      "schema = \"swarmcert/network/1\"\noutput = { quantity = \"force_z\", unit = \"gf\" }\n"
-      "gamma = { value = 3.0, scope = \"layer\", mode = \"clip\" }\n";
-  for (const char* const part :
-       {"phi.small phi_S", "phi.large phi_L", "phi.ground phi_G", "rho.small rho_S", "rho.large rho_L"}) {
-    const std::string words = part;
-    const std::size_t space = words.find(' ');
-    text += fmt::format("[{}]\nweights = {}\n", words.substr(0, space),
-                        files::Json((weights / (words.substr(space + 1) + ".pth")).string()).dump());
-  }
-  const std::string path = (fs::path(setting.work) / "published/network.toml").string();
-  fs::create_directories(fs::path(path).parent_path());
-  files::write_file(path, text, true);
-  return path;
-}
-
 /// Mean over groups, and the largest ratio of one group.
 struct Beside {
   double mean_ours_gf = 0, mean_theirs_gf = 0, largest_ratio = 0;
@@ -201,12 +182,7 @@ void deep_set_alone(const Setting& setting, Finding& finding) {
   add_flights(load_recorded(setting, recorded, recorded_options(setting)), ours, published, finding);
   add_having_seen(setting, recorded, theirs_blocks, finding);
   finding.json["published_networks_saw_test_flights"] = true;
-  lipschitz::CertifyOptions certify;
-  certify.jobs = setting.jobs;
-  certify.lower.rounds = 0;
-  if (!setting.full) certify.method = lipschitz::UpperMethod::kProduct;
-  const learning::Certified theirs = learning::write_certificate(
-      files::load_network({network, "", "", ""}), (fs::path(setting.work) / "published").string(), certify);
+  const learning::Certified theirs = certified_published(setting);
   add_bounds(learned, theirs, finding);
   finding.json["gamma_proved"] = learned.keeps_gamma;
   finding.json["epochs"] = learned.epochs;

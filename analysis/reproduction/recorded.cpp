@@ -61,6 +61,33 @@ residuals::Inputs with_network(residuals::Inputs inputs, const std::string& netw
   return inputs;
 }
 
+std::string published_network(const Setting& setting) {
+  const fs::path weights = fs::absolute(fs::path(setting.recorded) / "weights/zip_f32");
+  std::string text =
+      "schema = \"swarmcert/network/1\"\noutput = { quantity = \"force_z\", unit = \"gf\" }\n"
+      "gamma = { value = 3.0, scope = \"layer\", mode = \"clip\" }\n";
+  for (const char* const part :
+       {"phi.small phi_S", "phi.large phi_L", "phi.ground phi_G", "rho.small rho_S", "rho.large rho_L"}) {
+    const std::string words = part;
+    const std::size_t space = words.find(' ');
+    text += fmt::format("[{}]\nweights = {}\n", words.substr(0, space),
+                        files::Json((weights / (words.substr(space + 1) + ".pth")).string()).dump());
+  }
+  const std::string path = (fs::path(setting.work) / "published/network.toml").string();
+  fs::create_directories(fs::path(path).parent_path());
+  files::write_file(path, text, true);
+  return path;
+}
+
+learning::Certified certified_published(const Setting& setting) {
+  lipschitz::CertifyOptions certify;
+  certify.jobs = setting.jobs;
+  certify.lower.rounds = 0;
+  if (!setting.full) certify.method = lipschitz::UpperMethod::kProduct;
+  return learning::write_certificate(files::load_network({published_network(setting), "", "", ""}),
+                                     (fs::path(setting.work) / "published").string(), certify);
+}
+
 std::string recorded_key(const Setting& setting, const Recorded& recorded) {
   std::string key = setting.full ? "full" : "small";
   for (const residuals::Inputs* inputs : {&recorded.fit, &recorded.select, &recorded.test}) {
@@ -90,6 +117,19 @@ learning::LearningData load_recorded(const Setting& setting, const Recorded& rec
   return learning::load_learning_data(recorded.flights(), options.sizes, learning::SplitBy::kFlights,
                                       setting.jobs,
                                       [&](int done, int total) { setting.progress(done, total, "flights"); });
+}
+
+LearnOptions folds_options(const Setting& setting) {
+  LearnOptions options;
+  options.sizes.invariants = true;
+  options.gamma.value = 3;
+  options.rate = 1e-3;
+  options.batch = 1024;
+  options.epochs = setting.full ? 6 : 2;
+  options.patience = 2;
+  options.folds = setting.full ? 4 : 2;
+  options.seed = setting.seed;
+  return options;
 }
 
 Learned train_recorded(const Setting& setting, const Recorded& recorded, const LearnOptions& options,

@@ -121,6 +121,12 @@ TEST_F(Reproduction, RecordedFlightsAreLearnedBesideThePublishedNetworks) {
   for (const Json& bound : found["bounds"]) EXPECT_LE(bound["upper"].get<double>(), 373) << bound;
   const Json& ladder = found["physics_first"];
   EXPECT_LT(ladder.back()["rms_gf"].get<double>(), ladder.front()["rms_gf"].get<double>());
+  const Json& path = found["physics_then_network"];
+  EXPECT_EQ(path["compositions"].size(), 2u);
+  EXPECT_FALSE(path["left_out"].empty());
+  EXPECT_LT(path["bound"].get<double>(), path["published_bound"].get<double>());
+  for (const Json& row : path["silent"])
+    EXPECT_GT(row["rms_gf"].get<double>(), row["physics_rms_gf"].get<double>()) << row;
 }
 
 TEST_F(Reproduction, RefusesUnknownExperimentsAndShards) {
