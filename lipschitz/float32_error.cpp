@@ -10,6 +10,7 @@
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/eclipse_fast.h"
 #include "lipschitz/extremes.h"
+#include "lipschitz/float32_layers.h"
 #include "lipschitz/range.h"
 #include "lipschitz/sdp_bound.h"
 #include "nn/base/doubles.h"
@@ -54,20 +55,18 @@ std::vector<double> tails(const std::vector<check::Matrix>& chain, const Stop& s
   return result;
 }
 
-/// Errors of the layers `begin` .. `end` - 1 of a chain, weighted by what follows them. `before` is the error, entry by
-/// entry, of what layer `begin` takes in; afterwards that of what layer `end` would.
-double weighted_errors(const ReachNetwork& chain, const Reach& reach, std::size_t begin, std::size_t end,
-                       const std::vector<double>& tail, VectorXd& before) {
+VectorXd exact_inputs(const ReachNetwork& network) { return VectorXd::Zero(network.front().weights.cols()); }
+
+/// What the errors that the layers make come to behind everything that follows: for each layer the smaller of its
+/// Lipschitz bound and of the local sensitivities times `slope`, a Lipschitz bound of what follows the chain.
+double behind(const ReachNetwork& chain, const Reach& reach, const LayerErrors& errors,
+              const std::vector<double>& tail, double slope) {
+  const std::vector<Eigen::MatrixXd> local = sensitivities(chain, reach, errors);
   double total = 0;
-  for (std::size_t k = begin; k < end; ++k) {
-    const Eigen::MatrixXd size = chain[k].weights.cwiseAbs();
-    const VectorXd taken = reach.input_magnitude(k) + before;
-    const VectorXd bias = chain[k].bias.cwiseAbs() + chain[k].bias_radius;
-    const VectorXd delta =
-        float_gamma(chain[k].weights.cols() + 1) * (size * taken + bias) +
-        VectorXd::Constant(bias.size(), 0x1p-149 * static_cast<double>(chain[k].weights.cols()));
-    before = size * before + delta;  // ReLU does not enlarge it
-    total += tail[k - begin] * delta.norm();
+  for (std::size_t k = 0; k < chain.size(); ++k) {
+    const double everywhere = tail[k] * errors.made[k].norm();
+    const double here = slope * (local[k] * errors.made[k]).norm();
+    total += here < everywhere ? here : everywhere;
   }
   return safely(total);
 }
@@ -89,12 +88,13 @@ double largest_over_parts(const ReachNetwork& chain, const Box& box, int nodes, 
   queue.push(part_of(box, nullptr, kInfinity));
   for (int done = 1; done + 2 <= nodes; done += 2) {
     const Part top = queue.top();
+    const VectorXd slope = top.reach->influence(Eigen::RowVectorXd::Ones(chain.back().weights.rows()));
     Index widest = -1;
     double width = 0;
     for (std::size_t k = 0; k < box.lower.size(); ++k) {
-      const double whole = box.upper[k] - box.lower[k];
-      const double relative = whole > 0 ? (top.reach->box().upper[k] - top.reach->box().lower[k]) / whole : 0;
-      if (relative > width) width = relative, widest = static_cast<Index>(k);
+      const double gain =
+          slope(static_cast<Index>(k)) * (top.reach->box().upper[k] - top.reach->box().lower[k]);
+      if (gain > width) width = gain, widest = static_cast<Index>(k);
     }
     if (widest < 0) break;
     queue.pop();
@@ -155,8 +155,7 @@ class SetError {
 
   double plain() const {
     return largest_over_parts(phi_, domain_.at(names_[0]), nodes_, [&](const Reach& reach) {
-      VectorXd before = VectorXd::Zero(phi_.front().weights.cols());
-      return weighted_errors(phi_, reach, 0, phi_.size(), phi_tails_, before);
+      return behind(phi_, reach, layer_errors(phi_, reach, exact_inputs(phi_)), phi_tails_, 1);
     });
   }
 
@@ -172,23 +171,16 @@ class SetError {
                  const std::vector<double>& tail) const {
     TermError result;
     const Box& box = domain_.at(part);
-    result.values = hull(network, box, 4 * nodes_).bounds;
-    result.output = VectorXd::Zero(network.back().bias.size());
+    result.values = hull(network, box, nodes_).bounds;
     result.weighted = largest_over_parts(network, box, nodes_, [&](const Reach& reach) {
-      VectorXd before = VectorXd::Zero(network.front().weights.cols());
-      return weighted_errors(network, reach, 0, network.size(), tail, before);
+      return behind(network, reach, layer_errors(network, reach, exact_inputs(network)), tail, rho_bound_);
     });
-    VectorXd whole = VectorXd::Zero(network.front().weights.cols());
-    const Reach reach(network, box);
-    weighted_errors(network, reach, 0, network.size(), tail, whole);
-    result.output = whole;
+    result.output = layer_errors(network, Reach(network, box), exact_inputs(network)).total.back();
     return result;
   }
 
-  /// Adding n + 1 vectors one after the other: each partial sum is rounded; gamma_n of the sum of magnitudes.
-  double sum_error(const VectorXd& magnitudes, int additions) const {
-    return safely(rho_bound_ * float_gamma(additions) * magnitudes.norm());
-  }
+  /// Additions that round: the sum starts with the ground's term, or with zero, to which the first is added exactly.
+  int additions(int neighbours) const { return std::max(0, neighbours - (has_ground_ ? 0 : 1)); }
 
   /// The terms one by one, then rho over the box of their sum.
   double separate(int neighbours) const {
@@ -206,8 +198,9 @@ class SetError {
       total += ground_.weighted;
       add(ground_, 1);
     }
-    total += sum_error(magnitude, neighbours + 1);
-    error += float_gamma(neighbours + 1) * magnitude;
+    const VectorXd rounding = float_gamma(additions(neighbours)) * magnitude;
+    total += rho_bound_ * rounding.norm();
+    error += rounding;
     Box box;
     for (Index i = 0; i < hidden; ++i) {
       const double slack =
@@ -216,7 +209,7 @@ class SetError {
       box.upper.push_back(upper(i) + slack);
     }
     const Reach reach(rho_, box);
-    total += weighted_errors(rho_, reach, 0, rho_.size(), rho_tails_, error);
+    total += behind(rho_, reach, layer_errors(rho_, reach, error), rho_tails_, 1);
     return safely(total);
   }
 
@@ -227,13 +220,7 @@ class SetError {
     std::vector<double> tail = phi_tails_;
     tail.insert(tail.end(), rho_tails_.begin(), rho_tails_.end());
     return largest_over_parts(chain, domain_.at(names_[0]), nodes_, [&](const Reach& reach) {
-      VectorXd error = VectorXd::Zero(chain.front().weights.cols());
-      double total = weighted_errors(chain, reach, 0, phi_.size(), tail, error);
-      const VectorXd magnitude =
-          reach.input_magnitude(phi_.size()) + error;  // adding to zero is exact; to be safe
-      total += sum_error(magnitude, 1);
-      error += float_gamma(1) * magnitude;
-      return safely(total + weighted_errors(chain, reach, phi_.size(), chain.size(), rho_tails_, error));
+      return behind(chain, reach, layer_errors(chain, reach, exact_inputs(chain)), tail, 1);
     });
   }
 

@@ -26,7 +26,7 @@ struct Float32Error {
 struct Float32Options {
   int neighbours = 1;     ///< up to this many
   double input_step = 0;  ///< inputs are multiples of this, rounded to nearest; 0: only rounded to float32
-  int nodes = 200;        ///< parts of the box per function
+  int nodes = 1000;       ///< parts of the box per function
   int jobs = 0;
   Stop stop;  ///< ends the semidefinite programs of the tails: bounds layer by layer in their place
 };
@@ -34,16 +34,17 @@ struct Float32Options {
 /// How far an input's conversion may move it, per coordinate: rounding to float32, and half a step.
 std::vector<double> input_errors(const Box& box, double step);
 
-/// Bounds that hold in exact arithmetic for any order of summation and with or without fused multiply-adds.
+/// Bounds that hold in exact arithmetic for the order of summation of nn/mlp.h and nn/deep_set.h, with or without fused
+/// multiply-adds; those of the certificate hold for any order.
 ///
-/// With u = 2^-24 and m inputs, a computed layer differs from the exact layer at the same computed inputs h by at most
-/// delta = gamma_{m+1} (|W| |h| + |b|) + m 2^-149, entry by entry (Higham 2002, section 3.1; the last term for products
-/// that underflow). Replacing the computed layers by exact ones from the last to the first changes the output by at
+/// A computed layer differs from the exact layer at the same computed inputs by at most delta_k, entry by entry
+/// (layer_rounding()). Replacing the computed layers by exact ones from the last to the first changes the output by at
 /// most
-///   sum_k L_k |delta_k|_2,
+///   sum_k min(L_k |delta_k|_2, |S_k delta_k|_2),
 /// where L_k is a proved Lipschitz bound of what follows layer k (LipSDP of the tail, which holds at every point, hence
-/// for any other neighbours). |h| comes from bounds over parts of the box (reach.h), plus what was computed wrong
-/// before. Sums over n neighbours add gamma_n sum_j |phi_j| in front of rho.
+/// for any other neighbours), and S_k bounds its derivative over the part of the box (sensitivities()). Values of
+/// layers come from bounds over parts of the box (reach.h), plus what was computed wrong before. Sums over n neighbours
+/// add gamma_{n-1} sum_j |phi_j| in front of rho, gamma_n with the ground's term: what is added to zero is exact.
 ///
 /// @param domain by part, finite.
 /// @param lipschitz proved bounds by function: of "network" or the set functions, the ground's among them.

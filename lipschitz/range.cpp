@@ -47,7 +47,7 @@ void add_interval(ReachLayer& layer, const Bounds& bounds) {
 
 /// Boxes per search where nobody says: a box costs about the square of the number of weights.
 int usual_nodes(const Network& network, const std::string& function) {
-  constexpr double kNodes = 4000, kFewest = 300, kWeights = 8000;
+  constexpr double kNodes = 8000, kFewest = 600, kWeights = 8000;
   double weights = 0;
   const auto parts = files::parts(network);
   for (const std::string& name : files::networks_of(function))

@@ -38,7 +38,7 @@ struct CertifiedRange {
 
 struct RangeOptions {
   int neighbours = 1;  ///< up to this many, at least 1
-  int nodes = 0;       ///< boxes per search; 0: 4000, fewer for large networks, but at least 300
+  int nodes = 0;       ///< boxes per search; 0: 8000, fewer for large networks, but at least 600
   int jobs = 0;
   std::function<void(int done, int total)> progress;  ///< searches; may be empty
 };

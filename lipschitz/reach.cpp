@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "lipschitz/dense_kernels.h"
+#include "lipschitz/relu_lines.h"
 #include "nn/base/doubles.h"
 
 namespace swarmcert::lipschitz {
@@ -24,6 +25,13 @@ VectorXd side(const std::vector<double>& values) {
 
 VectorXd largest_input(const Box& box) {
   return side(box.lower).cwiseAbs().cwiseMax(side(box.upper).cwiseAbs());
+}
+
+/// Twice the unit roundoff per operation that a constant may go through.
+double rounding_per_term(const ReachNetwork& network) {
+  Index terms = 8;
+  for (const ReachLayer& layer : network) terms += 2 * layer.weights.rows() + 2 * layer.weights.cols();
+  return 2 * static_cast<double>(terms) * kUnit;
 }
 
 }  // namespace
@@ -53,11 +61,7 @@ Reach::Reach(const ReachNetwork& network, const Box& box, Support support)
 
 Reach::Reach(const ReachNetwork& network, const Reach& first, const Reach* around,
              std::vector<check::Decision>* decided)
-    : network_(network),
-      box_(first.box_),
-      bounds_(first.bounds_),
-      input_magnitude_(first.input_magnitude_),
-      term_magnitude_(first.term_magnitude_) {
+    : network_(network), box_(first.box_), bounds_(first.bounds_), term_magnitude_(first.term_magnitude_) {
   add_layers(around, nullptr, nullptr, decided);
 }
 
@@ -66,11 +70,12 @@ void Reach::add_layers(const Reach* around, std::vector<MatrixXd>* slopes, std::
   const auto after_relu = [](const ReachLayer& layer, const Bounds& bounds) {
     return layer.has_relu ? VectorXd(bounds.upper.cwiseMax(0.0)) : bounds.magnitude();
   };
+  relative_ = rounding_per_term(network_);
+  ActiveLayers layers = active_layers(bounds_.size());
   for (std::size_t k = bounds_.size(); k < network_.size(); ++k) {
     const ReachLayer& layer = network_[k];
     const VectorXd magnitude = k == 0 ? largest_input(box_) : after_relu(network_[k - 1], bounds_.back());
     const Index rows = layer.weights.rows();
-    input_magnitude_.push_back(magnitude);
     term_magnitude_.emplace_back(layer.weights.cwiseAbs() * magnitude + layer.bias.cwiseAbs() +
                                  layer.bias_radius);
     // The larger box's bounds hold here; they do for neurons that it decides, whose exact range no relaxation needs.
@@ -81,12 +86,9 @@ void Reach::add_layers(const Reach* around, std::vector<MatrixXd>* slopes, std::
     for (Index i = 0; i < rows; ++i)
       if (!layer.has_relu || (bounds.lower(i) < 0 && bounds.upper(i) > 0)) open.push_back(i);
     const auto count = static_cast<Index>(open.size());
-    MatrixXd both = MatrixXd::Zero(2 * count, rows);
-    for (Index i = 0; i < count; ++i)
-      both(i, open[static_cast<std::size_t>(i)]) = 1, both(count + i, open[static_cast<std::size_t>(i)]) = -1;
-    const LinearForms found = substituted(k, std::move(both));
+    const LinearForms found = around_outputs(layers, open);
     VectorXd ends = largest(found);
-    if (decided != nullptr && k > 0 && layer.has_relu) decide(k, open, found, ends, *decided);
+    if (decided != nullptr && k > 0 && layer.has_relu) decide(layers, open, found, ends, *decided);
     if (forms != nullptr) {
       forms->push_back({MatrixXd::Zero(2 * rows, network_.front().weights.cols()),
                         VectorXd::Constant(2 * rows, kInfinity)});
@@ -107,59 +109,98 @@ void Reach::add_layers(const Reach* around, std::vector<MatrixXd>* slopes, std::
             0.5 * (found.rows.row(i).cwiseAbs() + found.rows.row(count + i).cwiseAbs());
     }
     bounds_.push_back(std::move(bounds));
+    append(layers);
   }
 }
 
-LinearForms Reach::substituted(std::size_t top, MatrixXd lambda,
-                               const std::vector<MatrixXd>* given_below) const {
-  const Index rows = lambda.rows();
-  VectorXd constants = VectorXd::Zero(rows);
-  VectorXd absolute = VectorXd::Zero(rows);  // sum of the absolute values of all terms of `constants`
-  VectorXd error = VectorXd::Zero(rows);     // what rounding of lambda may have cost
-  Index terms = 8;
-  for (std::size_t j = top + 1; j-- > 0;) {
-    const ReachLayer& layer = network_[j];
-    const MatrixXd size = lambda.cwiseAbs();
-    constants += lambda * layer.bias + size * layer.bias_radius;
-    absolute += size * (layer.bias.cwiseAbs() + layer.bias_radius);
-    error += gamma(layer.weights.rows()) * (size * term_magnitude_[j]);
-    MatrixXd next = MatrixXd::Zero(rows, layer.weights.cols());
-    add_product(next, lambda, layer.weights);
-    lambda = std::move(next);
-    terms += 2 * layer.weights.rows() + 2 * layer.weights.cols();
-    if (j == 0 || !network_[j - 1].has_relu) continue;
-    for (Index i = 0; i < lambda.cols(); ++i) {
-      const double l = bounds_[j - 1].lower(i);
-      const double u = bounds_[j - 1].upper(i);
-      if (l >= 0) continue;
-      if (u <= 0) {
-        lambda.col(i).setZero();
-        continue;
-      }
-      const double slope = u / (u - l);
-      const double offset = std::max({0.0, up(u - down(slope * u)), up(-slope * l)});
-      const double below = u > -l ? 1.0 : 0.0;
-      const double magnitude = std::max(u, -l);
-      for (Index r = 0; r < rows; ++r) {
-        double& v = lambda(r, i);
-        if (v > 0) {
-          constants(r) += v * offset;
-          absolute(r) += v * offset;
-          v *= slope;
-          error(r) += 4 * kUnit * v * magnitude;
-        } else {
-          v *= given_below != nullptr ? (*given_below)[j - 1](r, i) : below;
-        }
-      }
-    }
+ReluLines Reach::lines(std::size_t j) const {
+  const ReachLayer& layer = network_[j];
+  const Bounds& bounds = bounds_[j];
+  ReluLines result;
+  for (Index i = 0; i < layer.weights.rows(); ++i)
+    if (!layer.has_relu || bounds.lower(i) >= 0 || !(bounds.upper(i) <= 0)) result.neurons.push_back(i);
+  const auto size = static_cast<Index>(result.neurons.size());
+  result.slope = result.below = VectorXd::Ones(size);
+  result.offset = result.line_error = VectorXd::Zero(size);
+  result.bias = layer.bias(result.neurons);
+  result.layer_error = layer_error(j)(result.neurons);
+  for (Index n = 0; n < size && layer.has_relu; ++n) {
+    const Index i = result.neurons[static_cast<std::size_t>(n)];
+    const double l = bounds.lower(i), u = bounds.upper(i);
+    if (l >= 0) continue;
+    const double slope = u / (u - l);
+    result.slope(n) = slope;
+    result.offset(n) = std::max({0.0, up(u - down(slope * u)), up(-slope * l)});
+    result.below(n) = u > -l ? 1.0 : 0.0;
+    result.line_error(n) = relative_ * result.offset(n) + 4 * kUnit * slope * std::max(u, -l);
   }
-  const double relative = 2 * static_cast<double>(terms) * kUnit;
-  return {std::move(lambda),
-          constants + (1 + 1e-6) * error + relative * absolute + VectorXd::Constant(rows, kUnderflow)};
+  return result;
+}
+
+VectorXd Reach::layer_error(std::size_t j) const {
+  const ReachLayer& layer = network_[j];
+  return gamma(layer.weights.rows()) * term_magnitude_[j] + layer.bias_radius +
+         relative_ * (layer.bias.cwiseAbs() + layer.bias_radius);
+}
+
+void Reach::append(ActiveLayers& layers) const {
+  const std::size_t j = layers.lines.size();
+  layers.lines.push_back(lines(j));
+  const std::vector<Index>& neurons = layers.lines[j].neurons;
+  layers.weights.push_back(j == 0 ? MatrixXd(network_[j].weights(neurons, Eigen::all))
+                                  : MatrixXd(network_[j].weights(neurons, layers.lines[j - 1].neurons)));
+}
+
+ActiveLayers Reach::active_layers(std::size_t count) const {
+  ActiveLayers layers;
+  while (layers.lines.size() < count) append(layers);
+  return layers;
+}
+
+LinearForms Reach::substituted(const ActiveLayers& layers, const MatrixXd& directions,
+                               const std::vector<MatrixXd>* given_below) const {
+  const std::size_t top = layers.lines.size();
+  MatrixXd lambda = directions;
+  if (top > 0) {
+    lambda = MatrixXd::Zero(directions.rows(), layers.weights[top - 1].rows());
+    add_product(lambda, directions,
+                MatrixXd(network_[top].weights(Eigen::all, layers.lines[top - 1].neurons)));
+  } else {
+    lambda = MatrixXd::Zero(directions.rows(), network_[0].weights.cols());
+    add_product(lambda, directions, network_[0].weights);
+  }
+  return pulled_back(layers, {std::move(lambda), directions * network_[top].bias},
+                     directions.cwiseAbs() * layer_error(top), given_below);
+}
+
+LinearForms Reach::around_outputs(const ActiveLayers& layers, const std::vector<Index>& outputs) const {
+  const std::size_t top = layers.lines.size();
+  const MatrixXd rows = top > 0 ? MatrixXd(network_[top].weights(outputs, layers.lines[top - 1].neurons))
+                                : MatrixXd(network_[top].weights(outputs, Eigen::all));
+  const VectorXd bias = network_[top].bias(outputs), error = layer_error(top)(outputs);
+  LinearForms both{MatrixXd(2 * rows.rows(), rows.cols()), VectorXd(2 * rows.rows())};
+  both.rows << rows, -rows;
+  both.constants << bias, -bias;
+  VectorXd errors(2 * rows.rows());
+  errors << error, error;
+  return pulled_back(layers, std::move(both), std::move(errors), nullptr);
+}
+
+LinearForms Reach::pulled_back(const ActiveLayers& layers, LinearForms forms, VectorXd error,
+                               const std::vector<MatrixXd>* given_below) const {
+  for (std::size_t j = layers.lines.size(); j-- > 0;) {
+    pull_back(layers.lines[j], given_below != nullptr ? &(*given_below)[j] : nullptr, forms.rows,
+              forms.constants, error);
+    MatrixXd next = MatrixXd::Zero(forms.rows.rows(), layers.weights[j].cols());
+    add_product(next, forms.rows, layers.weights[j]);
+    forms.rows = std::move(next);
+  }
+  forms.constants += (1 + 1e-9) * error + VectorXd::Constant(error.size(), kUnderflow);
+  return forms;
 }
 
 LinearForms Reach::upper_forms(const MatrixXd& directions) const {
-  return substituted(network_.size() - 1, directions);
+  return substituted(active_layers(network_.size() - 1), directions);
 }
 
 VectorXd Reach::largest(const LinearForms& forms) const {
@@ -175,22 +216,22 @@ VectorXd Reach::largest(const LinearForms& forms) const {
 }
 
 VectorXd Reach::influence(const Eigen::RowVectorXd& direction) const {
-  VectorXd least = direction.transpose(), most = least;
+  VectorXd middle = direction.transpose(), radius = VectorXd::Zero(middle.size());
   for (std::size_t j = network_.size(); j-- > 0;) {
-    const MatrixXd positive = network_[j].weights.transpose().cwiseMax(0.0);
-    const MatrixXd negative = network_[j].weights.transpose().cwiseMin(0.0);
-    const VectorXd below = positive * least + negative * most;
-    most = positive * most + negative * least;
-    least = below;
+    middle = (network_[j].weights.transpose() * middle).eval();
+    radius = (network_[j].weights.transpose().cwiseAbs() * radius).eval();
     if (j == 0 || !network_[j - 1].has_relu) continue;
     const Bounds& bounds = bounds_[j - 1];
-    for (Index i = 0; i < least.size(); ++i) {
+    for (Index i = 0; i < middle.size(); ++i) {
       if (bounds.lower(i) >= 0) continue;
-      least(i) = bounds.upper(i) <= 0 ? 0 : std::min(0.0, least(i));
-      most(i) = bounds.upper(i) <= 0 ? 0 : std::max(0.0, most(i));
+      const bool off = bounds.upper(i) <= 0;
+      const double least = off ? 0 : std::min(0.0, middle(i) - radius(i));
+      const double most = off ? 0 : std::max(0.0, middle(i) + radius(i));
+      middle(i) = (least + most) / 2;
+      radius(i) = (most - least) / 2;
     }
   }
-  return least.cwiseAbs().cwiseMax(most.cwiseAbs());
+  return middle.cwiseAbs() + radius;
 }
 
 VectorXd evaluate_roughly(const ReachNetwork& network, const VectorXd& x) {

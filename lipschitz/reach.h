@@ -7,6 +7,7 @@
 
 #include "lipschitz/box.h"
 #include "lipschitz/checker/box_states.h"
+#include "lipschitz/relu_lines.h"
 #include "nn/weights/weights.h"
 
 namespace swarmcert::lipschitz {
@@ -80,8 +81,6 @@ class Reach {
 
   /// Of y_k, before the ReLU of layer k.
   const Bounds& before_relu(std::size_t k) const { return bounds_[k]; }
-  /// Largest |h_{k-1}|, what layer k takes in.
-  const Eigen::VectorXd& input_magnitude(std::size_t k) const { return input_magnitude_[k]; }
   /// Of the network's output.
   const Bounds& output() const { return bounds_.back(); }
   const Box& box() const { return box_; }
@@ -102,23 +101,38 @@ class Reach {
  private:
   void add_layers(const Reach* around, std::vector<Eigen::MatrixXd>* slopes, std::vector<LinearForms>* forms,
                   std::vector<check::Decision>* decided);
-  /// @param given_below if not null, the lower slopes of each layer's undecided neurons, [rows of lambda x neurons].
-  LinearForms substituted(std::size_t top, Eigen::MatrixXd lambda,
+  /// Appends the layer behind those that `layers` has.
+  void append(ActiveLayers& layers) const;
+  /// The first `count` layers.
+  ActiveLayers active_layers(std::size_t count) const;
+  /// Forms in the inputs above directions y, y leaving the layer behind `layers`.
+  /// @param given_below if not null, the lower slopes of each layer's undecided neurons, [directions x neurons].
+  LinearForms substituted(const ActiveLayers& layers, const Eigen::MatrixXd& directions,
                           const std::vector<Eigen::MatrixXd>* given_below = nullptr) const;
+  /// The forms above y_i and then those above -y_i, i of `outputs`.
+  LinearForms around_outputs(const ActiveLayers& layers, const std::vector<Eigen::Index>& outputs) const;
+  /// @param forms in what the last of `layers` gives, behind its ReLU.
+  /// @param error what their rounding costs.
+  LinearForms pulled_back(const ActiveLayers& layers, LinearForms forms, Eigen::VectorXd error,
+                          const std::vector<Eigen::MatrixXd>* given_below) const;
+  ReluLines lines(std::size_t j) const;
+  /// What rounding and the radius of layer j's bias cost, per unit of |lambda|.
+  Eigen::VectorXd layer_error(std::size_t j) const;
   /// The corners of the box where the forms are largest, [inputs x rows].
   Eigen::MatrixXd corners(const Eigen::MatrixXd& forms) const;
   /// The lower slopes of layers before `top` that are tight at the points x, [inputs x rows].
   std::vector<Eigen::MatrixXd> slopes_at(Eigen::MatrixXd x, std::size_t top) const;
-  /// Tries better lower slopes for outputs `open` of layer k, whose forms are `found`, above y and then above -y.
+  /// Tries better lower slopes for outputs `open` of the layer behind `layers`, whose forms are `found`, above y and
+  /// then above -y.
   /// @param ends their largest values, improved where that decides.
-  void decide(std::size_t k, const std::vector<Eigen::Index>& open, const LinearForms& found,
+  void decide(const ActiveLayers& layers, const std::vector<Eigen::Index>& open, const LinearForms& found,
               Eigen::VectorXd& ends, std::vector<check::Decision>& decided) const;
 
   const ReachNetwork& network_;
+  double relative_ = 0;  ///< what rounding costs per term of a constant
   Box box_;
   Support support_;  ///< empty: the inputs are the box
   std::vector<Bounds> bounds_;
-  std::vector<Eigen::VectorXd> input_magnitude_;
   std::vector<Eigen::VectorXd> term_magnitude_;  ///< |W_k| max|h_{k-1}| + |b_k| + radius
 };
 

@@ -51,7 +51,8 @@ LinearForms Reach::sharpened_form(const Eigen::RowVectorXd& direction) const {
 
 LinearForms Reach::sharpened_form(const Eigen::RowVectorXd& direction, const Steepest& steepest) const {
   const std::size_t top = network_.size() - 1;
-  LinearForms form = substituted(top, direction), best = form;
+  const ActiveLayers layers = active_layers(top);
+  LinearForms form = substituted(layers, direction), best = form;
   double least = largest(form)(0), step = 1;
   std::vector<MatrixXd> slopes;
   for (std::size_t j = 0; j < top; ++j)
@@ -60,15 +61,16 @@ LinearForms Reach::sharpened_form(const Eigen::RowVectorXd& direction, const Ste
   for (int tried = 0; tried < kSharpened; ++tried, step *= kShorterSteps) {
     const std::vector<MatrixXd> states = slopes_at(steepest(form), top);
     for (std::size_t j = 0; j < top; ++j) slopes[j] += step * (states[j] - slopes[j]);
-    form = substituted(top, direction, &slopes);
+    form = substituted(layers, direction, &slopes);
     const double value = largest(form)(0);
     if (value < least) least = value, best = form;
   }
   return best;
 }
 
-void Reach::decide(std::size_t k, const std::vector<Index>& open, const LinearForms& found, VectorXd& ends,
-                   std::vector<check::Decision>& decided) const {
+void Reach::decide(const ActiveLayers& layers, const std::vector<Index>& open, const LinearForms& found,
+                   VectorXd& ends, std::vector<check::Decision>& decided) const {
+  const std::size_t k = layers.lines.size();
   const auto count = static_cast<Index>(open.size());
   if (found.rows.cols() > check::kMostCornerInputs) return;
   std::vector<Index> near;
@@ -87,7 +89,7 @@ void Reach::decide(std::size_t k, const std::vector<Index>& open, const LinearFo
     lambda(n, open[static_cast<std::size_t>(row % count)]) = row < count ? 1 : -1;
   }
   const std::vector<MatrixXd> slopes = slopes_at(corners(forms), k);
-  const VectorXd better = largest(substituted(k, std::move(lambda), &slopes));
+  const VectorXd better = largest(substituted(layers, lambda, &slopes));
   std::size_t first = 0;
   for (std::size_t j = 0; j < k; ++j) first += static_cast<std::size_t>(network_[j].weights.rows());
   for (Index n = 0; n < rows; ++n) {

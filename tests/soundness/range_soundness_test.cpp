@@ -171,6 +171,52 @@ TEST(RangeSoundness, AnAffineNetworkHasItsExactRange) {
   EXPECT_EQ(ranges[0].least.value, -9);
 }
 
+/// A climb goes much further than samples: from the worst of many points, steps that shrink where they fail.
+double furthest_off(const Network& network, const std::string& function, Random& random) {
+  const std::vector<std::string> names = files::networks_of(function);
+  const auto parts = files::parts(network);
+  const files::Evaluator<double> phi(*parts.at(names[0])), rho(*parts.at(names[1]));
+  const files::Evaluator<float> phi32(*parts.at(names[0])), rho32(*parts.at(names[1]));
+  const auto off = [&](const std::vector<float>& x) {
+    return std::abs(static_cast<double>(rho32(phi32(x))[0]) - rho(phi({x.begin(), x.end()}))[0]);
+  };
+  std::vector<float> best = point<float>(kBox, random);
+  for (int sample = 0; sample < 300; ++sample) {
+    const std::vector<float> x = point<float>(kBox, random);
+    if (off(x) > off(best)) best = x;
+  }
+  double step = 0.3;
+  for (int tried = 0; tried < 3000; ++tried) {
+    std::vector<float> x = best;
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      if (random.uniform() < 0.5) continue;
+      const double moved = static_cast<double>(x[k]) + step * kBox.upper[k] * random.symmetric();
+      x[k] = static_cast<float>(std::clamp(moved, kBox.lower[k], kBox.upper[k]));
+    }
+    if (off(x) > off(best))
+      best = x;
+    else
+      step = step < 1e-7 ? 1e-2 : 0.995 * step;
+  }
+  return off(best);
+}
+
+TEST(RangeSoundness, NoClimbFindsAFloat32EvaluationFurtherOffThanItsBound) {
+  std::mt19937 generator(8);
+  Random random(9);
+  for (int round = 0; round < 4; ++round) {
+    const Network network = tests::deep_set(tests::random_network({6, 8, 5, 4}, generator),
+                                            tests::random_network({4, 6, 1}, generator));
+    const double bound = prove(network, 1, 300).errors[0].evaluation.value();
+    double found = 0;
+    for (int climb = 0; climb < 3; ++climb)
+      found = std::max(found, furthest_off(network, "set:default:default", random));
+    std::printf("float32 off by %.3g of %.3g\n", found, bound);
+    EXPECT_LE(found, bound + 1e-14);  // f is evaluated in double here
+    EXPECT_LE(bound, 40 * found);
+  }
+}
+
 TEST(RangeSoundness, FlownNetworksAreWithinRangeAndFloat32IsWithinTwoHundredthsOfAGram) {
   SWARMCERT_NEEDS_DATA();
   const auto weights = [](const std::string& name) {

@@ -284,17 +284,21 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
                range.neighbours_at_most == 1 ? fmt::format(", a jump of at most {:.6g}", *stated->jump) : "");
   }
   if (!output.float32_errors.empty())
-    fmt::print("\nFloat32 evaluation against the exact function over the box, proved, in {}\n",
-               output_unit(network));
+    fmt::print(
+        "\nFloat32 evaluation, summed in the order of nn/mlp.h, against the exact function over the box, "
+        "proved, "
+        "in {}\n",
+        output_unit(network));
   for (const lipschitz::Float32Error& error : output.float32_errors) {
     const std::string many =
         error.neighbours_at_most > 0 ? fmt::format(" up to {} neighbours", error.neighbours_at_most) : "";
     fmt::print("  {}{}: {:.4g} (arithmetic {:.4g}, conversion of the inputs {:.4g})", error.function, many,
                error.total.value(), error.evaluation.value(), error.inputs.value());
     const auto* const stated = in_certificate(output, error.function, error.neighbours_at_most);
-    fmt::print("{}\n", stated != nullptr && stated->float32_error
-                           ? fmt::format("; in the certificate: {:.4g}", *stated->float32_error)
-                           : "");
+    fmt::print("{}\n",
+               stated != nullptr && stated->float32_error
+                   ? fmt::format("; in the certificate, for any order: {:.4g}", *stated->float32_error)
+                   : "");
   }
 }
 

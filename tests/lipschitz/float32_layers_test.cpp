@@ -1,0 +1,178 @@
+// Rounding of layers in float32, by the loop that flies, and what reaches the outputs, against exact arithmetic.
+#include "lipschitz/float32_layers.h"
+
+#include <gmpxx.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "lipschitz/networks.h"
+#include "nn/base/random.h"
+#include "nn/dense_layer.h"
+
+namespace swarmcert {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::RowVectorXd;
+using Eigen::VectorXd;
+using files::Random;
+using lipschitz::Reach;
+using lipschitz::ReachNetwork;
+
+/// A layer of one output.
+struct Sum {
+  std::vector<float> weights;
+  float bias = 0;
+
+  lipschitz::ReachLayer layer() const {
+    lipschitz::ReachLayer result;
+    result.weights = Eigen::Map<const Eigen::RowVectorXf>(weights.data(), static_cast<Index>(weights.size()))
+                         .cast<double>();
+    result.bias = VectorXd::Constant(1, static_cast<double>(bias));
+    result.bias_radius = VectorXd::Zero(1);
+    return result;
+  }
+  /// |what flies - exact| at h.
+  double off(const std::vector<float>& h) const {
+    const nn::DenseLayer<float> layer{weights.data(), &bias, 1, static_cast<int>(weights.size())};
+    float computed = 0;
+    nn::apply<1>(layer, h.data(), &computed, nn::Activation::kNone);
+    mpq_class exact(static_cast<double>(bias));
+    for (std::size_t j = 0; j < h.size(); ++j)
+      exact += mpq_class(static_cast<double>(weights[j])) * mpq_class(static_cast<double>(h[j]));
+    return mpq_class(abs(mpq_class(static_cast<double>(computed)) - exact)).get_d();
+  }
+};
+
+Sum random_sum(int inputs, double scale, Random& random) {
+  Sum sum;
+  for (int j = 0; j < inputs; ++j) sum.weights.push_back(static_cast<float>(scale * random.symmetric()));
+  sum.bias = static_cast<float>(scale * scale * random.symmetric());  // as large as a product
+  return sum;
+}
+
+double bound(const Sum& sum, const VectorXd& lower, const VectorXd& upper) {
+  return lipschitz::layer_rounding(sum.layer(), lower, upper)(0);
+}
+
+/// Points that a climb finds ever further off, for sums of ordinary size and at the border of underflow.
+TEST(LayerRounding, IsNeverExceededByWhatFlies) {
+  Random random(5);
+  for (const double scale : {1.0, 0x1p-70}) {
+    double closest = 0;
+    for (int round = 0; round < 60; ++round) {
+      const int inputs = 1 + static_cast<int>(random.below(40));
+      const Sum sum = random_sum(inputs, scale, random);
+      VectorXd lower(inputs), upper(inputs);
+      for (Index j = 0; j < inputs; ++j) {
+        lower(j) = scale * random.symmetric();
+        upper(j) = random.below(4) == 0 ? lower(j) : lower(j) + scale * random.uniform();
+        if (random.below(4) == 0) lower(j) = upper(j) = 0;
+      }
+      const double at_most = bound(sum, lower, upper);
+      std::vector<float> best;
+      double furthest = -1;
+      for (int step = 0; step < 400; ++step) {
+        std::vector<float> h;
+        for (Index j = 0; j < inputs; ++j) {
+          const bool moves = best.empty() || random.below(4) == 0;
+          auto x = moves ? static_cast<float>(lower(j) + random.uniform() * (upper(j) - lower(j)))
+                         : best[static_cast<std::size_t>(j)];
+          if (static_cast<double>(x) < lower(j)) x = std::nextafter(x, INFINITY);
+          if (static_cast<double>(x) > upper(j)) x = std::nextafter(x, -INFINITY);
+          h.push_back(x);
+        }
+        if (!((Eigen::Map<Eigen::VectorXf>(h.data(), inputs).cast<double>() - lower).minCoeff() >= 0))
+          continue;
+        const double off = sum.off(h);
+        ASSERT_LE(off, at_most);
+        if (off > furthest) furthest = off, best = h;
+      }
+      if (at_most > 0) closest = std::max(closest, furthest / at_most);
+    }
+    EXPECT_GT(closest, 0.2) << scale;  // some sum comes close
+  }
+}
+
+TEST(LayerRounding, CountsNeitherProductsWithZeroNorTheirAdditions) {
+  Sum sum{{3, -5, 7}, 0.1f};
+  const VectorXd zero = VectorXd::Zero(3);
+  EXPECT_EQ(bound(sum, zero, zero), 0);
+  VectorXd one = zero;
+  one(1) = 1;
+  const double with_one = bound(sum, zero, one);
+  sum.weights = {3e6f, -5, 7e6f};
+  EXPECT_EQ(bound(sum, zero, one), with_one);
+}
+
+/// 1 - 1 + tiny: any order of summation allows for errors of the size of 1, this one does not.
+TEST(LayerRounding, TakesPartialSumsAsTheyAreAdded) {
+  const Sum sum{{-1, 0x1p-30f}, 1};
+  const VectorXd ones = VectorXd::Ones(2);
+  EXPECT_LE(bound(sum, ones, ones), 1.001 * 0x1p-24);  // of the product 1; the sums are 0 and 2^-30
+  const Sum other{{0x1p-30f, -1}, 1};
+  EXPECT_GE(bound(other, ones, ones), 1.9 * 0x1p-24);
+  EXPECT_GE(bound(other, ones, ones), other.off({1, 1}));
+  EXPECT_GT(other.off({1, 1}), 0);
+}
+
+TEST(LayerRounding, IsInfiniteWhereFloat32MightOverflow) {
+  const Sum sum{{0x1p100f}, 0};
+  EXPECT_TRUE(std::isinf(bound(sum, VectorXd::Zero(1), VectorXd::Constant(1, 0x1p27))));
+  EXPECT_TRUE(std::isfinite(bound(sum, VectorXd::Zero(1), VectorXd::Constant(1, 0x1p20))));
+}
+
+/// d y_K / d y_k at x, for k = 0 .. K.
+std::vector<RowVectorXd> derivatives(const ReachNetwork& network, VectorXd h) {
+  std::vector<VectorXd> before;
+  for (const lipschitz::ReachLayer& layer : network) {
+    before.emplace_back(layer.weights * h + layer.bias);
+    h = before.back().cwiseMax(0.0);
+  }
+  std::vector<RowVectorXd> result(network.size());
+  RowVectorXd row = RowVectorXd::Ones(1);
+  for (std::size_t k = network.size(); k-- > 0;) {
+    if (k + 1 < network.size()) {
+      row = (row * network[k + 1].weights).eval();
+      for (Index i = 0; i < row.size(); ++i)
+        if (before[k](i) < 0) row(i) = 0;
+    }
+    result[k] = row;
+  }
+  return result;
+}
+
+TEST(Sensitivities, AreNotBelowAnyDerivativeAndEqualItAtAPoint) {
+  std::mt19937 generator(6);
+  Random random(7);
+  for (int round = 0; round < 10; ++round) {
+    const ReachNetwork network = lipschitz::reach_network(tests::random_network({3, 8, 10, 6, 1}, generator));
+    const lipschitz::Box box{{-0.5, -0.5, 0}, {0.25, 0.5, 1}};
+    const Reach reach(network, box);
+    const std::vector<MatrixXd> found =
+        lipschitz::sensitivities(network, reach, lipschitz::layer_errors(network, reach, VectorXd::Zero(3)));
+    ASSERT_EQ(found.size(), network.size());
+    VectorXd x(3);
+    for (int sample = 0; sample < 500; ++sample) {
+      for (Index k = 0; k < 3; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        x(k) = box.lower[i] + random.uniform() * (box.upper[i] - box.lower[i]);
+      }
+      const std::vector<RowVectorXd> exact = derivatives(network, x);
+      for (std::size_t k = 0; k < network.size(); ++k)
+        ASSERT_TRUE((exact[k].cwiseAbs().array() <= found[k].row(0).array() + 1e-12).all());
+    }
+    const Reach point(network, {{x(0), x(1), x(2)}, {x(0), x(1), x(2)}});
+    const std::vector<MatrixXd> there =
+        lipschitz::sensitivities(network, point, lipschitz::layer_errors(network, point, VectorXd::Zero(3)));
+    const std::vector<RowVectorXd> exact = derivatives(network, x);
+    for (std::size_t k = 0; k < network.size(); ++k)
+      EXPECT_LT((there[k].row(0) - exact[k].cwiseAbs()).cwiseAbs().maxCoeff(), 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace swarmcert
