@@ -7,10 +7,12 @@
 
 #include "lipschitz/box.h"
 #include "lipschitz/checker/box_states.h"
-#include "lipschitz/relu_lines.h"
 #include "nn/weights/weights.h"
 
 namespace swarmcert::lipschitz {
+
+struct ActiveLayers;  // relu_lines.h
+struct ReluLines;
 
 /// y = W h + b + e with any e, |e| <= bias_radius; then h = relu(y), or h = y where there is no ReLU.
 struct ReachLayer {

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "lipschitz/reach.h"
+#include "lipschitz/relu_lines.h"
 
 namespace swarmcert::lipschitz {
 namespace {
