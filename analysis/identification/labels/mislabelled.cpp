@@ -136,8 +136,10 @@ std::vector<Mislabelled> mislabelled(const residuals::Inputs& inputs, int jobs) 
   }
   std::vector<Mislabelled> found;
   for (const FlightLabels& flight : flights) judge_streams(flight, tried, found);
-  for (const WrongKind& wrong : wrong_kinds(kinds))
-    found.push_back(label_of(wrong, inputs.model_of(wrong.kind)->mass_kg));
+  for (const WrongKind& wrong : wrong_kinds(kinds)) {
+    const stability::Model* const model = inputs.model_of(wrong.kind);  // none where single logs have models
+    found.push_back(label_of(wrong, model == nullptr ? 0 : model->mass_kg));
+  }
   return found;
 }
 
