@@ -104,7 +104,8 @@ void Downwash::columns(const Instant& now, const double* shape, Wrench* columns)
     for (int k = 0; k < count; ++k) sum += power[k];
   }
   columns[0] = {};
-  if (sum > 0) columns[0].force_W_N.z() = -kernel_for(1).composed_of_one(sum, 1 / shape[kNorm]);
+  // Also where it is no number.
+  if (sum != 0) columns[0].force_W_N.z() = -kernel_for(1).composed_of_one(sum, 1 / shape[kNorm]);
 }
 
 double Downwash::pair_constant(double neighbour_mass_kg, const double* shape) const {
