@@ -13,10 +13,14 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kFloatUnit = 0x1p-24;
-/// Far above what rounding in double does to sums of fewer than 2^10 terms, relatively to their sizes.
+/// Far above what rounding in double does to a few operations, relatively to their sizes.
 constexpr double kSafe = 0x1p-40;
 /// Below the overflow of float32, with room for what is off.
 constexpr double kLargest = 0x1p126;
+
+/// The same of a sum of so many terms: (terms - 1) 2^-53 times the sum of their sizes (Higham 2002, section 4.2), and
+/// eight times that.
+double safe(Index terms) { return kSafe + 0x1p-50 * static_cast<double>(terms); }
 
 VectorXd side(const std::vector<double>& values) {
   return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
@@ -56,6 +60,7 @@ VectorXd layer_rounding(const ReachLayer& layer, const VectorXd& lower, const Ve
   ArrayXd most = layer.bias.array() + layer.bias_radius.array();
   ArrayXd size = layer.bias.cwiseAbs().array() + layer.bias_radius.array();
   ArrayXd error = ArrayXd::Zero(size.size());
+  const double slack = safe(2 * lower.size() + 1);
   for (Index j = 0; j < lower.size(); ++j) {
     const double low = lower(j), high = upper(j), largest = std::max(std::abs(low), std::abs(high));
     if (largest == 0) continue;
@@ -66,9 +71,9 @@ VectorXd layer_rounding(const ReachLayer& layer, const VectorXd& lower, const Ve
     const ArrayXd product = w.abs() * largest;
     size += product;
     error += kFloatUnit * product + 0x1p-150;
-    error += kFloatUnit * (least.abs().max(most.abs()) + kSafe * size + error);
+    error += kFloatUnit * (least.abs().max(most.abs()) + slack * size + error);
   }
-  error *= 1 + kSafe;
+  error *= 1 + slack;
   for (Index i = 0; i < error.size(); ++i)
     if (!(size(i) + error(i) < kLargest)) error(i) = kInfinity;
   return error.matrix();
@@ -90,7 +95,7 @@ LayerErrors layer_errors(const ReachNetwork& chain, const Reach& reach, const Ve
       lower = lower.cwiseMax(0.0);
     }
     errors.made.push_back(layer_rounding(chain[k], lower, upper));
-    error = (1 + kSafe) * (chain[k].weights.cwiseAbs() * error) + errors.made.back();
+    error = (1 + safe(error.size())) * (chain[k].weights.cwiseAbs() * error) + errors.made.back();
     errors.total.push_back(error);
   }
   return errors;
@@ -104,7 +109,8 @@ std::vector<MatrixXd> sensitivities(const ReachNetwork& chain, const Reach& reac
   result.back() = middle;
   for (std::size_t j = chain.size() - 1; j > 0; --j) {
     const MatrixXd size = chain[j].weights.cwiseAbs();
-    radius = ((1 + kSafe) * radius + kSafe * middle.cwiseAbs()) * size;
+    const double slack = safe(size.rows());
+    radius = ((1 + slack) * radius + slack * middle.cwiseAbs()) * size;
     middle = (middle * chain[j].weights).eval();
     if (chain[j - 1].has_relu) through_relu(reach.before_relu(j - 1), errors.total[j - 1], middle, radius);
     result[j - 1] = (1 + kSafe) * (middle.cwiseAbs() + radius);

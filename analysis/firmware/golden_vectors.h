@@ -24,8 +24,8 @@ struct GoldenVector {
 float newton_per_unit(const files::Network& network);
 
 /// `count` random vectors for each kind of vehicle, with no neighbours to `most_neighbours`; inputs reach half as far
-/// again as the clamp of states, or +-1 m and +-2 m/s. One more for each composition in which the network is silent and
-/// that has at most so many neighbours. Computed by the evaluator that flies.
+/// again as the clamp of states, or +-1 m and +-2 m/s. One more for each composition of at most `most_neighbours`
+/// neighbours in which the network is silent. Expected outputs are computed by the evaluator of the flight code.
 /// Precondition: every weight is a float32; the network is a deep set.
 std::vector<GoldenVector> golden_vectors(const files::Network& network, int count, int most_neighbours,
                                          std::uint64_t seed);

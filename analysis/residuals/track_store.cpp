@@ -59,9 +59,9 @@ double used_s(const Track& track) {
   return used * track.duration_s() / std::max(static_cast<double>(track.instants.size()) - 1, 1.0);
 }
 
-/// Whether an excerpt of many tracks has a stretch of this one. Where the share of a track is shorter than a stretch
-/// may be, so many tracks have one that their sum is the share; which ones follows from the names of flight and vehicle
-/// (with a few more letters behind, as this hash spreads what is in front of it).
+/// Whether an excerpt takes a stretch of this track. Where the share of a track is shorter than the shortest stretch,
+/// only part of the tracks contribute one, so that the expected total is the share. A hash of the flight's and the
+/// vehicle's name decides; the suffix is hashed last, because FNV-1a mixes the last characters poorly.
 bool takes_part(const Track& track, double share) {
   const double all_s = used_s(track), stretch_s = std::min(kShortest_s, all_s);
   return share * all_s >= stretch_s ||

@@ -75,7 +75,7 @@ TEST(Excerpt, OfAShortFlightIsNotShorterThanFourSeconds) {
   EXPECT_EQ(excerpt_of(straight_track(8), 0.01).used, 300u) << "all that is used";
 }
 
-TEST(TrackStore, OfManyShortTracksTakesNoMoreThanTheShare) {
+TEST(TrackStore, OfManyShortTracksTakesAboutTheShare) {
   constexpr int kTracks = 300;
   constexpr double kShare = 0.05;  // 1.5 s of each
   residuals::TrackStore store(kShare);

@@ -43,8 +43,7 @@ inline constexpr char kForReluOnly[] =
 /// Said of functions of rotation invariants, and of those that are silent somewhere.
 inline constexpr char kNoLowerBound[] =
     "of functions of rotation invariants, or that are silent in some compositions, upper bounds for all "
-    "inputs are "
-    "proved, and no lower bounds";
+    "inputs are proved, and no lower bounds";
 
 /// Unit of the network's outputs; "output" where NET states none.
 std::string output_unit(const files::Network& network);

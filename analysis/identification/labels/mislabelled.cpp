@@ -173,8 +173,7 @@ std::string in_words(const Mislabelled& label) {
     case What::kSensors:
       return fmt::format(
           "the sensors and duties in {} are those of {}: the accelerometer and that vehicle's velocity "
-          "differ "
-          "by {:.3f} m/s^2, and by {:.3f} m/s^2 from the velocity beside it",
+          "differ by {:.3f} m/s^2, and by {:.3f} m/s^2 from the velocity beside it",
           log, label.belongs_to, label.after, label.before);
     case What::kName:
       return fmt::format(
@@ -185,8 +184,7 @@ std::string in_words(const Mislabelled& label) {
   }
   return fmt::format(
       "{}{} flies as one of the kind {}: its model leaves {:.3f} m/s^2 along the thrust axis, that of {} "
-      "{:.3f} "
-      "m/s^2{}",
+      "{:.3f} m/s^2{}",
       label.vehicle, label.flight.empty() ? "" : " of " + label.flight, label.belongs_to, label.after,
       label.kind, label.before,
       label.is_sure ? "" : "; a thrust ratio, another mass or a payload explains it as well");
