@@ -285,8 +285,8 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
   }
   if (!output.float32_errors.empty())
     fmt::print(
-        "\nFloat32 evaluation in the order of summation of the exported code, against the exact function over\n"
-        "the box, proved, in {}\n",
+        "\nFloat32 evaluation in the order of summation of the exported code, against the exact\n"
+        "function over the box, proved, in {}\n",
         output_unit(network));
   for (const lipschitz::Float32Error& error : output.float32_errors) {
     const std::string many =
