@@ -7,6 +7,7 @@
 
 #include "lipschitz/checker/values.h"
 #include "lipschitz/rounding.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
@@ -24,7 +25,9 @@ class ValueSearch {
  public:
   ValueSearch(const files::Network& network, const std::map<std::string, Box>& domain,
               const std::string& function, int neighbours, std::uint64_t seed)
-      : parts_(files::parts(network)),
+      : network_(network),
+        function_(function),
+        parts_(files::parts(network)),
         domain_(domain),
         names_(files::networks_of(function)),
         neighbours_(neighbours),
@@ -53,6 +56,10 @@ class ValueSearch {
 
   /// Contains f(point).
   check::Intervals enclosed(const BoxPoint& point) const {
+    if (files::is_silent_among(network_, function_, point.networks)) {
+      const std::vector<check::Dyadic> zeros(static_cast<std::size_t>(outputs()));
+      return {zeros, zeros};
+    }
     std::vector<check::SumTerm> terms;
     for (std::size_t j = 0; j < point.inputs.size(); ++j) {
       check::Intervals at;
@@ -107,6 +114,8 @@ class ValueSearch {
   }
 
   std::vector<double> in_double(const BoxPoint& point) const {
+    if (files::is_silent_among(network_, function_, point.networks))
+      return std::vector<double>(static_cast<std::size_t>(outputs()));
     std::vector<double> sum;
     for (std::size_t j = 0; j < point.inputs.size(); ++j) {
       const std::vector<float>& x = point.inputs[j];
@@ -117,6 +126,8 @@ class ValueSearch {
     return names_.size() == 1 ? sum : evaluators_.at(names_.back())(sum);
   }
 
+  const files::Network& network_;
+  std::string function_;
   std::map<std::string, const files::Weights*> parts_;
   const std::map<std::string, Box>& domain_;
   std::vector<std::string> names_;

@@ -173,8 +173,8 @@ Json values_json(const CertifiedValues& values) {
                {"input_error", std::move(input_error)},
                {"networks", std::move(networks)},
                {"sum", values.sum ? vector_json(*values.sum) : Json()},
-               {"lower", hex_floats(values.output().lower)},
-               {"upper", hex_floats(values.output().upper)}};
+               {"lower", hex_floats(values.lower)},
+               {"upper", hex_floats(values.upper)}};
   set_number(json, "jump", values.jump);
   set_number(json, "float32_error", values.float32_error);
   return json;

@@ -10,7 +10,6 @@
 #include "lipschitz/stop.h"
 #include "lipschitz/work_progress.h"
 #include "nn/base/parallel.h"
-#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
 
@@ -34,9 +33,6 @@ void require_what_is_bounded(const Network& network, const std::map<std::string,
   if (network.invariants)
     throw std::invalid_argument(std::string(options.domain.empty() ? "--method branch" : "bounds on a box") +
                                 ": for networks of relative states only, and these are rotation invariants");
-  if (!network.silent.empty())
-    throw std::invalid_argument(std::string(options.domain.empty() ? "--method branch" : "bounds on a box") +
-                                ": for networks that are silent nowhere");
   if (options.method != UpperMethod::kBranch) return;
   for (const auto& [name, weights] : parts) {
     if (weights->is_relu()) continue;
@@ -188,8 +184,7 @@ void multiply_norms(const Network& network, const std::map<std::string, const We
     }
     bound.has_local_slopes = bound.has_local_slopes || (bound.domain == "box" && !parts.at(name)->is_relu());
   }
-  bound.has_witness =
-      !files::maps_to_invariants(network, bound.function) && !files::is_ever_silent(network, bound.function);
+  bound.has_witness = !files::maps_to_invariants(network, bound.function);
   bound.is_relu = bound.has_witness && has_relu_only(network, bound.function);
   bound.product = bound.upper = product_up(norms);
 }

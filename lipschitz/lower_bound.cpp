@@ -7,6 +7,7 @@
 #include "lipschitz/checker/witness.h"
 #include "lipschitz/rounding.h"
 #include "lipschitz/slope_estimate.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
@@ -46,6 +47,12 @@ std::vector<std::string> other_networks(const Network& network, const Claim& cla
     }
   }
   return others;
+}
+
+/// Whether the claim's function is 0 among these neighbours and the one that moves.
+bool is_silent(const Network& network, const Claim& claim, std::vector<std::string> others) {
+  others.push_back(files::networks_of(claim.function).front());
+  return files::is_silent_among(network, claim.function, others);
 }
 
 /// Rounds that keep the search of a function to seconds: a region costs about (weights) x (moving inputs).
@@ -169,6 +176,7 @@ FoundSlope sampled_lower_bound(const Network& network, const Claim& claim,
   FoundSlope found;
   found.rounds = place.starts;
   found.interrupted = place.interrupted;
+  if (is_silent(network, claim, place.other_networks)) return found;
   const FloatPoints points(boxes);
   SlopePoints pair;
   for (std::size_t j = 0; j < place.others.size(); ++j) {
@@ -206,6 +214,7 @@ FoundSlope lower_bound(const Network& network, const Claim& claim, const std::ma
   const int cases = names.size() == 2 ? kMostNeighbours : 1;  // they share the rounds and the seconds
   for (int neighbours = 1; neighbours <= cases; ++neighbours) {
     const std::vector<std::string> others = other_networks(network, claim, neighbours);
+    if (is_silent(network, claim, others)) continue;
     const SlopeFunction f = slope_function(network, claim.function, others);
     SlopeSearchOptions search;
     search.seed = options.seed + static_cast<std::uint64_t>(neighbours) * 1000003;

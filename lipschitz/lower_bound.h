@@ -39,7 +39,7 @@ bool has_relu_only(const files::Network& network, const std::string& function);
 
 /// Searches for the steepest pair of points within the claim's block and domain, as steep in the claim's norm as
 /// slope() proves. Of ReLU networks by search_slope(), a set function with one to three neighbours, of every kind and
-/// with the ground; of others around the steep_place().
+/// with the ground; of others around the steep_place(). Never among neighbours where NET is silent.
 /// @param domain the boxes of a claim whose domain is "box", by part.
 /// @throws std::invalid_argument as slope_function(): of functions of rotation invariants there is no such proof.
 FoundSlope lower_bound(const files::Network& network, const Claim& claim,

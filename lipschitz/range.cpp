@@ -76,6 +76,16 @@ bool within(const std::vector<float>& point, const Box& box) {
   return true;
 }
 
+/// How many neighbours there are, by network: "phi:<kind>".
+using Composition = std::map<std::string, int>;
+
+std::vector<std::string> parts_of(const Composition& neighbours) {
+  std::vector<std::string> parts;
+  for (const auto& [part, count] : neighbours)
+    parts.insert(parts.end(), static_cast<std::size_t>(count), part);
+  return parts;
+}
+
 /// One function at work.
 class Ranger {
  public:
@@ -86,43 +96,48 @@ class Ranger {
         names_(files::networks_of(function)),
         nodes_(nodes),
         jobs_(jobs),
-        function_(function) {
-    const auto parts = files::parts(network);
-    has_ground_ = names_.size() == 2 && parts.count(files::kGroundPhi) == 1;
-    first_ = reach_network(*parts.at(names_[0]));
-    if (names_.size() == 1) return;
-    rho_ = reach_network(*parts.at(names_[1]));
-    const int most = std::min(8 * nodes, kMostParts);
-    phi_hull_ = hull(first_, domain.at(names_[0]), most);
-    if (!has_ground_) return;
-    ground_network_ = reach_network(*parts.at(files::kGroundPhi));
-    ground_hull_ = hull(ground_network_, domain.at(files::kGroundPhi), most);
+        function_(function),
+        parts_(files::parts(network)) {
+    has_ground_ = names_.size() == 2 && parts_.count(files::kGroundPhi) == 1;
+    if (names_.size() == 2) rho_ = reach_network(*parts_.at(names_[1]));
   }
 
-  Index outputs() const { return names_.size() == 1 ? first_.back().bias.size() : rho_.back().bias.size(); }
-  double jump_norm() const { return phi_hull_.norm; }
+  Index outputs() const { return parts_.at(names_.back())->outputs(); }
+  double jump_norm() { return term(names_[0]).hull.norm; }
+  bool is_silent(const Composition& neighbours) const {
+    return files::is_silent_among(network_, function_, parts_of(neighbours));
+  }
 
-  /// At least every value of sign * f_output with exactly `neighbours` neighbours; proposes points where it is
-  /// attained.
-  double largest(int output, double sign, int neighbours, std::vector<std::vector<VectorXd>>& candidates) {
+  /// At least every value of sign * f_output among these neighbours, and no others; proposes points where it is
+  /// attained. A plain network has none.
+  double largest(int output, double sign, const Composition& neighbours,
+                 std::vector<std::vector<VectorXd>>& candidates) {
     RowVectorXd direction = RowVectorXd::Zero(outputs());
     direction(output) = sign;
     if (names_.size() == 1) {
-      const Maximum found = maximise(first_, direction, domain_.at(names_[0]), search(1));
+      const Maximum found =
+          maximise(reach_network(*parts_.at(names_[0])), direction, domain_.at(names_[0]), search(1));
       candidates.push_back({found.x});
       return found.upper;
     }
-    if (neighbours != 1) return by_support(direction, neighbours, candidates);
-    ReachNetwork chain = first_;
-    if (has_ground_) add_interval(chain.back(), ground_hull_.bounds);
+    if (is_silent(neighbours)) {
+      candidates.push_back(middles(neighbours));
+      return 0;
+    }
+    const std::vector<std::string> single = parts_of(neighbours);
+    if (single.size() != 1) return by_support(direction, neighbours, candidates);
+    ReachNetwork chain = term(single[0]).network;
+    if (has_ground_) add_interval(chain.back(), term(files::kGroundPhi).hull.bounds);
     chain.insert(chain.end(), rho_.begin(), rho_.end());
-    const Maximum found = maximise(chain, direction, domain_.at(names_[0]), search(1));
-    candidates.push_back(with_ground({found.x}, ground_middle()));
+    const Maximum found = maximise(chain, direction, domain_.at(single[0]), search(1));
+    candidates.push_back({found.x});
     if (!has_ground_) return found.upper;
-    propose_ground(direction, found.x, candidates);
+    candidates.back().push_back(middle(files::kGroundPhi));
+    propose_ground(direction, single[0], found.x, candidates);
     return std::min(found.upper, by_support(direction, neighbours, candidates));
   }
 
+  /// @param candidates among neighbours of the function's own kind.
   Attained attained(int output, double sign, const std::vector<std::vector<VectorXd>>& candidates) const {
     Attained best;
     bool any = false;
@@ -137,7 +152,7 @@ class Ranger {
       }
       const mpq_class exact =
           value(network_, function_, one.networks, one.points)[static_cast<std::size_t>(output)];
-      one.value = sign > 0 ? round_down(exact) : -round_down(-exact);
+      one.value = sign > 0 ? round_down(exact) : 0 - round_down(-exact);
       if (!any || sign * one.value > sign * best.value) best = one;
       any = true;
     }
@@ -145,7 +160,13 @@ class Ranger {
   }
 
  private:
-  /// rho over the sums with a number of neighbours.
+  /// A network whose outputs are added up.
+  struct Term {
+    ReachNetwork network;
+    Hull hull;
+  };
+
+  /// rho over the sums among some neighbours.
   struct Sums {
     SumSupport support;
     std::unique_ptr<const Reach> reach;
@@ -159,78 +180,91 @@ class Ranger {
 
   MaximiseOptions search(int share) const { return {nodes_ / share + 2, kCloseEnough, jobs_}; }
 
-  const Sums& sums(int neighbours) {
+  const Term& term(const std::string& part) {
+    Term& term = terms_[part];
+    if (!term.network.empty()) return term;
+    term.network = reach_network(*parts_.at(part));
+    term.hull = hull(term.network, domain_.at(part), std::min(8 * nodes_, kMostParts));
+    return term;
+  }
+
+  /// The neighbours, and the ground's term where there is one.
+  std::vector<std::pair<std::string, int>> all_terms(const Composition& neighbours) const {
+    std::vector<std::pair<std::string, int>> all;
+    for (const auto& [part, count] : neighbours)
+      if (count > 0) all.emplace_back(part, count);
+    if (has_ground_) all.emplace_back(files::kGroundPhi, 1);
+    return all;
+  }
+
+  const Sums& sums(const Composition& neighbours) {
     Sums& sums = sums_[neighbours];
     if (!sums.reach) {
-      sums.support = {&phi_hull_, neighbours, has_ground_ ? &ground_hull_ : nullptr, jobs_};
+      for (const auto& [part, count] : all_terms(neighbours))
+        sums.support.terms.push_back({&term(part).hull, count});
+      sums.support.size = rho_.front().weights.cols();
+      sums.support.jobs = jobs_;
       sums.reach = std::make_unique<const Reach>(rho_, box_of(sums.support.bounds()), sums.support);
     }
     return sums;
   }
 
-  VectorXd ground_middle() const {
-    if (!has_ground_) return {};
-    const Box& box = domain_.at(files::kGroundPhi);
-    VectorXd middle(files::kGroundInputs);
+  VectorXd middle(const std::string& part) const {
+    const Box& box = domain_.at(part);
+    VectorXd middle(static_cast<Index>(box.lower.size()));
     for (Index k = 0; k < middle.size(); ++k) {
       const auto i = static_cast<std::size_t>(k);
       middle(k) = (box.lower[i] + box.upper[i]) / 2;
     }
     return middle;
   }
-  std::vector<VectorXd> with_ground(std::vector<VectorXd> points, const VectorXd& ground) const {
-    if (has_ground_) points.push_back(ground);
+  std::vector<VectorXd> middles(const Composition& neighbours) const {
+    std::vector<VectorXd> points;
+    for (const auto& [part, count] : all_terms(neighbours))
+      points.insert(points.end(), static_cast<std::size_t>(count), middle(part));
     return points;
   }
 
   /// The neighbour fixed at x: where should the ground's input be?
-  void propose_ground(const RowVectorXd& direction, const VectorXd& x,
-                      std::vector<std::vector<VectorXd>>& candidates) const {
-    ReachNetwork chain = ground_network_;
-    chain.back().bias += evaluate_roughly(first_, x);
+  void propose_ground(const RowVectorXd& direction, const std::string& part, const VectorXd& x,
+                      std::vector<std::vector<VectorXd>>& candidates) {
+    ReachNetwork chain = term(files::kGroundPhi).network;
+    chain.back().bias += evaluate_roughly(term(part).network, x);
     chain.insert(chain.end(), rho_.begin(), rho_.end());
     candidates.push_back(
         {x, maximise(chain, direction, domain_.at(files::kGroundPhi), search(kShareOfSums)).x});
   }
 
-  /// phi and the ground where a form of their sum is largest: each for itself.
-  struct Terms {
-    std::optional<Maximum> phi, ground;
-  };
-  Terms largest_terms(const LinearForms& form, int neighbours, int share) const {
-    Terms terms;
-    const RowVectorXd row = form.rows.row(0);
-    if (neighbours > 0) terms.phi = maximise(first_, row, domain_.at(names_[0]), search(share));
-    if (has_ground_)
-      terms.ground = maximise(ground_network_, row, domain_.at(files::kGroundPhi), search(share));
-    return terms;
+  /// Where a form of the sum is largest, each term for itself, in the order of all_terms().
+  std::vector<Maximum> largest_terms(const LinearForms& form, const Composition& neighbours, int share) {
+    std::vector<Maximum> found;
+    for (const auto& [part, count] : all_terms(neighbours))
+      found.push_back(maximise(term(part).network, form.rows.row(0), domain_.at(part), search(share)));
+    return found;
   }
 
   /// A linear form above rho over the sums, f <= c s + d, and the largest values of its terms.
-  double by_support(const RowVectorXd& direction, int neighbours,
+  double by_support(const RowVectorXd& direction, const Composition& neighbours,
                     std::vector<std::vector<VectorXd>>& candidates) {
     const Reach& reach = *sums(neighbours).reach;
-    if (neighbours == 0 && !has_ground_) {
+    const auto all = all_terms(neighbours);
+    if (all.empty()) {
       candidates.emplace_back();
       return reach.largest(reach.upper_forms(direction))(0);
     }
     const LinearForms form = reach.sharpened_form(direction, [&](const LinearForms& one) -> VectorXd {
-      const Terms terms = largest_terms(one, neighbours, kShareOfHints);
+      const std::vector<Maximum> found = largest_terms(one, neighbours, kShareOfHints);
       VectorXd sum = VectorXd::Zero(one.rows.cols());
-      if (terms.phi) sum += neighbours * evaluate_roughly(first_, terms.phi->x);
-      if (terms.ground) sum += evaluate_roughly(ground_network_, terms.ground->x);
+      for (std::size_t k = 0; k < all.size(); ++k)
+        sum += all[k].second * evaluate_roughly(term(all[k].first).network, found[k].x);
       return sum;
     });
-    const Terms terms = largest_terms(form, neighbours, kShareOfSums);
+    const std::vector<Maximum> found = largest_terms(form, neighbours, kShareOfSums);
     double total = form.constants(0);
     std::vector<VectorXd> points;
-    if (terms.phi) {
-      total = sum_rounded_up(total, neighbours, terms.phi->upper);
-      points.assign(static_cast<std::size_t>(neighbours), terms.phi->x);
-    }
-    if (terms.ground) {
-      total = sum_rounded_up(total, 1, terms.ground->upper);
-      points.push_back(terms.ground->x);
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      total = sum_rounded_up(total, all[k].second, found[k].upper);
+      points.insert(points.end(), static_cast<std::size_t>(all[k].second), found[k].x);
     }
     candidates.push_back(points);
     const double by_parts = reach.largest(form)(0);
@@ -242,58 +276,122 @@ class Ranger {
   std::vector<std::string> names_;
   int nodes_, jobs_;
   std::string function_;
+  std::map<std::string, const files::Weights*> parts_;
   bool has_ground_ = false;
-  ReachNetwork first_, rho_, ground_network_;
-  Hull phi_hull_, ground_hull_;
-  std::map<int, Sums> sums_;
+  ReachNetwork rho_;
+  std::map<std::string, Term> terms_;
+  std::map<Composition, Sums> sums_;
+};
+
+/// The ends of one output among some neighbours; the function is 0 throughout where it is silent.
+struct Ends {
+  double lower = 0, upper = 0;
+  bool is_silent = false;
+  double largest() const { return std::max(-lower, upper); }
 };
 
 /// Bounds of all outputs of one function, for 1, 2, ... neighbours.
-std::vector<CertifiedRange> ranges_of(const Network& network, const std::map<std::string, Box>& domain,
-                                      const std::string& function,
-                                      const std::map<std::string, double>& rho_bound,
-                                      const RangeOptions& options, const std::function<void()>& searched) {
-  std::vector<CertifiedRange> found;
-  const bool is_set = function != "network";
-  const bool only_kind = network.phi.size() == 1 + network.phi.count(files::kGroundKind);
-  const int nodes = options.nodes > 0 ? options.nodes : usual_nodes(network, function);
-  Ranger ranger(network, domain, function, nodes, options.jobs);
-  for (int output = 0; output < ranger.outputs(); ++output) {
-    std::vector<std::vector<VectorXd>> high, low;
+class RangesOf {
+ public:
+  RangesOf(const Network& network, const std::map<std::string, Box>& domain, std::string function,
+           const std::map<std::string, double>& rho_bound, const RangeOptions& options,
+           std::function<void()> searched)
+      : function_(std::move(function)),
+        names_(files::networks_of(function_)),
+        is_set_(names_.size() == 2),
+        only_kind_(network.phi.size() == 1 + network.phi.count(files::kGroundKind)),
+        neighbours_(options.neighbours),
+        searched_(std::move(searched)),
+        ranger_(network, domain, function_,
+                options.nodes > 0 ? options.nodes : usual_nodes(network, function_), options.jobs) {
+    if (!is_set_) return;
+    jump_at_any_sum_ = up(ranger_.jump_norm() * rho_bound.at(files::kind_of(names_[1])));
+    // Of one kind, all steps are seen one after the other.
+    if (!only_kind_) beside_silent_ = steps_of(network, function_);
+  }
+
+  std::vector<CertifiedRange> all() {
+    std::vector<CertifiedRange> found;
+    for (int output = 0; output < ranger_.outputs(); ++output) add(output, found);
+    return found;
+  }
+
+  /// Compositions in which values are bounded beside those of the function's own kind, for the jump.
+  static std::vector<Composition> steps_of(const Network& network, const std::string& function) {
+    std::vector<Composition> result;
+    for (const std::vector<std::string>& parts : files::beside_silent(network, function)) {
+      result.emplace_back();
+      for (const std::string& part : parts) ++result.back()[part];
+    }
+    return result;
+  }
+
+ private:
+  using Candidates = std::vector<std::vector<VectorXd>>;
+
+  Ends ends(int output, const Composition& neighbours, Candidates& low, Candidates& high) {
+    Ends found;
+    found.is_silent = is_set_ && ranger_.is_silent(neighbours);
+    found.upper = ranger_.largest(output, 1, neighbours, high);
+    searched_();
+    found.lower = 0 - ranger_.largest(output, -1, neighbours, low);  // 0, not -0, where it is silent
+    searched_();
+    return found;
+  }
+
+  /// |f - f'| where the second of two numbers of neighbours follows on the first.
+  double step(const Ends& before, const Ends& after) const {
+    if (before.is_silent && after.is_silent) return 0;
+    const double between = std::max({0.0, up(after.upper - before.lower), up(before.upper - after.lower)});
+    return before.is_silent || after.is_silent ? between : std::min(between, jump_at_any_sum_);
+  }
+
+  void add(int output, std::vector<CertifiedRange>& found) {
+    Candidates high, low, unused;
     CertifiedRange range;
-    range.function = function;
+    range.function = function_;
     range.output = output;
     range.upper = -kInfinity;
     range.lower = kInfinity;
-    double jump_at_any_sum = 0, jump_between = 0, upper_before = 0, lower_before = 0;
-    if (is_set)
-      jump_at_any_sum =
-          up(ranger.jump_norm() * rho_bound.at(files::kind_of(files::networks_of(function)[1])));
-    for (int n = is_set ? 0 : 1; n <= (is_set ? options.neighbours : 1); ++n) {
-      const double upper = ranger.largest(output, 1, n, high);
-      searched();
-      const double lower = -ranger.largest(output, -1, n, low);
-      searched();
-      range.upper = std::max(range.upper, upper);
-      range.lower = std::min(range.lower, lower);
-      if (n > 0) jump_between = std::max({jump_between, up(upper - lower_before), up(upper_before - lower)});
-      upper_before = upper;
-      lower_before = lower;
-      if (is_set && n == 0) continue;
-      range.neighbours_at_most = is_set ? n : 0;
-      if (is_set) range.jump = only_kind ? std::min(jump_between, jump_at_any_sum) : jump_at_any_sum;
-      range.greatest = ranger.attained(output, 1, high);
-      range.least = ranger.attained(output, -1, low);
+    if (is_set_ && !only_kind_) range.jump = jump_at_any_sum_;
+    for (const Composition& beside : beside_silent_)
+      range.jump = std::max(range.jump, ends(output, beside, unused, unused).largest());
+    Ends before;
+    for (int n = is_set_ ? 0 : 1; n <= (is_set_ ? neighbours_ : 1); ++n) {
+      const Ends now = ends(output, is_set_ ? Composition{{names_[0], n}} : Composition(), low, high);
+      range.upper = std::max(range.upper, now.upper);
+      range.lower = std::min(range.lower, now.lower);
+      if (n > 0 && only_kind_ && is_set_) range.jump = std::max(range.jump, step(before, now));
+      before = now;
+      if (is_set_ && n == 0) continue;
+      range.neighbours_at_most = is_set_ ? n : 0;
+      range.greatest = ranger_.attained(output, 1, high);
+      range.least = ranger_.attained(output, -1, low);
       found.push_back(range);
     }
   }
-  return found;
-}
 
-/// Whether branch and bound on values can follow `function`, and the ground's term with it.
+  std::string function_;
+  std::vector<std::string> names_;
+  bool is_set_, only_kind_;
+  int neighbours_;
+  std::function<void()> searched_;
+  Ranger ranger_;
+  double jump_at_any_sum_ = 0;
+  std::vector<Composition> beside_silent_;
+};
+
+/// Whether branch and bound on values can follow `function`, and with it the ground's term, and those of neighbours
+/// beside which the network is silent.
 bool is_of_relu(const Network& network, const std::string& function) {
-  const auto ground = network.phi.find(files::kGroundKind);
-  return files::is_relu(network, function) && (ground == network.phi.end() || ground->second.is_relu());
+  const auto is_relu = [&network](const std::string& kind) {
+    const auto phi = network.phi.find(kind);
+    return phi == network.phi.end() || phi->second.is_relu();
+  };
+  for (const std::vector<std::string>& parts : files::beside_silent(network, function))
+    for (const std::string& part : parts)
+      if (!is_relu(files::kind_of(part))) return false;
+  return files::is_relu(network, function) && is_relu(files::kGroundKind);
 }
 
 /// What a certificate states of a function with other activations, and values that it takes.
@@ -311,8 +409,8 @@ std::vector<CertifiedRange> stated_ranges(const Network& network, const std::map
       range.function = function;
       range.output = static_cast<int>(i);
       range.neighbours_at_most = values.neighbours;
-      range.lower = values.output().lower[i];
-      range.upper = values.output().upper[i];
+      range.lower = values.lower[i];
+      range.upper = values.upper[i];
       range.least = ends[i].least;
       range.greatest = ends[i].greatest;
       range.jump = values.jump.value_or(0);
@@ -359,7 +457,6 @@ std::vector<std::string> value_functions(const Network& network) {
 std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::string, Box>& domain,
                                    const std::map<std::string, double>& rho_bound,
                                    const RangeOptions& options) {
-  files::require_never_silent(network, "ranges are of networks that are silent nowhere");
   const std::map<std::string, Box> inner = clamped(network, domain);
   // One function after the other: each search uses all threads.
   std::vector<CertifiedRange> result;
@@ -368,14 +465,15 @@ std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::s
   for (const std::string& function : functions) {
     if (!is_of_relu(network, function)) continue;
     const int outputs = files::parts(network).at(files::networks_of(function).back())->outputs();
-    total += outputs * (files::is_set(function) ? 2 * (1 + options.neighbours) : 2);
+    const int steps = static_cast<int>(RangesOf::steps_of(network, function).size());
+    total += outputs * (files::is_set(function) ? 2 * (1 + options.neighbours + steps) : 2);
   }
   const auto searched = [&] {
     if (options.progress) options.progress(++done, total);
   };
   for (const std::string& function : functions) {
     const std::vector<CertifiedRange> found =
-        is_of_relu(network, function) ? ranges_of(network, inner, function, rho_bound, options, searched)
+        is_of_relu(network, function) ? RangesOf(network, inner, function, rho_bound, options, searched).all()
                                       : stated_ranges(network, inner, function, rho_bound, options);
     result.insert(result.end(), found.begin(), found.end());
   }

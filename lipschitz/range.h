@@ -31,7 +31,8 @@ struct CertifiedRange {
   Attained least, greatest;  ///< lower <= least.value, greatest.value <= upper
   /// A neighbour that comes or goes while the others stay, anywhere in its box, as at a cut-off of the distance:
   /// |f(with it) - f(without it)| <= jump. Where NET knows one kind, with at most `neighbours_at_most` of them, each in
-  /// its box; else whatever the others do. 0 for a plain network.
+  /// its box; else whatever the others do, but that all are in their boxes where NET is silent before or after. 0 for
+  /// a plain network.
   double jump = 0;
   double largest() const { return std::max(-lower, upper); }
 };
@@ -48,7 +49,7 @@ std::vector<std::string> value_functions(const files::Network& network);
 
 /// Ranges of the plain network or of every set function, for 1, 2, ... neighbours of one kind; with the ground's term
 /// where there is one. The clamp of NET acts first: with it the range holds for every input, where its interval lies
-/// in the box.
+/// in the box. Among neighbours where NET is silent f is 0, exactly.
 ///
 /// One neighbour: branch and bound over its box, the ground's term as an interval. More: a linear form a s + c above
 /// rho on the sums s, whose neurons are bounded by such forms too (sum_support.h); f <= c + sum_j max a phi(x_j), each
@@ -57,7 +58,6 @@ std::vector<std::string> value_functions(const files::Network& network);
 /// Of functions with other activations than ReLU: what certified_values() states, and no branch and bound.
 /// @param domain by part, finite.
 /// @param rho_bound a proved Lipschitz bound of rho, by its kind; for the jump |f - f'| <= L |phi(x)|.
-/// @throws files::InputError if NET is silent in some composition, where it jumps by all of f.
 std::vector<CertifiedRange> ranges(const files::Network& network, const std::map<std::string, Box>& domain,
                                    const std::map<std::string, double>& rho_bound,
                                    const RangeOptions& options);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
 
@@ -101,13 +102,22 @@ VectorXd SampledFunction::random_point_of(const std::string& part, Index size,
 
 void SampledFunction::place_others(std::mt19937_64& generator) {
   if (!last_) return;
-  other_networks_.clear();
-  others_.clear();
-  others_sum_ = VectorXd::Zero(files::parts(network_).at(*last_)->inputs());
-  if (network_.phi.count(files::kGroundKind) == 1 && first_ != files::kGroundPhi)
-    add_other(files::kGroundPhi, generator);
-  for (std::uint64_t count = other_kinds_.empty() ? 0 : generator() % 3; count > 0; --count)
-    add_other(other_kinds_[generator() % other_kinds_.size()], generator);
+  constexpr int kTries =
+      100;  // a claim may be about neighbours among which there is nothing else than silence
+  for (int i = 0; i < kTries; ++i) {
+    other_networks_.clear();
+    others_.clear();
+    others_sum_ = VectorXd::Zero(files::parts(network_).at(*last_)->inputs());
+    if (network_.phi.count(files::kGroundKind) == 1 && first_ != files::kGroundPhi)
+      add_other(files::kGroundPhi, generator);
+    for (std::uint64_t count = other_kinds_.empty() ? 0 : generator() % 3; count > 0; --count)
+      add_other(other_kinds_[generator() % other_kinds_.size()], generator);
+    std::vector<std::string> all = other_networks_;
+    all.push_back(first_);
+    is_silent_ = files::is_silent_among(network_,
+                                        files::set_name(files::kind_of(first_), files::kind_of(*last_)), all);
+    if (!is_silent_) return;
+  }
 }
 
 void SampledFunction::add_other(const std::string& part, std::mt19937_64& generator) {
@@ -142,6 +152,7 @@ VectorXd SampledFunction::in_inputs(const VectorXd& direction) const {
 }
 
 VectorXd SampledFunction::quotient(const VectorXd& x, const VectorXd& direction) const {
+  if (is_silent_) return VectorXd::Zero(files::parts(network_).at(*last_)->outputs());
   const VectorXd step = half_step_ * in_inputs(direction);
   VectorXd above = term(first_, x + step), below = term(first_, x - step);
   if (last_) {

@@ -41,7 +41,7 @@ class SampledFunction {
   Eigen::VectorXd middle() const;
   /// A point at one of several scales, inside the box or the clamp where there is one.
   Eigen::VectorXd random_point(std::mt19937_64& generator) const;
-  /// Puts other neighbours somewhere, and the ground's input.
+  /// Puts other neighbours somewhere, and the ground's input; not so that the network is silent, where that can be had.
   void place_others(std::mt19937_64& generator);
 
   /// The steepest quotient around x: along the direction of the largest gain of the Jacobian.
@@ -75,7 +75,8 @@ class SampledFunction {
   std::string first_;
   std::optional<std::string> last_;
   Eigen::Index inputs_ = 0;
-  bool maps_ = false;  ///< to invariants, before the clamp
+  bool maps_ = false;       ///< to invariants, before the clamp
+  bool is_silent_ = false;  ///< among the one that moves and the others
   std::vector<int> block_;
   std::vector<double> scale_;
   double work_ = 0;

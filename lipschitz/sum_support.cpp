@@ -42,23 +42,22 @@ double sum_rounded_up(double constant, int count, double term) {
 }
 
 Bounds SumSupport::bounds() const {
-  const Index size = (ground != nullptr ? ground : phi)->bounds.lower.size();
-  Bounds result = ground != nullptr ? ground->bounds : Bounds{VectorXd::Zero(size), VectorXd::Zero(size)};
-  for (int j = 0; j < count; ++j) result = sum(result, phi->bounds);
+  Bounds result{VectorXd::Zero(size), VectorXd::Zero(size)};
+  for (const Term& term : terms)
+    for (int j = 0; j < term.count; ++j) result = sum(result, term.hull->bounds);
   return result;
 }
 
 VectorXd SumSupport::operator()(const LinearForms& forms) const {
   VectorXd result = forms.constants;
-  const auto add = [&](const Hull& hull, int times) {
-    const VectorXd largest = largest_over(hull.parts, forms.rows, jobs);
+  for (const Term& term : terms) {
+    if (term.count == 0) continue;
+    const VectorXd largest = largest_over(term.hull->parts, forms.rows, jobs);
     for (Index i = 0; i < result.size(); ++i) {
-      result(i) = sum_rounded_up(result(i), times, largest(i));
+      result(i) = sum_rounded_up(result(i), term.count, largest(i));
       if (std::isnan(result(i))) result(i) = kInfinity;
     }
-  };
-  if (count > 0) add(*phi, count);
-  if (ground != nullptr) add(*ground, 1);
+  }
   return result;
 }
 

@@ -8,14 +8,17 @@
 
 namespace swarmcert::lipschitz {
 
-/// Sums s = sum_j phi(x_j) + g(x_g) of `count` outputs of one network and at most one of another, each input anywhere
-/// in its box:
-///   max c s + d = count max_x c phi(x) + max_x c g(x) + d,
+/// Sums s = sum_k sum_j phi_k(x_kj) of outputs of several networks, of network k as many as its `count`, each input
+/// anywhere in its box:
+///   max c s + d = sum_k count_k max_x c phi_k(x) + d,
 /// each maximum taken over the parts of its box, by a linear form on each.
 struct SumSupport {
-  const Hull* phi = nullptr;
-  int count = 0;
-  const Hull* ground = nullptr;  ///< null: none
+  struct Term {
+    const Hull* hull;
+    int count;
+  };
+  std::vector<Term> terms;
+  Eigen::Index size = 0;  ///< outputs of each network
   int jobs = 1;
 
   /// The box of these sums, rounded outwards.

@@ -34,7 +34,7 @@ bool all_finite(const Row& values) {
 class Values {
  public:
   Values(const files::Network& network, std::map<std::string, Box> domain, const ValueOptions& options)
-      : parts_(files::parts(network)), domain_(std::move(domain)), options_(options) {}
+      : network_(network), parts_(files::parts(network)), domain_(std::move(domain)), options_(options) {}
 
   std::optional<CertifiedValues> of(const std::string& function, int neighbours,
                                     const std::map<std::string, double>& rho_bound) const {
@@ -61,18 +61,39 @@ class Values {
     if (names.size() == 2) {
       const auto size = static_cast<std::size_t>(parts_.at(names[1])->inputs());
       const double slope = rho_bound.at(files::kind_of(names[1]));
-      found.jump = sqrt_up(Dyadic(slope) * slope * check::largest_square(terms.front().values));
+      const Dyadic square = Dyadic(slope) * slope * check::largest_square(terms.front().values);
+      found.jump = sqrt_up(check::larger(square, check::silent_step_square(network_, function, boxes())));
       found.sum = rounded(check::sum_intervals(terms, size),
                           options_.float32 ? check::sum_error(terms, size) : std::nullopt, values);
       if (!found.sum || !std::isfinite(*found.jump) || !through_layers(names[1], values, found))
         return std::nullopt;
     }
+    state_ends(found);
     if (!options_.float32) return found;
     found.float32_error = sqrt_up(check::square(values.error));
     return std::isfinite(*found.float32_error) ? std::optional(found) : std::nullopt;
   }
 
  private:
+  std::function<check::Intervals(const std::string&)> boxes() const {
+    return [this](const std::string& part) {
+      const Box& box = domain_.at(part);
+      return check::Intervals{exact_numbers(box.lower), exact_numbers(box.upper)};
+    };
+  }
+
+  void state_ends(CertifiedValues& found) const {
+    const VectorBounds& last = found.layers.at(files::networks_of(found.function).back()).back();
+    found.lower = last.lower;
+    found.upper = last.upper;
+    const long silent = files::silent_up_to(network_, found.function, found.neighbours);
+    for (std::size_t i = 0; silent > 0 && i < found.lower.size(); ++i) {
+      const bool is_always = silent == found.neighbours + 1;
+      found.lower[i] = is_always ? 0 : std::min(0.0, found.lower[i]);
+      found.upper[i] = is_always ? 0 : std::max(0.0, found.upper[i]);
+    }
+  }
+
   /// Rounds outwards what the checker computes, and makes it the values from here on. Nothing where it is not finite.
   std::optional<VectorBounds> rounded(const check::Intervals& exact,
                                       const std::optional<std::vector<Dyadic>>& error,
@@ -110,6 +131,7 @@ class Values {
     return true;
   }
 
+  const files::Network& network_;
   std::map<std::string, const files::Weights*> parts_;
   std::map<std::string, Box> domain_;
   ValueOptions options_;
@@ -117,15 +139,10 @@ class Values {
 
 }  // namespace
 
-const VectorBounds& CertifiedValues::output() const {
-  return layers.at(files::networks_of(function).back()).back();
-}
-
 std::vector<CertifiedValues> certified_values(const files::Network& network,
                                               const std::map<std::string, Box>& domain,
                                               const std::map<std::string, double>& rho_bound,
                                               const ValueOptions& options, const std::string& only) {
-  files::require_never_silent(network, "ranges are of networks that are silent nowhere");
   const std::map<std::string, Box> inner = clamped(network, domain);
   ValueOptions exact_only = options;
   exact_only.float32 = false;

@@ -26,11 +26,11 @@ struct CertifiedValues {
   bool in_clamp = false;                                    ///< the box is what the input clamp lets through
   std::map<std::string, std::vector<double>> input_error;   ///< by network; empty: nothing is said of float32
   std::map<std::string, std::vector<VectorBounds>> layers;  ///< of each network, before its ReLU
-  std::optional<VectorBounds> sum;      ///< what rho takes in; nothing for a plain network
+  std::optional<VectorBounds> sum;  ///< what rho takes in; nothing for a plain network
+  /// Of f: those of the last layer, with 0 where NET is silent among so many neighbours, or nothing but 0.
+  std::vector<double> lower, upper;
   std::optional<double> jump;           ///< where a neighbour comes or goes, Euclidean
   std::optional<double> float32_error;  ///< Euclidean
-
-  const VectorBounds& output() const;  ///< of the last layer
 };
 
 struct ValueOptions {

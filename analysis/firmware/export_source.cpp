@@ -374,6 +374,13 @@ std::string samples_text(const files::Network& network, std::uint64_t seed) {
 
 }  // namespace
 
+long weights_bytes(const files::Network& network) {
+  std::size_t numbers = 0;
+  for (const auto& [name, weights] : files::parts(network))
+    for (const files::Layer& layer : weights->layers) numbers += layer.weights.size() + layer.biases.size();
+  return static_cast<long>(numbers * sizeof(float));
+}
+
 std::vector<SourceFile> export_source(const files::Network& network, const ExportOptions& options) {
   if (network.plain) {
     throw files::InputError({network.plain->path, "", "", "",

@@ -32,7 +32,7 @@ Evidence::~Evidence() = default;
 
 const files::Network& Evidence::flown() {
   if (!network_) {
-    files::Network network = files::load_network(release().network);
+    files::Network network = files::load_evaluated_network(release().network);
     if (release().is_float32 && !is_stored_as_float32(network))
       network = files::as_float32(std::move(network));
     network_ = std::make_unique<files::Network>(std::move(network));
@@ -50,7 +50,7 @@ const files::Json& Evidence::certificate() {
 
 const check::CheckResult& Evidence::certificate_verdict() {
   if (!verdict_) {
-    const files::Network stored = files::load_network(release().network);
+    const files::Network stored = files::load_evaluated_network(release().network);
     verdict_ = std::make_unique<check::CheckResult>(check::check(certificate(), stored));
   }
   return *verdict_;
@@ -60,7 +60,7 @@ std::string Evidence::why_not_certified() {
   const check::CheckResult& verdict = certificate_verdict();
   if (!verdict.accepted) return verdict.reason;
   const files::Json& as = certificate()["network"]["as"];
-  const bool is_stored_float32 = is_stored_as_float32(files::load_network(release().network));
+  const bool is_stored_float32 = is_stored_as_float32(files::load_evaluated_network(release().network));
   if (release().is_float32 && !is_stored_float32 && as != "float32")
     return "it is about the float64 weights as stored, but float32 flies: certify --as float32";
   if (!release().is_float32 && as == "float32")
@@ -129,6 +129,9 @@ std::map<std::string, double> Evidence::global_bounds() {
 }
 
 std::map<std::string, lipschitz::Box> Evidence::domain() {
+  if (flown().invariants)
+    throw Unfounded(
+        "values over a box are bounded of networks of relative states, not of rotation invariants");
   if (!release().box.empty()) return lipschitz::read_domain(release().box, flown());
   std::map<std::string, lipschitz::Box> clamp = lipschitz::clamp_domain(flown());
   if (clamp.empty()) throw Unfounded("no box: name box in [release], or clamp the inputs in network.toml");

@@ -76,10 +76,13 @@ class CertificateChecker {
   // check_values.cpp
   /// Range, jump and float32 error over a box, layer by layer.
   void check_values(const Json& entry);
-  /// |f - f'| <= jump where a neighbour comes or goes, from the bound of rho and the range of the neighbour's term.
+  /// |f - f'| <= jump where a neighbour comes or goes, from the bound of rho and the range of the neighbour's term; and
+  /// |f| <= jump beside compositions in which the network is silent.
   void check_jump(const Json& entry, const Bounded& moved, const std::vector<std::string>& names,
                   const std::string& where) const;
-  /// What reaches the first layer of network `name`.
+  /// The box of an entry, as the first layer of network `name` sees it.
+  Intervals values_box(const Json& entry, const std::string& name, const std::string& where) const;
+  /// The same with the errors of the inputs.
   Bounded values_input(const Json& entry, const std::string& name, const std::string& where) const;
 
   // check_lower.cpp

@@ -183,9 +183,6 @@ void CertificateChecker::check_bound(const Json& bound) {
   check_status(bound, where);
   check_activations(bound, names, where);
   check_invariants(bound, function, where);
-  if (files::is_ever_silent(network_, function))
-    require(bound["lower"].is_null() && bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
-            where + ": a lower bound of a function that is 0 in some compositions");
   files::block_coordinates(network_, function, block);  // refuses what is no block of the function
   if (bound["upper_method"] == "sdp" || bound["upper_method"] == "eclipse_fast") {
     check_upper(bent_chain(network_, function, block, scale), bound["proof"], upper, where);
@@ -334,8 +331,12 @@ std::string statement_for(const files::Network& network) {
     const std::vector<files::Activation> all = part.second->activations();
     return std::any_of(all.begin(), all.end(), [](auto one) { return files::function_of(one).sorts(); });
   });
-  return std::string(kStatement) + (sorts ? kSortingStatement : "") +
-         (network.invariants ? kInvariantsStatement : "") + (network.silent.empty() ? "" : kSilentStatement);
+  std::string text = kStatement;
+  if (sorts) text += kSortingStatement;
+  if (network.invariants) text += kInvariantsStatement;
+  const std::vector<std::string> silent = files::silent_compositions(network);
+  for (std::size_t k = 0; k < silent.size(); ++k) text += (k == 0 ? kSilentStatement : ", ") + silent[k];
+  return text + (silent.empty() ? "" : ".");
 }
 
 namespace {

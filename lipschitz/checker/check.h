@@ -32,8 +32,9 @@ files::Network with_stated_activations(const files::Json& certificate, files::Ne
 /// named weights; each spectral norm from both sides; each upper bound by its linear matrix inequality
 /// (lipschitz_lmi.h), part by part on a box (tree_proof.h), as product of norms, or by a law from bounds verified
 /// before; each lower bound by the exact slope between its two witness points; ranges, jumps and float32 errors layer
-/// by layer (values.h). Of functions with another activation than ReLU only bounds for all inputs, by a matrix
-/// inequality or by the product, and laws. A malformed certificate is answered with a reason, not with an exception.
+/// by layer (values.h), with the 0 and the steps of compositions in which NET is silent. Of functions with another
+/// activation than ReLU only bounds for all inputs, by a matrix inequality or by the product, and laws. A malformed
+/// certificate is answered with a reason, not with an exception.
 CheckResult check(const files::Json& certificate, const files::Network& network);
 
 }  // namespace swarmcert::check

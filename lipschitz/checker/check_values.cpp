@@ -95,8 +95,6 @@ void CertificateChecker::check_values(const Json& entry) {
   const bool is_set = names.size() == 2;
   for (const std::string& name : names)
     require(parts_.count(name) == 1, where + ": there is no network " + name);
-  require(!files::is_ever_silent(network_, function),
-          where + ": values of a function that is 0 in some compositions");
   require(!network_.invariants, where + ": values of a function of rotation invariants");
   require(is_set ? names[0] != files::kGroundPhi : function == "network",
           where + ": only of the network, or of a sum over neighbours");
@@ -127,7 +125,14 @@ void CertificateChecker::check_values(const Json& entry) {
   if (is_set) result = check_sum(entry, terms, *parts_.at(names[1]), names[1], where);
   const std::vector<Dyadic> lower = exact(files::parse_hex_floats(entry["lower"]));
   const std::vector<Dyadic> upper = exact(files::parse_hex_floats(entry["upper"]));
-  require(at_most(lower, result.values.lower) && at_most(result.values.upper, upper),
+  require(lower.size() == result.values.lower.size() && upper.size() == lower.size(),
+          where + ": needs one range per output");
+  const long silent = files::silent_up_to(network_, function, neighbours);
+  const std::vector<Dyadic> zeros(lower.size());
+  require(silent == 0 || (at_most(lower, zeros) && at_most(zeros, upper)),
+          where + ": the range lacks the 0 of neighbours among which the network is silent");
+  require(silent == neighbours + 1 ||
+              (at_most(lower, result.values.lower) && at_most(result.values.upper, upper)),
           where + ": the values leave the range");
   check_jump(entry, terms.front(), names, where);
   require(
@@ -152,27 +157,34 @@ void CertificateChecker::check_jump(const Json& entry, const Bounded& moved,
   require(bound != proved_.end(), where + ": rests on a bound of " + names[1] + " that is not there");
   require(jump * jump >= bound->second * bound->second * largest_square(moved.values),
           where + ": claims less than the jump");
+  const auto inputs = [&](const std::string& part) { return values_box(entry, part, where); };
+  require(jump * jump >= silent_step_square(network_, entry["function"].get<std::string>(), inputs),
+          where + ": claims less than the step to neighbours among which the network is silent");
+}
+
+Intervals CertificateChecker::values_box(const Json& entry, const std::string& name,
+                                         const std::string& where) const {
+  if (entry["domain"] == "box") {
+    require(certificate_["box"].is_object(), where + ": there is no box");
+    Row lower, upper;
+    read_box(name, lower, upper, where);
+    return {exact(lower), exact(upper)};
+  }
+  require(entry["domain"] == "clamp" && network_.clamp && files::is_clamped(name),
+          where + ": the domain is neither the box nor a clamp of this input");
+  return {exact(network_.clamp->lower), exact(network_.clamp->upper)};
 }
 
 Bounded CertificateChecker::values_input(const Json& entry, const std::string& name,
                                          const std::string& where) const {
-  Row lower, upper;
-  if (entry["domain"] == "box") {
-    require(certificate_["box"].is_object(), where + ": there is no box");
-    read_box(name, lower, upper, where);
-  } else {
-    require(entry["domain"] == "clamp" && network_.clamp && files::is_clamped(name),
-            where + ": the domain is neither the box nor a clamp of this input");
-    lower = network_.clamp->lower;
-    upper = network_.clamp->upper;
-  }
-  Bounded input{{exact(lower), exact(upper)}, {}};
+  Bounded input{values_box(entry, name, where), {}};
   if (entry["input_error"].is_null()) return input;
   require(parts_.at(name)->precision == files::Precision::kFloat32, where + kNotFloat32);
   input.error = exact(files::parse_hex_floats(entry["input_error"].at(name)));
-  require(input.error.size() == lower.size() && std::all_of(input.error.begin(), input.error.end(),
-                                                            [](const Dyadic& x) { return x.sign() >= 0; }),
-          where + ": needs one input error per input, none negative");
+  require(
+      input.error.size() == input.values.lower.size() &&
+          std::all_of(input.error.begin(), input.error.end(), [](const Dyadic& x) { return x.sign() >= 0; }),
+      where + ": needs one input error per input, none negative");
   return input;
 }
 

@@ -45,12 +45,12 @@ inline constexpr const char* kInvariantsStatement =
     "invariants: of a neighbour |p_xy|, 3/2 p_z, |v_xy|, 3/2 v_z, |p_xy + v_xy / 2|, and the ground's phi "
     "-z, |v_xy|, -v_z. So the input clamp is one of invariants, and phi alone is a function of them.";
 
-/// What is added for networks that are silent in some compositions.
+/// What is added for networks that are silent in some compositions, before their names.
 inline constexpr const char* kSilentStatement =
-    " Among neighbours that network.toml calls silent, as many of each kind as it lists and no others, the "
-    "set functions of that kind of vehicle are 0. Their bounds hold while the neighbours stay the same: "
-    "where one comes or goes that makes or ends such a composition they step by all of their value, which "
-    "nothing here bounds.";
+    " Among these neighbours > vehicle, as many of each kind and no others, the set functions of that kind "
+    "of vehicle are 0. Bounds and laws hold while the neighbours stay the same, lower bounds at witnesses "
+    "among other neighbours than these. Ranges hold this 0, and jumps bound the steps as well by which one "
+    "neighbour that comes or goes makes or ends such a composition, while all are in the box or clamp: ";
 
 /// The statement of a certificate for NET.
 std::string statement_for(const files::Network& network);

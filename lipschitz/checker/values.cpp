@@ -1,6 +1,8 @@
 #include "lipschitz/checker/values.h"
 
 #include "lipschitz/checker/activation_bounds.h"
+#include "nn/weights/compositions.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::check {
 namespace {
@@ -126,6 +128,24 @@ Dyadic largest_square(const Intervals& intervals) {
   }
   return sum;
 }
+
+Dyadic silent_step_square(const files::Network& network, const std::string& function,
+                          const std::function<Intervals(const std::string& part)>& inputs) {
+  Dyadic largest;
+  const auto networks = files::parts(network);
+  for (std::vector<std::string> parts : files::beside_silent(network, function)) {
+    if (networks.count(files::kGroundPhi) == 1) parts.emplace_back(files::kGroundPhi);
+    const files::Weights& rho = *networks.at(files::networks_of(function).back());
+    std::vector<SumTerm> terms;
+    for (const std::string& part : parts)
+      terms.push_back({{network_intervals(*networks.at(part), inputs(part)), {}}, 1, 1});
+    const Intervals sum = sum_intervals(terms, static_cast<std::size_t>(rho.inputs()));
+    largest = larger(largest, largest_square(network_intervals(rho, sum)));
+  }
+  return largest;
+}
+
+const Dyadic& larger(const Dyadic& a, const Dyadic& b) { return a >= b ? a : b; }
 
 Dyadic square(const std::vector<Dyadic>& values) {
   Dyadic sum;

@@ -2,12 +2,14 @@
 /// is. Not for users.
 #pragma once
 
+#include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "lipschitz/checker/dyadic.h"
 #include "nn/weights/activation_function.h"
-#include "nn/weights/weights.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::check {
 
@@ -52,6 +54,12 @@ std::optional<std::vector<Dyadic>> sum_error(const std::vector<SumTerm>& terms, 
 
 /// The sum of squares of the largest absolute values.
 Dyadic largest_square(const Intervals& intervals);
+/// At least |f|^2 of the set function `function` among all neighbours from which one of its own kind comes or goes to a
+/// composition in which NET is silent, by exact intervals layer by layer: the square of what f steps by there.
+/// @param inputs the box of a part, as its first layer sees it.
+Dyadic silent_step_square(const files::Network& network, const std::string& function,
+                          const std::function<Intervals(const std::string& part)>& inputs);
+const Dyadic& larger(const Dyadic& a, const Dyadic& b);
 /// The sum of squares.
 Dyadic square(const std::vector<Dyadic>& values);
 

@@ -279,7 +279,10 @@ SlopeFunction slope_function(const files::Network& network, const std::string& f
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const std::vector<std::string> names = files::networks_of(function);
   if (files::maps_to_invariants(network, function)) refuse(function + " maps to rotation invariants");
-  if (files::is_ever_silent(network, function)) refuse(function + " is 0 in some compositions");
+  std::vector<std::string> neighbours = others;
+  neighbours.push_back(names[0]);
+  if (files::is_silent_among(network, function, neighbours))
+    refuse(function + " is 0 among these neighbours");
   const auto term = [&](const std::string& name) {
     const bool clamped = network.clamp && files::is_clamped(name);
     return Term{parts.at(name), clamped ? &*network.clamp : nullptr};
@@ -304,7 +307,6 @@ std::vector<mpq_class> value(const files::Network& network, const std::string& f
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const std::vector<std::string> names = files::networks_of(function);
   if (files::maps_to_invariants(network, function)) refuse(function + " maps to rotation invariants");
-  if (files::is_ever_silent(network, function)) refuse(function + " is 0 in some compositions");
   if (names.size() == 1 && networks.size() != 1) refuse("a plain network has one point");
   if (networks.size() != points.size()) refuse("there is not one point per network");
   DyadicVector sum;
@@ -315,6 +317,8 @@ std::vector<mpq_class> value(const files::Network& network, const std::string& f
     check_point(points[j], term, "point " + std::to_string(j));
     add(sum, evaluate(term, points[j]));
   }
+  if (files::is_silent_among(network, function, networks))
+    return std::vector<mpq_class>(static_cast<std::size_t>(parts.at(names[1])->outputs()));
   if (names.size() == 2) sum = evaluate(*parts.at(names[1]), std::move(sum));
   std::vector<mpq_class> result;
   for (const mpz_class& integer : sum.integers) result.push_back(scaled(integer, sum.exponent));

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "nn/base/input_error.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::files {
@@ -45,10 +44,52 @@ bool is_ever_silent(const Network& network, const std::string& function) {
   return is_set(function) && network.silent.count(kind_of(networks_of(function).back())) == 1;
 }
 
-void require_never_silent(const Network& network, const std::string& what) {
-  if (network.silent.empty()) return;
-  throw InputError({network.path, "", "silent", in_quotes(silent_compositions(network).front()),
-                    "but " + what, "certify without --domain, compare, simulate, export and match take it"});
+bool is_silent_among(const Network& network, const std::string& function,
+                     const std::vector<std::string>& parts) {
+  if (!is_set(function)) return false;
+  const auto found = network.silent.find(kind_of(networks_of(function).back()));
+  if (found == network.silent.end()) return false;
+  std::vector<std::string> kinds;
+  for (const std::string& part : parts)
+    if (part != kGroundPhi) kinds.push_back(kind_of(part));
+  std::sort(kinds.begin(), kinds.end());
+  return found->second.count(kinds) == 1;
+}
+
+long silent_up_to(const Network& network, const std::string& function, long most) {
+  if (!is_ever_silent(network, function)) return 0;
+  const std::vector<std::string> names = networks_of(function);
+  const auto& compositions = network.silent.at(kind_of(names.back()));
+  return std::count_if(
+      compositions.begin(), compositions.end(), [&](const std::vector<std::string>& neighbours) {
+        return static_cast<long>(neighbours.size()) <= most &&
+               std::all_of(neighbours.begin(), neighbours.end(),
+                           [&](const std::string& kind) { return kind == kind_of(names.front()); });
+      });
+}
+
+std::set<std::vector<std::string>> beside_silent(const Network& network, const std::string& function) {
+  std::set<std::vector<std::string>> result;
+  if (!is_ever_silent(network, function)) return result;
+  const std::vector<std::string> names = networks_of(function);
+  if (names.front() == kGroundPhi) return result;  // the ground stays
+  for (const std::vector<std::string>& neighbours : network.silent.at(kind_of(names.back()))) {
+    std::vector<std::string> parts;
+    for (const std::string& kind : neighbours) parts.push_back(phi_name(kind));
+    const auto add = [&](std::vector<std::string> beside) {
+      std::sort(beside.begin(), beside.end());
+      if (!is_silent_among(network, function, beside)) result.insert(std::move(beside));
+    };
+    const auto own = std::find(parts.begin(), parts.end(), names.front());
+    if (own != parts.end()) {
+      std::vector<std::string> fewer = parts;
+      fewer.erase(fewer.begin() + (own - parts.begin()));
+      add(std::move(fewer));
+    }
+    parts.push_back(names.front());
+    add(std::move(parts));
+  }
+  return result;
 }
 
 }  // namespace swarmcert::files

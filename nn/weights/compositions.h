@@ -1,6 +1,7 @@
 /// @file Which kinds of vehicles are together: "large+small>small" is a small one among a large and a small one.
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -22,10 +23,19 @@ std::vector<std::string> silent_compositions(const Network& network);
 std::vector<int> silent_counts(const Network& network, const std::string& own);
 
 /// Whether `function` is a set function that is 0 in some compositions. Then it is no composition of rho and a sum as a
-/// whole: bounds hold while the neighbours stay the same, and nothing bounds the step where one comes or goes.
+/// whole: slopes are bounded while the neighbours stay the same, and it steps where one comes or goes that makes or ends
+/// such a composition.
 bool is_ever_silent(const Network& network, const std::string& function);
 
-/// @throws InputError if NET is silent in some composition; `what` says what is for networks that never are.
-void require_never_silent(const Network& network, const std::string& what);
+/// Whether the set function `function` is 0 among these neighbours, "phi:<kind>" each; the ground is none.
+bool is_silent_among(const Network& network, const std::string& function,
+                     const std::vector<std::string>& parts);
+
+/// How many of the compositions of 0, 1, ... `most` neighbours of the set function's own kind are silent.
+long silent_up_to(const Network& network, const std::string& function, long most);
+
+/// The compositions with a network from which one neighbour of the set function's own kind comes or goes to a silent
+/// one: the neighbours of each, "phi:<kind>", in order of names. The function steps there by all of its value.
+std::set<std::vector<std::string>> beside_silent(const Network& network, const std::string& function);
 
 }  // namespace swarmcert::files

@@ -8,7 +8,6 @@
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
 #include "nn/weights/activation.h"
-#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
 
@@ -366,7 +365,6 @@ Network load_evaluated_network(const NetworkArguments& arguments) {
 Network load_network(const NetworkArguments& arguments) {
   Network network = load_evaluated_network(arguments);
   require_relative_states(network, "this command is for networks of relative states");
-  require_never_silent(network, "this command is for networks that are silent nowhere");
   return network;
 }
 

@@ -65,9 +65,10 @@ INVARIANTS_STATEMENT = (
     "one of invariants, and phi alone is a function of them.")
 # Added for networks that are silent in some compositions.
 SILENT_STATEMENT = (
-    " Among neighbours that network.toml calls silent, as many of each kind as it lists and no others, the set "
-    "functions of that kind of vehicle are 0. Their bounds hold while the neighbours stay the same: where one comes "
-    "or goes that makes or ends such a composition they step by all of their value, which nothing here bounds.")
+    " Among these neighbours > vehicle, as many of each kind and no others, the set functions of that kind of vehicle "
+    "are 0. Bounds and laws hold while the neighbours stay the same, lower bounds at witnesses among other neighbours "
+    "than these. Ranges hold this 0, and jumps bound the steps as well by which one neighbour that comes or goes makes "
+    "or ends such a composition, while all are in the box or clamp: ")
 # The map to a neighbour's is 3/2-Lipschitz: the three norms change by at most the square root of the largest eigenvalue
 # of I + (1, 1/2)' (1, 1/2), which is 1 + 1 + 1/4; the ground's is 1-Lipschitz.
 SLOPE_OF_INVARIANTS, SLOPE_OF_GROUND_INVARIANTS = Fraction(3, 2), Fraction(1)
@@ -811,7 +812,7 @@ class Network:
         """orders: of layers, by "network", "phi" and "rho"; those of a network.toml stand there."""
         orders = orders or {}
         self.sha256, self.unit, self.order, self.clamp, self.invariants = "", "", [], None, False
-        self.silent = set()  # kinds of vehicles with compositions in which they have no network
+        self.silent = set()  # (kind of the vehicle, kinds of its neighbours in order) where it has no network
         if phi:
             self.parts = {f"{role}:default": read_weights(file, key, orders.get(role), activation)
                           for role, file in (("phi", phi), ("rho", rho))}
@@ -831,7 +832,8 @@ class Network:
             require_input(isinstance(silent, list) and all(isinstance(one, str) for one in silent) and
                           all(one.partition(">")[2] in document["rho"] for one in silent),
                           f"{net}: silent: a list of compositions, e.g. large+small>small")
-            self.silent = {one.partition(">")[2] for one in silent}
+            self.silent = {(own, tuple(sorted(kinds.split("+") if kinds else [])))
+                           for kinds, _, own in (one.partition(">") for one in silent)}
             clamp = document.get("input", {}).get("clamp")
             self.clamp = clamp and (clamp["lower"], clamp["upper"])
 
@@ -865,8 +867,33 @@ class Network:
     def maps_to_invariants(self, function):
         return self.invariants and function.startswith("set:")
 
-    def is_ever_silent(self, function):
-        return function.startswith("set:") and function.rpartition(":")[2] in self.silent
+    def is_silent_among(self, function, parts):
+        """Whether a set function is 0 among these neighbours, "phi:<kind>" each, besides the ground."""
+        kinds = sorted(part[4:] for part in parts if part != "phi:ground")
+        return function.startswith("set:") and (function.rpartition(":")[2], tuple(kinds)) in self.silent
+
+    def silent_up_to(self, function, most):
+        """How many compositions of at most so many neighbours of the function's own kind are silent."""
+        kind, _, own = function[4:].partition(":")
+        return sum(function.startswith("set:") and vehicle == own and len(kinds) <= most and set(kinds) <= {kind}
+                   for vehicle, kinds in self.silent)
+
+    def beside_silent(self, function):
+        """Compositions with a network that one neighbour of the function's own kind makes of a silent one, or ends."""
+        kind, _, own = function[4:].partition(":")
+        found = set()
+        for vehicle, kinds in self.silent:
+            if not function.startswith("set:") or vehicle != own or kind == "ground":
+                continue
+            less = list(kinds)
+            if kind in less:
+                less.remove(kind)
+                found.add(tuple(less))
+            found.add(tuple(sorted(kinds + (kind,))))
+        return {kinds for kinds in found if (own, kinds) not in self.silent}
+
+    def silent_names(self):
+        return ["+".join(kinds) + ">" + own for own, kinds in sorted(self.silent)]
 
     def slope_of_inputs(self, function):
         """Lipschitz constant of the map from the function's inputs to what its first layer sees."""
@@ -1844,7 +1871,8 @@ class Checker:
                       for step in weights["chain"])
         require(self.c["statement"] == STATEMENT + SORTING_STATEMENT * sorting +
                 INVARIANTS_STATEMENT * self.network.invariants +
-                SILENT_STATEMENT * bool(self.network.silent), "another statement")
+                (SILENT_STATEMENT + ", ".join(self.network.silent_names()) + ".") * bool(self.network.silent),
+                "another statement")
         require(self.c["content_sha256"] == content_sha256(self.c), "content_sha256 does not match")
         require(isinstance(self.c["tool"], str), "tool is not text")
         self.check_network(self.c["network"])
@@ -1971,9 +1999,6 @@ class Checker:
                     f"{where}: of rotation invariants, only bounds for all inputs together")
             require(bound["lower"] is None and bound["lower_hex"] is None and bound["lower_witness"] is None,
                     f"{where}: a lower bound of a function of rotation invariants")
-        if self.network.is_ever_silent(function):
-            require(bound["lower"] is None and bound["lower_hex"] is None and bound["lower_witness"] is None,
-                    f"{where}: a lower bound of a function that is 0 somewhere")
         if bound["upper_method"] in ("sdp", "eclipse_fast"):
             self.check_upper(stages(self.network, function, block, scale), bound["proof"], upper, where,
                              slope_ranges(self.network, function))
@@ -2217,6 +2242,7 @@ class Checker:
         neighbours, there = self.neighbours_of(bound, where), [names[0]] + [o for o, _ in others]
         require(not neighbours or all(there.count(o) <= neighbours.get(o[4:], 0) for o in there if o != "phi:ground"),
                 f"{where}: has more neighbours than listed")
+        require(not self.network.is_silent_among(function, there), f"{where}: 0 among these neighbours")
         block = block_coordinates(self.network, function, bound["block"])
         require(all(a == b for k, (a, b) in enumerate(zip(x, y)) if k not in block), f"{where}: leaves its block")
         run = sum(((Fraction(a) - Fraction(b)) / (Fraction(s) if scale else 1)) ** 2
@@ -2283,7 +2309,6 @@ class Checker:
         require(isinstance(entry["function"], str), "values: function is not text")
         where, names = f"values of {entry['function']}", networks_of(entry["function"])
         require(not self.network.invariants, f"{where}: of a function of rotation invariants")
-        require(not self.network.is_ever_silent(entry["function"]), f"{where}: of a function that is 0 somewhere")
         is_set, is_float32 = len(names) == 2, entry["input_error"] is not None
         require(names[0] != "phi:ground" if is_set else names == ["network"],
                 f"{where}: only of the network, or of a sum")
@@ -2312,7 +2337,10 @@ class Checker:
             result = self.stated(entry["sum"], size, sum_bounds(terms, size, is_float32), is_float32, f"{where}: sum")
             result = self.follow_layers(names[1], entry, result, where)
         lower, upper = ([Fraction(x) for x in hex_floats(entry[key])] for key in ("lower", "upper"))
-        require(len(lower) == len(upper) == len(result.lower) and all(
+        silent = self.network.silent_up_to(entry["function"], count)
+        require(len(lower) == len(upper) == len(result.lower), f"{where}: needs one range per output")
+        require(silent == 0 or (max(lower) <= 0 <= min(upper)), f"{where}: the range lacks a 0")
+        require(silent == count + 1 or all(
             a <= l and u <= b for a, l, u, b in zip(lower, result.lower, result.upper, upper)),
             f"{where}: the values leave the range")
         require((entry["jump"] is not None) == (entry["jump_hex"] is not None) == is_set,
@@ -2323,11 +2351,25 @@ class Checker:
             require(key in self.proved, f"{where}: no bound of {names[1]}")
             require(jump ** 2 >= self.proved[key] ** 2 * sum(x * x for x in terms[0][0].sizes()),
                     f"{where}: claims less than the jump")
+            for kinds in self.network.beside_silent(entry["function"]):
+                require(jump ** 2 >= self.largest_square(kinds, names[1], entry, where),
+                        f"{where}: claims less than the step to a 0")
         require((entry["float32_error"] is not None) == (entry["float32_error_hex"] is not None) == is_float32,
                 f"{where}: a float32 error where there are input errors, and only there")
         if is_float32:
             error = Fraction(number(entry["float32_error"], entry["float32_error_hex"], where))
             require(error ** 2 >= sum(x * x for x in result.error), f"{where}: claims less than the float32 error")
+
+    def largest_square(self, kinds, rho, entry, where):
+        """At least |f|^2 among exactly these neighbours."""
+        without_error = dict(entry, input_error=None)
+        low = high = [Fraction(0)] * self.network.parts[rho].layers[0].inputs
+        for part in ["phi:" + kind for kind in kinds] + ["phi:ground"] * ("phi:ground" in self.network.parts):
+            box = self.values_input(part, without_error, where)
+            least, most = enclosed_values(self.network.parts[part], box.lower, box.upper)
+            low, high = ([a + b for a, b in zip(*sides)] for sides in ((low, least), (high, most)))
+        low, high = enclosed_values(self.network.parts[rho], low, high)
+        return sum(max(abs(a), abs(b)) ** 2 for a, b in zip(low, high))
 
     def values_input(self, name, entry, where):
         """What reaches the first layer of a network."""

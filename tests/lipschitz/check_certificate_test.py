@@ -123,16 +123,46 @@ def of_invariants(folder, generator):
 
 
 def silent(folder):
-    """The network of heterogeneous(), without a word between a small and a large vehicle."""
+    """The network of heterogeneous(), without a word near a small one, alone or with a large one."""
     net = folder / "silent.toml"
     net.write_text((folder / "network.toml").read_text().replace(
-        "[input]", 'silent = ["large+small>small"]\n[input]', 1))
+        "[input]", 'silent = ["large+small>small", "small>small"]\n[input]', 1))
     return net
 
 
 def check_silent(certificate, net, folder):
-    """What is 0 in some compositions has no lower bound, and another statement."""
-    def refused(change):
+    """What is 0 in some compositions has no witness there, a 0 in its range, and another statement."""
+    def said_of(change):
+        changed = json.loads(json.dumps(certificate))
+        change(changed)
+        changed["content_sha256"] = second.content_sha256(changed)
+        accepted, said = first_checker(changed, net, folder, 0)
+        reason = second.check(changed, second.Network(**arguments(net)))
+        assert accepted == (not reason), f"first says {said!r}, second says {reason!r}"
+        return reason
+
+    assert any(bound["lower"] for bound in certificate["bounds"] if bound["function"].startswith("set:"))
+    assert said_of(lambda changed: changed.update(statement=second.STATEMENT))
+    other_names = certificate["statement"].replace(", small>small", "")
+    assert other_names != certificate["statement"] and said_of(lambda changed: changed.update(statement=other_names))
+    point = ["0x0p+0"] * 6
+    ground = {"network": "phi:ground", "x": point[:4]}
+    for i, bound in enumerate(certificate["bounds"]):
+        if bound["function"] not in ("set:small:small", "set:large:small"):
+            continue
+        own = bound["function"].split(":")[1]
+        other = {"network": "phi:large" if own == "small" else "phi:small", "x": point}
+        for others, is_silent in (([ground], own == "small"), ([ground, other], True), ([ground, other, other], False)):
+            witness = {"x": point, "y": ["0x1p+0"] + point[1:], "others": others}
+            reason = said_of(lambda changed: changed["bounds"][i].update(
+                lower=0.0, lower_hex="0x0p+0", lower_witness=witness))
+            assert is_silent == ("0 among these neighbours" in reason), reason
+    for i, entry in enumerate(certificate["values"]):
+        if entry["function"] == "set:small:small":
+            assert "lacks a 0" in said_of(lambda changed: changed["values"][i].update(lower=["0x1p-1000"]))
+
+
+def refused(change):
         changed = json.loads(json.dumps(certificate))
         change(changed)
         changed["content_sha256"] = second.content_sha256(changed)
@@ -476,7 +506,8 @@ def run():
         invariant_net = str(of_invariants(folder, generator))
         nets += [([invariant_net], ["--blocks", "--neighbours", "large=2,small=1"])]
         silent_net = str(silent(folder))
-        nets += [([silent_net], ["--neighbours", "large=2,small=1"])]
+        nets += [([silent_net], ["--neighbours", "large=2,small=1"]),
+                 ([silent_net], ["--domain", str(folder / "box.toml"), "--neighbours", "2"])]
         nets += [(net, []) for net in smooth_models(folder, generator)]
         nets += [([str(tiny)], ["--activation", ops])
                  for ops in ("silu", "gelu", "sigmoid", "tanh,relu", "relu,silu,sigmoid", "elu,relu,relu")]

@@ -85,7 +85,7 @@ TEST(Extremes, FormsOverSumsAreNotBelowAnySumOfOutputs) {
       lipschitz::reach_network(tests::random_network({3, 6, 4}, generator));
   const lipschitz::Hull phi_hull = lipschitz::hull(phi, kUnitBox, 64);
   const lipschitz::Hull ground_hull = lipschitz::hull(ground, kUnitBox, 64);
-  const lipschitz::SumSupport support{&phi_hull, 3, &ground_hull, 1};
+  const lipschitz::SumSupport support{{{&phi_hull, 3}, {&ground_hull, 1}}, 4, 1};
   const lipschitz::LinearForms forms{Eigen::MatrixXd::Random(5, 4), VectorXd::Random(5)};
   const VectorXd bound = support(forms);
   VectorXd largest = VectorXd::Constant(5, -1e300);

@@ -119,8 +119,27 @@ TEST(NetworkToml, SilentCompositionsAreOfKindsThatItHasInAnyOrderAndEachOnce) {
   EXPECT_TRUE(refused("[\"ground>small\"]", {"there is no phi.ground of a neighbour"}));
   EXPECT_TRUE(refused("[\"small+>small\"]", {"there is no phi. of a neighbour"}));
   EXPECT_TRUE(refused("[\"small+large>small\", \"large+small>small\"]", {"named twice"}));
-  EXPECT_TRUE(refuses([&] { require_never_silent(network, "this is for others"); },
-                      {"nets/network.toml", "silent", "small+small>large", "this is for others"}));
+}
+
+TEST(NetworkToml, SilentCompositionsAreFoundByTheNeighboursAndFromOneNeighbourMoreOrLess) {
+  Network network;
+  network.silent["small"] = {{}, {"small"}, {"large", "small"}};
+  EXPECT_TRUE(is_silent_among(network, "set:small:small", {"phi:small", "phi:ground", "phi:large"}));
+  EXPECT_TRUE(is_silent_among(network, "set:ground:small", {"phi:ground"}));
+  EXPECT_FALSE(is_silent_among(network, "set:small:small", {"phi:small", "phi:small"}));
+  EXPECT_FALSE(is_silent_among(network, "set:small:large", {"phi:small"}));
+  EXPECT_FALSE(is_silent_among(network, "phi:small", {"phi:small"}));
+  EXPECT_EQ(silent_up_to(network, "set:small:small", 0), 1);
+  EXPECT_EQ(silent_up_to(network, "set:small:small", 5), 2);
+  EXPECT_EQ(silent_up_to(network, "set:large:small", 5), 1);
+  EXPECT_EQ(silent_up_to(network, "set:small:large", 5), 0);
+  using Parts = std::set<std::vector<std::string>>;
+  EXPECT_EQ(beside_silent(network, "set:small:small"),
+            (Parts{{"phi:small", "phi:small"}, {"phi:large"}, {"phi:large", "phi:small", "phi:small"}}));
+  EXPECT_EQ(beside_silent(network, "set:large:small"),
+            (Parts{{"phi:large"}, {"phi:large", "phi:large", "phi:small"}}));
+  EXPECT_TRUE(beside_silent(network, "set:ground:small").empty());
+  EXPECT_TRUE(beside_silent(network, "set:small:large").empty());
 }
 
 TEST(NetworkToml, EveryKeyIsRead) {

@@ -110,8 +110,8 @@ TEST(LearnedForce, LiesBetweenItsFormsWithAGroundOfAnotherDepth) {
   expect_enclosed(network, 2, 13);
 }
 
-// Simulation and models fly it; a tube, whose force has no steps, does not.
-TEST(DeepSetForce, IsZeroInASilentCompositionAlsoOfNeighboursThatFadeAndNoTubeTakesIt) {
+// Simulation and models fly it, and a tube, whose neighbours stay the same.
+TEST(DeepSetForce, IsZeroInASilentCompositionAlsoOfNeighboursThatFadeAndInATube) {
   files::Network network = tests::demo_network();
   DeepSetForce always(network, "small", {"small"});
   network.silent["small"] = {{"small", "small"}};
@@ -133,7 +133,15 @@ TEST(DeepSetForce, IsZeroInASilentCompositionAlsoOfNeighboursThatFadeAndNoTubeTa
   now.num_neighbours = 2;
   const double weights[] = {1, 0.25};
   EXPECT_NEAR(force.force_z_N(now, weights), 0.75 * one, 1e-15) << "a quarter of what is silent is missing";
-  EXPECT_THROW(LearnedForce(network, "small", 2), files::InputError);
+  const lipschitz::Box box{std::vector<double>(static_cast<std::size_t>(state_size(2)), -0.4),
+                           std::vector<double>(static_cast<std::size_t>(state_size(2)), 0.4)};
+  const LearnedForce::Forms forms = LearnedForce(network, "small", 2).over(box);
+  EXPECT_EQ(forms.upper_row.norm(), 0);
+  EXPECT_EQ(forms.lower_row.norm(), 0);
+  EXPECT_GE(forms.upper, 0);
+  EXPECT_LT(forms.upper, 1e-12);
+  EXPECT_LT(forms.lower, 1e-12);
+  expect_enclosed(network, 3, 13);
 }
 
 }  // namespace

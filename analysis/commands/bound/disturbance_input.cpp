@@ -11,6 +11,7 @@
 #include "lipschitz/checker/check.h"
 #include "nn/base/doubles.h"
 #include "nn/base/input_error.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::analysis {
@@ -176,22 +177,28 @@ Constants largest(const Bounds& bounds, const Function& function, const Upper& u
   return result;
 }
 
-files::Network force_network(const DisturbanceArguments& arguments, std::vector<std::string>& inputs) {
-  files::Network network = load_net(arguments.network);
+files::Network force_network(const DisturbanceArguments& arguments, std::vector<std::string>& inputs,
+                             std::vector<std::string>& notes) {
+  files::Network network = load_evaluated_net(arguments.network);
   files::require_force_z(network);
   for (const std::string& path : input_files(network)) inputs.push_back(path);
+  for (const std::string& composition : files::silent_compositions(network))
+    notes.push_back("f_hat is 0 among " + composition +
+                    ": its rate holds while the neighbours stay the same; one that comes or goes there is an "
+                    "edge, at most the jump of certify --domain");
   return network;
 }
 
 /// Those of a certificate, which the checker must accept for the network.
-Constants certified_constants(const DisturbanceArguments& arguments, std::vector<std::string>& inputs) {
+Constants certified_constants(const DisturbanceArguments& arguments, std::vector<std::string>& inputs,
+                              std::vector<std::string>& notes) {
   inputs.push_back(arguments.certificate);
   const Json certificate = files::read_json(arguments.certificate, check::kCertificateSchema);
   if (arguments.network.file.empty() && arguments.network.phi.empty()) {
     throw UsageError(
         "--certificate C proves nothing without the network that it is about: add --network NET");
   }
-  const files::Network network = force_network(arguments, inputs);
+  const files::Network network = force_network(arguments, inputs, notes);
   const check::CheckResult verdict = check::check(certificate, network);
   if (!verdict.accepted) {
     throw InputError({arguments.certificate, "", "", "", "is rejected by the checker: " + verdict.reason,
@@ -211,8 +218,9 @@ Constants certified_constants(const DisturbanceArguments& arguments, std::vector
 }
 
 /// Products of the layers' norms.
-Constants product_constants(const DisturbanceArguments& arguments, std::vector<std::string>& inputs) {
-  const files::Network network = force_network(arguments, inputs);
+Constants product_constants(const DisturbanceArguments& arguments, std::vector<std::string>& inputs,
+                            std::vector<std::string>& notes) {
+  const files::Network network = force_network(arguments, inputs, notes);
   lipschitz::CertifyOptions options;
   options.method = lipschitz::UpperMethod::kProduct;
   options.lower.rounds = 0;
@@ -232,8 +240,8 @@ void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& so
         "a Lipschitz constant gives a rate only with --speed V (and --accel A) of a neighbour "
         "relative to the vehicle");
   }
-  const Constants lipschitz_N = arguments.certificate.empty() ? product_constants(arguments, inputs)
-                                                              : certified_constants(arguments, inputs);
+  const Constants lipschitz_N = arguments.certificate.empty() ? product_constants(arguments, inputs, notes)
+                                                              : certified_constants(arguments, inputs, notes);
   // A neighbour's input moves at |(v_rel, a_rel)|, and every neighbour adds its own; the ground's input is the own
   // state.
   if (arguments.acceleration < 0) notes.emplace_back("neighbours fly at constant velocity: no --accel");

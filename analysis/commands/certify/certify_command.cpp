@@ -20,7 +20,6 @@
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/chain.h"
-#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
 #include "nn/weights/samples.h"
@@ -248,8 +247,8 @@ void parse_map(const CertifyOptions& options, const files::Network& network,
   }
 }
 
-/// Branch and bound and float32 errors are for ReLU. Of rotation invariants, and of networks that are silent somewhere,
-/// bounds for all inputs are proved, and nothing else.
+/// Branch and bound and float32 errors are for ReLU. Of rotation invariants, bounds for all inputs are proved, and
+/// nothing else.
 void refuse_what_is_for_relu(const files::Network& network, const CertifyOptions& options) {
   struct Asked {
     bool is_asked;
@@ -267,7 +266,6 @@ void refuse_what_is_for_relu(const files::Network& network, const CertifyOptions
     const std::string option = one.option;
     if (one.is_for_relu) files::require_relu(network, option + " is for ReLU networks");
     files::require_relative_states(network, option + " is for networks of relative states");
-    files::require_never_silent(network, option + " is for networks that are silent nowhere");
   }
 }
 
@@ -452,7 +450,8 @@ void declare_search_on_a_box(CLI::App& app, CertifyOptions& options) {
 
 void declare_limits(CLI::App& app, CertifyOptions& options) {
   app.add_flag("--range", options.range,
-               "Range, jump at a cut-off and float32 error over the clamp's box; --domain implies it");
+               "Range, jump at a cut-off and float32 error over the clamp's box; --domain implies it. Where "
+               "network.toml lists compositions as silent, ranges and jumps hold their 0");
   app.add_option(
          "--range-nodes", options.range_nodes,
          "Maximum number of boxes of branch and bound per end of a range (default: 8000, fewer for large "

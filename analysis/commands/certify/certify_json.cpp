@@ -4,6 +4,7 @@
 #include "analysis/commands/certify/branch_outlook.h"
 #include "analysis/commands/certify/certify_output.h"
 #include "nn/weights/chain.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::analysis {
@@ -42,8 +43,8 @@ Json range_json(const files::Network& network, const CertifyOutput& output,
           {"upper_witness", attained_json(range.greatest)},
           {"cut_off_jump", range.jump},
           {"arithmetic", "exact"},
-          {"lower_in_certificate", stated != nullptr ? Json(stated->output().lower[index]) : Json()},
-          {"upper_in_certificate", stated != nullptr ? Json(stated->output().upper[index]) : Json()},
+          {"lower_in_certificate", stated != nullptr ? Json(stated->lower[index]) : Json()},
+          {"upper_in_certificate", stated != nullptr ? Json(stated->upper[index]) : Json()},
           {"jump_in_certificate", stated != nullptr ? number_or_null(stated->jump) : Json()}};
 }
 
@@ -232,6 +233,7 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
   result["max_lipschitz"] = output.max_lipschitz > 0 ? Json(output.max_lipschitz) : Json();
   result["chain"] = chains_json(network);
   result["chain_source"] = chain_sources_json(network);
+  result["silent"] = files::silent_compositions(network);
   result["samples"] = samples_result(found);
   result["layers"] = list_of(found.layers, layer_json);
   result["bounds"] = std::move(bounds);

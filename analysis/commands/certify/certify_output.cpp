@@ -1,12 +1,14 @@
 #include "analysis/commands/certify/certify_output.h"
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
 #include "analysis/cli/command.h"
 #include "analysis/commands/certify/branch_outlook.h"
 #include "nn/weights/chain.h"
+#include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::analysis {
@@ -230,6 +232,8 @@ void print_bounds(const files::Network& network, const CertifyOutput& output) {
   if (std::any_of(found.bounds.begin(), found.bounds.end(),
                   [](const CertifiedBound& bound) { return !bound.has_witness; }))
     fmt::print("  {}\n", kNoLowerBound);
+  if (!network.silent.empty())
+    fmt::print("  {}{}\n", kWhereSilent, fmt::join(files::silent_compositions(network), ", "));
   if (!network.rho.empty()) {
     fmt::print("  set: one neighbour moves; any number of other neighbours, anywhere\n");
     const auto is_counted = [](const CertifiedBound& bound) { return !bound.neighbours.empty(); };
@@ -273,15 +277,16 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
         range.neighbours_at_most > 0 ? fmt::format(" up to {} neighbours", range.neighbours_at_most) : "";
     fmt::print("  {}{}: {:.6g} ({:.6g}) .. ({:.6g}) {:.6g}", range.function, many, range.lower,
                range.least.value, range.greatest.value, range.upper);
-    if (range.neighbours_at_most == 1)
-      fmt::print("; a neighbour at a cut-off: a jump of at most {:.6g}", range.jump);
+    // Elsewhere it is that of one neighbour, or nearly.
+    const bool has_jump =
+        range.neighbours_at_most == 1 || (range.neighbours_at_most > 1 && !network.silent.empty());
+    if (has_jump) fmt::print("; a neighbour at a cut-off: a jump of at most {:.6g}", range.jump);
     fmt::print("\n");
     const auto* const stated = in_certificate(output, range.function, range.neighbours_at_most);
     if (stated == nullptr) continue;
     const auto index = static_cast<std::size_t>(range.output);
-    fmt::print("    in the certificate: {:.6g} .. {:.6g}{}\n", stated->output().lower[index],
-               stated->output().upper[index],
-               range.neighbours_at_most == 1 ? fmt::format(", a jump of at most {:.6g}", *stated->jump) : "");
+    fmt::print("    in the certificate: {:.6g} .. {:.6g}{}\n", stated->lower[index], stated->upper[index],
+               has_jump ? fmt::format(", a jump of at most {:.6g}", *stated->jump) : "");
   }
   if (!output.float32_errors.empty())
     fmt::print(

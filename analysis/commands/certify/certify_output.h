@@ -40,10 +40,14 @@ inline constexpr char kForReluOnly[] =
     "branch and bound is for ReLU networks of relative states: with other activations bounds on a box are "
     "proved from the slopes that they have there";
 
-/// Said of functions of rotation invariants, and of those that are silent somewhere.
+/// Said of functions of rotation invariants.
 inline constexpr char kNoLowerBound[] =
-    "of functions of rotation invariants, or that are silent in some compositions, upper bounds for all "
-    "inputs are proved, and no lower bounds";
+    "of functions of rotation invariants upper bounds for all inputs are proved, and no lower bounds";
+
+/// Said of networks that are silent in some compositions, whose names follow.
+inline constexpr char kWhereSilent[] =
+    "0 among these neighbours > vehicle, without a network: bounds hold while the neighbours stay the same, "
+    "ranges hold this 0, and jumps hold the step to it: ";
 
 /// Unit of the network's outputs; "output" where NET states none.
 std::string output_unit(const files::Network& network);

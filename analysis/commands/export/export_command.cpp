@@ -85,12 +85,21 @@ int run_export(ExportOptions options, const CommonOptions& common) {
   result["as"] = is_rounded ? files::Json("float32") : files::Json();
   result["seed"] = options.source.seed;
   result["files"] = std::move(list);
+  const long bytes = firmware::weights_bytes(network);
+  const bool fits = bytes <= firmware::kCrazyflieFlash_bytes;
+  result["weights_bytes"] = bytes;
+  result["fits_crazyflie"] = fits;
   result["golden_vectors"] = options.source.golden_vectors * static_cast<int>(network.rho.size());
   write_result(common, result);
   if (common.prints_text()) {
     for (const firmware::SourceFile& source : sources)
       fmt::print("written: {}/{}\n", options.output, source.name);
     fmt::print("compile swarmcert_network.cpp with -std=c++17 -O2 -ffp-contract=off -I{}\n", options.output);
+    fmt::print("weights: {} bytes of flash", bytes);
+    if (!fits)
+      fmt::print(", more than the {} of a Crazyflie, where this does not fit: {}",
+                 firmware::kCrazyflieFlash_bytes, firmware::kSmallerNetwork);
+    fmt::print("\n");
   }
   return kDone;
 }

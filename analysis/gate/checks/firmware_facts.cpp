@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "analysis/firmware/export_source.h"
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
 #include "nn/base/input_error.h"
@@ -13,6 +14,8 @@ namespace swarmcert::gate {
 namespace {
 
 using files::Json;
+
+constexpr char kFlash[] = "flash_bytes";
 
 struct Wanted {
   std::string name;  ///< of the row
@@ -68,7 +71,7 @@ Run read_firmware_facts(const files::TomlTable& table, Policy& policy) {
     if (const auto limit = gate::limit(table, key, "bytes"))
       all.push_back({"firmware_facts." + name, std::move(path), *limit});
   };
-  add("max_flash_bytes", "flash", {"flash_bytes"});
+  add("max_flash_bytes", "flash", {kFlash});
   add("max_ram_bytes", "ram", {"ram_bytes"});
   for (const char* entry : {"network_task", "controller", "self_test"})
     add("max_stack_bytes", std::string("stack.") + entry, {"stack", entry, "bytes"});
@@ -98,8 +101,13 @@ Run read_firmware_facts(const files::TomlTable& table, Policy& policy) {
     checks.push_back(std::move(same));
     for (const Wanted& wanted : all) {
       Check check = row(wanted.name, wanted.limit);
-      const double value = number_at(facts, wanted.path, file);
+      double value = number_at(facts, wanted.path, file);
+      const long weights = firmware::weights_bytes(evidence.flown());
+      if (wanted.path.front() == kFlash) value = std::max(value, static_cast<double>(weights));
       judge(check, wanted.limit, value, value);
+      if (wanted.path.front() == kFlash && check.verdict == Verdict::kFail)
+        check.reason +=
+            fmt::format("; the network's weights take {}: {}", weights, firmware::kSmallerNetwork);
       checks.push_back(std::move(check));
     }
   };

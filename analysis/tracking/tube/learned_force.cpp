@@ -83,7 +83,6 @@ Index component(const std::string& name) {
 
 LearnedForce::LearnedForce(const files::Network& network, const std::string& kind, int neighbours) {
   files::require_relative_states(network, "a tube is of networks of relative states");
-  files::require_never_silent(network, "a tube is of networks that are silent nowhere");
   stability::DeepSetForce(network, kind, {kind});  // refuses what no flight could use
   std::vector<std::string> kinds;
   for (const auto& [name, weights] : network.phi)
@@ -124,6 +123,11 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
   }
   add_up(layers_.back(), network.phi.at(phi).outputs());
   for (ReachLayer& layer : lipschitz::reach_network(network.rho.at(rho))) layers_.push_back(std::move(layer));
+  const std::vector<std::string> parts_in_sum(static_cast<std::size_t>(neighbours), files::phi_name(phi));
+  if (files::is_silent_among(network, neighbour_function_, parts_in_sum)) {
+    layers_.back().weights.setZero();
+    layers_.back().bias.setZero();
+  }
 
   const auto size = static_cast<std::size_t>(state_size(neighbours));
   clamp_ = {std::vector<double>(size, -kOpenEnd), std::vector<double>(size, kOpenEnd)};
