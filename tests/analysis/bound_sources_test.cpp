@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "analysis/tracking_runs.h"
 
@@ -20,6 +21,27 @@ TEST(BoundCommand, ANetworkAloneBoundsTheRateOfFHatAndGivesNoBall) {
   EXPECT_GT(result["disturbance"]["f_hat_rate_N_s"].get<double>(), 0);
   EXPECT_TRUE(result["theorem"]["ball"].is_null());
   EXPECT_EQ(run_shell("swarmcert bound" + gains + network, folder.path()).exit_code, 2);
+}
+
+TEST(BoundCommand, ASilentCompositionLeavesTheRateAndIsNamedBesideIt) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");
+  std::filesystem::copy(kSourceFolder + "/nn/networks/demo", folder / "net");
+  const std::string command = "bound" + gains + " --network net/network.toml --speed 1 --accel 2";
+  const Json plain = json_of(folder, command);
+  std::string toml = read_text(folder / "net/network.toml");
+  write_text(folder / "net/network.toml",
+             toml.insert(toml.find("output"), "silent = [\"small+small>small\"]\n"));
+  const Json silent = json_of(folder, command);
+  EXPECT_EQ(silent["disturbance"]["f_hat_rate_N_s"], plain["disturbance"]["f_hat_rate_N_s"]);
+  const std::string certificate = " --certificate net/cert.json";
+  ASSERT_EQ(
+      run_shell("swarmcert certify net/network.toml --nodes 1 -q -o net/cert.json", folder.path()).exit_code,
+      0);
+  EXPECT_LT(json_of(folder, command + certificate)["disturbance"]["f_hat_rate_N_s"],
+            plain["disturbance"]["f_hat_rate_N_s"]);
+  const Outcome told = run_shell("swarmcert " + command, folder.path());
+  EXPECT_NE(told.output.find("0 among small+small>small"), std::string::npos) << told.output;
 }
 
 TEST(BoundCommand, MeasuredQuantilesAreTaggedMeasured) {

@@ -285,6 +285,20 @@ TEST_F(Train, ExactSymmetryIsTrainedCertifiedSimulatedAndExportedAndRefusedWhere
       0);
   EXPECT_EQ(execute("swarmcert match out/network.toml firmware").exit_code, 0);
   EXPECT_EQ(execute("swarmcert inspect out/network.toml").exit_code, 0);
+  EXPECT_EQ(execute("swarmcert bound --model nominal.toml --gains '" + std::string(SWARMCERT_SOURCE_DIR) +
+                    "/controller/gains/crazyflie-small.toml' --speed 1 --accel 1 --network out/network.toml "
+                    "--certificate out/certificate.json")
+                .exit_code,
+            0);
+  write_text(folder_ / "policy.toml",
+             "schema = \"swarmcert/policy/1\"\n[release]\nnetwork = \"out/network.toml\"\ncertificate = "
+             "\"out/certificate.json\"\nsource = \"firmware/swarmcert_network.cpp\"\n[certificate]\n[match]\n"
+             "[spectral_norms]\n[lipschitz]\nmax_joint_gf = 60\n");
+  const Outcome gated = execute("swarmcert gate policy.toml");
+  EXPECT_EQ(gated.exit_code, 0) << gated.output;
+  write_text(folder_ / "range.toml",
+             read_text(folder_ / "policy.toml") + "[range]\nmax_abs_force_gf = 1000\n");
+  EXPECT_EQ(execute("swarmcert gate range.toml").exit_code, 4) << "values of invariants are not bounded";
   write_text(folder_ / "box.toml",
              "schema = \"swarmcert/box/1\"\nlower = [0,-1,0,-1,0]\nupper = [1,1,1,1,1]\n");
   for (const std::string option : {"--domain box.toml", "--range", "--method branch", "--explain"}) {

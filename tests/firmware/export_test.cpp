@@ -2,8 +2,10 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <random>
 
 #include "firmware/exported_network.h"
+#include "nn/random_network.h"
 
 namespace swarmcert {
 namespace {
@@ -276,6 +278,25 @@ TEST_F(Firmware, Float64NetworksAreExportedAsFloat32WhereAskedAndNeverSilently) 
             0);
   EXPECT_EQ(
       run("swarmcert export network.toml --as float32 --certificate narrow.cert.json -o other").exit_code, 0);
+}
+
+TEST_F(Firmware, ANetworkThatIsLargerThanTheFlashIsNotExportedWithoutAWordOfIt) {
+  std::mt19937 generator(1);
+  files::save_safetensors(tests::random_network({6, 8}, generator), folder_ / "phi4.safetensors", true);
+  for (const int width : {16, 512}) {
+    files::save_safetensors(tests::random_network({8, width, width, 1}, generator),
+                            folder_ / "rho4.safetensors", true);
+    const Outcome exported = run(
+        "swarmcert export --phi phi4.safetensors --rho rho4.safetensors -o flash --force --json flash.json");
+    ASSERT_EQ(exported.exit_code, 0) << exported.output;
+    const files::Json json = files::parse_json(read_text(folder_ / "flash.json"), "");
+    const int bytes = 4 * (6 * 8 + 8 + 8 * width + width + width * width + width + width + 1);
+    EXPECT_EQ(json["weights_bytes"], bytes);
+    EXPECT_EQ(json["fits_crazyflie"], width == 16);
+    EXPECT_NE(exported.output.find(std::to_string(bytes) + " bytes of flash"), std::string::npos);
+    EXPECT_EQ(exported.output.find("more than the 1048576 of a Crazyflie") == std::string::npos, width == 16);
+    EXPECT_EQ(exported.output.find("fewer --folds") == std::string::npos, width == 16) << exported.output;
+  }
 }
 
 TEST_F(Firmware, AChangedWeightFileFailsTheCheckerAndExportWithItsCertificate) {

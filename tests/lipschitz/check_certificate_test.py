@@ -162,24 +162,6 @@ def check_silent(certificate, net, folder):
             assert "lacks a 0" in said_of(lambda changed: changed["values"][i].update(lower=["0x1p-1000"]))
 
 
-def refused(change):
-        changed = json.loads(json.dumps(certificate))
-        change(changed)
-        changed["content_sha256"] = second.content_sha256(changed)
-        accepted, said = first_checker(changed, net, folder, 0)
-        reason = second.check(changed, second.Network(**arguments(net)))
-        assert not accepted and reason, f"first says {said!r}, second says {reason!r}"
-
-    sets = [bound for bound in certificate["bounds"] if bound["function"].startswith("set:")]
-    assert sets and all(bound["lower"] is None for bound in sets), sets
-    refused(lambda changed: changed.update(statement=second.STATEMENT))
-    point = ["0x0p+0"] * 6
-    witness = {"x": point, "y": ["0x1p+0"] + point[1:], "others": [{"network": "phi:ground", "x": point[:4]}]}
-    for i, bound in enumerate(certificate["bounds"]):
-        if bound["function"] in ("set:small:small", "set:large:small"):
-            refused(lambda changed: changed["bounds"][i].update(lower=0.0, lower_hex="0x0p+0", lower_witness=witness))
-
-
 def check_invariants(certificate, net, folder):
     """Bounds of set functions need the slope of the map to invariants, and hold for all inputs together only."""
     def refused(i, **fields):

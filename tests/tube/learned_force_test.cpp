@@ -135,7 +135,7 @@ TEST(DeepSetForce, IsZeroInASilentCompositionAlsoOfNeighboursThatFadeAndInATube)
   EXPECT_NEAR(force.force_z_N(now, weights), 0.75 * one, 1e-15) << "a quarter of what is silent is missing";
   const lipschitz::Box box{std::vector<double>(static_cast<std::size_t>(state_size(2)), -0.4),
                            std::vector<double>(static_cast<std::size_t>(state_size(2)), 0.4)};
-  const LearnedForce::Forms forms = LearnedForce(network, "small", 2).over(box);
+  const LearnedForce::Forms forms = LearnedForce(network, "small", 2).over(box, nullptr);
   EXPECT_EQ(forms.upper_row.norm(), 0);
   EXPECT_EQ(forms.lower_row.norm(), 0);
   EXPECT_GE(forms.upper, 0);

@@ -183,7 +183,7 @@ files::Network force_network(const DisturbanceArguments& arguments, std::vector<
   files::require_force_z(network);
   for (const std::string& path : input_files(network)) inputs.push_back(path);
   for (const std::string& composition : files::silent_compositions(network))
-    notes.push_back("f_hat is 0 among " + composition +
+    notes.push_back("f_hat = 0 among " + composition +
                     ": its rate holds while the neighbours stay the same; one that comes or goes there is an "
                     "edge, at most the jump of certify --domain");
   return network;
