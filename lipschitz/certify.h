@@ -113,9 +113,9 @@ std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const st
 /// with other activations than ReLU are bounded above by the same matrix inequality where the activation is monotone
 /// (checker/stages.h), else, up to the size that bent_bound.h states, by its extension; on a box also from the slopes
 /// that the activations have there. Set functions of rotation invariants get upper bounds only: those of rho(sum phi)
-/// times the Lipschitz constant of the map to invariants. Where NET is silent in some compositions, bounds hold while the
-/// neighbours stay the same, and lower ones are between neighbours among which it is not. Branch and bound is for ReLU.
-/// It runs on what the clamp lets through of the box, or on a projective cover of all inputs where there is no box.
+/// times the Lipschitz constant of the map to invariants. Where NET is silent in some compositions, bounds hold while
+/// the neighbours stay the same, and lower ones are among neighbours where it is not. Branch and bound is for ReLU. It
+/// runs on what the clamp lets through of the box, or on a projective cover of all inputs where there is no box.
 /// @throws std::invalid_argument if gamma is not positive, if branch and bound is asked for and an activation is not
 ///   ReLU, if there is a domain or branch and bound is asked for and NET has invariants, or as claims() and
 ///   law_claims().

@@ -23,8 +23,8 @@ std::vector<std::string> silent_compositions(const Network& network);
 std::vector<int> silent_counts(const Network& network, const std::string& own);
 
 /// Whether `function` is a set function that is 0 in some compositions. Then it is no composition of rho and a sum as a
-/// whole: slopes are bounded while the neighbours stay the same, and it steps where one comes or goes that makes or ends
-/// such a composition.
+/// whole: slopes are bounded while the neighbours stay the same, and it steps where one that comes or goes makes or
+/// ends such a composition.
 bool is_ever_silent(const Network& network, const std::string& function);
 
 /// Whether the set function `function` is 0 among these neighbours, "phi:<kind>" each; the ground is none.

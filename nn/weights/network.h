@@ -98,7 +98,7 @@ Network load_any_network(const NetworkArguments& arguments);
 /// @throws as load_any_network() and require_relu().
 Network load_evaluated_network(const NetworkArguments& arguments);
 
-/// Loads NET, whose activation must be ReLU, and whose inputs relative states; it may be silent somewhere. A `file` is a
+/// Loads NET, whose activation must be ReLU, and whose inputs relative states; it may be silent. A `file` is a
 /// network.toml if its name ends in ".toml" or its text names that schema. Weight files named in a network.toml are
 /// relative to its folder, which also states the order of their layers.
 /// @throws InputError with line, field, value and hint; unknown keys are errors that suggest a known one. Throws what
