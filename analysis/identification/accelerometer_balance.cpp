@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 
 #include "analysis/identification/vehicle_blocks.h"
@@ -12,18 +13,30 @@ namespace {
 using residuals::Track;
 
 constexpr double kMotionBlock_s = 1, kOffset_z = 2;
+/// Accelerometers are filtered, and attitudes come late, by no more than this.
+constexpr double kLongestLag_s = 0.02;
 constexpr std::size_t kFewestMotionBlocks = 10;
 
 /// Means over a second without a cut.
 struct MotionBlock {
   Eigen::Vector3d of_velocity_m_s2, measured_m_s2;
+  /// Vertical part that a lag of the accelerometer behind the attitude adds to the measured mean, per second of lag: the
+  /// body turns meanwhile. Of a filter a' = (a_B - a) / lag, measured = R a = R a_B - lag R a', and R a' = (R a)' -
+  /// omega x (R a), whose first part has no mean.
+  double of_lag_m_s3;
 };
+
+double turned_upwards_m_s3(const Track& track, std::size_t i) {
+  const stability::Instant& now = track.instants[i];
+  return (now.R_WB * now.omega_B_rad_s).cross(track.specific_force_m_s2[i]).z();
+}
 
 /// The trapezoidal rule integrates the measured force over the same time as the velocity changes in.
 /// @param scale by which the measured force is divided.
 std::vector<MotionBlock> motion_blocks(const Track& track, double scale) {
   std::vector<MotionBlock> blocks;
   Eigen::Vector3d integral = Eigen::Vector3d::Zero();
+  double turned_m_s2 = 0;
   std::size_t first = 0;
   bool is_open = false;
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
@@ -35,18 +48,21 @@ std::vector<MotionBlock> motion_blocks(const Track& track, double scale) {
     if (!is_open) {
       first = i;
       integral.setZero();
+      turned_m_s2 = 0;
       is_open = true;
       continue;
     }
     const double step_s = now.time_s - track.instants[i - 1].time_s;
     integral += step_s / 2 * (track.specific_force_m_s2[i - 1] + track.specific_force_m_s2[i]);
+    turned_m_s2 += step_s / 2 * (turned_upwards_m_s3(track, i - 1) + turned_upwards_m_s3(track, i));
     const double length_s = now.time_s - track.instants[first].time_s;
     if (length_s < kMotionBlock_s) continue;
     const Eigen::Vector3d gained_m_s = now.v_W_m_s - track.instants[first].v_W_m_s;
     blocks.push_back({gained_m_s / length_s + stability::kGravity_m_s2 * Eigen::Vector3d::UnitZ(),
-                      integral / (scale * length_s)});
+                      integral / (scale * length_s), turned_m_s2 / (scale * length_s)});
     first = i;
     integral.setZero();
+    turned_m_s2 = 0;
   }
   return blocks;
 }
@@ -54,11 +70,12 @@ std::vector<MotionBlock> motion_blocks(const Track& track, double scale) {
 /// Along the vertical, where gravity shows the scale.
 void fit_scale(const std::vector<MotionBlock>& blocks, double mass_kg, AccelerometerBalance& balance) {
   std::vector<double> x, y, gains;
-  double offset_m_s2 = 0;
+  double offset_m_s2 = 0, of_lag_m_s3 = 0;
   for (const MotionBlock& block : blocks) {
     x.push_back(block.of_velocity_m_s2.z());
     y.push_back(block.measured_m_s2.z());
     offset_m_s2 += (y.back() - x.back()) / static_cast<double>(blocks.size());
+    of_lag_m_s3 += block.of_lag_m_s3 / static_cast<double>(blocks.size());
   }
   balance.scale = fit_through_origin(x, y);
   double before = 0, after = 0;
@@ -73,8 +90,9 @@ void fit_scale(const std::vector<MotionBlock>& blocks, double mass_kg, Accelerom
   const double count = static_cast<double>(x.size());
   balance.rmse_before_N = mass_kg * std::sqrt(before / count);
   balance.rmse_after_N = mass_kg * std::sqrt(after / count);
-  balance.is_named =
-      std::abs(balance.scale.value - 1) - balance.scale.half > kOrdinaryScaleError && balance.z >= -kOffset_z;
+  balance.of_lag = kLongestLag_s * std::abs(of_lag_m_s3) / stability::kGravity_m_s2;
+  const double surely_off = std::abs(balance.scale.value - 1) - balance.scale.half - balance.of_lag;
+  balance.is_named = surely_off > kOrdinaryScaleError && balance.z >= -kOffset_z;
 }
 
 }  // namespace

@@ -170,9 +170,11 @@ bool may_be_part(const Missing& missing, double weight_N) {
 
 /// Whether a name is no match for what is left beside it.
 bool is_doubtful(const Missing& missing, const Explained& explained, double weight_N) {
-  constexpr double kMost = 0.5, kOfSameVariable = 0.5;
+  constexpr double kMost = 0.5, kOfSameVariable = 0.5, kLittle = 0.1;
   const double taken = taken_N2(missing);
   const Remainder& rest = explained.settled.rest;
+  // Formulas that stood beside the name are what is left again: it may be a part of what they explain.
+  if (rest.ratio > kLoudRatio && taken < kLittle * rest.excess_N2) return true;
   if (rest.flag && may_be_part(missing, weight_N) && taken < rest.excess_N2) return true;
   if (explained.scan.entries.empty() || explained.scan.entries[0].share < kMost) return false;
   const ScanEntry& first = explained.scan.entries[0];
@@ -268,6 +270,7 @@ Settled settle_with_formulas(const Passes& passes, const Coverage& covered, std:
 bool is_curve_over(const std::string& variable, const std::string& effect, bool has_battery) {
   if (effect == "inflow") return variable == "vz" || variable == "climb";
   if (effect == "ground" || effect == "ceiling") return variable == "z";
+  if (effect == "sensor_delay") return variable == "rate_x" || variable == "rate_y";
   if (effect == "thrust_ratio") return has_battery && variable == "battery";
   return points_to(variable, effect);
 }
@@ -282,7 +285,7 @@ std::set<std::string> refuted_names(const Explained& explained, double weight_N)
                                        [](const Missing& missing) { return missing.effect == "battery"; });
   std::set<std::string> names;
   for (const Missing& missing : ranking) {
-    if (!may_be_part(missing, weight_N)) continue;
+    if (!may_be_part(missing, weight_N) && missing.effect != "sensor_delay") continue;
     for (const ScanEntry& entry : explained.scan.entries) {
       const double left = entry.rmse_before * entry.rmse_before - entry.rmse_after * entry.rmse_after;
       if (is_curve_over(entry.variable, missing.effect, has_battery) && left > kOfTaken * taken_N2(missing))

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "analysis/identification/instrument.h"
+#include "analysis/identification/scan/curve_fit.h"
 #include "analysis/identification/scan/forms.h"
 #include "analysis/identification/scan/formulas.h"
 #include "analysis/identification/scan/proposal.h"
@@ -261,6 +262,15 @@ TEST(Scan, FindsTheVariableOfEachForm) {
        [](const Flights& f, Eigen::Index i) {
          return 0.02 * std::exp(-(std::pow(f.at(i, V::kX), 2) + std::pow(f.at(i, V::kY) - 0.3, 2)) / 0.3);
        }},
+      {"xz", 2,
+       [](const Flights& f, Eigen::Index i) {
+         return f.at(i, V::kX) > 0.2 ? 0.02 * std::exp(-f.at(i, V::kZ) / 0.5) : 0;
+       }},
+      {"yz", 0,
+       [](const Flights& f, Eigen::Index i) {
+         return f.at(i, V::kY) < 0 ? 0.02 * std::exp(-std::pow(f.at(i, V::kZ) / 0.5, 2)) : 0;
+       }},
+      {"rate_z", 2, [](const Flights& f, Eigen::Index i) { return 0.01 * std::abs(f.at(i, V::kRateZ)); }},
       {"time", 2, [](const Flights& f, Eigen::Index i) { return f.at(i, V::kTime) > 17 ? 0.01 : 0; }},
       {"time", 0, [](const Flights& f, Eigen::Index i) { return 0.01 * std::sin(4 * f.at(i, V::kTime)); }},
   };
@@ -305,6 +315,30 @@ TEST(Scan, CountsNoAnswerOfTheController) {
   for (Eigen::Index i = 0; i < flights.samples.size(); ++i)
     flights.samples.values(i, thrust) = flights.samples.commanded(i, thrust);
   EXPECT_TRUE(names_thrust(scan(flights.samples, 1)));
+}
+
+TEST(CurveFit, ErrorsUnderOtherSignsAreThoseOfFitsToThoseTargets) {
+  const ScanSamples samples = Flights(3).samples;
+  const Chunks chunks = chunks_of(samples);
+  const auto z = samples.values.col(static_cast<int>(V::kZ));
+  const std::vector<SparseRow> rows = hat_rows(z, knots_over(z, 8));
+  CurveFit fit(rows, 8, chunks);
+  Eigen::MatrixXd signs(2, chunks.count());
+  for (Eigen::Index c = 0; c < signs.cols(); ++c) {
+    signs(0, c) = 1;
+    signs(1, c) = c % 3 == 0 ? -1 : 1;
+  }
+  const Columns targets = samples.residual;
+  const Eigen::MatrixXd errors = fit.errors_of_flipped(targets, signs);
+  for (Eigen::Index d = 0; d < signs.rows(); ++d) {
+    Columns flipped = targets;
+    for (Eigen::Index i = 0; i < flipped.rows(); ++i)
+      flipped.row(i) *= static_cast<float>(signs(d, chunks.of_sample[static_cast<std::size_t>(i)]));
+    fit.fit(flipped);
+    const Eigen::RowVectorXd expected = chunk_errors(flipped, fit.predictions(), chunks).colwise().sum();
+    for (Eigen::Index k = 0; k < expected.size(); ++k)
+      EXPECT_NEAR(errors(d, k), expected[k], 1e-6 * targets.squaredNorm());
+  }
 }
 
 TEST(Scan, DoesNotDependOnTheNumberOfThreads) {
@@ -491,7 +525,7 @@ TEST(Forms, TextsGiveTheValues) {
   };
   check(forms_over({0, 1}, false));
   check(forms_over({-1, 1}, true));
-  check(forms_over_place({-1, 1}, {0, 1}));
+  check(forms_over_section({-1, 1}, {0, 1}));
 }
 
 }  // namespace

@@ -194,6 +194,10 @@ def flapping(k=0.03):
     return lambda s: tuple(s.to_world([k * s.w[1], 0, 0]))
 
 
+def jet(a=0.03, z0=0.8, width=0.15, to_x=0.2):
+    return lambda s: (0, a * math.exp(-((s.p[2] - z0) / width) ** 2 / 2) if s.p[0] < to_x else 0, 0)
+
+
 EFFECTS = {
     "thermal": dict(force=column(), variables={"xy"}, names={"wind_field"}, formula=expression(
         "force_z_N", "a_N * exp(-((x - 0.2)^2 + (y + 0.1)^2) / (2 * w_m^2))", a_N=0.03, w_m=0.25)),
@@ -228,7 +232,8 @@ EFFECTS = {
         "force_z_N", "a_N * max(0, z - 0.6)", a_N=-0.035)),
     "weak cells": dict(rotor=weak_cells(), variables={"battery", "time", "thrust"}, names={"battery", "voltage_sag"},
                        discharge_V_s=0.012),
-    "platform": dict(force=platform(), variables={"z", "x", "xy"}, names={"ground"}),
+    "platform": dict(force=platform(), variables={"z", "x", "xy", "xz"}, names={"ground"}, formula=expression(
+        "force_z_N", "a_N * (x > 0.1) * exp(-(max(z, 0.4) - 0.4) / reach_m)", a_N=0.06, reach_m=0.15)),
     "turning wind": dict(force=turning_wind(), variables={"time"}),
     "icing": dict(rotor=icing(), variables={"time", "battery", "thrust"}, names={"battery", "thrust_ratio"}),
     "dead band": dict(force=dead_band(), variables={"x", "xy"}, names={"tether"}),
@@ -245,5 +250,10 @@ EFFECTS = {
     "late draft": dict(force=late_draft(), variables={"neighbour_vy"}, vehicles=2),
     "flapping": dict(force=flapping(), variables={"rate_y"}, speed=1.6, formula=expression(
         "force_b1_N", "a_N * wy", a_N=0.03)),
+    "jet": dict(force=jet(), variables={"xz", "z"}, names={"wind_field"}),
+    "spin lift": dict(force=lambda s: (0, 0, 0.02 * abs(s.w[2])), variables={"rate_z"}, yaw_reach=3.0,
+                      formula=expression("force_z_N", "a_N * abs(wz)", a_N=0.02)),
+    "roll slip": dict(force=lambda s: tuple(s.to_world([0, 0.015 * s.w[0], 0])), variables={"rate_x"}, speed=1.3,
+                      formula=expression("force_b2_N", "a_N * wx", a_N=0.015)),
     "slow drain": dict(force=slow_drain(), variables={"time", "battery"}, names={"payload_step"}),
 }

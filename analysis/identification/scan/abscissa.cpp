@@ -12,9 +12,14 @@ std::vector<Abscissa> abscissas(const ScanSamples& samples) {
     if (!info.in_world && !info.in_body) continue;
     std::vector<int> knots = {4, 8, 16};
     if (variable == ScanVariable::kTime || variable == ScanVariable::kBattery) knots = {4, 8};
-    all.push_back({info.name, {variable}, 0, info.is_answer, info.in_world, info.in_body, knots});
+    // Torques turn the vehicle, and no set point of the heading tells what was meant.
+    const bool is_turned = samples.quantity == ScanQuantity::kBalance && variable == ScanVariable::kRateZ;
+    all.push_back(
+        {info.name, {variable}, 0, info.is_answer || is_turned, info.in_world, info.in_body, knots});
   }
   all.push_back({"xy", {ScanVariable::kX, ScanVariable::kY}, 0, false, true, false, {4, 7}});
+  all.push_back({"xz", {ScanVariable::kX, ScanVariable::kZ}, 0, false, true, false, {7}});
+  all.push_back({"yz", {ScanVariable::kY, ScanVariable::kZ}, 0, false, true, false, {7}});
   if (has_neighbours) {
     const std::vector<ScanVariable> place = {ScanVariable::kNeighbourX, ScanVariable::kNeighbourY};
     all.push_back({"neighbour_xy", place, 0, false, true, false, {5, 9}});

@@ -180,6 +180,45 @@ Columns CurveFit::predictions(const std::vector<SparseRow>& rows) const {
   return result;
 }
 
+Eigen::MatrixXd CurveFit::errors_of_flipped(const Columns& targets, const Eigen::MatrixXd& signs) const {
+  // |t - X b|^2 = |t|^2 - 2 b' X' t + b' X' X b for each fold, where signs change X' t alone, chunk by chunk.
+  const auto draws = static_cast<std::size_t>(signs.rows());
+  const Eigen::Index size = columns_ + 1, m = targets.cols();
+  std::vector<std::array<RowMajorXd, Chunks::kFolds>> products(draws);  // X' t of each draw and fold
+  for (auto& of_draw : products) of_draw.fill(RowMajorXd::Zero(size, m));
+  RowMajorXd of_chunk = RowMajorXd::Zero(size, m);
+  Eigen::RowVectorXd values, squares = Eigen::RowVectorXd::Zero(m);
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const SparseRow& row = rows_[i];
+    values = targets.row(static_cast<Eigen::Index>(i)).cast<double>();
+    squares += values.cwiseAbs2();
+    for (std::size_t a = 0; a < static_cast<std::size_t>(row.count); ++a)
+      of_chunk.row(row.index[a]) += static_cast<double>(row.weight[a]) * values;
+    of_chunk.row(columns_) += values;
+    const int chunk = chunks_.of_sample[i];
+    if (i + 1 < rows_.size() && chunks_.of_sample[i + 1] == chunk) continue;
+    const auto fold = static_cast<std::size_t>(chunks_.fold[static_cast<std::size_t>(chunk)]);
+    for (std::size_t d = 0; d < draws; ++d)
+      products[d][fold] += signs(static_cast<Eigen::Index>(d), chunk) * of_chunk;
+    of_chunk.setZero();
+  }
+  Eigen::MatrixXd errors = squares.replicate(signs.rows(), 1);
+  for (std::size_t f = 0; f < Chunks::kFolds; ++f) {
+    Eigen::MatrixXd gram = grams_[Chunks::kFolds] - grams_[f];
+    gram.row(columns_) = gram.col(columns_).transpose();
+    for (std::size_t d = 0; d < draws; ++d) {
+      RowMajorXd others = RowMajorXd::Zero(size, m);
+      for (std::size_t g = 0; g < Chunks::kFolds; ++g) {
+        if (g != f) others += products[d][g];
+      }
+      const Eigen::MatrixXd b = inverses_[f] * others;
+      errors.row(static_cast<Eigen::Index>(d)) +=
+          b.cwiseProduct(gram * b - 2 * products[d][f]).colwise().sum();
+    }
+  }
+  return errors;
+}
+
 Columns mean_predictions(const Columns& targets, const Chunks& chunks) {
   const Eigen::Index m = targets.cols();
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(Chunks::kFolds, m);

@@ -54,6 +54,9 @@ class CurveFit {
   const Eigen::MatrixXd& coefficients(int fold) const {
     return coefficients_[static_cast<std::size_t>(fold)];
   }
+  /// Sums of squared errors [draws x m] of fits to `targets` with other signs: chunk c counts signs(d, c) times. Every
+  /// sample is predicted by the fit without its fold. One pass over the samples, however many draws.
+  Eigen::MatrixXd errors_of_flipped(const Columns& targets, const Eigen::MatrixXd& signs) const;
   Eigen::VectorXd samples_at_columns() const { return grams_[Chunks::kFolds].diagonal(); }
 
  private:

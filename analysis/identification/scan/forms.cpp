@@ -51,11 +51,29 @@ Form hinge(const FormRange& range, bool above) {
   return form;
 }
 
+/// Beyond an edge, and less with height: what a platform below does, or a shelf beside.
+Form ledge(const FormRange& along, const FormRange& height, bool above) {
+  Form form;
+  form.name = above ? "ledge_above" : "ledge_below";
+  form.inputs = 2;
+  form.shape = {place("edge", along, 30),
+                width("length", height.span(), {0.1, 0.2, 0.4, 0.8}),
+                {"from", FormUnit::kVariable, height.lower, height.lower, {height.lower}}};
+  form.values = [above](const double* v, const double* t, double* to) {
+    const bool is_beyond = above ? v[0] > t[0] : v[0] < t[0];
+    to[0] = is_beyond ? std::exp(std::fmin(-(v[1] - t[2]) / t[1], 20.0)) : 0;
+  };
+  form.texts = {std::string(above ? "({0} > {a})" : "({0} < {a})") + " * exp(min(-({1} - {c}) / {b}, 20))"};
+  return form;
+}
+
 /// Units of the coefficients: newton over the variable's unit to these powers.
 std::vector<Form> with_powers(std::vector<Form> forms) {
   for (Form& form : forms) {
     const std::string& name = form.name;
-    if (name == "linear" || name == "above" || name == "below" || name == "beyond") form.powers[0] = 1;
+    for (const char* const first : {"linear", "absolute", "above", "below", "beyond"}) {
+      if (name == first) form.powers[0] = 1;
+    }
     if (name == "signed_square") form.powers[0] = 2;
     if (name == "plane") form.powers[0] = form.powers[1] = 1;
     if (name == "quadratic") {
@@ -66,7 +84,7 @@ std::vector<Form> with_powers(std::vector<Form> forms) {
   return forms;
 }
 
-void add_polynomials(bool is_velocity, std::vector<Form>& forms) {
+void add_polynomials(bool has_origin, std::vector<Form>& forms) {
   forms.push_back(
       {"linear", 1, {}, [](const double* v, const double*, double* to) { to[0] = v[0]; }, {"{0}"}});
   forms.push_back({"quadratic",
@@ -77,12 +95,17 @@ void add_polynomials(bool is_velocity, std::vector<Form>& forms) {
                      to[1] = v[0] * v[0];
                    },
                    {"{0}", "{0}^2"}});
-  if (is_velocity)
-    forms.push_back({"signed_square",
-                     1,
-                     {},
-                     [](const double* v, const double*, double* to) { to[0] = v[0] * std::abs(v[0]); },
-                     {"{0} * abs({0})"}});
+  if (!has_origin) return;
+  forms.push_back({"signed_square",
+                   1,
+                   {},
+                   [](const double* v, const double*, double* to) { to[0] = v[0] * std::abs(v[0]); },
+                   {"{0} * abs({0})"}});
+  forms.push_back({"absolute",
+                   1,
+                   {},
+                   [](const double* v, const double*, double* to) { to[0] = std::abs(v[0]); },
+                   {"abs({0})"}});
 }
 
 Form sinusoid(double span) {
@@ -112,10 +135,10 @@ Form resonance(const FormRange& range) {
 
 }  // namespace
 
-std::vector<Form> forms_over(const FormRange& range, bool is_velocity) {
+std::vector<Form> forms_over(const FormRange& range, bool has_origin) {
   const double span = range.span();
   std::vector<Form> forms;
-  add_polynomials(is_velocity, forms);
+  add_polynomials(has_origin, forms);
   forms.push_back(decay(range, true));
   forms.push_back(decay(range, false));
   forms.push_back({"gaussian",
@@ -189,6 +212,12 @@ std::vector<Form> forms_over_place(const FormRange& x, const FormRange& y) {
                    },
                    {"max(0, sqrt(" + text + ") - {c})"}});
   return with_powers(std::move(forms));
+}
+
+std::vector<Form> forms_over_section(const FormRange& along, const FormRange& height) {
+  std::vector<Form> forms = forms_over_place(along, height);
+  for (const bool above : {true, false}) forms.push_back(ledge(along, height, above));
+  return forms;
 }
 
 }  // namespace swarmcert::identification

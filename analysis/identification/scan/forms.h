@@ -39,9 +39,11 @@ struct Form {
 
 inline constexpr int kMostFormFunctions = 2;
 
-/// All forms of one variable. @param range of its values; `is_velocity` where zero is a physical origin.
-std::vector<Form> forms_over(const FormRange& range, bool is_velocity);
+/// All forms of one variable. @param range of its values; `has_origin` where zero is a physical one, as of velocities.
+std::vector<Form> forms_over(const FormRange& range, bool has_origin);
 /// All forms over a place in the plane.
 std::vector<Form> forms_over_place(const FormRange& x, const FormRange& y);
+/// All forms over a place in a vertical section. Its centres have the names of forms_over_place().
+std::vector<Form> forms_over_section(const FormRange& along, const FormRange& height);
 
 }  // namespace swarmcert::identification

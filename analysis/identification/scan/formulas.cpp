@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "analysis/identification/scan/formula_trial.h"
 #include "analysis/identification/scan/pull.h"
@@ -22,9 +23,12 @@ constexpr ScanVariable kFactors[] = {ScanVariable::kThrust, ScanVariable::kX,   
                                      ScanVariable::kZ,      ScanVariable::kVx,   ScanVariable::kVy,
                                      ScanVariable::kVz,     ScanVariable::kSpeed};
 
-bool is_velocity(ScanVariable v) {
-  return v == ScanVariable::kVx || v == ScanVariable::kVy || v == ScanVariable::kVz ||
-         v == ScanVariable::kBodyVx || v == ScanVariable::kBodyVy || v == ScanVariable::kClimb;
+/// Velocities and rates, of which zero is none.
+bool has_origin(ScanVariable v) {
+  using V = ScanVariable;
+  constexpr V kSuch[] = {V::kVx,    V::kVy,    V::kVz,    V::kBodyVx, V::kBodyVy,
+                         V::kClimb, V::kRateX, V::kRateY, V::kRateZ};
+  return std::find(std::begin(kSuch), std::end(kSuch), v) != std::end(kSuch);
 }
 
 FormData rows_of(const ScanSamples& samples, const ScanEntry& entry, const std::vector<Eigen::Index>& rows) {
@@ -75,8 +79,27 @@ bool is_of_neighbours(const ScanEntry& entry) {
   return !entry.variables.empty() && entry.variables[0] == ScanVariable::kNeighbourX;
 }
 
+/// Forms over a vertical section, whose centres are named after its axes.
+std::vector<Form> forms_of_section(const ScanEntry& entry, const EntryData& data) {
+  std::vector<Form> forms =
+      forms_over_section(range_of(data.few.inputs.col(0)), range_of(data.few.inputs.col(1)));
+  const std::string along = scan_variable(entry.variables[0]).name,
+                    up = scan_variable(entry.variables[1]).name;
+  for (Form& form : forms) {
+    for (FormParameter& parameter : form.shape) {
+      if (parameter.name == "x_centre")
+        parameter.name = along + "_centre";
+      else if (parameter.name == "y_centre")
+        parameter.name = up + "_centre";
+    }
+  }
+  return forms;
+}
+
 std::vector<Form> forms_of(const ScanEntry& entry, const EntryData& data) {
   std::vector<Form> forms;
+  if (entry.variables.size() == 2 && entry.variables[1] == ScanVariable::kZ)
+    return forms_of_section(entry, data);
   if (entry.variables.size() == 2) {
     forms = forms_over_place(range_of(data.few.inputs.col(0)), range_of(data.few.inputs.col(1)));
     // Neighbours far away do nothing.
@@ -85,7 +108,7 @@ std::vector<Form> forms_of(const ScanEntry& entry, const EntryData& data) {
       forms.erase(std::remove_if(forms.begin(), forms.end(), reaches_far), forms.end());
     return forms;
   }
-  forms = forms_over(range_of(data.few.inputs.col(0)), is_velocity(entry.variables[0]));
+  forms = forms_over(range_of(data.few.inputs.col(0)), has_origin(entry.variables[0]));
   for (Form& form : forms) {
     if (form.name != "sinusoid") continue;
     constexpr double kFullTurn = 6.283185307179586;

@@ -376,7 +376,7 @@ const ScanVariableInfo& scan_variable(ScanVariable variable) {
       {"set_point_z", "", "m", false, true, true},
       {"rate_x", "wx", "rad_s", true, true, true},
       {"rate_y", "wy", "rad_s", true, true, true},
-      {"rate_z", "wz", "rad_s", true, true, true},
+      {"rate_z", "wz", "rad_s", false, true, true},
       {"neighbour_x", "dx", "m", false, false, false},
       {"neighbour_y", "dy", "m", false, false, false},
       {"neighbour_vx", "", "m_s", false, true, false},

@@ -101,15 +101,21 @@ BestOfColumns best_curves(const Judged& judged, const Abscissa& abscissa) {
   return best;
 }
 
-/// The targets about their mean, with the sign of each chunk drawn.
-Columns flipped(const Columns& targets, const Chunks& chunks, std::uint64_t seed) {
-  std::mt19937_64 generator(seed);
-  std::vector<float> sign;
-  for (int c = 0; c < chunks.count(); ++c) sign.push_back((generator() & 1) != 0 ? 1.0F : -1.0F);
-  const Eigen::RowVectorXf mean = targets.colwise().mean();
-  Columns result = targets.rowwise() - mean;
+/// 1 or -1 for each draw and chunk.
+Eigen::MatrixXd drawn_signs(const Chunks& chunks) {
+  Eigen::MatrixXd signs(kFlips, chunks.count());
+  for (Eigen::Index d = 0; d < kFlips; ++d) {
+    std::mt19937_64 generator(1 + static_cast<std::uint64_t>(d));
+    for (Eigen::Index c = 0; c < signs.cols(); ++c) signs(d, c) = (generator() & 1) != 0 ? 1 : -1;
+  }
+  return signs;
+}
+
+/// `targets` with the sign of each chunk.
+Columns flipped(const Columns& targets, const Chunks& chunks, const Eigen::RowVectorXd& signs) {
+  Columns result = targets;
   for (Eigen::Index i = 0; i < result.rows(); ++i)
-    result.row(i) *= sign[static_cast<std::size_t>(chunks.of_sample[static_cast<std::size_t>(i)])];
+    result.row(i) *= static_cast<float>(signs[chunks.of_sample[static_cast<std::size_t>(i)]]);
   return result;
 }
 
@@ -120,10 +126,15 @@ struct Accidents {
 
 Accidents accidental_share(const ScanSamples& all, const std::vector<Abscissa>& tried, int jobs) {
   const ScanSamples samples = thinned(all, kManySamples);
-  std::vector<Judged> draws;
-  for (int d = 0; d < kFlips; ++d) {
-    const Chunks chunks = chunks_of(samples);
-    draws.emplace_back(samples, flipped(samples.residual, chunks, 1 + static_cast<std::uint64_t>(d)));
+  const Chunks chunks = chunks_of(samples);
+  const Eigen::MatrixXd signs = drawn_signs(chunks);
+  const Columns about_mean = samples.residual.rowwise() - samples.residual.colwise().mean();
+  const std::vector<ScanColumn>& columns = scan_columns(samples.quantity);
+  Eigen::MatrixXd none(kFlips, about_mean.cols()), totals = none;
+  for (Eigen::Index d = 0; d < kFlips; ++d) {
+    const Judged judged(samples, flipped(about_mean, chunks, signs.row(d)));
+    none.row(d) = judged.none.colwise().sum();
+    totals.row(d) = judged.totals;
   }
   std::vector<std::vector<double>> largest(tried.size(), std::vector<double>(kFlips, 0));
   files::parallel_for(static_cast<int>(tried.size()), jobs, [&](int a) {
@@ -131,13 +142,13 @@ Accidents accidental_share(const ScanSamples& all, const std::vector<Abscissa>& 
     for (const int knots : abscissa.knots) {
       const Curve curve = curve_over(samples, abscissa, knots);
       if (curve.columns == 0) continue;
-      CurveFit fit(curve.rows, curve.columns, draws[0].chunks);
+      const CurveFit fit(curve.rows, curve.columns, chunks);
+      const Eigen::MatrixXd shares = (none - fit.errors_of_flipped(about_mean, signs)).cwiseQuotient(totals);
       for (std::size_t d = 0; d < kFlips; ++d) {
-        const Eigen::VectorXd shares = shares_of(draws[d], fit);
         double& most = largest[static_cast<std::size_t>(a)][d];
-        for (Eigen::Index k = 0; k < shares.size(); ++k) {
-          if (is_offered(abscissa, draws[d].columns()[static_cast<std::size_t>(k)]))
-            most = std::max(most, shares[k]);
+        for (std::size_t k = 0; k < columns.size(); ++k) {
+          if (is_offered(abscissa, columns[k]))
+            most = std::max(most, shares(static_cast<Eigen::Index>(d), static_cast<Eigen::Index>(k)));
         }
       }
     }
