@@ -503,16 +503,10 @@ TEST(Forms, TextsGiveTheValues) {
         spec.parameters["coefficient"] = 1;
         spec.expression.linear = {"coefficient"};
         std::string text = form.texts[k];
-        const auto put = [&](const std::string& from, const std::string& to) {
-          for (std::size_t at = text.find(from); at != std::string::npos;
-               at = text.find(from, at + to.size()))
-            text.replace(at, from.size(), to);
-        };
-        put("{0}", "x");
-        put("{1}", "y");
-        const char* const letters[] = {"{a}", "{b}", "{c}"};
+        replace_all(text, "{0}", "x");
+        replace_all(text, "{1}", "y");
         for (std::size_t s = 0; s < form.shape.size(); ++s) {
-          put(letters[s], form.shape[s].name);
+          replace_all(text, kShapeLetters[s], form.shape[s].name);
           spec.parameters[form.shape[s].name] = theta[s];
         }
         spec.expression.formulas["force_z_N"] = "coefficient * (" + text + ")";

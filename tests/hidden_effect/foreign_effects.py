@@ -250,7 +250,8 @@ EFFECTS = {
     "late draft": dict(force=late_draft(), variables={"neighbour_vy"}, vehicles=2),
     "flapping": dict(force=flapping(), variables={"rate_y"}, speed=1.6, formula=expression(
         "force_b1_N", "a_N * wy", a_N=0.03)),
-    "jet": dict(force=jet(), variables={"xz", "z"}, names={"wind_field"}),
+    "jet": dict(force=jet(), variables={"xz", "z"}, names={"wind_field"}, formula=expression(
+        "force_y_N", "a_N * (x < 0.2) * exp(-((z - 0.8) / width_m)^2 / 2)", a_N=0.03, width_m=0.15)),
     "spin lift": dict(force=lambda s: (0, 0, 0.02 * abs(s.w[2])), variables={"rate_z"}, yaw_reach=3.0,
                       formula=expression("force_z_N", "a_N * abs(wz)", a_N=0.02)),
     "roll slip": dict(force=lambda s: tuple(s.to_world([0, 0.015 * s.w[0], 0])), variables={"rate_x"}, speed=1.3,

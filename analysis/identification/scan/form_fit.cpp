@@ -31,6 +31,27 @@ std::vector<std::vector<double>> combinations(const Form& form) {
   return all;
 }
 
+/// The most promising combinations of starts, by some of the samples.
+std::vector<std::vector<double>> best_starts(const Form& form, const FormData& data) {
+  constexpr Eigen::Index kEnough = 600;
+  constexpr std::size_t kTaken = 5;
+  std::vector<std::vector<double>> starts = combinations(form);
+  const Eigen::Index each = data.target.size() / kEnough;
+  if (each < 2 || starts.size() <= kTaken) return starts;
+  const auto some = Eigen::seq(0, data.target.size() - 1, each);
+  FormData few;
+  few.inputs = data.inputs(some, Eigen::all);
+  few.target = data.target(some);
+  if (data.factor.size() > 0) few.factor = data.factor(some);
+  std::vector<FormFit> fits;
+  for (const std::vector<double>& theta : starts) fits.push_back(fit_coefficients(form, few, theta));
+  std::partial_sort(fits.begin(), fits.begin() + kTaken, fits.end(),
+                    [](const FormFit& a, const FormFit& b) { return a.mean_square < b.mean_square; });
+  starts.clear();
+  for (std::size_t k = 0; k < kTaken; ++k) starts.push_back(std::move(fits[k].theta));
+  return starts;
+}
+
 double first_step(const FormParameter& parameter, double value) {
   const std::vector<double>& starts = parameter.starts;
   if (parameter.lower == parameter.upper) return 0;
@@ -106,7 +127,7 @@ FormFit fit_form(const Form& form, const FormData& data, const std::vector<doubl
   FormFit best;
   best.mean_square = kInfinity;
   for (const std::vector<double>& theta :
-       start.empty() ? combinations(form) : std::vector<std::vector<double>>{start}) {
+       start.empty() ? best_starts(form, data) : std::vector<std::vector<double>>{start}) {
     FormFit fit = fit_coefficients(form, data, theta);
     if (fit.mean_square < best.mean_square) best = std::move(fit);
   }

@@ -1,8 +1,15 @@
 #include "analysis/identification/scan/forms.h"
 
 #include <cmath>
+#include <utility>
 
 namespace swarmcert::identification {
+
+void replace_all(std::string& text, const std::string& from, const std::string& to) {
+  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
+    text.replace(at, from.size(), to);
+}
+
 namespace {
 
 constexpr double kTwoPi = 6.283185307179586;
@@ -51,20 +58,64 @@ Form hinge(const FormRange& range, bool above) {
   return form;
 }
 
-/// Beyond an edge, and less with height: what a platform below does, or a shelf beside.
-Form ledge(const FormRange& along, const FormRange& height, bool above) {
+Form gaussian(const FormRange& range, int centres, std::vector<double> widths) {
+  return {"gaussian",
+          1,
+          {place("centre", range, centres), width("width", range.span(), std::move(widths))},
+          [](const double* v, const double* t, double* to) {
+            to[0] = std::exp(-square((v[0] - t[0]) / t[1]) / 2);
+          },
+          {"exp(-(({0} - {a}) / {b})^2 / 2)"}};
+}
+
+Form step(const FormRange& range, int places, bool above) {
+  return {above ? "step" : "step_down",
+          1,
+          {place("at", range, places)},
+          [above](const double* v, const double* t, double* to) {
+            to[0] = (above ? v[0] > t[0] : v[0] < t[0]) ? 1 : 0;
+          },
+          {above ? "({0} > {a})" : "({0} < {a})"}};
+}
+
+/// The product of a form over the first and one over the second variable, each of one function.
+Form product(const Form& first, const Form& second) {
   Form form;
-  form.name = above ? "ledge_above" : "ledge_below";
+  form.name = first.name + "_" + second.name;
   form.inputs = 2;
-  form.shape = {place("edge", along, 30),
-                width("length", height.span(), {0.1, 0.2, 0.4, 0.8}),
-                {"from", FormUnit::kVariable, height.lower, height.lower, {height.lower}}};
-  form.values = [above](const double* v, const double* t, double* to) {
-    const bool is_beyond = above ? v[0] > t[0] : v[0] < t[0];
-    to[0] = is_beyond ? std::exp(std::fmin(-(v[1] - t[2]) / t[1], 20.0)) : 0;
+  form.is_product = true;
+  for (FormParameter parameter : first.shape) {
+    parameter.name = "x_" + parameter.name;
+    form.shape.push_back(std::move(parameter));
+  }
+  for (FormParameter parameter : second.shape) {
+    parameter.name = "y_" + parameter.name;
+    form.shape.push_back(std::move(parameter));
+  }
+  form.values = [f = first.values, g = second.values, n = first.shape.size()](const double* v,
+                                                                              const double* t, double* to) {
+    double value = 0;
+    f(v, t, &value);
+    g(v + 1, t + n, to);
+    to[0] *= value;
   };
-  form.texts = {std::string(above ? "({0} > {a})" : "({0} < {a})") + " * exp(min(-({1} - {c}) / {b}, 20))"};
+  std::string text = second.texts[0];
+  for (std::size_t k = second.shape.size(); k-- > 0;)
+    replace_all(text, kShapeLetters[k], kShapeLetters[k + first.shape.size()]);
+  replace_all(text, "{0}", "{1}");
+  form.texts = {first.texts[0] + " * " + text};
   return form;
+}
+
+/// Edges along either variable, and a strip along one that ends at an edge along the other.
+void add_edges(const FormRange& x, const FormRange& y, std::vector<Form>& forms) {
+  const Form across_x = gaussian(x, 7, {0.1, 0.3}), across_y = gaussian(y, 7, {0.1, 0.3});
+  for (const bool above_x : {true, false}) {
+    for (const bool above_y : {true, false})
+      forms.push_back(product(step(x, 20, above_x), step(y, 20, above_y)));
+    forms.push_back(product(step(x, 20, above_x), across_y));
+    forms.push_back(product(across_x, step(y, 20, above_x)));
+  }
 }
 
 /// Units of the coefficients: newton over the variable's unit to these powers.
@@ -141,18 +192,8 @@ std::vector<Form> forms_over(const FormRange& range, bool has_origin) {
   add_polynomials(has_origin, forms);
   forms.push_back(decay(range, true));
   forms.push_back(decay(range, false));
-  forms.push_back({"gaussian",
-                   1,
-                   {place("centre", range, 10), width("width", span, {0.05, 0.1, 0.2, 0.4})},
-                   [](const double* v, const double* t, double* to) {
-                     to[0] = std::exp(-square((v[0] - t[0]) / t[1]) / 2);
-                   },
-                   {"exp(-(({0} - {a}) / {b})^2 / 2)"}});
-  forms.push_back({"step",
-                   1,
-                   {place("at", range, 60)},
-                   [](const double* v, const double* t, double* to) { to[0] = v[0] > t[0] ? 1 : 0; },
-                   {"({0} > {a})"}});
+  forms.push_back(gaussian(range, 10, {0.05, 0.1, 0.2, 0.4}));
+  forms.push_back(step(range, 60, true));
   forms.push_back({"logistic",
                    1,
                    {place("middle", range, 10), width("width", span, {0.02, 0.05, 0.1, 0.2})},
@@ -211,12 +252,18 @@ std::vector<Form> forms_over_place(const FormRange& x, const FormRange& y) {
                      to[0] = std::fmax(0.0, std::sqrt(distance2(v, t)) - t[2]);
                    },
                    {"max(0, sqrt(" + text + ") - {c})"}});
+  add_edges(x, y, forms);
   return with_powers(std::move(forms));
 }
 
 std::vector<Form> forms_over_section(const FormRange& along, const FormRange& height) {
   std::vector<Form> forms = forms_over_place(along, height);
-  for (const bool above : {true, false}) forms.push_back(ledge(along, height, above));
+  for (const bool upwards : {true, false}) {
+    const Form with_height = decay(height, upwards);
+    forms.push_back(product(step(along, 20, true), with_height));
+    forms.push_back(product(step(along, 20, false), with_height));
+    forms.push_back(product(gaussian(along, 7, {0.1, 0.3}), with_height));
+  }
   return forms;
 }
 

@@ -31,19 +31,24 @@ struct Form {
   std::vector<FormParameter> shape;
   /// Values of the m functions. @param v [inputs], theta [shape.size()], to [m]
   std::function<void(const double* v, const double* theta, double* to)> values;
-  /// The functions as text, with {0}, {1} for variables and {a}, {b}, {c} for shape parameters in their order.
+  /// The functions as text, with {0}, {1} for variables and kShapeLetters for shape parameters in their order.
   std::vector<std::string> texts;
   int powers[2] = {0, 0};  ///< of the variable in each function: units of the coefficients
   bool has_offset = true;
+  bool is_product = false;  ///< of forms of one variable each
 };
 
 inline constexpr int kMostFormFunctions = 2;
+inline constexpr const char* kShapeLetters[] = {"{a}", "{b}", "{c}", "{d}"};
+
+/// Puts `to` wherever `from` stands.
+void replace_all(std::string& text, const std::string& from, const std::string& to);
 
 /// All forms of one variable. @param range of its values; `has_origin` where zero is a physical one, as of velocities.
 std::vector<Form> forms_over(const FormRange& range, bool has_origin);
-/// All forms over a place in the plane.
+/// All forms over a place in the plane. Parameters of one variable begin with x_ or y_.
 std::vector<Form> forms_over_place(const FormRange& x, const FormRange& y);
-/// All forms over a place in a vertical section. Its centres have the names of forms_over_place().
+/// All forms over a place in a vertical section, whose second variable is called y here too.
 std::vector<Form> forms_over_section(const FormRange& along, const FormRange& height);
 
 }  // namespace swarmcert::identification

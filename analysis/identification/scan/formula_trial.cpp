@@ -6,8 +6,6 @@
 namespace swarmcert::identification {
 namespace {
 
-constexpr const char* kLetters[] = {"{a}", "{b}", "{c}"};
-
 int numbers_of(const FormulaTrial& trial) {
   int count = static_cast<int>(trial.form.texts.size()) + (trial.factor == ScanVariable::kCount ? 0 : 1);
   for (const FormParameter& parameter : trial.form.shape) count += parameter.lower < parameter.upper ? 1 : 0;
@@ -36,10 +34,11 @@ double independent_samples(const EntryData& data, const FormulaTrial& trial) {
   return std::max(static_cast<double>(data.all.target.size()) * (1 - rho) / (1 + rho), 4.0);
 }
 
-double saved_bits(const EntryData& data, const FormulaTrial& trial, double independent) {
+double saved_bits(double mean_square, const FormulaTrial& trial, double independent) {
   const double left = std::max(trial.fit.mean_square, 1e-300);
-  return 0.5 * independent * std::log2(data.mean_square / left) -
-         0.5 * numbers_of(trial) * std::log2(independent);
+  const double tried_bits = trial.form.is_product ? kSurely_bits : 0;
+  return 0.5 * independent * std::log2(mean_square / left) -
+         0.5 * numbers_of(trial) * std::log2(independent) - tried_bits;
 }
 
 FormRange range_of(const Eigen::VectorXd& values) {
@@ -49,11 +48,6 @@ FormRange range_of(const Eigen::VectorXd& values) {
     return sorted[static_cast<std::size_t>(p * static_cast<double>(sorted.size() - 1))];
   };
   return {at(0.01), at(0.99)};
-}
-
-void replace_all(std::string& text, const std::string& from, const std::string& to) {
-  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
-    text.replace(at, from.size(), to);
 }
 
 std::string unit_of_coefficient(const std::string& unit, const std::string& variable_unit, int power) {
@@ -69,7 +63,7 @@ void add_shapes(const FormulaTrial& trial, const std::string& unit, stability::E
     const double value = trial.fit.theta[k];
     spec.parameters[name] = value;
     spec.expression.bounds[name] = {std::min(parameter.lower, value), std::max(parameter.upper, value)};
-    for (std::string& text : texts) replace_all(text, kLetters[k], name);
+    for (std::string& text : texts) replace_all(text, kShapeLetters[k], name);
     if (parameter.lower == parameter.upper) continue;
     // What identification tries around it; the step also says how far it may be off where it is near zero.
     const double step = std::max(0.2 * std::abs(value), 0.02 * (parameter.upper - parameter.lower));

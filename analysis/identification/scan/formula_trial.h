@@ -17,6 +17,8 @@ struct FormulaTrial {
   FormFit fit;
   ScanVariable factor = ScanVariable::kCount;  ///< kCount: none
   double saved_bits = -kInfinity;
+  double mean_square = 0;  ///< of the target about its mean
+  double independent = 0;  ///< samples that saved_bits counts
 };
 
 /// The samples of an entry: all in order, and those that the search looks at.
@@ -31,13 +33,14 @@ struct EntryData {
 /// one sample to the next.
 double independent_samples(const EntryData& data, const FormulaTrial& trial);
 
-/// What the form saves against a constant, less what its numbers cost.
-double saved_bits(const EntryData& data, const FormulaTrial& trial, double independent);
+/// By how much a second variable must be worth more than its numbers cost: many are tried.
+inline constexpr double kSurely_bits = 10;
+
+/// What the form saves against a constant, which leaves `mean_square`, less what its numbers cost; of a product also less kSurely_bits.
+double saved_bits(double mean_square, const FormulaTrial& trial, double independent);
 
 /// From the first to the last percentile.
 FormRange range_of(const Eigen::VectorXd& values);
-
-void replace_all(std::string& text, const std::string& from, const std::string& to);
 
 /// "N" over "m" squared: "N_per_m2".
 std::string unit_of_coefficient(const std::string& unit, const std::string& variable_unit, int power);

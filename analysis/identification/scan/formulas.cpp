@@ -79,18 +79,16 @@ bool is_of_neighbours(const ScanEntry& entry) {
   return !entry.variables.empty() && entry.variables[0] == ScanVariable::kNeighbourX;
 }
 
-/// Forms over a vertical section, whose centres are named after its axes.
+/// Forms over a vertical section, with parameters named after its axes.
 std::vector<Form> forms_of_section(const ScanEntry& entry, const EntryData& data) {
   std::vector<Form> forms =
       forms_over_section(range_of(data.few.inputs.col(0)), range_of(data.few.inputs.col(1)));
-  const std::string along = scan_variable(entry.variables[0]).name,
-                    up = scan_variable(entry.variables[1]).name;
   for (Form& form : forms) {
     for (FormParameter& parameter : form.shape) {
-      if (parameter.name == "x_centre")
-        parameter.name = along + "_centre";
-      else if (parameter.name == "y_centre")
-        parameter.name = up + "_centre";
+      if (parameter.name.rfind("x_", 0) == 0)
+        parameter.name.replace(0, 1, scan_variable(entry.variables[0]).name);
+      else if (parameter.name.rfind("y_", 0) == 0)
+        parameter.name.replace(0, 1, scan_variable(entry.variables[1]).name);
     }
   }
   return forms;
@@ -122,7 +120,6 @@ std::vector<Form> forms_of(const ScanEntry& entry, const EntryData& data) {
 
 /// The best form of an entry, with or without a factor.
 FormulaTrial best_trial(const ScanSamples& samples, const ScanEntry& entry, EntryData& data) {
-  constexpr double kSurely_bits = 10;  // a factor must be worth it
   std::vector<FormulaTrial> trials;
   for (Form& form : forms_of(entry, data)) {
     FormFit fit = fit_form(form, data.few);
@@ -133,7 +130,7 @@ FormulaTrial best_trial(const ScanSamples& samples, const ScanEntry& entry, Entr
       [](const FormulaTrial& a, const FormulaTrial& b) { return a.fit.mean_square < b.fit.mean_square; });
   if (least == trials.end()) return {};
   const double independent = independent_samples(data, *least);
-  for (FormulaTrial& trial : trials) trial.saved_bits = saved_bits(data, trial, independent);
+  for (FormulaTrial& trial : trials) trial.saved_bits = saved_bits(data.mean_square, trial, independent);
   std::stable_sort(trials.begin(), trials.end(),
                    [](const FormulaTrial& a, const FormulaTrial& b) { return a.saved_bits > b.saved_bits; });
   FormulaTrial best = trials[0];
@@ -144,13 +141,26 @@ FormulaTrial best_trial(const ScanSamples& samples, const ScanEntry& entry, Entr
       data.few.factor = factor_of(samples, data.thin, factor);
       FormulaTrial product = {trials[t].form, fit_form(trials[t].form, data.few, trials[t].fit.theta),
                               factor};
-      product.saved_bits = saved_bits(data, product, independent);
+      product.saved_bits = saved_bits(data.mean_square, product, independent);
       if (product.saved_bits > std::max(best.saved_bits, trials[0].saved_bits + kSurely_bits))
         best = std::move(product);
     }
     data.few.factor.resize(0);
   }
+  best.mean_square = data.mean_square;
+  best.independent = independent;
   return best;
+}
+
+/// Formulas over several variables count the same samples: those of the one that takes the fewest for independent.
+void count_alike(const std::vector<FormulaTrial>& trials, std::vector<Formula>& formulas) {
+  double least = kInfinity;
+  for (const FormulaTrial& trial : trials)
+    least = trial.independent > 0 ? std::min(least, trial.independent) : least;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    if (trials[i].independent > 0)
+      formulas[i].saved_bits = saved_bits(trials[i].mean_square, trials[i], least);
+  }
 }
 
 const ScanColumn& column_of_entry(const ScanSamples& samples, int column) {
@@ -258,6 +268,7 @@ std::vector<Formula> find_formulas(const ScanSamples& samples, const Scan& scan,
     total = (world.rowwise() - world.colwise().mean()).squaredNorm() / static_cast<double>(samples.size());
   }
   std::vector<Formula> formulas(which.size());
+  std::vector<FormulaTrial> trials(which.size());
   files::parallel_for(static_cast<int>(which.size()), jobs, [&](int i) {
     const std::size_t e = which[static_cast<std::size_t>(i)];
     const ScanEntry& entry = scan.entries[e];
@@ -281,14 +292,15 @@ std::vector<Formula> find_formulas(const ScanSamples& samples, const Scan& scan,
     EntryData data = data_of(samples, entry);
     const FormulaTrial trial = best_trial(samples, entry, data);
     formula.form = trial.form.name;
-    formula.saved_bits = trial.saved_bits;
     if (!(trial.saved_bits > 0)) return;
+    trials[static_cast<std::size_t>(i)] = trial;
     const double of = samples.quantity == ScanQuantity::kForce ? total : data.mean_square;
     formula.share = (data.mean_square - trial.fit.mean_square) / std::max(of, 1e-300);
     ScanEntry along = entry;
     along.column = column_of(samples, entry, data, trial);
     formula.effect = spec_of(along, column_of_entry(samples, along.column).target, trial);
   });
+  count_alike(trials, formulas);
   formulas.erase(
       std::remove_if(formulas.begin(), formulas.end(), [](const Formula& f) { return !(f.saved_bits > 0); }),
       formulas.end());

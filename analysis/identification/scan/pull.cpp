@@ -99,7 +99,7 @@ Pull find_pull(const ScanSamples& samples) {
       if (!std::isfinite(trial.fit.mean_square)) continue;
       // The same for all forms, or what leaves more correlated errors would count for less.
       if (independent == 0) independent = independent_samples(data, trial);
-      trial.saved_bits = saved_bits(data, trial, independent);
+      trial.saved_bits = saved_bits(data.mean_square, trial, independent);
       if (!(trial.saved_bits > best.saved_bits)) continue;
       best = {trial.form.name, pull_spec(law, trial), trial.saved_bits,
               data.mean_square - trial.fit.mean_square};
