@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <random>
 
 namespace swarmcert::identification {
@@ -167,8 +168,11 @@ class Injector {
   Members members_;
 };
 
-double smallest_size(const Injector& injector, const stability::Parameter& p, int coefficient, int theta) {
+/// Nothing where flights seem to show it without any injection: what is left looks like it, and no size can be told.
+std::optional<double> smallest_size(const Injector& injector, const stability::Parameter& p, int coefficient,
+                                    int theta) {
   constexpr int kMostDoublings = 60;
+  if (injector.is_shown(coefficient, 0, theta)) return std::nullopt;
   const double largest = std::max(std::abs(p.lower), std::abs(p.upper));
   double lower = 0, upper = std::min(injector.size_of_share(coefficient, theta, 0.02), largest);
   if (!std::isfinite(upper)) return upper;
@@ -178,7 +182,7 @@ double smallest_size(const Injector& injector, const stability::Parameter& p, in
     upper = std::min(2 * upper, largest);
   }
   if (lower == 0) {
-    while (injector.is_shown(coefficient, upper / 2, theta) && upper > 1e-12) upper /= 2;
+    while (injector.is_shown(coefficient, upper / 2, theta)) upper /= 2;
     lower = upper / 2;
   }
   while (upper > kResolution * lower) {
@@ -221,7 +225,9 @@ std::vector<Detectable> detectable(const Grams& grams, const Members& members) {
       const stability::Parameter& p = candidate.info.linear[static_cast<std::size_t>(c)];
       Detectable entry{candidate.info.name, p.name, never, candidate.info.excitation, {}};
       if (!thetas.empty()) {
-        entry.size = smallest_size(injector, p, c, thetas[0]);
+        const std::optional<double> size = smallest_size(injector, p, c, thetas[0]);
+        if (!size) continue;
+        entry.size = *size;
         for (std::size_t i = 0; i < candidate.info.shape.size(); ++i)
           entry.shape[candidate.info.shape[i].name] =
               candidate.thetas[static_cast<std::size_t>(thetas[0])][i];

@@ -20,7 +20,8 @@ struct Detectable {
 /// For each candidate that is not among `members` and each of its coefficients: the smallest size at which at least 9
 /// of 10 injections are accepted beside `members`. An injection adds size x column to the residual of a resampled set
 /// of blocks (open loop: the flight does not react), with the theta of the grid that is nearest to the effect's
-/// default. Columns scaled and added change Gram matrices by known amounts, so that no flight is read again.
+/// default. A coefficient that is accepted without any injection has no entry: what is left looks like it. Columns
+/// scaled and added change Gram matrices by known amounts, so that no flight is read again.
 std::vector<Detectable> detectable(const Grams& grams, const Members& members);
 
 }  // namespace swarmcert::identification
