@@ -296,11 +296,11 @@ std::set<std::string> refuted_names(const Explained& explained, double weight_N)
 }
 
 /// Thrust that saturates close to hovering throws the vehicle about, and what its set points ask for hardly reaches
-/// beyond the knee: no curve over the thrust is confirmed then. Where much is left, the effect itself is tried.
+/// beyond the knee: no curve over the thrust is confirmed then. Where anything is left, the effect itself is tried.
 bool may_saturate(const Explained& explained, const stability::Model& model,
                   const std::vector<Candidate>& rivals) {
   const auto is_it = [](const auto& one) { return one.name == "thrust_saturation"; };
-  return explained.settled.rest.ratio > kLoudRatio &&
+  return explained.settled.rest.flag &&
          std::none_of(model.effects.begin(), model.effects.end(), is_it) &&
          std::none_of(rivals.begin(), rivals.end(), is_it);
 }
