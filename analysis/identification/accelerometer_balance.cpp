@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "analysis/identification/force_means.h"
 #include "analysis/identification/vehicle_blocks.h"
 
 namespace swarmcert::identification {
@@ -31,38 +32,23 @@ double turned_upwards_m_s3(const Track& track, std::size_t i) {
   return (now.R_WB * now.omega_B_rad_s).cross(track.specific_force_m_s2[i]).z();
 }
 
-/// The trapezoidal rule integrates the measured force over the same time as the velocity changes in.
+/// By the trapezoidal rule, over the same time as the mean of the force.
+double mean_turned_m_s3(const Track& track, const ForceMean& one) {
+  double integral_m_s2 = 0;
+  for (std::size_t i = one.first + 1; i <= one.last; ++i)
+    integral_m_s2 += (track.instants[i].time_s - track.instants[i - 1].time_s) / 2 *
+                     (turned_upwards_m_s3(track, i - 1) + turned_upwards_m_s3(track, i));
+  return integral_m_s2 / (track.instants[one.last].time_s - track.instants[one.first].time_s);
+}
+
 /// @param scale by which the measured force is divided.
 std::vector<MotionBlock> motion_blocks(const Track& track, double scale) {
   std::vector<MotionBlock> blocks;
-  Eigen::Vector3d integral = Eigen::Vector3d::Zero();
-  double turned_m_s2 = 0;
-  std::size_t first = 0;
-  bool is_open = false;
-  for (std::size_t i = 0; i < track.instants.size(); ++i) {
-    if (track.cut[i] != residuals::Cut::kNone || track.restarts[i] != 0) {
-      is_open = false;
-      continue;
-    }
-    const stability::Instant& now = track.instants[i];
-    if (!is_open) {
-      first = i;
-      integral.setZero();
-      turned_m_s2 = 0;
-      is_open = true;
-      continue;
-    }
-    const double step_s = now.time_s - track.instants[i - 1].time_s;
-    integral += step_s / 2 * (track.specific_force_m_s2[i - 1] + track.specific_force_m_s2[i]);
-    turned_m_s2 += step_s / 2 * (turned_upwards_m_s3(track, i - 1) + turned_upwards_m_s3(track, i));
-    const double length_s = now.time_s - track.instants[first].time_s;
-    if (length_s < kMotionBlock_s) continue;
-    const Eigen::Vector3d gained_m_s = now.v_W_m_s - track.instants[first].v_W_m_s;
-    blocks.push_back({gained_m_s / length_s + stability::kGravity_m_s2 * Eigen::Vector3d::UnitZ(),
-                      integral / (scale * length_s), turned_m_s2 / (scale * length_s)});
-    first = i;
-    integral.setZero();
-    turned_m_s2 = 0;
+  for (const ForceMean& one : specific_force_means(track, kMotionBlock_s)) {
+    const stability::Instant &from = track.instants[one.first], &to = track.instants[one.last];
+    blocks.push_back({(to.v_W_m_s - from.v_W_m_s) / (to.time_s - from.time_s) +
+                          stability::kGravity_m_s2 * Eigen::Vector3d::UnitZ(),
+                      one.mean_m_s2 / scale, mean_turned_m_s3(track, one) / scale});
   }
   return blocks;
 }

@@ -35,4 +35,13 @@ double mean_z(const std::vector<double>& values) {
   return squares > 0 ? mean / std::sqrt(squares / (count * (count - 1))) : 0;
 }
 
+bool surely_positive(const std::vector<double>& differences, int tried) {
+  constexpr std::size_t kFewest = 8;
+  if (differences.size() < kFewest) return false;
+  const MeanFit fit = fit_through_origin(std::vector<double>(differences.size(), 1), differences);
+  const boost::math::students_t student(static_cast<double>(differences.size()) - 1);
+  const double deviation = fit.half / boost::math::quantile(student, 0.95);
+  return fit.value > deviation * boost::math::quantile(student, 1 - 0.01 / std::max(tried, 1));
+}
+
 }  // namespace swarmcert::identification

@@ -17,4 +17,8 @@ MeanFit fit_through_origin(const std::vector<double>& x, const std::vector<doubl
 /// Mean over its standard error; 0 where the values are equal.
 double mean_z(const std::vector<double>& values);
 
+/// Whether the mean of `differences` is above zero by a one-sided t-test at 1 % for `tried` tests together. Neighbours
+/// may be correlated, as in fit_through_origin(). False for fewer than eight.
+bool surely_positive(const std::vector<double>& differences, int tried);
+
 }  // namespace swarmcert::identification

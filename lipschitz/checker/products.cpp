@@ -3,14 +3,6 @@
 #include <cmath>
 #include <cstddef>
 
-// Doubles four at a time where the processor can, chosen when the program starts; the sums are the same.
-#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__)
-#define SWARMCERT_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define SWARMCERT_WIDE
-#endif
-
 namespace swarmcert::check {
 namespace {
 

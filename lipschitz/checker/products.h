@@ -5,6 +5,15 @@
 #include <cstddef>
 #include <vector>
 
+/// A function with doubles four at a time where the processor can, chosen when the program starts; the numbers are the
+/// same.
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__)
+#define SWARMCERT_WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define SWARMCERT_WIDE
+#endif
+
 namespace swarmcert::check {
 
 /// Rows of a matrix, row-major, `stride` numbers from one to the next.

@@ -6,6 +6,7 @@
 
 #include "analysis/identification/labels/exchanged_streams.h"
 #include "analysis/identification/labels/mislabelled.h"
+#include "analysis/identification/mean_fit.h"
 #include "analysis/residuals/inputs.h"
 #include "data.h"
 

@@ -2,7 +2,7 @@
 
 #include <fmt/core.h>
 
-#include "analysis/identification/verdict.h"
+#include "analysis/commands/shared/log_faults.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -10,29 +10,24 @@ namespace {
 using identification::ClockOffset;
 
 files::Json ranking_entry_of(const ClockOffset& offset) {
-  return {{"effect", "clock_offset"},
-          {"kind", offset.kind},
-          {"vehicle", offset.vehicle},
-          {"against", offset.against_vehicle},
-          {"rmse_before", offset.rmse_before_N},
-          {"rmse_after", offset.rmse_after_N},
-          {"drop", 1 - offset.rmse_after_N / offset.rmse_before_N},
-          {"drop_ci", {nullptr, nullptr}},
-          {"parameters", {{"offset_s", {{"value", offset.offset_s}, {"interval_90", offset.interval}}}}},
-          {"per_vehicle", true},
-          {"model_form", files::Json::object()},
-          {"instrument", files::Json::object()},
-          {"class", "clock offset"},
-          {"confounded_with", files::Json::array()},
-          {"rivals", files::Json::array()},
-          {"separated_by", "passes in which each vehicle disturbs the other"},
-          {"paired_z", offset.z},
-          {"wald_z", nullptr},
-          {"records_in_support", offset.records},
-          {"blocks_in_support", offset.records},
-          {"flights_in_support", 1},
-          {"statement", identification::in_words(offset)},
-          {"sensor", true}};
+  return fault_entry(
+      {{"effect", "clock_offset"},
+       {"kind", offset.kind},
+       {"vehicle", offset.vehicle},
+       {"against", offset.against_vehicle},
+       {"rmse_before", offset.rmse_before_N},
+       {"rmse_after", offset.rmse_after_N},
+       {"drop", 1 - offset.rmse_after_N / offset.rmse_before_N},
+       {"parameters", {{"offset_s", {{"value", offset.offset_s}, {"interval_90", offset.interval}}}}},
+       {"class", "clock offset"},
+       {"confounded_with", files::Json::array()},
+       {"rivals", files::Json::array()},
+       {"separated_by", "passes in which each vehicle disturbs the other"},
+       {"paired_z", offset.z},
+       {"records_in_support", offset.records},
+       {"blocks_in_support", offset.records},
+       {"flights_in_support", 1},
+       {"statement", identification::in_words(offset)}});
 }
 
 void print_all(const std::vector<ClockOffset>& offsets) {
@@ -62,14 +57,10 @@ void add_clocks(const std::vector<ClockOffset>& offsets, bool prints, files::Jso
 }
 
 bool judge_clocks(const std::vector<ClockOffset>& offsets, bool prints, files::Json& result) {
-  for (const ClockOffset& offset : offsets) result["ranking"].push_back(ranking_entry_of(offset));
+  std::vector<files::Json> entries;
+  for (const ClockOffset& offset : offsets) entries.push_back(ranking_entry_of(offset));
   if (prints) print_all(offsets);
-  if (offsets.empty()) return false;
-  if (result["verdict"] != identification::name(identification::Verdict::kInconclusive)) {
-    result["verdict"] = identification::name(identification::Verdict::kMissingEffect);
-    result.erase("reason");
-  }
-  return true;
+  return rank_faults(entries, result);
 }
 
 }  // namespace swarmcert::analysis

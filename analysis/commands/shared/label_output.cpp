@@ -2,7 +2,7 @@
 
 #include <fmt/core.h>
 
-#include "analysis/identification/verdict.h"
+#include "analysis/commands/shared/log_faults.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -25,29 +25,24 @@ files::Json ranking_entry_of(const Mislabelled& label) {
   const std::vector<std::string> rivals =
       label.is_sure ? std::vector<std::string>{}
                     : std::vector<std::string>{"thrust_ratio", "payload", "constant_force"};
-  files::Json entry = {{"effect", "mislabelled"},
-                       {"kind", label.kind},
-                       {"vehicle", label.vehicle},
-                       {"against", label.belongs_to},
-                       {"rmse_before", force_of(label, label.before)},
-                       {"rmse_after", force_of(label, label.after)},
-                       {"drop", 1 - label.after / label.before},
-                       {"drop_ci", {nullptr, nullptr}},
-                       {"parameters", parameters_of(label)},
-                       {"per_vehicle", true},
-                       {"model_form", files::Json::object()},
-                       {"instrument", files::Json::object()},
-                       {"class", label.is_sure ? "mislabelled" : "mislabelled, thrust ratio or mass"},
-                       {"confounded_with", rivals},
-                       {"rivals", files::Json::array()},
-                       {"separated_by", label.is_sure ? "" : "the vehicle on a scale"},
-                       {"paired_z", nullptr},
-                       {"wald_z", nullptr},
-                       {"records_in_support", 0},
-                       {"blocks_in_support", label.blocks},
-                       {"flights_in_support", label.flights},
-                       {"statement", identification::in_words(label)},
-                       {"sensor", true}};
+  files::Json entry =
+      fault_entry({{"effect", "mislabelled"},
+                   {"kind", label.kind},
+                   {"vehicle", label.vehicle},
+                   {"against", label.belongs_to},
+                   {"rmse_before", force_of(label, label.before)},
+                   {"rmse_after", force_of(label, label.after)},
+                   {"drop", 1 - label.after / label.before},
+                   {"parameters", parameters_of(label)},
+                   {"class", label.is_sure ? "mislabelled" : "mislabelled, thrust ratio or mass"},
+                   {"confounded_with", rivals},
+                   {"rivals", files::Json::array()},
+                   {"separated_by", label.is_sure ? "" : "the vehicle on a scale"},
+                   {"paired_z", nullptr},
+                   {"records_in_support", 0},
+                   {"blocks_in_support", label.blocks},
+                   {"flights_in_support", label.flights},
+                   {"statement", identification::in_words(label)}});
   for (const std::string& rival : rivals)
     entry["rivals"].push_back({{"effect", rival}, {"fly", "the vehicle on a scale"}});
   return entry;
@@ -84,14 +79,10 @@ void add_labels(const std::vector<Mislabelled>& labels, bool prints, files::Json
 }
 
 bool judge_labels(const std::vector<Mislabelled>& labels, bool prints, files::Json& result) {
-  for (const Mislabelled& label : labels) result["ranking"].push_back(ranking_entry_of(label));
+  std::vector<files::Json> entries;
+  for (const Mislabelled& label : labels) entries.push_back(ranking_entry_of(label));
   if (prints) print_all(labels);
-  if (labels.empty()) return false;
-  if (result["verdict"] != identification::name(identification::Verdict::kInconclusive)) {
-    result["verdict"] = identification::name(identification::Verdict::kMissingEffect);
-    result.erase("reason");
-  }
-  return true;
+  return rank_faults(entries, result);
 }
 
 }  // namespace swarmcert::analysis

@@ -1,10 +1,10 @@
 #include "analysis/identification/labels/exchanged_streams.h"
 
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <optional>
 
+#include "analysis/identification/force_means.h"
 #include "analysis/identification/mean_fit.h"
 
 namespace swarmcert::identification {
@@ -15,7 +15,6 @@ using residuals::Track;
 
 constexpr double kStreamBlock_s = 1, kPathSample_s = 0.1, kGain_s = 0.5, kLongestStep_s = 0.1;
 constexpr double kTimesBetter = 2;
-constexpr std::size_t kFewestStreamBlocks = 8;
 
 int block_at(double time_s) { return static_cast<int>(std::floor(time_s / kStreamBlock_s)); }
 
@@ -86,28 +85,8 @@ struct Felt {
 std::vector<Felt> felt_by(const Track& track) {
   std::vector<Felt> all;
   if (track.position_only || track.force_source != logs::ForceSource::kAccelerometer) return all;
-  Vector3d gained_m_s = Vector3d::Zero();
-  std::size_t first = 0;
-  bool is_open = false;
-  for (std::size_t i = 0; i < track.instants.size(); ++i) {
-    if (track.cut[i] != residuals::Cut::kNone || track.restarts[i] != 0) {
-      is_open = false;
-      continue;
-    }
-    if (!is_open) {
-      first = i;
-      gained_m_s.setZero();
-      is_open = true;
-      continue;
-    }
-    const double now_s = track.instants[i].time_s, from_s = track.instants[first].time_s;
-    gained_m_s += (now_s - track.instants[i - 1].time_s) / 2 *
-                  (track.specific_force_m_s2[i - 1] + track.specific_force_m_s2[i]);
-    if (now_s - from_s < kGain_s) continue;
-    all.push_back({from_s, now_s, gained_m_s / (now_s - from_s)});
-    first = i;
-    gained_m_s.setZero();
-  }
+  for (const ForceMean& one : specific_force_means(track, kGain_s))
+    all.push_back({track.instants[one.first].time_s, track.instants[one.last].time_s, one.mean_m_s2});
   return all;
 }
 
@@ -197,14 +176,6 @@ std::vector<int> belongs_to(const Misfits& misfits, int tried) {
 
 double root_mean_square(const Misfits& misfits, int own, int other) {
   return std::sqrt(comparison(misfits, own, other).other);
-}
-
-bool surely_positive(const std::vector<double>& differences, int tried) {
-  if (differences.size() < kFewestStreamBlocks) return false;
-  const MeanFit fit = fit_through_origin(std::vector<double>(differences.size(), 1), differences);
-  const boost::math::students_t student(static_cast<double>(differences.size()) - 1);
-  const double deviation = fit.half / boost::math::quantile(student, 0.95);
-  return fit.value > deviation * boost::math::quantile(student, 1 - 0.01 / std::max(tried, 1));
 }
 
 }  // namespace swarmcert::identification

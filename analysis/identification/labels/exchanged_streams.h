@@ -39,8 +39,4 @@ std::vector<int> belongs_to(const Misfits& misfits, int tried);
 /// Root of the mean over the blocks that both pairs have; 0 where they have none.
 double root_mean_square(const Misfits& misfits, int own, int other);
 
-/// Whether the mean of `differences` is above zero by a one-sided t-test at 1 % for `tried` tests together. Neighbours
-/// may be correlated, as in fit_through_origin(). False for fewer than eight.
-bool surely_positive(const std::vector<double>& differences, int tried);
-
 }  // namespace swarmcert::identification

@@ -8,6 +8,7 @@
 
 #include "analysis/identification/column_run.h"
 #include "analysis/identification/labels/exchanged_streams.h"
+#include "analysis/identification/mean_fit.h"
 #include "analysis/residuals/force_residual.h"
 #include "analysis/residuals/plausibility.h"
 
