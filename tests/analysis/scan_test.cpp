@@ -125,6 +125,19 @@ TEST(Scan, FindsAForceAlongTheMotionOfANeighbour) {
   EXPECT_GT(found.entries[0].share, 0.8);
 }
 
+TEST(Scan, TellsTheMotionOfANeighbourOverGroundFromThatAgainstTheVehicle) {
+  Flights flights = of_two_vehicles(44);
+  remember_velocities(flights.samples);
+  flights.push(
+      0, [&](Eigen::Index i) { return 0.01 * (flights.at(i, V::kNeighbourVx) + flights.at(i, V::kVx)); });
+  const Scan found = scan(flights.samples, 1);
+  ASSERT_FALSE(found.entries.empty());
+  EXPECT_EQ(found.entries[0].variable, "neighbour_vx");
+  EXPECT_TRUE(found.entries[0].over_ground);
+  EXPECT_EQ(found.entries[0].lag_s, 0);
+  EXPECT_GT(found.entries[0].share, 0.8);
+}
+
 TEST(Scan, FindsWhenANeighbourMovedThatDisturbsLater) {
   Flights flights = of_two_vehicles(43);
   const auto vy = static_cast<int>(V::kNeighbourVy);

@@ -111,6 +111,7 @@ files::Json json_of(const ScanEntry& entry, const std::string& kind) {
                       {"rmse_after", entry.rmse_after},
                       {"set_points", verdict_of(entry)}};
   if (entry.lag_s > 0) json["lag_s"] = entry.lag_s;
+  if (entry.over_ground) json["over_ground"] = true;
   if (entry.period_s > 0) json["period_s"] = entry.period_s;
   return json;
 }
@@ -119,6 +120,7 @@ std::string place_of(const ScanEntry& entry) {
   if (entry.frame == "neighbour") return words_of(entry) + " towards the nearest neighbour, over its place";
   std::string text = fmt::format("{} {} over {}", words_of(entry), entry.axis, entry.variable);
   if (entry.frame == "body" && entry.quantity == "force") text += " (body axes)";
+  if (entry.over_ground) text += " over ground";
   if (entry.lag_s > 0) text += fmt::format(", {:.1f} s ago", entry.lag_s);
   if (entry.period_s > 0) text += fmt::format(", period {:.3g} s", entry.period_s);
   return text;

@@ -25,11 +25,13 @@ std::vector<Abscissa> abscissas(const ScanSamples& samples) {
     all.push_back({"neighbour_xy", place, 0, false, true, false, {5, 9}});
     for (int lag = 0; lag < NeighbourPlaces::kLags; ++lag)
       all.push_back({"neighbour", {}, lag, false, true, false, {7}});
-    // Now they are among the variables above.
-    for (int lag = 1; lag < NeighbourPlaces::kLags; ++lag) {
+    for (int lag = 0; lag < NeighbourPlaces::kLags; ++lag) {
       for (const auto v :
-           {ScanVariable::kNeighbourVx, ScanVariable::kNeighbourVy, ScanVariable::kNeighbourVz})
-        all.push_back({scan_variable(v).name, {v}, lag, false, true, false, {8}});
+           {ScanVariable::kNeighbourVx, ScanVariable::kNeighbourVy, ScanVariable::kNeighbourVz}) {
+        // Now, and minus the vehicle's, they are among the variables above.
+        if (lag > 0) all.push_back({scan_variable(v).name, {v}, lag, false, true, false, {8}});
+        all.push_back({scan_variable(v).name, {v}, lag, false, true, false, {8}, true});
+      }
     }
   }
   return all;
@@ -64,9 +66,13 @@ Curve curve_over(const ScanSamples& samples, const Abscissa& abscissa, int knots
     curve.knots = {lateral, height};
     return curve;
   }
-  if (abscissa.lag > 0) {
-    const auto velocity_m_s = samples.neighbours.velocity_m_s.col(
-        NeighbourPlaces::velocity_column(abscissa.variables[0], abscissa.lag));
+  if (abscissa.lag > 0 || abscissa.over_ground) {
+    const ScanVariable v = abscissa.variables[0];
+    Eigen::VectorXf velocity_m_s =
+        samples.neighbours.velocity_m_s.col(NeighbourPlaces::velocity_column(v, abscissa.lag));
+    if (abscissa.over_ground)
+      velocity_m_s += samples.values.col(static_cast<int>(ScanVariable::kVx) + static_cast<int>(v) -
+                                         static_cast<int>(ScanVariable::kNeighbourVx));
     curve.knots = {knots_over(velocity_m_s, knots)};
     if (curve.knots[0].empty()) return {};
     curve.columns = knots;

@@ -15,7 +15,8 @@ struct Abscissa {
   int lag = 0;                          ///< of neighbours, in steps of NeighbourPlaces::kLag_s
   bool is_answer = false;
   bool in_world = true, in_body = true;
-  std::vector<int> knots;  ///< how many to try, for each variable
+  std::vector<int> knots;    ///< how many to try, for each variable
+  bool over_ground = false;  ///< velocity of a neighbour, not minus the vehicle's
 };
 
 /// A curve over an abscissa with so many knots.

@@ -275,6 +275,7 @@ ScanEntry entry_of(const Judged& judged, const Abscissa& abscissa, int component
   set_column(judged, component, entry);
   entry.variables = abscissa.variables;
   entry.lag_s = abscissa.lag * NeighbourPlaces::kLag_s;
+  entry.over_ground = abscissa.over_ground;
   if (!curve.commanded.empty()) {
     entry.is_checked = true;
     entry.slope = slope_of(judged, component, predictions, fit.predictions(curve.commanded).col(component));
@@ -327,7 +328,7 @@ void add_body_constant(const Judged& judged, double least, std::vector<ScanEntry
   entries.push_back(std::move(entry));
 }
 
-/// Of neighbours at several lags only the one that explains most.
+/// Of neighbours at several lags, with and without the vehicle's own velocity, only the one that explains most.
 void keep_best_lags(std::vector<ScanEntry>& entries) {
   std::vector<ScanEntry> kept;
   for (ScanEntry& entry : entries) {

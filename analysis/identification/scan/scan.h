@@ -41,10 +41,11 @@ struct ScanEntry {
   /// In newton, of the force's vector at single records; else of the column in its unit, means over 0.1 s.
   double rmse_before = 0, rmse_after = 0;
   std::vector<CurvePoint> curve;
-  bool is_checked = false;  ///< set points allow the check against closed-loop bias
-  InstrumentedValue slope;  ///< beta; 1 where the controller plays no part
-  double lag_s = 0;         ///< neighbours as they were so long ago
-  double period_s = 0;      ///< of what repeats in time; 0: it does not
+  bool is_checked = false;   ///< set points allow the check against closed-loop bias
+  InstrumentedValue slope;   ///< beta; 1 where the controller plays no part
+  double lag_s = 0;          ///< neighbours as they were so long ago
+  bool over_ground = false;  ///< velocity of a neighbour, not minus the vehicle's
+  double period_s = 0;       ///< of what repeats in time; 0: it does not
   /// What formulas are fitted to.
   std::vector<ScanVariable> variables;  ///< empty for neighbours and constants
   int column = 0;                       ///< of ScanSamples::residual
