@@ -6,9 +6,11 @@
 #include <random>
 
 #include "lipschitz/checker/values.h"
+#include "lipschitz/invariant_box.h"
 #include "lipschitz/rounding.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -62,9 +64,8 @@ class ValueSearch {
     }
     std::vector<check::SumTerm> terms;
     for (std::size_t j = 0; j < point.inputs.size(); ++j) {
-      check::Intervals at;
-      for (const float coordinate : point.inputs[j]) at.lower.emplace_back(static_cast<double>(coordinate));
-      at.upper = at.lower;
+      const Box seen = seen_at(point.networks[j], point.inputs[j]);
+      check::Intervals at{{seen.lower.begin(), seen.lower.end()}, {seen.upper.begin(), seen.upper.end()}};
       const files::Weights& network = *parts_.at(point.networks[j]);
       terms.push_back({{check::network_intervals(network, std::move(at)), {}}, 1, 1});
     }
@@ -74,6 +75,13 @@ class ValueSearch {
   }
 
  private:
+  /// What phi sees of a point: itself, or about its invariants, as they leave the clamp.
+  Box seen_at(const std::string& name, const std::vector<float>& x) const {
+    const Box point{{x.begin(), x.end()}, {x.begin(), x.end()}};
+    if (!files::maps_to_invariants(network_, function_)) return point;
+    return clamped(network_, {{name, invariant_box(name, point)}}).at(name);
+  }
+
   double share() { return std::ldexp(static_cast<double>(generator_() >> 11), -53); }
 
   /// Each coordinate at random, a third of them at an end.
@@ -118,8 +126,8 @@ class ValueSearch {
       return std::vector<double>(static_cast<std::size_t>(outputs()));
     std::vector<double> sum;
     for (std::size_t j = 0; j < point.inputs.size(); ++j) {
-      const std::vector<float>& x = point.inputs[j];
-      const std::vector<double> term = evaluators_.at(point.networks[j])({x.begin(), x.end()});
+      const std::vector<double> term =
+          evaluators_.at(point.networks[j])(seen_at(point.networks[j], point.inputs[j]).lower);
       if (sum.empty()) sum.resize(term.size());
       for (std::size_t i = 0; i < term.size(); ++i) sum[i] += term[i];
     }

@@ -145,6 +145,7 @@ std::map<std::string, Box> read_domain(const std::string& path, const files::Net
   for (const auto& [kind, phi] : network.phi) {
     if (kind != files::kGroundKind) inputs = static_cast<std::size_t>(phi.inputs());
   }
+  if (network.invariants) inputs = nn::kRelativeState;  // a box of states
   if (inputs > 0) {
     const Box box = read_box(top, inputs);
     for (const auto& [kind, phi] : network.phi) domain[files::phi_name(kind)] = box;

@@ -8,12 +8,14 @@
 
 #include "lipschitz/attained_values.h"
 #include "lipschitz/extremes.h"
+#include "lipschitz/invariant_box.h"
 #include "lipschitz/sum_support.h"
 #include "lipschitz/value_bounds.h"
 #include "nn/base/doubles.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -293,10 +295,14 @@ struct Ends {
 /// Bounds of all outputs of one function, for 1, 2, ... neighbours.
 class RangesOf {
  public:
-  RangesOf(const Network& network, const std::map<std::string, Box>& domain, std::string function,
+  /// @param states where the inputs are; `domain`: what phi sees of them.
+  RangesOf(const Network& network, const std::map<std::string, Box>& states,
+           const std::map<std::string, Box>& domain, std::string function,
            const std::map<std::string, double>& rho_bound, const RangeOptions& options,
            std::function<void()> searched)
-      : function_(std::move(function)),
+      : network_(network),
+        states_(states),
+        function_(std::move(function)),
         names_(files::networks_of(function_)),
         is_set_(names_.size() == 2),
         only_kind_(network.phi.size() == 1 + network.phi.count(files::kGroundKind)),
@@ -365,12 +371,26 @@ class RangesOf {
       before = now;
       if (is_set_ && n == 0) continue;
       range.neighbours_at_most = is_set_ ? n : 0;
-      range.greatest = ranger_.attained(output, 1, high);
-      range.least = ranger_.attained(output, -1, low);
+      attain(output, n, low, high, range);
       found.push_back(range);
     }
   }
 
+  /// Values of invariants are no rational numbers: they are enclosed, at states.
+  void attain(int output, int neighbours, const Candidates& low, const Candidates& high,
+              CertifiedRange& range) {
+    if (files::maps_to_invariants(network_, function_)) {
+      const std::vector<AttainedEnds> ends = attained_ends(network_, states_, function_, neighbours);
+      range.least = ends[static_cast<std::size_t>(output)].least;
+      range.greatest = ends[static_cast<std::size_t>(output)].greatest;
+      return;
+    }
+    range.greatest = ranger_.attained(output, 1, high);
+    range.least = ranger_.attained(output, -1, low);
+  }
+
+  const Network& network_;
+  const std::map<std::string, Box>& states_;
   std::string function_;
   std::vector<std::string> names_;
   bool is_set_, only_kind_;
@@ -395,7 +415,8 @@ bool is_of_relu(const Network& network, const std::string& function) {
 }
 
 /// What a certificate states of a function with other activations, and values that it takes.
-std::vector<CertifiedRange> stated_ranges(const Network& network, const std::map<std::string, Box>& domain,
+std::vector<CertifiedRange> stated_ranges(const Network& network, const std::map<std::string, Box>& states,
+                                          const std::map<std::string, Box>& domain,
                                           const std::string& function,
                                           const std::map<std::string, double>& rho_bound,
                                           const RangeOptions& options) {
@@ -403,7 +424,7 @@ std::vector<CertifiedRange> stated_ranges(const Network& network, const std::map
   for (const CertifiedValues& values :
        certified_values(network, domain, rho_bound, {options.neighbours, false, false, 0}, function)) {
     const std::vector<AttainedEnds> ends =
-        attained_ends(network, domain, function, std::max(1, values.neighbours));
+        attained_ends(network, states, function, std::max(1, values.neighbours));
     for (std::size_t i = 0; i < ends.size(); ++i) {
       CertifiedRange range;
       range.function = function;
@@ -457,7 +478,9 @@ std::vector<std::string> value_functions(const Network& network) {
 std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::string, Box>& domain,
                                    const std::map<std::string, double>& rho_bound,
                                    const RangeOptions& options) {
-  const std::map<std::string, Box> inner = clamped(network, domain);
+  const std::map<std::string, Box> inner =
+      clamped(network, network.invariants ? invariant_boxes(domain) : domain);
+  const std::map<std::string, Box>& states = network.invariants ? domain : inner;
   // One function after the other: each search uses all threads.
   std::vector<CertifiedRange> result;
   int done = 0, total = 0;
@@ -473,8 +496,9 @@ std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::s
   };
   for (const std::string& function : functions) {
     const std::vector<CertifiedRange> found =
-        is_of_relu(network, function) ? RangesOf(network, inner, function, rho_bound, options, searched).all()
-                                      : stated_ranges(network, inner, function, rho_bound, options);
+        is_of_relu(network, function)
+            ? RangesOf(network, states, inner, function, rho_bound, options, searched).all()
+            : stated_ranges(network, states, inner, function, rho_bound, options);
     result.insert(result.end(), found.begin(), found.end());
   }
   return result;

@@ -56,7 +56,9 @@ std::vector<std::string> value_functions(const files::Network& network);
 /// maximum by branch and bound.
 ///
 /// Of functions with other activations than ReLU: what certified_values() states, and no branch and bound.
-/// @param domain by part, finite.
+///
+/// Of networks of rotation invariants: over the boxes of invariants that hold those of the states.
+/// @param domain by part, finite; of states where NET has invariants.
 /// @param rho_bound a proved Lipschitz bound of rho, by its kind; for the jump |f - f'| <= L |phi(x)|.
 std::vector<CertifiedRange> ranges(const files::Network& network, const std::map<std::string, Box>& domain,
                                    const std::map<std::string, double>& rho_bound,

@@ -129,10 +129,8 @@ std::map<std::string, double> Evidence::global_bounds() {
 }
 
 std::map<std::string, lipschitz::Box> Evidence::domain() {
-  if (flown().invariants)
-    throw Unfounded(
-        "values over a box are bounded of networks of relative states, not of rotation invariants");
   if (!release().box.empty()) return lipschitz::read_domain(release().box, flown());
+  if (flown().invariants) throw Unfounded("no box of relative states: name box in [release]");
   std::map<std::string, lipschitz::Box> clamp = lipschitz::clamp_domain(flown());
   if (clamp.empty()) throw Unfounded("no box: name box in [release], or clamp the inputs in network.toml");
   return clamp;

@@ -296,9 +296,16 @@ TEST_F(Train, ExactSymmetryIsTrainedCertifiedSimulatedAndExportedAndRefusedWhere
              "[spectral_norms]\n[lipschitz]\nmax_joint_gf = 60\n");
   const Outcome gated = execute("swarmcert gate policy.toml");
   EXPECT_EQ(gated.exit_code, 0) << gated.output;
-  write_text(folder_ / "range.toml",
-             read_text(folder_ / "policy.toml") + "[range]\nmax_abs_force_gf = 1000\n");
-  const Outcome unfounded = execute("swarmcert gate range.toml");
+  write_text(folder_ / "states.toml",
+             "schema = \"swarmcert/box/1\"\nlower = [-0.2,-0.2,-0.5,-1,-1,-1]\nupper = [0.2,0.2,0.5,1,1,1]\n"
+             "ground = { lower = [-1,-1,-1,-1], upper = [0,1,1,1] }\n");
+  std::string policy = read_text(folder_ / "policy.toml");
+  policy.insert(policy.find("[certificate]"), "box = \"states.toml\"\n");
+  write_text(folder_ / "range.toml", policy + "[range]\nmax_abs_force_gf = 200\nmax_jump_gf = 500\n");
+  const Outcome ranged = execute("swarmcert gate range.toml");
+  EXPECT_EQ(ranged.exit_code, 0) << ranged.output;
+  write_text(folder_ / "float32.toml", policy + "[float32_error]\nmax_error_gf = 1000\n");
+  const Outcome unfounded = execute("swarmcert gate float32.toml");
   EXPECT_EQ(unfounded.exit_code, 1);
   EXPECT_NE(unfounded.output.find("networks of relative states"), std::string::npos) << unfounded.output;
   write_text(folder_ / "box.toml",
