@@ -21,8 +21,8 @@ constexpr std::size_t kFewestMotionBlocks = 10;
 /// Means over a second without a cut.
 struct MotionBlock {
   Eigen::Vector3d of_velocity_m_s2, measured_m_s2;
-  /// Vertical part that a lag of the accelerometer behind the attitude adds to the measured mean, per second of lag: the
-  /// body turns meanwhile. Of a filter a' = (a_B - a) / lag, measured = R a = R a_B - lag R a', and R a' = (R a)' -
+  /// Vertical part that a lag of the accelerometer behind the attitude adds to the measured mean, per second of lag:
+  /// the body turns meanwhile. Of a filter a' = (a_B - a) / lag, measured = R a = R a_B - lag R a', and R a' = (R a)' -
   /// omega x (R a), whose first part has no mean.
   double of_lag_m_s3;
 };

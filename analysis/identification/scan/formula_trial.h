@@ -36,7 +36,8 @@ double independent_samples(const EntryData& data, const FormulaTrial& trial);
 /// By how much a second variable must be worth more than its numbers cost: many are tried.
 inline constexpr double kSurely_bits = 10;
 
-/// What the form saves against a constant, which leaves `mean_square`, less what its numbers cost; of a product also less kSurely_bits.
+/// What the form saves against a constant, which leaves `mean_square`, less what its numbers cost; of a product also
+/// less kSurely_bits.
 double saved_bits(double mean_square, const FormulaTrial& trial, double independent);
 
 /// From the first to the last percentile.
