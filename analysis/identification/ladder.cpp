@@ -251,7 +251,10 @@ class Climb {
       const Passes passes = {working_, kind_, ladder_.split.fit, 0, jobs_, progress_};
       name = propose(working_, passes, ladder_.fitted, asked);
       if (name.empty())
-        return refuse(asked, "what is left varies with no variable that a " + asked + " could express");
+        return refuse(asked,
+                      fmt::format("what is left of the {} flights for fitting varies surely with no variable "
+                                  "that a {} could express; more flights may show one",
+                                  ladder_.split.fit.size(), asked));
     }
     std::vector<std::string> names = accepted_;
     names.push_back(name);
