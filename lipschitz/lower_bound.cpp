@@ -100,8 +100,11 @@ SlopeWitness search_scaled(const SlopeFunction& f, const Claim& claim, SlopeSear
     search.box->lower[k] /= claim.scale[k];
     search.box->upper[k] /= claim.scale[k];
   }
-  for (Eigen::VectorXd& start : search.starts)
-    for (Eigen::Index k = 0; k < start.size(); ++k) start(k) /= claim.scale[static_cast<std::size_t>(k)];
+  const auto moved_size = static_cast<Eigen::Index>(claim.scale.size());
+  for (std::vector<Eigen::VectorXd>* points : {&search.starts, &search.places})
+    for (Eigen::VectorXd& point : *points)
+      for (Eigen::Index k = 0; k < std::min(point.size(), moved_size); ++k)
+        point(k) /= claim.scale[static_cast<std::size_t>(k)];
   SlopeWitness found = search_slope(scaled, search);
   const auto back = [&](std::vector<float>& x) {
     for (std::size_t k = 0; k < x.size(); ++k) {
@@ -222,9 +225,11 @@ FoundSlope lower_bound(const Network& network, const Claim& claim, const std::ma
     search.seconds = options.seconds / cases;
     search.cancelled = options.cancelled;
     search.starts = options.starts;
+    search.places = options.places;
+    search.regions = options.regions;
     if (claim.block != "all") search.block = files::block_coordinates(network, claim.function, claim.block);
     if (claim.domain == "box") {
-      search.box = domain.at(names[0]);
+      search.box = options.moved ? *options.moved : domain.at(names[0]);
       for (const std::string& name : others) search.other_boxes.emplace_back(domain.at(name));
     }
     SlopeWitness found = claim.scale.empty() ? search_slope(f, search) : search_scaled(f, claim, search);

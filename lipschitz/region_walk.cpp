@@ -17,6 +17,8 @@ using Eigen::VectorXd;
 constexpr int kPatience = 100;
 /// Random points of which a walk starts at the steepest.
 constexpr int kStarts = 50;
+/// And points with the others as at one of the places that are given, the first being that place.
+constexpr int kStartsAtPlace = 10;
 /// Newton steps towards a region's centre; the centre need not be accurate.
 constexpr int kCentringSteps = 8;
 constexpr double kCentred = 0.3;  ///< Newton decrement at which a point counts as central
@@ -135,10 +137,11 @@ VectorXd RegionWalk::random_point(double nearest, double farthest) {
   return z;
 }
 
-void RegionWalk::move_to(const VectorXd& x, VectorXd& z) const {
-  for (int v = 0; v < network_.moved_variables(); ++v) {
+void RegionWalk::move_to(const VectorXd& inputs, VectorXd& z, int first) const {
+  for (int v = first; v < network_.variables(); ++v) {
     const int k = network_.coordinate[static_cast<std::size_t>(v)];
-    z[v] = (x[k] - network_.centre[v]) / network_.scale[v];
+    if (k >= inputs.size()) return;
+    z[v] = (inputs[k] - network_.centre[v]) / network_.scale[v];
     if (network_.boxed[v]) z[v] = std::clamp(z[v], -1 + 1e-9, 1 - 1e-9);
   }
 }
@@ -166,6 +169,14 @@ RegionWalk::Candidate RegionWalk::steepest_start(double nearest, double farthest
     if (!starts_.empty()) move_to(starts_.back(), z);
     const double slope = local_slope(network_, z).slope;
     if (slope > start.slope) start = {slope, std::move(z), true};
+  }
+  for (const VectorXd& place : places_) {
+    for (int i = 0; i < kStartsAtPlace; ++i) {
+      VectorXd z = random_point(nearest, farthest);
+      move_to(place, z, i == 0 ? 0 : network_.moved_variables());
+      const double slope = local_slope(network_, z).slope;
+      if (slope > start.slope) start = {slope, std::move(z), true};
+    }
   }
   return start;
 }
@@ -297,19 +308,13 @@ void RegionWalk::queue_neighbours(const LinearRegion& region, const VectorXd& z)
 
 RegionWalk::Hit RegionWalk::first_hit(const VectorXd& rates, const VectorXd& ray, const VectorXd& z) const {
   Hit hit;
-  double largest = 0;
-  for (Eigen::Index i = 0; i < rates.size(); ++i) {
-    if (rates[i] > largest) {
-      largest = rates[i];
-      hit.facet = i;
-    }
-  }
-  if (hit.facet < 0) return hit;
+  const double largest = rates.size() > 0 ? rates.maxCoeff() : 0;
+  if (!(largest > 0)) return hit;
+  hit.facet = std::find(rates.begin(), rates.end(), largest) - rates.begin();
   hit.first = 1 / largest;
-  double next = 0;  // kinks at the same place, as those of equal neurons, are one
-  for (Eigen::Index i = 0; i < rates.size(); ++i) {
-    if (rates[i] > next && rates[i] < largest * (1 - 1e-9)) next = rates[i];
-  }
+  const double same = largest * (1 - 1e-9);  // kinks at the same place, as those of equal neurons, are one
+  double next = 0;
+  for (const double rate : rates) next = std::max(next, rate < same ? rate : 0.0);
   if (next > 0) hit.second = 1 / next;
   for (int v = 0; v < network_.variables(); ++v) {
     if (!network_.boxed[v] || ray[v] == 0) continue;

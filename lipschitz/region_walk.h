@@ -53,6 +53,10 @@ class RegionWalk {
   RegionWalk(const SearchNetwork& network, std::uint64_t seed,
              const std::vector<Eigen::VectorXd>& starts = {}, Where where = Where::kAmongKinks);
 
+  /// Points (x, x_1, ...) of the moved vector and of the first few others: every walk may start there as well, or
+  /// elsewhere with these others.
+  void set_places(std::vector<Eigen::VectorXd> places) { places_ = std::move(places); }
+
   /// Enters up to `regions` regions, continuing the current walk and starting new ones.
   /// @returns whether it went through with that, rather than stop.
   bool enter(int regions, const Stop& stop);
@@ -72,7 +76,8 @@ class RegionWalk {
 
   /// A point of the domain; open variables at a random distance from the centre, between these two.
   Eigen::VectorXd random_point(double nearest, double farthest);
-  void move_to(const Eigen::VectorXd& x, Eigen::VectorXd& z) const;
+  /// Puts the variables of (x, x_1, ...), from the one at `first` on and as far as `inputs` go, where these are.
+  void move_to(const Eigen::VectorXd& inputs, Eigen::VectorXd& z, int first = 0) const;
   void start_walk();
   /// The steepest of some points of the domain at distances between these two.
   Candidate steepest_start(double nearest, double farthest);
@@ -91,6 +96,7 @@ class RegionWalk {
   const SearchNetwork& network_;
   files::Random random_;
   std::vector<Eigen::VectorXd> starts_;  ///< still to be used, the first one last
+  std::vector<Eigen::VectorXd> places_;
   bool all_move_;  ///< every neuron depends on the moved vector, so that what lies behind a facet is exact
   std::optional<SearchNetwork> recession_;  ///< of walks far out: the chain without its biases
   int walks_ = 0;

@@ -175,6 +175,20 @@ VectorXd SearchNetwork::inputs(const VectorXd& z) const {
   return result;
 }
 
+VectorXd SearchNetwork::value(const std::vector<float>& inputs) const {
+  VectorXd h(variables());
+  for (int v = 0; v < variables(); ++v) h[v] = (inputs[coordinate[v]] - centre[v]) / scale[v];
+  for (const SearchStage& stage : stages) {
+    if (&stage != &stages.front()) {
+      const std::vector<char>& passes = (&stage - 1)->passes;
+      for (Eigen::Index i = 0; i < h.size(); ++i)
+        if (!passes[static_cast<std::size_t>(i)]) h[i] = std::max(h[i], 0.0);
+    }
+    h = (stage.weights * h + stage.biases).eval();
+  }
+  return h;
+}
+
 SearchNetwork search_network(const SlopeFunction& f, const std::vector<std::optional<Box>>& boxes,
                              const std::vector<int>& block) {
   std::vector<Term> terms = {f.moved};

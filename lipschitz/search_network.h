@@ -44,6 +44,8 @@ struct SearchNetwork {
 
   /// (x, x_1, x_2, ...) at z.
   Eigen::VectorXd inputs(const Eigen::VectorXd& z) const;
+  /// f, up to rounding, at (x, x_1, x_2, ...) = `inputs`, which agree with `fixed_inputs` where they are no variables.
+  Eigen::VectorXd value(const std::vector<float>& inputs) const;
 };
 
 /// Builds the chain: the networks of a deep set side by side, their last layers and rho's first one multiplied out.

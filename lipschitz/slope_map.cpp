@@ -14,6 +14,8 @@ namespace {
 
 /// Branch and bound need not come closer than this to a slope that is attained, relatively.
 constexpr double kTolerance = 0.01;
+/// Linear regions that a round of the search for steep points enters.
+constexpr int kRegions = 15;
 
 bool has_map(const CertifiedBound& bound) {
   if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) return false;
@@ -46,33 +48,65 @@ Box cell_box(Box box, const SlopeMapOptions& options, int index) {
   return box;
 }
 
-void look_at(const files::Network& network, const CertifiedBound& everywhere, const SlopeMapOptions& options,
-             SlopeCell& cell) {
-  if (options.cancelled != nullptr && *options.cancelled) return;
-  Claim claim = everywhere;
-  claim.domain = "box";
-  const std::string moving = files::networks_of(claim.function).front();
-  std::map<std::string, Box> domain = options.domain;
-  domain[moving] = cell.box;
-  LowerBoundOptions lower;
-  lower.seed = options.seed;
-  lower.rounds = options.rounds;
-  lower.cancelled = options.cancelled;
-  cell.lower = lower_bound(network, claim, domain, lower);
-  BranchOptions branch;
-  branch.nodes = options.nodes;
-  branch.known = cell.lower.witness ? cell.lower.witness->slope.value() : 0;
-  branch.tolerance = kTolerance;
-  branch.cancelled = options.cancelled;
-  const UpperProof* const global = everywhere.proof       ? &*everywhere.proof
-                                   : everywhere.sdp.proof ? &*everywhere.sdp.proof
-                                                          : nullptr;
-  const LocalBound local = local_bound(network, claim, clamped(network, domain),
-                                       global != nullptr ? global->t : std::vector<double>(), branch);
-  if (!local.proof || !(local.upper.value() < cell.upper.value())) return;
-  cell.upper = local.upper;
-  cell.is_local = true;
+/// Where a search found f steep, as LowerBoundOptions::places takes it.
+void add_place(const FoundSlope& found, std::vector<Eigen::VectorXd>& places) {
+  if (!found.witness) return;
+  std::vector<float> all = found.witness->x;
+  for (const std::vector<float>& other : found.witness->others)
+    all.insert(all.end(), other.begin(), other.end());
+  places.push_back(
+      Eigen::Map<const Eigen::VectorXf>(all.data(), static_cast<Eigen::Index>(all.size())).cast<double>());
 }
+
+/// One function's cells, which share what is computed once.
+class Cells {
+ public:
+  Cells(const files::Network& network, const CertifiedBound& everywhere, const SlopeMapOptions& options)
+      : network_(network),
+        options_(options),
+        everywhere_(everywhere),
+        claim_(everywhere),
+        bounds_(network, everywhere, multipliers(everywhere)) {
+    claim_.domain = "box";
+  }
+
+  /// @param before the cell beside it, or null: where that one is steep, this one may be.
+  void look_at(SlopeCell& cell, const SlopeCell* before) const {
+    if (options_.cancelled != nullptr && *options_.cancelled) return;
+    LowerBoundOptions lower;
+    lower.seed = options_.seed;
+    lower.rounds = options_.rounds;
+    lower.regions = kRegions;
+    lower.cancelled = options_.cancelled;
+    lower.moved = cell.box;
+    add_place(everywhere_.lower, lower.places);
+    if (before != nullptr) add_place(before->lower, lower.places);
+    cell.lower = lower_bound(network_, claim_, options_.domain, lower);
+    BranchOptions branch;
+    branch.nodes = options_.nodes;
+    branch.boxes_only = true;
+    branch.known = cell.lower.witness ? cell.lower.witness->slope.value() : 0;
+    branch.tolerance = kTolerance;
+    branch.cancelled = options_.cancelled;
+    const std::string moving = files::networks_of(claim_.function).front();
+    const LocalBound local = bounds_.on(clamped(network_, {{moving, cell.box}}).at(moving), branch);
+    if (!local.proof || !(local.upper.value() < cell.upper.value())) return;
+    cell.upper = local.upper;
+    cell.is_local = true;
+  }
+
+ private:
+  static std::vector<double> multipliers(const CertifiedBound& bound) {
+    if (bound.proof) return bound.proof->t;
+    return bound.sdp.proof ? bound.sdp.proof->t : std::vector<double>();
+  }
+
+  const files::Network& network_;
+  const SlopeMapOptions& options_;
+  const CertifiedBound& everywhere_;
+  Claim claim_;
+  LocalBounds bounds_;
+};
 
 }  // namespace
 
@@ -100,24 +134,28 @@ std::vector<SlopeMap> slope_maps(const files::Network& network, const Certificat
   if (options.coordinates[0] == options.coordinates[1])
     throw std::invalid_argument("slope map: two different coordinates are needed");
   std::vector<SlopeMap> maps;
-  std::vector<const CertifiedBound*> bounds;
+  std::vector<Cells> functions;
   for (const CertifiedBound& bound : found.bounds) {
     if (!has_map(bound)) continue;
-    bounds.push_back(&bound);
+    functions.emplace_back(network, bound, options);
     maps.push_back({bound.function, {}});
     const Box& box = options.domain.at(files::networks_of(bound.function).front());
     for (int i = 0; i < options.cells[0] * options.cells[1]; ++i)
       maps.back().cells.push_back({cell_box(box, options, i), bound.upper, false, {}});
   }
-  const int per_map = options.cells[0] * options.cells[1];
-  const int total = per_map * static_cast<int>(maps.size());
+  // A row from one end to the other, rows at once.
+  const int rows = options.cells[0], columns = options.cells[1];
+  const int total = rows * columns * static_cast<int>(maps.size());
   int done = 0;
   std::mutex mutex;
-  files::parallel_for(total, options.jobs, [&](int i) {
-    const auto m = static_cast<std::size_t>(i / per_map);
-    look_at(network, *bounds[m], options, maps[m].cells[static_cast<std::size_t>(i % per_map)]);
-    const std::lock_guard<std::mutex> lock(mutex);
-    if (options.progress) options.progress(++done, total);
+  files::parallel_for(rows * static_cast<int>(maps.size()), options.jobs, [&](int i) {
+    const auto m = static_cast<std::size_t>(i / rows);
+    SlopeCell* const row = &maps[m].cells[static_cast<std::size_t>(i % rows * columns)];
+    for (int j = 0; j < columns; ++j) {
+      functions[m].look_at(row[j], j > 0 ? &row[j - 1] : nullptr);
+      const std::lock_guard<std::mutex> lock(mutex);
+      if (options.progress) options.progress(++done, total);
+    }
   });
   return maps;
 }

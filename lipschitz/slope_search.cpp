@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "lipschitz/dense_kernels.h"
 #include "lipschitz/linear_region.h"
 #include "lipschitz/region_walk.h"
 #include "lipschitz/search_network.h"
@@ -44,6 +45,7 @@ std::vector<std::optional<Box>> check(const SlopeFunction& f, const SlopeSearchO
   check_function(f);
   if (!is_relu(f)) refuse("an activation is not ReLU");
   if (options.rounds < 1) refuse("rounds = " + std::to_string(options.rounds) + " is below 1");
+  if (options.regions < 1) refuse("regions = " + std::to_string(options.regions) + " is below 1");
   if (!(options.seconds >= 0)) refuse("seconds = " + std::to_string(options.seconds) + " is negative");
   for (const VectorXd& start : options.starts) {
     if (start.size() != f.moved.network->inputs())
@@ -85,12 +87,16 @@ FloatInterval floats_within(double lower, double upper) {
   return result;
 }
 
-/// Turns points of the search into float32 points of the boxes, and keeps the steepest pair, exactly compared.
+/// Pairs whose slopes in double are this close, relatively, are compared exactly.
+constexpr double kSameSlope = 1e-9;
+
+/// Turns points of the search into float32 points of the boxes, and finds the steepest pair: exactly compared where
+/// double cannot tell.
 class Witnesses {
  public:
-  Witnesses(const SlopeFunction& f, const SlopeSearchOptions& options,
+  Witnesses(const SlopeFunction& f, const SearchNetwork& network, const SlopeSearchOptions& options,
             const std::vector<std::optional<Box>>& boxes)
-      : f_(f), options_(options) {
+      : f_(f), network_(network), options_(options) {
     for (std::size_t j = 0; j < boxes.size(); ++j) {
       const int inputs = (j == 0 ? f.moved : f.others[j - 1]).network->inputs();
       for (int k = 0; k < inputs; ++k) {
@@ -121,10 +127,9 @@ class Witnesses {
         points.others.back().push_back(rounded(next, (from[next] + to[next]) / 2));
       }
     }
-    const LowerBound found = slope(f_, points, options_.block);
-    if (!best_.x.empty() && found.value() <= best_.slope.value()) return;
-    static_cast<SlopePoints&>(best_) = std::move(points);
-    best_.slope = found;
+    const double slope = estimate(points);
+    pairs_.push_back(
+        {std::isnan(slope) ? std::numeric_limits<double>::infinity() : slope, std::move(points)});
   }
 
   /// Some pair of the box, so that there is a witness of slope 0 where nothing was found.
@@ -140,13 +145,44 @@ class Witnesses {
         to[k] = intervals_[k].greatest;
       }
       try_pair(from, to);
-      if (!best_.x.empty()) return;
+      if (!pairs_.empty()) return;
     }
   }
 
-  SlopeWitness take() { return std::move(best_); }
+  /// The steepest of the pairs that were tried; no points if there was none.
+  SlopeWitness take() {
+    std::stable_sort(pairs_.begin(), pairs_.end(),
+                     [](const Pair& a, const Pair& b) { return a.estimate > b.estimate; });
+    SlopeWitness best;
+    for (Pair& pair : pairs_) {
+      if (!best.x.empty() && pair.estimate * (1 + kSameSlope) < best.slope.value()) break;
+      const LowerBound found = slope(f_, pair.points, options_.block);
+      if (!best.x.empty() && found.value() <= best.slope.value()) continue;
+      static_cast<SlopePoints&>(best) = std::move(pair.points);
+      best.slope = found;
+    }
+    pairs_.clear();
+    return best;
+  }
 
  private:
+  struct Pair {
+    double estimate;  ///< of the slope, in double
+    SlopePoints points;
+  };
+
+  double estimate(const SlopePoints& points) const {
+    std::vector<float> from = points.x, to = points.y;
+    double run = 0;
+    for (std::size_t k = 0; k < from.size(); ++k)
+      run = std::hypot(run, static_cast<double>(from[k]) - static_cast<double>(to[k]));
+    for (const std::vector<float>& other : points.others) {
+      from.insert(from.end(), other.begin(), other.end());
+      to.insert(to.end(), other.begin(), other.end());
+    }
+    return (network_.value(from) - network_.value(to)).norm() / run;
+  }
+
   bool moves(int k) const {
     return options_.block.empty() || std::count(options_.block.begin(), options_.block.end(), k) > 0;
   }
@@ -157,9 +193,10 @@ class Witnesses {
   }
 
   const SlopeFunction& f_;
+  const SearchNetwork& network_;
   const SlopeSearchOptions& options_;
   std::vector<FloatInterval> intervals_;  ///< of (x, x_1, x_2, ...)
-  SlopeWitness best_;
+  std::vector<Pair> pairs_;
 };
 
 /// Pairs around the centre z of a region, along its direction of steepest ascent.
@@ -200,10 +237,11 @@ std::vector<RegionWalk::Found> both(std::vector<RegionWalk::Found> regions,
 }  // namespace
 
 SlopeWitness search_slope(const SlopeFunction& f, const SlopeSearchOptions& options) {
+  keep_freed_memory();
   const Stop stop(options.cancelled, options.seconds);
   const std::vector<std::optional<Box>> boxes = check(f, options);
   const SearchNetwork network = search_network(f, boxes, options.block);
-  Witnesses witnesses(f, options, boxes);
+  Witnesses witnesses(f, network, options, boxes);
   if (!witnesses.box_has_floats()) return {};
 
   int rounds_done = 0;
@@ -212,12 +250,13 @@ SlopeWitness search_slope(const SlopeFunction& f, const SlopeSearchOptions& opti
     try_region(network, VectorXd::Zero(network.variables()), witnesses);  // f is affine: one region
   } else if (!network.block.empty()) {
     RegionWalk walk(network, options.seed, options.starts);
+    walk.set_places(options.places);
     RegionWalk far_out(network, options.seed + 1, {}, RegionWalk::Where::kFarOut);
     const bool is_open = std::count(network.boxed.begin(), network.boxed.end(), 0) == network.variables();
     std::vector<RegionWalk::Found> steepest;
     while (rounds_done < options.rounds) {
       interrupted =
-          !walk.enter(kRegionsPerRound, stop) || (is_open && !far_out.enter(kFarRegionsPerRound, stop));
+          !walk.enter(options.regions, stop) || (is_open && !far_out.enter(kFarRegionsPerRound, stop));
       if (!interrupted || rounds_done == 0) steepest = both(walk.steepest(), far_out.steepest());
       if (interrupted) break;
       ++rounds_done;

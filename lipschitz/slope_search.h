@@ -37,6 +37,10 @@ struct SlopeSearchOptions {
 
   /// Points x where the first walks start instead of at random ones, [inputs of the moved network] each.
   std::vector<Eigen::VectorXd> starts;
+  /// Where f was found steep on other boxes, (x, x_1, x_2, ...) of the moved vector and of the first few others: walks
+  /// start there too, put into the boxes.
+  std::vector<Eigen::VectorXd> places;
+  int regions = kRegionsPerRound;  ///< that a round enters, at least 1; besides those far from the kinks
 
   const std::atomic<bool>* cancelled = nullptr;  ///< ends the search early, as `seconds` does
   /// Called after each round with the steepest slope so far.
@@ -58,9 +62,10 @@ struct SlopeWitness : SlopePoints {
 /// The same options (seconds unset) give the same bits on the same machine; one thread.
 /// Where f does not depend on the block, and where the boxes hold no two float32 points that differ in the block only,
 /// the slope is 0; in the latter case there are no points either (x and y are empty).
-/// @throws std::invalid_argument if an activation is not ReLU, the function's sizes do not fit, rounds < 1, seconds is
-///   negative or NaN, a box has the wrong size, is empty, NaN or open to one side only, other_boxes is missing or has
-///   the wrong size, a start has the wrong size, or block names a coordinate twice or one that does not exist.
+/// @throws std::invalid_argument if an activation is not ReLU, the function's sizes do not fit, rounds or regions are
+///   below 1, seconds is negative or NaN, a box has the wrong size, is empty, NaN or open to one side only, other_boxes
+///   is missing or has the wrong size, a start has the wrong size, or block names a coordinate twice or one that does
+///   not exist.
 SlopeWitness search_slope(const SlopeFunction& f, const SlopeSearchOptions& options = {});
 
 }  // namespace swarmcert::lipschitz

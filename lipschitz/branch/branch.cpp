@@ -131,10 +131,10 @@ BranchResult BranchSearch::run() {
 }
 
 BranchResult BranchSearch::finished(std::priority_queue<Part>& queue) {
-  polish(queue);
+  if (!options_.boxes_only) polish(queue);
   const double rho = queue.top().rho * (1 + kRhoMargin);
   result_.tree.rho = chain_.unscaled_rho(rho);
-  look_ahead(queue.top());
+  if (!options_.boxes_only) look_ahead(queue.top());
   for (; !queue.empty(); queue.pop())
     nodes_[static_cast<std::size_t>(queue.top().index)].multipliers = queue.top().multipliers;
   result_.tree = in_preorder(nodes_, boxes_.size(), std::move(result_.tree));
@@ -193,7 +193,8 @@ BranchResult search(const LocalChain& chain, const SetChain* set, const std::vec
   BranchResult found = BranchSearch(chain, set, boxes, options).run();
   BranchOptions uncut = options;
   uncut.nodes = static_cast<int>(boxes.size());
-  if (found.nodes <= uncut.nodes || found.nodes > 2 * static_cast<int>(kFewParts)) return found;
+  if (options.boxes_only || found.nodes <= uncut.nodes || found.nodes > 2 * static_cast<int>(kFewParts))
+    return found;
   BranchResult whole = BranchSearch(chain, set, boxes, uncut).run();
   if (whole.tree.rho < found.tree.rho) found.tree = std::move(whole.tree);
   return found;

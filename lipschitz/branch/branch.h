@@ -45,6 +45,9 @@ struct BranchOptions {
   /// Multipliers to start from, one per hidden neuron of the network, in its own units: those of a bound that holds
   /// everywhere. Empty: none.
   std::vector<double> start;
+  /// For one of many searches: it spends its time on boxes alone. The parts that dominate in the end are not solved
+  /// better, and there is no outlook.
+  bool boxes_only = false;
   const std::atomic<bool>* cancelled = nullptr;
   /// After every so many nodes: share of the nodes or of the time that is used up, bound so far.
   std::function<void(double share, double bound)> progress;

@@ -122,64 +122,90 @@ std::vector<double> beginning(const std::vector<double>& t, const LocalChain& ch
 
 }  // namespace
 
-LocalBound local_bound(const files::Network& network, const Claim& claim,
-                       const std::map<std::string, Box>& domain, const std::vector<double>& joint_t,
-                       const BranchOptions& given) {
-  LocalBound result;
-  BranchOptions options = given;
+LocalBounds::LocalBounds(const files::Network& network, const Claim& claim,
+                         const std::vector<double>& joint_t) {
   const std::vector<std::string> names = files::networks_of(claim.function);
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
-  if (parts.at(names.front())->layers.size() < 2 || files::is_rho(names.front())) return result;
-  const bool is_global = claim.domain == "global";
-  std::vector<check::Sides> boxes;
-  if (!is_global) boxes.push_back({domain.at(names.front()).lower, domain.at(names.front()).upper});
-  LocalProof proof;
-  if (!claim.neighbours.empty()) {
-    if (parts.at(names.back())->layers.size() < 2) return result;
-    Others others = others_of(network, claim, domain, options.nodes);
-    proof.others = std::move(others.ranges);
-    const check::LocalFunction f =
-        check::coupled_function(network, claim.function, claim.block, claim.scale, others.least, others.most);
-    std::vector<check::HiddenLayer> layers = f.hidden;
-    layers.insert(layers.end(), f.behind.begin(), f.behind.end());
-    ReachNetwork whole = reach_layers(layers);
-    whole.push_back(reach_network(*parts.at(names.back())).back());
-    const SetChain set = set_chain(local_chain(whole, {}, f.coordinates, f.weight), f.hidden.size());
-    options.start = beginning(joint_t, set.whole);
-    prove(
-        f, boxes, [&](const std::vector<Box>& roots) { return branch(set, roots, options); },
-        std::move(proof), result);
-    return result;
-  }
+  const std::vector<files::Layer>& layers = parts.at(names.front())->layers;
+  if (layers.size() < 2 || files::is_rho(names.front())) return;
   if (names.size() == 2) {
     const std::vector<check::Matrix> rho = check::stages(network, names.back());
     const std::size_t hidden = check::hidden_neurons(rho);
-    if (rho.size() < 2 || joint_t.size() < hidden) return result;
-    proof.form = rho_form(rho, {joint_t.end() - static_cast<std::ptrdiff_t>(hidden), joint_t.end()});
-    if (!proof.form) return result;
+    if (rho.size() < 2 || joint_t.size() < hidden) return;
+    form_ = rho_form(rho, {joint_t.end() - static_cast<std::ptrdiff_t>(hidden), joint_t.end()});
+    if (!form_) return;
   }
-  const Eigen::MatrixXd q = proof.form ? proof.form->q : Eigen::MatrixXd();
-  const check::LocalFunction f =
-      check::local_function(network, names.front(), claim.block, claim.scale, exact(q));
-  const LocalChain chain = local_chain(reach_network(*parts.at(names.front())), q, f.coordinates, f.weight);
-  options.start = beginning(joint_t, chain);
-  if (!is_global) {
-    prove(
-        f, boxes, [&](const std::vector<Box>& roots) { return branch(chain, roots, options); },
-        std::move(proof), result);
-    return result;
-  }
-  proof.radius.assign(static_cast<std::size_t>(chain.inputs()),
-                      cover_radius(parts.at(names.front())->layers.front()));
-  const LocalChain wider = homogeneous(chain);
-  boxes = check::projective_cover(proof.radius);
+  const Eigen::MatrixXd q = form_ ? form_->q : Eigen::MatrixXd();
+  f_ = check::local_function(network, names.front(), claim.block, claim.scale, exact(q));
+  chain_ = local_chain(reach_network(*parts.at(names.front())), q, f_.coordinates, f_.weight);
+  start_ = beginning(joint_t, chain_);
+  cover_radius_ = cover_radius(layers.front());
+  has_bound_ = true;
+}
+
+LocalBound LocalBounds::on(const Box& box, const BranchOptions& given) const {
+  LocalBound result;
+  if (!has_bound_) return result;
+  BranchOptions options = given;
+  options.start = start_;
+  LocalProof proof;
+  proof.form = form_;
   prove(
-      check::homogeneous(f), boxes,
+      f_, {{box.lower, box.upper}},
+      [&](const std::vector<Box>& roots) { return branch(chain_, roots, options); }, std::move(proof),
+      result);
+  return result;
+}
+
+LocalBound LocalBounds::everywhere(const BranchOptions& given) const {
+  LocalBound result;
+  if (!has_bound_) return result;
+  BranchOptions options = given;
+  options.start = start_;
+  LocalProof proof;
+  proof.form = form_;
+  proof.radius.assign(static_cast<std::size_t>(chain_.inputs()), cover_radius_);
+  const LocalChain wider = homogeneous(chain_);
+  const std::vector<check::Sides> boxes = check::projective_cover(proof.radius);
+  prove(
+      check::homogeneous(f_), boxes,
       [&](const std::vector<Box>& roots) { return branch(wider, roots, options); }, std::move(proof), result);
   for (Eigen::VectorXd& centre : result.steep_centres) {  // (u, s) is the point u / s
     const double s = centre(centre.size() - 1);
     centre = Eigen::VectorXd(centre.head(centre.size() - 1) / (s > 0 ? s : 1));
   }
+  return result;
+}
+
+LocalBound local_bound(const files::Network& network, const Claim& claim,
+                       const std::map<std::string, Box>& domain, const std::vector<double>& joint_t,
+                       const BranchOptions& given) {
+  const std::vector<std::string> names = files::networks_of(claim.function);
+  if (claim.neighbours.empty()) {
+    const LocalBounds bounds(network, claim, joint_t);
+    return claim.domain == "global" ? bounds.everywhere(given) : bounds.on(domain.at(names.front()), given);
+  }
+  LocalBound result;
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  if (parts.at(names.front())->layers.size() < 2 || files::is_rho(names.front()) ||
+      parts.at(names.back())->layers.size() < 2)
+    return result;
+  BranchOptions options = given;
+  LocalProof proof;
+  Others others = others_of(network, claim, domain, options.nodes);
+  proof.others = std::move(others.ranges);
+  const check::LocalFunction f =
+      check::coupled_function(network, claim.function, claim.block, claim.scale, others.least, others.most);
+  std::vector<check::HiddenLayer> layers = f.hidden;
+  layers.insert(layers.end(), f.behind.begin(), f.behind.end());
+  ReachNetwork whole = reach_layers(layers);
+  whole.push_back(reach_network(*parts.at(names.back())).back());
+  const SetChain set = set_chain(local_chain(whole, {}, f.coordinates, f.weight), f.hidden.size());
+  options.start = beginning(joint_t, set.whole);
+  const Box& box = domain.at(names.front());
+  prove(
+      f, {{box.lower, box.upper}}, [&](const std::vector<Box>& roots) { return branch(set, roots, options); },
+      std::move(proof), result);
   return result;
 }
 

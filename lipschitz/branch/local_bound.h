@@ -50,6 +50,25 @@ LocalBound local_bound(const files::Network& network, const Claim& claim,
                        const std::map<std::string, Box>& domain, const std::vector<double>& joint_t,
                        const BranchOptions& options);
 
+/// local_bound() for a claim without a number of neighbours on one box after the other: what these share is made once.
+class LocalBounds {
+ public:
+  /// `claim` itself may be for all inputs; the network stays the caller's.
+  LocalBounds(const files::Network& network, const Claim& claim, const std::vector<double>& joint_t);
+  /// @param box of the moving input, as it leaves the clamp.
+  LocalBound on(const Box& box, const BranchOptions& options) const;
+  /// By a projective cover.
+  LocalBound everywhere(const BranchOptions& options) const;
+
+ private:
+  bool has_bound_ = false;
+  std::optional<RhoForm> form_;
+  check::LocalFunction f_;
+  LocalChain chain_;
+  std::vector<double> start_;
+  double cover_radius_ = 1;
+};
+
 /// The same for a claim without a number of neighbours, whose box is that of the moving input.
 LocalBound local_bound(const files::Network& network, const Claim& claim, const Box& box,
                        const std::vector<double>& joint_t, const BranchOptions& options);

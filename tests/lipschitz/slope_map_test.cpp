@@ -127,6 +127,25 @@ TEST(SlopeMap, IsTheSameForAnyNumberOfThreadsAndHasOneMapPerSetFunction) {
   }
 }
 
+TEST(SlopeMap, OtherNeighboursOfWitnessesAreAnywhereInTheirBox) {
+  // f(x) = rho(x_0 + sum of the others), rho(s) = relu(s - 1.5): steep where x_0 <= 0 through others elsewhere alone.
+  files::Weights rho = weights({layer(1, 1, {1}), layer(1, 1, {1})});
+  rho.layers[0].biases[0] = -1.5;
+  const files::Network network =
+      tests::deep_set(weights({layer(2, 2, {1, 0, -1, 0}), layer(1, 2, {1, -1})}), rho);
+  const std::vector<SlopeCell> cells =
+      maps_of(network, map_of({{-1, -1}, {1, 1}}, {2, 2}, "phi:default")).at(0).cells;
+  for (const SlopeCell& cell : cells) {
+    ASSERT_TRUE(cell.lower.witness.has_value());
+    EXPECT_NEAR(cell.lower.witness->slope.value(), 1, 1e-6);
+    EXPECT_LE(cell.lower.witness->slope.value(), cell.upper.value());
+    for (const std::vector<float>& other : cell.lower.witness->others) {
+      EXPECT_GE(other[0], -1);
+      EXPECT_LE(other[0], 1);
+    }
+  }
+}
+
 TEST(SlopeMap, NamesOfInputsAreUnderstoodAndOthersRefused) {
   files::Network network = plain(weights({layer(1, 2, {3, 0}), layer(1, 1, {1})}));
   EXPECT_EQ(map_coordinate(network, "x1"), 1);
