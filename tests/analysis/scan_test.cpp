@@ -115,6 +115,20 @@ TEST(Scan, FindsALiftBesideANeighbourWithItsFormula) {
   EXPECT_NEAR(effect.parameters.at("width_m"), 0.25, 0.03);
 }
 
+/// A force of an edge would never end: what such a neighbour does is fitted by a form that vanishes far away.
+TEST(Scan, OffersNoFormOverNeighboursThatReachesFar) {
+  Flights flights = of_two_vehicles(45);
+  flights.push(2, [&](Eigen::Index i) {
+    return flights.at(i, V::kNeighbourX) > 0.2 && flights.at(i, V::kNeighbourY) < 0.3 ? 0.02 : 0.0;
+  });
+  const Scan found = scan(flights.samples, 1);
+  ASSERT_FALSE(found.entries.empty());
+  EXPECT_EQ(found.entries[0].variable, "neighbour_xy");
+  const std::vector<Formula> formulas = find_formulas(flights.samples, found, 1, 1);
+  ASSERT_EQ(formulas.size(), 1U);
+  EXPECT_TRUE(formulas[0].form == "gaussian" || formulas[0].form == "inverse_square") << formulas[0].form;
+}
+
 TEST(Scan, FindsAForceAlongTheMotionOfANeighbour) {
   Flights flights = of_two_vehicles(42);
   flights.push(1, [&](Eigen::Index i) { return 0.01 * flights.at(i, V::kNeighbourVy); });

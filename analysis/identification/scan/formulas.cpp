@@ -101,7 +101,9 @@ std::vector<Form> forms_of(const ScanEntry& entry, const EntryData& data) {
   if (entry.variables.size() == 2) {
     forms = forms_over_place(range_of(data.few.inputs.col(0)), range_of(data.few.inputs.col(1)));
     // Neighbours far away do nothing.
-    const auto reaches_far = [](const Form& form) { return form.name == "plane" || form.name == "beyond"; };
+    const auto reaches_far = [](const Form& form) {
+      return form.name == "plane" || form.name == "beyond" || form.is_product;
+    };
     if (is_of_neighbours(entry))
       forms.erase(std::remove_if(forms.begin(), forms.end(), reaches_far), forms.end());
     return forms;
