@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <string>
+#include <utility>
 
 #include "analysis/identification/verdict.h"
 
@@ -14,6 +16,7 @@ namespace {
 using identification::CurvePoint;
 using identification::Diagnosis;
 using identification::ScanEntry;
+using identification::ScanVariable;
 
 constexpr std::size_t kShownCurves = 4;
 
@@ -126,6 +129,18 @@ std::string place_of(const ScanEntry& entry) {
   return text;
 }
 
+/// Of a curve's one axis, or of a map's two.
+std::pair<std::string, std::string> axis_labels(const ScanEntry& entry) {
+  if (entry.variables.empty()) return {"neighbour to the side [m]", "neighbour above [m]"};
+  const auto label = [](const std::string& name, ScanVariable variable) {
+    const std::string unit = with_slash(identification::scan_variable(variable).unit);
+    return name + (unit.empty() ? "" : " [" + unit + "]");
+  };
+  if (entry.variables.size() == 1) return {label(entry.variable, entry.variables[0]), ""};
+  const auto named = [&](ScanVariable v) { return label(identification::scan_variable(v).name, v); };
+  return {named(entry.variables[0]), named(entry.variables[1])};
+}
+
 /// @param name of the figure.
 void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
                const residuals::ForceUnit& force) {
@@ -133,8 +148,9 @@ void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
   const std::string shown = fmt::format("{} {} [{}]", words_of(entry), entry.axis, unit_name);
   const bool is_map = entry.curve[0].at.size() == 2;
   std::string data = is_map ? "# at_1 at_2 force\n" : "# at force lower upper\n";
-  double last = NAN;
+  double last = NAN, most = 0;
   for (const CurvePoint& point : entry.curve) {
+    most = std::max(most, std::abs(per_unit * point.value));
     if (is_map) {
       if (point.at[0] != last && !std::isnan(last)) data += "\n";
       last = point.at[0];
@@ -144,13 +160,14 @@ void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
                           per_unit * point.interval.lower, per_unit * point.interval.upper);
     }
   }
-  const std::string unit =
-      entry.variables.empty() ? "m" : with_slash(identification::scan_variable(entry.variables[0]).unit);
-  const std::string label = is_map ? "[m]" : entry.variable + (unit.empty() ? "" : " [" + unit + "]");
-  std::string script = "set xlabel '" + label + "'\n";
+  const auto [along, across] = axis_labels(entry);
+  std::string script = "set xlabel '" + along + "'\n";
   if (is_map) {
-    script += "set ylabel '[m]'\nset cblabel '" + shown + "'\nset palette @signed_colours\nplot '" + name +
-              ".dat' using 1:2:3 with points pointtype 5 pointsize 3 palette notitle\n";
+    // White is no force.
+    script += fmt::format(
+        "set ylabel '{}'\nset cblabel '{}'\nset palette @signed_colours\nset cbrange [{:.6g}:{:.6g}]\n"
+        "plot '{}.dat' using 1:2:3 with points pointtype 5 pointsize 3 palette notitle\n",
+        across, shown, -most, most, name);
   } else {
     script += "set ylabel '" + shown + "'\nplot '" + name +
               ".dat' using 1:3:4 with filledcurves fillcolor rgb '#cccccc' title '90 %', '' using 1:2 with "
