@@ -21,8 +21,9 @@ struct AccelerometerBalance {
   std::string kind, vehicle;
   int flights = 0;
   std::size_t blocks = 0;
-  MeanFit scale;             ///< measured over what the model says of the sensor; 1: the model is right
-  double of_lag = 0;  ///< largest error of `scale` that a lag of the sensor makes while the body turns back and forth
+  MeanFit scale;  ///< measured over what the model says of the sensor; 1: the model is right
+  /// Largest error of `scale` that a lag of the sensor makes while the body turns back and forth.
+  double of_lag = 0;
   double z = 0;              ///< of the scale over an offset along the vertical, by the squares of the blocks
   double rmse_before_N = 0;  ///< mean disagreement of the blocks, times the mass
   double rmse_after_N = 0;

@@ -300,8 +300,7 @@ std::set<std::string> refuted_names(const Explained& explained, double weight_N)
 bool may_saturate(const Explained& explained, const stability::Model& model,
                   const std::vector<Candidate>& rivals) {
   const auto is_it = [](const auto& one) { return one.name == "thrust_saturation"; };
-  return explained.settled.rest.flag &&
-         std::none_of(model.effects.begin(), model.effects.end(), is_it) &&
+  return explained.settled.rest.flag && std::none_of(model.effects.begin(), model.effects.end(), is_it) &&
          std::none_of(rivals.begin(), rivals.end(), is_it);
 }
 
