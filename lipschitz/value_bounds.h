@@ -27,7 +27,8 @@ struct CertifiedValues {
   std::map<std::string, std::vector<double>> input_error;   ///< by network; empty: nothing is said of float32
   std::map<std::string, std::vector<VectorBounds>> layers;  ///< of each network, before its ReLU
   std::optional<VectorBounds> sum;  ///< what rho takes in; nothing for a plain network
-  /// Of f: those of the last layer, with 0 where NET is silent among so many neighbours, or nothing but 0.
+  /// Bounds of f: those of the last layer; widened to contain 0 if NET is silent for some composition of at most
+  /// `neighbours` neighbours, and exactly 0 if it is silent for all of them.
   std::vector<double> lower, upper;
   std::optional<double> jump;           ///< where a neighbour comes or goes, Euclidean
   std::optional<double> float32_error;  ///< Euclidean

@@ -143,33 +143,30 @@ LocalBounds::LocalBounds(const files::Network& network, const Claim& claim,
   has_bound_ = true;
 }
 
-LocalBound LocalBounds::on(const Box& box, const BranchOptions& given) const {
+LocalBound LocalBounds::over(const check::LocalFunction& f, const LocalChain& chain,
+                             const std::vector<check::Sides>& boxes, const std::vector<double>& radius,
+                             BranchOptions options) const {
   LocalBound result;
-  if (!has_bound_) return result;
-  BranchOptions options = given;
   options.start = start_;
   LocalProof proof;
   proof.form = form_;
+  proof.radius = radius;
   prove(
-      f_, {{box.lower, box.upper}},
-      [&](const std::vector<Box>& roots) { return branch(chain_, roots, options); }, std::move(proof),
-      result);
+      f, boxes, [&](const std::vector<Box>& roots) { return branch(chain, roots, options); },
+      std::move(proof), result);
   return result;
 }
 
-LocalBound LocalBounds::everywhere(const BranchOptions& given) const {
-  LocalBound result;
-  if (!has_bound_) return result;
-  BranchOptions options = given;
-  options.start = start_;
-  LocalProof proof;
-  proof.form = form_;
-  proof.radius.assign(static_cast<std::size_t>(chain_.inputs()), cover_radius_);
-  const LocalChain wider = homogeneous(chain_);
-  const std::vector<check::Sides> boxes = check::projective_cover(proof.radius);
-  prove(
-      check::homogeneous(f_), boxes,
-      [&](const std::vector<Box>& roots) { return branch(wider, roots, options); }, std::move(proof), result);
+LocalBound LocalBounds::on(const Box& box, const BranchOptions& options) const {
+  if (!has_bound_) return {};
+  return over(f_, chain_, {{box.lower, box.upper}}, {}, options);
+}
+
+LocalBound LocalBounds::everywhere(const BranchOptions& options) const {
+  if (!has_bound_) return {};
+  const std::vector<double> radius(static_cast<std::size_t>(chain_.inputs()), cover_radius_);
+  LocalBound result =
+      over(check::homogeneous(f_), homogeneous(chain_), check::projective_cover(radius), radius, options);
   for (Eigen::VectorXd& centre : result.steep_centres) {  // (u, s) is the point u / s
     const double s = centre(centre.size() - 1);
     centre = Eigen::VectorXd(centre.head(centre.size() - 1) / (s > 0 ? s : 1));

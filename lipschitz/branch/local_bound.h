@@ -61,6 +61,11 @@ class LocalBounds {
   LocalBound everywhere(const BranchOptions& options) const;
 
  private:
+  /// @param radius of the cover that `boxes` are; empty: they are none.
+  LocalBound over(const check::LocalFunction& f, const LocalChain& chain,
+                  const std::vector<check::Sides>& boxes, const std::vector<double>& radius,
+                  BranchOptions options) const;
+
   bool has_bound_ = false;
   std::optional<RhoForm> form_;
   check::LocalFunction f_;

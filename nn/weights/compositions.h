@@ -27,7 +27,8 @@ std::vector<int> silent_counts(const Network& network, const std::string& own);
 /// ends such a composition.
 bool is_ever_silent(const Network& network, const std::string& function);
 
-/// Whether the set function `function` is 0 among these neighbours, "phi:<kind>" each; the ground is none.
+/// Whether NET is silent for exactly these neighbours ("phi:<kind>" each, an entry for the ground is ignored), so that
+/// the set function `function` is 0.
 bool is_silent_among(const Network& network, const std::string& function,
                      const std::vector<std::string>& parts);
 

@@ -873,7 +873,7 @@ class Network:
         return function.startswith("set:") and (function.rpartition(":")[2], tuple(kinds)) in self.silent
 
     def silent_up_to(self, function, most):
-        """How many compositions of at most so many neighbours of the function's own kind are silent."""
+        """Number of silent compositions that consist of 0 to `most` neighbours of the function's own kind."""
         kind, _, own = function[4:].partition(":")
         return sum(function.startswith("set:") and vehicle == own and len(kinds) <= most and set(kinds) <= {kind}
                    for vehicle, kinds in self.silent)

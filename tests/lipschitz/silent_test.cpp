@@ -125,7 +125,7 @@ class Flown {
   std::vector<double> ground_;
 };
 
-/// What was stated of one function with up to so many neighbours.
+/// The certified values of `function` for at most `neighbours` neighbours.
 struct Stated {
   std::string function;
   int neighbours;

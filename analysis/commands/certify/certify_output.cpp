@@ -277,7 +277,7 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
         range.neighbours_at_most > 0 ? fmt::format(" up to {} neighbours", range.neighbours_at_most) : "";
     fmt::print("  {}{}: {:.6g} ({:.6g}) .. ({:.6g}) {:.6g}", range.function, many, range.lower,
                range.least.value, range.greatest.value, range.upper);
-    // Elsewhere it is that of one neighbour, or nearly.
+    // Without silent compositions the jump hardly depends on the number of neighbours: it is printed once.
     const bool has_jump =
         range.neighbours_at_most == 1 || (range.neighbours_at_most > 1 && !network.silent.empty());
     if (has_jump) fmt::print("; a neighbour at a cut-off: a jump of at most {:.6g}", range.jump);

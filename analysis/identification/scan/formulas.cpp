@@ -23,7 +23,7 @@ constexpr ScanVariable kFactors[] = {ScanVariable::kThrust, ScanVariable::kX,   
                                      ScanVariable::kZ,      ScanVariable::kVx,   ScanVariable::kVy,
                                      ScanVariable::kVz,     ScanVariable::kSpeed};
 
-/// Velocities and rates, of which zero is none.
+/// Velocities and rates: zero means that nothing moves, so forms may depend on the sign or the absolute value.
 bool has_origin(ScanVariable v) {
   using V = ScanVariable;
   constexpr V kSuch[] = {V::kVx,    V::kVy,    V::kVz,    V::kBodyVx, V::kBodyVy,
