@@ -2,7 +2,11 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <map>
+#include <numeric>
 #include <random>
 
 #include "analysis/run.h"
@@ -188,6 +192,59 @@ TEST_F(GainsInFlight, RecordedGainSetsLeftOutAreBoundedSharperThanWithoutTheory)
   }
   EXPECT_GE(found["axes"][0]["rank_rms"].get<double>(), 0.5);
   EXPECT_GE(found["axes"][2]["rank"].get<double>(), 0.7);
+}
+
+/// What tune proposes for x, found from gains that flew, with the attitude gains beside which most others flew.
+Json proposed(const std::string& gains, const std::filesystem::path& folder) {
+  tests::write_text(folder / "given.toml", "schema = \"swarmcert/gains/1\"\n[position]\nrate_hz = 500\n" +
+                                               gains +
+                                               "\n[attitude]\nKR = 0.01\nKw = 0.001125\nKI = 0.04\n"
+                                               "[lag]\nmotor_s = 0.03\nbody_rate_s = 0.003\n");
+  const Outcome outcome = tests::run_shell("swarmcert tune --gains given.toml --model '" +
+                                               tests::source_path("stability/models/crazyflie-small.toml") +
+                                               "' --axis x --objective amplitude --json tuned.json --force",
+                                           folder);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  return files::read_json(folder / "tuned.json", "swarmcert/tune/1")["gains"];
+}
+
+/// From the gains that flew most often, with and without an integrator.
+TEST_F(GainsInFlight, TuneProposesGainsNextToThoseThatFlewBest) {
+  SWARMCERT_NEEDS_DATA();
+  const std::string flown = "'" + tests::data_path("collections/crazyswarm2-tools") + "'";
+  const Json found = result("--calibrate " + flown + " --flights " + flown);
+  std::map<std::string, std::vector<double>> rms_m;
+  for (const Json& flight : found["flights"])
+    if (flight["axis"] == "along") rms_m[flight["gain_set"]].push_back(flight["rms"]);
+  const auto mean_rms_m = [&](const std::string& set) {
+    const std::vector<double>& all = rms_m.at(set);
+    return std::accumulate(all.begin(), all.end(), 0.0) / static_cast<double>(all.size());
+  };
+  const auto better_than = [&](const std::string& set) {
+    return std::count_if(rms_m.begin(), rms_m.end(),
+                         [&](const auto& other) { return mean_rms_m(other.first) < mean_rms_m(set); });
+  };
+  const std::string attitude = " KR 0.01 Kw 0.001125 KI 0.04";
+  for (const char* given : {"Kp = 9\nKd = 7\nKi = 0", "Kp = 9\nKd = 7\nKi = 5"}) {
+    const Json gains = proposed(given, folder_.path());
+    std::string nearest;
+    double least = 1e9;
+    for (const auto& [set, errors] : rms_m) {
+      double Kp = 0, Kd = 0, Ki = 0;
+      ASSERT_EQ(std::sscanf(set.c_str(), "Kp %lf Kd %lf Ki %lf", &Kp, &Kd, &Ki), 3) << set;
+      if (set.find(attitude) == std::string::npos) continue;
+      const double distance =
+          std::hypot(std::log(gains["Kp"].get<double>() / Kp), std::log(gains["Kd"].get<double>() / Kd),
+                     std::log1p(gains["Ki"].get<double>()) - std::log1p(Ki));
+      if (distance < least) {
+        least = distance;
+        nearest = set;
+      }
+    }
+    EXPECT_LT(least, std::log(1.25)) << gains << ": " << nearest;
+    EXPECT_LT(better_than(nearest), static_cast<long>(rms_m.size()) / 5) << gains << ": " << nearest;
+    EXPECT_LT(mean_rms_m(nearest), mean_rms_m("Kp 9 Kd 7 Ki 0" + attitude)) << nearest;
+  }
 }
 
 }  // namespace
