@@ -228,6 +228,26 @@ TEST(Plausibility, ThrustFarFromTheWeightAndABatteryOutOfRangeAreSaid) {
       << three_cells.output;
 }
 
+TEST(Plausibility, OfManyLogsThatAreWrongAlikeThreeAreNamedAndTheOthersCounted) {
+  const ScratchFolder folder;
+  const RecordedCsv flight(folder);
+  flight.write({"u1", "u2", "u3", "u4"}, 0.7);
+  for (const char* run : {"01", "02", "03", "04"}) {
+    std::filesystem::copy_file(folder.path() / "logs/cf1_00.csv",
+                               folder.path() / (std::string("logs/cf1_") + run + ".csv"));
+  }
+  const Outcome outcome = run_shell("swarmcert " + compare_logs(), folder.path());
+  int named = 0;
+  for (std::size_t at = 0; (at = outcome.output.find("implausible: logs/", at)) != std::string::npos; ++at)
+    ++named;
+  EXPECT_EQ(named, 3) << outcome.output;
+  EXPECT_NE(outcome.output.find("implausible: thrust: 2 more like these, all in --json"), std::string::npos)
+      << outcome.output;
+  const files::Json flights = files::parse_json(read_text(folder / "compare.json"), "compare.json")["flights"];
+  ASSERT_EQ(flights.size(), 5u);
+  for (const files::Json& one : flights) EXPECT_EQ(one["plausibility"].size(), 1u) << one["file"];
+}
+
 /// A touch-down in flight: three records of 60 m/s^2.
 TEST(Plausibility, AnImpactIsSaidAndCutSoThatItIsNotTheWorstMoment) {
   const ScratchFolder folder;

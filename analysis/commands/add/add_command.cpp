@@ -16,6 +16,7 @@
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/shared/label_output.h"
 #include "analysis/commands/shared/output_folder.h"
+#include "analysis/commands/shared/plausibility_output.h"
 #include "analysis/identification/balance_ladder.h"
 #include "analysis/identification/ladder.h"
 #include "analysis/identification/scan/proposal.h"
@@ -172,7 +173,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   result["written"] = ladder.any_accepted;
   result["problems"] = ladder.problems;
   if (!ladder.too_poor.empty()) result["reason"] = ladder.too_poor;
-  for (const std::string& problem : ladder.problems) note("warning: " + problem);
+  for (const std::string& problem : few_of_each(ladder.problems)) note("warning: " + problem);
   write_result(common, result);
   if (!ladder.too_poor.empty()) {
     note("inconclusive: " + ladder.too_poor + "; 'swarmcert compare' says what was cut");

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "analysis/commands/shared/plausibility_output.h"
+
 namespace swarmcert::analysis {
 namespace {
 
@@ -89,12 +91,14 @@ void print_cuts(const Comparison& comparison) {
 }
 
 void print_doubts(const Comparison& comparison) {
+  std::vector<std::string> implausible;
   for (const TrackErrors& track : comparison.tracks) {
     if (!track.is_sound) fmt::print("damaged: {}: {}\n", track.path, fmt::join(track.findings, "; "));
     for (const logs::Doubt& doubt : track.doubts) {
-      if (!doubt.refuses_force) fmt::print("implausible: {}: {}\n", track.path, doubt.words);
+      if (!doubt.refuses_force) implausible.push_back(track.path + ": " + doubt.words);
     }
   }
+  for (const std::string& line : few_of_each(implausible)) fmt::print("implausible: {}\n", line);
 }
 
 }  // namespace swarmcert::analysis

@@ -15,6 +15,7 @@
 #include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/shared/label_output.h"
+#include "analysis/commands/shared/plausibility_output.h"
 #include "analysis/identification/diagnose.h"
 #include "analysis/identification/verdict.h"
 
@@ -120,7 +121,8 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   if (options.each) add_each(answers.each, result);
   if (options.next) add_next(answers.diagnoses, result);
   if (options.next && common.prints_text()) print_next(answers.diagnoses);
-  for (const files::Json& problem : result["problems"]) note("warning: " + problem.get<std::string>());
+  for (const std::string& problem : few_of_each(result["problems"].get<std::vector<std::string>>()))
+    note("warning: " + problem);
   write_result(common, result);
   std::string reason;
   identification::Verdict verdict = identification::verdict_of(answers.diagnoses, reason);

@@ -6,6 +6,7 @@
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/flight_options.h"
+#include "analysis/commands/shared/plausibility_output.h"
 #include "analysis/identification/model_draft.h"
 #include "nn/base/file_io.h"
 
@@ -63,8 +64,8 @@ int run_model(const ModelOptions& options, const CommonOptions& common) {
                  p.has_interval ? fmt::format(" [{:.6g}, {:.6g}]", p.lower, p.upper) : "", p.source);
   }
   result["problems"] = draft.problems;
-  for (const std::string& problem : draft.problems) {
-    if (common.prints_text()) fmt::print("not used: {}\n", problem);
+  if (common.prints_text()) {
+    for (const std::string& problem : few_of_each(draft.problems)) fmt::print("not used: {}\n", problem);
   }
   files::write_file(options.output, stability::to_toml(draft.model, comments), common.force);
   write_result(common, result);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "analysis/cli/command.h"
+#include "analysis/commands/shared/plausibility_output.h"
 #include "nn/base/json_number.h"
 
 namespace swarmcert::analysis {
@@ -177,7 +178,7 @@ void print_training(const TrainOptions& options, const LearningData& data, const
     fmt::print("Lipschitz constants at most {}: {}\n", options.run.max_lipschitz,
                outcome.certified.largest() <= options.run.max_lipschitz ? "proved" : "inconclusive");
   print_support(outcome, target.unit);
-  for (const std::string& problem : data.problems) fmt::print("left out: {}\n", problem);
+  for (const std::string& problem : few_of_each(data.problems)) fmt::print("left out: {}\n", problem);
   print_worse_than_none(outcome, target.unit);
   fmt::print("written: {}/network.toml, weights, certificate.json, models\n", options.output);
 }
