@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <queue>
+#include <vector>
 
 #include "nn/base/doubles.h"
 #include "nn/base/parallel.h"
@@ -111,12 +113,11 @@ Hull hull(const ReachNetwork& network, const Box& box, int nodes) {
     const auto [first, second] = halves(top.reach->box(), k);
     for (const Box& piece : {first, second}) queue.push(part_of(piece, top.reach.get()));
   }
-  Hull result{queue.top().reach->output(), queue.top().norm, {}};
+  Hull result{queue.top().reach->output(), queue.top().norm};
   for (; !queue.empty(); queue.pop()) {
     const Bounds& bounds = queue.top().reach->output();
     result.bounds.lower = result.bounds.lower.cwiseMin(bounds.lower);
     result.bounds.upper = result.bounds.upper.cwiseMax(bounds.upper);
-    result.parts.push_back(queue.top().reach);
   }
   return result;
 }

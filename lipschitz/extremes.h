@@ -2,8 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <memory>
-#include <vector>
 
 #include "lipschitz/box.h"
 #include "lipschitz/reach.h"
@@ -32,8 +30,7 @@ Maximum maximise(const ReachNetwork& network, const Eigen::RowVectorXd& directio
 /// All outputs over the box, as the hull over up to `nodes` parts of it; and the largest Euclidean norm of the output.
 struct Hull {
   Bounds bounds;
-  double norm = 0;                                  ///< at least |y_K|_2
-  std::vector<std::shared_ptr<const Reach>> parts;  ///< they cover the box
+  double norm = 0;  ///< at least |y_K|_2
 };
 Hull hull(const ReachNetwork& network, const Box& box, int nodes);
 

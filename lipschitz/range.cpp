@@ -9,6 +9,7 @@
 #include "lipschitz/attained_values.h"
 #include "lipschitz/extremes.h"
 #include "lipschitz/invariant_box.h"
+#include "lipschitz/sum_climb.h"
 #include "lipschitz/sum_support.h"
 #include "lipschitz/value_bounds.h"
 #include "nn/base/doubles.h"
@@ -31,8 +32,12 @@ Box box_of(const Bounds& bounds) {
 
 /// Searches end where the bound is this close to what was found, relatively.
 constexpr double kCloseEnough = 0.01;
-/// Parts of phi's box, at most; and the share of the boxes that a search over sums gets, which needs several.
-constexpr int kMostParts = 2400, kShareOfSums = 4, kShareOfHints = 16;
+/// Parts of phi's box for its largest norm, at most.
+constexpr int kMostParts = 2400;
+/// Parts that linear forms over sums may halve, as shares of the boxes of a search: those above neurons of rho, those
+/// that say where a form is about largest, and the one that is the bound. What may be left of a form's values.
+constexpr double kShareOfNeurons = 0.3, kShareOfHints = 0.05, kShareOfForms = 4;
+constexpr double kCloseForms = 0.002;
 
 /// Makes `layer` add anything within `bounds` to its output.
 void add_interval(ReachLayer& layer, const Bounds& bounds) {
@@ -105,7 +110,9 @@ class Ranger {
   }
 
   Index outputs() const { return parts_.at(names_.back())->outputs(); }
-  double jump_norm() { return term(names_[0]).hull.norm; }
+  double jump_norm() {
+    return hull(term(names_[0]).network, domain_.at(names_[0]), std::min(8 * nodes_, kMostParts)).norm;
+  }
   bool is_silent(const Composition& neighbours) const {
     return files::is_silent_among(network_, function_, parts_of(neighbours));
   }
@@ -118,25 +125,22 @@ class Ranger {
     direction(output) = sign;
     if (names_.size() == 1) {
       const Maximum found =
-          maximise(reach_network(*parts_.at(names_[0])), direction, domain_.at(names_[0]), search(1));
-      candidates.push_back({found.x});
+          maximise(term(names_[0]).network, direction, domain_.at(names_[0]), search_of_boxes());
+      propose({{names_[0], 1}}, direction, {{found.x}}, candidates);
       return found.upper;
     }
-    if (is_silent(neighbours)) {
-      candidates.push_back(middles(neighbours));
-      return 0;
+    const std::vector<std::pair<std::string, int>> terms = all_terms(neighbours);
+    std::vector<std::vector<VectorXd>> starts;
+    double upper = 0;
+    if (!is_silent(neighbours)) {
+      upper = parts_of(neighbours).size() == 1 ? beside_one(direction, neighbours, starts)
+                                               : by_support(direction, neighbours, starts);
     }
-    const std::vector<std::string> single = parts_of(neighbours);
-    if (single.size() != 1) return by_support(direction, neighbours, candidates);
-    ReachNetwork chain = term(single[0]).network;
-    if (has_ground_) add_interval(chain.back(), term(files::kGroundPhi).hull.bounds);
-    chain.insert(chain.end(), rho_.begin(), rho_.end());
-    const Maximum found = maximise(chain, direction, domain_.at(single[0]), search(1));
-    candidates.push_back({found.x});
-    if (!has_ground_) return found.upper;
-    candidates.back().push_back(middle(files::kGroundPhi));
-    propose_ground(direction, single[0], found.x, candidates);
-    return std::min(found.upper, by_support(direction, neighbours, candidates));
+    if (starts.empty())
+      candidates.push_back(middles(neighbours));
+    else
+      propose(terms, direction, starts, candidates);
+    return upper;
   }
 
   /// @param candidates among neighbours of the function's own kind.
@@ -165,7 +169,7 @@ class Ranger {
   /// A network whose outputs are added up.
   struct Term {
     ReachNetwork network;
-    Hull hull;
+    std::unique_ptr<PartTree> tree;
   };
 
   /// rho over the sums among some neighbours.
@@ -180,13 +184,16 @@ class Ranger {
     return result;
   }
 
-  MaximiseOptions search(int share) const { return {nodes_ / share + 2, kCloseEnough, jobs_}; }
+  MaximiseOptions search_of_boxes() const { return {nodes_ + 2, kCloseEnough, jobs_}; }
+  PartSearch search_of_forms(double share) const {
+    return {static_cast<int>(nodes_ * share) + 1, kCloseForms, jobs_};
+  }
 
   const Term& term(const std::string& part) {
     Term& term = terms_[part];
     if (!term.network.empty()) return term;
     term.network = reach_network(*parts_.at(part));
-    term.hull = hull(term.network, domain_.at(part), std::min(8 * nodes_, kMostParts));
+    term.tree = std::make_unique<PartTree>(term.network, domain_.at(part));
     return term;
   }
 
@@ -203,9 +210,9 @@ class Ranger {
     Sums& sums = sums_[neighbours];
     if (!sums.reach) {
       for (const auto& [part, count] : all_terms(neighbours))
-        sums.support.terms.push_back({&term(part).hull, count});
+        sums.support.terms.push_back({term(part).tree.get(), count});
       sums.support.size = rho_.front().weights.cols();
-      sums.support.jobs = jobs_;
+      sums.support.search = search_of_forms(kShareOfNeurons);
       sums.reach = std::make_unique<const Reach>(rho_, box_of(sums.support.bounds()), sums.support);
     }
     return sums;
@@ -227,50 +234,51 @@ class Ranger {
     return points;
   }
 
-  /// The neighbour fixed at x: where should the ground's input be?
-  void propose_ground(const RowVectorXd& direction, const std::string& part, const VectorXd& x,
-                      std::vector<std::vector<VectorXd>>& candidates) {
-    ReachNetwork chain = term(files::kGroundPhi).network;
-    chain.back().bias += evaluate_roughly(term(part).network, x);
+  /// One neighbour and the ground, if there is one.
+  double beside_one(const RowVectorXd& direction, const Composition& neighbour,
+                    std::vector<std::vector<VectorXd>>& starts) {
+    const std::string part = parts_of(neighbour).front();
+    ReachNetwork chain = term(part).network;
+    if (has_ground_) add_interval(chain.back(), sums({}).support.bounds());
     chain.insert(chain.end(), rho_.begin(), rho_.end());
-    candidates.push_back(
-        {x, maximise(chain, direction, domain_.at(files::kGroundPhi), search(kShareOfSums)).x});
-  }
-
-  /// Where a form of the sum is largest, each term for itself, in the order of all_terms().
-  std::vector<Maximum> largest_terms(const LinearForms& form, const Composition& neighbours, int share) {
-    std::vector<Maximum> found;
-    for (const auto& [part, count] : all_terms(neighbours))
-      found.push_back(maximise(term(part).network, form.rows.row(0), domain_.at(part), search(share)));
-    return found;
+    const Maximum found = maximise(chain, direction, domain_.at(part), search_of_boxes());
+    starts.push_back({found.x});
+    if (!has_ground_) return found.upper;
+    starts.back().push_back(middle(files::kGroundPhi));
+    return std::min(found.upper, by_support(direction, neighbour, starts));
   }
 
   /// A linear form above rho over the sums, f <= c s + d, and the largest values of its terms.
+  /// @param starts where the terms of forms above f are largest, one x per term.
   double by_support(const RowVectorXd& direction, const Composition& neighbours,
-                    std::vector<std::vector<VectorXd>>& candidates) {
+                    std::vector<std::vector<VectorXd>>& starts) {
     const Reach& reach = *sums(neighbours).reach;
-    const auto all = all_terms(neighbours);
-    if (all.empty()) {
-      candidates.emplace_back();
-      return reach.largest(reach.upper_forms(direction))(0);
-    }
+    SumSupport support = sums(neighbours).support;
+    if (support.terms.empty()) return reach.largest(reach.upper_forms(direction))(0);
+    support.search = search_of_forms(kShareOfHints);
     const LinearForms form = reach.sharpened_form(direction, [&](const LinearForms& one) -> VectorXd {
-      const std::vector<Maximum> found = largest_terms(one, neighbours, kShareOfHints);
+      starts.push_back(support.steepest(one.rows.row(0)));
       VectorXd sum = VectorXd::Zero(one.rows.cols());
+      const auto all = all_terms(neighbours);
       for (std::size_t k = 0; k < all.size(); ++k)
-        sum += all[k].second * evaluate_roughly(term(all[k].first).network, found[k].x);
+        sum += all[k].second * evaluate_roughly(term(all[k].first).network, starts.back()[k]);
       return sum;
     });
-    const std::vector<Maximum> found = largest_terms(form, neighbours, kShareOfSums);
-    double total = form.constants(0);
-    std::vector<VectorXd> points;
-    for (std::size_t k = 0; k < all.size(); ++k) {
-      total = sum_rounded_up(total, all[k].second, found[k].upper);
-      points.insert(points.end(), static_cast<std::size_t>(all[k].second), found[k].x);
-    }
-    candidates.push_back(points);
-    const double by_parts = reach.largest(form)(0);
-    return std::isnan(total) ? by_parts : std::min(by_parts, total);
+    support.search = search_of_forms(kShareOfForms);
+    starts.push_back(support.steepest(form.rows.row(0)));
+    return std::min(reach.largest(form)(0), support(form)(0));
+  }
+
+  /// Climbs from `starts`, all neighbours of a kind in one place.
+  void propose(const std::vector<std::pair<std::string, int>>& all, const RowVectorXd& direction,
+               const std::vector<std::vector<VectorXd>>& starts,
+               std::vector<std::vector<VectorXd>>& candidates) {
+    std::vector<PlacedTerm> terms;
+    for (const auto& [part, count] : all) terms.push_back({&term(part).network, &domain_.at(part), count});
+    const std::vector<VectorXd> best = climb(terms, rho_, direction, starts);
+    candidates.emplace_back();
+    for (std::size_t k = 0; k < all.size(); ++k)
+      candidates.back().insert(candidates.back().end(), static_cast<std::size_t>(all[k].second), best[k]);
   }
 
   const Network& network_;

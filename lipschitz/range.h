@@ -53,7 +53,7 @@ std::vector<std::string> value_functions(const files::Network& network);
 ///
 /// One neighbour: branch and bound over its box, the ground's term as an interval. More: a linear form a s + c above
 /// rho on the sums s, whose neurons are bounded by such forms too (sum_support.h); f <= c + sum_j max a phi(x_j), each
-/// maximum by branch and bound.
+/// maximum by branch and bound over one box, with parts that all forms share (part_tree.h).
 ///
 /// Of functions with other activations than ReLU: what certified_values() states, and no branch and bound.
 ///

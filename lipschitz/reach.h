@@ -100,6 +100,13 @@ class Reach {
   /// along which dimension to split, and proves nothing.
   Eigen::VectorXd influence(const Eigen::RowVectorXd& direction) const;
 
+  /// The lines that bound the ReLUs of hidden layer j.
+  ReluLines lines(std::size_t j) const;
+  /// What rounding and the radius of layer j's bias cost, per unit of |lambda|.
+  Eigen::VectorXd layer_error(std::size_t j) const;
+  /// What rounding costs per term of a constant, relatively.
+  double rounding() const { return relative_; }
+
  private:
   void add_layers(const Reach* around, std::vector<Eigen::MatrixXd>* slopes, std::vector<LinearForms>* forms,
                   std::vector<check::Decision>* decided);
@@ -117,9 +124,6 @@ class Reach {
   /// @param error what their rounding costs.
   LinearForms pulled_back(const ActiveLayers& layers, LinearForms forms, Eigen::VectorXd error,
                           const std::vector<Eigen::MatrixXd>* given_below) const;
-  ReluLines lines(std::size_t j) const;
-  /// What rounding and the radius of layer j's bias cost, per unit of |lambda|.
-  Eigen::VectorXd layer_error(std::size_t j) const;
   /// The corners of the box where the forms are largest, [inputs x rows].
   Eigen::MatrixXd corners(const Eigen::MatrixXd& forms) const;
   /// The lower slopes of layers before `top` that are tight at the points x, [inputs x rows].

@@ -83,9 +83,8 @@ TEST(Extremes, FormsOverSumsAreNotBelowAnySumOfOutputs) {
   const lipschitz::ReachNetwork phi = lipschitz::reach_network(tests::random_network({3, 8, 4}, generator));
   const lipschitz::ReachNetwork ground =
       lipschitz::reach_network(tests::random_network({3, 6, 4}, generator));
-  const lipschitz::Hull phi_hull = lipschitz::hull(phi, kUnitBox, 64);
-  const lipschitz::Hull ground_hull = lipschitz::hull(ground, kUnitBox, 64);
-  const lipschitz::SumSupport support{{{&phi_hull, 3}, {&ground_hull, 1}}, 4, 1};
+  lipschitz::PartTree phi_tree(phi, kUnitBox), ground_tree(ground, kUnitBox);
+  const lipschitz::SumSupport support{{{&phi_tree, 3}, {&ground_tree, 1}}, 4, {64, 0.01, 1}};
   const lipschitz::LinearForms forms{Eigen::MatrixXd::Random(5, 4), VectorXd::Random(5)};
   const VectorXd bound = support(forms);
   VectorXd largest = VectorXd::Constant(5, -1e300);

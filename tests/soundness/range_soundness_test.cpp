@@ -143,6 +143,67 @@ TEST(RangeSoundness, RandomSetsStayWithinTheirRange) {
   }
 }
 
+/// The largest of sign f that steps of single neighbours find from a random place, the ground's input among them.
+double climbed_value(const Network& network, int neighbours, double sign, Random& random) {
+  const files::Evaluator<double> phi(network.phi.at("large")), ground(network.phi.at("ground"));
+  const files::Evaluator<double> rho(network.rho.at("small"));
+  std::vector<std::vector<double>> best;
+  for (int j = 0; j < neighbours; ++j) best.push_back(point<double>(kBox, random));
+  best.push_back(point<double>(kGroundBox, random));
+  const auto value = [&](const std::vector<std::vector<double>>& x) {
+    std::vector<double> sum = ground(x.back());
+    for (std::size_t j = 0; j + 1 < x.size(); ++j) {
+      const std::vector<double> term = phi(x[j]);
+      for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += term[i];
+    }
+    return sign * rho(sum)[0];
+  };
+  double largest = value(best);
+  for (int tried = 0; tried < 600; ++tried) {
+    std::vector<std::vector<double>> x = best;
+    const std::size_t j = random.below(x.size());
+    const Box& box = j + 1 < x.size() ? kBox : kGroundBox;
+    const double scale = std::exp2(-8.0 * tried / 600);
+    for (std::size_t k = 0; k < x[j].size(); ++k)
+      x[j][k] = std::clamp(x[j][k] + scale * box.upper[k] * random.symmetric(), box.lower[k], box.upper[k]);
+    if (const double found = value(x); found > largest) largest = found, best = std::move(x);
+  }
+  return largest;
+}
+
+TEST(RangeSoundness, NoClimbOverDistinctNeighboursAndTheGroundLeavesARangeThatPartsOfTheBoxMadeTighter) {
+  std::mt19937 generator(14);
+  Random random(15);
+  for (int round = 0; round < 4; ++round) {
+    Network network;
+    network.phi["large"] = tests::random_network({6, 9, 7, 4}, generator);
+    network.phi["ground"] = tests::random_network({4, 6, 4}, generator);
+    network.rho["small"] = tests::random_network({4, 8, 6, 1}, generator);
+    lipschitz::RangeOptions options;
+    options.neighbours = 3;
+    options.nodes = 1;
+    const auto whole = lipschitz::ranges(network, domain_of(network), {{"small", 1e9}}, options);
+    options.nodes = 1000;
+    const auto ranges = lipschitz::ranges(network, domain_of(network), {{"small", 1e9}}, options);
+    for (std::size_t n = 1; n <= 3; ++n) {
+      const lipschitz::CertifiedRange& range = ranges[n - 1];
+      // The boxes of the inputs were divided, for every form that the bound takes.
+      EXPECT_LT(range.upper - range.lower, 0.8 * (whole[n - 1].upper - whole[n - 1].lower));
+      double least = 1e300, greatest = -1e300;
+      for (int climb = 0; climb < 15; ++climb) {
+        greatest = std::max(greatest, climbed_value(network, static_cast<int>(n), 1, random));
+        least = std::min(least, -climbed_value(network, static_cast<int>(n), -1, random));
+      }
+      EXPECT_LE(greatest, range.upper + 1e-12);
+      EXPECT_GE(least, range.lower - 1e-12);
+      std::printf(
+          "%zu neighbours and the ground: climbed to %.4g .. %.4g, proved %.4g .. %.4g, undivided %.4g .. "
+          "%.4g\n",
+          n, least, greatest, range.lower, range.upper, whole[n - 1].lower, whole[n - 1].upper);
+    }
+  }
+}
+
 TEST(RangeSoundness, AClampMakesTheRangeHoldForEveryInput) {
   std::mt19937 generator(5);
   Network network = tests::deep_set(tests::random_network({6, 6, 4}, generator),
