@@ -33,7 +33,7 @@ Box box_of(const Bounds& bounds) {
 /// Searches end where the bound is this close to what was found, relatively.
 constexpr double kCloseEnough = 0.01;
 /// Parts of phi's box for its largest norm, at most.
-constexpr int kMostParts = 2400;
+constexpr int kMostParts = 20000;
 /// Parts that linear forms over sums may halve, as shares of the boxes of a search: those above neurons of rho, those
 /// that say where a form is about largest, and the one that is the bound. What may be left of a form's values.
 constexpr double kShareOfNeurons = 0.3, kShareOfHints = 0.05, kShareOfForms = 4;
