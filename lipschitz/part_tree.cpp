@@ -118,8 +118,8 @@ void PartTree::halve(std::size_t index, const RowVectorXd& form) {
   part.reach.reset();
 }
 
-/// Takes a form through hidden layer j, whose coefficients it has behind the ReLU: next += v' W, row by row, where v' is
-/// what a neuron's line makes of its coefficient v (relu_lines.h).
+/// Takes a form through hidden layer j, whose coefficients it has behind the ReLU: next += v' W, row by row, where v'
+/// is what a neuron's line makes of its coefficient v (relu_lines.h).
 SWARMCERT_WIDE void PartTree::pull_back(const Layer& layer, const std::vector<Line>& lines, double relative,
                                         const double* __restrict coefficients, double* __restrict next,
                                         Left& left) {

@@ -26,8 +26,8 @@ struct LargestValues {
   Eigen::MatrixXd x;      ///< in the box, [inputs x forms]
 };
 
-/// Best-first branch and bound for many linear forms c y in the outputs of one network. Parts of the box are halved where
-/// a form asks for it, and kept for the forms that follow: a form over a part that is there costs one backward
+/// Best-first branch and bound for many linear forms c y in the outputs of one network. Parts of the box are halved
+/// where a form asks for it, and kept for the forms that follow: a form over a part that is there costs one backward
 /// substitution (reach.h), two hundredths of what bounds on all neurons cost.
 ///
 /// Rounding is accounted for as in Reach. What it costs is measured by the magnitudes that Reach finds over the whole

@@ -243,7 +243,8 @@ TEST(Plausibility, OfManyLogsThatAreWrongAlikeThreeAreNamedAndTheOthersCounted) 
   EXPECT_EQ(named, 3) << outcome.output;
   EXPECT_NE(outcome.output.find("implausible: thrust: 2 more like these, all in --json"), std::string::npos)
       << outcome.output;
-  const files::Json flights = files::parse_json(read_text(folder / "compare.json"), "compare.json")["flights"];
+  const files::Json flights =
+      files::parse_json(read_text(folder / "compare.json"), "compare.json")["flights"];
   ASSERT_EQ(flights.size(), 5u);
   for (const files::Json& one : flights) EXPECT_EQ(one["plausibility"].size(), 1u) << one["file"];
 }
