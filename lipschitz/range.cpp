@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "lipschitz/attained_values.h"
+#include "lipschitz/convex_majorant.h"
 #include "lipschitz/extremes.h"
 #include "lipschitz/invariant_box.h"
 #include "lipschitz/sum_climb.h"
@@ -35,8 +36,14 @@ constexpr double kCloseEnough = 0.01;
 /// Parts of phi's box for its largest norm, at most.
 constexpr int kMostParts = 20000;
 /// Parts that linear forms over sums may halve, as shares of the boxes of a search: those above neurons of rho, those
-/// that say where a form is about largest, and the one that is the bound. What may be left of a form's values.
-constexpr double kShareOfNeurons = 0.3, kShareOfHints = 0.05, kShareOfForms = 4;
+/// that say where a form is about largest, and the one that is the bound.
+struct FormShares {
+  double neurons, hints, bound;
+};
+constexpr FormShares kShares{0.15, 0.025, 2};
+/// Where such forms are but hints, since by_alike() bounds f more tightly.
+constexpr FormShares kSharesOfHints{0.025, 0.01, 0.5};
+/// What may be left of a form, as a share of how far its values are apart.
 constexpr double kCloseForms = 0.002;
 
 /// Makes `layer` add anything within `bounds` to its output.
@@ -54,7 +61,7 @@ void add_interval(ReachLayer& layer, const Bounds& bounds) {
 
 /// Boxes per search where nobody says: a box costs about the square of the number of weights.
 int usual_nodes(const Network& network, const std::string& function) {
-  constexpr double kNodes = 8000, kFewest = 600, kWeights = 8000;
+  constexpr double kNodes = 16000, kFewest = 600, kWeights = 8000;
   double weights = 0;
   const auto parts = files::parts(network);
   for (const std::string& name : files::networks_of(function))
@@ -133,8 +140,9 @@ class Ranger {
     std::vector<std::vector<VectorXd>> starts;
     double upper = 0;
     if (!is_silent(neighbours)) {
-      upper = parts_of(neighbours).size() == 1 ? beside_one(direction, neighbours, starts)
-                                               : by_support(direction, neighbours, starts);
+      const bool is_one = parts_of(neighbours).size() == 1;
+      upper = is_one ? beside_one(direction, neighbours, starts) : by_support(direction, neighbours, starts);
+      if (is_alike(neighbours)) upper = std::min(upper, by_alike(direction, neighbours, starts));
     }
     if (starts.empty())
       candidates.push_back(middles(neighbours));
@@ -185,6 +193,9 @@ class Ranger {
   }
 
   MaximiseOptions search_of_boxes() const { return {nodes_ + 2, kCloseEnough, jobs_}; }
+  const FormShares& shares(const Composition& neighbours) const {
+    return is_alike(neighbours) ? kSharesOfHints : kShares;
+  }
   PartSearch search_of_forms(double share) const {
     return {static_cast<int>(nodes_ * share) + 1, kCloseForms, jobs_};
   }
@@ -212,7 +223,7 @@ class Ranger {
       for (const auto& [part, count] : all_terms(neighbours))
         sums.support.terms.push_back({term(part).tree.get(), count});
       sums.support.size = rho_.front().weights.cols();
-      sums.support.search = search_of_forms(kShareOfNeurons);
+      sums.support.search = search_of_forms(shares(neighbours).neurons);
       sums.reach = std::make_unique<const Reach>(rho_, box_of(sums.support.bounds()), sums.support);
     }
     return sums;
@@ -248,6 +259,29 @@ class Ranger {
     return std::min(found.upper, by_support(direction, neighbour, starts));
   }
 
+  /// Whether there are several neighbours, all of one kind.
+  bool is_alike(const Composition& neighbours) const {
+    return !has_ground_ && neighbours.size() == 1 && neighbours.begin()->second > 1;
+  }
+
+  /// Several neighbours of one kind: one neighbour of a network that is convex in the sum, tight where f is largest.
+  double by_alike(const RowVectorXd& direction, const Composition& neighbours,
+                  std::vector<std::vector<VectorXd>>& starts) {
+    const auto& [part, count] = *neighbours.begin();
+    const std::vector<PlacedTerm> terms = placed(all_terms(neighbours));
+    std::vector<VectorXd> best = climb(terms, rho_, direction, starts);
+    VectorXd sum = VectorXd::Zero(rho_.front().weights.cols());
+    for (std::size_t k = 0; k < terms.size(); ++k)
+      sum += terms[k].count * evaluate_roughly(*terms[k].network, best[k]);
+    const ReachNetwork above =
+        convex_majorant(term(part).network, domain_.at(part), count, rho_, direction, sum);
+    const Maximum found = maximise(above, RowVectorXd::Ones(1), domain_.at(part), search_of_boxes());
+    starts.push_back(best);
+    best.front() = found.x;
+    starts.push_back(std::move(best));
+    return found.upper;
+  }
+
   /// A linear form above rho over the sums, f <= c s + d, and the largest values of its terms.
   /// @param starts where the terms of forms above f are largest, one x per term.
   double by_support(const RowVectorXd& direction, const Composition& neighbours,
@@ -255,7 +289,7 @@ class Ranger {
     const Reach& reach = *sums(neighbours).reach;
     SumSupport support = sums(neighbours).support;
     if (support.terms.empty()) return reach.largest(reach.upper_forms(direction))(0);
-    support.search = search_of_forms(kShareOfHints);
+    support.search = search_of_forms(shares(neighbours).hints);
     const LinearForms form = reach.sharpened_form(direction, [&](const LinearForms& one) -> VectorXd {
       starts.push_back(support.steepest(one.rows.row(0)));
       VectorXd sum = VectorXd::Zero(one.rows.cols());
@@ -264,18 +298,22 @@ class Ranger {
         sum += all[k].second * evaluate_roughly(term(all[k].first).network, starts.back()[k]);
       return sum;
     });
-    support.search = search_of_forms(kShareOfForms);
+    support.search = search_of_forms(shares(neighbours).bound);
     starts.push_back(support.steepest(form.rows.row(0)));
     return std::min(reach.largest(form)(0), support(form)(0));
+  }
+
+  std::vector<PlacedTerm> placed(const std::vector<std::pair<std::string, int>>& all) {
+    std::vector<PlacedTerm> terms;
+    for (const auto& [part, count] : all) terms.push_back({&term(part).network, &domain_.at(part), count});
+    return terms;
   }
 
   /// Climbs from `starts`, all neighbours of a kind in one place.
   void propose(const std::vector<std::pair<std::string, int>>& all, const RowVectorXd& direction,
                const std::vector<std::vector<VectorXd>>& starts,
                std::vector<std::vector<VectorXd>>& candidates) {
-    std::vector<PlacedTerm> terms;
-    for (const auto& [part, count] : all) terms.push_back({&term(part).network, &domain_.at(part), count});
-    const std::vector<VectorXd> best = climb(terms, rho_, direction, starts);
+    const std::vector<VectorXd> best = climb(placed(all), rho_, direction, starts);
     candidates.emplace_back();
     for (std::size_t k = 0; k < all.size(); ++k)
       candidates.back().insert(candidates.back().end(), static_cast<std::size_t>(all[k].second), best[k]);

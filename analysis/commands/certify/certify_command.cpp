@@ -454,7 +454,7 @@ void declare_limits(CLI::App& app, CertifyOptions& options) {
                "network.toml lists compositions as silent, ranges and jumps hold their 0");
   app.add_option(
          "--range-nodes", options.range_nodes,
-         "Maximum number of boxes of branch and bound per end of a range (default: 8000, fewer for large "
+         "Maximum number of boxes of branch and bound per end of a range (default: 16000, fewer for large "
          "networks)")
       ->check(CLI::Range(1, 10'000'000));
   app.add_option("--input-step", options.input_step,
