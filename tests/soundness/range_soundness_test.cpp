@@ -143,17 +143,22 @@ TEST(RangeSoundness, RandomSetsStayWithinTheirRange) {
   }
 }
 
-/// The largest of sign f that steps of single neighbours find from a random place, the ground's input among them.
+/// The largest of sign f that steps of single neighbours find from a random place, the ground's input among them if
+/// there is one.
 double climbed_value(const Network& network, int neighbours, double sign, Random& random) {
-  const files::Evaluator<double> phi(network.phi.at("large")), ground(network.phi.at("ground"));
-  const files::Evaluator<double> rho(network.rho.at("small"));
+  const bool has_ground = network.phi.count("ground") == 1;
+  const files::Evaluator<double> phi(network.phi.at("large")), rho(network.rho.at("small"));
+  const files::Evaluator<double> ground(network.phi.at(has_ground ? "ground" : "large"));
   std::vector<std::vector<double>> best;
   for (int j = 0; j < neighbours; ++j) best.push_back(point<double>(kBox, random));
-  best.push_back(point<double>(kGroundBox, random));
+  if (has_ground) best.push_back(point<double>(kGroundBox, random));
+  const auto is_ground = [&](std::size_t j) {
+    return has_ground && j == static_cast<std::size_t>(neighbours);
+  };
   const auto value = [&](const std::vector<std::vector<double>>& x) {
-    std::vector<double> sum = ground(x.back());
-    for (std::size_t j = 0; j + 1 < x.size(); ++j) {
-      const std::vector<double> term = phi(x[j]);
+    std::vector<double> sum(static_cast<std::size_t>(phi.mlp().outputs()), 0.0);
+    for (std::size_t j = 0; j < x.size(); ++j) {
+      const std::vector<double> term = is_ground(j) ? ground(x[j]) : phi(x[j]);
       for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += term[i];
     }
     return sign * rho(sum)[0];
@@ -162,7 +167,7 @@ double climbed_value(const Network& network, int neighbours, double sign, Random
   for (int tried = 0; tried < 600; ++tried) {
     std::vector<std::vector<double>> x = best;
     const std::size_t j = random.below(x.size());
-    const Box& box = j + 1 < x.size() ? kBox : kGroundBox;
+    const Box& box = is_ground(j) ? kGroundBox : kBox;
     const double scale = std::exp2(-8.0 * tried / 600);
     for (std::size_t k = 0; k < x[j].size(); ++k)
       x[j][k] = std::clamp(x[j][k] + scale * box.upper[k] * random.symmetric(), box.lower[k], box.upper[k]);
@@ -171,13 +176,13 @@ double climbed_value(const Network& network, int neighbours, double sign, Random
   return largest;
 }
 
-TEST(RangeSoundness, NoClimbOverDistinctNeighboursAndTheGroundLeavesARangeThatPartsOfTheBoxMadeTighter) {
+TEST(RangeSoundness, NoClimbOverDistinctNeighboursLeavesARangeThatPartsOfTheBoxMadeTighter) {
   std::mt19937 generator(14);
   Random random(15);
   for (int round = 0; round < 4; ++round) {
     Network network;
     network.phi["large"] = tests::random_network({6, 9, 7, 4}, generator);
-    network.phi["ground"] = tests::random_network({4, 6, 4}, generator);
+    if (round % 2 == 0) network.phi["ground"] = tests::random_network({4, 6, 4}, generator);
     network.rho["small"] = tests::random_network({4, 8, 6, 1}, generator);
     lipschitz::RangeOptions options;
     options.neighbours = 3;
@@ -197,9 +202,10 @@ TEST(RangeSoundness, NoClimbOverDistinctNeighboursAndTheGroundLeavesARangeThatPa
       EXPECT_LE(greatest, range.upper + 1e-12);
       EXPECT_GE(least, range.lower - 1e-12);
       std::printf(
-          "%zu neighbours and the ground: climbed to %.4g .. %.4g, proved %.4g .. %.4g, undivided %.4g .. "
+          "%zu neighbours%s: climbed to %.4g .. %.4g, proved %.4g .. %.4g, undivided %.4g .. "
           "%.4g\n",
-          n, least, greatest, range.lower, range.upper, whole[n - 1].lower, whole[n - 1].upper);
+          n, round % 2 == 0 ? " and the ground" : "", least, greatest, range.lower, range.upper,
+          whole[n - 1].lower, whole[n - 1].upper);
     }
   }
 }
