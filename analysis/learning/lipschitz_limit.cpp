@@ -8,6 +8,7 @@
 #include "lipschitz/sdp_bound.h"
 #include "lipschitz/spectral_norm.h"
 #include "nn/base/parallel.h"
+#include "nn/training/spectral_normalization.h"
 #include "nn/weights/function_names.h"
 #include "nn/weights/invariants.h"
 #include "nn/weights/network.h"
@@ -56,6 +57,24 @@ std::vector<JointBound> joint_bounds(const training::Layout& layout, const train
     if (found.proof) bound.upper = std::min(bound.upper, found.proof->upper.value());
   });
   return bounds;
+}
+
+std::vector<double> shares_of_product(double limit, training::Layers layers,
+                                      const files::GammaStatement& gamma, const training::Layout& layout) {
+  const auto& parts = layout.parts();
+  std::vector<double> shares(parts.size(), 1.0);
+  for (std::size_t phi = 0; phi < parts.size(); ++phi) {
+    for (std::size_t rho = 0; rho < parts.size(); ++rho) {
+      if (!files::is_phi(parts[phi].name) || !files::is_rho(parts[rho].name)) continue;
+      const int of_phi = parts[phi].layers(), of_rho = parts[rho].layers();
+      const double product =
+          limit * training::slack_of_product(layers, of_phi) * training::slack_of_product(layers, of_rho);
+      const double of_layer = std::pow(product, 1.0 / (of_phi + of_rho));
+      for (const std::size_t part : {phi, rho})
+        shares[part] = std::min(shares[part], of_layer / training::layer_limit(gamma, parts[part].layers()));
+    }
+  }
+  return shares;
 }
 
 Tightening scale_to(double limit, const training::Layout& layout, int jobs, training::Vector& theta,

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/training/layout.h"
+#include "nn/training/bounded_layers.h"
 
 namespace swarmcert::learning {
 
@@ -22,6 +22,11 @@ struct JointBound {
 /// @param invariants whether phi sees invariants of the inputs (nn/invariants.h), whose map's slope is in the bounds.
 std::vector<JointBound> joint_bounds(const training::Layout& layout, const training::Vector& theta, int jobs,
                                      bool invariants = false);
+
+/// Shares of gamma's limits, per part, with which bounded layers keep `limit` by construction over each phi and rho; one
+/// where gamma alone does. Where their training begins.
+std::vector<double> shares_of_product(double limit, training::Layers layers,
+                                      const files::GammaStatement& gamma, const training::Layout& layout);
 
 /// What one look at the bounds asks for.
 struct Tightening {

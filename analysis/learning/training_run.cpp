@@ -38,14 +38,16 @@ std::string fingerprint(const LearningData& data, const RunOptions& options) {
   for (const TrackSamples& track : data.tracks) text += name(track.use) + std::to_string(track.end);
   for (const training::Part& part : data.layout.parts()) text += part.name + bytes(part.sizes);
   const training::TrainerOptions& t = options.trainer;
-  const std::array<double, 8> numbers = {t.gamma.value,
-                                         t.learning_rate,
-                                         static_cast<double>(t.gamma.scope),
-                                         static_cast<double>(t.gamma.mode),
-                                         static_cast<double>(t.batch),
-                                         static_cast<double>(t.turns),
-                                         static_cast<double>(options.weighing),
-                                         options.max_lipschitz};
+  const std::array<double, 10> numbers = {t.gamma.value,
+                                          t.learning_rate,
+                                          static_cast<double>(t.gamma.scope),
+                                          static_cast<double>(t.gamma.mode),
+                                          static_cast<double>(t.batch),
+                                          static_cast<double>(t.turns),
+                                          static_cast<double>(options.weighing),
+                                          options.max_lipschitz,
+                                          static_cast<double>(t.layers),
+                                          static_cast<double>(options.begins_within)};
   text += bytes(numbers);
   return files::sha256(text + std::to_string(t.seed) + "," + std::to_string(options.epochs));
 }
@@ -126,6 +128,8 @@ Run run_training(const LearningData& data, const RunOptions& options) {
   State state;
   state.best = trainer.theta();
   state.shares.assign(data.layout.parts().size(), 1.0);
+  if (options.max_lipschitz > 0 && options.begins_within)
+    state.shares = shares_of_product(options.max_lipschitz, chosen.layers, chosen.gamma, data.layout);
   if (options.resumes) {
     state = read_checkpoint(key, options.checkpoint);
     if (state.best.size() != data.layout.size() || state.shares.size() != data.layout.parts().size() ||
@@ -142,8 +146,8 @@ Run run_training(const LearningData& data, const RunOptions& options) {
       break;
     }
     const double rate = chosen.learning_rate * 0.5 * (1 + std::cos(kPi * epoch / options.epochs));
-    trainer.weigh(weights_by(options.weighing, data, trainer.theta(), chosen.jobs));
     trainer.tighten(state.shares);
+    trainer.weigh(weights_by(options.weighing, data, trainer.theta(), chosen.jobs));
     const double fit = std::sqrt(trainer.run_epoch(epoch, rate));
     if (!std::isfinite(fit) || !trainer.theta().allFinite())
       throw files::InputError({"", "", "--rate", fmt::format("{}", chosen.learning_rate),

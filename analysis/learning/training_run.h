@@ -15,6 +15,9 @@ struct RunOptions {
   training::TrainerOptions trainer;
   Weighing weighing = Weighing::kErrors;
   double max_lipschitz = 0;  ///< joint bounds are proved to keep it; 0: no limit but gamma
+  /// The first epoch has the limits of shares_of_product(), which the next ones let out or tighten; else gamma's, from
+  /// which the layers come down epoch by epoch.
+  bool begins_within = true;
   int epochs = 40;
   int patience = 10;       ///< epochs without a better score on the selecting flights before the run ends
   std::string checkpoint;  ///< file that is written after every epoch; empty: none

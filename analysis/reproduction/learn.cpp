@@ -27,6 +27,9 @@ std::string text_of(const LearnOptions& options) {
                                  options.teachers, options.sizes.features, options.sizes.ground);
   if (options.sizes.invariants) text += " invariants";
   if (options.tight_bounds) text += " tight bounds";
+  if (options.layers != training::Layers::kFree)
+    text += fmt::format(" layers {}", static_cast<int>(options.layers));
+  if (options.max_lipschitz > 0 && !options.begins_within) text += " begins outside";
   if (options.folds > 0) text += fmt::format(" folds {}", options.folds);
   if (options.patience > 0) text += fmt::format(" patience {}", options.patience);
   for (const int size : options.sizes.phi) text += fmt::format(" phi {}", size);
@@ -101,8 +104,10 @@ files::Json train(const Setting& setting, const LearnOptions& options, const std
   run.trainer.gamma = options.gamma;
   run.trainer.learning_rate = options.rate;
   run.trainer.batch = options.batch;
+  run.trainer.layers = options.layers;
   run.trainer.turns = options.turns;
   run.max_lipschitz = options.max_lipschitz;
+  run.begins_within = options.begins_within;
   run.trainer.seed = options.seed;
   run.trainer.jobs = setting.jobs;
   const auto samples = static_cast<int>(data.indices(Use::kFit).size());

@@ -14,8 +14,10 @@ namespace swarmcert::reproduction {
 struct LearnOptions {
   learning::NetworkSizes sizes;
   files::GammaStatement gamma;
-  double max_lipschitz = 0;  ///< see learning::RunOptions
-  bool turns = false;        ///< see training::TrainerOptions
+  training::Layers layers = training::Layers::kFree;
+  double max_lipschitz = 0;   ///< see learning::RunOptions
+  bool begins_within = true;  ///< likewise
+  bool turns = false;         ///< see training::TrainerOptions
   double rate = 3e-3;
   int batch = 256;
   int steps = 0;   ///< of the optimiser: as many whole epochs as come nearest, at least one

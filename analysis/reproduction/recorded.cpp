@@ -52,6 +52,18 @@ Recorded recorded_flights(const Setting& setting, bool published_signals) {
           read("visible_test")};
 }
 
+Recorded of_small_vehicles(const Recorded& recorded) {
+  const auto some = [](const residuals::Inputs& inputs) {
+    return some_flights(inputs, [&](const residuals::FlightFiles& flight) {
+      return std::all_of(flight.logs.begin(), flight.logs.end(), [&](const auto& log) {
+        const auto found = inputs.fleet.find(log.first);
+        return found != inputs.fleet.end() && found->second.kind == "small";
+      });
+    });
+  };
+  return {some(recorded.fit), some(recorded.select), some(recorded.test)};
+}
+
 residuals::Inputs with_network(residuals::Inputs inputs, const std::string& network) {
   stability::EffectSpec spec;
   spec.name = "deep_set";
@@ -104,6 +116,7 @@ LearnOptions recorded_options(const Setting& setting) {
   options.sizes.features = 20;
   options.gamma.value = 3;
   options.max_lipschitz = kMaxLipschitz;
+  options.begins_within = false;  // makes no difference at a limit as large as that
   options.turns = true;
   options.rate = 2e-3;
   options.batch = 1024;

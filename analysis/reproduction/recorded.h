@@ -19,6 +19,9 @@ struct Recorded {
 /// @param published_signals labels as the networks' authors made them, see residuals::CutRules.
 Recorded recorded_flights(const Setting& setting, bool published_signals);
 
+/// The flights in which every vehicle is small.
+Recorded of_small_vehicles(const Recorded& recorded);
+
 /// `inputs` whose models all have the deep set as one more effect.
 residuals::Inputs with_network(residuals::Inputs inputs, const std::string& network);
 

@@ -27,20 +27,33 @@ double sum_of_weights(const Dataset& data, const Index* samples, Index count) {
 
 }  // namespace
 
-Trainer::Trainer(const Layout& layout, const Dataset& data, std::vector<Index> samples, Vector theta,
+Trainer::Trainer(const Layout& layout, const Dataset& data, std::vector<Index> samples, Vector parameters,
                  const TrainerOptions& options)
     : layout_(layout),
       source_(data),
       data_(data),
       samples_(std::move(samples)),
       options_(options),
-      theta_(std::move(theta)),
+      parameters_(std::move(parameters)),
       adam_(layout.size()),
       shares_(layout.parts().size(), 1.0),
-      normalization_(layout, options.gamma, theta_) {
+      normalization_(layout, options.gamma, parameters_),
+      bounded_(layout, options.layers, options.gamma) {
   fix_order_of_sums();
-  normalization_.apply(theta_);
+  settle();
   gradients_.resize(static_cast<std::size_t>((options_.batch + kPiece - 1) / kPiece));
+}
+
+/// The weights after a change of the parameters.
+void Trainer::settle() {
+  if (options_.layers == Layers::kFree) normalization_.apply(parameters_);
+  theta_ = bounded_.weights(parameters_);
+}
+
+void Trainer::tighten(std::vector<double> shares) {
+  shares_ = std::move(shares);
+  bounded_.tighten(shares_);
+  theta_ = bounded_.weights(parameters_);
 }
 
 double Trainer::step(const Index* samples, Index count, double learning_rate) {
@@ -59,8 +72,9 @@ double Trainer::step(const Index* samples, Index count, double learning_rate) {
     loss += losses[i];
   }
   gradients_[0] *= static_cast<float>(1 / weight);
-  adam_.step(theta_, gradients_[0], learning_rate);
-  normalization_.apply(theta_);
+  bounded_.pull_back(parameters_, gradients_[0]);
+  adam_.step(parameters_, gradients_[0], learning_rate);
+  settle();
   return loss;
 }
 
@@ -70,7 +84,7 @@ double Trainer::run_epoch(int epoch, double learning_rate) {
   for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);
   if (options_.turns) turn_about_vertical(layout_, source_, random, data_);
   // Where the power iteration stands is no part of the state: begin anew, as a resumed run must.
-  normalization_ = SpectralNormalization(layout_, options_.gamma, theta_);
+  normalization_ = SpectralNormalization(layout_, options_.gamma, parameters_);
   normalization_.tighten(shares_);
   double loss = 0;
   const Index count = static_cast<Index>(order.size());
@@ -82,7 +96,7 @@ double Trainer::run_epoch(int epoch, double learning_rate) {
 
 Vector Trainer::state() const {
   Vector state(3 * layout_.size() + 2);
-  state << theta_, adam_.first_moment, adam_.second_moment, static_cast<float>(adam_.steps / kHalf),
+  state << parameters_, adam_.first_moment, adam_.second_moment, static_cast<float>(adam_.steps / kHalf),
       static_cast<float>(adam_.steps % kHalf);
   return state;
 }
@@ -90,7 +104,8 @@ Vector Trainer::state() const {
 void Trainer::restore(const Vector& state) {
   const Index size = layout_.size();
   if (state.size() != 3 * size + 2) throw std::invalid_argument("a checkpoint of other networks");
-  theta_ = state.head(size);
+  parameters_ = state.head(size);
+  theta_ = bounded_.weights(parameters_);
   adam_.first_moment = state.segment(size, size);
   adam_.second_moment = state.segment(2 * size, size);
   adam_.steps =

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numeric>
 
@@ -8,6 +10,7 @@
 #include "analysis/learning/training_run.h"
 #include "analysis/learning/weighing.h"
 #include "analysis/reproduction/nearest_labels.h"
+#include "analysis/run.h"
 #include "nn/base/random.h"
 #include "nn/training/trainer.h"
 
@@ -253,6 +256,65 @@ TEST(LipschitzLimit, ScaledNetworksAreProvedToKeepItAndNothingElseChanges) {
   training::Vector again = theta;
   limit_joint_bounds(limit, data.layout, 1, again);
   EXPECT_EQ(again, theta) << "what keeps the limit stays";
+}
+
+constexpr training::Layers kBoundedLayers[] = {training::Layers::kAol, training::Layers::kOrthogonal,
+                                               training::Layers::kSandwich};
+
+TEST(LipschitzLimit, BoundedLayersWithTheSharesOfTheirProductAreProvedToKeepItForAnyParameters) {
+  // Parts of one to three layers: phi of three and rho of two, phi of one and rho of two.
+  const training::Layout layout(
+      {{"phi:large", {6, 5}}, {"phi:small", {6, 10, 7, 5}}, {"rho:small", {5, 8, 1}}});
+  const files::GammaStatement gamma = {3, files::GammaStatement::Scope::kLayer,
+                                       files::GammaStatement::Mode::kClip};
+  constexpr double kLimit = 2;
+  for (const training::Layers layers : kBoundedLayers) {
+    training::BoundedLayers bounded(layout, layers, gamma);
+    bounded.tighten(shares_of_product(kLimit, layers, gamma, layout));
+    double largest = 0;
+    for (const double scale : {0.3, 1.0, 3.0}) {
+      const training::Vector theta =
+          bounded.weights(static_cast<float>(scale) * training::initial_parameters(layout, 5));
+      for (const JointBound& bound : joint_bounds(layout, theta, 1)) {
+        EXPECT_LE(bound.upper, kLimit * (1 + 1e-4)) << static_cast<int>(layers) << " scale " << scale;
+        largest = std::max(largest, bound.upper);
+      }
+    }
+    EXPECT_GT(largest, 0.2 * kLimit) << "the limit is not out of reach";
+  }
+}
+
+TEST(RunTraining, WithBoundedLayersKeepsTheLimitAndGoesOnToTheSameBits) {
+  LearningData data = two_compositions();
+  for (int t = 0; t < 2; ++t) {  // the last quarter of each selects
+    TrackSamples rest = data.tracks[t];
+    rest.use = Use::kSelect;
+    rest.begin += 3 * (rest.end - rest.begin) / 4;
+    data.tracks[t].end = rest.begin;
+    data.tracks.push_back(rest);
+  }
+  const tests::ScratchFolder folder;
+  for (const training::Layers layers : kBoundedLayers) {
+    RunOptions options;
+    options.trainer.gamma.value = 3;
+    options.trainer.layers = layers;
+    options.trainer.batch = 256;
+    options.trainer.jobs = 1;
+    options.max_lipschitz = 3;
+    options.epochs = 5;
+    const learning::Run whole = run_training(data, options);
+    for (const JointBound& bound : joint_bounds(data.layout, whole.theta, 1)) EXPECT_LE(bound.upper, 3);
+
+    std::atomic<bool> cancelled = false;
+    options.cancelled = &cancelled;
+    options.progress = [&](int done, int, double) { cancelled = done == 2; };
+    options.checkpoint = folder / "checkpoint.json";
+    EXPECT_TRUE(run_training(data, options).was_cancelled);
+    options.cancelled = nullptr;
+    options.resumes = true;
+    options.trainer.jobs = 2;
+    EXPECT_EQ(run_training(data, options).theta, whole.theta) << static_cast<int>(layers);
+  }
 }
 
 TEST(LipschitzLimit, AsksForTheLayersThatHaveAHandInTheLargestBound) {

@@ -257,6 +257,23 @@ TEST_F(Train, KeepsTheLipschitzLimitThatItWasGiven) {
   EXPECT_EQ(execute(train("--epochs 1 --max-lipschitz 100 --gamma-mode equal -o out")).exit_code, 2);
 }
 
+TEST_F(Train, BoundedLayersAreCertifiedAndCheckedAsAnyOtherNetwork) {
+  for (const std::string layers : {"aol", "orthogonal", "sandwich"}) {
+    const Outcome outcome = execute(train("--epochs 25 --batch 256 --rate 6e-3 --max-lipschitz 40 --layers " +
+                                          layers + " --force -o out --json out.json"));
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+    const Json result = files::read_json(folder_ / "out.json", "swarmcert/train/1");
+    EXPECT_EQ(result["layers"], layers);
+    EXPECT_LE(result["lipschitz"].get<double>(), 40) << layers;
+    EXPECT_GE(result["lipschitz"].get<double>(), 20) << layers;
+    EXPECT_EQ(result["gamma_verdict"], "proved") << layers;
+    EXPECT_LT(result["test_rmse"].get<double>(), 0.8 * result["test_rmse_of_nothing"].get<double>())
+        << layers;
+    EXPECT_EQ(execute("swarmcert check out/certificate.json out/network.toml").exit_code, 0) << layers;
+  }
+  EXPECT_EQ(execute(train("--epochs 1 --layers aol --gamma-mode equal -o equal")).exit_code, 2);
+}
+
 TEST_F(Train, ExactSymmetryIsTrainedCertifiedSimulatedAndExportedAndRefusedWhereItIsNotKnown) {
   const Outcome trained =
       execute(train("--symmetry exact --epochs 25 --batch 256 --rate 3e-3 --max-lipschitz 60 -o out "

@@ -221,6 +221,8 @@ TrainerOptions options_with(double gamma, files::GammaStatement::Scope scope,
   return options;
 }
 
+constexpr Layers kAllLayers[] = {Layers::kFree, Layers::kAol, Layers::kOrthogonal, Layers::kSandwich};
+
 using Scope = files::GammaStatement::Scope;
 using Mode = files::GammaStatement::Mode;
 
@@ -298,48 +300,58 @@ TEST(Adam, StepIsTheFormulaInFloatToTheBit) {
 TEST(Trainer, SameBitsForAnyNumberOfThreads) {
   const Layout layout = mixed_layout();
   const Dataset data = mixed_dataset(900, 4);
-  std::vector<Vector> results;
-  for (const int jobs : {1, 2, 5}) {
-    TrainerOptions options = options_with(2, Scope::kLayer, Mode::kClip);
-    options.batch = 700;
-    options.jobs = jobs;
-    Trainer trainer(layout, data, all_samples(data), initial_parameters(layout, 1), options);
-    for (int epoch = 0; epoch < 3; ++epoch) trainer.run_epoch(epoch, 1e-2);
-    results.push_back(trainer.theta());
+  for (const Layers layers : kAllLayers) {
+    std::vector<Vector> results;
+    for (const int jobs : {1, 2, 5}) {
+      TrainerOptions options = options_with(2, Scope::kLayer, Mode::kClip);
+      options.layers = layers;
+      options.batch = 700;
+      options.jobs = jobs;
+      Trainer trainer(layout, data, all_samples(data), initial_parameters(layout, 1), options);
+      for (int epoch = 0; epoch < 3; ++epoch) trainer.run_epoch(epoch, 1e-2);
+      results.push_back(trainer.theta());
+    }
+    EXPECT_EQ(results[0], results[1]);
+    EXPECT_EQ(results[0], results[2]);
   }
-  EXPECT_EQ(results[0], results[1]);
-  EXPECT_EQ(results[0], results[2]);
 }
 
 TEST(Trainer, SameBitsForAnySizeOfTheProcessorsCaches) {
   const Layout layout = mixed_layout();
   const Dataset data = mixed_dataset(900, 4);
-  std::vector<Vector> results;
-  for (const int l1_bytes : {4 << 10, 32 << 10, 48 << 10}) {
-    Eigen::setCpuCacheSizes(l1_bytes, 16 * l1_bytes, 64 * l1_bytes);
-    Trainer trainer(layout, data, all_samples(data), initial_parameters(layout, 1),
-                    options_with(2, Scope::kLayer, Mode::kClip));
-    for (int epoch = 0; epoch < 3; ++epoch) trainer.run_epoch(epoch, 1e-2);
-    results.push_back(trainer.theta());
+  for (const Layers layers : kAllLayers) {
+    std::vector<Vector> results;
+    for (const int l1_bytes : {4 << 10, 32 << 10, 48 << 10}) {
+      Eigen::setCpuCacheSizes(l1_bytes, 16 * l1_bytes, 64 * l1_bytes);
+      TrainerOptions options = options_with(2, Scope::kLayer, Mode::kClip);
+      options.layers = layers;
+      Trainer trainer(layout, data, all_samples(data), initial_parameters(layout, 1), options);
+      for (int epoch = 0; epoch < 3; ++epoch) trainer.run_epoch(epoch, 1e-2);
+      results.push_back(trainer.theta());
+    }
+    EXPECT_EQ(results[0], results[1]);
+    EXPECT_EQ(results[0], results[2]);
   }
-  EXPECT_EQ(results[0], results[1]);
-  EXPECT_EQ(results[0], results[2]);
 }
 
 TEST(Trainer, ARunThatWasTakenUpAgainEndsWithTheSameBits) {
   const Layout layout = mixed_layout();
   const Dataset data = mixed_dataset(500, 4);
-  const TrainerOptions options = options_with(2, Scope::kLayer, Mode::kClip);
-  Trainer whole(layout, data, all_samples(data), initial_parameters(layout, 1), options);
-  for (int epoch = 0; epoch < 4; ++epoch) whole.run_epoch(epoch, 1e-2);
+  for (const Layers layers : kAllLayers) {
+    TrainerOptions options = options_with(2, Scope::kLayer, Mode::kClip);
+    options.layers = layers;
+    Trainer whole(layout, data, all_samples(data), initial_parameters(layout, 1), options);
+    for (int epoch = 0; epoch < 4; ++epoch) whole.run_epoch(epoch, 1e-2);
 
-  Trainer first(layout, data, all_samples(data), initial_parameters(layout, 1), options);
-  for (int epoch = 0; epoch < 2; ++epoch) first.run_epoch(epoch, 1e-2);
-  Trainer second(layout, data, all_samples(data), initial_parameters(layout, 99), options);
-  second.restore(first.state());
-  for (int epoch = 2; epoch < 4; ++epoch) second.run_epoch(epoch, 1e-2);
-  EXPECT_EQ(second.theta(), whole.theta());
-  EXPECT_THROW(second.restore(Vector::Zero(3)), std::invalid_argument);
+    Trainer first(layout, data, all_samples(data), initial_parameters(layout, 1), options);
+    for (int epoch = 0; epoch < 2; ++epoch) first.run_epoch(epoch, 1e-2);
+    Trainer second(layout, data, all_samples(data), initial_parameters(layout, 99), options);
+    second.restore(first.state());
+    EXPECT_EQ(second.theta(), first.theta());
+    for (int epoch = 2; epoch < 4; ++epoch) second.run_epoch(epoch, 1e-2);
+    EXPECT_EQ(second.theta(), whole.theta());
+    EXPECT_THROW(second.restore(Vector::Zero(3)), std::invalid_argument);
+  }
 }
 
 TEST(Trainer, TurnsLetItPredictDirectionsThatItNeverSaw) {
@@ -380,10 +392,16 @@ TEST(Trainer, LearnsTheForceOfAnotherDeepSet) {
   for (Index s = 0; s < data.samples(); ++s) data.target[s] = force(0, s);
   const double variance = static_cast<double>((force.array() - force.mean()).square().mean());
 
-  Trainer trainer(layout, data, samples, initial_parameters(layout, 2),
-                  options_with(10, Scope::kLayer, Mode::kClip));
-  for (int epoch = 0; epoch < 60; ++epoch) trainer.run_epoch(epoch, 1e-2);
-  EXPECT_LT(mean_loss(layout, trainer.theta(), data, samples, 1), 0.05 * variance);
+  for (const Layers layers : kAllLayers) {
+    TrainerOptions options = options_with(10, Scope::kLayer, Mode::kClip);
+    options.layers = layers;
+    Trainer trainer(layout, data, samples, initial_parameters(layout, 2), options);
+    if (layers != Layers::kFree) trainer.tighten({0.2, 0.2});
+    for (int epoch = 0; epoch < 60; ++epoch) trainer.run_epoch(epoch, 1e-2);
+    EXPECT_LT(mean_loss(layout, trainer.theta(), data, samples, 1),
+              (layers == Layers::kFree ? 0.05 : 0.1) * variance)
+        << static_cast<int>(layers);
+  }
 }
 
 }  // namespace

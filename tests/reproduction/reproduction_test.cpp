@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "analysis/run.h"
@@ -95,6 +96,27 @@ TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
   for (const Json& row : symmetry["by_bound"]) {
     if (row["limited"] == "joint bound") {
       EXPECT_LE(row["bound_gf_per_unit"][0].get<double>(), row["limit"].get<double>()) << row;
+    }
+  }
+
+  reproduce("layers -o out");
+  const Json layers = result("layers");
+  ASSERT_EQ(layers["curves"].size(), 10u);
+  for (const Json& row : layers["curves"]) {
+    EXPECT_LT(row["test_rmse_gf"][0].get<double>(), 2) << row;
+    if (row["limited"] != "joint bound") continue;
+    EXPECT_LE(row["bound_gf_per_unit"][0].get<double>(), row["limit"].get<double>()) << row;
+    EXPECT_GE(row["bound_gf_per_unit"][0].get<double>(), 0.5 * row["limit"].get<double>()) << row;
+  }
+  ASSERT_EQ(layers["at_equal_bounds"].size(), 2u);
+  for (const Json& row : layers["at_equal_bounds"]) {
+    for (const Json& errors : row["errors"]) {
+      if (errors["method"] == row["preferred_by_selecting_flights"]) continue;
+      const auto preferred = std::find_if(row["errors"].begin(), row["errors"].end(), [&](const Json& other) {
+        return other["method"] == row["preferred_by_selecting_flights"];
+      });
+      ASSERT_NE(preferred, row["errors"].end()) << row;
+      EXPECT_LE((*preferred)["select_rmse_gf"], errors["select_rmse_gf"]) << row;
     }
   }
 

@@ -35,6 +35,11 @@ const std::map<std::string, learning::SplitBy> kSplits = {{"auto", learning::Spl
                                                           {"flights", learning::SplitBy::kFlights},
                                                           {"blocks", learning::SplitBy::kBlocks}};
 
+const std::map<std::string, training::Layers> kLayers = {{"free", training::Layers::kFree},
+                                                         {"aol", training::Layers::kAol},
+                                                         {"orthogonal", training::Layers::kOrthogonal},
+                                                         {"sandwich", training::Layers::kSandwich}};
+
 /// Sums of squares of some targets, and of what the outputs leave of them.
 struct Squares {
   double nothing = 0, network = 0, samples = 0;
@@ -152,12 +157,15 @@ void choose_trainer(const CommonOptions& common, TrainOptions& options) {
                                                        : files::GammaStatement::Scope::kNetwork;
   trainer.gamma.mode =
       options.gamma_mode == "clip" ? files::GammaStatement::Mode::kClip : files::GammaStatement::Mode::kEqual;
+  trainer.layers = kLayers.at(options.layers);
   trainer.jobs = common.jobs;
   trainer.turns = options.symmetry == "vertical";
   options.run.weighing =
       options.weights == "errors" ? learning::Weighing::kErrors : learning::Weighing::kGroups;
   if (options.run.max_lipschitz > 0 && options.gamma_mode == "equal")
     throw UsageError("--max-lipschitz scales layers, which --gamma-mode equal forbids");
+  if (options.layers != "free" && options.gamma_mode == "equal")
+    throw UsageError("--gamma-mode equal is for --layers free");
 }
 
 /// Certifies the network that was written, and scores it on the flights of the test.

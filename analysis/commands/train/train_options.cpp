@@ -31,6 +31,14 @@ void declare_limits_of_training(CLI::App& app, TrainOptions& options) {
   app.add_option("--gamma-mode", options.gamma_mode, "clip: at most the limit; equal: always the limit")
       ->check(CLI::IsMember({"clip", "equal"}))
       ->capture_default_str();
+  app.add_option(
+         "--layers", options.layers,
+         "free: any weights, scaled back to their limits after each step; aol, orthogonal, sandwich: weights "
+         "that keep them by construction (not with --gamma-mode equal). With a tight --max-lipschitz these "
+         "leave "
+         "smaller errors than free; which one leaves least, the selecting flights say")
+      ->check(CLI::IsMember({"free", "aol", "orthogonal", "sandwich"}))
+      ->capture_default_str();
   app.add_option("--max-lipschitz", options.run.max_lipschitz,
                  "Limit of the joint Lipschitz bounds in gf (torque: mN m) per unit of input, proved; layers "
                  "that reach it are clipped below gamma")

@@ -17,7 +17,7 @@ struct TrainOptions {
   std::string output, report, quantity = "force_z", split = "auto";
   learning::NetworkSizes sizes;
   learning::RunOptions run;
-  std::string gamma_scope = "layer", gamma_mode = "clip";
+  std::string gamma_scope = "layer", gamma_mode = "clip", layers = "free";
   std::string weights = "errors", symmetry = "vertical";
   bool no_ground = false, allow_worse = false;
   int teachers = 0, folds = 0;

@@ -68,6 +68,7 @@ files::Json train_json(const TrainOptions& options, const std::vector<std::strin
   json["gamma"] = options.run.trainer.gamma.value;
   json["max_lipschitz"] =
       options.run.max_lipschitz > 0 ? files::Json(options.run.max_lipschitz) : files::Json();
+  json["layers"] = options.layers;
   json["samples"] = {{"fit", data.indices(Use::kFit).size()},
                      {"select", data.indices(Use::kSelect).size()},
                      {"test", data.indices(Use::kTest).size()}};
