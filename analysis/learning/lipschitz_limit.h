@@ -23,8 +23,8 @@ struct JointBound {
 std::vector<JointBound> joint_bounds(const training::Layout& layout, const training::Vector& theta, int jobs,
                                      bool invariants = false);
 
-/// Shares of gamma's limits, per part, with which bounded layers keep `limit` by construction over each phi and rho; one
-/// where gamma alone does. Where their training begins.
+/// Shares of gamma's limits, per part, for which the product of the layers' limits over each phi and rho, less what the
+/// kind of layers takes off it (slack_of_product()), is `limit`; one where gamma alone keeps it. Where training begins.
 std::vector<double> shares_of_product(double limit, training::Layers layers,
                                       const files::GammaStatement& gamma, const training::Layout& layout);
 

@@ -29,9 +29,9 @@ Finding lipschitz_tradeoff(const Setting& setting);
 /// and from half of them; test error over the proved joint bound, where the norms of layers are limited and where the
 /// bound itself is.
 Finding symmetry(const Setting& setting);
-/// Test error at equal proved joint bounds: spectral normalisation as in the paper, projection onto the bound, and layers
-/// that keep it by construction (nn/training/bounded_layers.h). Simulated flights, or those that were recorded of small
-/// vehicles.
+/// Test error at equal proved joint bounds: spectral normalisation as in the paper, projection onto the bound, and
+/// layers that keep it by construction (nn/training/bounded_layers.h). Simulated flights, or those that were recorded of
+/// small vehicles.
 Finding bounded_layers(const Setting& setting);
 /// Training on the published flights beside the published networks; then physics first.
 Finding real_flights(const Setting& setting);

@@ -17,10 +17,11 @@ namespace swarmcert::training {
 enum class Layers {
   /// W_k = V_k, rescaled to the limit by SpectralNormalization.
   kFree,
-  /// W_k = s V_k D, D_jj = (sum_i |V_k' V_k|_ij)^(-1/2): |W_k| <= s (almost orthogonal layers, Prach and Lampert 2022).
+  /// W_k = s V_k D, D_jj = (sum_i |V_k' V_k|_ij)^(-1/2): |W_k| <= s (almost orthogonal layers, Prach and Lampert
+  /// 2022).
   kAol,
-  /// W_k = s Q with orthonormal columns, or rows where there are fewer rows: |W_k| = s. With V_k = [X; Y], X square, and
-  /// Z = X - X' + Y'Y, the Cayley transform Q = [(I - Z) (I + Z)^-1; -2 Y (I + Z)^-1] (Trockman and Kolter 2021).
+  /// W_k = s Q with orthonormal columns, or rows where there are fewer rows: |W_k| = s. With V_k = [X; Y], X square,
+  /// and Z = X - X' + Y'Y, the Cayley transform Q = [(I - Z) (I + Z)^-1; -2 Y (I + Z)^-1] (Trockman and Kolter 2021).
   kOrthogonal,
   /// With K_k = (I + V_k V_k')^-1, contractions C_k = 2 K_k V_k and A_k = 2 K_k - I, for which C_k C_k' + A_k A_k = I:
   ///   W_1 = s C_1,  W_k = s C_k A_{k-1}.

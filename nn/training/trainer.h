@@ -21,8 +21,8 @@ struct TrainerOptions {
   int jobs = 0;  ///< threads; 0: all. The bits of the result do not depend on it.
 };
 
-/// Minimises deep_set_loss() / (sum of weights) with Adam, over the parameters of bounded layers, or over the weights with
-/// spectral normalisation after every step.
+/// Minimises deep_set_loss() / (sum of weights) with Adam, over the parameters of bounded layers, or over the weights
+/// with spectral normalisation after every step.
 ///
 /// A batch is cut into pieces of kPiece samples, whose gradients are summed in their order: the same bits for any
 /// number of threads and on every processor of one instruction set. Everything that a step depends on is in the
