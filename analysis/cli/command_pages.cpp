@@ -68,6 +68,12 @@ std::string roff(const std::string& text) {
 std::string bold(const std::string& text) { return "\\fB" + roff(text) + "\\fR"; }
 std::string italic(const std::string& text) { return "\\fI" + roff(text) + "\\fR"; }
 
+/// Lines may break behind each of them.
+std::string italic_choices(std::vector<std::string> choices) {
+  for (std::string& choice : choices) choice = roff(choice);
+  return fmt::format("\\fI{}\\fR", fmt::join(choices, "|\\:"));
+}
+
 /// Prose is filled; examples and indented lines stay as they are.
 std::string roff_paragraphs(const std::string& text, bool after_heading = false) {
   std::istringstream lines(text);
@@ -95,7 +101,7 @@ std::string roff_option(const CLI::Option& option) {
   for (const std::string& name : names_of(option)) head += (head.empty() ? "" : ", ") + bold(name);
   if (option.get_positional()) head = italic(option.get_name(true));
   if (!value.choices.empty())
-    head += " " + italic(fmt::format("{}", fmt::join(value.choices, "|")));
+    head += " " + italic_choices(value.choices);
   else if (!value.type.empty() && !option.get_positional())
     head += " " + italic(value.type);
   std::string body = option.get_description();

@@ -30,8 +30,8 @@ Finding lipschitz_tradeoff(const Setting& setting);
 /// bound itself is.
 Finding symmetry(const Setting& setting);
 /// Test error at equal proved joint bounds: spectral normalisation as in the paper, projection onto the bound, and
-/// layers that keep it by construction (nn/training/bounded_layers.h). Simulated flights, or those that were recorded of
-/// small vehicles.
+/// layers that keep it by construction (nn/training/bounded_layers.h). Simulated flights, or those that were recorded
+/// of small vehicles.
 Finding bounded_layers(const Setting& setting);
 /// Training on the published flights beside the published networks; then physics first.
 Finding real_flights(const Setting& setting);

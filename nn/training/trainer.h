@@ -26,8 +26,8 @@ struct TrainerOptions {
 ///
 /// A batch is cut into pieces of kPiece samples, whose gradients are summed in their order: the same bits for any
 /// number of threads and on every processor of one instruction set. Everything that a step depends on is in the
-/// parameters, adam, the norms' vectors, the epoch's number, and what weigh() and tighten() were told, so that a run can be taken
-/// up again at the end of any epoch.
+/// parameters, adam, the norms' vectors, the epoch's number, and what weigh() and tighten() were told, so that a run
+/// can be taken up again at the end of any epoch.
 class Trainer {
  public:
   /// @param layout, data must outlive the trainer.

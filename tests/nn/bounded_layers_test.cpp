@@ -38,9 +38,8 @@ MatrixXd weights_of(const Layout& layout, const Vector& theta, int part, int lay
 
 /// Least eigenvalue of the matrix of LipSDP-Neuron (Fazlyab et al. 2019, the last block by a Schur complement),
 ///   [L^2 I, -W_1'; -W_1, 2 I, -W_2'; ...; -W_n, I],
-/// with all multipliers one, after the layers were scaled to keep their product and the outer two, which stand beside
-/// the ends, are sqrt(2) smaller than the others: if it is not negative, L is a Lipschitz bound. Both ends are scaled to
-/// one.
+/// with all multipliers one, both ends scaled to one, and the layers scaled so that their product stays and the outer
+/// two are sqrt(2) smaller than the others, which ReLU lets pass: if it is not negative, L is a Lipschitz bound.
 double least_eigenvalue(const Layout& layout, const Vector& theta, int part, double lipschitz) {
   const std::vector<int>& sizes = layout.parts()[part].sizes;
   const std::size_t layers = sizes.size() - 1;
