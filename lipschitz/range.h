@@ -39,7 +39,9 @@ struct CertifiedRange {
 
 struct RangeOptions {
   int neighbours = 1;  ///< up to this many, at least 1
-  int nodes = 0;       ///< boxes per search; 0: 16000, fewer for large networks, but at least 600
+  /// Boxes per search, a linear form over sums up to twice as many; 0: 16000, fewer for large networks, but at least
+  /// 600.
+  int nodes = 0;
   int jobs = 0;
   std::function<void(int done, int total)> progress;  ///< searches; may be empty
 };
@@ -54,8 +56,8 @@ std::vector<std::string> value_functions(const files::Network& network);
 /// One neighbour: branch and bound over its box, the ground's term as an interval. More: a linear form a s + c above
 /// rho on the sums s, whose neurons are bounded by such forms too (sum_support.h); f <= c + sum_j max a phi(x_j), each
 /// maximum by branch and bound over one box, with parts that all forms share (part_tree.h). Several neighbours of one
-/// kind, the ground's term as an interval: also branch and bound over the box of one, for a network above rho that is
-/// convex in the sum (convex_majorant.h).
+/// kind, without a ground's term: also branch and bound over the box of one, for a network above rho that is convex in
+/// the sum (convex_majorant.h); the smaller of both.
 ///
 /// Of functions with other activations than ReLU: what certified_values() states, and no branch and bound.
 ///

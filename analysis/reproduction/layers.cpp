@@ -180,10 +180,9 @@ Finding bounded_layers(const Setting& setting) {
   add_figure(source, curves, finding);
   finding.notes.push_back(
       "All with exact symmetry and the same epochs. The rate and the epoch of each network are chosen on the "
-      "selecting flights, and "
-      "nothing on those that test. Bounds are those of the certificate, not products of norms; at equal "
-      "bounds, spectral "
-      "normalisation is interpolated between two gammas.");
+      "selecting flights, "
+      "and nothing on those that test. Bounds are those of the certificate, not products of norms; at equal "
+      "bounds, spectral normalisation is interpolated between two gammas.");
   return finding;
 }
 

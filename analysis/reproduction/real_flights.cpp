@@ -210,10 +210,7 @@ Finding real_flights(const Setting& setting) {
   finding.json["test"] = "visible_test";
   if (setting.shard.has(0)) deep_set_alone(setting, finding);
   if (setting.shard.has(1)) physics_first(setting, finding);
-  const Recorded recorded = recorded_flights(setting, true);
-  for (const residuals::Inputs* inputs : {&recorded.fit, &recorded.select, &recorded.test})
-    for (const residuals::FlightFiles& flight : inputs->found.flights)
-      for (const auto& [vehicle, path] : flight.logs) finding.inputs.push_back(path);
+  add_inputs(recorded_flights(setting, true), finding);
   return finding;
 }
 

@@ -64,6 +64,12 @@ Recorded of_small_vehicles(const Recorded& recorded) {
   return {some(recorded.fit), some(recorded.select), some(recorded.test)};
 }
 
+void add_inputs(const Recorded& recorded, Finding& finding) {
+  for (const residuals::Inputs* inputs : {&recorded.fit, &recorded.select, &recorded.test})
+    for (const residuals::FlightFiles& flight : inputs->found.flights)
+      for (const auto& [vehicle, path] : flight.logs) finding.inputs.push_back(path);
+}
+
 residuals::Inputs with_network(residuals::Inputs inputs, const std::string& network) {
   stability::EffectSpec spec;
   spec.name = "deep_set";

@@ -22,6 +22,9 @@ Recorded recorded_flights(const Setting& setting, bool published_signals);
 /// The flights in which every vehicle is small.
 Recorded of_small_vehicles(const Recorded& recorded);
 
+/// Names the recorded files in the finding.
+void add_inputs(const Recorded& recorded, Finding& finding);
+
 /// `inputs` whose models all have the deep set as one more effect.
 residuals::Inputs with_network(residuals::Inputs inputs, const std::string& network);
 

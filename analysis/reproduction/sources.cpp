@@ -96,10 +96,4 @@ files::Json json_of(const Group& group) {
           {"mean_bound_gf_per_unit", group.mean_bound()}};
 }
 
-void add_inputs(const Recorded& recorded, Finding& finding) {
-  for (const residuals::Inputs* inputs : {&recorded.fit, &recorded.select, &recorded.test})
-    for (const residuals::FlightFiles& flight : inputs->found.flights)
-      for (const auto& [vehicle, path] : flight.logs) finding.inputs.push_back(path);
-}
-
 }  // namespace swarmcert::reproduction

@@ -36,7 +36,4 @@ Group train_group(const Setting& setting, const Source& source, const Recorded& 
 
 files::Json json_of(const Group& group);
 
-/// Names the recorded files in the finding.
-void add_inputs(const Recorded& recorded, Finding& finding);
-
 }  // namespace swarmcert::reproduction

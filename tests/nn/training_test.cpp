@@ -297,6 +297,13 @@ TEST(Adam, StepIsTheFormulaInFloatToTheBit) {
   }
 }
 
+/// The weights after three epochs.
+Vector trained(const Layout& layout, const Dataset& data, const TrainerOptions& options) {
+  Trainer trainer(layout, data, all_samples(data), initial_parameters(layout, 1), options);
+  for (int epoch = 0; epoch < 3; ++epoch) trainer.run_epoch(epoch, 1e-2);
+  return trainer.theta();
+}
+
 TEST(Trainer, SameBitsForAnyNumberOfThreads) {
   const Layout layout = mixed_layout();
   const Dataset data = mixed_dataset(900, 4);
@@ -307,9 +314,7 @@ TEST(Trainer, SameBitsForAnyNumberOfThreads) {
       options.layers = layers;
       options.batch = 700;
       options.jobs = jobs;
-      Trainer trainer(layout, data, all_samples(data), initial_parameters(layout, 1), options);
-      for (int epoch = 0; epoch < 3; ++epoch) trainer.run_epoch(epoch, 1e-2);
-      results.push_back(trainer.theta());
+      results.push_back(trained(layout, data, options));
     }
     EXPECT_EQ(results[0], results[1]);
     EXPECT_EQ(results[0], results[2]);
@@ -325,9 +330,7 @@ TEST(Trainer, SameBitsForAnySizeOfTheProcessorsCaches) {
       Eigen::setCpuCacheSizes(l1_bytes, 16 * l1_bytes, 64 * l1_bytes);
       TrainerOptions options = options_with(2, Scope::kLayer, Mode::kClip);
       options.layers = layers;
-      Trainer trainer(layout, data, all_samples(data), initial_parameters(layout, 1), options);
-      for (int epoch = 0; epoch < 3; ++epoch) trainer.run_epoch(epoch, 1e-2);
-      results.push_back(trainer.theta());
+      results.push_back(trained(layout, data, options));
     }
     EXPECT_EQ(results[0], results[1]);
     EXPECT_EQ(results[0], results[2]);

@@ -45,7 +45,7 @@ struct CertifyOptions {
   bool range = false;
   bool explain = false;
   double input_step = 0;
-  int range_nodes = 0;  ///< boxes per end of a range; 0: as many as usual
+  int range_nodes = 0;  ///< RangeOptions::nodes
   std::string output;
   std::string report;
   std::optional<int> nodes;
@@ -452,10 +452,9 @@ void declare_limits(CLI::App& app, CertifyOptions& options) {
   app.add_flag("--range", options.range,
                "Range, jump at a cut-off and float32 error over the clamp's box; --domain implies it. Where "
                "network.toml lists compositions as silent, ranges and jumps hold their 0");
-  app.add_option(
-         "--range-nodes", options.range_nodes,
-         "Maximum number of boxes of branch and bound per end of a range (default: 16000, fewer for large "
-         "networks)")
+  app.add_option("--range-nodes", options.range_nodes,
+                 "Maximum number of boxes of branch and bound per search for an end of a range, twice that "
+                 "for linear forms over several neighbours (default: 16000, fewer for large networks)")
       ->check(CLI::Range(1, 10'000'000));
   app.add_option("--input-step", options.input_step,
                  "Inputs are quantised to multiples of this (float32 error)")

@@ -35,8 +35,7 @@ void declare_limits_of_training(CLI::App& app, TrainOptions& options) {
          "--layers", options.layers,
          "free: any weights, scaled back to their limits after each step; aol, orthogonal, sandwich: weights "
          "that keep them by construction (not with --gamma-mode equal). With a tight --max-lipschitz these "
-         "leave "
-         "smaller errors than free; which one leaves least, the selecting flights say")
+         "leave smaller errors than free; which one leaves least, the selecting flights say")
       ->check(CLI::IsMember({"free", "aol", "orthogonal", "sandwich"}))
       ->capture_default_str();
   app.add_option("--max-lipschitz", options.run.max_lipschitz,
