@@ -54,6 +54,8 @@ let rec add = (+)
 
 let rec sub = fun n m -> Stdlib.max 0 (n-m)
 
+
+
 (** val eqb : bool -> bool -> bool **)
 
 let eqb b1 b2 =
@@ -382,6 +384,12 @@ let rec flat_map f = function
 let rec fold_right f a0 = function
 | [] -> a0
 | b :: t -> f b (fold_right f a0 t)
+
+(** val existsb : ('a1 -> bool) -> 'a1 list -> bool **)
+
+let rec existsb f = function
+| [] -> false
+| a :: l0 -> (||) (f a) (existsb f l0)
 
 (** val forallb : ('a1 -> bool) -> 'a1 list -> bool **)
 
@@ -910,6 +918,26 @@ let moved = function
 | Alone p -> p
 | Set_of (phi0, _) -> phi0
 
+(** val count_of : int -> int list -> int **)
+
+let count_of p those =
+  length (filter ((=) p) those)
+
+(** val same_terms : int list -> int list -> bool **)
+
+let same_terms a b =
+  forallb (fun p -> (=) (count_of p a) (count_of p b)) (app a b)
+
+(** val is_silent : int list list -> int list -> bool **)
+
+let is_silent silent those =
+  existsb (same_terms those) silent
+
+(** val outputs_of : part -> int **)
+
+let outputs_of p =
+  length (fst p.outer)
+
 (** val one : dyadic **)
 
 let one =
@@ -921,19 +949,29 @@ type box = (dyadic * dyadic) list
 
 type term = { phi : int; inputs_in : box; fewest : Big.t; most : Big.t }
 
+(** val box_of : (int * box) list -> int -> box option **)
+
+let rec box_of boxes p =
+  match boxes with
+  | [] -> None
+  | p0 :: boxes' ->
+    let (q, b) = p0 in if (=) p q then Some b else box_of boxes' p
+
 type claim =
 | Norm_at_most of int * int * dyadic
 | Norm_at_least of int * int * dyadic
 | Slope_at_most of function0 * bool list * dyadic list * dyadic
-| Slope_at_least of function0 * bool list * dyadic list * dyadic
+| Slope_at_least of int list list * function0 * bool list * dyadic list
+   * dyadic
 | Slope_in_box of function0 * bool list * dyadic list * box * dyadic
 | Law of bool * kind list * int * dyadic
 | Law_in_box of bool * (kind * box) list * int * dyadic
 | Within of int * box * box
-| Sum_within of term list * int * box
+| Sum_within of int list list * term list * int * box
 | Jump_at_most of int * box * int * dyadic
 | Float_error of int * box * dyadic list * dyadic list * dyadic
 | Sum_float_error of (term * dyadic list) list * int * dyadic
+| Step_at_most of int list list * (int * box) list * int * int * dyadic
 
 (** val steepest : activation -> dyadic **)
 
@@ -1967,6 +2005,7 @@ type proof =
 | By_norm
 | By_roundings of box list * dyadic list list
 | By_rounded_sum of box * dyadic list
+| By_steps of box list
 
 (** val is_nil : 'a1 list -> bool **)
 
@@ -2233,10 +2272,10 @@ let rec fraction_in scale0 = function
   ((add0 (mul0 n (mul0 s s)) (mul0 (mul0 a a) m)), (mul0 m (mul0 s s)))
 
 (** val check_points :
-    part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic
-    list -> dyadic list -> (int * dyadic list) list -> bool **)
+    part list -> int list list -> function0 -> bool list -> dyadic list ->
+    dyadic -> dyadic list -> dyadic list -> (int * dyadic list) list -> bool **)
 
-let check_points ps f moves scale0 l x y others =
+let check_points ps silent f moves scale0 l x y others =
   let rest0 =
     fold_right (plus add0) []
       (map (fun o -> valueD (part_at ps (fst o)) (snd o)) others)
@@ -2249,9 +2288,12 @@ let check_points ps f moves scale0 l x y others =
           ((&&)
             ((&&)
               ((&&)
-                ((&&) (forallb relu_between (parts_of ps f))
-                  (forallb (fun o -> relu_between (part_at ps (fst o)))
-                    others)) (positive_scale scale0)) (is_nonnegative l))
+                ((&&)
+                  ((&&) (forallb relu_between (parts_of ps f))
+                    (forallb (fun o -> relu_between (part_at ps (fst o)))
+                      others))
+                  (negb (is_silent silent ((moved f) :: (map fst others)))))
+                (positive_scale scale0)) (is_nonnegative l))
             (agreeD moves x y))
           ((=) (length x) (inputs_of (part_at ps (moved f)))))
         (forallb (fun o ->
@@ -2469,14 +2511,62 @@ let check_within ps p b bounds0 v =
   (&&) (relu_between q)
     (check_layers q.hidden q.outer (clamp_ends q.clamp b) bounds0 v)
 
-(** val check_sum_within :
-    part list -> claim list -> term list -> int -> box -> box -> bool **)
+(** val number_of : (term -> Big.t) -> int -> term list -> Big.t **)
 
-let check_sum_within ps accepted terms rho v sums =
+let number_of number p terms =
+  fold_right (fun t n -> if (=) t.phi p then Big.add (number t) n else n)
+    Big.zero terms
+
+(** val times_in : int -> int list -> Big.t **)
+
+let times_in p those =
+  size (filter ((=) p) those)
+
+(** val may_be_silent : int list list -> term list -> bool **)
+
+let may_be_silent silent terms =
+  existsb (fun c ->
+    forallb (fun p ->
+      (&&) (Big.leq (number_of (fun t -> t.fewest) p terms) (times_in p c))
+        (Big.leq (times_in p c) (number_of (fun t -> t.most) p terms)))
+      (app c (map (fun t -> t.phi) terms))) silent
+
+(** val choices_of : int -> term -> int list list **)
+
+let choices_of n t =
+  filter (fun c ->
+    (&&) (Big.leq t.fewest (size c)) (Big.leq (size c) t.most))
+    (map (repeat t.phi) (seq 0 (Stdlib.Int.succ n)))
+
+(** val all_choices : int -> term list -> int list list **)
+
+let rec all_choices n = function
+| [] -> [] :: []
+| t :: terms' ->
+  flat_map (fun c -> map (app c) (all_choices n terms')) (choices_of n t)
+
+(** val always_silent : int list list -> term list -> bool **)
+
+let always_silent silent terms =
+  let longest = fold_right (fun c n -> Stdlib.max (length c) n) 0 silent in
+  if forallb (fun t -> Big.leq t.most (size (repeat 0 longest))) terms
+  then forallb (is_silent silent) (all_choices longest terms)
+  else false
+
+(** val check_sum_within :
+    part list -> claim list -> int list list -> term list -> int -> box ->
+    box -> bool **)
+
+let check_sum_within ps accepted silent terms rho v sums =
   match sum_ends accepted (inputs_of (part_at ps rho)) terms with
   | Some s ->
     (match find_within accepted rho sums with
-     | Some w -> (&&) (contains sums s) (contains v w)
+     | Some w ->
+       (&&)
+         ((&&) (contains sums s)
+           ((||) (contains v w) (always_silent silent terms)))
+         ((||) (negb (may_be_silent silent terms))
+           (contains v (repeat (zero, zero) (outputs_of (part_at ps rho)))))
      | None -> false)
   | None -> false
 
@@ -2495,6 +2585,100 @@ let check_jump ps accepted p b rho u =
          (at_most (mul0 (mul0 k k) (squareD (map largest_abs v))) (mul0 u u))
      | None -> false)
   | None -> false
+
+(** val find_jump : claim list -> int -> box -> int -> dyadic option **)
+
+let rec find_jump accepted p b rho =
+  match accepted with
+  | [] -> None
+  | c0 :: rest0 ->
+    (match c0 with
+     | Jump_at_most (q, c, k, u) ->
+       if (&&) ((&&) ((=) p q) ((=) rho k)) (same_box b c)
+       then Some u
+       else find_jump rest0 p b rho
+     | _ -> find_jump rest0 p b rho)
+
+(** val without : int -> int list -> int list **)
+
+let rec without p = function
+| [] -> []
+| q :: those' -> if (=) p q then those' else q :: (without p those')
+
+(** val beside : int list list -> int -> int list list **)
+
+let beside silent p =
+  filter (fun c -> negb (is_silent silent c))
+    (flat_map (fun c ->
+      (p :: c) :: (if (=) (count_of p c) 0 then [] else (without p c) :: []))
+      silent)
+
+(** val terms_of : (int * box) list -> int list -> term list option **)
+
+let rec terms_of boxes = function
+| [] -> Some []
+| p :: those' ->
+  (match box_of boxes p with
+   | Some b ->
+     (match terms_of boxes those' with
+      | Some ts ->
+        Some ({ phi = p; inputs_in = b; fewest = ((fun p -> p) Big.one);
+          most = ((fun p -> p) Big.one) } :: ts)
+      | None -> None)
+   | None -> None)
+
+(** val check_value_among :
+    part list -> claim list -> (int * box) list -> int -> dyadic -> int list
+    -> box -> bool **)
+
+let check_value_among ps accepted boxes rho u those sums =
+  match terms_of boxes those with
+  | Some ts ->
+    (match sum_ends accepted (inputs_of (part_at ps rho)) ts with
+     | Some s ->
+       (match find_within accepted rho sums with
+        | Some w ->
+          (&&) (contains sums s)
+            (at_most (squareD (map largest_abs w)) (mul0 u u))
+        | None -> false)
+     | None -> false)
+  | None -> false
+
+(** val check_all_among :
+    part list -> claim list -> (int * box) list -> int -> dyadic -> int list
+    list -> box list -> bool **)
+
+let rec check_all_among ps accepted boxes rho u compositions sums =
+  match compositions with
+  | [] -> (match sums with
+           | [] -> true
+           | _ :: _ -> false)
+  | c :: compositions' ->
+    (match sums with
+     | [] -> false
+     | s :: sums' ->
+       (&&) (check_value_among ps accepted boxes rho u c s)
+         (check_all_among ps accepted boxes rho u compositions' sums'))
+
+(** val check_step :
+    part list -> claim list -> int list list -> (int * box) list -> int ->
+    int -> dyadic -> box list -> bool **)
+
+let check_step ps accepted silent boxes p rho u sums =
+  (&&)
+    ((&&)
+      ((&&) (is_nonnegative u)
+        (forallb (fun b ->
+          (&&) (fits_part (part_at ps (fst b)))
+            ((=) (outputs_of (part_at ps (fst b)))
+              (inputs_of (part_at ps rho)))) boxes))
+      (match box_of boxes p with
+       | Some b ->
+         (match find_jump accepted p b rho with
+          | Some w -> at_most w u
+          | None -> false)
+       | None -> false))
+    (check_all_among ps accepted boxes rho u (beside silent p) sums)
 
 (** val check_error :
     part list -> int -> box -> dyadic list -> dyadic list -> dyadic -> box
@@ -2581,9 +2765,10 @@ let check_claim ps accepted c p =
      | By_all_parts (r, form, o, radius, ts) ->
        check_parts_of_all ps f moves scale0 u r form o radius ts
      | _ -> false)
-  | Slope_at_least (f, moves, scale0, l) ->
+  | Slope_at_least (silent, f, moves, scale0, l) ->
     (match p with
-     | By_points (x, y, others) -> check_points ps f moves scale0 l x y others
+     | By_points (x, y, others) ->
+       check_points ps silent f moves scale0 l x y others
      | _ -> false)
   | Slope_in_box (f, moves, scale0, b, u) ->
     (match p with
@@ -2602,9 +2787,9 @@ let check_claim ps accepted c p =
     (match p with
      | By_layers bounds0 -> check_within ps p0 b bounds0 v
      | _ -> false)
-  | Sum_within (terms, rho, v) ->
+  | Sum_within (silent, terms, rho, v) ->
     (match p with
-     | By_sum sums -> check_sum_within ps accepted terms rho v sums
+     | By_sum sums -> check_sum_within ps accepted silent terms rho v sums
      | _ -> false)
   | Jump_at_most (p0, b, rho, u) ->
     (match p with
@@ -2619,6 +2804,10 @@ let check_claim ps accepted c p =
     (match p with
      | By_rounded_sum (sums, errors) ->
        check_sum_error ps accepted terms rho u sums errors
+     | _ -> false)
+  | Step_at_most (silent, boxes, p0, rho, u) ->
+    (match p with
+     | By_steps sums -> check_step ps accepted silent boxes p0 rho u sums
      | _ -> false)
 
 (** val step :

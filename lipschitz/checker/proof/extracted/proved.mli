@@ -22,6 +22,8 @@ val add : int -> int -> int
 
 val sub : int -> int -> int
 
+
+
 val eqb : bool -> bool -> bool
 
 module Nat :
@@ -83,6 +85,8 @@ val map : ('a1 -> 'a2) -> 'a1 list -> 'a2 list
 val flat_map : ('a1 -> 'a2 list) -> 'a1 list -> 'a2 list
 
 val fold_right : ('a2 -> 'a1 -> 'a1) -> 'a1 -> 'a2 list -> 'a1
+
+val existsb : ('a1 -> bool) -> 'a1 list -> bool
 
 val forallb : ('a1 -> bool) -> 'a1 list -> bool
 
@@ -265,6 +269,14 @@ type function0 =
 
 val moved : function0 -> int
 
+val count_of : int -> int list -> int
+
+val same_terms : int list -> int list -> bool
+
+val is_silent : int list list -> int list -> bool
+
+val outputs_of : part -> int
+
 val one : dyadic
 
 type kind = (int * bool list) * Big.t
@@ -273,19 +285,23 @@ type box = (dyadic * dyadic) list
 
 type term = { phi : int; inputs_in : box; fewest : Big.t; most : Big.t }
 
+val box_of : (int * box) list -> int -> box option
+
 type claim =
 | Norm_at_most of int * int * dyadic
 | Norm_at_least of int * int * dyadic
 | Slope_at_most of function0 * bool list * dyadic list * dyadic
-| Slope_at_least of function0 * bool list * dyadic list * dyadic
+| Slope_at_least of int list list * function0 * bool list * dyadic list
+   * dyadic
 | Slope_in_box of function0 * bool list * dyadic list * box * dyadic
 | Law of bool * kind list * int * dyadic
 | Law_in_box of bool * (kind * box) list * int * dyadic
 | Within of int * box * box
-| Sum_within of term list * int * box
+| Sum_within of int list list * term list * int * box
 | Jump_at_most of int * box * int * dyadic
 | Float_error of int * box * dyadic list * dyadic list * dyadic
 | Sum_float_error of (term * dyadic list) list * int * dyadic
+| Step_at_most of int list list * (int * box) list * int * int * dyadic
 
 val steepest : activation -> dyadic
 
@@ -530,6 +546,7 @@ type proof =
 | By_norm
 | By_roundings of box list * dyadic list list
 | By_rounded_sum of box * dyadic list
+| By_steps of box list
 
 val is_nil : 'a1 list -> bool
 
@@ -598,8 +615,8 @@ val agreeD : bool list -> dyadic list -> dyadic list -> bool
 val fraction_in : dyadic list -> dyadic list -> dyadic * dyadic
 
 val check_points :
-  part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic list
-  -> dyadic list -> (int * dyadic list) list -> bool
+  part list -> int list list -> function0 -> bool list -> dyadic list ->
+  dyadic -> dyadic list -> dyadic list -> (int * dyadic list) list -> bool
 
 val same_moves : bool list -> bool list -> bool
 
@@ -632,11 +649,44 @@ val sum_ends : claim list -> int -> term list -> box option
 
 val check_within : part list -> int -> box -> box list -> box -> bool
 
+val number_of : (term -> Big.t) -> int -> term list -> Big.t
+
+val times_in : int -> int list -> Big.t
+
+val may_be_silent : int list list -> term list -> bool
+
+val choices_of : int -> term -> int list list
+
+val all_choices : int -> term list -> int list list
+
+val always_silent : int list list -> term list -> bool
+
 val check_sum_within :
-  part list -> claim list -> term list -> int -> box -> box -> bool
+  part list -> claim list -> int list list -> term list -> int -> box -> box
+  -> bool
 
 val check_jump :
   part list -> claim list -> int -> box -> int -> dyadic -> bool
+
+val find_jump : claim list -> int -> box -> int -> dyadic option
+
+val without : int -> int list -> int list
+
+val beside : int list list -> int -> int list list
+
+val terms_of : (int * box) list -> int list -> term list option
+
+val check_value_among :
+  part list -> claim list -> (int * box) list -> int -> dyadic -> int list ->
+  box -> bool
+
+val check_all_among :
+  part list -> claim list -> (int * box) list -> int -> dyadic -> int list
+  list -> box list -> bool
+
+val check_step :
+  part list -> claim list -> int list list -> (int * box) list -> int -> int
+  -> dyadic -> box list -> bool
 
 val check_error :
   part list -> int -> box -> dyadic list -> dyadic list -> dyadic -> box list

@@ -93,7 +93,8 @@ let check net json =
   let member key = find "certificate" key json in
   let net = with_stated_activations net json in
   let sorts (_, w) = List.exists Activation.sorts (Weights.between w) in
-  let text = Statement.text ~sorts:(List.exists sorts net.parts) ~of_invariants:net.invariants in
+  let text = Statement.text ~sorts:(List.exists sorts net.parts) ~of_invariants:net.invariants
+      ~silent_names:(Functions.silent_names net) in
   require (member "statement" = Text text)
     "statement is not the one that is checked";
   let rest = List.filter (fun (key, _) -> key <> "content_sha256") (members "certificate" json) in

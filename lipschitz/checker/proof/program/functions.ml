@@ -76,6 +76,7 @@ let chain_words steps =
       | _, Some "" -> "linear"
       | _, Some name -> name
       | op, None -> Option.fold ~none:"linear" ~some:Activation.words (Activation.called op)) steps)
+let silent_names (net : Network.t) = List.map (fun (own, kinds) -> String.concat "+" kinds ^ ">" ^ own) net.silent
 (* Parts that have the same words, together. *)
 let words (net : Network.t) =
   let add found (name, _) =
@@ -86,7 +87,8 @@ let words (net : Network.t) =
   match net.parts with
   | [ "network", _ ] -> chain_words (chain net "network")
   | parts -> String.concat "; " (List.map (fun (w, names) -> names ^ ": " ^ w) (List.fold_left add [] parts))
-    ^ if net.invariants then "; phi of rotation invariants" else ""
+    ^ (if net.invariants then "; phi of rotation invariants" else "")
+    ^ String.concat "" (List.map (( ^ ) "; silent: ") (silent_names net))
 
 (* The networks as the theorems speak of them. *)
 let part (net : Network.t) (name, (w : Weights.t)) =
@@ -99,3 +101,12 @@ let part (net : Network.t) (name, (w : Weights.t)) =
       else [] in
   { Proved.hidden; outer; clamp; between = Weights.between w }
 let parts (net : Network.t) = List.map (part net) net.parts
+(* The compositions in which rho, by name, is silent: of each the numbers of the networks whose terms make up the
+   sum. *)
+let silent (net : Network.t) rho =
+  let terms (own, kinds) =
+    if "rho:" ^ own <> rho then None
+    else
+      let ground = if has_ground net then [ "phi:ground" ] else [] in
+      Some (List.map (index net) (List.map (( ^ ) "phi:") kinds @ ground)) in
+  List.filter_map terms net.silent

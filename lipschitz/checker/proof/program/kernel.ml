@@ -27,6 +27,7 @@ let part out { Proved.hidden; outer; clamp; between } =
 let func out = function
   | Proved.Alone p -> Printf.bprintf out "(Alone %a)" natural p
   | Set_of (phi, rho) -> Printf.bprintf out "(Set_of %a %a)" natural phi natural rho
+let compositions = list (list natural)
 let box = list (pair number number)
 let term out { Proved.phi; inputs_in; fewest; most } =
   Printf.bprintf out "(Term %a %a (%a) (%a))" natural phi box inputs_in integer fewest integer most
@@ -35,14 +36,19 @@ let claim out = function
   | Norm_at_least (p, k, l) -> Printf.bprintf out "Norm_at_least %a %a %a" natural p natural k number l
   | Slope_at_most (f, moves, scale, u) ->
     Printf.bprintf out "Slope_at_most %a %a %a %a" func f (list flag) moves numbers scale number u
-  | Slope_at_least (f, moves, scale, l) ->
-    Printf.bprintf out "Slope_at_least %a %a %a %a" func f (list flag) moves numbers scale number l
+  | Slope_at_least (silent, f, moves, scale, l) ->
+    Printf.bprintf out "Slope_at_least %a %a %a %a %a" compositions silent func f (list flag) moves numbers scale
+      number l
   | Law (stacked, kinds, rho, u) ->
     Printf.bprintf out "Law %a %a %a %a" flag stacked (list (pair (pair natural (list flag)) integer)) kinds natural rho
       number u
   | Slope_in_box _ | Law_in_box _ -> assert false  (* not written: Claims.prove_unwritten *)
   | Within (p, b, v) -> Printf.bprintf out "Within %a %a %a" natural p box b box v
-  | Sum_within (terms, rho, v) -> Printf.bprintf out "Sum_within %a %a %a" (list term) terms natural rho box v
+  | Sum_within (silent, terms, rho, v) ->
+    Printf.bprintf out "Sum_within %a %a %a %a" compositions silent (list term) terms natural rho box v
+  | Step_at_most (silent, boxes, phi, rho, u) ->
+    Printf.bprintf out "Step_at_most %a %a %a %a %a" compositions silent (list (pair natural box)) boxes natural phi
+      natural rho number u
   | Jump_at_most (phi, b, rho, u) ->
     Printf.bprintf out "Jump_at_most %a %a %a %a" natural phi box b natural rho number u
   | Float_error (p, b, r, e, u) ->
@@ -63,6 +69,7 @@ let proof out = function
   | By_sum sums -> Printf.bprintf out "By_sum %a" box sums
   | By_norm -> Buffer.add_string out "By_norm"
   | By_roundings (bounds, errors) -> Printf.bprintf out "By_roundings %a %a" (list box) bounds (list numbers) errors
+  | By_steps sums -> Printf.bprintf out "By_steps %a" (list box) sums
   | By_rounded_sum (sums, errors) -> Printf.bprintf out "By_rounded_sum %a %a" box sums numbers errors
 
 let file parts claims =

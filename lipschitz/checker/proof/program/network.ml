@@ -8,6 +8,8 @@ type t = {
   order : string list;
   invariants : bool;  (* the phi of set functions see rotation invariants *)
   clamp : (float * float) list;  (* [] : none *)
+  silent : (string * string list) list;
+    (* kinds of a vehicle and of the neighbours among which it has no network, sorted *)
   parts : (string * Weights.t) list;  (* by name, sorted *)
 }
 
@@ -165,13 +167,30 @@ let check_sizes path ~order ~invariants ~clamp ~components phis rhos =
       if i <> hidden then refuse name "inputs";
       if o <> outputs || (components <> None && components <> Some o) then refuse name "outputs") rhos
 
+let read_silent path phis rhos json =
+  let names = texts path "silent" json in
+  if names = [] then bad_input "%s: silent: names no composition" path;
+  let composition name =
+    let refuse what = bad_input "%s: silent: %s: %s" path (shown name) what in
+    match String.index_opt name '>' with
+    | None -> refuse "is no composition"
+    | Some arrow ->
+      let own = String.sub name (arrow + 1) (String.length name - arrow - 1) in
+      if not (List.mem_assoc ("rho:" ^ own) rhos) then refuse ("there is no rho." ^ own);
+      let kinds = if arrow = 0 then [] else String.split_on_char '+' (String.sub name 0 arrow) in
+      List.iter (fun kind -> if kind = "ground" || not (List.mem_assoc ("phi:" ^ kind) phis) then
+          refuse ("there is no phi." ^ kind ^ " of a neighbour")) kinds;
+      own, List.sort String.compare kinds in
+  let compositions = List.map composition names in
+  let sorted = List.sort_uniq compare compositions in
+  if List.length sorted < List.length names then bad_input "%s: silent: names a composition twice" path;
+  sorted
+
 let read_toml path bytes ~key =
   let members = match Toml.parse path bytes with Json.Object m -> m | _ -> assert false in
   if List.assoc_opt "schema" members <> Some (Json.Text "swarmcert/network/1") then
     bad_input "%s: schema must be \"swarmcert/network/1\"" path;
-  if List.mem_assoc "silent" members then
-    bad_input "%s: silent: compositions without a network are beyond the theorems; swarmcert check takes them" path;
-  allow_only path "" [ "schema"; "output"; "gamma"; "input"; "phi"; "rho" ] members;
+  allow_only path "" [ "schema"; "output"; "gamma"; "input"; "silent"; "phi"; "rho" ] members;
   let optional name absent read = match List.assoc_opt name members with
     | None -> absent | json -> read path (table path name json) in
   let unit, quantity = optional "output" ("", None) read_output in
@@ -184,9 +203,10 @@ let read_toml path bytes ~key =
   let rhos = kinds "rho" in
   check_sizes path ~order ~invariants ~clamp ~components phis rhos;
   let sorted = List.sort (fun (a, _) (b, _) -> String.compare a b) (phis @ rhos) in
-  { sha256 = Sha256.to_hex (Sha256.string bytes); unit; order; invariants; clamp; parts = sorted }
+  let silent = Option.fold ~none:[] ~some:(read_silent path phis rhos) (List.assoc_opt "silent" members) in
+  { sha256 = Sha256.to_hex (Sha256.string bytes); unit; order; invariants; clamp; silent; parts = sorted }
 
-let plain parts = { sha256 = ""; unit = ""; order = []; invariants = false; clamp = []; parts }
+let plain parts = { sha256 = ""; unit = ""; order = []; invariants = false; clamp = []; silent = []; parts }
 let read_stated { net; phi; rho; key; orders; _ } =
   let order part = Option.value ~default:[] (List.assoc_opt part orders) in
   if phi <> "" then begin

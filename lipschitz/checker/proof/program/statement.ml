@@ -38,5 +38,13 @@ let invariants =
    |p_xy|, 3/2 p_z, |v_xy|, 3/2 v_z, |p_xy + v_xy / 2|, and the ground's phi -z, |v_xy|, -v_z. So the input clamp \
    is one of invariants, and phi alone is a function of them."
 
-let text ~sorts ~of_invariants =
-  common ^ (if sorts then sorting else "") ^ if of_invariants then invariants else ""
+(* What is added for networks that are silent in some compositions, before their names. *)
+let silent =
+  " Among these neighbours > vehicle, as many of each kind and no others, the set functions of that kind \
+   of vehicle are 0. Bounds and laws hold while the neighbours stay the same, lower bounds at witnesses \
+   among other neighbours than these. Ranges hold this 0, and jumps bound the steps as well by which one \
+   neighbour that comes or goes makes or ends such a composition, while all are in the box or clamp: "
+
+let text ~sorts ~of_invariants ~silent_names =
+  common ^ (if sorts then sorting else "") ^ (if of_invariants then invariants else "")
+  ^ if silent_names = [] then "" else silent ^ String.concat ", " silent_names ^ "."

@@ -40,12 +40,14 @@ let prove_network (state : Claims.t) where p ~box ~errors ~with_error ~norm (hid
 let sum_of numbers = List.fold_left Claims.plus Exact.zero numbers
 
 (* What reaches the first layer: a box, and errors. The theorems apply the clamp themselves. *)
-let input (state : Claims.t) where name entry =
+let input_box (state : Claims.t) where name entry =
   let box = match find where "domain" entry with
     | Text "box" -> Witness.box where state.json name
     | Text "clamp" when state.net.clamp <> [] && Network.is_clamped name -> state.net.clamp
     | _ -> rejected "%s: the domain is neither the box nor a clamp of this input" where in
-  let box = List.map (fun (low, high) -> Exact.of_float low, Exact.of_float high) box in
+  List.map (fun (low, high) -> Exact.of_float low, Exact.of_float high) box
+let input (state : Claims.t) where name entry =
+  let box = input_box state where name entry in
   match find where "input_error" entry with
   | Null -> box, []
   | all ->
@@ -63,14 +65,55 @@ let optional where entry key ~given =
 let keys = [ "function"; "neighbours"; "domain"; "input_error"; "networks"; "sum"; "lower"; "upper"; "jump"; "jump_hex";
              "float32_error"; "float32_error_hex" ]
 
+(* Of the largest absolute values. *)
+let sum_of_squares values =
+  sum_of (List.map (fun i -> let a = Proved.largest_abs i in Claims.times a a) values)
+
 let check_jump (state : Claims.t) where phi ~box ~values rho jump =
   let reason = where ^ ": claims less than the jump" in
   let slope = match Hashtbl.find_opt state.uppers (rho, "all", []) with
     | Some (slope, Claims.Proved_here) -> slope
     | _ -> rejected "%s: rests on a bound of %s that is not there" where (shown rho) in
-  let square = sum_of (List.map (fun i -> let a = Proved.largest_abs i in Claims.times a a) values) in
-  require (Claims.at_most (Claims.times (Claims.times slope slope) square) (Claims.times jump jump)) "%s" reason;
+  require (Claims.at_most (Claims.times (Claims.times slope slope) (sum_of_squares values)) (Claims.times jump jump))
+    "%s" reason;
   Claims.prove state (Jump_at_most (phi, box, Functions.index state.net rho, jump)) Proved.By_norm reason
+
+(* Exact intervals of the layers of part p over a box, proved; those of the last one. *)
+let prove_exact (state : Claims.t) where p box =
+  let part = Proved.part_at state.parts p in
+  let ends (rows, biases) box =
+    List.map2 (fun row bias -> let low, high = Proved.row_ends row box in Claims.plus low bias, Claims.plus high bias)
+      rows biases in
+  let hidden, input = List.fold_left (fun (found, box) layer ->
+      let bounds = ends layer box in bounds :: found, List.map Proved.relu_ends bounds)
+      ([], Proved.clamp_ends part.clamp box) part.hidden in
+  let last = ends part.outer input in
+  Claims.prove state (Within (p, box, last)) (By_layers (List.rev hidden)) (leaves where);
+  last
+
+(* One neighbour that makes or ends a composition in which the function is silent: the values beside those. *)
+let check_step (state : Claims.t) where entry ~silent phi rho jump =
+  let names = Array.of_list (List.map fst state.net.parts) in
+  let compositions = Proved.beside silent phi in
+  let here = List.sort_uniq compare (phi :: List.concat compositions) in
+  if not (List.for_all (fun p -> Functions.is_relu state.net names.(p)) here) then
+    Claims.not_checked state
+      (where ^ ": the step to compositions without a network: of activations that are not ReLU")
+  else begin
+    let boxes = List.map (fun p -> p, input_box state where names.(p) entry) here in
+    List.iter (fun (p, box) -> ignore (prove_exact state where p box)) boxes;
+    let size = Proved.inputs_of (Proved.part_at state.parts rho) in
+    let sum_of composition =
+      match Option.bind (Proved.terms_of boxes composition) (Proved.sum_ends state.accepted size) with
+      | Some sum -> sum | None -> rejected "%s: no range of a term" where in
+    let sums = List.map sum_of compositions in
+    let reason = where ^ ": claims less than the step to neighbours among which the network is silent" in
+    List.iter (fun sum ->
+        let values = prove_exact state where rho sum in
+        let square = sum_of_squares values in
+        require (Claims.at_most square (Claims.times jump jump)) "%s" reason) sums;
+    Claims.prove state (Step_at_most (silent, boxes, phi, rho, jump)) (Proved.By_steps sums) reason
+  end
 
 let check_relu (state : Claims.t) entry f names =
   let where = "values of " ^ shown f in
@@ -131,10 +174,16 @@ let check_relu (state : Claims.t) entry f names =
      let sums, sum_errors = stated (where ^ ": sum") ~size ~with_error sum in
      let last = bounds rho in
      prove_network state (where ^ ": " ^ rho) r ~box:sums ~errors:sum_errors ~with_error ~norm last;
-     Claims.prove state (Sum_within (List.map (fun (t, _, _) -> t) terms, r, range)) (Proved.By_sum sums)
+     let silent = Functions.silent state.net rho and summed = List.map (fun (t, _, _) -> t) terms in
+     let zeros = List.map (fun _ -> Exact.zero, Exact.zero) range in
+     require (not (Proved.may_be_silent silent summed) || Proved.contains range zeros)
+       "%s: the range lacks the 0 of neighbours among which the network is silent" where;
+     Claims.prove state (Sum_within (silent, summed, r, range)) (Proved.By_sum sums)
        (where ^ ": the values leave the range");
      let first, _, values = List.hd terms in
-     check_jump state where first.phi ~box:first.inputs_in ~values rho (Option.get jump);
+     let jump = Option.get jump in
+     check_jump state where first.phi ~box:first.inputs_in ~values rho jump;
+     if silent <> [] then check_step state where entry ~silent first.phi r jump;
      if with_error then
        Claims.prove state (Sum_float_error (List.map (fun (t, errors, _) -> t, errors) terms, r, norm))
          (Proved.By_rounded_sum (sums, sum_errors)) (too_little where));

@@ -21,7 +21,8 @@ let point net certificate where ~in_box part json =
       "%s: a point is outside of the box" where;
   values
 
-(* And whether only ReLU networks enter: of those alone the theorems have values. *)
+(* And in which compositions the function is silent, and whether only ReLU networks enter: of those alone the theorems
+   have values. *)
 let read net certificate where names ~in_box ~neighbours ~moves json =
   require_keys where [ "x"; "y"; "others" ] json;
   let moved = List.hd names in
@@ -41,10 +42,14 @@ let read net certificate where names ~in_box ~neighbours ~moves json =
     "%s: has more neighbours than listed" where;
   require (List.length names = 1 || count "phi:ground" = (if Functions.has_ground net then 1 else 0))
     "%s: slope: the ground network enters the sum exactly once" where;
+  let silent = if List.length names = 1 then [] else Functions.silent net (List.nth names 1) in
+  require (not (Proved.is_silent silent (List.map (Functions.index net) here)))
+    "%s: slope: the function is 0 among these neighbours" where;
   let differs = List.map2 (fun a b -> a <> b) x y in
   require (List.for_all2 (fun moves differs -> moves || not differs) moves differs)
     "%s: slope: x and y differ in a coordinate that is not in the block" where;
   require (List.mem true differs) "%s: slope: x == y" where;
   let exact = List.map Exact.of_float in
   Proved.By_points (exact x, exact y, List.map (fun (part, x) -> Functions.index net part, exact x) others),
+  silent,
   List.for_all (Functions.is_relu net) (here @ List.tl names)

@@ -1,6 +1,6 @@
 (** The theorems, and what they rest on; compared with assumptions.txt. *)
 From Coq Require Import List Reals.
-From Swarmcert Require Import Activations Form Network Sorting Checker Meaning Steepness Sets Claims Sound.
+From Swarmcert Require Import Activations Form Network Sorting Checker Meaning Steepness Sets Claims Silent Sound.
 Open Scope R_scope.
 Set Printing Width 120.
 Check rising_slopes.
@@ -19,3 +19,9 @@ Check accepted_hold.
 Print Assumptions accepted_hold.
 Check check_all_holds.
 Print Assumptions check_all_holds.
+Check silent_slope.
+Print Assumptions silent_slope.
+Check silent_slope_in_box.
+Print Assumptions silent_slope_in_box.
+Check silent_law.
+Print Assumptions silent_law.

@@ -15,7 +15,8 @@ Inductive proof :=
 | By_sum (sums : box)
 | By_norm
 | By_roundings (bounds : list box) (errors : list (list dyadic))
-| By_rounded_sum (sums : box) (errors : list dyadic).
+| By_rounded_sum (sums : box) (errors : list dyadic)
+| By_steps (sums : list box).
 
 Definition is_nil {A} (l : list A) : bool := match l with [] => true | _ => false end.
 Definition matrix_at (ps : list part) (p layer : nat) : matrixD := fst (nth layer (layers (part_at ps p)) ([], [])).
@@ -139,10 +140,11 @@ Fixpoint fraction_in (scale : list dyadic) (d : list dyadic) : dyadic * dyadic :
       let s := hd one scale in
       let (n, m) := fraction_in (tl scale) d' in (add (mul n (mul s s)) (mul (mul a a) m), mul m (mul s s))
   end.
-Definition check_points ps f moves scale l x y others : bool :=
+Definition check_points ps silent f moves scale l x y others : bool :=
   let rest := fold_right (plus add) [] (map (fun o => valueD (part_at ps (fst o)) (snd o)) others) in
   let (n, m) := fraction_in scale (minusD x y) in
   forallb relu_between (parts_of ps f) && forallb (fun o => relu_between (part_at ps (fst o))) others
+  && negb (is_silent silent (moved f :: map fst others))
   && positive_scale scale && is_nonnegative l && agreeD moves x y && (length x =? inputs_of (part_at ps (moved f)))%nat
   && forallb (fun o => length (snd o) =? inputs_of (part_at ps (fst o)))%nat others && is_positive n
   && at_most (mul (mul l l) n) (mul (squareD (minusD (value_ofD ps f rest x) (value_ofD ps f rest y))) m).
@@ -247,9 +249,31 @@ Fixpoint sum_ends (accepted : list claim) (n : nat) (terms : list term) : option
   end.
 Definition check_within ps p b bounds v : bool :=
   let q := part_at ps p in relu_between q && check_layers (hidden q) (outer q) (clamp_ends (clamp q) b) bounds v.
-Definition check_sum_within ps accepted terms rho v sums : bool :=
+(** How many terms of network p there are, by the fewest or the most of each entry. *)
+Definition number_of (number : term -> Z) (p : nat) (terms : list term) : Z :=
+  fold_right (fun t n => if (phi t =? p)%nat then (number t + n)%Z else n) 0%Z terms.
+Definition times_in (p : nat) (those : list nat) : Z := size (filter (Nat.eqb p) those).
+Definition may_be_silent (silent : list (list nat)) (terms : list term) : bool :=
+  existsb (fun c => forallb (fun p =>
+    (number_of fewest p terms <=? times_in p c)%Z && (times_in p c <=? number_of Meaning.most p terms)%Z)
+    (c ++ map phi terms)) silent.
+(** Every choice of numbers of terms, each up to n, and whether all are silent. *)
+Definition choices_of (n : nat) (t : term) : list (list nat) :=
+  filter (fun c => (fewest t <=? size c)%Z && (size c <=? Meaning.most t)%Z) (map (repeat (phi t)) (seq 0 (S n))).
+Fixpoint all_choices (n : nat) (terms : list term) : list (list nat) :=
+  match terms with
+  | [] => [[]]
+  | t :: terms' => flat_map (fun c => map (app c) (all_choices n terms')) (choices_of n t)
+  end.
+Definition always_silent (silent : list (list nat)) (terms : list term) : bool :=
+  let longest := fold_right (fun c n => max (length c) n) O silent in
+  if forallb (fun t => (Meaning.most t <=? size (repeat O longest))%Z) terms
+  then forallb (is_silent silent) (all_choices longest terms) else false.
+Definition check_sum_within ps accepted silent terms rho v sums : bool :=
   match sum_ends accepted (inputs_of (part_at ps rho)) terms, find_within accepted rho sums with
-  | Some s, Some w => contains sums s && contains v w
+  | Some s, Some w =>
+      contains sums s && (contains v w || always_silent silent terms)
+      && (negb (may_be_silent silent terms) || contains v (repeat (zero, zero) (outputs_of (part_at ps rho))))
   | _, _ => false
   end.
 Definition check_jump ps accepted p b rho u : bool :=
@@ -259,6 +283,54 @@ Definition check_jump ps accepted p b rho u : bool :=
       && at_most (mul (mul k k) (squareD (map largest_abs v))) (mul u u)
   | _, _ => false
   end.
+(** One term more or less, where one of the two sums is silent: the value at the other. *)
+Fixpoint find_jump (accepted : list claim) (p : nat) (b : box) (rho : nat) : option dyadic :=
+  match accepted with
+  | [] => None
+  | Jump_at_most q c k u :: rest =>
+      if ((p =? q) && (rho =? k))%nat && same_box b c then Some u else find_jump rest p b rho
+  | _ :: rest => find_jump rest p b rho
+  end.
+Fixpoint without (p : nat) (those : list nat) : list nat :=
+  match those with [] => [] | q :: those' => if (p =? q)%nat then those' else q :: without p those' end.
+Definition beside (silent : list (list nat)) (p : nat) : list (list nat) :=
+  filter (fun c => negb (is_silent silent c))
+    (flat_map (fun c => (p :: c) :: if (count_of p c =? 0)%nat then [] else [without p c]) silent).
+(** One of each. *)
+Fixpoint terms_of (boxes : list (nat * box)) (those : list nat) : option (list term) :=
+  match those with
+  | [] => Some []
+  | p :: those' =>
+      match box_of boxes p, terms_of boxes those' with
+      | Some b, Some ts => Some (Term p b 1%Z 1%Z :: ts)
+      | _, _ => None
+      end
+  end.
+Definition check_value_among ps accepted boxes rho u (those : list nat) (sums : box) : bool :=
+  match terms_of boxes those with
+  | Some ts =>
+      match sum_ends accepted (inputs_of (part_at ps rho)) ts, find_within accepted rho sums with
+      | Some s, Some w => contains sums s && at_most (squareD (map largest_abs w)) (mul u u)
+      | _, _ => false
+      end
+  | None => false
+  end.
+Fixpoint check_all_among ps accepted boxes rho u (compositions : list (list nat)) (sums : list box) : bool :=
+  match compositions, sums with
+  | [], [] => true
+  | c :: compositions', s :: sums' =>
+      check_value_among ps accepted boxes rho u c s && check_all_among ps accepted boxes rho u compositions' sums'
+  | _, _ => false
+  end.
+Definition check_step ps accepted silent boxes p rho u sums : bool :=
+  is_nonnegative u
+  && forallb (fun b => fits_part (part_at ps (fst b)) && (outputs_of (part_at ps (fst b)) =? inputs_of (part_at ps
+    rho))%nat) boxes
+  && match box_of boxes p with
+     | Some b => match find_jump accepted p b rho with Some w => at_most w u | None => false end
+     | None => false
+     end
+  && check_all_among ps accepted boxes rho u (beside silent p) sums.
 Definition check_error ps p b r e u bounds errors : bool :=
   let q := part_at ps p in
   relu_between q && check_roundings (hidden q) (outer q) (clamp_ends (clamp q) b) r bounds errors e
@@ -296,14 +368,15 @@ Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p :
   | Slope_at_most f moves scale u, By_all_parts r form o radius ts => check_parts_of_all ps f moves scale u r form o
     radius ts
   | Slope_in_box f moves scale b u, By_parts r form o t => check_parts_of_box ps f moves scale b u r form o t
-  | Slope_at_least f moves scale l, By_points x y others => check_points ps f moves scale l x y others
+  | Slope_at_least silent f moves scale l, By_points x y others => check_points ps silent f moves scale l x y others
   | Law stacked kinds rho u, By_triangle => check_law ps accepted stacked kinds rho u
   | Law_in_box stacked kinds rho u, By_triangle => check_law_in_box ps accepted stacked kinds rho u
   | Within p b v, By_layers bounds => check_within ps p b bounds v
-  | Sum_within terms rho v, By_sum sums => check_sum_within ps accepted terms rho v sums
+  | Sum_within silent terms rho v, By_sum sums => check_sum_within ps accepted silent terms rho v sums
   | Jump_at_most p b rho u, By_norm => check_jump ps accepted p b rho u
   | Float_error p b r e u, By_roundings bounds errors => check_error ps p b r e u bounds errors
   | Sum_float_error terms rho u, By_rounded_sum sums errors => check_sum_error ps accepted terms rho u sums errors
+  | Step_at_most silent boxes p rho u, By_steps sums => check_step ps accepted silent boxes p rho u sums
   | _, _ => false
   end.
 (** The claims accepted so far with one more, if it is proved. *)

@@ -45,6 +45,16 @@ Definition value_of (ps : list part) (f : function) (rest x : list R) : list R :
   | Set_of phi rho => value (part_at ps rho) (plusR (value (part_at ps phi) x) rest)
   end.
 
+(** A set function may be silent: 0 where just these networks' terms, in any order and as often as listed, make up the
+    sum. `those`: the networks of the terms that are there; `sum`: the sum of their terms. *)
+Definition zeros (n : nat) : list R := repeat 0 n.
+Definition count_of (p : nat) (those : list nat) : nat := length (filter (Nat.eqb p) those).
+Definition same_terms (a b : list nat) : bool := forallb (fun p => count_of p a =? count_of p b)%nat (a ++ b).
+Definition is_silent (silent : list (list nat)) (those : list nat) : bool := existsb (same_terms those) silent.
+Definition outputs_of (p : part) : nat := length (fst (outer p)).
+Definition unless_silent (ps : list part) (silent : list (list nat)) (rho : nat) (those : list nat) (sum : list R) :=
+  if is_silent silent those then zeros (outputs_of (part_at ps rho)) else value (part_at ps rho) sum.
+
 (** Of equal length, and different only where `moves` says true. *)
 Fixpoint agree (moves : list bool) (x y : list R) : Prop :=
   match moves, x, y with
@@ -94,10 +104,21 @@ Fixpoint close (r : list dyadic) (x y : list R) : Prop :=
 Record term := Term { phi : nat; inputs_in : box; fewest : Z; most : Z }.
 Definition may_stand (t : term) (xs : list (list R)) : Prop :=
   (fewest t <= Z.of_nat (length xs) <= most t)%Z /\ Forall (within (inputs_in t)) xs.
-Definition zeros (n : nat) : list R := repeat 0 n.
 Definition sum_of_terms (ps : list part) (rho : nat) (groups : list (term * list (list R))) : list R :=
   vector_sum (zeros (inputs_of (part_at ps rho)) ::
     flat_map (fun g => map (value (part_at ps (phi (fst g)))) (snd g)) groups).
+Definition networks_in (groups : list (term * list (list R))) : list nat :=
+  flat_map (fun g => map (fun _ => phi (fst g)) (snd g)) groups.
+(** Single terms: of which network, and its input. *)
+Definition single := (nat * list R)%type.
+Definition sum_of_singles (ps : list part) (rho : nat) (terms : list single) : list R :=
+  vector_sum (zeros (inputs_of (part_at ps rho)) :: map (fun t => value (part_at ps (fst t)) (snd t)) terms).
+Definition set_value (ps : list part) (silent : list (list nat)) (rho : nat) (terms : list single) : list R :=
+  unless_silent ps silent rho (map fst terms) (sum_of_singles ps rho terms).
+Fixpoint box_of (boxes : list (nat * box)) (p : nat) : option box :=
+  match boxes with [] => None | (q, b) :: boxes' => if (p =? q)%nat then Some b else box_of boxes' p end.
+Definition in_its_box (boxes : list (nat * box)) (t : single) : Prop :=
+  match box_of boxes (fst t) with Some b => within b (snd t) | None => False end.
 (** v is what the float32 evaluation of part p returns for inputs x,
   if what reaches its first layer differs from the clamped x
     by at most r, number by number. *)
@@ -112,15 +133,16 @@ Inductive claim :=
 | Norm_at_most (p layer : nat) (u : dyadic)
 | Norm_at_least (p layer : nat) (l : dyadic)
 | Slope_at_most (f : function) (moves : list bool) (scale : list dyadic) (u : dyadic)
-| Slope_at_least (f : function) (moves : list bool) (scale : list dyadic) (l : dyadic)
+| Slope_at_least (silent : list (list nat)) (f : function) (moves : list bool) (scale : list dyadic) (l : dyadic)
 | Slope_in_box (f : function) (moves : list bool) (scale : list dyadic) (b : box) (u : dyadic)
 | Law (stacked : bool) (kinds : list kind) (rho : nat) (u : dyadic)
 | Law_in_box (stacked : bool) (kinds : list (kind * box)) (rho : nat) (u : dyadic)
 | Within (p : nat) (b v : box)
-| Sum_within (terms : list term) (rho : nat) (v : box)
+| Sum_within (silent : list (list nat)) (terms : list term) (rho : nat) (v : box)
 | Jump_at_most (phi : nat) (b : box) (rho : nat) (u : dyadic)
 | Float_error (p : nat) (b : box) (r e : list dyadic) (u : dyadic)
-| Sum_float_error (terms : list (term * list dyadic)) (rho : nat) (u : dyadic).
+| Sum_float_error (terms : list (term * list dyadic)) (rho : nat) (u : dyadic)
+| Step_at_most (silent : list (list nat)) (boxes : list (nat * box)) (phi rho : nat) (u : dyadic).
 
 Definition weights_at (ps : list part) (p layer : nat) : list (list R) :=
   map (map real) (fst (nth layer (layers (part_at ps p)) ([], []))).
@@ -136,9 +158,10 @@ Definition holds (ps : list part) (c : claim) : Prop :=
   | Slope_in_box f moves scale b u =>
       forall rest x y, agree moves x y -> length x = inputs_of (part_at ps (moved f)) -> within b x -> within b y ->
         norm (minus (value_of ps f rest x) (value_of ps f rest y)) <= real u * distance scale x y
-  | Slope_at_least f moves scale l =>
+  | Slope_at_least silent f moves scale l =>
       exists others x y, agree moves x y /\ length x = inputs_of (part_at ps (moved f)) /\ 0 < distance scale x y /\
         Forall (fun o => length (snd o) = inputs_of (part_at ps (fst o))) others /\
+        is_silent silent (moved f :: map fst others) = false /\
         let rest := vector_sum (map (fun o => value (part_at ps (fst o)) (snd o)) others) in
         real l * distance scale x y <= norm (minus (value_of ps f rest x) (value_of ps f rest y))
   | Law stacked kinds rho u =>
@@ -156,9 +179,9 @@ Definition holds (ps : list part) (c : claim) : Prop :=
       bounded_change stacked u (minus (value (part_at ps rho) (sum_at ps fst groups))
         (value (part_at ps rho) (sum_at ps snd groups))) (concat movers)
   | Within p b v => forall x, within b x -> within v (value (part_at ps p) x)
-  | Sum_within terms rho v =>
-      forall inputs, Forall2 may_stand terms inputs ->
-        within v (value (part_at ps rho) (sum_of_terms ps rho (combine terms inputs)))
+  | Sum_within silent terms rho v =>
+      forall inputs, Forall2 may_stand terms inputs -> let groups := combine terms inputs in
+        within v (unless_silent ps silent rho (networks_in groups) (sum_of_terms ps rho groups))
   | Jump_at_most phi b rho u =>
       forall x rest, within b x -> length rest = inputs_of (part_at ps rho) ->
         norm (minus (value (part_at ps rho) (plusR (value (part_at ps phi) x) rest)) (value (part_at ps rho) rest))
@@ -176,4 +199,7 @@ Definition holds (ps : list part) (c : claim) : Prop :=
         float_vector_sum (inputs_of (part_at ps rho)) (concat computed) s ->
         float_network (map real_layer (hidden (part_at ps rho))) (real_layer (outer (part_at ps rho))) s v ->
         norm (minus v (value (part_at ps rho) (sum_of_terms ps rho (combine (map fst terms) inputs)))) <= real u
+  | Step_at_most silent boxes phi rho u =>
+      forall x others, Forall (in_its_box boxes) ((phi, x) :: others) ->
+        norm (minus (set_value ps silent rho ((phi, x) :: others)) (set_value ps silent rho others)) <= real u
   end.

@@ -162,14 +162,6 @@ Proof.
     apply add_ends_within with (k := INR (length xs)); auto; [|congruence]. rewrite INR_IZR_INZ. split;
       apply IZR_le; lia.
 Qed.
-Lemma sum_within_sound ps accepted terms rho v sums : Forall (holds ps) accepted ->
-  check_sum_within ps accepted terms rho v sums = true -> holds ps (Sum_within terms rho v).
-Proof.
-  intros HA. unfold check_sum_within. destruct (sum_ends _ _ _) as [s|] eqn:Es; [|discriminate].
-  destruct (find_within _ _ _) as [w|] eqn:Ew; [|discriminate]. intros H inputs M. both H.
-  eapply contains_within; eauto. apply (find_within_sound _ _ _ _ _ HA Ew). eapply contains_within; eauto.
-  eapply sum_ends_sound; eauto.
-Qed.
 
 (** Jumps *)
 Lemma real_larger x y : real (larger x y) = Rmax (real x) (real y).
@@ -195,7 +187,7 @@ Lemma find_alone_sound ps accepted p n u : Forall (holds ps) accepted -> find_al
   exists moves, forallb (fun m => m) moves = true /\ length moves = n /\ holds ps (Slope_at_most (Alone p) moves []
     u).
 Proof.
-  intros H. induction H as [|c rest Hc H IH]; [discriminate|]. destruct c as [| |[q|] m [|] w| | | | | | | | |];
+  intros H. induction H as [|c rest Hc H IH]; [discriminate|]. destruct c as [| |[q|] m [|] w| | | | | | | | | |];
     simpl find_alone; auto.
   destruct (Nat.eqb_spec p q); simpl; auto. destruct (forallb _ m) eqn:E; auto.
   destruct (Nat.eqb_spec (length m) n); simpl; auto. intros G. inversion G. subst. exists m. auto.

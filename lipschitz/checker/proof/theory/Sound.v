@@ -1,7 +1,7 @@
 (** An accepted claim holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Claims Slopes Witness Laws Ranges Roundings
+    Values Claims Slopes Witness Laws Ranges Silent Roundings
     Relaxation Increments Cover Everywhere.
 Import ListNotations.
 Open Scope R_scope.
@@ -23,6 +23,7 @@ Proof.
   - now apply jump_sound in H.
   - now apply error_sound in H.
   - now apply sum_error_sound in H.
+  - now apply step_at_most_sound in H.
 Qed.
 (** What the program does claim by claim. *)
 Theorem accepted_hold ps accepted c p accepted' : Forall (holds ps) accepted -> step ps accepted c p = Some accepted' ->

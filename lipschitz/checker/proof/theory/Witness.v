@@ -54,13 +54,13 @@ Proof.
   unfold minusD, minus. rewrite (f_plus add Rplus real real_add), (f_scale mul Rmult real real_mul).
   replace (real (-1, 0)%Z) with (-1) by (unfold real; simpl; ring). reflexivity.
 Qed.
-Lemma points_sound ps f moves scale l x y others :
-  check_points ps f moves scale l x y others = true -> holds ps (Slope_at_least f moves scale l).
+Lemma points_sound ps silent f moves scale l x y others :
+  check_points ps silent f moves scale l x y others = true -> holds ps (Slope_at_least silent f moves scale l).
 Proof.
   unfold check_points. set (rest := fold_right _ _ _). intros H.
-  destruct (fraction_in scale (minusD x y)) as [n m] eqn:E. do 8 both H.
+  destruct (fraction_in scale (minusD x y)) as [n m] eqn:E. do 9 both H.
   rename H0 into Hr, H1 into Hn, H2 into Ho, H3 into Hx, H4 into Ha, H5 into Hl, H6 into Hs.
-  rename H7 into Hro.
+  rename H7 into Hw, H8 into Hro.
   destruct (fraction_real scale (minusD x y) Hs) as [Pm En]. rewrite E, real_minus in *. simpl in *.
   apply real_positive in Hn. apply real_nonnegative in Hl. apply at_most_real in Hr.
   assert (0 < square_in scale (minus (reals x) (reals y))) as Ps by
@@ -71,6 +71,7 @@ Proof.
   - apply sqrt_lt_R0, Ps.
   - rewrite forallb_forall in Ho. apply Forall_map, Forall_forall. intros o G. simpl. rewrite map_length.
       now apply Nat.eqb_eq, Ho.
+  - rewrite map_map. simpl. now apply negb_true_iff.
   - rewrite <- real_rest by auto. fold rest. rewrite <- !real_value_of by auto.
     rewrite !real_mul, real_square, real_minus, En in Hr. unfold distance, norm.
     rewrite <- (sqrt_square (real l)) at 1 by auto. rewrite <- sqrt_mult_alt by nra. apply sqrt_le_1_alt.

@@ -1,0 +1,215 @@
+#!/usr/bin/env python3
+"""Networks that are silent in some compositions, decided alike by three checkers, each for the reason at hand: the
+statement names the compositions, lower bounds have no witness among them, ranges hold the 0 (and nothing else, where
+there is no other composition), and jumps cover the steps to and from them.
+
+    silence_test.py SWARMCERT SOURCE_DIR 0 CHECKER [COQC THEORY]
+    with COQC, the kernel accepts such a certificate as well
+"""
+import json
+import math
+import random
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from struct import pack
+
+SOURCE, CHECKER = Path(sys.argv[2]), Path(sys.argv[4]).resolve()
+sys.path.insert(0, str(SOURCE / "tests/lipschitz"))
+import check_certificate as second  # noqa: E402
+import check_certificate_test as common  # noqa: E402
+
+
+def run(*command):
+    return subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=60)
+
+
+def decided(certificate, net):
+    """The reasons of all three, "" where one accepts."""
+    certificate["content_sha256"] = second.content_sha256(certificate)
+    path = net.parent / "checked.json"
+    path.write_text(json.dumps(certificate))
+    one, three = run(common.SWARMCERT, "check", path, net, "-q"), run(CHECKER, path, net)
+    assert one.returncode in (0, 1) and three.returncode == one.returncode, f"{one} {three}"
+    if one.returncode == 0:
+        assert three.stdout == one.stdout, f"{one} {three}"
+    reasons = [done.stdout if done.returncode == 1 else "" for done in (one, three)]
+    reasons.append(second.check(certificate, second.Network(**common.arguments([str(net)]))))
+    assert bool(reasons[0]) == bool(reasons[2]), reasons
+    return reasons
+
+
+def refused(certificate, net, *words):
+    """`words`: of the reasons of the first and the proved checker, and of the second one."""
+    one, three, two = decided(certificate, net)
+    assert words[0] in one and words[0] in three and words[-1] in two, f"{words}: {one!r} {three!r} {two!r}"
+
+
+def accepted(certificate, net):
+    reasons = decided(certificate, net)
+    assert not any(reasons), reasons
+
+
+def with_values(certificate, function, **fields):
+    changed = json.loads(json.dumps(certificate))
+    entries = [entry for entry in changed["values"] if entry["function"] == function]
+    assert entries
+    for entry in entries:
+        entry.update(fields)
+    return changed
+
+
+def network(folder, name, silent):
+    """The one of heterogeneous(), whose value is near 100: a step to a 0 is the largest jump."""
+    data = (folder / "rho.safetensors").read_bytes()
+    (folder / "high.safetensors").write_bytes(data[:-8] + pack("<d", 100.0))  # the last bias
+    net = folder / name
+    net.write_text((folder / "network.toml").read_text().replace("rho.safetensors", "high.safetensors").replace(
+        "[input]", f"silent = {json.dumps(silent)}\n[input]", 1))
+    return net
+
+
+def certify(net, *options):
+    path = net.parent / "certificate.json"
+    done = run(common.SWARMCERT, "certify", net, *options, "--nodes", "1", "-q", "--force", "-o", path)
+    assert done.returncode == 0, done
+    return second.parse(path.read_text())
+
+
+def statement_and_witnesses(folder):
+    net = common.silent(folder)
+    certificate = certify(net, "--neighbours", "large=2,small=1")
+    accepted(certificate, net)
+    assert any(bound["lower"] for bound in certificate["bounds"] if bound["function"].startswith("set:"))
+    for text in second.STATEMENT, certificate["statement"].replace(", small>small", ""):
+        assert text != certificate["statement"]
+        refused(dict(certificate, statement=text), net, "statement is not the one", "another statement")
+    point = ["0x0p+0"] * 6
+    ground = {"network": "phi:ground", "x": point[:4]}
+    small, large = ({"network": f"phi:{kind}", "x": point} for kind in ("small", "large"))
+    tried = 0
+    for i, bound in enumerate(certificate["bounds"]):
+        if bound["function"] not in ("set:small:small", "set:large:small"):
+            continue
+        own = bound["function"].split(":")[1]
+        for others in ([ground], [ground, small], [large, ground], [ground, large, small]):
+            kinds = sorted([own] + [other["network"][4:] for other in others if other is not ground])
+            changed = json.loads(json.dumps(certificate))
+            changed["bounds"][i].update(lower=0.0, lower_hex="0x0p+0", lower_witness={
+                "x": point, "y": ["0x1p+0"] + point[1:], "others": others})
+            if kinds in (["small"], ["large", "small"]):
+                refused(changed, net, "is 0 among these neighbours", "0 among these neighbours")
+                tried += 1
+            else:
+                accepted(changed, net)
+    assert tried == 3, tried
+
+
+def one_unit_less(number):
+    smaller = math.nextafter(number, 0)
+    return {"jump": smaller, "jump_hex": smaller.hex()}
+
+
+def ranges_and_jumps(folder):
+    net = network(folder, "high.toml", ["large+small>small", "small>small"])
+    certificate = certify(net, "--domain", folder / "box.toml", "--neighbours", "1")
+    accepted(certificate, net)
+    for function in "set:small:small", "set:large:small":
+        jump = max(entry["jump"] for entry in certificate["values"] if entry["function"] == function)
+        assert jump > 90, jump  # the step
+        refused(with_values(certificate, function, **one_unit_less(jump)), net,
+                "less than the step to neighbours among", "less than the step to a 0")
+    refused(with_values(certificate, "set:small:small", lower=["0x1p-1000"]), net,
+            "lacks the 0 of neighbours", "lacks a 0")
+    # Among large neighbours alone there is no 0, only the values near 100.
+    accepted(with_values(certificate, "set:large:small", lower=["-0x1p+8"]), net)
+    lower = {entry["function"]: float.fromhex(entry["lower"][0]) for entry in certificate["values"]}
+    assert lower["set:large:small"] > 50 and lower["set:small:small"] == 0, lower
+    # The other kind has no box: nothing is known of the steps beside it.
+    changed = json.loads(json.dumps(certificate))
+    changed["values"] = [entry for entry in changed["values"] if entry["function"] == "set:small:small"]
+    accepted(changed, net)
+    del changed["box"]["phi:large"]
+    changed["bounds"] = [b for b in changed["bounds"] if b["domain"] == "global" and "large" not in b["function"]]
+    changed["laws"] = []
+    assert all(decided(changed, net))
+    return net, certificate
+
+
+def always_silent(folder):
+    """Up to one neighbour of its kind: the range is 0."""
+    net = network(folder, "always.toml", [">small", "small>small"])
+    certificate = certify(net, "--domain", folder / "box.toml", "--neighbours", "1")
+    zero = {"lower": ["0x0p+0"], "upper": ["0x0p+0"]}
+    accepted(with_values(certificate, "set:small:small", **zero), net)
+    refused(with_values(certificate, "set:large:small", **zero), net, "leave the range")
+    net = network(folder, "sometimes.toml", ["small>small", "small+small>small"])
+    certificate = certify(net, "--domain", folder / "box.toml", "--neighbours", "1")
+    refused(with_values(certificate, "set:small:small", **zero), net, "leave the range")
+
+
+def descriptions(folder):
+    certificate = folder / "certificate.json"
+    for silent, reason in (([], "names no composition"), (["small"], "is no composition"),
+                           (["small>large"], "there is no rho.large"), (["tiny>small"], "there is no phi.tiny"),
+                           (["ground>small"], "there is no phi.ground"), (["+small>small"], "there is no phi."),
+                           (["large+small>small", "small+large>small"], "twice")):
+        net = network(folder, "wrong.toml", silent)
+        one, three = run(common.SWARMCERT, "check", certificate, net), run(CHECKER, certificate, net)
+        assert one.returncode == three.returncode == 3 and reason in one.stderr and reason in three.stderr, (one, three)
+
+
+def smooth_neighbours(folder):
+    """Beside neighbours with another activation, the step is beyond the theorems, and the rest is not."""
+    net = network(folder, "beside.toml", ["large+small>small"])
+    net.write_text(net.read_text().replace('"large.safetensors"', '"large.safetensors"\nactivation = "tanh"'))
+    certificate = certify(net, "--domain", folder / "box.toml", "--neighbours", "1")
+    certificate["values"] = [entry for entry in certificate["values"] if entry["function"] == "set:small:small"]
+    certificate["content_sha256"] = second.content_sha256(certificate)
+    path = folder / "beside.json"
+    path.write_text(json.dumps(certificate))
+    three = run(CHECKER, path, net)
+    assert three.returncode == 4, three
+    assert "values of set:small:small: the step to compositions without" in three.stdout, three
+
+
+def kernel(net, certificate, coqc, theory):
+    path = net.parent / "Silent.json"
+    certificate["content_sha256"] = second.content_sha256(certificate)
+    path.write_text(json.dumps(certificate))
+    text = run(CHECKER, "--coq", path, net).stdout
+    source = net.parent / "Silent.v"
+
+    def accepts(words):
+        source.write_text(words)
+        return run(coqc, "-q", "-R", theory, "Swarmcert", source).returncode == 0
+
+    assert accepts(text)
+    steps = re.findall(r"(claim := Step_at_most .*)\((\d+),(-?\d+)\)\.", text)
+    assert len(steps) == len(certificate["values"])
+    for head, mantissa, exponent in steps[:1]:
+        false = text.replace(f"{head}({mantissa},{exponent}).", f"{head}({int(mantissa) - 1},{exponent}).")
+        assert false != text and not accepts(false)
+    # Silent with no neighbour, whose only term is then the ground's, network 0: the range of large ones lacks that 0.
+    others = re.sub(r"claim := Sum_within \[\[.*?\]\] ", "claim := Sum_within [[0%nat]] ", text)
+    assert others != text and not accepts(others)
+
+
+def main():
+    generator = random.Random(29)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        common.heterogeneous(folder, generator)
+        statement_and_witnesses(folder)
+        net, certificate = ranges_and_jumps(folder)
+        if len(sys.argv) > 5:
+            kernel(net, certificate, *sys.argv[5:7])
+        always_silent(folder)
+        descriptions(folder)
+        smooth_neighbours(folder)
+
+
+if __name__ == "__main__":
+    main()
