@@ -415,8 +415,9 @@ def check_activations(certificate, net, folder):
             for step in changed["network"]["weights"][part]["chain"]:
                 step["op"] = op if step["op"] in own else step["op"]
             assert not (both(changed) and part in stated), f"{part}: {op} instead of {own} is accepted"
-            changed["network"]["weights"][part]["chain"][1]["op"] = "identity"
-            assert not both(changed)
+        changed = copy()
+        changed["network"]["weights"][part]["chain"][1]["op"] = "identity"
+        assert not both(changed)
     point = lambda part: ["0x0p+0"] * second.Network(**arguments(net)).parts[part].layers[0].inputs
     for i, bound in enumerate(certificate["bounds"]):
         changed = copy()
