@@ -109,7 +109,6 @@ class Scene {
   /// Thrust beyond the weight at t = 0, N: rotors start anywhere between the weight and the force that the first
   /// prediction asks for.
   Interval excess_at_start_N(int vehicle) const { return excess_N_[static_cast<std::size_t>(vehicle)]; }
-  const LagStart& lag_start_z() const { return lag_start_z_; }
 
   /// Bounds of the errors of one vehicle that f_hat - f_a does not cause along z: the feed-forward's and the truth's
   /// lag, the rotors' start and errors of the estimates, and along x and y the truth itself.
