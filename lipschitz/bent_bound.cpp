@@ -194,6 +194,7 @@ SdpBound bent_bound(const check::BentChain& chain, const SdpOptions& options) {
   const ScaledBentChain scaled = scaled_to_one(chain, live);
   InteriorPointOptions solver;
   solver.stop = options.stop;
+  solver.relative_gap = options.relative_gap;
   const std::optional<InteriorPointResult> found = minimise(scaled, solver);
   if (!found) return result;
   result.stop = found->stop;

@@ -24,8 +24,8 @@ std::string called(const CertifiedBound& bound) {
   return bound.function + " " + bound.block + (bound.neighbours.empty() ? "" : " with so many neighbours");
 }
 
-bool has_program(const CertifyOptions& options, const CertifiedBound& bound) {
-  return options.method != UpperMethod::kProduct && bound.neighbours.empty() && bound.has_slopes;
+bool has_program(UpperMethod method, const CertifiedBound& bound) {
+  return method != UpperMethod::kProduct && bound.neighbours.empty() && bound.has_slopes;
 }
 
 bool is_branched(const CertifyOptions& options, const CertifiedBound& bound) {
@@ -65,9 +65,8 @@ void solve_program(const Network& network, const CertifyOptions& options, const 
 }
 
 /// Of the inputs that the bound is about, as they leave the clamp.
-check::Intervals box_of(const Network& network, const CertifyOptions& options, const CertifiedBound& bound) {
-  const Box box = clamped(network, options.domain).at(files::networks_of(bound.function).front());
-  return {{box.lower.begin(), box.lower.end()}, {box.upper.begin(), box.upper.end()}};
+Box box_of(const Network& network, const CertifyOptions& options, const CertifiedBound& bound) {
+  return clamped(network, options.domain).at(files::networks_of(bound.function).front());
 }
 
 /// The product, with the steepest slopes on the box in place of those of all inputs.
@@ -88,23 +87,6 @@ void multiply_local_slopes(const Network& network, const check::Intervals& box,
   bound.upper = UpperBound(upper);
   bound.method = UpperMethod::kLocalProduct;
   bound.proof.reset();
-}
-
-/// Smaller bounds for the box, where the slopes on it give any. Whether the program was solved.
-bool solve_on_box(const Network& network, const CertifyOptions& options, const Stop& stop,
-                  const std::vector<CertifiedLayer>& layers, CertifiedBound& bound) {
-  const check::Intervals box = box_of(network, options, bound);
-  multiply_local_slopes(network, box, layers, bound);
-  if (!has_program(options, bound)) return false;
-  bound.sdp = bent_bound(check::chain_on_box(network, bound.function, bound.block, bound.scale, box),
-                         {stop, bound.upper});
-  if (!bound.sdp.proof || !(bound.sdp.proof->upper.value() < bound.upper.value()))
-    return bound.sdp.proof.has_value();
-  bound.upper = bound.sdp.proof->upper;
-  bound.method = UpperMethod::kLocalSdp;
-  bound.proof = std::move(bound.sdp.proof);
-  bound.sdp.proof.reset();
-  return true;
 }
 
 void search_below(const Network& network, const CertifyOptions& options, const Stop& stop,
@@ -189,6 +171,24 @@ void branch_all(const Network& network, const CertifyOptions& options, const Sto
 
 }  // namespace
 
+bool bound_by_slopes_on_box(const Network& network, const Box& box, const std::vector<CertifiedLayer>& layers,
+                            UpperMethod method, SdpOptions options, CertifiedBound& bound) {
+  const check::Intervals inputs = {{box.lower.begin(), box.lower.end()},
+                                   {box.upper.begin(), box.upper.end()}};
+  multiply_local_slopes(network, inputs, layers, bound);
+  if (!has_program(method, bound)) return false;
+  options.known = bound.upper;
+  bound.sdp =
+      bent_bound(check::chain_on_box(network, bound.function, bound.block, bound.scale, inputs), options);
+  if (!bound.sdp.proof) return false;
+  if (!(bound.sdp.proof->upper.value() < bound.upper.value())) return true;
+  bound.upper = bound.sdp.proof->upper;
+  bound.method = UpperMethod::kLocalSdp;
+  bound.proof = std::move(bound.sdp.proof);
+  bound.sdp.proof.reset();
+  return true;
+}
+
 int pieces_of_work(const CertifyOptions& options, int bounds) {
   return (options.method == UpperMethod::kBranch ? 4 : 3) * bounds;
 }
@@ -200,7 +200,7 @@ void find_bounds(const Network& network, const CertifyOptions& options, const St
   files::parallel_for(count, options.jobs, [&](int i) {
     CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
     progress.run("layer-wise bound of " + called(bound), [&] {
-      if (has_program(options, bound) && bound.is_monotone) bound_layer_by_layer(network, bound);
+      if (has_program(options.method, bound) && bound.is_monotone) bound_layer_by_layer(network, bound);
     });
   });
 
@@ -216,8 +216,10 @@ void find_bounds(const Network& network, const CertifyOptions& options, const St
       });
     } else {
       progress.run("semidefinite program of " + called(bound), [&] {
-        const bool is_solved = bound.has_local_slopes && solve_on_box(network, options, share, layers, bound);
-        if (!is_solved && has_program(options, bound)) solve_program(network, options, share, bound);
+        const bool is_solved =
+            bound.has_local_slopes && bound_by_slopes_on_box(network, box_of(network, options, bound), layers,
+                                                             options.method, {share, {}}, bound);
+        if (!is_solved && has_program(options.method, bound)) solve_program(network, options, share, bound);
       });
     }
   });

@@ -19,4 +19,12 @@ void find_bounds(const files::Network& network, const CertifyOptions& options, c
                  WorkProgress& progress, const std::vector<CertifiedLayer>& layers,
                  std::vector<CertifiedBound>& bounds);
 
+/// Replaces `bound` by a smaller one for inputs in `box`, by the product of norms and by the matrix inequality, where
+/// the slopes that the activations have there give one. Whether the inequality was proved, smaller or not.
+/// @param box of the moving input, as it leaves the clamp. @param method kProduct: by the product alone.
+/// @param options `known` is taken from the bound.
+bool bound_by_slopes_on_box(const files::Network& network, const Box& box,
+                            const std::vector<CertifiedLayer>& layers, UpperMethod method, SdpOptions options,
+                            CertifiedBound& bound);
+
 }  // namespace swarmcert::lipschitz

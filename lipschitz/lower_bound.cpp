@@ -173,6 +173,7 @@ FoundSlope sampled_lower_bound(const Network& network, const Claim& claim,
   SlopeEstimateOptions search;
   search.seed = options.seed;
   search.domain = boxes;
+  search.moved = options.moved;
   search.starts = rounds;
   search.stop = Stop(options.cancelled, options.seconds);
   const SteepPlace place = steep_place(network, claim, search);
@@ -180,7 +181,10 @@ FoundSlope sampled_lower_bound(const Network& network, const Claim& claim,
   found.rounds = place.starts;
   found.interrupted = place.interrupted;
   if (is_silent(network, claim, place.other_networks)) return found;
-  const FloatPoints points(boxes);
+  const std::string moving = files::networks_of(claim.function).front();
+  std::map<std::string, Box> box_of_moving = boxes;
+  if (options.moved) box_of_moving[moving] = *options.moved;
+  const FloatPoints points(boxes), moving_points(box_of_moving);
   SlopePoints pair;
   for (std::size_t j = 0; j < place.others.size(); ++j) {
     std::optional<std::vector<float>> other = points.nearest(place.other_networks[j], place.others[j]);
@@ -188,9 +192,8 @@ FoundSlope sampled_lower_bound(const Network& network, const Claim& claim,
     pair.others.push_back(std::move(*other));
   }
   found.other_networks = place.other_networks;
-  try_pairs(slope_function(network, claim.function, place.other_networks),
-            files::networks_of(claim.function).front(), place, claim,
-            files::block_coordinates(network, claim.function, claim.block), points, pair, found);
+  try_pairs(slope_function(network, claim.function, place.other_networks), moving, place, claim,
+            files::block_coordinates(network, claim.function, claim.block), moving_points, pair, found);
   return found;
 }
 

@@ -22,7 +22,7 @@ struct LowerBoundOptions {
   std::optional<int> rounds;
   double seconds = 0;  ///< per claim, as SlopeSearchOptions has it; 0: no limit
   const std::atomic<bool>* cancelled = nullptr;
-  std::optional<Box> moved;             ///< where x and y lie instead of the domain's box; for ReLU
+  std::optional<Box> moved;             ///< where x and y lie instead of the domain's box
   std::vector<Eigen::VectorXd> starts;  ///< as SlopeSearchOptions has them
   /// As SlopeSearchOptions has them; others in the order of FoundSlope::other_networks.
   std::vector<Eigen::VectorXd> places;

@@ -22,15 +22,21 @@ double random_number(std::mt19937_64& generator) {
   return std::ldexp(static_cast<double>(generator() >> 11), -52) - 1;
 }
 
+std::optional<Box> box_in(const std::map<std::string, Box>& domain, const std::string& part) {
+  const auto found = domain.find(part);
+  return found == domain.end() ? std::nullopt : std::optional<Box>(found->second);
+}
+
 }  // namespace
 
 SampledFunction::SampledFunction(const files::Network& network, const Claim& claim,
-                                 std::map<std::string, Box> domain)
+                                 std::map<std::string, Box> domain, const std::optional<Box>& moved)
     : network_(network), domain_(std::move(domain)), half_step_(kHalfStep) {
   const std::vector<std::string> names = files::networks_of(claim.function);
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   for (const auto& [name, weights] : parts) evaluators_.emplace(name, files::Evaluator<double>(*weights));
   first_ = names.front();
+  box_ = moved ? moved : box_in(domain_, first_);
   inputs_ = files::inputs(network, claim.function);
   maps_ = files::maps_to_invariants(network, claim.function);
   if (names.size() == 2) last_ = names.back();
@@ -47,9 +53,8 @@ SampledFunction::SampledFunction(const files::Network& network, const Claim& cla
 }
 
 void SampledFunction::narrow_steps(const Claim& claim) {
-  const auto found = domain_.find(first_);
-  if (found == domain_.end()) return;
-  Box& box = found->second;
+  if (!box_) return;
+  Box& box = *box_;
   const auto width = [&box](int k) {
     return box.upper[static_cast<std::size_t>(k)] - box.lower[static_cast<std::size_t>(k)];
   };
@@ -65,10 +70,11 @@ void SampledFunction::narrow_steps(const Claim& claim) {
   }
 }
 
-std::optional<std::pair<double, double>> SampledFunction::interval(const std::string& part, Index k) const {
+std::optional<std::pair<double, double>> SampledFunction::interval(const std::string& part,
+                                                                   const std::optional<Box>& box,
+                                                                   Index k) const {
   const auto i = static_cast<std::size_t>(k);
-  const auto box = domain_.find(part);
-  if (box != domain_.end()) return std::pair{box->second.lower[i], box->second.upper[i]};
+  if (box) return std::pair{box->lower[i], box->upper[i]};
   if (network_.clamp && files::is_clamped(part) && !maps_)
     return std::pair{network_.clamp->lower[i], network_.clamp->upper[i]};
   return std::nullopt;
@@ -76,25 +82,24 @@ std::optional<std::pair<double, double>> SampledFunction::interval(const std::st
 
 VectorXd SampledFunction::middle() const {
   VectorXd x = VectorXd::Zero(inputs_);
-  const auto box = domain_.find(first_);
-  for (Index k = 0; box != domain_.end() && k < inputs_; ++k) {
+  for (Index k = 0; box_ && k < inputs_; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    x[k] = (box->second.lower[i] + box->second.upper[i]) / 2;
+    x[k] = (box_->lower[i] + box_->upper[i]) / 2;
   }
   return x;
 }
 
 VectorXd SampledFunction::random_point(std::mt19937_64& generator) const {
-  return random_point_of(first_, inputs_, generator);
+  return random_point_of(first_, box_, inputs_, generator);
 }
 
-VectorXd SampledFunction::random_point_of(const std::string& part, Index size,
+VectorXd SampledFunction::random_point_of(const std::string& part, const std::optional<Box>& box, Index size,
                                           std::mt19937_64& generator) const {
   const double scale = std::exp2(static_cast<double>(generator() % 8) - 4);
   VectorXd x(size);
   for (Index k = 0; k < size; ++k) {
     const double r = random_number(generator);
-    const auto ends = interval(part, k);
+    const auto ends = interval(part, box, k);
     x[k] = ends ? ends->first + (ends->second - ends->first) * (r + 1) / 2 : scale * r;
   }
   return x;
@@ -123,7 +128,7 @@ void SampledFunction::place_others(std::mt19937_64& generator) {
 void SampledFunction::add_other(const std::string& part, std::mt19937_64& generator) {
   const Index size = files::inputs(network_, files::set_name(files::kind_of(part), files::kind_of(*last_)));
   other_networks_.push_back(part);
-  others_.push_back(random_point_of(part, size, generator));
+  others_.push_back(random_point_of(part, box_in(domain_, part), size, generator));
   others_sum_ += term(part, others_.back());
 }
 
@@ -182,7 +187,7 @@ SampledFunction::Steepness SampledFunction::steepest(const VectorXd& x) const {
 }
 
 double SampledFunction::width(Index k) const {
-  const auto ends = interval(first_, k);
+  const auto ends = interval(first_, box_, k);
   return ends ? ends->second - ends->first : 1;
 }
 
@@ -203,7 +208,7 @@ VectorXd SampledFunction::gradient(const VectorXd& x, const VectorXd& direction)
 VectorXd SampledFunction::moved(const VectorXd& x, const VectorXd& step) const {
   VectorXd result = x;
   for (Index k = 0; k < inputs_; ++k) {
-    const auto ends = interval(first_, k);
+    const auto ends = interval(first_, box_, k);
     result[k] += width(k) * step[k];
     if (ends) result[k] = std::max(ends->first, std::min(result[k], ends->second));
   }

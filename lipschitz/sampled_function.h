@@ -24,8 +24,9 @@ class SampledFunction {
     Eigen::VectorXd direction;
   };
 
-  /// @param domain as it leaves the clamp.
-  SampledFunction(const files::Network& network, const Claim& claim, std::map<std::string, Box> domain);
+  /// @param domain as it leaves the clamp. @param moved instead of the domain's box of the input that moves.
+  SampledFunction(const files::Network& network, const Claim& claim, std::map<std::string, Box> domain,
+                  const std::optional<Box>& moved = std::nullopt);
 
   Eigen::Index inputs() const { return inputs_; }
   /// Half the distance of the points of a quotient, in units of the scale.
@@ -56,9 +57,10 @@ class SampledFunction {
  private:
   /// In a box points move neither along inputs that it fixes nor, with the room that random_point() leaves, out of it.
   void narrow_steps(const Claim& claim);
-  /// Where input k of `part` may be; nothing: anywhere.
-  std::optional<std::pair<double, double>> interval(const std::string& part, Eigen::Index k) const;
-  Eigen::VectorXd random_point_of(const std::string& part, Eigen::Index size,
+  /// Where input k of `part` may be, which has this box; nothing: anywhere.
+  std::optional<std::pair<double, double>> interval(const std::string& part, const std::optional<Box>& box,
+                                                    Eigen::Index k) const;
+  Eigen::VectorXd random_point_of(const std::string& part, const std::optional<Box>& box, Eigen::Index size,
                                   std::mt19937_64& generator) const;
   void add_other(const std::string& part, std::mt19937_64& generator);
   Eigen::VectorXd evaluated(const std::string& part, const Eigen::VectorXd& x) const;
@@ -69,7 +71,8 @@ class SampledFunction {
   double width(Eigen::Index k) const;
 
   const files::Network& network_;
-  std::map<std::string, Box> domain_;
+  std::map<std::string, Box> domain_;  ///< of the others
+  std::optional<Box> box_;             ///< of the input that moves
   double half_step_;
   std::map<std::string, files::Evaluator<double>> evaluators_;
   std::string first_;

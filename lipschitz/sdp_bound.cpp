@@ -40,6 +40,7 @@ SdpBound sdp_bound(const std::vector<check::Matrix>& stages, const SdpOptions& o
   }
   LipSdpOptions solver;
   solver.stop = options.stop;
+  solver.relative_gap = options.relative_gap;
   const LipSdpResult solved = solve_lipsdp(chain.live(), solver);
   result.stop = solved.stop;
   result.iterations = solved.iterations;

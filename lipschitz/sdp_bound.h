@@ -15,6 +15,8 @@ struct SdpOptions {
   /// A bound that is proved already. A search that was stopped does not prove iterates above it: the exact proof of a
   /// large program takes a second.
   std::optional<UpperBound> known;
+  /// As InteriorPointOptions has it: a search that may end further from the optimum is shorter.
+  double relative_gap = InteriorPointOptions().relative_gap;
 };
 
 /// What a search for an SDP bound came to.

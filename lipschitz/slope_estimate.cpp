@@ -5,6 +5,7 @@
 
 #include "lipschitz/range.h"
 #include "lipschitz/sampled_function.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -118,7 +119,12 @@ class SteepSearch {
 
 SteepPlace steep_place(const files::Network& network, const Claim& claim,
                        const SlopeEstimateOptions& options) {
-  SteepSearch search(SampledFunction(network, claim, clamped(network, options.domain)), options);
+  std::optional<Box> moved = options.moved;
+  if (moved) {
+    const std::string part = files::networks_of(claim.function).front();
+    moved = clamped(network, {{part, *moved}}).at(part);
+  }
+  SteepSearch search(SampledFunction(network, claim, clamped(network, options.domain), moved), options);
   const double most = std::max(options.starts, 1);
   const int starts = static_cast<int>(std::clamp(search.affordable_starts(), 1.0, most));
   SteepPlace best;

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@ namespace swarmcert::lipschitz {
 struct SlopeEstimateOptions {
   std::uint64_t seed = 1;
   std::map<std::string, Box> domain;  ///< by part, as the claim's; empty: all inputs
+  std::optional<Box> moved;  ///< where the input that moves lies, instead of the domain's box of its part
   int starts = 24;  ///< random points, from each of which the slope is climbed; fewer for large networks
   Stop stop;        ///< a start that it cuts short counts for nothing, unless it is the first
 };

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 
+#include "lipschitz/certify_bounds.h"
 #include "lipschitz/range.h"
 #include "nn/base/parallel.h"
 #include "nn/base/suggest.h"
@@ -12,7 +14,8 @@
 namespace swarmcert::lipschitz {
 namespace {
 
-/// Branch and bound need not come closer than this to a slope that is attained, relatively.
+/// Branch and bound need not come closer than this to a slope that is attained, relatively, and the search for
+/// multipliers not closer to the least square of a bound.
 constexpr double kTolerance = 0.01;
 /// Linear regions that a round of the search for steep points enters.
 constexpr int kRegions = 15;
@@ -61,13 +64,15 @@ void add_place(const FoundSlope& found, std::vector<Eigen::VectorXd>& places) {
 /// One function's cells, which share what is computed once.
 class Cells {
  public:
-  Cells(const files::Network& network, const CertifiedBound& everywhere, const SlopeMapOptions& options)
+  Cells(const files::Network& network, const Certification& found, const CertifiedBound& everywhere,
+        const SlopeMapOptions& options)
       : network_(network),
         options_(options),
+        layers_(found.layers),
         everywhere_(everywhere),
-        claim_(everywhere),
-        bounds_(network, everywhere, multipliers(everywhere)) {
+        claim_(everywhere) {
     claim_.domain = "box";
+    if (everywhere.is_relu) bounds_.emplace(network, everywhere, multipliers(everywhere));
   }
 
   /// @param before the cell beside it, or null: where that one is steep, this one may be.
@@ -82,20 +87,42 @@ class Cells {
     add_place(everywhere_.lower, lower.places);
     if (before != nullptr) add_place(before->lower, lower.places);
     cell.lower = lower_bound(network_, claim_, options_.domain, lower);
+    const std::string moving = files::networks_of(claim_.function).front();
+    const Box box = clamped(network_, {{moving, cell.box}}).at(moving);
+    if (bounds_) {
+      branch(box, cell);
+    } else {
+      bound_by_slopes(box, cell);
+    }
+  }
+
+ private:
+  void branch(const Box& box, SlopeCell& cell) const {
     BranchOptions branch;
     branch.nodes = options_.nodes;
     branch.boxes_only = true;
     branch.known = cell.lower.witness ? cell.lower.witness->slope.value() : 0;
     branch.tolerance = kTolerance;
     branch.cancelled = options_.cancelled;
-    const std::string moving = files::networks_of(claim_.function).front();
-    const LocalBound local = bounds_.on(clamped(network_, {{moving, cell.box}}).at(moving), branch);
+    const LocalBound local = bounds_->on(box, branch);
     if (!local.proof || !(local.upper.value() < cell.upper.value())) return;
     cell.upper = local.upper;
     cell.is_local = true;
   }
 
- private:
+  void bound_by_slopes(const Box& box, SlopeCell& cell) const {
+    CertifiedBound bound;
+    static_cast<Claim&>(bound) = claim_;
+    bound.has_slopes = everywhere_.has_slopes;
+    bound.upper = cell.upper;
+    bound_by_slopes_on_box(network_, box, layers_, UpperMethod::kAuto,
+                           {Stop(options_.cancelled), {}, kTolerance}, bound);
+    if (!(bound.upper.value() < cell.upper.value())) return;
+    cell.upper = bound.upper;
+    cell.method = bound.method;
+    cell.is_local = true;
+  }
+
   static std::vector<double> multipliers(const CertifiedBound& bound) {
     if (bound.proof) return bound.proof->t;
     return bound.sdp.proof ? bound.sdp.proof->t : std::vector<double>();
@@ -103,9 +130,10 @@ class Cells {
 
   const files::Network& network_;
   const SlopeMapOptions& options_;
+  const std::vector<CertifiedLayer>& layers_;
   const CertifiedBound& everywhere_;
   Claim claim_;
-  LocalBounds bounds_;
+  std::optional<LocalBounds> bounds_;  ///< of ReLU networks
 };
 
 }  // namespace
@@ -137,11 +165,11 @@ std::vector<SlopeMap> slope_maps(const files::Network& network, const Certificat
   std::vector<Cells> functions;
   for (const CertifiedBound& bound : found.bounds) {
     if (!has_map(bound)) continue;
-    functions.emplace_back(network, bound, options);
+    functions.emplace_back(network, found, bound, options);
     maps.push_back({bound.function, {}});
     const Box& box = options.domain.at(files::networks_of(bound.function).front());
     for (int i = 0; i < options.cells[0] * options.cells[1]; ++i)
-      maps.back().cells.push_back({cell_box(box, options, i), bound.upper, false, {}});
+      maps.back().cells.push_back({cell_box(box, options, i), bound.upper, false, UpperMethod::kBranch, {}});
   }
   // A row from one end to the other, rows at once.
   const int rows = options.cells[0], columns = options.cells[1];

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <random>
 
+#include "lipschitz/boxes.h"
 #include "lipschitz/networks.h"
+#include "lipschitz/slope_estimate.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -143,6 +145,107 @@ TEST(SlopeMap, OtherNeighboursOfWitnessesAreAnywhereInTheirBox) {
       EXPECT_GE(other[0], -1);
       EXPECT_LE(other[0], 1);
     }
+  }
+}
+
+/// Of networks with other activations, with the bounds of the whole box beside them.
+struct SmoothMap {
+  Certification found;
+  SlopeMap map;  ///< of the last function that has one
+};
+
+SmoothMap smooth_map(const files::Network& network, const SlopeMapOptions& options) {
+  CertifyOptions certify_options;
+  certify_options.domain = options.domain;
+  certify_options.lower.rounds = 0;
+  certify_options.jobs = 1;
+  SmoothMap result{certify(network, certify_options), {}};
+  result.map = slope_maps(network, result.found, options).back();
+  return result;
+}
+
+/// No cell is above the bound of the whole box, one at most `share` of it, and above all that is found in it: by the
+/// map, and by a longer climb from other starts.
+void expect_sound(const files::Network& network, const SlopeMapOptions& options, const std::string& name,
+                  double share = 0.9) {
+  SCOPED_TRACE(name);
+  const SmoothMap smooth = smooth_map(network, options);
+  const CertifiedBound* whole = nullptr;
+  for (const CertifiedBound& bound : smooth.found.bounds)
+    if (bound.function == smooth.map.function && bound.block == "all") whole = &bound;
+  ASSERT_NE(whole, nullptr);
+  double least = whole->upper.value();
+  for (const SlopeCell& cell : smooth.map.cells) {
+    least = std::min(least, cell.upper.value());
+    EXPECT_LE(cell.upper.value(), whole->upper.value());
+    EXPECT_EQ(cell.is_local, cell.upper.value() < whole->upper.value());
+    if (cell.is_local) {
+      EXPECT_TRUE(cell.method == UpperMethod::kLocalSdp || cell.method == UpperMethod::kLocalProduct);
+    }
+    ASSERT_TRUE(cell.lower.witness.has_value());
+    EXPECT_GT(cell.lower.witness->slope.value(), 0);
+    EXPECT_LE(cell.lower.witness->slope.value(), cell.upper.value());
+    for (const std::vector<float>* point : {&cell.lower.witness->x, &cell.lower.witness->y}) {
+      for (std::size_t k = 0; k < point->size(); ++k) {
+        EXPECT_GE(static_cast<double>((*point)[k]), cell.box.lower[k]);
+        EXPECT_LE(static_cast<double>((*point)[k]), cell.box.upper[k]);
+      }
+    }
+    SlopeEstimateOptions climb;
+    climb.seed = 77;
+    climb.starts = 8;
+    climb.domain = options.domain;
+    climb.moved = cell.box;
+    EXPECT_LE(slope_estimate(network, *whole, climb).value(), cell.upper.value() * (1 + 1e-9));
+  }
+  EXPECT_LT(least, share * whole->upper.value())
+      << "the slopes in the cells change nothing: the map shows nothing";
+}
+
+TEST(SlopeMap, OfSmoothNetworksNoClimbedSlopeExceedsItsCell) {
+  std::mt19937 generator(25);
+  using A = files::Activation;
+  const SlopeMapOptions options = map_of({{-2, -2, -0.1}, {2, 2, 0.1}}, {4, 3});
+  for (const A activation : {A::kTanh, A::kSigmoid, A::kSoftplus, A::kElu, A::kSelu, A::kSilu, A::kGelu}) {
+    files::Weights net = tests::random_network({3, 8, 8, 2}, generator);
+    net.set_activations({activation, activation});
+    expect_sound(plain(net), options, files::function_of(activation).op);
+  }
+  files::Weights mixed = tests::random_network({3, 8, 8, 2}, generator);
+  mixed.set_activations({A::kRelu, A::kTanh});
+  expect_sound(plain(mixed), options, "relu, tanh");
+  mixed.set_activations({A::kTanh, A::kMaxMinPairs});
+  expect_sound(plain(mixed), options, "tanh, maxmin:pairs",
+               0.95);  // the product, by each layer's steepest neuron
+}
+
+TEST(SlopeMap, OfSmoothSetFunctionsHoldsWhereverTheOthersAre) {
+  std::mt19937 generator(26);
+  using A = files::Activation;
+  const std::pair<A, A> pairs[] = {{A::kTanh, A::kSilu}, {A::kRelu, A::kTanh}, {A::kGelu, A::kRelu}};
+  for (const auto& [of_phi, of_rho] : pairs) {
+    files::Weights phi = tests::random_network({3, 8, 4}, generator);
+    files::Weights rho = tests::random_network({4, 6, 1}, generator);
+    phi.set_activations({of_phi});
+    rho.set_activations({of_rho});
+    const files::Network network = tests::deep_set(phi, rho);
+    expect_sound(network, map_of({{-2, -2, -0.1}, {2, 2, 0.1}}, {3, 3}, "phi:default"),
+                 files::function_of(of_phi).op + " in front of " + files::function_of(of_rho).op);
+  }
+}
+
+TEST(SlopeMap, SeesWhereTanhIsFlat) {
+  // f(x, y) = tanh(3 x): the slope is 3 (1 - tanh(3 x)^2), steepest at the end of a cell that is nearest to 0.
+  const files::Network network =
+      plain(tests::with(weights({layer(1, 2, {3, 0}), layer(1, 1, {1})}), files::Activation::kTanh));
+  const SmoothMap smooth = smooth_map(network, map_of({{-2, -1}, {2, 1}}, {8, 2}));
+  for (const SlopeCell& cell : smooth.map.cells) {
+    const double nearest = cell.box.lower[0] >= 0 ? cell.box.lower[0] : -cell.box.upper[0];
+    const double slope = 3 * (1 - std::pow(std::tanh(3 * nearest), 2));
+    EXPECT_GE(cell.upper.value(), slope);
+    EXPECT_LE(cell.upper.value(), slope * (1 + 1e-3) + 1e-6) << cell.box.lower[0];
+    ASSERT_TRUE(cell.lower.witness.has_value());
+    EXPECT_GE(cell.lower.witness->slope.value(), 0.9 * slope) << cell.box.lower[0];
   }
 }
 

@@ -257,7 +257,7 @@ void refuse_what_is_for_relu(const files::Network& network, const CertifyOptions
   };
   const Asked all[] = {{!options.domain.empty(), "--domain", false},
                        {options.range, "--range", false},
-                       {!options.map.empty(), "--map", true},
+                       {!options.map.empty(), "--map", false},
                        {options.explain, "--explain", true},
                        {options.input_step > 0, "--input-step, for the float32 error,", true},
                        {options.method == "branch", "--method branch", true}};
@@ -442,7 +442,7 @@ void declare_search_on_a_box(CLI::App& app, CertifyOptions& options) {
   app.add_option("--cells", options.cells, "Cells of --map along each input (default: 12), e.g. 12,8")
       ->needs(map);
   app.add_option("--cell-nodes", options.slope_map.nodes,
-                 "Maximum number of boxes of branch and bound per cell of --map")
+                 "Maximum number of boxes of branch and bound per cell of --map, of ReLU networks")
       ->needs(map)
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();

@@ -141,7 +141,7 @@ Json map_json(const files::Network& network, const lipschitz::SlopeMapOptions& o
   for (const lipschitz::SlopeCell& cell : map.cells) {
     cells.push_back({{"box", {{names[0], interval(cell.box, first)}, {names[1], interval(cell.box, second)}}},
                      {"upper", cell.upper.value()},
-                     {"upper_method", cell.is_local ? "branch" : "everywhere"},
+                     {"upper_method", cell.is_local ? lipschitz::name(cell.method) : "everywhere"},
                      {"lower", cell.lower.witness ? Json(cell.lower.witness->slope.value()) : Json()},
                      {"lower_witness", witness_json(cell.lower)}});
   }

@@ -95,11 +95,13 @@ void add_map(Report& report, const files::Network& network, const CertifyOutput&
   };
   const SlopeCell* steepest = &map.cells.front();
   int local = 0;
+  std::string by = "branch and bound";
   std::string data = "# first second upper lower\n";
   for (std::size_t i = 0; i < map.cells.size(); ++i) {
     const SlopeCell& cell = map.cells[i];
     if (cell.upper.value() > steepest->upper.value()) steepest = &cell;
     local += cell.is_local ? 1 : 0;
+    if (cell.method != lipschitz::UpperMethod::kBranch) by = "the slopes that the activations have there";
     if (i > 0 && i % static_cast<std::size_t>(output.map.cells[1]) == 0) data += "\n";
     const double lower = slope_of(cell.lower);
     data += fmt::format("{:.10g} {:.10g} {:.10g} {}\n", middle(cell, first), middle(cell, second),
@@ -116,11 +118,12 @@ void add_map(Report& report, const files::Network& network, const CertifyOutput&
   }
   report.heading("Where " + map.function + " is steep");
   report.paragraph(fmt::format(
-      "Local slope over {} and {}; {}. {} of {} cells have a bound of their own, proved by branch and bound; "
-      "the others keep the bound for all inputs. The steepest proved cell lies at {} = {:.4g}, {} = {:.4g}: "
+      "Local slope over {} and {}; {}. {} of {} cells have a bound of their own, proved by {}; the others "
+      "keep the "
+      "bound of the whole box. The steepest proved cell lies at {} = {:.4g}, {} = {:.4g}: "
       "at most {:.6g}, witnessed {} {}.",
       names[0], names[1], others.empty() ? "there are no other inputs" : "the other inputs: " + others, local,
-      map.cells.size(), names[0], middle(*steepest, first), names[1], middle(*steepest, second),
+      map.cells.size(), by, names[0], middle(*steepest, first), names[1], middle(*steepest, second),
       steepest->upper.value(), number(slope_of(steepest->lower), 6), unit));
   const auto script = [&](const std::string& figure, int column, const std::string& label) {
     return "set key off\nset xlabel " + plot_string("input " + names[0]) + "\nset ylabel " +
