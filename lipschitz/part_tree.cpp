@@ -234,22 +234,23 @@ void PartTree::refine(const std::vector<Form*>& forms, const Work& wanted, int j
     }
 }
 
-LargestValues PartTree::largest(const MatrixXd& rows, const PartSearch& search) {
+LargestValues PartTree::largest(const MatrixXd& forms, const PartSearch& search) {
   if (forms_.size() > kMostForms) forms_.clear();
-  std::vector<Form*> forms;
-  for (Index row = 0; row < rows.rows(); ++row)
-    forms.push_back(
-        &form_of(rows.row(row).allFinite() ? RowVectorXd(rows.row(row)) : RowVectorXd::Zero(rows.cols())));
+  std::vector<Form*> searched;
+  for (Index row = 0; row < forms.rows(); ++row)
+    searched.push_back(
+        &form_of(forms.row(row).allFinite() ? RowVectorXd(forms.row(row)) : RowVectorXd::Zero(forms.cols())));
   while (true) {
     Work wanted;
-    for (std::size_t form = 0; form < forms.size(); ++form) choose(form, *forms[form], search, wanted);
+    for (std::size_t form = 0; form < searched.size(); ++form) choose(form, *searched[form], search, wanted);
     if (wanted.empty()) break;
-    refine(forms, wanted, search.jobs);
+    refine(searched, wanted, search.jobs);
   }
-  LargestValues result{VectorXd(rows.rows()), VectorXd(rows.rows()), MatrixXd(points_.rows(), rows.rows())};
-  for (Index row = 0; row < rows.rows(); ++row) {
-    const Form& form = *forms[static_cast<std::size_t>(row)];
-    result.upper(row) = rows.row(row).allFinite() ? form.queue.top().first : kInfinity;
+  LargestValues result{VectorXd(forms.rows()), VectorXd(forms.rows()),
+                       MatrixXd(points_.rows(), forms.rows())};
+  for (Index row = 0; row < forms.rows(); ++row) {
+    const Form& form = *searched[static_cast<std::size_t>(row)];
+    result.upper(row) = forms.row(row).allFinite() ? form.queue.top().first : kInfinity;
     result.value(row) = form.value;
     result.x.col(row) = form.x;
   }

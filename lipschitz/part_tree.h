@@ -76,7 +76,7 @@ class PartTree {
 
   Part part_of(const Box& box, const Reach* around) const;
   /// Bounds on both halves of a part, across the dimension along which the form may change most.
-  void halve(std::size_t part, const Eigen::RowVectorXd& form);
+  void halve(std::size_t index, const Eigen::RowVectorXd& form);
   Form& form_of(const Eigen::RowVectorXd& direction);
   static void pull_back(const Layer& layer, const std::vector<Line>& lines, double relative,
                         const double* coefficients, double* next, Left& left);

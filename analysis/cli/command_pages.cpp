@@ -121,7 +121,7 @@ std::string roff_command(const CLI::App& command) {
 }  // namespace
 
 std::string man_page(const CLI::App& app) {
-  const std::string name = app.get_name();
+  const std::string& name = app.get_name();
   std::string summary = app.get_description();
   while (!summary.empty() && summary.back() == '.') summary.pop_back();
   std::string text = fmt::format(".TH {} 1 {} \"swarmcert {}\" \"User Commands\"\n", "SWARMCERT",
@@ -139,7 +139,7 @@ std::string man_page(const CLI::App& app) {
 // --- bash ---
 
 std::string bash_completion(const CLI::App& app) {
-  const std::string name = app.get_name();
+  const std::string& name = app.get_name();
   const auto all_names = [](const CLI::App& scope) {
     std::vector<std::string> words;
     for (const CLI::Option* option : options_of(scope)) {

@@ -96,8 +96,9 @@ double Trainer::run_epoch(int epoch, double learning_rate) {
 
 Vector Trainer::state() const {
   Vector state(3 * layout_.size() + 2);
-  state << parameters_, adam_.first_moment, adam_.second_moment, static_cast<float>(adam_.steps / kHalf),
-      static_cast<float>(adam_.steps % kHalf);
+  const std::uint64_t high = adam_.steps / kHalf, low = adam_.steps % kHalf;
+  state << parameters_, adam_.first_moment, adam_.second_moment, static_cast<float>(high),
+      static_cast<float>(low);
   return state;
 }
 

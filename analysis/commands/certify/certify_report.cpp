@@ -118,9 +118,8 @@ void add_map(Report& report, const files::Network& network, const CertifyOutput&
   }
   report.heading("Where " + map.function + " is steep");
   report.paragraph(fmt::format(
-      "Local slope over {} and {}; {}. {} of {} cells have a bound of their own, proved by {}; the others "
-      "keep the "
-      "bound of the whole box. The steepest proved cell lies at {} = {:.4g}, {} = {:.4g}: "
+      "Local slope over {} and {}; {}. {} of {} cells have a bound of their own, proved by {}; the "
+      "others keep the bound of the whole box. The steepest proved cell lies at {} = {:.4g}, {} = {:.4g}: "
       "at most {:.6g}, witnessed {} {}.",
       names[0], names[1], others.empty() ? "there are no other inputs" : "the other inputs: " + others, local,
       map.cells.size(), by, names[0], middle(*steepest, first), names[1], middle(*steepest, second),
