@@ -971,6 +971,9 @@ type claim =
 | Jump_at_most of int * box * int * dyadic
 | Float_error of int * box * dyadic list * dyadic list * dyadic
 | Sum_float_error of (term * dyadic list) list * int * dyadic
+| Slope_among of int * int * bool list * dyadic list * box * term list
+   * dyadic
+| Law_among of bool * ((kind * box) * Big.t) list * int * dyadic
 | Step_at_most of int list list * (int * box) list * int * int * dyadic
 
 (** val steepest : activation -> dyadic **)
@@ -1991,6 +1994,140 @@ let rec check_trees o ls inequality bs ts =
        (&&) (check_tree o ls inequality b [] t)
          (check_trees o ls inequality bs' ts'))
 
+(** val passing : int -> int -> layerD list -> layerD list **)
+
+let rec passing n m = function
+| [] -> []
+| l :: ls' ->
+  let (w, c) = l in
+  ((app (map (fun r -> app r (repeat zero m)) w)
+     (map (fun i -> unit_form (add n i)) (seq 0 m))),
+  (app c (repeat zero m))) :: (passing (length w) m ls')
+
+(** val joined_layer : layerD -> layerD -> layerD **)
+
+let joined_layer phi0 rho =
+  ((product zero add0 mul0 (fst rho) (fst phi0)),
+    (plus add0 (apply zero add0 mul0 (fst rho) (snd phi0)) (snd rho)))
+
+(** val first_layer : part -> layerD **)
+
+let first_layer p =
+  hd p.outer p.hidden
+
+(** val term_layer : part -> part -> layerD **)
+
+let term_layer phi0 rho =
+  joined_layer phi0.outer ((fst (first_layer rho)),
+    (map (fun _ -> zero) (fst (first_layer rho))))
+
+(** val with_units : matrixD -> int -> matrixD **)
+
+let rec with_units w n =
+  match w with
+  | [] -> []
+  | r :: w' -> (app r (unit_form n)) :: (with_units w' (Stdlib.Int.succ n))
+
+(** val coupled : part -> part -> dyadic list -> part **)
+
+let coupled phi0 rho least =
+  let (w, c) = joined_layer phi0.outer (first_layer rho) in
+  { hidden =
+  (app (passing (inputs_of phi0) (length w) phi0.hidden) (((with_units w 0),
+    (plus add0 c least)) :: (tl rho.hidden))); outer = rho.outer; clamp =
+  phi0.clamp; between = [] }
+
+type range_tree =
+| Range_leaf of decision list list
+| Range_halves of decision list list * int * dyadic * range_tree * range_tree
+
+(** val all_before :
+    layerD list -> line list list -> (layerD * line list) list ->
+    (layerD * line list) list **)
+
+let rec all_before ls lines before =
+  match ls with
+  | [] -> before
+  | l :: ls' ->
+    (match lines with
+     | [] -> before
+     | a :: lines' -> all_before ls' lines' ((l, a) :: before))
+
+(** val ends_of :
+    (layerD * line list) list -> matrixD -> dyadic list -> box -> box **)
+
+let rec ends_of before w c b =
+  match w with
+  | [] -> []
+  | row :: w' ->
+    (match c with
+     | [] -> []
+     | a :: c' ->
+       ((neg (most0 before [] (map neg row) (neg a) b)),
+         (most0 before [] row a b)) :: (ends_of before w' c' b))
+
+(** val narrowed : box -> box -> box **)
+
+let rec narrowed known v =
+  match known with
+  | [] -> v
+  | p :: known' ->
+    let (l, h) = p in
+    (match v with
+     | [] -> v
+     | p0 :: v' ->
+       let (l', h') = p0 in
+       ((larger l l'),
+       (if at_most h h' then h else h')) :: (narrowed known' v'))
+
+(** val check_range :
+    hints -> layerD list -> layerD -> box -> line list list -> box -> box ->
+    range_tree -> bool **)
+
+let rec check_range o ls last0 b around known v = function
+| Range_leaf ds ->
+  (match bounds o b [] ls around ds with
+   | Some lines ->
+     contains v
+       (narrowed known
+         (ends_of (all_before ls lines []) (fst last0) (snd last0) b))
+   | None -> false)
+| Range_halves (ds, k, m, lower, upper) ->
+  (match bounds o b [] ls around ds with
+   | Some lines ->
+     let e =
+       narrowed known
+         (ends_of (all_before ls lines []) (fst last0) (snd last0) b)
+     in
+     (&&) (check_range o ls last0 (cut k m false b) lines e v lower)
+       (check_range o ls last0 (cut k m true b) lines e v upper)
+   | None -> false)
+
+(** val ends_of_terms : int -> term list -> box list -> box option **)
+
+let rec ends_of_terms m others vs =
+  match others with
+  | [] -> (match vs with
+           | [] -> Some (repeat (zero, zero) m)
+           | _ :: _ -> None)
+  | t :: others' ->
+    let { phi = _; inputs_in = _; fewest = low; most = high } = t in
+    (match vs with
+     | [] -> None
+     | v :: vs' ->
+       (match ends_of_terms m others' vs' with
+        | Some s ->
+          if (&&) ((&&) ((=) (length v) m) (Big.leq Big.zero low))
+               (Big.leq low high)
+          then Some (add_ends low high v s)
+          else None
+        | None -> None))
+
+(** val joins : part -> int -> bool **)
+
+let joins p n =
+  (=) (length (hd [] (fst p.outer))) (outputs (map fst p.hidden) n)
+
 type proof =
 | By_inequality of dyadic * dyadic list * factor
 | By_vector of dyadic list
@@ -2006,6 +2143,7 @@ type proof =
 | By_roundings of box list * dyadic list list
 | By_rounded_sum of box * dyadic list
 | By_steps of box list
+| By_parts_among of dyadic * hints * (box * range_tree) list * tree
 
 (** val is_nil : 'a1 list -> bool **)
 
@@ -2228,6 +2366,66 @@ let check_parts_of_all ps f moves scale0 u r form o radius ts =
         (part_inequality ls p.outer q (app moves (false :: [])) scale0 r)
         (all_faces radius) ts))
 
+(** val check_term_range :
+    part list -> int -> hints -> term -> (box * range_tree) -> bool **)
+
+let check_term_range ps rho o t v =
+  let p = part_at ps t.phi in
+  (&&)
+    ((&&) ((&&) (fits_part p) (relu_between p))
+      (joins p (length t.inputs_in)))
+    (check_range o p.hidden (term_layer p (part_at ps rho))
+      (clamp_ends p.clamp t.inputs_in) [] [] (fst v) (snd v))
+
+(** val check_term_ranges :
+    part list -> int -> hints -> term list -> (box * range_tree) list -> bool **)
+
+let rec check_term_ranges ps rho o others vs =
+  match others with
+  | [] -> (match vs with
+           | [] -> true
+           | _ :: _ -> false)
+  | t :: others' ->
+    (match vs with
+     | [] -> false
+     | v :: vs' ->
+       (&&) (check_term_range ps rho o t v)
+         (check_term_ranges ps rho o others' vs'))
+
+(** val check_slope_among :
+    part list -> int -> int -> bool list -> dyadic list -> box -> term list
+    -> dyadic -> dyadic -> hints -> (box * range_tree) list -> tree -> bool **)
+
+let check_slope_among ps p rho moves scale0 b others u r o ranges t =
+  let f = part_at ps p in
+  let g = part_at ps rho in
+  let n = inputs_of f in
+  let m = length (fst (first_layer g)) in
+  (&&)
+    ((&&)
+      ((&&)
+        ((&&)
+          ((&&)
+            ((&&)
+              ((&&)
+                ((&&)
+                  ((&&)
+                    ((&&)
+                      ((&&) ((&&) (fits_part f) (relu_between f))
+                        ((<=) (length f.clamp) n)) (joins f n))
+                    (negb (is_nil f.hidden))) (is_chain n f.hidden))
+                (fits_part g)) (relu_between g)) (is_nil g.clamp))
+          (negb (is_nil g.hidden))) ((=) (length moves) n))
+      (check_term_ranges ps rho o others ranges))
+    (match ends_of_terms m others (map fst ranges) with
+     | Some s ->
+       check_parts_of_box ((coupled f g (map fst s)) :: []) (Alone 0)
+         (app moves (repeat false m))
+         (if is_nil scale0 then [] else app scale0 (repeat one m))
+         (app b (map (fun i -> (zero, (add0 (snd i) (neg (fst i))))) s)) u r
+         None o t
+     | None -> false)
+
 (** val valueD : part -> dyadic list -> dyadic list **)
 
 let valueD p x =
@@ -2439,6 +2637,106 @@ let rec total_in accepted squares kinds rho =
 let check_law_in_box ps accepted stacked kinds rho u =
   (&&) ((&&) (is_nonnegative u) (fits_part (part_at ps rho)))
     (match total_in accepted stacked kinds rho with
+     | Some s -> at_most s (if stacked then mul0 u u else u)
+     | None -> false)
+
+(** val term_among : Big.t -> ((kind * box) * Big.t) -> term **)
+
+let term_among less k =
+  let least = Big.sub (snd k) less in
+  { phi = (fst (fst (fst (fst k)))); inputs_in = (snd (fst k)); fewest =
+  (if Big.leq Big.zero least then least else Big.zero); most =
+  (Big.sub (snd (fst (fst k))) less) }
+
+(** val others_of :
+    ((kind * box) * Big.t) list -> ((kind * box) * Big.t) ->
+    ((kind * box) * Big.t) list -> term list **)
+
+let others_of before k after =
+  app (map (term_among Big.zero) before)
+    ((term_among ((fun p -> p) Big.one) k) :: (map (term_among Big.zero)
+                                                after))
+
+(** val same_terms_in_boxes : term list -> term list -> bool **)
+
+let rec same_terms_in_boxes a b =
+  match a with
+  | [] -> (match b with
+           | [] -> true
+           | _ :: _ -> false)
+  | s :: a' ->
+    (match b with
+     | [] -> false
+     | t :: b' ->
+       (&&)
+         ((&&)
+           ((&&) ((&&) ((=) s.phi t.phi) (same_box s.inputs_in t.inputs_in))
+             (Big.equal s.fewest t.fewest)) (Big.equal s.most t.most))
+         (same_terms_in_boxes a' b'))
+
+(** val may_be_there : term -> bool **)
+
+let may_be_there t =
+  negb (Big.equal t.most Big.zero)
+
+(** val find_slope_among :
+    claim list -> int -> int -> bool list -> box -> term list -> dyadic option **)
+
+let rec find_slope_among accepted p rho moves b others =
+  match accepted with
+  | [] -> None
+  | c0 :: rest0 ->
+    (match c0 with
+     | Slope_among (q, k, m, scale0, c, ts, u) ->
+       (match scale0 with
+        | [] ->
+          if (&&)
+               ((&&) ((&&) ((&&) ((=) p q) ((=) rho k)) (same_moves moves m))
+                 (same_box b c))
+               (same_terms_in_boxes (filter may_be_there others) ts)
+          then Some u
+          else find_slope_among rest0 p rho moves b others
+        | _ :: _ -> find_slope_among rest0 p rho moves b others)
+     | _ -> find_slope_among rest0 p rho moves b others)
+
+(** val total_among :
+    claim list -> bool -> ((kind * box) * Big.t) list ->
+    ((kind * box) * Big.t) list -> int -> dyadic option **)
+
+let rec total_among accepted squares before kinds rho =
+  match kinds with
+  | [] -> Some zero
+  | k :: kinds' ->
+    let (p0, _) = k in
+    let (k0, b) = p0 in
+    let (p1, n) = k0 in
+    let (p, moves) = p1 in
+    let any = find_slope_in accepted p rho moves b in
+    let bound =
+      match find_slope_among accepted p rho moves b
+              (others_of before k kinds') with
+      | Some u -> less_of u any
+      | None -> any
+    in
+    (match bound with
+     | Some u ->
+       (match total_among accepted squares (app before (k :: [])) kinds' rho with
+        | Some rest0 ->
+          if (&&) (is_nonnegative u) (Big.leq Big.zero n)
+          then Some
+                 (add0 (mul0 (n, Big.zero) (if squares then mul0 u u else u))
+                   rest0)
+          else None
+        | None -> None)
+     | None -> None)
+
+(** val check_law_among :
+    part list -> claim list -> bool -> ((kind * box) * Big.t) list -> int ->
+    dyadic -> bool **)
+
+let check_law_among ps accepted stacked kinds rho u =
+  (&&) ((&&) (is_nonnegative u) (fits_part (part_at ps rho)))
+    (match total_among accepted stacked [] kinds rho with
      | Some s -> at_most s (if stacked then mul0 u u else u)
      | None -> false)
 
@@ -2804,6 +3102,15 @@ let check_claim ps accepted c p =
     (match p with
      | By_rounded_sum (sums, errors) ->
        check_sum_error ps accepted terms rho u sums errors
+     | _ -> false)
+  | Slope_among (p0, rho, moves, scale0, b, others, u) ->
+    (match p with
+     | By_parts_among (r, o, ranges, t) ->
+       check_slope_among ps p0 rho moves scale0 b others u r o ranges t
+     | _ -> false)
+  | Law_among (stacked, kinds, rho, u) ->
+    (match p with
+     | By_triangle -> check_law_among ps accepted stacked kinds rho u
      | _ -> false)
   | Step_at_most (silent, boxes, p0, rho, u) ->
     (match p with

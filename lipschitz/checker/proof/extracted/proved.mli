@@ -301,6 +301,9 @@ type claim =
 | Jump_at_most of int * box * int * dyadic
 | Float_error of int * box * dyadic list * dyadic list * dyadic
 | Sum_float_error of (term * dyadic list) list * int * dyadic
+| Slope_among of int * int * bool list * dyadic list * box * term list
+   * dyadic
+| Law_among of bool * ((kind * box) * Big.t) list * int * dyadic
 | Step_at_most of int list list * (int * box) list * int * int * dyadic
 
 val steepest : activation -> dyadic
@@ -532,6 +535,39 @@ val check_trees :
   hints -> layerD list -> (line list list -> conflict list -> dyadic list ->
   matrixD) -> box list -> tree list -> bool
 
+val passing : int -> int -> layerD list -> layerD list
+
+val joined_layer : layerD -> layerD -> layerD
+
+val first_layer : part -> layerD
+
+val term_layer : part -> part -> layerD
+
+val with_units : matrixD -> int -> matrixD
+
+val coupled : part -> part -> dyadic list -> part
+
+type range_tree =
+| Range_leaf of decision list list
+| Range_halves of decision list list * int * dyadic * range_tree * range_tree
+
+val all_before :
+  layerD list -> line list list -> (layerD * line list) list ->
+  (layerD * line list) list
+
+val ends_of :
+  (layerD * line list) list -> matrixD -> dyadic list -> box -> box
+
+val narrowed : box -> box -> box
+
+val check_range :
+  hints -> layerD list -> layerD -> box -> line list list -> box -> box ->
+  range_tree -> bool
+
+val ends_of_terms : int -> term list -> box list -> box option
+
+val joins : part -> int -> bool
+
 type proof =
 | By_inequality of dyadic * dyadic list * factor
 | By_vector of dyadic list
@@ -547,6 +583,7 @@ type proof =
 | By_roundings of box list * dyadic list list
 | By_rounded_sum of box * dyadic list
 | By_steps of box list
+| By_parts_among of dyadic * hints * (box * range_tree) list * tree
 
 val is_nil : 'a1 list -> bool
 
@@ -605,6 +642,16 @@ val check_parts_of_all :
   part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic ->
   proved_form option -> hints -> dyadic list -> tree list -> bool
 
+val check_term_range :
+  part list -> int -> hints -> term -> (box * range_tree) -> bool
+
+val check_term_ranges :
+  part list -> int -> hints -> term list -> (box * range_tree) list -> bool
+
+val check_slope_among :
+  part list -> int -> int -> bool list -> dyadic list -> box -> term list ->
+  dyadic -> dyadic -> hints -> (box * range_tree) list -> tree -> bool
+
 val valueD : part -> dyadic list -> dyadic list
 
 val value_ofD :
@@ -637,6 +684,27 @@ val total_in : claim list -> bool -> (kind * box) list -> int -> dyadic option
 val check_law_in_box :
   part list -> claim list -> bool -> (kind * box) list -> int -> dyadic ->
   bool
+
+val term_among : Big.t -> ((kind * box) * Big.t) -> term
+
+val others_of :
+  ((kind * box) * Big.t) list -> ((kind * box) * Big.t) ->
+  ((kind * box) * Big.t) list -> term list
+
+val same_terms_in_boxes : term list -> term list -> bool
+
+val may_be_there : term -> bool
+
+val find_slope_among :
+  claim list -> int -> int -> bool list -> box -> term list -> dyadic option
+
+val total_among :
+  claim list -> bool -> ((kind * box) * Big.t) list -> ((kind * box) * Big.t)
+  list -> int -> dyadic option
+
+val check_law_among :
+  part list -> claim list -> bool -> ((kind * box) * Big.t) list -> int ->
+  dyadic -> bool
 
 val find_within : claim list -> int -> box -> box option
 

@@ -11,9 +11,7 @@ let largest_input = 0x1p100
 let on_at_corner = 0x1p-30
 
 type domain = Box of Proved.box | Everywhere
-type found = Beyond | Proof of domain * (unit -> Proved.proof) * (unit -> string)
-
-let words_of_beyond = "proved by parts of boxes with forms for a number of neighbours"
+type found = domain * (unit -> Proved.proof) * (unit -> string)
 
 (* Guesses. None of them can make a false claim accepted. *)
 
@@ -78,7 +76,7 @@ let box_of (net : Network.t) certificate part where =
 let hex_words where json = List.map Exact.parse_hex_float (Exact.words (text where json))
 
 (* One word of a tree: a letter, and its number or its decision. *)
-type word = Split of int | Multipliers of int | Of_rho | Decided of int * bool * int
+type word = Split of int | Multipliers of int | Form of int | Of_rho | Decided of int * bool * int
 let word_of text =
   let size = String.length text in
   let number from until =
@@ -90,7 +88,7 @@ let word_of text =
   | 'r' when size = 1 -> Some Of_rho
   | 's' -> Option.map (fun k -> Split k) (number 1 size)
   | 't' -> Option.map (fun k -> Multipliers k) (number 1 size)
-  | 'q' -> Option.map (fun _ -> Of_rho) (number 1 size)
+  | 'q' -> Option.map (fun k -> Form k) (number 1 size)
   | 'd' ->
     (match List.find_opt (fun sign -> String.contains text sign) [ '+'; '-' ] with
      | None -> None
@@ -157,7 +155,7 @@ let trees_of ~where ~(layers : Weights.layer list) ~passes ~multipliers ~boxes t
     if !at >= Array.length words then rejected "%s: the tree ends before the box is covered" where;
     match word_of words.(!at) with
     | None -> fails !at "neither a split nor a leaf, a form or a decision"
-    | Some Of_rho -> fails !at "there is no rho"
+    | Some (Of_rho | Form _) -> fails !at "there is no rho"
     | Some (Decided (neuron, is_on, corner)) ->
       (match place neuron 0 sizes with
        | None -> fails !at "a neuron is decided that nothing looks at"
@@ -190,7 +188,7 @@ let trees_of ~where ~(layers : Weights.layer list) ~passes ~multipliers ~boxes t
       let lower = tree (pending + 1) low (with_middle high) in
       let upper = tree pending (with_middle low) high in
       Proved.Halve (decided, k, Exact.of_float middle, lower, upper)
-    | Of_rho | Decided _ -> assert false in
+    | Of_rho | Form _ | Decided _ -> assert false in
   let last = List.length boxes - 1 in
   let trees = List.mapi (fun k (low, high) -> tree (last - k) low high) boxes in
   if !at < Array.length words then fails !at "the box is covered already";
@@ -219,68 +217,79 @@ let form_of net rho where json =
   require (Proved.check_form part form) "%s: the factor does not show that the matrix inequality holds" where;
   form
 
+(* rho of a proof, which the bound's square must reach. *)
+let rho_of where json ~upper =
+  let rho = Exact.hex_float where (find where "rho" json) in
+  require (rho > 0. && Proved.at_most (Exact.of_float rho) (Proved.mul0 upper upper)) "%s: claims less than sqrt(rho)"
+    where;
+  rho
+let check_range where rho ~moves ~scale =
+  require (0x1p-400 <= rho && rho <= 0x1p400) "%s: rho is not positive, or out of range" where;
+  let moving = List.filteri (fun k _ -> List.nth moves k) scale in
+  require (List.for_all (fun w -> 0x1p-200 <= w && w <= 0x1p200) moving) "%s: scale is out of range" where
+
+(* Conflicts and the multipliers, as many as there are neurons, that a leaf may name. *)
+let multipliers_of where json sizes =
+  let lists = list where (find where "multipliers" json) in
+  let conflicts = if has "conflicts" json then list where (find where "conflicts" json) else [] in
+  require (not (has "conflicts" json) || List.length conflicts = List.length lists)
+    "%s: there are conflicts for other multipliers" where;
+  let conflicts =
+    if has "conflicts" json then List.map (conflicts_of where sizes) conflicts else List.map (fun _ -> []) lists in
+  let neurons = List.fold_left (+) 0 sizes in
+  Array.of_list (List.map2 (fun conflicts some ->
+      let t = hex_words where some in
+      require (List.length t = neurons && List.for_all (fun x -> x >= 0.) t)
+        "%s: multipliers are not one nonnegative number per hidden neuron" where;
+      conflicts, List.map Exact.of_float t) conflicts lists)
+
+(* Hints for a proof, and the reason where they do not show it. `leaves`: the number of the word of each. *)
+let hints_of where leaves =
+  let guesses = new_guesses () in
+  let reason () =
+    let k = guesses.matrices in
+    if k > 0 && not guesses.is_shown then
+      Printf.sprintf "%s: word %d of the tree: its multipliers do not show the bound there" where leaves.(k - 1)
+    else
+      Printf.sprintf "%s: the tree does not prove the bound after leaf %d: a neuron is not decided by its slopes"
+        where k in
+  { Proved.slope_between; rounded_up; factor_number = next_factor guesses }, reason
+
 (* `bound`'s proof; its box and what proves the bound there. *)
-let read (net : Network.t) certificate bound ~where ~names ~moves ~scale ~upper =
+let read (net : Network.t) certificate bound ~where ~names ~moves ~scale ~upper : found =
   let json = find where "proof" bound and here = where ^ ".proof" in
-  let is_coupled = has "others" json and is_global = find where "domain" bound = Text "global" in
-  let has_conflicts = has "conflicts" json in
-  require_keys here ([ "rho"; (if is_coupled then "others" else "form"); "tree"; "multipliers" ]
-    @ (if is_global then [ "radius" ] else []) @ (if has_conflicts then [ "conflicts" ] else [])
-    @ (if is_coupled then [ "forms" ] else [])) json;
+  let is_global = find where "domain" bound = Text "global" in
+  require_keys here ([ "rho"; "form"; "tree"; "multipliers" ] @ (if is_global then [ "radius" ] else [])
+    @ if has "conflicts" json then [ "conflicts" ] else []) json;
   let moved = List.hd names in
   require (not (Functions.starts_with "rho:" moved)) "%s: rho has no box" where;
-  let rho = Exact.hex_float where (find where "rho" json) in
+  let rho = rho_of where json ~upper in
   let exact_rho = Exact.of_float rho in
-  require (rho > 0. && Proved.at_most exact_rho (Proved.mul0 upper upper)) "%s: claims less than sqrt(rho)" where;
-  let conflicts = if has_conflicts then list where (find where "conflicts" json) else [] in
-  let lists = list where (find where "multipliers" json) in
-  require (not has_conflicts || List.length conflicts = List.length lists)
-    "%s: there are conflicts for other multipliers" where;
   let tree_text = text where (find where "tree" json) in
-  if is_coupled then Beyond else begin
-    let weights = Functions.weights net moved in
-    require (List.length weights.layers > 1) "%s: no hidden layer" where;
-    let form_json = find where "form" json in
-    require ((form_json = Null) = (List.length names = 1)) "%s: a form for set functions, and only for those" where;
-    let radius = if is_global then begin
-        let radius = Exact.hex_floats where (find where "radius" json) in
-        require (List.length radius = Functions.inputs net moved && List.for_all (fun r -> r > 0.) radius)
-          "%s: needs a positive radius per input" where;
-        require (List.for_all (fun r -> r <= largest_input) radius)
-          "%s: the box is empty, too large or of another size" where;
-        radius
-      end else [] in
-    let domain, boxes = if is_global then Everywhere, all_faces (Array.of_list radius)
-      else let box, low, high = box_of net certificate moved where in Box box, [ low, high ] in
-    let hidden = List.filteri (fun k _ -> k + 1 < List.length weights.layers) weights.layers in
-    let layers = if is_global then homogeneous hidden else hidden in
-    let passes (layer, neuron) =
-      is_global && layer + 1 < List.length hidden && neuron = Weights.outputs (List.nth hidden layer) in
-    let sizes = List.map Weights.outputs layers in
-    let neurons = List.fold_left (+) 0 sizes in
-    let conflicts =
-      if has_conflicts then List.map (conflicts_of where sizes) conflicts else List.map (fun _ -> []) lists in
-    let multipliers = Array.of_list (List.map2 (fun conflicts some ->
-        let t = hex_words where some in
-        require (List.length t = neurons && List.for_all (fun x -> x >= 0.) t)
-          "%s: multipliers are not one nonnegative number per hidden neuron" where;
-        conflicts, List.map Exact.of_float t) conflicts lists) in
-    require (0x1p-400 <= rho && rho <= 0x1p400) "%s: rho is not positive, or out of range" where;
-    let moving = List.filteri (fun k _ -> List.nth moves k) scale in
-    require (List.for_all (fun w -> 0x1p-200 <= w && w <= 0x1p200) moving) "%s: scale is out of range" where;
-    let trees, leaves = trees_of ~where ~layers ~passes ~multipliers ~boxes tree_text in
-    let form = match names with [ _; name ] -> Some (form_of net name (where ^ ".form") form_json) | _ -> None in
-    let guesses = new_guesses () in
-    let hints = { Proved.slope_between; rounded_up; factor_number = next_factor guesses } in
-    let proof () = match domain, trees with
-      | Box _, [ tree ] -> Proved.By_parts (exact_rho, form, hints, tree)
-      | _ -> By_all_parts (exact_rho, form, hints, List.map Exact.of_float radius, trees) in
-    let reason () =
-      let k = guesses.matrices in
-      if k > 0 && not guesses.is_shown then
-        Printf.sprintf "%s: word %d of the tree: its multipliers do not show the bound there" where leaves.(k - 1)
-      else
-        Printf.sprintf "%s: the tree does not prove the bound after leaf %d: a neuron is not decided by its slopes"
-          where k in
-    Proof (domain, proof, reason)
-  end
+  let weights = Functions.weights net moved in
+  require (List.length weights.layers > 1) "%s: no hidden layer" where;
+  let form_json = find where "form" json in
+  require ((form_json = Null) = (List.length names = 1)) "%s: a form for set functions, and only for those" where;
+  let radius = if is_global then begin
+      let radius = Exact.hex_floats where (find where "radius" json) in
+      require (List.length radius = Functions.inputs net moved && List.for_all (fun r -> r > 0.) radius)
+        "%s: needs a positive radius per input" where;
+      require (List.for_all (fun r -> r <= largest_input) radius)
+        "%s: the box is empty, too large or of another size" where;
+      radius
+    end else [] in
+  let domain, boxes = if is_global then Everywhere, all_faces (Array.of_list radius)
+    else let box, low, high = box_of net certificate moved where in Box box, [ low, high ] in
+  let hidden = List.filteri (fun k _ -> k + 1 < List.length weights.layers) weights.layers in
+  let layers = if is_global then homogeneous hidden else hidden in
+  let passes (layer, neuron) =
+    is_global && layer + 1 < List.length hidden && neuron = Weights.outputs (List.nth hidden layer) in
+  let multipliers = multipliers_of where json (List.map Weights.outputs layers) in
+  check_range where rho ~moves ~scale;
+  let trees, leaves = trees_of ~where ~layers ~passes ~multipliers ~boxes tree_text in
+  let form = match names with [ _; name ] -> Some (form_of net name (where ^ ".form") form_json) | _ -> None in
+  let hints, reason = hints_of where leaves in
+  let proof () = match domain, trees with
+    | Box _, [ tree ] -> Proved.By_parts (exact_rho, form, hints, tree)
+    | _ -> By_all_parts (exact_rho, form, hints, List.map Exact.of_float radius, trees) in
+  domain, proof, reason

@@ -4,8 +4,8 @@
 open Refusal
 open Json
 
-(* By parts: proved for all inputs, and not written by --coq. *)
-type source = Proved_here | By_parts | In_box | Not_checked
+(* By parts: proved for all inputs, and not written by --coq. Among: for a number of neighbours in a box. *)
+type source = Proved_here | By_parts | In_box | Among | Not_checked
 type t = {
   net : Network.t;
   json : Json.t;
@@ -160,19 +160,21 @@ let check_product state where names claim scale upper =
   prove state claim Proved.By_product (where ^ ": claims less than the product of the norms");
   Proved_here
 
-(* By parts of boxes: the claim is one of the box, and what is beyond the theorems is not checked. *)
-let check_parts state where bound names ~func ~moves ~scale ~exact_scale ~upper =
-  match Box_parts.read state.net state.json bound ~where ~names ~moves ~scale ~upper with
-  | Beyond ->
-    let upper = text where (find where "upper_hex" bound) in
-    not_checked state (Printf.sprintf "%s <= %s: %s" where upper Box_parts.words_of_beyond);
-    Not_checked
-  | Proof (domain, proof, reason) ->
+(* By parts of boxes: the claim is one of the box. *)
+let check_parts state where bound names ~func ~moves ~scale ~exact_scale ~neighbours ~upper =
+  if has "others" (find where "proof" bound) then begin
+    let claim, proof, reason =
+      Coupled.read state.net state.json bound ~where ~names ~moves ~scale ~neighbours ~upper in
+    prove_unwritten state claim (proof ()) reason;
+    Among
+  end else begin
+    let domain, proof, reason = Box_parts.read state.net state.json bound ~where ~names ~moves ~scale ~upper in
     let claim, source = match domain with
       | Box_parts.Box box -> Proved.Slope_in_box (func, moves, exact_scale, box, upper), In_box
       | Everywhere -> Slope_at_most (func, moves, exact_scale, upper), By_parts in
     prove_unwritten state claim (proof ()) reason;
     source
+  end
 
 (* What is not stated of functions with other activations than ReLU. *)
 let check_activations state where bound names =
@@ -219,7 +221,7 @@ let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~
       let proofs = inequality state claim where ~neurons ~upper (find where "proof" bound) in
       prove_by state claim proofs (no_factor where); Proved_here
     | method_ when List.mem method_ local_methods -> check_local state where bound names
-    | Text "branch" -> check_parts state where bound names ~func ~moves ~scale ~exact_scale ~upper
+    | Text "branch" -> check_parts state where bound names ~func ~moves ~scale ~exact_scale ~neighbours ~upper
     | Text "product" when find where "proof" bound = Null -> check_product state where names claim scale upper
     | _ -> rejected "%s: unknown upper_method" where in
   if scale = [] then begin
@@ -286,7 +288,8 @@ let check_law state law =
     require (domain = "box" || not (Hashtbl.mem state.in_box (f, block)))
       "%s: rests on a bound that holds on a box only" where;
     match Hashtbl.find_opt state.uppers (f, block, neighbours) with
-    | Some (fewer, source) when domain = "box" && neighbours <> [] && at_most fewer any -> f, count, fewer, source
+    | Some (fewer, fewer_source) when domain = "box" && neighbours <> [] && at_most fewer any ->
+      f, count, fewer, (if Z.equal (fst fewer) (fst any) && Z.equal (snd fewer) (snd any) then source else fewer_source)
     | _ -> f, count, any, source in
   let bounds = List.map bound_of terms in
   require (List.mem block [ "all"; "position"; "velocity" ]) "%s: no law for this block" where;
@@ -312,7 +315,14 @@ let check_law state law =
       let box, _, _ = Box_parts.box_of state.net state.json (part f) where in kind bound, box in
     let rho = Functions.index state.net ("rho:" ^ rho) in
     let law = Proved.Law (stacked, List.map kind bounds, rho, upper) in
-    if is_written then prove state law By_triangle reason
+    if List.exists (fun (_, _, _, source) -> source = Among) bounds then begin
+      (* In the order of the others in claims of bounds. *)
+      let grounds, others = List.partition (fun (f, _, _, _) -> part f = "phi:ground") bounds in
+      let least (f, _, _, _) = if part f = "phi:ground" then Z.one else Z.zero in
+      let kinds = List.map (fun bound -> in_box bound, least bound) (others @ grounds) in
+      prove_unwritten state (Law_among (stacked, kinds, rho, upper)) By_triangle (fun () -> reason)
+    end
+    else if is_written then prove state law By_triangle reason
     else if everywhere then prove_unwritten state law By_triangle (fun () -> reason)
     else
       prove_unwritten state (Law_in_box (stacked, List.map in_box bounds, rho, upper)) By_triangle (fun () -> reason);

@@ -42,7 +42,8 @@ let claim out = function
   | Law (stacked, kinds, rho, u) ->
     Printf.bprintf out "Law %a %a %a %a" flag stacked (list (pair (pair natural (list flag)) integer)) kinds natural rho
       number u
-  | Slope_in_box _ | Law_in_box _ -> assert false  (* not written: Claims.prove_unwritten *)
+  | Slope_in_box _ | Slope_among _ | Law_in_box _ | Law_among _ ->
+    assert false  (* not written: Claims.prove_unwritten *)
   | Within (p, b, v) -> Printf.bprintf out "Within %a %a %a" natural p box b box v
   | Sum_within (silent, terms, rho, v) ->
     Printf.bprintf out "Sum_within %a %a %a %a" compositions silent (list term) terms natural rho box v
@@ -64,7 +65,7 @@ let proof out = function
   | By_points (x, y, others) ->
     Printf.bprintf out "By_points %a %a %a" numbers x numbers y (list (pair natural numbers)) others
   | By_triangle -> Buffer.add_string out "By_triangle"
-  | By_parts _ | By_all_parts _ -> assert false
+  | By_parts _ | By_all_parts _ | By_parts_among _ -> assert false
   | By_layers bounds -> Printf.bprintf out "By_layers %a" (list box) bounds
   | By_sum sums -> Printf.bprintf out "By_sum %a" box sums
   | By_norm -> Buffer.add_string out "By_norm"

@@ -23,5 +23,7 @@ Check silent_slope.
 Print Assumptions silent_slope.
 Check silent_slope_in_box.
 Print Assumptions silent_slope_in_box.
+Check silent_slope_among.
+Print Assumptions silent_slope_among.
 Check silent_law.
 Print Assumptions silent_law.

@@ -1,6 +1,7 @@
 (** The checker of claims, and what its acceptance means: `step_sound`. *)
 From Coq Require Import List ZArith Reals Bool.
-From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Blocks Lower Values Parts.
+From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Blocks Lower Values
+  Parts Coupled.
 Import ListNotations.
 
 Inductive proof :=
@@ -16,7 +17,8 @@ Inductive proof :=
 | By_norm
 | By_roundings (bounds : list box) (errors : list (list dyadic))
 | By_rounded_sum (sums : box) (errors : list dyadic)
-| By_steps (sums : list box).
+| By_steps (sums : list box)
+| By_parts_among (rho : dyadic) (o : hints) (ranges : list (box * range_tree)) (t : tree).
 
 Definition is_nil {A} (l : list A) : bool := match l with [] => true | _ => false end.
 Definition matrix_at (ps : list part) (p layer : nat) : matrixD := fst (nth layer (layers (part_at ps p)) ([], [])).
@@ -119,6 +121,36 @@ Definition check_parts_of_all ps f moves scale u r form (o : hints) (radius : li
   && check_parts_with ps f moves scale u r form (fun q =>
     check_trees o ls (part_inequality ls (outer p) q (moves ++ [false]) scale r) (all_faces radius) ts).
 
+(** In a box among a given number of neighbours. *)
+Definition check_term_range ps rho (o : hints) (t : term) (v : box * range_tree) : bool :=
+  let p := part_at ps (phi t) in
+  fits_part p && relu_between p && joins p (length (inputs_in t))
+  && check_range o (hidden p) (term_layer p (part_at ps rho)) (clamp_ends (clamp p) (inputs_in t)) [] [] (fst v)
+       (snd v).
+Fixpoint check_term_ranges ps rho (o : hints) (others : list term) (vs : list (box * range_tree)) : bool :=
+  match others, vs with
+  | [], [] => true
+  | t :: others', v :: vs' => check_term_range ps rho o t v && check_term_ranges ps rho o others' vs'
+  | _, _ => false
+  end.
+Definition check_slope_among ps p rho moves scale (b : box) others u r (o : hints) (ranges : list (box * range_tree))
+    (t : tree) : bool :=
+  let f := part_at ps p in
+  let g := part_at ps rho in
+  let n := inputs_of f in
+  let m := length (fst (first_layer g)) in
+  fits_part f && relu_between f && (length (clamp f) <=? n)%nat && joins f n && negb (is_nil (hidden f)) && is_chain
+    n (hidden f)
+  && fits_part g && relu_between g && is_nil (clamp g) && negb (is_nil (hidden g))
+  && (length moves =? n)%nat && check_term_ranges ps rho o others ranges
+  && match ends_of_terms m others (map fst ranges) with
+     | Some s =>
+         check_parts_of_box [coupled f g (map fst s)] (Alone 0) (moves ++ repeat false m)
+           (if is_nil scale then [] else scale ++ repeat one m)
+           (b ++ map (fun i => (zero, add (snd i) (neg (fst i)))) s) u r None o t
+     | None => false
+     end.
+
 (** Slopes from below, between two points. *)
 Definition valueD (p : part) (x : list dyadic) : list dyadic := networkD (hidden p) (outer p) (clampedD (clamp p) x).
 Definition value_ofD (ps : list part) (f : function) (rest x : list dyadic) : list dyadic :=
@@ -209,6 +241,57 @@ Fixpoint total_in (accepted : list claim) (squares : bool) (kinds : list (kind *
 Definition check_law_in_box ps accepted (stacked : bool) kinds rho u : bool :=
   is_nonnegative u && fits_part (part_at ps rho)
   && match total_in accepted stacked kinds rho with
+     | Some s => at_most s (if stacked then mul u u else u)
+     | None => false
+     end.
+
+(** Among a given number of neighbours: of each kind, with its box and the fewest there may be, the others of its
+  own and
+    of the other kinds. *)
+Definition term_among (less : Z) (k : kind * box * Z) : term :=
+  let least := (snd k - less)%Z in
+  Term (fst (fst (fst (fst k)))) (snd (fst k)) (if (0 <=? least)%Z then least else 0%Z) (snd (fst (fst k)) - less).
+Definition others_of (before : list (kind * box * Z)) (k : kind * box * Z) (after : list (kind * box * Z)) : list
+  term :=
+  map (term_among 0) before ++ term_among 1 k :: map (term_among 0) after.
+Fixpoint same_terms_in_boxes (a b : list term) : bool :=
+  match a, b with
+  | s :: a', t :: b' =>
+      (phi s =? phi t)%nat && same_box (inputs_in s) (inputs_in t) && (fewest s =? fewest t)%Z
+      && (Meaning.most s =? Meaning.most t)%Z && same_terms_in_boxes a' b'
+  | [], [] => true
+  | _, _ => false
+  end.
+Definition may_be_there (t : term) : bool := negb (Meaning.most t =? 0)%Z.
+Fixpoint find_slope_among (accepted : list claim) (p rho : nat) (moves : list bool) (b : box) (others : list term) :
+    option dyadic :=
+  match accepted with
+  | [] => None
+  | Slope_among q k m [] c ts u :: rest =>
+      if (p =? q)%nat && (rho =? k)%nat && same_moves moves m && same_box b c
+         && same_terms_in_boxes (filter may_be_there others) ts
+      then Some u else find_slope_among rest p rho moves b others
+  | _ :: rest => find_slope_among rest p rho moves b others
+  end.
+Fixpoint total_among (accepted : list claim) (squares : bool) (before kinds : list (kind * box * Z)) (rho : nat) :
+    option dyadic :=
+  match kinds with
+  | [] => Some zero
+  | k :: kinds' =>
+      let '(p, moves, n, b, least) := k in
+      let any := find_slope_in accepted p rho moves b in
+      let bound := match find_slope_among accepted p rho moves b (others_of before k kinds') with
+                   | Some u => less_of u any | None => any end in
+      match bound, total_among accepted squares (before ++ [k]) kinds' rho with
+      | Some u, Some rest =>
+          if is_nonnegative u && (0 <=? n)%Z then Some (add (mul (n, 0%Z) (if squares then mul u u else u)) rest)
+          else None
+      | _, _ => None
+      end
+  end.
+Definition check_law_among ps accepted (stacked : bool) kinds rho u : bool :=
+  is_nonnegative u && fits_part (part_at ps rho)
+  && match total_among accepted stacked [] kinds rho with
      | Some s => at_most s (if stacked then mul u u else u)
      | None => false
      end.
@@ -376,6 +459,9 @@ Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p :
   | Jump_at_most p b rho u, By_norm => check_jump ps accepted p b rho u
   | Float_error p b r e u, By_roundings bounds errors => check_error ps p b r e u bounds errors
   | Sum_float_error terms rho u, By_rounded_sum sums errors => check_sum_error ps accepted terms rho u sums errors
+  | Slope_among p rho moves scale b others u, By_parts_among r o ranges t =>
+      check_slope_among ps p rho moves scale b others u r o ranges t
+  | Law_among stacked kinds rho u, By_triangle => check_law_among ps accepted stacked kinds rho u
   | Step_at_most silent boxes p rho u, By_steps sums => check_step ps accepted silent boxes p rho u sums
   | _, _ => false
   end.

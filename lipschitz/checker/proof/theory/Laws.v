@@ -21,7 +21,7 @@ Lemma find_slope_sound ps accepted phi rho moves u : Forall (holds ps) accepted 
   find_slope accepted phi rho moves = Some u -> holds ps (Slope_at_most (Set_of phi rho) moves [] u).
 Proof.
   intros H. revert u. induction H as [|c rest Hc H IH]; intros u; [discriminate|].
-  destruct c as [| |[|q k] m [|] v| | | | | | | | | |]; simpl find_slope; auto.
+  destruct c as [| |[|q k] m [|] v| | | | | | | | | | | |]; simpl find_slope; auto.
   destruct (Nat.eqb_spec phi q), (Nat.eqb_spec rho k); cbn [andb]; try apply IH.
   destruct (same_moves moves m) eqn:E; [|apply IH]. apply same_moves_eq in E. subst.
   destruct (find_slope rest q k m) as [w|]; [destruct (at_most w v)|]; intros G; inversion G; subst;
@@ -141,9 +141,9 @@ Lemma Forall2_lengths {A B} (P : A -> B -> Prop) a b : Forall2 P a b -> length a
 Proof. intros H. induction H; simpl; auto. Qed.
 Lemma law_of_steps ps rho cs kinds movers (stacked : bool) u v : fits_part (part_at ps rho) = true -> 0 <= real u ->
   not_negative cs kinds -> Forall2 may_move kinds movers ->
-  Forall (fun m => forall s,
-      norm (minus (value (part_at ps rho) (plusR (before m) s)) (value (part_at ps rho) (plusR (after m) s)))
-    <= bound m * far m) (steps_of ps cs (combine kinds movers)) ->
+  let steps := steps_of ps cs (combine kinds movers) in
+  norm (minus (value (part_at ps rho) (vector_sum (map before steps)))
+    (value (part_at ps rho) (vector_sum (map after steps)))) <= dotR (map bound steps) (map far steps) ->
   real v = fold_right Rplus 0 (map
       (fun ck : dyadic * kind => IZR (snd (snd ck)) * (if stacked then
       real (fst ck) * real (fst ck) else real (fst ck))) (combine cs kinds)) ->
@@ -151,15 +151,24 @@ Lemma law_of_steps ps rho cs kinds movers (stacked : bool) u v : fits_part (part
   bounded_change stacked u (minus (value (part_at ps rho) (sum_at ps fst groups))
     (value (part_at ps rho) (sum_at ps snd groups))) (concat movers).
 Proof.
-  intros Hf H B M S E Ht. pose proof (Forall2_lengths _ _ _ B) as Lc. pose proof (Forall2_lengths _ _ _ M) as Lm.
+  intros Hf H B M steps T E Ht. unfold steps in T. clear steps. pose proof (Forall2_lengths _ _ _ B) as Lc. pose
+    proof (Forall2_lengths _ _ _ M) as Lm.
   cbv zeta. unfold sum_at. destruct (steps_values ps cs kinds movers Lc) as [-> ->].
-  pose proof (telescope (value (part_at ps rho)) _ _ (fun x => length_value _ x Hf) S []) as T.
-  rewrite !plus_nil_r in T. destruct stacked; simpl.
+  destruct stacked; simpl.
   - eapply Rle_trans; [exact T|]. eapply Rle_trans; [apply cauchy|]. rewrite steps_far by auto.
     apply Rmult_le_compat_r; [apply norm_nonneg|]. apply sqrt_below; auto. rewrite real_mul in Ht.
     pose proof (square_of_bounds ps cs kinds movers B M). lra.
   - intros r Hr F. eapply Rle_trans; [exact T|].
     eapply Rle_trans; [apply (sum_of_steps ps cs kinds movers r Hr B M F)|]. apply Rmult_le_compat_r; auto. lra.
+Qed.
+Lemma telescope_all ps rho steps : fits_part (part_at ps rho) = true -> Forall (fun m => forall s,
+      norm (minus (value (part_at ps rho) (plusR (before m) s)) (value (part_at ps rho) (plusR (after m) s)))
+    <= bound m * far m) steps ->
+  norm (minus (value (part_at ps rho) (vector_sum (map before steps)))
+    (value (part_at ps rho) (vector_sum (map after steps)))) <= dotR (map bound steps) (map far steps).
+Proof.
+  intros Hf S. pose proof (telescope (value (part_at ps rho)) _ _ (fun x => length_value _ x Hf) S []) as T.
+  now rewrite !plus_nil_r in T.
 Qed.
 Lemma law_sound ps accepted stacked kinds rho u : Forall (holds ps) accepted ->
   check_law ps accepted stacked kinds rho u = true -> holds ps (Law stacked kinds rho u).
@@ -167,7 +176,8 @@ Proof.
   intros HA. unfold check_law. intros H. do 2 both H. rename H0 into Ht, H1 into Hf. apply real_nonnegative in H.
   destruct (total_of accepted stacked kinds rho) as [v|] eqn:Ev; [|discriminate]. apply at_most_real in Ht.
   destruct (total_sound _ _ _ _ _ _ HA Ev) as (cs & P & B & E). simpl holds. intros movers M L.
-  apply law_of_steps with (cs := cs) (v := v); auto. apply (steps_hold ps rho cs kinds movers B M L).
+  apply law_of_steps with (cs := cs) (v := v); auto. apply telescope_all; auto. apply (steps_hold ps rho cs kinds
+    movers B M L).
 Qed.
 
 (** In a box *)
@@ -175,7 +185,7 @@ Lemma find_slope_in_sound ps accepted phi rho moves b u : Forall (holds ps) acce
   find_slope_in accepted phi rho moves b = Some u -> holds ps (Slope_in_box (Set_of phi rho) moves [] b u).
 Proof.
   intros H. revert u. induction H as [|c rest Hc H IH]; intros u; [discriminate|].
-  destruct c as [| |[|q k] m [|] v| |[|q k] m [|] d v| | | | | | | |]; simpl find_slope_in; auto.
+  destruct c as [| |[|q k] m [|] v| |[|q k] m [|] d v| | | | | | | | | |]; simpl find_slope_in; auto.
   - destruct (Nat.eqb_spec phi q), (Nat.eqb_spec rho k); cbn [andb]; try apply IH.
     destruct (same_moves moves m) eqn:E; [|apply IH]. apply same_moves_eq in E. subst.
     assert (holds ps (Slope_in_box (Set_of q k) m [] b v)) as Hv by (intros r x y A L _ _; now apply Hc).
@@ -227,5 +237,6 @@ Proof.
   intros HA. unfold check_law_in_box. intros H. do 2 both H. rename H0 into Ht, H1 into Hf. apply real_nonnegative in H.
   destruct (total_in accepted stacked kinds rho) as [v|] eqn:Ev; [|discriminate]. apply at_most_real in Ht.
   destruct (total_in_sound _ _ _ _ _ _ HA Ev) as (cs & P & B & E). simpl holds. intros movers M W L.
-  apply law_of_steps with (cs := cs) (v := v); auto. apply (steps_in_box_hold ps rho cs kinds movers B M W L).
+  apply law_of_steps with (cs := cs) (v := v); auto. apply telescope_all; auto. apply (steps_in_box_hold ps rho cs
+    kinds movers B M W L).
 Qed.

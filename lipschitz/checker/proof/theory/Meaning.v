@@ -142,6 +142,8 @@ Inductive claim :=
 | Jump_at_most (phi : nat) (b : box) (rho : nat) (u : dyadic)
 | Float_error (p : nat) (b : box) (r e : list dyadic) (u : dyadic)
 | Sum_float_error (terms : list (term * list dyadic)) (rho : nat) (u : dyadic)
+| Slope_among (phi rho : nat) (moves : list bool) (scale : list dyadic) (b : box) (others : list term) (u : dyadic)
+| Law_among (stacked : bool) (kinds : list (kind * box * Z)) (rho : nat) (u : dyadic)
 | Step_at_most (silent : list (list nat)) (boxes : list (nat * box)) (phi rho : nat) (u : dyadic).
 
 Definition weights_at (ps : list part) (p layer : nat) : list (list R) :=
@@ -199,6 +201,22 @@ Definition holds (ps : list part) (c : claim) : Prop :=
         float_vector_sum (inputs_of (part_at ps rho)) (concat computed) s ->
         float_network (map real_layer (hidden (part_at ps rho))) (real_layer (outer (part_at ps rho))) s v ->
         norm (minus v (value (part_at ps rho) (sum_of_terms ps rho (combine (map fst terms) inputs)))) <= real u
+  | Slope_among p rho moves scale b others u =>
+      forall inputs x y, Forall2 may_stand others inputs -> agree moves x y -> length x = inputs_of (part_at ps p) ->
+        within b x -> within b y -> let term t := map (value (part_at ps (phi (fst t)))) (snd t) in
+        let rest := vector_sum (flat_map term (combine others inputs)) in
+        norm (minus (value_of ps (Set_of p rho) rest x) (value_of ps (Set_of p rho) rest y))
+          <= real u * distance scale x y
+  | Law_among stacked kinds rho u =>
+      let movable := map (fun k => fst (fst k)) kinds in
+      forall movers, Forall2 may_move movable movers ->
+      Forall2 (fun k ms => (snd k <= Z.of_nat (length ms))%Z /\
+        Forall (fun m => within (snd (fst k)) (fst m) /\ within (snd (fst k)) (snd m)) ms) kinds movers ->
+      let groups := combine movable movers in
+      Forall (fun g => Forall (fun m => length (fst m) = inputs_of (part_at ps (fst (fst (fst g))))) (snd g))
+        groups ->
+      bounded_change stacked u (minus (value (part_at ps rho) (sum_at ps fst groups))
+        (value (part_at ps rho) (sum_at ps snd groups))) (concat movers)
   | Step_at_most silent boxes phi rho u =>
       forall x others, Forall (in_its_box boxes) ((phi, x) :: others) ->
         norm (minus (set_value ps silent rho ((phi, x) :: others)) (set_value ps silent rho others)) <= real u

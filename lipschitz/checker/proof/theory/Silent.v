@@ -25,7 +25,16 @@ Theorem silent_slope_in_box ps silent phi rho moves scale b u :
   let f z := unless_silent ps silent rho those (plusR (value (part_at ps phi) z) rest) in
   norm (minus (f x) (f y)) <= real u * distance scale x y.
 Proof. intros H those rest x y A L X Y. eapply Rle_trans; [apply silent_change|]. now apply (H rest x y). Qed.
-(** What `Law` and `Law_in_box` conclude. *)
+Theorem silent_slope_among ps silent p rho moves scale b others u :
+  holds ps (Slope_among p rho moves scale b others u) ->
+  forall those inputs x y, Forall2 may_stand others inputs -> agree moves x y ->
+  length x = inputs_of (part_at ps p) -> within b x -> within b y ->
+  let term t := map (value (part_at ps (phi (fst t)))) (snd t) in
+  let rest := vector_sum (flat_map term (combine others inputs)) in
+  let f z := unless_silent ps silent rho those (plusR (value (part_at ps p) z) rest) in
+  norm (minus (f x) (f y)) <= real u * distance scale x y.
+Proof. intros H those inputs x y M A L X Y. eapply Rle_trans; [apply silent_change|]. now apply (H inputs x y). Qed.
+(** What `Law`, `Law_in_box` and `Law_among` conclude. *)
 Theorem silent_law ps silent those stacked rho u s t movers :
   bounded_change stacked u (minus (value (part_at ps rho) s) (value (part_at ps rho) t)) movers ->
   bounded_change stacked u

@@ -2,7 +2,7 @@
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
     Values Claims Slopes Witness Laws Ranges Silent Roundings
-    Relaxation Increments Cover Everywhere.
+    Relaxation Increments Cover Among Laws_among Everywhere.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -23,6 +23,8 @@ Proof.
   - now apply jump_sound in H.
   - now apply error_sound in H.
   - now apply sum_error_sound in H.
+  - now apply slope_among_sound in H.
+  - now apply law_among_sound in H.
   - now apply step_at_most_sound in H.
 Qed.
 (** What the program does claim by claim. *)
