@@ -43,10 +43,8 @@ void require_what_is_bounded(const Network& network, const std::map<std::string,
 
 /// The largest slopes of what lies between the layers of `weights`; nothing where they are 1.
 void add_steepest_slopes(const Weights& weights, std::vector<UpperBound>& factors) {
-  for (const files::Activation activation : weights.activations()) {
-    const double steepest = files::function_of(activation).steepest();
+  for (const double steepest : weights.steepest_slopes())
     if (steepest != 1) factors.emplace_back(steepest);
-  }
 }
 
 /// The law's bound from those of its terms, and whether one of them was cut short.

@@ -80,8 +80,8 @@ void multiply_local_slopes(const Network& network, const check::Intervals& box,
       total = total * check::Dyadic(layer.norm.norm.upper.value());
   total = total * check::steepest_on_box(*parts.at(names.front()), box);
   if (names.size() == 2)
-    for (const files::Activation activation : parts.at(names.back())->activations())
-      total = total * check::Dyadic(files::function_of(activation).steepest());
+    for (const double steepest : parts.at(names.back())->steepest_slopes())
+      total = total * check::Dyadic(steepest);
   const double upper = rounded_up(total);
   if (!(upper < bound.upper.value())) return;
   bound.upper = UpperBound(upper);

@@ -51,13 +51,16 @@ class BoxValues {
     return values_;
   }
 
-  void activate(Activation activation) {
+  /// All numbers but the last ones, which the layer keeps.
+  void activate(const files::Layer& layer) {
+    const Activation activation = layer.activation;
     if (files::function_of(activation).sorts()) {
-      values_ = activated_intervals(activation, values_);
+      values_ = activated_intervals(layer, values_);
       form_ = constant_form();
       return;
     }
-    for (std::size_t i = 0; i < values_.lower.size(); ++i) activate(activation, i);
+    const std::size_t changed = values_.lower.size() - static_cast<std::size_t>(layer.kept);
+    for (std::size_t i = 0; i < changed; ++i) activate(activation, i);
   }
 
  private:
@@ -127,7 +130,7 @@ std::vector<Intervals> layers_on_box(const files::Weights& weights, const Interv
   BoxValues values(box);
   std::vector<Intervals> result;
   for (std::size_t k = 0; k < weights.layers.size(); ++k) {
-    if (k > 0) values.activate(weights.layers[k - 1].activation);
+    if (k > 0) values.activate(weights.layers[k - 1]);
     result.push_back(values.pass(weights.layers[k]));
   }
   return result;
@@ -140,8 +143,10 @@ std::vector<std::vector<Interval>> slopes_on_box(const files::Weights& weights, 
     const Activation activation = weights.layers[k].activation;
     result.emplace_back();
     if (files::function_of(activation).sorts()) continue;
-    for (std::size_t i = 0; i < layers[k].lower.size(); ++i)
+    const auto kept = static_cast<std::size_t>(weights.layers[k].kept);
+    for (std::size_t i = 0; i < layers[k].lower.size() - kept; ++i)
       result.back().push_back(slopes_between(activation, {layers[k].lower[i], layers[k].upper[i]}));
+    result.back().insert(result.back().end(), kept, kKeptSlopes);
   }
   return result;
 }

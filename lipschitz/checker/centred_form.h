@@ -21,6 +21,9 @@ namespace swarmcert::check {
 /// @param box finite, an interval per input.
 std::vector<Intervals> layers_on_box(const files::Weights& weights, const Intervals& box);
 
+/// Around 1, of numbers that an activation leaves as they are: the upper one is above the lower one.
+inline const Interval kKeptSlopes{1 - 0x1p-24, 1.0};
+
 /// For each layer but the last, between which slopes each of its numbers is activated over the box. Empty for a layer
 /// that is sorted.
 std::vector<std::vector<Interval>> slopes_on_box(const files::Weights& weights, const Intervals& box);

@@ -222,8 +222,7 @@ void CertificateChecker::check_product(const Json& bound, const std::vector<std:
       total = total * steepest_on_box(*parts_.at(name), local_inputs(bound, name, where));
       continue;
     }
-    for (const files::Activation activation : parts_.at(name)->activations())
-      total = total * files::function_of(activation).steepest();
+    for (const double steepest : parts_.at(name)->steepest_slopes()) total = total * steepest;
   }
   require(Dyadic(upper) >= total, where + ": claims less than the product of the norms");
 }
@@ -331,8 +330,14 @@ std::string statement_for(const files::Network& network) {
     const std::vector<files::Activation> all = part.second->activations();
     return std::any_of(all.begin(), all.end(), [](auto one) { return files::function_of(one).sorts(); });
   });
+  const bool keeps = std::any_of(parts.begin(), parts.end(), [](const auto& part) {
+    const std::vector<files::Layer>& layers = part.second->layers;
+    return std::any_of(layers.begin(), layers.end(),
+                       [](const files::Layer& layer) { return layer.kept > 0; });
+  });
   std::string text = kStatement;
   if (sorts) text += kSortingStatement;
+  if (keeps) text += kKeepingStatement;
   if (network.invariants) text += kInvariantsStatement;
   const std::vector<std::string> silent = files::silent_compositions(network);
   for (std::size_t k = 0; k < silent.size(); ++k) text += (k == 0 ? kSilentStatement : ", ") + silent[k];

@@ -49,7 +49,8 @@ Unit unit_of(const files::ActivationFunction& function) {
 /// Of layer k.
 using FactorOf = std::function<Dyadic(const files::Weights& weights, std::size_t k)>;
 
-/// The stages of `function`, with `factor` of each layer in front of its activation multiplied to the stage behind it.
+/// The stages of `function`, with `factor` of each layer in front of its activation multiplied to what the activation
+/// passes to the stage behind it.
 std::vector<Matrix> chained(const files::Network& network, const std::string& function,
                             const std::string& block, const std::vector<double>& scale,
                             const FactorOf& factor) {
@@ -77,7 +78,8 @@ std::vector<Matrix> chained(const files::Network& network, const std::string& fu
         chain.back() = product(w, chain.back());
       } else {
         const Dyadic before = factor(weights, k - 1);
-        for (Dyadic& entry : w.entries) entry = entry * before;
+        for (int i = 0; i < w.rows; ++i)
+          for (int j = 0; j < w.cols - weights.layers[k - 1].kept; ++j) w(i, j) = w(i, j) * before;
         chain.push_back(std::move(w));
       }
     }
@@ -102,7 +104,7 @@ std::vector<Matrix> stages(const files::Network& network, const std::string& fun
 
 BentChain bent_chain(const files::Network& network, const std::string& function, const std::string& block,
                      const std::vector<double>& scale) {
-  BentChain result;
+  BentChain result;  // what a layer keeps has slope 1, which lies in [0, 1] and in [1 - c, c]
   result.stages = chained(network, function, block, scale, [](const files::Weights& weights, std::size_t k) {
     return unit_of(function_after(weights, k)).slope;
   });
@@ -134,8 +136,10 @@ BentChain chain_on_box(const files::Network& network, const std::string& functio
   const files::Weights& behind = *parts.at(names.back());
   for (std::size_t k = 0; k + 1 < behind.layers.size(); ++k) {
     const files::ActivationFunction& after = function_after(behind, k);
-    result.slopes.insert(result.slopes.end(), static_cast<std::size_t>(behind.layers[k].outputs),
+    const auto kept = static_cast<std::size_t>(behind.layers[k].kept);
+    result.slopes.insert(result.slopes.end(), static_cast<std::size_t>(behind.layers[k].outputs) - kept,
                          {after.least_slope, after.greatest_slope});
+    result.slopes.insert(result.slopes.end(), kept, {kKeptSlopes.lower, kKeptSlopes.upper});
   }
   return result;
 }

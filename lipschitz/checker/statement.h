@@ -38,6 +38,11 @@ inline constexpr const char* kSortingStatement =
     "maxmin:halves, of 2 h numbers, is max(t_i, t_(i+h)) for i = 1 .. h and then min(t_i, t_(i+h)); "
     "maxmin:pairs is max(t_(2i-1), t_(2i)) for i = 1 .. h and then min(t_(2i-1), t_(2i)).";
 
+/// What is added for networks with a skip connection past another activation than ReLU.
+inline constexpr const char* kKeepingStatement =
+    " tanh:n, and so with other names, is that function of each of the first n numbers of a layer and leaves "
+    "the others as they are.";
+
 /// What is added for networks of rotation invariants.
 inline constexpr const char* kInvariantsStatement =
     " A set function takes of each neighbour its relative position p in m and velocity v in m/s, whose "

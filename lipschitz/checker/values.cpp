@@ -48,22 +48,23 @@ Intervals relu_intervals(Intervals intervals) {
   return intervals;
 }
 
-Intervals activated_intervals(files::Activation activation, const Intervals& layer) {
+Intervals activated_intervals(const files::Layer& layer, const Intervals& values) {
+  const files::Activation activation = layer.activation;
   // Sorting, maxima and minima do not decrease when a number grows: each end by itself.
   if (files::function_of(activation).sorts())
-    return {files::rearranged(activation, layer.lower), files::rearranged(activation, layer.upper)};
-  Intervals result;
-  for (std::size_t i = 0; i < layer.lower.size(); ++i) {
-    Interval values = values_between(activation, {layer.lower[i], layer.upper[i]});
-    result.lower.push_back(std::move(values.lower));
-    result.upper.push_back(std::move(values.upper));
+    return {files::rearranged(activation, values.lower), files::rearranged(activation, values.upper)};
+  Intervals result = values;
+  for (std::size_t i = 0; i + static_cast<std::size_t>(layer.kept) < values.lower.size(); ++i) {
+    Interval between = values_between(activation, {values.lower[i], values.upper[i]});
+    result.lower[i] = std::move(between.lower);
+    result.upper[i] = std::move(between.upper);
   }
   return result;
 }
 
 Intervals network_intervals(const files::Weights& weights, Intervals inputs) {
   for (std::size_t k = 0; k < weights.layers.size(); ++k) {
-    if (k > 0) inputs = activated_intervals(weights.layers[k - 1].activation, inputs);
+    if (k > 0) inputs = activated_intervals(weights.layers[k - 1], inputs);
     inputs = layer_intervals(weights.layers[k], inputs);
   }
   return inputs;

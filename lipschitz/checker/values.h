@@ -28,8 +28,8 @@ struct Bounded {
 /// @param inputs as many as the layer takes.
 Intervals layer_intervals(const files::Layer& layer, const Intervals& inputs);
 Intervals relu_intervals(Intervals intervals);
-/// Of a layer behind its activation, number by number (values_between()) or sorted.
-Intervals activated_intervals(files::Activation activation, const Intervals& layer);
+/// Of what leaves `layer`, behind its activation: number by number (values_between()), sorted, or kept.
+Intervals activated_intervals(const files::Layer& layer, const Intervals& values);
 /// Of what leaves the last layer of `weights`. At a point exact, without width, where all activations are ReLU or sort.
 Intervals network_intervals(const files::Weights& weights, Intervals inputs);
 

@@ -71,7 +71,7 @@ AffineMap map_of(const Layer& layer) {
 /// The activation of `before`, as a map of a new layer's outputs.
 AffineMap activated(ReluChain& chain, const AffineMap& before, const ActivationTerms& activation,
                     const std::string& name) {
-  if (activation.s != Activation::kRelu) return chain.activated(before, activation.s, name);
+  if (activation.s != Activation::kRelu) return chain.activated(before, activation.s, {}, name);
   std::vector<AffineMap> rows;
   for (const ActivationTerms::Term& term : activation.terms) {
     rows.push_back(before);
@@ -144,9 +144,9 @@ std::string activation_misfit(const Weights& weights, const std::string& text) {
   const std::vector<std::string> names = spread(weights, listed_activations(text));
   const std::size_t layers = weights.layers.size();
   if (weights.states_activation() && layers > 1) {
-    const std::vector<Activation> own = weights.activations();
-    const bool agrees = std::equal(own.begin(), own.end(), names.begin(), names.end(),
-                                   [](Activation s, const auto& name) { return function_of(s).op == name; });
+    const bool agrees =
+        std::equal(names.begin(), names.end(), weights.layers.begin(), weights.layers.end() - 1,
+                   [](const auto& name, const Layer& layer) { return op_after(layer) == name; });
     if (agrees) return "";
     return std::string(weights.activation_is_given ? "network.toml states " : "the file itself states ") +
            weights.activation_names() + " between its layers";

@@ -14,7 +14,7 @@ std::vector<ChainStep> chain(const Network& network, const std::string& name) {
   for (const Layer& layer : weights.layers) {
     result.push_back({"linear", layer.name, layer.inputs, layer.outputs});
     if (&layer != &weights.layers.back())
-      result.push_back({function_of(layer.activation).op, "", layer.outputs, layer.outputs});
+      result.push_back({op_after(layer), "", layer.outputs, layer.outputs, words_after(layer)});
   }
   return result;
 }
@@ -34,8 +34,7 @@ std::string chain_words(const std::vector<ChainStep>& chain) {
   std::string text;
   for (const ChainStep& step : chain) {
     if (!text.empty()) text += " - ";
-    const std::optional<Activation> activation = activation_called(step.op);
-    text += activation           ? function_of(*activation).words
+    text += !step.words.empty()  ? step.words
             : step.op == "clamp" ? "clamp"
             : step.layer.empty() ? "linear"
                                  : step.layer;

@@ -13,6 +13,7 @@ struct ChainStep {
   std::string op;     ///< "clamp", "linear" (y = W x + b), or what ActivationFunction::op says
   std::string layer;  ///< of "linear": its name in the file, which may be empty
   int inputs = 0, outputs = 0;
+  std::string words = {};  ///< of an activation, in texts
 };
 
 /// The operations of part `name` of NET, first applied first: the clamp where one acts on it, then its layers with an

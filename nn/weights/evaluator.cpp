@@ -48,6 +48,7 @@ Evaluator<Scalar>::Evaluator(const Weights& weights)
   if (sizeof(Scalar) < sizeof(double) && !is_relu_)
     throw InputError({weights.path, "", "activation", weights.activation_names(),
                       "float32 evaluates ReLU networks only", "evaluate this network in float64"});
+  for (const Layer& layer : weights.layers) kept_.push_back(layer.kept);
   arrays_.reserve(2 * weights.layers.size());
   for (const Layer& layer : weights.layers) {
     arrays_.push_back(converted<Scalar>(layer.weights, weights.path, layer.name + ".weight"));
@@ -71,8 +72,8 @@ std::vector<Scalar> Evaluator<Scalar>::smooth_value(const std::vector<Scalar>& i
     std::vector<Scalar> y(static_cast<std::size_t>(layers_[k].outputs));
     nn::apply<1>(layers_[k], x.data(), y.data(), nn::Activation::kNone);
     if (k < activations_.size()) {
-      const std::vector<double> after = activated(activations_[k], {y.begin(), y.end()});
-      for (std::size_t i = 0; i < y.size(); ++i) y[i] = static_cast<Scalar>(after[i]);
+      const std::vector<double> after = activated(activations_[k], {y.begin(), y.end() - kept_[k]});
+      for (std::size_t i = 0; i < after.size(); ++i) y[i] = static_cast<Scalar>(after[i]);
     }
     x = std::move(y);
   }

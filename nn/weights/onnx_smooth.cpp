@@ -121,10 +121,7 @@ std::vector<AffineMap*> OnnxGraph::needed_after(const Node& node) {
 OnnxValue OnnxGraph::computed_smooth(const Node& node) {
   const OnnxValue x = value(node, 0);
   const Activation activation = smooth_activation(node);
-  if (!needed_after(node).empty())
-    throw OperatorRefusal{"has a skip connection beside it, which can be read beside ReLU only",
-                          "leave the skip connection out, or train with ReLU"};
-  const AffineMap activated = chain_.activated(x.map, activation, layer_name(x.name));
+  const AffineMap activated = chain_.activated(x.map, activation, needed_after(node), layer_name(x.name));
   for (auto& [value_name, value] : values_) value.name.clear();
   return {activated, x.shape, ""};
 }

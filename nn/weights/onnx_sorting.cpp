@@ -79,9 +79,9 @@ void OnnxGraph::join_sorting() {
 /// The activation of the whole value `x`, as it lies in memory.
 OnnxValue OnnxGraph::sorted(const Node& node, const OnnxValue& x, Activation activation) {
   if (!needed_after(node).empty())
-    throw OperatorRefusal{"has a skip connection beside it, which can be read beside ReLU only",
+    throw OperatorRefusal{"has a skip connection beside it, which can be read beside other activations only",
                           "leave the skip connection out, or train with ReLU"};
-  const AffineMap result = chain_.activated(x.map, activation, layer_name(x.name));
+  const AffineMap result = chain_.activated(x.map, activation, {}, layer_name(x.name));
   for (auto& [value_name, value] : values_) value.name.clear();
   return {result, x.shape, ""};
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "nn/weights/tensors.h"
@@ -87,9 +88,30 @@ AffineMap ReluChain::relu(const AffineMap& rows, const std::vector<AffineMap*>& 
   return result;
 }
 
-AffineMap ReluChain::activated(const AffineMap& rows, Activation activation, const std::string& name) {
-  append(rows, activation, name);
-  return identity_map(width_);
+AffineMap ReluChain::activated(const AffineMap& rows, Activation activation,
+                               const std::vector<AffineMap*>& carried, const std::string& name) {
+  const int own = rows.outputs();
+  Rows kept(width_);
+  std::vector<AffineMap> rewritten;
+  for (const AffineMap* const value : carried) {
+    AffineMap map;
+    for (std::size_t i = 0; i < value->rows.size(); ++i) {
+      const bool is_constant = value->rows[i].empty();
+      map.shift.push_back(is_constant ? value->shift[i] : Enclosed{});
+      map.rows.emplace_back();
+      if (!is_constant) map.rows.back() = {{own + kept.add(value->rows[i], value->shift[i]), {1, 0}}};
+    }
+    rewritten.push_back(std::move(map));
+  }
+  append(stacked({&rows, &kept.map}), activation, name);
+  layers_.back().kept = kept.map.outputs();
+  for (std::size_t k = 0; k < carried.size(); ++k) {
+    rewritten[k].inputs = width_;
+    *carried[k] = std::move(rewritten[k]);
+  }
+  std::vector<int> which(static_cast<std::size_t>(own));
+  std::iota(which.begin(), which.end(), 0);
+  return selected(identity_map(width_), which);
 }
 
 void ReluChain::append(const AffineMap& map, Activation activation, const std::string& name) {

@@ -26,10 +26,12 @@ class ReluChain {
   /// @throws FoldingLimit.
   AffineMap relu(const AffineMap& rows, const std::vector<AffineMap*>& carried, const std::string& name);
 
-  /// Adds the layer `rows` with any activation, which may act on the layer as a whole. @return the map of its outputs,
-  /// x -> x; all values before it are given up.
+  /// Adds the layer `rows` with any activation, which may act on the layer as a whole. @return its outputs as a map of
+  /// the new layer's, in the same order.
+  /// @param carried values that are needed later: rewritten as maps of numbers that the activation leaves as they are.
   /// @throws FoldingLimit.
-  AffineMap activated(const AffineMap& rows, Activation activation, const std::string& name);
+  AffineMap activated(const AffineMap& rows, Activation activation, const std::vector<AffineMap*>& carried,
+                      const std::string& name);
   /// Of the last layer that was added. Precondition: has_layers().
   Activation last_activation() const { return layers_.back().activation; }
 

@@ -78,12 +78,32 @@ std::vector<Activation> Weights::activations() const {
   return result;
 }
 
+std::vector<double> Weights::steepest_slopes() const {
+  std::vector<double> result;
+  for (std::size_t k = 0; k + 1 < layers.size(); ++k) {
+    const double own = function_of(layers[k].activation).steepest();
+    result.push_back(layers[k].kept > 0 ? std::max(own, 1.0) : own);
+  }
+  return result;
+}
+
+std::string op_after(const Layer& layer) {
+  const std::string op = function_of(layer.activation).op;
+  return layer.kept > 0 ? op + ":" + std::to_string(layer.outputs - layer.kept) : op;
+}
+
+std::string words_after(const Layer& layer) {
+  const std::string words = function_of(layer.activation).words;
+  return layer.kept > 0 ? words + " of the first " + std::to_string(layer.outputs - layer.kept) : words;
+}
+
 std::string Weights::activation_names() const {
-  const std::vector<Activation> all = activations();
+  std::vector<std::string> all;
+  for (std::size_t k = 0; k + 1 < layers.size(); ++k) all.push_back(op_after(layers[k]));
   const bool are_alike = std::adjacent_find(all.begin(), all.end(), std::not_equal_to<>()) == all.end();
   std::string names;
-  for (const Activation activation : all) {
-    names += (names.empty() ? "" : ", ") + function_of(activation).op;
+  for (const std::string& op : all) {
+    names += (names.empty() ? "" : ", ") + op;
     if (are_alike) break;
   }
   return names;
@@ -127,8 +147,7 @@ double rounding_of_slope(const Weights& weights) {
     product *= norm * kUp;
     if (layer.weight_rounding > 0) share += layer.weight_rounding / norm * kUp;
   }
-  for (const Activation activation : weights.activations())
-    product *= function_of(activation).steepest() * kUp;
+  for (const double steepest : weights.steepest_slopes()) product *= steepest * kUp;
   if (!(share > 0)) return 0;
   return product * std::expm1(share * kUp) * kUp * kUp;  // 1 + s <= exp(s)
 }

@@ -42,8 +42,16 @@ struct Layer {
   double bias_rounding = 0;
   Activation activation =
       Activation::kRelu;  ///< between this layer and the next; of the last one without meaning
+  /// How many of the outputs, the last ones, the activation leaves as they are: what a skip connection takes past it. 0
+  /// where the activation is ReLU or sorts.
+  int kept = 0;
   bool is_added = false;  ///< no layer of the file: the identity behind an activation that ends the network
 };
+
+/// What follows `layer`, as chains state it: "tanh", or "tanh:8" of the first 8 outputs only.
+std::string op_after(const Layer& layer);
+/// The same in texts: "tanh", "tanh of the first 8".
+std::string words_after(const Layer& layer);
 
 /// A multilayer perceptron: after every layer but the last an activation, ReLU unless stated otherwise. One that ends
 /// in an activation has an identity layer behind it.
@@ -62,6 +70,8 @@ struct Weights {
   int outputs() const { return layers.back().outputs; }
   /// What follows each layer but the last, first layer first.
   std::vector<Activation> activations() const;
+  /// The steepest slope of each.
+  std::vector<double> steepest_slopes() const;
   /// Their names as chains state them, each once where all are alike: "tanh", "relu, relu, tanh".
   std::string activation_names() const;
   bool is_relu() const;  ///< whether all of them are ReLU
@@ -131,6 +141,7 @@ class Evaluator {
 
   bool is_relu_;
   std::vector<Activation> activations_;  ///< after each layer but the last
+  std::vector<int> kept_;                ///< of each layer
   std::vector<std::vector<Scalar>> arrays_;
   std::vector<nn::DenseLayer<Scalar>> layers_;
 };

@@ -57,6 +57,10 @@ SORTING_STATEMENT = (
     " Of the numbers t_1, t_2, ... of a layer, groupsort:k sorts each k side by side, the smallest first; "
     "maxmin:halves, of 2 h numbers, is max(t_i, t_(i+h)) for i = 1 .. h and then min(t_i, t_(i+h)); "
     "maxmin:pairs is max(t_(2i-1), t_(2i)) for i = 1 .. h and then min(t_(2i-1), t_(2i)).")
+# Added for networks with a skip connection past another activation than ReLU.
+KEEPING_STATEMENT = (
+    " tanh:n, and so with other names, is that function of each of the first n numbers of a layer and leaves the "
+    "others as they are.")
 # Added for networks of rotation invariants.
 INVARIANTS_STATEMENT = (
     " A set function takes of each neighbour its relative position p in m and velocity v in m/s, whose vertical "
@@ -84,6 +88,8 @@ MONOTONE = {"relu": Fraction(1), "tanh": Fraction(1), "sigmoid": Fraction(1, 4),
 SORTING = {"maxmin:halves": 2, "maxmin:pairs": 2, **{f"groupsort:{k}": k for k in range(2, 65)}}
 STEEPEST = {**MONOTONE, "silu": 1 + Fraction(0x1999, 2 ** 16), "gelu": 1 + Fraction(0x211, 2 ** 12),
             **dict.fromkeys(SORTING, Fraction(1))}
+# Around the slope 1 of numbers that an activation leaves as they are, on a box.
+KEPT_SLOPES = (1 - Fraction(1, 2 ** 24), Fraction(1))
 
 
 class Rejected(Exception):
@@ -243,11 +249,15 @@ def content_sha256(document):
 # --- weight files --------------------------------------------------------------------------------------------------
 
 class Layer:
-    def __init__(self, name, outputs, inputs, weights, biases):
+    """`kept`: how many of the outputs, the last ones, the activation behind it leaves as they are."""
+
+    def __init__(self, name, outputs, inputs, weights, biases, kept=0):
         self.name, self.outputs, self.inputs, self.weights, self.biases = name, outputs, inputs, weights, biases
+        self.kept = kept
 
     def rounded(self):
-        return Layer(self.name, self.outputs, self.inputs, list(map(f32, self.weights)), list(map(f32, self.biases)))
+        return Layer(self.name, self.outputs, self.inputs, list(map(f32, self.weights)), list(map(f32, self.biases)),
+                     self.kept)
 
 
 def identity_layer(name, size):
@@ -712,6 +722,166 @@ class OnnxChain:
             self.order = [k - k % size + size - 1 - k % size for k in range(count)]
 
 
+class OnnxFolding:
+    """A graph with skip connections as a chain of layers. Every value is an affine map of the last layer's outputs,
+    each number of it rounded once where it is no double: (rows {column: factor}, shifts, name of its first weight)."""
+
+    def __init__(self, stored, value, shape):
+        self.stored, self.layers, self.ops, self.is_exact, self.is_double = stored, [], [], True, False
+        self.width, self.names = shape[-1], []
+        self.values, self.first = {}, value
+        if self.width is not None:
+            self.begin()
+
+    def begin(self):
+        self.values[self.first] = ([{i: 1.0} for i in range(self.width)], [0.0] * self.width, "")
+
+    def rounded(self, exact):
+        result = float(exact)
+        self.is_exact = self.is_exact and Fraction(result) == exact
+        return result
+
+    def sums(self, terms):
+        """Rows of columns and exact factors, summed up."""
+        result = {}
+        for column, factor in terms:
+            result[column] = result.get(column, 0) + factor
+        return {column: self.rounded(x) for column, x in sorted(result.items()) if x != 0}
+
+    def tensor(self, name):
+        require_input(name in self.stored, f"{name} is not stored")
+        self.is_double = self.is_double or self.stored[name].kind == "float64"
+        return self.stored[name]
+
+    def linear(self, node):
+        weight = self.tensor(node.inputs[1])
+        require_input(len(weight.shape) == 2 and not node.integer("transA", 0), "no matrix of weights")
+        first, second = weight.shape
+        rows = [weight.numbers[i * second:(i + 1) * second] for i in range(first)]
+        if node.kind == "MatMul" or node.integer("transB", 0) == 0:
+            rows = [list(column) for column in zip(*rows)]
+        if self.width is None:
+            self.width = len(rows[0])
+            self.begin()
+        of, shifts, name = self.values[node.inputs[0]]
+        require_input(len(rows[0]) == len(of), "a layer takes another number of inputs")
+        has_bias = len(node.inputs) == 3 and node.inputs[2]
+        bias = self.tensor(node.inputs[2]).numbers if has_bias else [0.0] * len(rows)
+        require_input(len(bias) == len(rows), "a bias of another size")
+        return ([self.sums((column, Fraction(w) * Fraction(x)) for w, inner in zip(row, of) if w
+                           for column, x in inner.items()) for row in rows],
+                [self.rounded(Fraction(b) + sum(Fraction(w) * Fraction(s) for w, s in zip(row, shifts)))
+                 for row, b in zip(rows, bias)], name or node.inputs[1])
+
+    def added(self, node):
+        sign = -1 if node.kind == "Sub" else 1
+        if all(name in self.values for name in node.inputs):
+            (a, p, name), (b, q, other) = (self.values[name] for name in node.inputs)
+            require_input(len(a) == len(b), "adds values of different sizes")
+            return ([self.sums([(k, Fraction(x)) for k, x in row.items()] +
+                               [(k, sign * Fraction(x)) for k, x in beside.items()]) for row, beside in zip(a, b)],
+                    [self.rounded(Fraction(x) + sign * Fraction(y)) for x, y in zip(p, q)], name or other)
+        require_input(node.kind == "Add", "subtracts a constant")
+        value, constant = sorted(node.inputs, key=lambda name: name not in self.values)
+        rows, shifts, name = self.values[value]
+        numbers = self.tensor(constant).numbers
+        require_input(len(numbers) == len(rows), "adds a constant of another size")
+        return rows, [self.rounded(Fraction(x) + Fraction(y)) for x, y in zip(shifts, numbers)], name
+
+    def is_never_negative(self, row, shift):
+        behind_relu = not row if not self.ops else self.ops[-1] == "relu"
+        return shift >= 0 and behind_relu and all(x > 0 for x in row.values())
+
+    def activated(self, op, value, needed):
+        """What is needed later passes a smooth activation as it is; of ReLU, as x where x >= 0, else as relu(x) -
+        relu(-x)."""
+        rows, shifts, kept_from = [], [], {}
+
+        def taken(row, shift):
+            key = next(iter(row.items())) if len(row) == 1 and shift == 0 else None
+            if key in kept_from:
+                return kept_from[key]
+            rows.append(row)
+            shifts.append(shift)
+            if key is not None:
+                kept_from[key] = len(rows) - 1
+            return len(rows) - 1
+
+        own, own_shifts, name = self.values[value]
+        if op == "relu":
+            own = [{taken(row, shift): 1.0} for row, shift in zip(own, own_shifts)]
+        else:
+            rows += own
+            shifts += own_shifts
+            own = [{i: 1.0} for i in range(len(own))]
+        for other in sorted(needed, key=lambda text: text.encode()):
+            maps, constants = [], []
+            for row, shift in zip(*self.values[other][:2]):
+                constants.append(0.0 if row else shift)
+                maps.append({taken(row, shift): 1.0} if row else {})
+                if row and op == "relu" and not self.is_never_negative(row, shift):
+                    maps[-1][taken({k: -x for k, x in row.items()}, -shift)] = -1.0
+            self.values[other] = maps, constants, ""
+        self.append(name, rows, shifts, 0 if op == "relu" else len(rows) - len(own))
+        self.ops.append(op)
+        for other, (maps, constants, _) in list(self.values.items()):
+            self.values[other] = maps, constants, ""
+        return own, [0.0] * len(own), ""
+
+    def append(self, weight, rows, shifts, kept):
+        name = weight[:-7] if weight.endswith(".weight") and len(weight) > 7 else weight
+        while not name or name in self.names:
+            name = f"layer{len(self.names) + 1}" + (f"_{name}" if name else "")
+        self.names.append(name)
+        self.layers.append(Layer(name, len(rows), self.width, [row.get(j, 0.0) for row in rows
+                                                               for j in range(self.width)], shifts, kept))
+        self.width = len(rows)
+
+    def run(self, nodes, outputs, data, order):
+        uses = [name for node in nodes for name in node.inputs] + outputs
+        for at, node in enumerate(nodes):
+            if node.kind == "Constant":
+                self.stored[node.outputs[0]] = OnnxTensor(next(v for n, v in node.attributes["value"] if n == 5))
+                continue
+            if node.kind == "Identity" and node.inputs[0] in self.stored:
+                self.stored[node.outputs[0]] = self.stored[node.inputs[0]]
+                continue
+            require_input(node.has_only(2, "alpha", [b"\0\0\x80?"]) and node.has_only(2, "beta", [b"\0\0\x80?"])
+                          and node.has_only(4, "approximate", [b"none"]),
+                          "this checker reads no factors of Gemm or Elu and no approximate Gelu")
+            if node.kind in ("Gemm", "MatMul"):
+                result = self.linear(node)
+            elif node.kind in ("Add", "Sub"):
+                result = self.added(node)
+            elif node.kind in ("Relu", "Tanh", "Sigmoid", "Softplus", "Elu", "Celu", "Gelu", "Swish"):
+                later = {name for other in nodes[at + 1:] for name in other.inputs} | set(outputs)
+                op = {"Celu": "elu", "Swish": "silu"}.get(node.kind, node.kind.lower())
+                result = self.activated(op, node.inputs[0], [name for name in self.values if name in later])
+            else:
+                require_input(node.kind == "Identity", f"this checker does not read ONNX's {node.kind} beside a skip")
+                result = self.values[node.inputs[0]]
+            for name in node.inputs:
+                uses.remove(name)
+                if name not in uses:
+                    self.values.pop(name, None)
+            if node.outputs[0] in uses:
+                self.values[node.outputs[0]] = result
+        require_input(len(outputs) == 1 and outputs[0] in self.values, "the graph does not end at its output")
+        rows, shifts, name = self.values[outputs[0]]
+        self.append(name, rows, shifts, 0)
+        numbers, f32_max = [x for layer in self.layers for x in layer.weights + layer.biases], 2.0 ** 128 - 2.0 ** 104
+        is_float = self.is_exact and not self.is_double and all(abs(x) <= f32_max and f32(x) == x for x in numbers)
+        tensors = []
+        for layer in self.layers:
+            tensors += [(f"{layer.name}.weight", [layer.outputs, layer.inputs], layer.weights),
+                        (f"{layer.name}.bias", [layer.outputs], layer.biases)]
+        result = Weights(tensors, "float32" if is_float else "float64", data, "evaluation", order)
+        for layer, folded in zip(result.layers, self.layers):
+            layer.kept = folded.kept
+        result.activations = self.ops
+        return result
+
+
 def input_shape(message):
     """Of a ValueInfoProto; without one, a row of any size."""
     def inside(data, numbers):
@@ -737,8 +907,13 @@ def read_onnx(data, order):
     require_input(len(inputs) == 1, "the graph has not one input")
     names = [inputs[0][0]] + list(stored) + [name for node in nodes for name in node.outputs if name]
     require_input(len(stored) == len(tensors) and len(set(names)) == len(names), "two values have the same name")
+    joined = list(with_groups_joined(nodes))
+    taken = [name for node in joined for name in node.inputs if name and name not in stored]
+    if any(taken.count(name) > 1 for name in taken):
+        return OnnxFolding(stored, inputs[0][0], input_shape(inputs[0][1])).run(
+            joined, [name for name, _ in named(12)], data, order)
     chain = OnnxChain(stored, inputs[0][0], input_shape(inputs[0][1]))
-    for node in with_groups_joined(nodes):
+    for node in joined:
         chain.follow(node)
     require_input([name for name, _ in named(12)] == [chain.value], "the chain does not end at the graph's output")
     if chain.is_activated:  # what ends in an activation is followed by the identity
@@ -861,7 +1036,8 @@ class Network:
         result = [("clamp", None, layers[0].inputs, layers[0].inputs)] if clamps else []
         for layer, op in zip(layers, self.parts[part].between() + [None]):
             result.append(("linear", layer.name, layer.inputs, layer.outputs))
-            result += [(op, None, layer.outputs, layer.outputs)] * (op is not None)
+            stated = f"{op}:{layer.outputs - layer.kept}" if layer.kept else op
+            result += [(stated, None, layer.outputs, layer.outputs)] * (op is not None)
         return result
 
     def maps_to_invariants(self, function):
@@ -951,9 +1127,9 @@ def unit_of(network, function, block):
 
 def stages(network, function, block, scale, divided=True):
     """The matrices between the activations, from the block's inputs in units of their scale to the output. An
-    activation of slopes in [0, b] is b times one of slopes in [0, 1]: b goes to the matrix behind it. Others, and all
-    if not `divided`, stay as they are. Of a function of rotation invariants, the inputs are those, times the slope of
-    the map to them."""
+    activation of slopes in [0, b] is b times one of slopes in [0, 1]: b goes to the columns behind it of what it does
+    not keep. Others, and all if not `divided`, stay as they are. Of a function of rotation invariants, the inputs are
+    those, times the slope of the map to them."""
     names = networks_of(function)
     require(all(name in network.parts for name in names), f"there is no {function}")
     inputs = network.parts[names[0]].layers[0].inputs
@@ -971,8 +1147,9 @@ def stages(network, function, block, scale, divided=True):
             else:
                 op = network.parts[name].between()[index - 1]
                 b = MONOTONE.get(op, Fraction(1)) if divided else Fraction(1)
-                chain.append(Matrix([[x * b.numerator for x in row] for row in w.rows],
-                                    w.exponent + 1 - b.denominator.bit_length()))
+                changed = layer.inputs - network.parts[name].layers[index - 1].kept
+                chain.append(Matrix([[x * (b.numerator if j < changed else b.denominator) for j, x in enumerate(row)]
+                                     for row in w.rows], w.exponent + 1 - b.denominator.bit_length()))
     return chain
 
 
@@ -1017,7 +1194,8 @@ def lmi(chain, rho, t):
 
 
 def slope_ranges(network, function):
-    """Per hidden neuron: slopes of stages() lie in [0, 1], or in [1 - c, c], c > 1, where they are not divided by c."""
+    """Per hidden neuron: slopes of stages() lie in [0, 1], or in [1 - c, c], c > 1, where they are not divided by c; 1,
+    of what is kept, is in both."""
     return [(Fraction(0), Fraction(1)) if op in MONOTONE else (1 - STEEPEST[op], STEEPEST[op])
             for part in (network.parts[name] for name in networks_of(function))
             for op, layer in zip(part.between(), part.layers[:-1]) for _ in range(layer.outputs)]
@@ -1777,7 +1955,8 @@ def layers_on_box(weights, low, high):
             middle = [down((l + h) / 2) for l, h in zip(low, high)]
             error = [up((h - l) / 2) + VALUE_UNIT for l, h in zip(low, high)]
             continue
-        slopes += [slopes_between(op, l, h) for l, h in zip(low, high)]
+        changed = layer.outputs - layer.kept
+        slopes += [slopes_between(op, l, h) for l, h in zip(low[:changed], high)]
         for i, (l, h, (a, b)) in enumerate(zip(low, high, slopes)):
             p = max(l, min(middle[i], h))
             value = values_between(op, p, p)
@@ -1785,7 +1964,15 @@ def layers_on_box(weights, low, high):
                 column[i] = down((a + b) / 2 * column[i])
             error[i] = up(abs(a + b) / 2 * error[i] + (b - a) / 2 * max(h - p, p - l) + value[1] - value[0] + rounding)
             middle[i] = down(value[0] + (a + b) / 2 * (middle[i] - p))
-        low, high = map(list, zip(*(values_between(op, l, h) for l, h in zip(low, high))))
+        slopes += [KEPT_SLOPES] * layer.kept
+        low, high = values_behind(op, layer, low, high)
+
+
+def values_behind(op, layer, low, high):
+    """Of the layer's numbers, those that it keeps at the end."""
+    changed = layer.outputs - layer.kept
+    ends = [values_between(op, l, h) for l, h in zip(low[:changed], high)]
+    return [a for a, _ in ends] + low[changed:], [b for _, b in ends] + high[changed:]
 
 
 def enclosed_values(weights, low, high):
@@ -1796,7 +1983,7 @@ def enclosed_values(weights, low, high):
             if op in SORTING:
                 low, high = sorted_layer(op, low), sorted_layer(op, high)
             else:
-                low, high = map(list, zip(*(values_between(op, l, h) for l, h in zip(low, high))))
+                low, high = values_behind(op, weights.layers[k - 1], low, high)
         low, high = layer_ends(layer, low, high)
     return low, high
 
@@ -1869,7 +2056,8 @@ class Checker:
         require(self.c["schema"] == "swarmcert/certificate/1", "another schema")
         sorting = any(step["op"] in SORTING for weights in self.c["network"]["weights"].values()
                       for step in weights["chain"])
-        require(self.c["statement"] == STATEMENT + SORTING_STATEMENT * sorting +
+        keeping = any(layer.kept for weights in self.network.parts.values() for layer in weights.layers)
+        require(self.c["statement"] == STATEMENT + SORTING_STATEMENT * sorting + KEEPING_STATEMENT * keeping +
                 INVARIANTS_STATEMENT * self.network.invariants +
                 (SILENT_STATEMENT + ", ".join(self.network.silent_names()) + ".") * bool(self.network.silent),
                 "another statement")
@@ -2006,8 +2194,9 @@ class Checker:
             slopes = [s for layer in self.slopes_on_box(names[0], boxed, where) for s in layer]
             if len(names) == 2:
                 behind = self.network.parts[names[1]]
-                slopes += [(Fraction(0) if op in MONOTONE else 1 - STEEPEST[op], STEEPEST[op])
-                           for op, layer in zip(behind.between(), behind.layers[:-1]) for _ in range(layer.outputs)]
+                slopes += [KEPT_SLOPES if i >= layer.outputs - layer.kept else
+                           (Fraction(0) if op in MONOTONE else 1 - STEEPEST[op], STEEPEST[op])
+                           for op, layer in zip(behind.between(), behind.layers[:-1]) for i in range(layer.outputs)]
             self.check_upper(stages(self.network, function, block, scale, divided=False), bound["proof"], upper, where,
                              slopes)
         elif bound["upper_method"] == "branch":
@@ -2025,7 +2214,8 @@ class Checker:
                     for layer in self.slopes_on_box(name, boxed, where):
                         total *= max((max(b, -a) for a, b in layer), default=Fraction(1))
                 else:
-                    total *= math.prod(STEEPEST[op] for op in part.between())
+                    total *= math.prod(max(STEEPEST[op], 1) if layer.kept else STEEPEST[op]
+                                       for op, layer in zip(part.between(), part.layers))
             require(Fraction(upper) >= total, f"{where}: claims less than the product of the norms")
         if not scale:
             key = (function, block, frozenset(neighbours.items()))

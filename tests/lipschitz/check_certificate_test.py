@@ -73,6 +73,27 @@ def smooth_models(folder, generator):
         yield [str(folder / f"{name}.onnx")]
 
 
+def skip_models(folder, generator):
+    """ONNX models with skip connections past smooth activations: residual blocks, branches side by side, ReLU blocks
+    beside them; some fold two layers into one whose weights are no doubles."""
+    layer = lambda k, x, y: ("MatMul", [x, f"w{k}"], y)
+    block = lambda k, x, y, *nodes: [layer(k, x, f"{y}a"), *nodes, layer(k + 1, f"{y}b", f"{y}c"),
+                                     ("Add", [x, f"{y}c"], y)]
+    silu = [("Sigmoid", ["ra"], "rs"), ("Mul", ["ra", "rs"], "rb")]
+    models = {
+        "residual": ([layer(1, "x", "h"), *block(2, "h", "r", ("Tanh", ["ra"], "rb")), layer(4, "r", "y")],
+                     [3, 4, 4, 4, 2]),
+        "around": (block(1, "x", "r", *silu) + block(3, "r", "y", ("Tanh", ["ya"], "yb")), [3, 4, 3, 5, 3]),
+        "branches": ([layer(1, "x", "h"), ("Tanh", ["h"], "t"), ("Sigmoid", ["h"], "s"), ("Sub", ["t", "s"], "d"),
+                      layer(2, "d", "e"), ("Softplus", ["e"], "y")], [3, 4, 2]),
+        "with_relu": ([layer(1, "x", "h"), *block(2, "h", "r", ("Relu", ["ra"], "rb")),
+                       *block(4, "r", "q", ("Gelu", ["qa"], "qb")), ("Relu", ["q"], "p"), ("Add", ["p", "h"], "y")],
+                      [3, 3, 4, 3, 4, 3])}
+    for name, (nodes, sizes) in models.items():
+        (folder / f"{name}.onnx").write_bytes(onnx(nodes, sizes, generator))
+        yield [str(folder / f"{name}.onnx")]
+
+
 def heterogeneous(folder, generator):
     """A network.toml with two kinds, ground, clamp and units."""
     for name, sizes in (("small", [6, 5, 4]), ("large", [6, 4, 4, 4]), ("ground", [4, 5, 4]), ("rho", [4, 5, 1])):
@@ -492,6 +513,9 @@ def run():
         nets += [([silent_net], ["--neighbours", "large=2,small=1"]),
                  ([silent_net], ["--domain", str(folder / "box.toml"), "--neighbours", "2"])]
         nets += [(net, []) for net in smooth_models(folder, generator)]
+        nets += [(net, options) for net in skip_models(folder, generator)
+                 for options in ([], ["--domain", str(folder / "cube.toml")])]
+        nets += [([str(folder / "around.onnx")], ["--method", "product"])]
         nets += [([str(tiny)], ["--activation", ops])
                  for ops in ("silu", "gelu", "sigmoid", "tanh,relu", "relu,silu,sigmoid", "elu,relu,relu")]
         (folder / "plane.toml").write_text('schema = "swarmcert/box/1"\nlower = [-0.5, 0.25]\nupper = [1, 0.75]\n')

@@ -56,11 +56,13 @@ class AdversarialSlopes {
       using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
       w_.emplace_back(Eigen::Map<const RowMajor>(layer.weights.data(), layer.outputs, layer.inputs));
     }
-    for (const Activation activation : weights.activations()) {
-      const files::ActivationFunction& function = files::function_of(activation);
+    for (std::size_t k = 0; k + 1 < weights.layers.size(); ++k) {
+      const files::ActivationFunction& function = files::function_of(weights.layers[k].activation);
       ends_.push_back({function.least_slope, function.greatest_slope});
       VectorXd slopes(w_[ends_.size() - 1].rows());
       for (Index i = 0; i < slopes.size(); ++i) slopes[i] = ends_.back()[generator() % 2];
+      kept_.push_back(weights.layers[k].kept);
+      slopes.tail(kept_.back()).setOnes();
       slopes_.push_back(slopes);
     }
   }
@@ -70,7 +72,7 @@ class AdversarialSlopes {
     for (bool improves = true; improves;) {
       improves = false;
       for (std::size_t k = 0; k < slopes_.size(); ++k)
-        for (Index i = 0; i < slopes_[k].size(); ++i) {
+        for (Index i = 0; i < slopes_[k].size() - kept_[k]; ++i) {
           const double before = slopes_[k][i];
           slopes_[k][i] = before == ends_[k][0] ? ends_[k][1] : ends_[k][0];
           const double there = norm();
@@ -95,6 +97,7 @@ class AdversarialSlopes {
 
   std::vector<MatrixXd> w_;
   std::vector<std::array<double, 2>> ends_;
+  std::vector<Index> kept_;  ///< numbers at the end of a layer, of slope 1
   std::vector<VectorXd> slopes_;
 };
 
@@ -189,6 +192,53 @@ TEST(MixedBounds, BesideALayerThatSortsAreTheProduct) {
     EXPECT_LE(tests::sampled_slope(weights, generator, 5000), bound.upper.value());
     EXPECT_THROW(check::bent_chain(tests::plain(weights), "network"), std::domain_error);
   }
+}
+
+/// The last `kept` numbers of each layer stay as they are, as past a skip connection.
+Weights with_skip(const std::vector<int>& sizes, const std::vector<int>& kept, const Mixture& between,
+                  unsigned seed) {
+  Weights weights = mixed(sizes, between, seed);
+  for (std::size_t k = 0; k < kept.size(); ++k) weights.layers[k].kept = kept[k];
+  return weights;
+}
+
+TEST(MixedBounds, PastSkipConnectionsAreAboveSampledAndAdversarialSlopes) {
+  std::mt19937 generator(61);
+  unsigned seed = 62;
+  for (const Mixture& between : {Mixture{Activation::kTanh, Activation::kSigmoid},
+                                 {Activation::kSilu, Activation::kRelu},
+                                 {Activation::kSelu, Activation::kGelu},
+                                 {Activation::kElu, Activation::kSoftplus},
+                                 {Activation::kSigmoid, Activation::kSigmoid}}) {
+    const std::vector<int> kept = {3, between[1] == Activation::kRelu ? 0 : 2};
+    const Weights weights = with_skip({3, 8, 7, 2}, kept, between, seed++);
+    const Network network = tests::plain(weights);
+    const CertifiedBound bound = mixed_bound(network);
+    const double upper = bound.upper.value();
+    SCOPED_TRACE(weights.activation_names());
+    EXPECT_EQ(bound.method, UpperMethod::kSdp);
+    EXPECT_LT(upper, bound.product.value());
+    const double sampled = tests::sampled_slope(weights, generator, 200000);
+    const double adversarial = AdversarialSlopes(weights, generator).climb();
+    EXPECT_LE(sampled, upper * (1 + 1e-9));
+    EXPECT_LE(adversarial, upper * (1 + 1e-9));
+    EXPECT_GT(adversarial, 0.5 * upper) << "the bound is far above all slopes: the test shows little";
+    ASSERT_TRUE(bound.lower.witness.has_value());
+    EXPECT_LE(bound.lower.witness->slope.value(), upper);
+    EXPECT_GE(bound.lower.witness->slope.value(), 0.8 * sampled);
+  }
+}
+
+TEST(MixedBounds, OfOneNumberAndItsSkipConnectionAreExact) {
+  // sigmoid(2 x) + 3 x has the slopes 3 to 3.5; tanh(x) - x has 0 to 1 in absolute value.
+  Weights sum = tests::weights({tests::layer(2, 1, {2, 1}), tests::layer(1, 2, {1, 3})});
+  sum.layers[0].activation = Activation::kSigmoid;
+  sum.layers[0].kept = 1;
+  EXPECT_NEAR(mixed_bound(tests::plain(sum)).upper.value(), 3.5, 1e-6);
+  Weights difference = tests::weights({tests::layer(2, 1, {1, 1}), tests::layer(1, 2, {1, -1})});
+  difference.layers[0].activation = Activation::kTanh;
+  difference.layers[0].kept = 1;
+  EXPECT_NEAR(mixed_bound(tests::plain(difference)).upper.value(), 1, 1e-6);
 }
 
 TEST(MixedBounds, TheStageBehindEachActivationIsMultipliedByItsOwnSlope) {
@@ -327,6 +377,31 @@ TEST(MixedCertificate, StatesTheActivationsForFilesThatDoNot) {
   Json fewer = mixed_certificate();
   fewer["network"]["weights"]["rho:default"]["chain"][1]["op"] = "mish";
   EXPECT_FALSE(check_mixed(fewer, check::with_stated_activations(fewer, unstated)).accepted);
+}
+
+TEST(MixedCertificate, PastSkipConnectionsIsOfTheNumbersThatAreKept) {
+  const Weights weights = with_skip({3, 8, 7, 2}, {3, 2}, {Activation::kSigmoid, Activation::kSigmoid}, 71);
+  const Network network = tests::plain(weights);
+  for (const UpperMethod method : {UpperMethod::kSdp, UpperMethod::kProduct}) {
+    const Json made = lipschitz::certificate(network, certify_mixed(network, method));
+    EXPECT_TRUE(check_mixed(made, network).accepted) << check_mixed(made, network).reason;
+    EXPECT_NE(made["statement"].get<std::string>().find("tanh:n"), std::string::npos);
+    for (const char* const other : {"sigmoid", "sigmoid:4", "tanh:5", "relu:5", "sigmoid:8"}) {
+      Json changed = made;
+      changed["network"]["weights"]["network"]["chain"][1]["op"] = other;
+      EXPECT_NE(check_mixed(changed, network).reason.find("chain"), std::string::npos) << other;
+    }
+    // What holds where nothing is kept does not hold here: what is kept is steeper than a sigmoid.
+    Weights all = weights;
+    for (files::Layer& layer : all.layers) layer.kept = 0;
+    Json changed = made;
+    changed["bounds"] =
+        lipschitz::certificate(tests::plain(all), certify_mixed(tests::plain(all), method))["bounds"];
+    const std::string reason = check_mixed(changed, network).reason;
+    EXPECT_NE(reason.find(method == UpperMethod::kSdp ? "does not show" : "less than the product"),
+              std::string::npos)
+        << reason;
+  }
 }
 
 TEST(MixedCertificate, IsRejectedWithABoundByParts) {

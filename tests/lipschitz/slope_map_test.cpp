@@ -214,6 +214,10 @@ TEST(SlopeMap, OfSmoothNetworksNoClimbedSlopeExceedsItsCell) {
   files::Weights mixed = tests::random_network({3, 8, 8, 2}, generator);
   mixed.set_activations({A::kRelu, A::kTanh});
   expect_sound(plain(mixed), options, "relu, tanh");
+  files::Weights with_skip = tests::random_network({3, 8, 8, 2}, generator);
+  with_skip.set_activations({A::kTanh, A::kSilu});
+  with_skip.layers[0].kept = with_skip.layers[1].kept = 2;
+  expect_sound(plain(with_skip), options, "tanh:6, silu:6");
   mixed.set_activations({A::kTanh, A::kMaxMinPairs});
   expect_sound(plain(mixed), options, "tanh, maxmin:pairs",
                0.95);  // the product, by each layer's steepest neuron

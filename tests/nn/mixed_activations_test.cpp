@@ -146,6 +146,67 @@ TEST(MixedActivations, ASkipConnectionPastAReluTakesNegativeValuesOfAnotherActiv
   EXPECT_GT(negative, 2);
 }
 
+TEST(MixedActivations, SkipConnectionsPastSmoothOnesAreKeptAsTheyAre) {
+  Model around;  // y = W (t + h) + b, t = tanh h
+  around.gemm("x", "h").node("Tanh", {"h"}, "t").node("Add", {"t", "h"}, "s").gemm("s", "y");
+  const Weights weights = around.weights();
+  EXPECT_EQ(weights.activation_names(), "tanh:2");
+  EXPECT_EQ(weights.layers.front().outputs, 4);
+  EXPECT_EQ(weights.layers.front().kept, 2);
+  EXPECT_EQ(words_after(weights.layers.front()), "tanh of the first 2");
+  EXPECT_FALSE(weights.is_relu());
+  expect_function(weights, [&around](const Values& x) {
+    const Values h = affine(around.w, around.b, x);
+    return affine(around.w, around.b, each([](double t) { return std::tanh(t) + t; }, h));
+  });
+}
+
+TEST(MixedActivations, ResidualBlocksAndParallelBranchesAreTheSameFunction) {
+  Model residual;  // two blocks h + W silu(W h + b) + b, then h - relu(h)
+  residual.gemm("x", "h");
+  for (const std::string k : {"1", "2"}) {
+    const std::string from = k == "1" ? "h" : "r1";
+    residual.gemm(from, "g" + k).node("Sigmoid", {"g" + k}, "s" + k).node("Mul", {"g" + k, "s" + k}, "a" + k);
+    residual.gemm("a" + k, "b" + k).node("Add", {from, "b" + k}, "r" + k);
+  }
+  residual.node("Relu", {"r2"}, "p").node("Sub", {"r2", "p"}, "y");
+  const Weights blocks = residual.weights();
+  EXPECT_EQ(blocks.activation_names(), "silu:2, silu:2, relu");
+  expect_function(blocks, [&residual](const Values& x) {
+    Values h = affine(residual.w, residual.b, x);
+    for (int k = 0; k < 2; ++k) {
+      const Values b = affine(residual.w, residual.b, each(silu, affine(residual.w, residual.b, h)));
+      for (std::size_t i = 0; i < h.size(); ++i) h[i] += b[i];
+    }
+    return each([](double t) { return t - relu(t); }, h);
+  });
+
+  Model gated;  // h + W gelu(h) + b, GELU as PyTorch exports it for opsets below 20
+  gated.gemm("x", "h").node("Div", {"h", "root"}, "q").node("Erf", {"q"}, "e").node("Add", {"e", "one"}, "p");
+  gated.node("Mul", {"h", "p"}, "m")
+      .node("Mul", {"m", "half"}, "a")
+      .gemm("a", "g")
+      .node("Add", {"h", "g"}, "y");
+  EXPECT_EQ(gated.weights().activation_names(), "gelu:2");
+  expect_function(gated.weights(), [&gated](const Values& x) {
+    const Values h = affine(gated.w, gated.b, x);
+    Values y = affine(gated.w, gated.b, each(gelu, h));
+    for (std::size_t i = 0; i < y.size(); ++i) y[i] += h[i];
+    return y;
+  });
+
+  Model parallel;  // tanh h - sigmoid h, then tanh of it all
+  parallel.gemm("x", "h").node("Tanh", {"h"}, "t").node("Sigmoid", {"h"}, "s").node("Sub", {"t", "s"}, "d");
+  parallel.gemm("d", "g").node("Tanh", {"g"}, "y");
+  const Weights branches = parallel.weights();
+  EXPECT_EQ(branches.activation_names(), "tanh:2, sigmoid:2, tanh");
+  expect_function(branches, [&parallel](const Values& x) {
+    const Values d =
+        each([](double t) { return std::tanh(t) - sigmoid(t); }, affine(parallel.w, parallel.b, x));
+    return each(tanh_of, affine(parallel.w, parallel.b, d));
+  });
+}
+
 Weights unstated_network(const std::vector<int>& sizes) {
   std::mt19937 generator(5);
   Weights weights = random_network(sizes, generator);

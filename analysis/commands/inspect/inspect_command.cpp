@@ -42,7 +42,7 @@ struct InspectOptions {
 
 /// What follows layer `k`: the activation, after the last one nothing.
 std::string activation_after(const files::Weights& weights, std::size_t k) {
-  return k + 1 < weights.layers.size() ? files::function_of(weights.layers[k].activation).op : "";
+  return k + 1 < weights.layers.size() ? files::op_after(weights.layers[k]) : "";
 }
 
 files::Json describe(const files::Weights& weights) {
