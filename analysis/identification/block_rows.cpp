@@ -47,6 +47,25 @@ void run_blocks(const residuals::Inputs& inputs, const ModelledTrack& modelled, 
   close();
 }
 
+std::vector<Eigen::MatrixXd> block_columns(const residuals::Inputs& inputs, const ModelledTrack& modelled,
+                                           const Grams& grams,
+                                           const std::vector<stability::Instant>& instants) {
+  const TrackBlocks& cut = modelled.cut;
+  std::vector<Eigen::MatrixXd> blocks;
+  for (const TrackBlock& block : cut.blocks)
+    blocks.emplace_back(Eigen::Index(3) * block.records, grams.columns);
+  std::vector<Eigen::Index> next(blocks.size(), 0);
+  ColumnRun run(grams, inputs, modelled.model, modelled.track);
+  for (std::size_t i = 0; i < instants.size(); ++i) {
+    const Eigen::Matrix3Xd& columns = run.advance(instants[i], modelled.track.restarts[i] != 0);
+    if (cut.of_record[i] < 0) continue;
+    const auto b = static_cast<std::size_t>(cut.of_record[i]);
+    blocks[b].middleRows<3>(next[b]) = columns;
+    next[b] += 3;
+  }
+  return blocks;
+}
+
 Block condensed(const Eigen::Ref<const Eigen::MatrixXd>& rows) {
   const Eigen::Index columns = rows.cols() - 1;
   const auto x = rows.leftCols(columns);

@@ -17,6 +17,11 @@ void run_blocks(const residuals::Inputs& inputs, const ModelledTrack& track, con
                 const Noise* noise, std::vector<Support>& support,
                 const std::function<void(int block, const Eigen::MatrixXd& rows)>& add);
 
+/// The columns of `grams` along `instants`, the track's or others of the same times: [3 x records, columns] by block.
+std::vector<Eigen::MatrixXd> block_columns(const residuals::Inputs& inputs, const ModelledTrack& track,
+                                           const Grams& grams,
+                                           const std::vector<stability::Instant>& instants);
+
 /// Gram matrix, products and sums of a block.
 /// @param rows as run_blocks() gives them
 Block condensed(const Eigen::Ref<const Eigen::MatrixXd>& rows);

@@ -40,13 +40,21 @@ Block gathered(const KeptBlock& kept, const std::vector<int>& source) {
   block.gram = Eigen::VectorXd::Zero(n * (n + 1) / 2);
   block.b = Eigen::VectorXd::Zero(n);
   block.sums = Eigen::Matrix3Xd::Zero(3, n + 1);
-  Eigen::Index at = 0;
-  for (std::size_t j = 0; j < source.size(); ++j) {
-    for (std::size_t i = 0; i <= j; ++i, ++at) {
-      if (source[i] >= 0 && source[j] >= 0)
-        block.gram[at] = kept.gram[static_cast<std::size_t>(Grams::packed(source[i], source[j]))];
-    }
+  double* to = block.gram.data();
+  for (std::size_t j = 0; j < source.size(); to += ++j) {
     if (source[j] < 0) continue;
+    const double* const column = kept.gram.data() + Grams::packed(0, source[j]);
+    for (std::size_t i = 0; i <= j;) {
+      if (source[i] < 0 || source[i] > source[j]) {
+        if (source[i] >= 0) to[i] = kept.gram[static_cast<std::size_t>(Grams::packed(source[i], source[j]))];
+        ++i;
+        continue;
+      }
+      std::size_t end = i + 1;  // of a run of columns that lie side by side
+      while (end <= j && source[end] == source[end - 1] + 1 && source[end] <= source[j]) ++end;
+      std::copy(column + source[i], column + source[end - 1] + 1, to + i);
+      i = end;
+    }
     block.b[static_cast<Eigen::Index>(j)] = kept.b[static_cast<std::size_t>(source[j])];
     block.sums.col(static_cast<Eigen::Index>(j)) = kept.sums[static_cast<std::size_t>(source[j])];
   }
@@ -63,18 +71,26 @@ auto kept_column(const KeptBlock& block, int at) {
   return piece->col(at);
 }
 
-/// The same, where columns after the kept ones are those of `fresh`.
-Block condensed_from(const KeptBlock& kept, const Eigen::MatrixXd& fresh, const std::vector<int>& source) {
-  const auto n = static_cast<Eigen::Index>(source.size());
+/// Columns of the block, of which those after the kept ones are in `more`. @param source which; -1: zero
+void assemble(const KeptBlock& kept, const Eigen::MatrixXd& more, const std::vector<int>& source,
+              Eigen::Ref<Eigen::MatrixXd> columns) {
   const int known = kept.columns();
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(kept.r.size(), n + 1);
-  for (Eigen::Index j = 0; j < n; ++j) {
-    const int from = source[static_cast<std::size_t>(j)];
-    if (from >= known)
-      rows.col(j) = fresh.col(from - known);
-    else if (from >= 0)
-      rows.col(j) = kept_column(kept, from);
+  for (std::size_t j = 0; j < source.size(); ++j) {
+    auto to = columns.col(static_cast<Eigen::Index>(j));
+    if (source[j] >= known)
+      to = more.col(source[j] - known);
+    else if (source[j] >= 0)
+      to = kept_column(kept, source[j]);
+    else
+      to.setZero();
   }
+}
+
+/// gathered(), likewise.
+Block condensed_from(const KeptBlock& kept, const Eigen::MatrixXd& more, const std::vector<int>& source) {
+  const auto n = static_cast<Eigen::Index>(source.size());
+  Eigen::MatrixXd rows(kept.r.size(), n + 1);
+  assemble(kept, more, source, rows.leftCols(n));
   rows.col(n) = kept.r;
   return condensed(rows);
 }
@@ -117,16 +133,39 @@ void append(Eigen::MatrixXd fresh, KeptBlock& block) {
 
 }  // namespace
 
+std::string text_of(const std::vector<Candidate>& candidates) {
+  std::string text;
+  for (const Candidate& candidate : candidates) {
+    text += fmt::format("{} {}\n", candidate.name, candidate.refined_thetas);
+    for (const std::string& vehicle : candidate.vehicles) text += vehicle + '\n';
+    for (const auto* const parameters : {&candidate.info.linear, &candidate.info.shape}) {
+      for (const stability::Parameter& p : *parameters) {
+        text += fmt::format("{} {:a} {:a} {:a}:", p.name, p.value, p.lower, p.upper);
+        for (const double value : p.grid) text += fmt::format(" {:a}", value);
+      }
+    }
+    for (const std::vector<double>& theta : candidate.thetas) text += key_of(candidate, theta);
+  }
+  return text;
+}
+
 /// What is asked for, by candidate and theta, in the order of Grams::support.
 struct ColumnMemory::Request {
+  /// An effect with one theta whose columns are not kept.
+  struct More {
+    std::string key;
+    int columns;
+    bool is_new;     ///< to be made in this pass
+    Recent* recent;  ///< where they are, or are to be; null: nowhere
+  };
   std::vector<std::string> keys;
-  std::vector<int> first;               ///< column among the kept ones, followed by the fresh ones
-  Grams fresh;                          ///< what is to be made
-  std::map<std::string, int> of_fresh;  ///< first column of each, likewise
-  std::vector<std::string> fresh_keys;  ///< in the order of fresh.support
+  std::vector<int> first;  ///< column among the kept ones, followed by those of `more`
+  std::vector<More> more;
+  int more_columns = 0;
+  Grams fresh;  ///< what is new, in the order of `more`
   bool keeps = false;
 
-  /// Column among the kept and fresh ones by column of `asked`; -1: zero.
+  /// Column among the kept ones and `more` by column of `asked`; -1: zero.
   std::vector<int> sources(const Grams& asked, const std::string& vehicle) const {
     std::vector<int> source(static_cast<std::size_t>(asked.columns), -1);
     std::size_t stream = 0;
@@ -147,34 +186,73 @@ struct ColumnMemory::Request {
   }
 };
 
-ColumnMemory::Request ColumnMemory::planned(const Grams& asked, Kept kept) const {
+std::size_t ColumnMemory::bytes_of(int columns) const {
+  return 3 * sizeof(double) * records_ * static_cast<std::size_t>(columns);
+}
+
+ColumnMemory::Request ColumnMemory::planned(const Grams& asked, Kept kept, Along along) {
   Request request;
   std::vector<Candidate> fresh;
-  int next = columns_;
+  std::map<std::string, int> first;
+  ++requests_;
   for (const Candidate& candidate : asked.candidates) {
     Candidate missing = of_one_vehicle(candidate);
     missing.thetas.clear();
     for (const std::vector<double>& theta : candidate.thetas) {
-      request.keys.push_back(key_of(candidate, theta));
-      const std::string& key = request.keys.back();
+      const std::string key = (along == Along::kWanted ? "wanted " : "") + key_of(candidate, theta);
+      request.keys.push_back(key);
       const auto known = first_column_.find(key);
       if (known != first_column_.end()) {
         request.first.push_back(known->second);
         continue;
       }
-      const auto [place, is_new] = request.of_fresh.emplace(key, next);
+      const auto [place, is_other] = first.emplace(key, columns_ + request.more_columns);
       request.first.push_back(place->second);
-      if (!is_new) continue;
-      missing.thetas.push_back(theta);
-      request.fresh_keys.push_back(key);
-      next += missing.columns();
+      if (!is_other) continue;
+      const auto recent = recent_.find(key);
+      const bool is_new = recent == recent_.end();
+      request.more.push_back({key, missing.columns(), is_new, is_new ? nullptr : &recent->second});
+      if (is_new) missing.thetas.push_back(theta);
+      request.more_columns += missing.columns();
     }
     if (!missing.thetas.empty()) fresh.push_back(std::move(missing));
   }
   request.fresh = columns_of(std::move(fresh));
-  const std::size_t bytes = 3 * sizeof(double) * records_ * static_cast<std::size_t>(next);
-  request.keeps = kept == Kept::kYes && bytes <= most_bytes_;
+  request.keeps = kept == Kept::kYes && bytes_of(columns_ + request.more_columns) <= most_bytes_;
+  const bool are_recent = !request.keeps && bytes_of(request.fresh.columns) <= kMostRecent_bytes;
+  for (Request::More& more : request.more) {
+    if (more.is_new && are_recent) {
+      more.recent = &recent_[more.key];
+      more.recent->columns = more.columns;
+      more.recent->flights.resize(flights_.size());
+    }
+    if (more.recent != nullptr) more.recent->last_use = requests_;
+  }
   return request;
+}
+
+void ColumnMemory::forget_old() {
+  int columns = 0;
+  for (const auto& [key, recent] : recent_) columns += recent.columns;
+  while (bytes_of(columns) > kMostRecent_bytes) {
+    const auto oldest = std::min_element(recent_.begin(), recent_.end(), [](const auto& a, const auto& b) {
+      return a.second.last_use < b.second.last_use;
+    });
+    columns -= oldest->second.columns;
+    recent_.erase(oldest);
+  }
+}
+
+void ColumnMemory::forget_kept() {
+  first_column_.clear();
+  columns_ = 0;
+  for (Flight& flight : flights_) {
+    for (KeptTrack& track : flight.tracks) {
+      track.support.clear();
+      for (KeptBlock& block : track.blocks)
+        block = {{}, std::move(block.r), block.y, block.residual_sum_N, {}, {}, {}};
+    }
+  }
 }
 
 std::vector<KeptTrack>& ColumnMemory::tracks(const Passes& passes, std::size_t flight) {
@@ -189,27 +267,61 @@ std::vector<KeptTrack>& ColumnMemory::tracks(const Passes& passes, std::size_t f
   return known.tracks;
 }
 
-void ColumnMemory::add_track(const Passes& passes, const Grams& asked, const Request& request, int flight,
-                             KeptTrack& track, FlightPart& part) const {
-  std::vector<Eigen::MatrixXd> fresh(track.blocks.size());
-  std::vector<Support> fresh_support(request.fresh_keys.size());
-  if (request.fresh.columns > 0) {
-    run_blocks(passes.inputs, track.known, request.fresh, nullptr, fresh_support,
+std::vector<Eigen::MatrixXd> ColumnMemory::more_columns(const Passes& passes, const Request& request,
+                                                        Along along, const Place& at, KeptTrack& track,
+                                                        std::map<std::string, Support>& support) const {
+  std::vector<Eigen::MatrixXd> made(track.blocks.size());
+  std::vector<Support> made_support(request.more.size());
+  if (request.fresh.columns > 0 && along == Along::kFlown) {
+    run_blocks(passes.inputs, track.known, request.fresh, nullptr, made_support,
                [&](int block, const Eigen::MatrixXd& rows) {
-                 fresh[static_cast<std::size_t>(block)] = rows.leftCols(request.fresh.columns);
+                 made[static_cast<std::size_t>(block)] = rows.leftCols(request.fresh.columns);
                });
+  } else if (request.fresh.columns > 0) {
+    made = block_columns(passes.inputs, track.known, request.fresh, track.wanted);
   }
+  std::vector<Eigen::MatrixXd> result(track.blocks.size());
+  const bool is_all = request.fresh.columns == request.more_columns;
+  for (std::size_t b = 0; b < result.size() && !is_all; ++b)
+    result[b].resize(track.blocks[b].r.size(), request.more_columns);
+  Eigen::Index from = 0, to = 0;
+  auto shown = made_support.begin();
+  for (const Request::More& more : request.more) {
+    TrackColumns* const place =
+        more.recent != nullptr ? &more.recent->flights[at.flight].at(at.track) : nullptr;
+    for (std::size_t b = 0; b < result.size() && more.is_new && place != nullptr; ++b)
+      place->blocks.emplace_back(made[b].middleCols(from, more.columns));
+    for (std::size_t b = 0; b < result.size() && !is_all; ++b)
+      result[b].middleCols(to, more.columns) =
+          more.is_new ? made[b].middleCols(from, more.columns) : place->blocks[b].leftCols(more.columns);
+    if (more.is_new && place != nullptr) place->support = *shown;
+    support[more.key] = more.is_new ? *shown++ : place->support;
+    if (more.is_new) from += more.columns;
+    to += more.columns;
+  }
+  return is_all ? made : result;
+}
+
+void ColumnMemory::make_places(const Request& request, std::size_t flight) const {
+  for (const Request::More& more : request.more) {
+    if (more.is_new && more.recent != nullptr)
+      more.recent->flights[flight].resize(flights_[flight].tracks.size());
+  }
+}
+
+void ColumnMemory::add_track(const Passes& passes, const Grams& asked, const Request& request,
+                             const Place& at, KeptTrack& track, FlightPart& part) const {
   std::map<std::string, Support> support;
-  for (std::size_t s = 0; s < fresh_support.size(); ++s) support[request.fresh_keys[s]] = fresh_support[s];
+  std::vector<Eigen::MatrixXd> more = more_columns(passes, request, Along::kFlown, at, track, support);
   const std::vector<int> source = request.sources(asked, track.known.track.vehicle);
   const int number = part.tracks++;
   for (std::size_t b = 0; b < track.blocks.size(); ++b) {
     KeptBlock& kept = track.blocks[b];
-    if (request.keeps && request.fresh.columns > 0) append(std::move(fresh[b]), kept);
-    const bool has_all = request.keeps || request.fresh.columns == 0;
-    part.blocks.push_back(has_all ? gathered(kept, source) : condensed_from(kept, fresh[b], source));
+    if (request.keeps && request.more_columns > 0) append(std::move(more[b]), kept);
+    const bool has_all = request.keeps || request.more_columns == 0;
+    part.blocks.push_back(has_all ? gathered(kept, source) : condensed_from(kept, more[b], source));
     Block& block = part.blocks.back();
-    block.flight = flight;
+    block.flight = passes.flights[at.flight];
     block.track = number;
     block.follows = track.known.cut.blocks[b].follows;
   }
@@ -231,20 +343,55 @@ void ColumnMemory::add_track(const Passes& passes, const Grams& asked, const Req
 
 Grams ColumnMemory::grams(const Passes& passes, std::vector<Candidate> candidates, Kept kept) {
   const Grams asked = columns_of(std::move(candidates));
-  const Request request = planned(asked, kept);
+  const Request request = planned(asked, kept, Along::kFlown);
   std::vector<FlightPart> parts(flights_.size(), FlightPart(asked));
   std::atomic<int> done{0};
   files::parallel_for(static_cast<int>(parts.size()), passes.jobs, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    for (KeptTrack& track : tracks(passes, k))
-      add_track(passes, asked, request, passes.flights[k], track, parts[k]);
+    std::vector<KeptTrack>& all = tracks(passes, k);
+    make_places(request, k);
+    for (std::size_t t = 0; t < all.size(); ++t) add_track(passes, asked, request, {k, t}, all[t], parts[k]);
     passes.progress(++done, static_cast<int>(parts.size()));
   });
   if (request.keeps) {
-    first_column_.insert(request.of_fresh.begin(), request.of_fresh.end());
-    columns_ += request.fresh.columns;
+    int next = columns_;
+    for (const Request::More& more : request.more) {
+      first_column_.emplace(more.key, next);
+      next += more.columns;
+    }
+    columns_ = next;
   }
+  forget_old();
   return joined(asked, std::move(parts));
+}
+
+void ColumnMemory::over_columns(const Passes& passes, const Grams& asked, const UseColumns& use) {
+  const Request flown = planned(asked, Kept::kNo, Along::kFlown);
+  const Request wanted = planned(asked, Kept::kNo, Along::kWanted);
+  const auto columns = [&](const Request& request, Along along, const Place& at, KeptTrack& track) {
+    std::map<std::string, Support> support;
+    const std::vector<Eigen::MatrixXd> more = more_columns(passes, request, along, at, track, support);
+    const std::vector<int> source = request.sources(asked, track.known.track.vehicle);
+    std::vector<Eigen::MatrixXd> blocks;
+    for (std::size_t b = 0; b < more.size(); ++b) {
+      blocks.emplace_back(track.blocks[b].r.size(), asked.columns);
+      assemble(track.blocks[b], more[b], source, blocks.back());
+    }
+    return blocks;
+  };
+  files::parallel_for(static_cast<int>(flights_.size()), passes.jobs, [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    std::vector<KeptTrack>& all = tracks(passes, k);
+    make_places(flown, k);
+    make_places(wanted, k);
+    for (std::size_t t = 0; t < all.size(); ++t) {
+      KeptTrack& track = all[t];
+      if (track.wanted.empty()) track.wanted = as_commanded(track.known.track, track.known.model.mass_kg);
+      use(k, track.known, columns(flown, Along::kFlown, {k, t}, track),
+          columns(wanted, Along::kWanted, {k, t}, track));
+    }
+  });
+  forget_old();
 }
 
 }  // namespace swarmcert::identification

@@ -179,8 +179,10 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   result.searched_blocks = seen.blocks;
   const auto memory = std::make_shared<ColumnMemory>(which.size(), seen.records);
   const Passes passes = {searched, kind, which, seen.records, jobs, progress, memory};
-  const Passes all = is_excerpt ? Passes{inputs, kind, which, covered.records, jobs, progress} : passes;
   Explained explained = explain(passes, seen);
+  memory->forget_kept();
+  const residuals::Inputs whole = kept_tracks(inputs, kind, covered.blocks, covered.blocks);
+  const Passes all = is_excerpt ? Passes{whole, kind, which, covered.records, jobs, progress} : passes;
   Settled& settled = explained.settled;
   const Selected& selected = settled.selected;
   const Selection selection(selected.grams);

@@ -1,11 +1,14 @@
 #include "analysis/identification/instrument.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/identification/column_run.h"
+#include "analysis/identification/block_rows.h"
+#include "analysis/identification/column_memory.h"
 #include "analysis/identification/covariance.h"
 
 namespace swarmcert::identification {
@@ -22,64 +25,48 @@ struct Moments {
   bool follows = false;  ///< the block before it, of the same track
 };
 
-/// Rows of one block: the columns as flown, as set points ask for them, and the residual.
-struct BlockRows {
-  Eigen::MatrixXd x, z;
-  Eigen::VectorXd r;
-  Eigen::Index count = 0;
-};
-
+/// @param flown, wanted columns of the blocks as flown and as set points ask for them
 /// @param mix [columns x unknowns]: what is fitted, as sums of columns.
-bool add_track(const Passes& passes, const ModelledTrack& modelled, const Grams& columns,
-               const Eigen::MatrixXd& mix, std::vector<Moments>& blocks) {
-  const Track& track = modelled.track;
-  if (track.targets.size() != track.instants.size()) return false;
-  const std::vector<stability::Instant> wanted = as_commanded(track, modelled.model.mass_kg);
-  ColumnRun actual(columns, passes.inputs, modelled.model, track),
-      commanded(columns, passes.inputs, modelled.model, track);
-  BlockRows rows;
-  int current = -1;
-  const auto close = [&] {
-    if (current < 0) return;
-    const Eigen::MatrixXd x = rows.x * mix, z = rows.z * mix;
-    blocks.push_back({z.transpose() * x, x.transpose() * x, z.transpose() * rows.r, x.transpose() * rows.r,
-                      modelled.cut.blocks[static_cast<std::size_t>(current)].follows});
-  };
-  for (std::size_t i = 0; i < track.instants.size(); ++i) {
-    const bool restart = track.restarts[i] != 0;
-    const Eigen::Matrix3Xd& all = actual.advance(track.instants[i], restart);
-    const Eigen::Matrix3Xd& wanted_all = commanded.advance(wanted[i], restart);
-    const int block = modelled.cut.of_record[i];
-    if (block < 0) continue;
-    if (block != current) {
-      close();
-      current = block;
-      const Eigen::Index size =
-          Eigen::Index(3) * modelled.cut.blocks[static_cast<std::size_t>(block)].records;
-      rows.x.resize(size, columns.columns);
-      rows.z.resize(size, columns.columns);
-      rows.r.resize(size);
-      rows.count = 0;
-    }
-    rows.x.middleRows<3>(rows.count) = all;
-    rows.z.middleRows<3>(rows.count) = wanted_all;
-    rows.r.segment<3>(rows.count) = modelled.residual_N[i];
-    rows.count += 3;
+std::vector<Moments> moments_of(const ModelledTrack& track, const std::vector<Eigen::MatrixXd>& flown,
+                                const std::vector<Eigen::MatrixXd>& wanted, const Eigen::MatrixXd& mix) {
+  std::vector<Eigen::VectorXd> residual;
+  for (const TrackBlock& block : track.cut.blocks) residual.emplace_back(Eigen::Index(3) * block.records);
+  std::vector<Eigen::Index> next(residual.size(), 0);
+  for (std::size_t i = 0; i < track.residual_N.size(); ++i) {
+    if (track.cut.of_record[i] < 0) continue;
+    const auto b = static_cast<std::size_t>(track.cut.of_record[i]);
+    residual[b].segment<3>(3 * next[b]++) = track.residual_N[i];
   }
-  close();
-  return true;
+  std::vector<Moments> blocks;
+  for (std::size_t b = 0; b < residual.size(); ++b) {
+    const Eigen::MatrixXd x = flown[b] * mix, z = wanted[b] * mix;
+    blocks.push_back({z.transpose() * x, x.transpose() * x, z.transpose() * residual[b],
+                      x.transpose() * residual[b], track.cut.blocks[b].follows});
+  }
+  return blocks;
 }
 
-/// Both estimates of every unknown. Empty where a log has no set points, or nothing moves.
-std::vector<InstrumentedValue> estimates(const Passes& passes, const Grams& columns,
-                                         const Eigen::MatrixXd& mix) {
+/// estimates(), made anew.
+std::vector<InstrumentedValue> made_estimates(const Passes& passes, const Grams& columns,
+                                              const Eigen::MatrixXd& mix) {
   const Eigen::Index n = mix.cols();
   std::vector<std::vector<Moments>> pieces(passes.flights.size());
   std::vector<char> complete(passes.flights.size(), 1);
-  over_modelled_tracks(passes, [&](std::size_t k, const ModelledTrack& track) {
-    if (!add_track(passes, track, columns, mix, pieces[k])) complete[k] = 0;
+  const auto add = [&](std::size_t k, const ModelledTrack& track, const std::vector<Eigen::MatrixXd>& flown,
+                       const std::vector<Eigen::MatrixXd>& wanted) {
+    for (Moments& block : moments_of(track, flown, wanted, mix)) pieces[k].push_back(std::move(block));
+  };
+  const bool remembers = passes.memory != nullptr;
+  over_modelled_tracks(passes, [&](std::size_t k, const ModelledTrack& modelled) {
+    const Track& track = modelled.track;
+    if (track.targets.size() != track.instants.size())
+      complete[k] = 0;
+    else if (n > 0 && !remembers)
+      add(k, modelled, block_columns(passes.inputs, modelled, columns, track.instants),
+          block_columns(passes.inputs, modelled, columns, as_commanded(track, modelled.model.mass_kg)));
   });
   if (n == 0 || std::find(complete.begin(), complete.end(), 0) != complete.end()) return {};
+  if (remembers) passes.memory->over_columns(passes, columns, add);
   Moments sum{Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n),
               Eigen::VectorXd::Zero(n)};
   for (const auto& piece : pieces) {
@@ -118,6 +105,18 @@ std::vector<InstrumentedValue> estimates(const Passes& passes, const Grams& colu
     values.push_back(value);
   }
   return values;
+}
+
+/// Both estimates of every unknown. Empty where a log has no set points, or nothing moves.
+std::vector<InstrumentedValue> estimates(const Passes& passes, const Grams& columns,
+                                         const Eigen::MatrixXd& mix) {
+  if (passes.memory == nullptr) return made_estimates(passes, columns, mix);
+  std::string text;
+  for (const double value : mix.reshaped()) text += fmt::format("{:a} ", value);
+  const auto [known, is_new] = passes.memory->instrumented.emplace(text + text_of(columns.candidates),
+                                                                   std::vector<InstrumentedValue>());
+  if (is_new) known->second = made_estimates(passes, columns, mix);
+  return known->second;
 }
 
 /// Coefficients in `mix` become those of the model: see scaled_stages().

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "analysis/identification/box_least_squares.h"
+#include "analysis/identification/column_memory.h"
 #include "analysis/identification/covariance.h"
 #include "analysis/residuals/force_residual.h"
 #include "nn/base/parallel.h"
@@ -405,11 +406,19 @@ bool has_memory(const std::vector<Refined>& refined) {
 std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Members& members) {
   if (members.empty()) return {};
   Refinement refinement(passes);
+  std::vector<Candidate> candidates;
+  std::string start;
   for (const Member& m : members) {
-    const Candidate& candidate = grams.candidates[static_cast<std::size_t>(m.candidate)];
+    candidates.push_back(grams.candidates[static_cast<std::size_t>(m.candidate)]);
+    const Candidate& candidate = candidates.back();
     refinement.add(candidate, candidate.thetas[static_cast<std::size_t>(m.theta)], Moves::kAll);
+    start += std::to_string(m.theta) + ' ';
   }
-  return refinement.run();
+  if (passes.memory == nullptr) return refinement.run();
+  const auto [known, is_new] =
+      passes.memory->refinements.emplace(start + text_of(candidates), std::vector<Refined>());
+  if (is_new) known->second = refinement.run();
+  return known->second;
 }
 
 std::vector<Refined> with_innovations(const Passes& passes, std::vector<Refined> refined) {

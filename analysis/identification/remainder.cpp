@@ -27,19 +27,16 @@ residuals::Inputs inputs_with(const Passes& passes, const std::vector<stability:
 
 Remainder remainder(const Passes& passes, const std::vector<stability::EffectSpec>& specs) {
   const residuals::Inputs inputs = inputs_with(passes, specs);
-  const residuals::Comparison left = residuals::compare(inputs, passes.jobs, [](int, int) {});
+  const residuals::Leftover left = residuals::left_over(inputs, passes.jobs);
   Remainder result;
   for (int axis = 0; axis < 3; ++axis) {
-    const double ratio = left.overall.low_band_to_floor[axis];
+    const double ratio = left.low_band_to_floor[axis];
     if (std::isfinite(ratio)) result.ratio = std::max(result.ratio, ratio);
   }
   result.flag = result.ratio > kFlagRatio;
-  const double total_N = left.overall.statistics.rmse.total;
-  result.excess_N2 = std::max(total_N * total_N - left.overall.noise_floor_N.squaredNorm(), 0.0);
+  result.excess_N2 = std::max(left.rmse_N * left.rmse_N - left.noise_floor_N.squaredNorm(), 0.0);
   if (!result.flag) return result;
-  std::array<double, residuals::kNumVariables> shares{};
-  for (const residuals::RegionErrors& region : left.regions)
-    shares[static_cast<std::size_t>(region.variable)] += region.share;
+  std::array<double, residuals::kNumVariables> shares = left.region_shares;
   for (int rank = 0; rank < residuals::kNumVariables; ++rank) {
     const auto largest = std::max_element(shares.begin(), shares.end());
     if (*largest < kLeastShare) break;

@@ -14,6 +14,8 @@
 namespace swarmcert::residuals {
 namespace {
 
+constexpr std::size_t kFewestOfRegion = 50;
+
 Eigen::Vector4d array_of(const Axes& a) { return {a.x, a.y, a.z, a.total}; }
 
 Trajectories trajectories(const std::vector<TrackPart>& parts, bool has_gains) {
@@ -75,8 +77,7 @@ std::vector<RegionErrors> regions_of_all(const std::vector<TrackPart>& parts, co
       }
     }
     for (std::size_t k = 0; k < count; ++k) {
-      constexpr std::size_t kFewest = 50;
-      if (r[k].size() < kFewest) continue;
+      if (r[k].size() < kFewestOfRegion) continue;
       RegionErrors region;
       region.variable = variable;
       region.region = static_cast<int>(k);
@@ -124,14 +125,69 @@ void name_compositions(const Kinds& kinds, std::vector<TrackPart>& tracks) {
 
 }  // namespace
 
-Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, const GainsOfKinds& gains) {
+Leftover left_over(const Inputs& inputs, int jobs) {
+  std::vector<std::vector<Part>> by_flight(inputs.found.flights.size());
+  files::parallel_for(static_cast<int>(by_flight.size()), jobs, [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    std::vector<std::string> problems;
+    for (Track& track : inputs.load(k, problems)) {
+      if (!track.position_only) by_flight[k].push_back(residual_part(inputs, track));
+    }
+  });
+  struct Sum {
+    Eigen::Vector3d r = Eigen::Vector3d::Zero();
+    std::size_t count = 0;
+  };
+  std::array<std::vector<Sum>, kNumVariables> regions;
+  for (int v = 0; v < kNumVariables; ++v)
+    regions[static_cast<std::size_t>(v)].resize(static_cast<std::size_t>(num_regions(v)));
+  Spectrum spectrum;
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  double block_squares = 0, records = 0;
+  for (const std::vector<Part>& parts : by_flight) {
+    for (const Part& part : parts) {
+      if (part.points.empty()) continue;
+      spectrum.add(part.spectrum);
+      for (const BlockSum& block : part.blocks) block_squares += block.squares.sum();
+      records += static_cast<double>(part.points.size());
+      for (const ResidualPoint& point : part.points) {
+        const Eigen::Vector3d r = point.r.cast<double>();
+        squares += r.cwiseAbs2();
+        for (std::size_t v = 0; v < regions.size(); ++v) {
+          if (point.regions[v] < 0) continue;
+          Sum& sum = regions[v][static_cast<std::size_t>(point.regions[v])];
+          sum.r += r;
+          ++sum.count;
+        }
+      }
+    }
+  }
+  Leftover left;
+  left.rmse_N = records > 0 ? std::sqrt(squares.sum() / records) : 0;
+  left.low_band_to_floor = spectrum.low_band_to_floor();
+  left.noise_floor_N = spectrum.noise_floor_N();
+  for (std::size_t v = 0; v < regions.size(); ++v) {
+    for (const Sum& sum : regions[v]) {
+      if (sum.count < kFewestOfRegion || !(block_squares > 0)) continue;
+      const double bias = (sum.r / static_cast<double>(sum.count)).norm();
+      left.region_shares[v] += static_cast<double>(sum.count) * bias * bias / block_squares;
+    }
+  }
+  return left;
+}
+
+Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, const GainsOfKinds& gains,
+                   const std::function<void(std::size_t flight, const Track& track)>& visit) {
   const auto count = inputs.found.flights.size();
   std::vector<std::vector<TrackPart>> by_flight(count);
   std::vector<std::vector<std::string>> problems(count);
   std::atomic<int> done{0};
   files::parallel_for(static_cast<int>(count), jobs, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    for (Track& track : inputs.load(k, problems[k])) by_flight[k].push_back(track_part(inputs, gains, track));
+    for (Track& track : inputs.load(k, problems[k])) {
+      if (visit) visit(k, track);
+      by_flight[k].push_back(track_part(inputs, gains, track));
+    }
     name_compositions(inputs.kinds, by_flight[k]);
     progress(++done, static_cast<int>(count));
   });

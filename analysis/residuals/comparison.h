@@ -106,6 +106,19 @@ using GainsOfKinds = std::map<std::string, stability::Gains>;
 /// Compares. The result does not depend on `jobs`.
 /// @param gains of the second level, for the kinds that have them.
 /// @throws files::InputError if gains cannot be flown at 500 Hz.
-Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, const GainsOfKinds& gains = {});
+/// @param visit if there is one, is shown each track as loaded, with the index of its flight: the tracks of a flight in
+///   their order, several flights at a time. What else needs the tracks so needs no pass of its own.
+Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, const GainsOfKinds& gains = {},
+                   const std::function<void(std::size_t flight, const Track& track)>& visit = nullptr);
+
+/// What a search wants to know of a comparison.
+struct Leftover {
+  double rmse_N = 0;                                     ///< of all axes together
+  Eigen::Vector3d low_band_to_floor, noise_floor_N;      ///< as of GroupErrors
+  std::array<double, kNumVariables> region_shares = {};  ///< sum of RegionErrors::share, by variable
+};
+
+/// These numbers as compare() gives them for the same inputs, without the rest of its work.
+Leftover left_over(const Inputs& inputs, int jobs);
 
 }  // namespace swarmcert::residuals

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 
 #include "analysis/residuals/published_lag.h"
 #include "analysis/residuals/thrust_stage.h"
@@ -60,11 +62,15 @@ double commanded_thrust_N(const stability::Model& model, const Track& track, std
   return thrust_N;
 }
 
-/// Turns each column. Eigen's own product of the whole needs a copy of all columns.
+/// Turns each column. Eigen's own product of the whole needs a copy of all columns; sums are in its order.
 void turn(const Eigen::Matrix3d& rotation, Eigen::Matrix3Xd& vectors) {
-  for (Eigen::Index k = 0; k < vectors.cols(); ++k) {
-    const Eigen::Vector3d turned = rotation * vectors.col(k);
-    vectors.col(k) = turned;
+  const Eigen::Matrix3d r = rotation;  // no other name leads here, so that it stays in registers
+  double* at = vectors.data();
+  for (Eigen::Index k = 0; k < vectors.cols(); ++k, at += 3) {
+    const double x = at[0], y = at[1], z = at[2];
+    at[0] = (r(0, 0) * x + r(0, 1) * y) + r(0, 2) * z;
+    at[1] = (r(1, 0) * x + r(1, 1) * y) + r(1, 2) * z;
+    at[2] = r(2, 0) * x + (r(2, 1) * y + r(2, 2) * z);
   }
 }
 
@@ -83,7 +89,8 @@ AccelerometerFilter::AccelerometerFilter(double cutoff_hz, int channels)
     : rate_1_s_(2 * kPi * cutoff_hz / std::sqrt(2.0)),
       input_(3, channels),
       output_(3, channels),
-      slope_(3, channels) {}
+      slope_(3, channels),
+      known_(256) {}
 
 // y'' = w^2 (u - y) - sqrt(2) w y' with a = w / sqrt(2). For u = u0 + s t the particular solution is u0 + s t - s / a;
 // the rest decays as e^{-a t} (e0 cos a t + (e0' + a e0) / a sin a t).
@@ -91,6 +98,15 @@ AccelerometerFilter::Response AccelerometerFilter::response_to(double step_s) co
   const double a = rate_1_s_, decay = std::exp(-a * step_s);
   const double c = decay * std::cos(a * step_s), s = decay * std::sin(a * step_s);
   return {step_s, 1 / step_s, c + s, s * (1 / a), 2 * a * s, c - s};
+}
+
+// Clocks count in milliseconds or microseconds: a log has few different steps, and every fit meets them again.
+const AccelerometerFilter::Response& AccelerometerFilter::known_response(double step_s) {
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &step_s, sizeof bits);
+  Response& known = known_[(bits * 0x9E3779B97F4A7C15u) >> 56];
+  if (known.step_s != step_s) known = response_to(step_s);
+  return known;
 }
 
 /// Of kCount numbers side by side, which the compiler keeps in registers.
@@ -111,7 +127,7 @@ void AccelerometerFilter::advance(double time_s, Eigen::Matrix3Xd& values) {
     slope_.setZero();
   } else {
     const double step_s = time_s - time_s_;
-    if (step_s != response_.step_s) response_ = response_to(step_s);
+    if (step_s != response_.step_s) response_ = known_response(step_s);
     // One pass over the signals, without temporary matrices and divisions: every record of every fit comes here.
     constexpr int kBlock = 4;
     Eigen::Index next = 0;

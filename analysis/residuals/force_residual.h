@@ -33,6 +33,7 @@ class AccelerometerFilter {
     double start_to_output = 0, bend_to_output = 0, start_to_slope = 0, bend_to_slope = 0;
   };
   Response response_to(double step_s) const;
+  const Response& known_response(double step_s);
   template <int kCount>
   void advance_block(Eigen::Index first, double* values);
 
@@ -41,6 +42,7 @@ class AccelerometerFilter {
   bool has_past_ = false;
   double time_s_ = 0;
   Eigen::Matrix3Xd input_, output_, slope_;
+  std::vector<Response> known_;  ///< responses to the steps met last, by a hash
 };
 
 /// Turns forces in W into what the log of a track would show of them.

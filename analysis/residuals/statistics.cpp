@@ -8,13 +8,17 @@
 namespace swarmcert::residuals {
 namespace {
 
+std::ptrdiff_t quantile_place(std::size_t size, double p) {
+  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(p * static_cast<double>(size)));
+  return std::max<std::ptrdiff_t>(rank - 1, 0);
+}
+
 template <typename Number>
 double quantile_of(std::vector<Number>& values, double p) {
   if (values.empty()) return 0;
-  const auto rank = static_cast<std::size_t>(std::ceil(p * static_cast<double>(values.size())));
-  const std::size_t k = rank == 0 ? 0 : rank - 1;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
-  return static_cast<double>(values[k]);
+  const auto at = values.begin() + quantile_place(values.size(), p);
+  std::nth_element(values.begin(), at, values.end());
+  return static_cast<double>(*at);
 }
 
 double share(double part, double whole) { return whole > 0 ? 1 - part / whole : 0; }
@@ -48,9 +52,13 @@ ErrorStatistics statistics(const std::vector<Eigen::Vector3f>& r, const std::vec
   std::vector<float> sizes(r.size());
   const auto fill = [&](double Axes::*axis, auto size_of) {
     std::transform(r.begin(), r.end(), sizes.begin(), size_of);
-    result.max.*axis = static_cast<double>(*std::max_element(sizes.begin(), sizes.end()));
     result.p95.*axis = quantile(sizes, 0.95);
-    result.p999.*axis = quantile(sizes, 0.999);
+    // What is larger lies behind it.
+    const auto tail = sizes.begin() + quantile_place(sizes.size(), 0.95),
+               at = sizes.begin() + quantile_place(sizes.size(), 0.999);
+    std::nth_element(tail, at, sizes.end());
+    result.p999.*axis = static_cast<double>(*at);
+    result.max.*axis = static_cast<double>(*std::max_element(at, sizes.end()));
   };
   fill(&Axes::x, [](const Eigen::Vector3f& v) { return std::abs(v[0]); });
   fill(&Axes::y, [](const Eigen::Vector3f& v) { return std::abs(v[1]); });

@@ -168,6 +168,16 @@ GroupErrors errors_of(const std::vector<const Part*>& parts) {
   return group;
 }
 
+Part residual_part(const Inputs& inputs, Track& track) {
+  const stability::Model model = inputs.model_for(track);
+  apply_model(model, inputs.kinds, inputs.rules, track);
+  const std::vector<Eigen::Vector3d> r = force_residual(model, inputs.kinds, inputs.rules, track);
+  TrackPart result;
+  add_records(track, r, r, result);
+  add_spectra(track, r, result.part.spectrum);
+  return std::move(result.part);
+}
+
 TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& track) {
   TrackPart result;
   TrackErrors& errors = result.errors;

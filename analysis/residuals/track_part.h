@@ -33,6 +33,10 @@ struct TrackPart {
 /// Applies the models and evaluates both levels. @param track its thrust is changed.
 TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& track);
 
+/// The residual of the model alone: its points, where they lie, blocks and spectrum.
+/// @param track its thrust is changed.
+Part residual_part(const Inputs& inputs, Track& track);
+
 /// Errors over all records of `parts`.
 GroupErrors errors_of(const std::vector<const Part*>& parts);
 

@@ -77,6 +77,7 @@ EffectInfo describe(const EffectSpec& spec) {
 struct ExpressionEffect::Formulas {
   std::string path, name;
   bool per_neighbour = false;
+  bool turns = false;  ///< some formula takes the heading or the tilt, which are slow to compute
   std::vector<double> variables = std::vector<double>(kVariables.size());
   std::vector<double> linear, shape;
   struct Formula {
@@ -107,6 +108,7 @@ struct ExpressionEffect::Formulas {
       }
       formula.parser.SetExpr(text);
       for (const auto& used : formula.parser.GetUsedVar()) {
+        turns = turns || used.first == "heading" || used.first == "tilt";
         if (std::find(known.begin(), known.end(), used.first) == known.end()) {
           refuse(kTargets[target], files::in_quotes(used.first), "is neither a variable nor a parameter",
                  files::did_you_mean(used.first, known));
@@ -139,8 +141,8 @@ struct ExpressionEffect::Formulas {
                                            now.time_s,
                                            now.time_s,
                                            now.battery_V,
-                                           std::atan2(now.R_WB(1, 0), now.R_WB(0, 0)),
-                                           std::acos(std::clamp(now.R_WB(2, 2), -1.0, 1.0)),
+                                           turns ? std::atan2(now.R_WB(1, 0), now.R_WB(0, 0)) : 0,
+                                           turns ? std::acos(std::clamp(now.R_WB(2, 2), -1.0, 1.0)) : 0,
                                            now.v_W_m_s.norm(),
                                            now.v_W_m_s.dot(b3),
                                            now.v_W_m_s.dot(now.R_WB.col(0)),

@@ -112,5 +112,41 @@ TEST_F(Remembered, GramsAreTheSameBitsOnAnyNumberOfThreads) {
   }
 }
 
+TEST_F(Remembered, InstrumentsAreTheSameBitsWithMemoryAskedOnceOrTwice) {
+  const std::vector<Candidate> effects = requests()[1].first;
+  const auto anew = instrument(passes(nullptr), effects);
+  ASSERT_EQ(anew.size(), effects.size());
+  const auto memory = std::make_shared<ColumnMemory>(2, covered_.records);
+  for (int time = 0; time < 2; ++time) {
+    // The second time from recent columns, not from the results.
+    memory->instrumented.clear();
+    const auto known = instrument(passes(memory), effects);
+    ASSERT_EQ(known.size(), anew.size());
+    for (std::size_t e = 0; e < anew.size(); ++e) {
+      for (std::size_t c = 0; c < anew[e].size(); ++c) {
+        EXPECT_EQ(known[e][c].instrument, anew[e][c].instrument) << effects[e].name;
+        EXPECT_EQ(known[e][c].least_squares, anew[e][c].least_squares) << effects[e].name;
+        EXPECT_EQ(known[e][c].difference_z, anew[e][c].difference_z) << effects[e].name;
+      }
+    }
+  }
+}
+
+TEST_F(Remembered, RefinementsAreTheSameBitsWithMemoryAskedOnceOrTwice) {
+  const Grams grams = block_grams(passes(nullptr), {candidate("drag_linear"), candidate("motor_lag")});
+  const identification::Members members = {{0, 0}, {1, 1}};
+  const auto anew = refine(passes(nullptr), grams, members);
+  const auto memory = std::make_shared<ColumnMemory>(2, covered_.records);
+  for (int time = 0; time < 2; ++time) {
+    const auto known = refine(passes(memory), grams, members);
+    ASSERT_EQ(known.size(), anew.size());
+    for (std::size_t e = 0; e < anew.size(); ++e) {
+      EXPECT_EQ(known[e].coefficients, anew[e].coefficients);
+      EXPECT_EQ(known[e].theta, anew[e].theta);
+    }
+    EXPECT_EQ(memory->refinements.size(), 1u);
+  }
+}
+
 }  // namespace
 }  // namespace swarmcert::tests

@@ -130,6 +130,23 @@ TEST(Compare, GivesTheSameNumbersForAnyNumberOfJobs) {
   for (std::size_t i = 0; i < one.regions.size(); ++i) EXPECT_EQ(one.regions[i].words, two.regions[i].words);
 }
 
+TEST(Compare, WhatASearchWantsToKnowIsThatOfTheWholeComparison) {
+  SWARMCERT_NEEDS_DATA();
+  const residuals::Inputs inputs = visible("visible_test/21_swap_ss", false);
+  const residuals::Comparison all = residuals::compare(inputs, 2, [](int, int) {});
+  const residuals::Leftover left = residuals::left_over(inputs, 2);
+  EXPECT_EQ(left.rmse_N, all.overall.statistics.rmse.total);
+  EXPECT_EQ(left.low_band_to_floor, all.overall.low_band_to_floor);
+  EXPECT_EQ(left.noise_floor_N, all.overall.noise_floor_N);
+  std::array<double, residuals::kNumVariables> shares{};
+  for (const residuals::RegionErrors& region : all.regions)
+    shares[static_cast<std::size_t>(region.variable)] += region.share;
+  for (std::size_t v = 0; v < shares.size(); ++v) {
+    EXPECT_GT(left.region_shares[v], 0);
+    EXPECT_NEAR(left.region_shares[v], shares[v], 1e-12);
+  }
+}
+
 TEST(Compare, NamesTheDownwashRegionOfSwapsFirst) {
   SWARMCERT_NEEDS_DATA();
   const residuals::Comparison comparison =

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "nn/base/random.h"
 
@@ -27,6 +29,27 @@ TEST(ResidualStatistics, AreThoseOfANumberThatWasWorkedOutByHand) {
   EXPECT_DOUBLE_EQ(s.variance_explained.x, 0.75);
   EXPECT_DOUBLE_EQ(s.variance_explained.y, 0) << "does not vary";
   EXPECT_EQ(statistics({}, {}).samples, 0u);
+}
+
+TEST(ResidualStatistics, TheTailIsThatOfTheSortedSizes) {
+  std::mt19937_64 random(1);
+  for (const std::size_t count : {1u, 2u, 19u, 20u, 21u, 999u, 1000u, 1001u, 5000u}) {
+    std::vector<Eigen::Vector3f> r;
+    std::vector<float> sorted;
+    for (std::size_t i = 0; i < count; ++i) {
+      r.emplace_back(static_cast<float>(random() % 700) - 350.f, 0.f, 0.f);
+      sorted.push_back(std::abs(r.back()[0]));
+    }
+    std::sort(sorted.begin(), sorted.end());
+    const auto at = [&](double p) {
+      const auto rank = static_cast<std::size_t>(std::ceil(p * static_cast<double>(count)));
+      return static_cast<double>(sorted[rank - 1]);
+    };
+    const ErrorStatistics s = statistics(r, r);
+    EXPECT_EQ(s.p95.x, at(0.95)) << count;
+    EXPECT_EQ(s.p999.x, at(0.999)) << count;
+    EXPECT_EQ(s.max.x, static_cast<double>(sorted.back())) << count;
+  }
 }
 
 TEST(ResidualStatistics, AQuantileLeavesNoMoreThanItsShareAbove) {

@@ -100,16 +100,37 @@ FormFit fit_coefficients(const Form& form, const FormData& data, const std::vect
   const auto functions = static_cast<Eigen::Index>(form.texts.size());
   const Eigen::Index size = functions + (form.has_offset ? 1 : 0);
   Eigen::Matrix3d gram = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero(), row = Eigen::Vector3d::Zero();  // of size 3, which is faster
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
   double squares = 0;
-  for (Eigen::Index i = 0; i < data.target.size(); ++i) {
-    const Inputs2 v = inputs_at(data, i);
-    form.values(v.data(), theta.data(), row.data());
-    if (data.factor.size() > 0) row.head(functions) *= data.factor[i];
-    if (form.has_offset) row[functions] = 1;
-    gram.noalias() += row * row.transpose();
-    b += data.target[i] * row;
-    squares += data.target[i] * data.target[i];
+  // Values first, sums then: these stay in registers.
+  constexpr Eigen::Index kMany = 128;
+  Eigen::Matrix<double, 3, kMany> rows = Eigen::Matrix<double, 3, kMany>::Zero();
+  for (Eigen::Index first = 0; first < data.target.size(); first += kMany) {
+    const Eigen::Index count = std::min(kMany, data.target.size() - first);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Inputs2 v = inputs_at(data, first + i);
+      form.values(v.data(), theta.data(), rows.col(i).data());
+      if (data.factor.size() > 0) rows.col(i).head(functions) *= data.factor[first + i];
+      if (form.has_offset) rows(functions, i) = 1;
+    }
+    double xx = gram(0, 0), xy = gram(0, 1), xz = gram(0, 2), yy = gram(1, 1), yz = gram(1, 2),
+           zz = gram(2, 2);
+    double bx = b[0], by = b[1], bz = b[2];
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const double x = rows(0, i), y = rows(1, i), z = rows(2, i), target = data.target[first + i];
+      xx += x * x;
+      xy += x * y;
+      xz += x * z;
+      yy += y * y;
+      yz += y * z;
+      zz += z * z;
+      bx += target * x;
+      by += target * y;
+      bz += target * z;
+      squares += target * target;
+    }
+    gram << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+    b << bx, by, bz;
   }
   FormFit fit;
   fit.theta = theta;
