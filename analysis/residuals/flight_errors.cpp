@@ -31,19 +31,23 @@ ErrorWindow ErrorOfFlight::largest() const {
   return most;
 }
 
+std::optional<FlightError> flight_error(const Inputs& inputs, const Track& track) {
+  if (track.position_only || track.used == 0) return std::nullopt;
+  const std::vector<Eigen::Vector3d> r =
+      force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
+  FlightError error;
+  error.path = track.path;
+  error.force = error_of(track, r);
+  if (error.force.windows.empty()) return std::nullopt;
+  error.places = place_residuals(track, r);
+  if (measures_velocity(inputs.cache->log(track.path, inputs.map)->log))
+    error.velocity = error_of(track, velocity_error(track));
+  return error;
+}
+
 std::vector<FlightError> flight_errors(const Inputs& inputs, int jobs) {
   return over_tracks<FlightError>(inputs, jobs, [&](const Track& track, std::vector<FlightError>& errors) {
-    if (track.used == 0) return;
-    const std::vector<Eigen::Vector3d> r =
-        force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
-    FlightError error;
-    error.path = track.path;
-    error.force = error_of(track, r);
-    if (error.force.windows.empty()) return;
-    error.places = place_residuals(track, r);
-    if (measures_velocity(inputs.cache->log(track.path, inputs.map)->log))
-      error.velocity = error_of(track, velocity_error(track));
-    errors.push_back(std::move(error));
+    if (std::optional<FlightError> error = flight_error(inputs, track)) errors.push_back(std::move(*error));
   });
 }
 

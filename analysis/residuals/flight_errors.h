@@ -27,8 +27,11 @@ struct FlightError {
   std::vector<PlaceResidual> places;  ///< range of the force residual by place of the neighbour
 };
 
-/// One per vehicle whose force is judged and whose log holds a window at least, in the order of flights. The logs are
+/// Of a track as Inputs::load() gives it; nothing where its force is not judged, or its log holds no window. The log is
 /// taken from the cache of `inputs`.
+std::optional<FlightError> flight_error(const Inputs& inputs, const Track& track);
+
+/// flight_error() of all tracks, in the order of flights.
 std::vector<FlightError> flight_errors(const Inputs& inputs, int jobs);
 
 /// The velocity's error over all windows of all flights; nothing where no log measures it.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -163,8 +164,7 @@ files::Json place_grid_json() {
 
 /// flights[].learning_error, flights[].velocity_error and flights[].residual_by_place, from which bound --coverage
 /// makes its promise, and the quantiles of the velocity's error over all windows.
-void add_flight_errors(const residuals::Inputs& inputs, int jobs, files::Json& result) {
-  const std::vector<residuals::FlightError> all = residuals::flight_errors(inputs, jobs);
+void add_flight_errors(const std::vector<residuals::FlightError>& all, files::Json& result) {
   std::map<std::string, const residuals::FlightError*> errors;
   for (const residuals::FlightError& error : all) errors[error.path] = &error;
   for (files::Json& flight : result["flights"]) {
@@ -243,20 +243,33 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   const auto start = std::chrono::steady_clock::now();
   check_outputs(options, common);
   const residuals::GainsOfKinds gains = read_gains(options.gains);
-  const residuals::Inputs inputs = read_flights(options.flights, true, true);
+  residuals::Inputs inputs = read_flights(options.flights, true, true);
+  // One pass over the flights asks for each log once, or twice in a row.
+  constexpr std::size_t kOfOnePass_bytes = std::size_t{64} << 20;
+  if (options.budget.empty() && options.inject.empty() && options.promise.empty())
+    inputs.cache = std::make_shared<residuals::LogCache>(inputs.rules.per_mass, kOfOnePass_bytes);
   const residuals::ForceUnit unit = page_unit(options.flights, inputs);
   check_kinds(gains, inputs);
   Progress progress(common.quiet);
   const auto show = [&](int done, int total) { progress.show(done, total, "flights"); };
-  const residuals::Comparison comparison = residuals::compare(inputs, common.jobs, show, gains);
+  // Nobody else reads the errors of single flights, and they take as long as the comparison.
+  const bool wants_errors = !common.json.empty() || !options.report.empty() || host() != nullptr;
+  std::vector<std::vector<residuals::FlightError>> errors(inputs.found.flights.size());
+  const auto add_error = [&](std::size_t flight, const residuals::Track& track) {
+    if (!wants_errors) return;
+    if (auto error = residuals::flight_error(inputs, track)) errors[flight].push_back(std::move(*error));
+  };
+  const residuals::Comparison comparison = residuals::compare(inputs, common.jobs, show, gains, add_error);
   std::vector<std::string> files = inputs.files();
   for (const auto& [kind, file] : gains) files.push_back(file.path);
   if (!options.promise.empty()) files.push_back(options.promise);
   files::Json result = result_head("compare", files);
   add_comparison(comparison, inputs, result);
-  // Nobody else reads them, and they take as long as the comparison.
-  if (!common.json.empty() || !options.report.empty() || host() != nullptr)
-    add_flight_errors(inputs, common.jobs, result);
+  if (wants_errors) {
+    std::vector<residuals::FlightError> all;
+    for (auto& flight : errors) std::move(flight.begin(), flight.end(), std::back_inserter(all));
+    add_flight_errors(all, result);
+  }
   std::optional<residuals::Comparison> own;
   if (options.flights.published_filter) {
     FlightOptions without = options.flights;
