@@ -9,16 +9,16 @@
 
 namespace swarmcert::identification {
 
-/// Runs the columns of `grams` along `track`, and calls add(block, rows) at the end of each block, where `rows` is
+/// Runs the columns of `grams` along `modelled`, and calls add(block, rows) at the end of each block, where `rows` is
 /// [3 x records, columns + 1] with the residual last.
 /// @param noise   whitens columns and residual where it is not null
 /// @param support by candidate and theta; what the track shows is added
-void run_blocks(const residuals::Inputs& inputs, const ModelledTrack& track, const Grams& grams,
+void run_blocks(const residuals::Inputs& inputs, const ModelledTrack& modelled, const Grams& grams,
                 const Noise* noise, std::vector<Support>& support,
                 const std::function<void(int block, const Eigen::MatrixXd& rows)>& add);
 
 /// The columns of `grams` along `instants`, the track's or others of the same times: [3 x records, columns] by block.
-std::vector<Eigen::MatrixXd> block_columns(const residuals::Inputs& inputs, const ModelledTrack& track,
+std::vector<Eigen::MatrixXd> block_columns(const residuals::Inputs& inputs, const ModelledTrack& modelled,
                                            const Grams& grams,
                                            const std::vector<stability::Instant>& instants);
 

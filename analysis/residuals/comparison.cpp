@@ -16,6 +16,11 @@ namespace {
 
 constexpr std::size_t kFewestOfRegion = 50;
 
+/// RegionErrors::share of `count` records with this bias, where blocks have these squares in sum.
+double region_share(std::size_t count, double bias_N, double all_squares_N2) {
+  return all_squares_N2 > 0 ? static_cast<double>(count) * bias_N * bias_N / all_squares_N2 : 0;
+}
+
 Eigen::Vector4d array_of(const Axes& a) { return {a.x, a.y, a.z, a.total}; }
 
 Trajectories trajectories(const std::vector<TrackPart>& parts, bool has_gains) {
@@ -83,8 +88,7 @@ std::vector<RegionErrors> regions_of_all(const std::vector<TrackPart>& parts, co
       region.region = static_cast<int>(k);
       region.statistics = statistics(r[k], r0[k]);
       const Axes& bias = region.statistics.bias;
-      region.share =
-          all_squares > 0 ? static_cast<double>(r[k].size()) * bias.total * bias.total / all_squares : 0;
+      region.share = region_share(r[k].size(), bias.total, all_squares);
       region.words = fmt::format("{}: {:+.2f} {}", region_name(variable, region.region), bias.z / unit.size_N,
                                  unit.name);
       if (std::hypot(bias.x, bias.y) > std::abs(bias.z)) {
@@ -168,9 +172,9 @@ Leftover left_over(const Inputs& inputs, int jobs) {
   left.noise_floor_N = spectrum.noise_floor_N();
   for (std::size_t v = 0; v < regions.size(); ++v) {
     for (const Sum& sum : regions[v]) {
-      if (sum.count < kFewestOfRegion || !(block_squares > 0)) continue;
-      const double bias = (sum.r / static_cast<double>(sum.count)).norm();
-      left.region_shares[v] += static_cast<double>(sum.count) * bias * bias / block_squares;
+      if (sum.count < kFewestOfRegion) continue;
+      left.region_shares[v] +=
+          region_share(sum.count, (sum.r / static_cast<double>(sum.count)).norm(), block_squares);
     }
   }
   return left;

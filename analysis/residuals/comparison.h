@@ -118,7 +118,7 @@ struct Leftover {
   std::array<double, kNumVariables> region_shares = {};  ///< sum of RegionErrors::share, by variable
 };
 
-/// These numbers as compare() gives them for the same inputs, without the rest of its work.
+/// These numbers as compare() gives them for the same inputs, without the rest of its work; shares up to rounding.
 Leftover left_over(const Inputs& inputs, int jobs);
 
 }  // namespace swarmcert::residuals

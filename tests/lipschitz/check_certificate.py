@@ -589,6 +589,35 @@ def with_groups_joined(nodes):
             yield node
 
 
+ACTIVATIONS_OF_ONNX = {"Relu": "relu", "Tanh": "tanh", "Sigmoid": "sigmoid", "Softplus": "softplus", "Elu": "elu",
+                       "Celu": "elu", "Gelu": "gelu", "Swish": "silu"}  # with their alpha, 1
+
+
+def stores(stored, node):
+    """Whether the node is a constant, or another name of one: then `stored` has it."""
+    if node.kind == "Constant":
+        stored[node.outputs[0]] = OnnxTensor(next(v for n, v in node.attributes["value"] if n == 5))
+        return True
+    if node.kind == "Identity" and node.inputs[0] in stored:
+        stored[node.outputs[0]] = stored[node.inputs[0]]
+        return True
+    return False
+
+
+def require_no_factors(node):
+    require_input(node.has_only(2, "alpha", [b"\0\0\x80?"]) and node.has_only(2, "beta", [b"\0\0\x80?"])
+                  and node.has_only(4, "approximate", [b"none"]),
+                  "this checker reads no factors of Gemm or Elu and no approximate Gelu")
+
+
+def layer_name(weight, names):
+    """Of the layer with these weights, behind layers that have `names`."""
+    name = weight[:-7] if weight.endswith(".weight") and len(weight) > 7 else weight
+    while not name or name in names:
+        name = f"layer{len(names) + 1}" + (f"_{name}" if name else "")
+    return name
+
+
 class OnnxChain:
     """Linear layers with an activation behind each, the last one possibly not, which take one another's results."""
 
@@ -600,25 +629,18 @@ class OnnxChain:
         self.order = None  # in which the next layer takes what is sorted, where it is another
 
     def follow(self, node):
-        if node.kind == "Constant":
-            self.stored[node.outputs[0]] = OnnxTensor(next(v for n, v in node.attributes["value"] if n == 5))
-            return
-        if node.kind == "Identity" and node.inputs[0] in self.stored:
-            self.stored[node.outputs[0]] = self.stored[node.inputs[0]]
+        if stores(self.stored, node):
             return
         require_input(node.inputs.count(self.value) == 1 and all(
             name in ("", self.value) or name in self.stored for name in node.inputs),
             f"ONNX's {node.kind} does not take the value before it, or takes another one")
-        activation = {"Celu": "elu", "Swish": "silu"}.get(node.kind, node.kind.lower())  # with their alpha, 1
-        require_input(node.has_only(2, "alpha", [b"\0\0\x80?"]) and node.has_only(2, "beta", [b"\0\0\x80?"])
-                      and node.has_only(4, "approximate", [b"none"]),
-                      "this checker reads no factors of Gemm or Elu and no approximate Gelu")
+        require_no_factors(node)
         if node.kind in ("Gemm", "MatMul"):
             self.linear(node)
         elif node.kind == "Add":
             self.add(self.stored[next(name for name in node.inputs if name != self.value)])
-        elif node.kind in ("Relu", "Tanh", "Sigmoid", "Softplus", "Elu", "Celu", "Gelu", "Swish"):
-            self.activate(activation)
+        elif node.kind in ACTIVATIONS_OF_ONNX:
+            self.activate(ACTIVATIONS_OF_ONNX[node.kind])
         elif node.kind in ("Reshape", "Flatten"):
             self.reshape(node)
         elif node.kind in ("MaxMin", "PairsMaxMin", "TopK"):
@@ -640,7 +662,7 @@ class OnnxChain:
         if self.order is not None:
             rows = [[row[k] for k in self.order] for row in rows]
         self.kinds.add(weight.kind)
-        self.layers.append([self.layer_name(node.inputs[1]), rows, None])
+        self.layers.append([layer_name(node.inputs[1], [name for name, _, _ in self.layers]), rows, None])
         self.shape, self.is_activated, self.order = sizes[:-1] + [len(rows)], False, None
         if len(node.inputs) == 3 and node.inputs[2]:
             self.add(self.stored[node.inputs[2]])
@@ -656,13 +678,6 @@ class OnnxChain:
         require_input(self.layers and not self.is_activated, "an activation does not follow a linear layer")
         self.activations.append(activation)
         self.is_activated = True
-
-    def layer_name(self, weight):
-        names = [name for name, _, _ in self.layers]
-        name = weight[:-7] if weight.endswith(".weight") and len(weight) > 7 else weight
-        while not name or name in names:
-            name = f"layer{len(names) + 1}" + (f"_{name}" if name else "")
-        return name
 
     def integers_at(self, node, k, attribute):
         """What older operator sets hold in an attribute, newer ones in input `k`."""
@@ -829,9 +844,7 @@ class OnnxFolding:
         return own, [0.0] * len(own), ""
 
     def append(self, weight, rows, shifts, kept):
-        name = weight[:-7] if weight.endswith(".weight") and len(weight) > 7 else weight
-        while not name or name in self.names:
-            name = f"layer{len(self.names) + 1}" + (f"_{name}" if name else "")
+        name = layer_name(weight, self.names)
         self.names.append(name)
         self.layers.append(Layer(name, len(rows), self.width, [row.get(j, 0.0) for row in rows
                                                                for j in range(self.width)], shifts, kept))
@@ -840,23 +853,17 @@ class OnnxFolding:
     def run(self, nodes, outputs, data, order):
         uses = [name for node in nodes for name in node.inputs] + outputs
         for at, node in enumerate(nodes):
-            if node.kind == "Constant":
-                self.stored[node.outputs[0]] = OnnxTensor(next(v for n, v in node.attributes["value"] if n == 5))
+            if stores(self.stored, node):
                 continue
-            if node.kind == "Identity" and node.inputs[0] in self.stored:
-                self.stored[node.outputs[0]] = self.stored[node.inputs[0]]
-                continue
-            require_input(node.has_only(2, "alpha", [b"\0\0\x80?"]) and node.has_only(2, "beta", [b"\0\0\x80?"])
-                          and node.has_only(4, "approximate", [b"none"]),
-                          "this checker reads no factors of Gemm or Elu and no approximate Gelu")
+            require_no_factors(node)
             if node.kind in ("Gemm", "MatMul"):
                 result = self.linear(node)
             elif node.kind in ("Add", "Sub"):
                 result = self.added(node)
-            elif node.kind in ("Relu", "Tanh", "Sigmoid", "Softplus", "Elu", "Celu", "Gelu", "Swish"):
+            elif node.kind in ACTIVATIONS_OF_ONNX:
                 later = {name for other in nodes[at + 1:] for name in other.inputs} | set(outputs)
-                op = {"Celu": "elu", "Swish": "silu"}.get(node.kind, node.kind.lower())
-                result = self.activated(op, node.inputs[0], [name for name in self.values if name in later])
+                needed = [name for name in self.values if name in later]
+                result = self.activated(ACTIVATIONS_OF_ONNX[node.kind], node.inputs[0], needed)
             else:
                 require_input(node.kind == "Identity", f"this checker does not read ONNX's {node.kind} beside a skip")
                 result = self.values[node.inputs[0]]
@@ -919,8 +926,8 @@ def read_onnx(data, order):
     if chain.is_activated:  # what ends in an activation is followed by the identity
         size = len(chain.layers[-1][1])
         which = chain.order or range(size)
-        chain.layers.append([chain.layer_name(""), [[float(which[i] == j) for j in range(size)] for i in range(size)],
-                             None])
+        name = layer_name("", [name for name, _, _ in chain.layers])
+        chain.layers.append([name, [[float(which[i] == j) for j in range(size)] for i in range(size)], None])
     parts = []
     for name, rows, biases in chain.layers:
         parts.append((f"{name}.weight", [len(rows), len(rows[0])], [x for row in rows for x in row]))

@@ -145,53 +145,68 @@ let all_faces radius =
     at low, at high in
   face n 1. :: List.concat_map (fun k -> [ face k (-. radius.(k)); face k radius.(k) ]) (List.init n Fun.id)
 
+let sizes_of layers = List.map Weights.outputs layers
+let hidden (w : Weights.t) = List.filteri (fun k _ -> k + 1 < List.length w.layers) w.layers
+
+let point corner low high = Array.mapi (fun k l -> if (corner lsr k) land 1 = 1 then high.(k) else l) low
+
+(* By layer, in the order in which they were read. *)
+let by_layer count found =
+  let found = List.rev found in
+  List.init count (fun k -> List.filter_map (fun (layer, d) -> if layer = k then Some d else None) found)
+let decided found count = if found = [] then [] else by_layer count found
+
+(* Words of a tree, and where they fail. *)
+type reader = { where : string; words : string array; mutable at : int }
+let reader where text =
+  { where; words = (if text = "" then [||] else Array.of_list (String.split_on_char ' ' text)); at = 0 }
+let fails reader at reason = rejected "%s: word %d of the tree: %s" reader.where (at + 1) reason
+let next reader =
+  if reader.at >= Array.length reader.words then rejected "%s: the tree ends before the box is covered" reader.where;
+  match word_of reader.words.(reader.at) with
+  | Some word -> reader.at <- reader.at + 1; word
+  | None -> fails reader reader.at "neither a split nor a leaf, a form or a decision"
+let ends reader =
+  if reader.at < Array.length reader.words then fails reader reader.at "the box is covered already"
+
+let middle_of reader here k low high ~pending ~boxes =
+  if pending > deepest + boxes then fails reader here "the tree is too deep";
+  if k >= Array.length low then fails reader here "there is no such coordinate";
+  let middle = low.(k) +. (high.(k) -. low.(k)) /. 2. in
+  if not (low.(k) <= middle && middle <= high.(k)) then fails reader here "the side cannot be halved";
+  middle
+let with_middle side k middle = let side = Array.copy side in side.(k) <- middle; side
+
 (* The tree of each box, and the number of the word of each leaf. `passes`: neurons that pass their input on. *)
 let trees_of ~where ~(layers : Weights.layer list) ~passes ~multipliers ~boxes text =
-  let words = if text = "" then [||] else Array.of_list (String.split_on_char ' ' text) in
-  let fails at reason = rejected "%s: word %d of the tree: %s" where (at + 1) reason in
-  let at = ref 0 and leaves = ref [] in
-  let sizes = List.map Weights.outputs layers in
-  let rec decisions low high found =
-    if !at >= Array.length words then rejected "%s: the tree ends before the box is covered" where;
-    match word_of words.(!at) with
-    | None -> fails !at "neither a split nor a leaf, a form or a decision"
-    | Some (Of_rho | Form _) -> fails !at "there is no rho"
-    | Some (Decided (neuron, is_on, corner)) ->
-      (match place neuron 0 sizes with
-       | None -> fails !at "a neuron is decided that nothing looks at"
-       | Some place when Array.length low > most_inputs_of_a_corner || passes place ->
-          fails !at "a neuron is not decided by its slopes"
-       | Some (layer, neuron) ->
-         let point = Array.mapi (fun k l -> if (corner lsr k) land 1 = 1 then high.(k) else l) low in
-         incr at;
-         decisions low high ((layer, { Proved.neuron; is_on; lower_slopes = slopes_at layers layer point }) :: found))
-    | Some word ->
-      if found = [] then word, [] else
-      let found = List.rev found in
-      word, List.mapi (fun k _ -> List.filter_map (fun (layer, d) -> if layer = k then Some d else None) found) sizes in
-  let rec tree pending low high =
-    let word, decided = decisions low high [] in
-    let here = !at in
-    incr at;
+  let reader = reader where text in
+  let leaves = ref [] and sizes = sizes_of layers and count = List.length layers in
+  let rec tree pending low high found =
+    let word = next reader in
+    let here = reader.at - 1 in
     match word with
+    | Of_rho | Form _ -> fails reader here "there is no rho"
+    | Decided (neuron, is_on, corner) ->
+      (match place neuron 0 sizes with
+       | None -> fails reader here "a neuron is decided that nothing looks at"
+       | Some place when Array.length low > most_inputs_of_a_corner || passes place ->
+         fails reader here "a neuron is not decided by its slopes"
+       | Some (layer, neuron) ->
+         let lower_slopes = slopes_at layers layer (point corner low high) in
+         tree pending low high ((layer, { Proved.neuron; is_on; lower_slopes }) :: found))
     | Multipliers k ->
-      if k >= Array.length multipliers then fails here "there are no such multipliers";
+      if k >= Array.length multipliers then fails reader here "there are no such multipliers";
       leaves := (here + 1) :: !leaves;
       let conflicts, t = multipliers.(k) in
-      Proved.Leaf (decided, conflicts, t)
+      Proved.Leaf (decided found count, conflicts, t)
     | Split k ->
-      if pending > deepest + List.length boxes then fails here "the tree is too deep";
-      if k >= Array.length low then fails here "there is no such coordinate";
-      let middle = low.(k) +. (high.(k) -. low.(k)) /. 2. in
-      if not (low.(k) <= middle && middle <= high.(k)) then fails here "the side cannot be halved";
-      let with_middle side = let side = Array.copy side in side.(k) <- middle; side in
-      let lower = tree (pending + 1) low (with_middle high) in
-      let upper = tree pending (with_middle low) high in
-      Proved.Halve (decided, k, Exact.of_float middle, lower, upper)
-    | Of_rho | Form _ | Decided _ -> assert false in
+      let middle = middle_of reader here k low high ~pending ~boxes:(List.length boxes) in
+      let lower = tree (pending + 1) low (with_middle high k middle) [] in
+      let upper = tree pending (with_middle low k middle) high [] in
+      Proved.Halve (decided found count, k, Exact.of_float middle, lower, upper) in
   let last = List.length boxes - 1 in
-  let trees = List.mapi (fun k (low, high) -> tree (last - k) low high) boxes in
-  if !at < Array.length words then fails !at "the box is covered already";
+  let trees = List.mapi (fun k (low, high) -> tree (last - k) low high []) boxes in
+  ends reader;
   trees, Array.of_list (List.rev !leaves)
 
 (* |drho|^2 <= dv' Q dv. *)
@@ -280,11 +295,11 @@ let read (net : Network.t) certificate bound ~where ~names ~moves ~scale ~upper 
     end else [] in
   let domain, boxes = if is_global then Everywhere, all_faces (Array.of_list radius)
     else let box, low, high = box_of net certificate moved where in Box box, [ low, high ] in
-  let hidden = List.filteri (fun k _ -> k + 1 < List.length weights.layers) weights.layers in
+  let hidden = hidden weights in
   let layers = if is_global then homogeneous hidden else hidden in
   let passes (layer, neuron) =
     is_global && layer + 1 < List.length hidden && neuron = Weights.outputs (List.nth hidden layer) in
-  let multipliers = multipliers_of where json (List.map Weights.outputs layers) in
+  let multipliers = multipliers_of where json (sizes_of layers) in
   check_range where rho ~moves ~scale;
   let trees, leaves = trees_of ~where ~layers ~passes ~multipliers ~boxes tree_text in
   let form = match names with [ _; name ] -> Some (form_of net name (where ^ ".form") form_json) | _ -> None in

@@ -6,9 +6,6 @@ open Refusal
 open Json
 open Box_parts
 
-let sizes_of layers = List.map Weights.outputs layers
-let hidden (w : Weights.t) = List.filteri (fun k _ -> k + 1 < List.length w.layers) w.layers
-
 (* rho's first layer behind phi's last one, with these numbers added, in floating point. *)
 let joined (phi : Weights.layer) (rho : Weights.layer) added =
   let times row = Array.init (Weights.inputs phi) (fun j ->
@@ -17,35 +14,6 @@ let joined (phi : Weights.layer) (rho : Weights.layer) added =
     let sum = ref (rho.biases.(i) +. added.(i)) in
     Array.iteri (fun k v -> sum := !sum +. v *. phi.biases.(k)) row; !sum in
   { rho with weights = Array.map times rho.weights; biases = Array.mapi bias rho.weights }
-
-let point corner low high = Array.mapi (fun k l -> if (corner lsr k) land 1 = 1 then high.(k) else l) low
-
-(* By layer, in the order in which they were read. *)
-let by_layer count found =
-  let found = List.rev found in
-  List.init count (fun k -> List.filter_map (fun (layer, d) -> if layer = k then Some d else None) found)
-let decided found count = if found = [] then [] else by_layer count found
-
-(* Words of a tree, and where they fail. *)
-type reader = { where : string; words : string array; mutable at : int }
-let reader where text =
-  { where; words = (if text = "" then [||] else Array.of_list (String.split_on_char ' ' text)); at = 0 }
-let fails reader at reason = rejected "%s: word %d of the tree: %s" reader.where (at + 1) reason
-let next reader =
-  if reader.at >= Array.length reader.words then rejected "%s: the tree ends before the box is covered" reader.where;
-  match word_of reader.words.(reader.at) with
-  | Some word -> reader.at <- reader.at + 1; word
-  | None -> fails reader reader.at "neither a split nor a leaf, a form or a decision"
-let ends reader =
-  if reader.at < Array.length reader.words then fails reader reader.at "the box is covered already"
-
-let middle_of reader here k low high ~pending =
-  if pending > deepest + 1 then fails reader here "the tree is too deep";
-  if k >= Array.length low then fails reader here "there is no such coordinate";
-  let middle = low.(k) +. (high.(k) -. low.(k)) /. 2. in
-  if not (low.(k) <= middle && middle <= high.(k)) then fails reader here "the side cannot be halved";
-  middle
-let with_middle side k middle = let side = Array.copy side in side.(k) <- middle; side
 
 (* A decision of a neuron of phi. *)
 let decision reader ~layers ~low ~high (neuron, is_on, corner) =
@@ -68,7 +36,7 @@ let range_of where (phi : Weights.t) low high text =
     | Multipliers 0 -> Proved.Range_leaf (decided found count)
     | Multipliers _ -> fails reader here "a leaf of a range has no multipliers"
     | Split k ->
-      let middle = middle_of reader here k low high ~pending in
+      let middle = middle_of reader here k low high ~pending ~boxes:1 in
       let lower = tree (pending + 1) low (with_middle high k middle) [] in
       let upper = tree pending (with_middle low k middle) high [] in
       Range_halves (decided found count, k, Exact.of_float middle, lower, upper)
@@ -133,7 +101,7 @@ let tree_of ~where ~(phi : Weights.t) ~(rho : Weights.t) ~added ~multipliers ~fo
     | Some (layer, neuron) ->
       let layer = if layer > before then layer - 1 else layer in
       layer, { Proved.neuron; is_on; lower_slopes = slopes_at layers layer (point corner low high) } in
-  (* `waiting`: decisions that nothing has looked at yet; those of phi are looked at by the first word that is none. *)
+  (* `waiting`: decisions that no word has used yet. Those of phi are used by the first word that is not a decision. *)
   let rec tree pending low high form said ~is_first found waiting =
     let word = next reader in
     let here = reader.at - 1 in
@@ -163,7 +131,7 @@ let tree_of ~where ~(phi : Weights.t) ~(rho : Weights.t) ~added ~multipliers ~fo
          { said = List.rev said; then_ = Leaf_with (here + 1, form, conflicts, t) })
     | Split k ->
       nothing_waits ();
-      let middle = middle_of reader here k low high ~pending in
+      let middle = middle_of reader here k low high ~pending ~boxes:1 in
       let lower, below = tree (pending + 1) low (with_middle high k middle) form [] ~is_first:true [] [] in
       let upper, above = tree pending (with_middle low k middle) high form [] ~is_first:true [] [] in
       let middle = Exact.of_float middle in
