@@ -5,10 +5,10 @@
 #include <map>
 #include <stdexcept>
 
+#include "lipschitz/base/rounding.h"
+#include "lipschitz/base/stop.h"
+#include "lipschitz/base/work_progress.h"
 #include "lipschitz/certify_bounds.h"
-#include "lipschitz/rounding.h"
-#include "lipschitz/stop.h"
-#include "lipschitz/work_progress.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"

@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "lipschitz/base/claims.h"
 #include "lipschitz/branch/local_bound.h"
 #include "lipschitz/checker/bounds.h"
-#include "lipschitz/claims.h"
-#include "lipschitz/lower_bound.h"
-#include "lipschitz/sdp_bound.h"
-#include "lipschitz/spectral_norm.h"
-#include "lipschitz/value_bounds.h"
+#include "lipschitz/lower/lower_bound.h"
+#include "lipschitz/upper/sdp_bound.h"
+#include "lipschitz/upper/spectral_norm.h"
+#include "lipschitz/values/value_bounds.h"
 #include "nn/base/json.h"
 #include "nn/weights/network.h"
 #include "nn/weights/samples.h"

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
-#include "lipschitz/bent_bound.h"
+#include "lipschitz/base/rounding.h"
 #include "lipschitz/checker/stages.h"
-#include "lipschitz/eclipse_fast.h"
-#include "lipschitz/range.h"
-#include "lipschitz/rounding.h"
+#include "lipschitz/upper/bent_bound.h"
+#include "lipschitz/upper/eclipse_fast.h"
+#include "lipschitz/values/range.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/functions.h"
 

@@ -1,9 +1,9 @@
 /// @file The bounds of a certification: what is done for each claim, in which order, within which time.
 #pragma once
 
+#include "lipschitz/base/stop.h"
+#include "lipschitz/base/work_progress.h"
 #include "lipschitz/certify.h"
-#include "lipschitz/stop.h"
-#include "lipschitz/work_progress.h"
 
 namespace swarmcert::lipschitz {
 

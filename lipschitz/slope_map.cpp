@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "lipschitz/certify_bounds.h"
-#include "lipschitz/range.h"
+#include "lipschitz/values/range.h"
 #include "nn/base/parallel.h"
 #include "nn/base/suggest.h"
 #include "nn/weights/functions.h"

@@ -10,7 +10,7 @@
 #include "analysis/residuals/inputs.h"
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
-#include "lipschitz/range.h"
+#include "lipschitz/values/range.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/functions.h"
 #include "stability/bounds/tracking_setup.h"

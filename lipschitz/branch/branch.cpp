@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "lipschitz/branch/search.h"
-#include "lipschitz/dense_kernels.h"
+#include "lipschitz/solver/dense_kernels.h"
 
 namespace swarmcert::lipschitz {
 namespace {

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "lipschitz/box.h"
-#include "lipschitz/reach.h"
+#include "lipschitz/base/box.h"
+#include "lipschitz/values/reach.h"
 
 namespace swarmcert::lipschitz {
 

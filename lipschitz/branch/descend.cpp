@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "lipschitz/dense_kernels.h"
+#include "lipschitz/solver/dense_kernels.h"
 
 namespace swarmcert::lipschitz {
 namespace {

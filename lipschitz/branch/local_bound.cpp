@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lipschitz/base/rounding.h"
 #include "lipschitz/branch/search_tree.h"
 #include "lipschitz/checker/projective_cover.h"
 #include "lipschitz/checker/stages.h"
-#include "lipschitz/lmi_proof.h"
-#include "lipschitz/rounding.h"
+#include "lipschitz/upper/lmi_proof.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {

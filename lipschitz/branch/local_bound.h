@@ -4,12 +4,12 @@
 #include <map>
 #include <optional>
 
+#include "lipschitz/base/claims.h"
 #include "lipschitz/branch/branch.h"
 #include "lipschitz/branch/rho_form.h"
 #include "lipschitz/branch/sum_range.h"
 #include "lipschitz/checker/bounds.h"
 #include "lipschitz/checker/tree_proof.h"
-#include "lipschitz/claims.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::lipschitz {

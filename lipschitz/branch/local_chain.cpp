@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "lipschitz/lipsdp_solver.h"
+#include "lipschitz/solver/lipsdp_solver.h"
 
 namespace swarmcert::lipschitz {
 

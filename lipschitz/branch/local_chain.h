@@ -3,10 +3,10 @@
 
 #include <vector>
 
-#include "lipschitz/box.h"
+#include "lipschitz/base/box.h"
 #include "lipschitz/branch/conflicts.h"
 #include "lipschitz/checker/tree_proof.h"
-#include "lipschitz/reach.h"
+#include "lipschitz/values/reach.h"
 
 namespace swarmcert::lipschitz {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "lipschitz/dense_kernels.h"
+#include "lipschitz/solver/dense_kernels.h"
 
 namespace swarmcert::lipschitz {
 

@@ -6,7 +6,7 @@
 
 #include "lipschitz/branch/conflicts.h"
 #include "lipschitz/branch/local_chain.h"
-#include "lipschitz/interior_point.h"
+#include "lipschitz/solver/interior_point.h"
 
 namespace swarmcert::lipschitz {
 

@@ -2,7 +2,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "lipschitz/lmi_proof.h"
+#include "lipschitz/upper/lmi_proof.h"
 
 namespace swarmcert::lipschitz {
 

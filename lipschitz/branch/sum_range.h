@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "lipschitz/box.h"
+#include "lipschitz/base/box.h"
 #include "lipschitz/checker/box_states.h"
-#include "lipschitz/reach.h"
+#include "lipschitz/values/reach.h"
 
 namespace swarmcert::lipschitz {
 

@@ -1,5 +1,5 @@
 /// @file Which neurons a box decides: linear relaxation in double, every rounding accounted for. Shares no code with
-/// the search (lipschitz/reach.h), which does the same for its own purposes.
+/// the search (lipschitz/values/reach.h), which does the same for its own purposes.
 #pragma once
 
 #include <cstddef>

@@ -11,10 +11,10 @@
 #include "nn/base/input_error.h"
 #include "nn/weights/c_source.h"
 #include "nn/weights/enclosed.h"
-#include "nn/weights/mat_file.h"
+#include "nn/weights/matlab/mat_file.h"
 #include "nn/weights/named_arrays.h"
 #include "nn/weights/nnet.h"
-#include "nn/weights/onnx.h"
+#include "nn/weights/onnx/onnx.h"
 #include "nn/weights/pth.h"
 #include "nn/weights/safetensors.h"
 

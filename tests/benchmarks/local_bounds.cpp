@@ -22,8 +22,8 @@
 #include "data.h"
 #include "lipschitz/branch/local_bound.h"
 #include "lipschitz/checker/stages.h"
-#include "lipschitz/lower_bound.h"
-#include "lipschitz/sdp_bound.h"
+#include "lipschitz/lower/lower_bound.h"
+#include "lipschitz/upper/sdp_bound.h"
 #include "nn/weights/functions.h"
 
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "data.h"
-#include "lipschitz/slope_search.h"
+#include "lipschitz/lower/slope_search.h"
 
 namespace {
 

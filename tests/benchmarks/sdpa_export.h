@@ -3,7 +3,7 @@
 
 #include <ostream>
 
-#include "lipschitz/lipsdp_solver.h"
+#include "lipschitz/solver/lipsdp_solver.h"
 
 namespace swarmcert::benchmarks {
 

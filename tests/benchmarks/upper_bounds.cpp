@@ -16,8 +16,8 @@
 #include "lipschitz/checker/check.h"
 #include "lipschitz/checker/lipschitz_lmi.h"
 #include "lipschitz/checker/stages.h"
-#include "lipschitz/sdp_bound.h"
-#include "lipschitz/spectral_norm.h"
+#include "lipschitz/upper/sdp_bound.h"
+#include "lipschitz/upper/spectral_norm.h"
 #include "nn/weights/functions.h"
 
 namespace {

@@ -1,16 +1,16 @@
 /// The matrix inequality of neurons whose slopes lie in any [a, b]: values that are known, proofs and refusals.
-#include "lipschitz/bent_bound.h"
+#include "lipschitz/upper/bent_bound.h"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include "lipschitz/certify.h"
-#include "lipschitz/chain_newton.h"
 #include "lipschitz/checker/check.h"
 #include "lipschitz/checker/stages.h"
-#include "lipschitz/live_chain.h"
 #include "lipschitz/networks.h"
+#include "lipschitz/solver/chain_newton.h"
+#include "lipschitz/upper/live_chain.h"
 #include "nn/base/content_hash.h"
 #include "nn/base/json.h"
 

@@ -1,5 +1,5 @@
 /// Factors of block tridiagonal matrices, against Eigen's dense ones; and a program that is solved with them.
-#include "lipschitz/block_cholesky.h"
+#include "lipschitz/solver/block_cholesky.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <cmath>
 #include <random>
 
-#include "lipschitz/lipsdp_solver.h"
+#include "lipschitz/solver/lipsdp_solver.h"
 
 namespace swarmcert::lipschitz {
 namespace {

@@ -7,7 +7,7 @@
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/checker/statement.h"
 #include "lipschitz/networks.h"
-#include "lipschitz/value_bounds.h"
+#include "lipschitz/values/value_bounds.h"
 #include "nn/base/content_hash.h"
 #include "nn/base/json.h"
 #include "nn/weights/functions.h"

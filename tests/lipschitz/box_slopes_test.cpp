@@ -6,10 +6,10 @@
 #include "lipschitz/boxes.h"
 #include "lipschitz/checker/centred_form.h"
 #include "lipschitz/checker/check.h"
+#include "lipschitz/lower/slope_estimate.h"
 #include "lipschitz/networks.h"
-#include "lipschitz/range.h"
-#include "lipschitz/slope_estimate.h"
-#include "lipschitz/value_bounds.h"
+#include "lipschitz/values/range.h"
+#include "lipschitz/values/value_bounds.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert {

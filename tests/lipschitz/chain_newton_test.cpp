@@ -1,4 +1,4 @@
-#include "lipschitz/chain_newton.h"
+#include "lipschitz/solver/chain_newton.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <atomic>
 #include <cmath>
 
-#include "lipschitz/lmi_proof.h"
+#include "lipschitz/upper/lmi_proof.h"
 #include "nn/base/random.h"
 
 namespace swarmcert::lipschitz {

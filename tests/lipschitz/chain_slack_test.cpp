@@ -1,5 +1,5 @@
 /// log det S and its derivatives against the definition of S, assembled as one dense matrix.
-#include "lipschitz/chain_slack.h"
+#include "lipschitz/solver/chain_slack.h"
 
 #include <gtest/gtest.h>
 

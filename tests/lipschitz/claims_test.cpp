@@ -1,4 +1,4 @@
-#include "lipschitz/claims.h"
+#include "lipschitz/base/claims.h"
 
 #include <Eigen/Core>
 

@@ -1,4 +1,4 @@
-#include "lipschitz/comparison.h"
+#include "lipschitz/upper/comparison.h"
 
 #include "data.h"
 #include "lipschitz/networks.h"

@@ -1,13 +1,13 @@
 // The convex network above a function of a sum: above the function of any neighbours, tight where it was asked to be.
-#include "lipschitz/convex_majorant.h"
+#include "lipschitz/values/convex_majorant.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 
-#include "lipschitz/extremes.h"
 #include "lipschitz/networks.h"
+#include "lipschitz/values/extremes.h"
 #include "nn/base/random.h"
 
 namespace swarmcert {

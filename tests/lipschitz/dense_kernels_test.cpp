@@ -1,5 +1,5 @@
 // The kernels of the interior point method give one thread's bits to every thread.
-#include "lipschitz/dense_kernels.h"
+#include "lipschitz/solver/dense_kernels.h"
 
 #include <gtest/gtest.h>
 

@@ -1,14 +1,14 @@
 // Largest values of networks over a box: never below a value, close to the exact maximum, the same for any number of
 // threads.
-#include "lipschitz/extremes.h"
+#include "lipschitz/values/extremes.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
 #include "lipschitz/networks.h"
-#include "lipschitz/range.h"
-#include "lipschitz/sum_support.h"
+#include "lipschitz/values/range.h"
+#include "lipschitz/values/sum_support.h"
 #include "nn/base/random.h"
 
 namespace swarmcert {

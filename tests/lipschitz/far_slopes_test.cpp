@@ -5,10 +5,10 @@
 
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
-#include "lipschitz/linear_region.h"
+#include "lipschitz/lower/linear_region.h"
+#include "lipschitz/lower/search_network.h"
+#include "lipschitz/lower/slope_search.h"
 #include "lipschitz/networks.h"
-#include "lipschitz/search_network.h"
-#include "lipschitz/slope_search.h"
 #include "nn/base/random.h"
 
 namespace swarmcert::lipschitz {

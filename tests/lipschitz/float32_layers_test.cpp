@@ -1,5 +1,5 @@
 // Rounding of layers in float32, by the loop that flies, and what reaches the outputs, against exact arithmetic.
-#include "lipschitz/float32_layers.h"
+#include "lipschitz/values/float32_layers.h"
 
 #include <gmpxx.h>
 #include <gtest/gtest.h>

@@ -3,11 +3,11 @@
 
 #include <atomic>
 
+#include "lipschitz/base/stop.h"
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
-#include "lipschitz/eclipse_fast.h"
 #include "lipschitz/networks.h"
-#include "lipschitz/stop.h"
+#include "lipschitz/upper/eclipse_fast.h"
 
 namespace swarmcert::lipschitz {
 namespace {

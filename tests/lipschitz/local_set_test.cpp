@@ -8,7 +8,7 @@
 #include "lipschitz/branch/conflicts.h"
 #include "lipschitz/branch/local_bound.h"
 #include "lipschitz/checker/projective_cover.h"
-#include "lipschitz/lower_bound.h"
+#include "lipschitz/lower/lower_bound.h"
 #include "lipschitz/networks.h"
 #include "nn/weights/functions.h"
 

@@ -5,8 +5,8 @@
 
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
+#include "lipschitz/lower/slope_estimate.h"
 #include "lipschitz/networks.h"
-#include "lipschitz/slope_estimate.h"
 #include "nn/base/content_hash.h"
 #include "nn/weights/activation.h"
 

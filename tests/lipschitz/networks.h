@@ -10,7 +10,7 @@
 
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/checker/witness.h"
-#include "lipschitz/sdp_bound.h"
+#include "lipschitz/upper/sdp_bound.h"
 #include "nn/random_network.h"
 #include "nn/weights/network.h"
 

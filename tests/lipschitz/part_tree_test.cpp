@@ -1,6 +1,6 @@
 // Largest values of many forms over one tree of parts: those of Reach where nothing is halved, never below a value,
 // close to the largest one found, whatever was asked for before and with any number of threads.
-#include "lipschitz/part_tree.h"
+#include "lipschitz/values/part_tree.h"
 
 #include <gtest/gtest.h>
 

@@ -2,14 +2,14 @@
 #include <cmath>
 #include <optional>
 
+#include "lipschitz/base/rounding.h"
 #include "lipschitz/boxes.h"
 #include "lipschitz/checker/check.h"
 #include "lipschitz/checker/witness.h"
-#include "lipschitz/lower_bound.h"
+#include "lipschitz/lower/lower_bound.h"
+#include "lipschitz/lower/slope_estimate.h"
+#include "lipschitz/lower/slope_search.h"
 #include "lipschitz/networks.h"
-#include "lipschitz/rounding.h"
-#include "lipschitz/slope_estimate.h"
-#include "lipschitz/slope_search.h"
 #include "nn/base/content_hash.h"
 #include "nn/base/json.h"
 #include "nn/weights/functions.h"

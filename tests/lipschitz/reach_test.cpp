@@ -1,12 +1,12 @@
 // Linear bounds of ReLU networks over a box: those of plain backward substitution, and never below a value.
-#include "lipschitz/reach.h"
+#include "lipschitz/values/reach.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "lipschitz/extremes.h"
 #include "lipschitz/networks.h"
+#include "lipschitz/values/extremes.h"
 #include "nn/base/random.h"
 
 namespace swarmcert {

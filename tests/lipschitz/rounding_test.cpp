@@ -1,5 +1,5 @@
 // Exact numbers rounded to doubles that stay bounds.
-#include "lipschitz/rounding.h"
+#include "lipschitz/base/rounding.h"
 
 #include <gtest/gtest.h>
 

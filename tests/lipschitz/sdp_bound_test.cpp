@@ -1,4 +1,4 @@
-#include "lipschitz/sdp_bound.h"
+#include "lipschitz/upper/sdp_bound.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -6,7 +6,7 @@
 
 #include "data.h"
 #include "lipschitz/networks.h"
-#include "lipschitz/spectral_norm.h"
+#include "lipschitz/upper/spectral_norm.h"
 
 namespace swarmcert {
 namespace {

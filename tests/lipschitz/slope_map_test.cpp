@@ -7,8 +7,8 @@
 #include <random>
 
 #include "lipschitz/boxes.h"
+#include "lipschitz/lower/slope_estimate.h"
 #include "lipschitz/networks.h"
-#include "lipschitz/slope_estimate.h"
 
 namespace swarmcert::lipschitz {
 namespace {

@@ -1,4 +1,4 @@
-#include "lipschitz/slope_search.h"
+#include "lipschitz/lower/slope_search.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 #include "data.h"
 #include "lipschitz/networks.h"
-#include "lipschitz/spectral_norm.h"
+#include "lipschitz/upper/spectral_norm.h"
 #include "nn/random_network.h"
 
 namespace swarmcert::lipschitz {

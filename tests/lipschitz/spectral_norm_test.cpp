@@ -1,4 +1,4 @@
-#include "lipschitz/spectral_norm.h"
+#include "lipschitz/upper/spectral_norm.h"
 
 #include <Eigen/Dense>
 

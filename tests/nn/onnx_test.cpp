@@ -1,6 +1,6 @@
 /// ONNX models: two written by the onnx package (1.12, opset 13), with the outputs that NumPy computes from the same
 /// arrays; and damaged or unsuitable ones, built field by field.
-#include "nn/weights/onnx.h"
+#include "nn/weights/onnx/onnx.h"
 
 #include <gtest/gtest.h>
 

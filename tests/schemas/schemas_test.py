@@ -236,7 +236,7 @@ def test_the_readers_take_no_key_that_the_schemas_do_not_know():
         "gains": ["stability/gains.cpp"],
         "flights": ["analysis/residuals/flight_set.cpp"],
         "columns": ["analysis/logs/columns.cpp"],
-        "box": ["lipschitz/claims.cpp"],
+        "box": ["lipschitz/base/claims.cpp"],
         "grid": ["stability/sweep/grid.cpp"],
         "swarm": ["stability/bounds/coupled_swarm.cpp"],
         "policy": ["analysis/gate/policy.cpp", *map(str, (SOURCE / "analysis/gate/checks").glob("*.cpp"))],

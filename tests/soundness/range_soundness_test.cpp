@@ -8,9 +8,9 @@
 
 #include "data.h"
 #include "lipschitz/certify.h"
-#include "lipschitz/float32_error.h"
 #include "lipschitz/networks.h"
-#include "lipschitz/range.h"
+#include "lipschitz/values/float32_error.h"
+#include "lipschitz/values/range.h"
 #include "nn/base/random.h"
 #include "nn/weights/functions.h"
 

@@ -15,7 +15,7 @@
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/output_folder.h"
 #include "lipschitz/certify.h"
-#include "lipschitz/slope_estimate.h"
+#include "lipschitz/lower/slope_estimate.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"

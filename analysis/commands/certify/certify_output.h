@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "lipschitz/certify.h"
-#include "lipschitz/comparison.h"
-#include "lipschitz/float32_error.h"
-#include "lipschitz/range.h"
 #include "lipschitz/slope_map.h"
+#include "lipschitz/upper/comparison.h"
+#include "lipschitz/values/float32_error.h"
+#include "lipschitz/values/range.h"
 #include "nn/base/json.h"
 #include "nn/weights/network.h"
 

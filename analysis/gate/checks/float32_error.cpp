@@ -1,4 +1,4 @@
-#include "lipschitz/float32_error.h"
+#include "lipschitz/values/float32_error.h"
 
 #include <fmt/core.h>
 

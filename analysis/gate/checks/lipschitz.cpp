@@ -6,7 +6,7 @@
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/checks/force_unit.h"
 #include "analysis/gate/evidence.h"
-#include "lipschitz/box.h"
+#include "lipschitz/base/box.h"
 #include "nn/base/json.h"
 #include "nn/base/toml.h"
 #include "nn/weights/function_names.h"

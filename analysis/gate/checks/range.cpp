@@ -1,4 +1,4 @@
-#include "lipschitz/range.h"
+#include "lipschitz/values/range.h"
 
 #include <fmt/core.h>
 

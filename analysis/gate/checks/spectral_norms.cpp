@@ -3,7 +3,7 @@
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
 #include "lipschitz/certify.h"
-#include "lipschitz/spectral_norm.h"
+#include "lipschitz/upper/spectral_norm.h"
 #include "nn/base/toml.h"
 #include "nn/weights/functions.h"
 

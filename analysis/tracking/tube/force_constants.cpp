@@ -5,8 +5,8 @@
 
 #include "lipschitz/branch/local_bound.h"
 #include "lipschitz/checker/stages.h"
-#include "lipschitz/sdp_bound.h"
-#include "lipschitz/spectral_norm.h"
+#include "lipschitz/upper/sdp_bound.h"
+#include "lipschitz/upper/spectral_norm.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/functions.h"
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "lipschitz/box.h"
-#include "lipschitz/reach.h"
+#include "lipschitz/base/box.h"
+#include "lipschitz/values/reach.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::analysis {

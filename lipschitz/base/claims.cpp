@@ -1,0 +1,170 @@
+#include "lipschitz/base/claims.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "nn/base/file_io.h"
+#include "nn/base/toml.h"
+#include "nn/weights/functions.h"
+#include "nn/weights/invariants.h"
+
+namespace swarmcert::lipschitz {
+namespace {
+
+bool contains(const std::vector<std::string>& list, const std::string& text) {
+  return std::find(list.begin(), list.end(), text) != list.end();
+}
+
+/// Whether `function` takes inputs of NET rather than hidden values.
+bool takes_inputs(const std::string& function) { return !files::is_rho(function); }
+
+/// Whether there are claims of `function` with weights of its inputs.
+bool takes_scale(const files::Network& network, const std::string& function, std::size_t scales) {
+  return takes_inputs(function) && !files::maps_to_invariants(network, function) &&
+         static_cast<std::size_t>(files::inputs(network, function)) == scales;
+}
+
+/// The groups of neighbours that the options name.
+std::vector<Neighbours> groups(const files::Network& network, const ClaimOptions& options) {
+  std::vector<Neighbours> result;
+  for (const auto& [kind, phi] : network.phi) {
+    if (kind != files::kGroundKind && options.neighbours > 0) result.push_back({{kind, options.neighbours}});
+  }
+  for (const auto& [kind, count] : options.mixture) {
+    if (network.phi.count(kind) == 0 || kind == files::kGroundKind)
+      throw std::invalid_argument("there are no neighbours of kind \"" + kind + "\"");
+    if (count < 1) throw std::invalid_argument("a number of neighbours is below 1");
+  }
+  if (!options.mixture.empty()) result.push_back(options.mixture);
+  return result;
+}
+
+/// Claims that hold for a group of neighbours only: of the set functions whose moving term is in it, or the ground's.
+void add_counted(const files::Network& network, const ClaimOptions& options, std::vector<Claim>& claims) {
+  for (const Neighbours& group : groups(network, options)) {
+    for (const std::string& function : files::functions(network)) {
+      if (!files::is_set(function)) continue;
+      const std::string kind = files::kind_of(files::networks_of(function).front());
+      if (kind != files::kGroundKind && group.count(kind) == 0) continue;
+      Claim claim;
+      claim.function = function;
+      claim.domain = "box";
+      claim.neighbours = group;
+      claims.push_back(std::move(claim));
+    }
+  }
+}
+
+Box read_box(const files::TomlTable& table, std::size_t inputs) {
+  Box box{table.numbers("lower"), table.numbers("upper")};
+  for (const auto& [key, numbers] : {std::pair{"lower", &box.lower}, std::pair{"upper", &box.upper}}) {
+    if (numbers->size() != inputs)
+      table.refuse(key, std::to_string(numbers->size()) + " numbers",
+                   "there are " + std::to_string(inputs) + " inputs");
+  }
+  for (std::size_t k = 0; k < inputs; ++k) {
+    if (box.lower[k] > box.upper[k])
+      table.refuse("lower", std::to_string(box.lower[k]),
+                   "entry " + std::to_string(k) + " is above upper, " + std::to_string(box.upper[k]));
+  }
+  return box;
+}
+
+}  // namespace
+
+const char* name(LawKind law) {
+  return law == LawKind::kAllStacked ? "all_stacked" : law == LawKind::kAllMax ? "all_max" : "own_state";
+}
+
+std::vector<Claim> claims(const files::Network& network, const ClaimOptions& options) {
+  std::vector<Claim> result;
+  std::vector<std::string> unused = options.blocks;
+  unused.erase(std::remove(unused.begin(), unused.end(), "every"), unused.end());  // which may be none
+  bool scale_fits = options.scale.empty();
+  for (const double scale : options.scale) {
+    if (!(scale > 0) || std::isinf(scale)) throw std::invalid_argument("a scale must be positive");
+  }
+  for (const std::string& function : files::functions(network)) {
+    Claim claim;
+    claim.function = function;
+    if (!options.domain.empty() && takes_inputs(function)) claim.domain = "box";
+    result.push_back(claim);
+    for (const std::string& block : files::blocks(network, function)) {
+      const bool is_named = contains(options.blocks, block);
+      if (!is_named && !contains(options.blocks, "every")) continue;
+      unused.erase(std::remove(unused.begin(), unused.end(), block), unused.end());
+      claim.block = block;
+      result.push_back(claim);
+    }
+    claim.block = "all";
+    if (options.scale.empty() || !takes_scale(network, function, options.scale.size())) continue;
+    scale_fits = true;
+    claim.scale = options.scale;
+    result.push_back(claim);
+  }
+  if (!unused.empty()) throw std::invalid_argument("no function has a block \"" + unused.front() + "\"");
+  if (!scale_fits)
+    throw std::invalid_argument("no function has " + std::to_string(options.scale.size()) +
+                                " inputs, as the scale has");
+  if (options.counted && !options.domain.empty()) add_counted(network, options, result);
+  return result;
+}
+
+std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptions& options) {
+  const std::vector<Neighbours> named = groups(network, options);  // which refuses, rho or not
+  std::vector<LawClaim> result;
+  for (const auto& [rho, weights] : network.rho) {
+    for (const Neighbours& group : named) {
+      for (const std::string block : {"all", "position", "velocity"}) {
+        const std::vector<std::string> has =
+            files::blocks(network, files::set_name(group.begin()->first, rho));
+        const bool wanted = contains(options.blocks, block) || contains(options.blocks, "every");
+        if (block != "all" && !(wanted && contains(has, block))) continue;
+        for (const LawKind law : {LawKind::kAllStacked, LawKind::kAllMax, LawKind::kOwnState})
+          result.push_back({rho, group, block, law});
+      }
+    }
+  }
+  return result;
+}
+
+std::map<std::string, Box> read_domain(const std::string& path, const files::Network& network) {
+  const std::string text = files::read_file(path);
+  const toml::table document = files::parse_toml(text, path);
+  const files::TomlTable top(document, path);
+  top.require_schema("swarmcert/box/1");
+  top.allow_only({"schema", "lower", "upper", "ground"});
+  std::map<std::string, Box> domain;
+  if (network.plain) {
+    if (top.has("ground")) top.refuse("ground", "", "the network has no ground term");
+    domain["network"] = read_box(top, static_cast<std::size_t>(network.plain->inputs()));
+    return domain;
+  }
+  std::size_t inputs = 0;
+  for (const auto& [kind, phi] : network.phi) {
+    if (kind != files::kGroundKind) inputs = static_cast<std::size_t>(phi.inputs());
+  }
+  if (network.invariants) inputs = nn::kRelativeState;  // a box of states
+  if (inputs > 0) {
+    const Box box = read_box(top, inputs);
+    for (const auto& [kind, phi] : network.phi) domain[files::phi_name(kind)] = box;
+  }
+  const bool has_ground = network.phi.count(files::kGroundKind) == 1;
+  if (!has_ground && top.has("ground")) top.refuse("ground", "", "the network has no ground term");
+  if (!has_ground) return domain;
+  Box& ground = domain[files::kGroundPhi];
+  if (top.has("ground")) {
+    const files::TomlTable table = top.table("ground");
+    table.allow_only({"lower", "upper"});
+    ground = read_box(table, files::kGroundInputs);
+  } else if (inputs < files::kGroundInputs) {
+    top.refuse("ground", "", "is missing, and the box has too few intervals to take the ground's from them");
+  } else {
+    ground.lower.assign(ground.lower.end() - files::kGroundInputs, ground.lower.end());
+    ground.upper.assign(ground.upper.end() - files::kGroundInputs, ground.upper.end());
+  }
+  return domain;
+}
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,250 @@
+#include "lipschitz/lower/lower_bound.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "lipschitz/base/rounding.h"
+#include "lipschitz/checker/witness.h"
+#include "lipschitz/lower/slope_estimate.h"
+#include "nn/weights/compositions.h"
+#include "nn/weights/functions.h"
+
+namespace swarmcert::lipschitz {
+namespace {
+
+using files::Network;
+using files::Weights;
+
+/// Numbers of neighbours at which a set function is searched: more rarely steepen it further.
+constexpr int kMostNeighbours = 3;
+
+/// The fixed neighbours of a set function with `neighbours` neighbours in all: the moving one's own kind first, then
+/// the other kinds in turn, each as often as the claim allows; and the ground.
+std::vector<std::string> other_networks(const Network& network, const Claim& claim, int neighbours) {
+  const std::vector<std::string> names = files::networks_of(claim.function);
+  std::vector<std::string> others;
+  if (names.size() == 1) return others;
+  const std::string ground = files::kGroundPhi;
+  const bool ground_moves = names[0] == ground;
+  if (!ground_moves && files::parts(network).count(ground) == 1) others.push_back(ground);
+  std::vector<std::string> kinds;
+  if (!ground_moves) kinds.push_back(names[0]);
+  for (const auto& [kind, weights] : network.phi) {
+    const std::string name = files::phi_name(kind);
+    if (name != ground && name != names[0]) kinds.push_back(name);
+  }
+  Neighbours left = claim.neighbours;
+  if (!ground_moves && !left.empty()) --left[files::kind_of(names[0])];
+  std::size_t turn = 0;
+  for (int j = ground_moves ? 0 : 1; j < neighbours; ++j) {
+    for (std::size_t tries = 0; tries < kinds.size(); ++tries, ++turn) {
+      const std::string& name = kinds[turn % kinds.size()];
+      if (!claim.neighbours.empty() && left[files::kind_of(name)]-- <= 0) continue;
+      others.push_back(name);
+      ++turn;
+      break;
+    }
+  }
+  return others;
+}
+
+/// Whether the claim's function is 0 among these neighbours and the one that moves.
+bool is_silent(const Network& network, const Claim& claim, std::vector<std::string> others) {
+  others.push_back(files::networks_of(claim.function).front());
+  return files::is_silent_among(network, claim.function, others);
+}
+
+/// Rounds that keep the search of a function to seconds: a region costs about (weights) x (moving inputs).
+int default_rounds(const Network& network, const std::string& function) {
+  const std::map<std::string, const Weights*> parts = files::parts(network);
+  const std::vector<std::string> names = files::networks_of(function);
+  double weights = 0;
+  for (const std::string& name : names) {
+    for (const files::Layer& layer : parts.at(name)->layers)
+      weights += static_cast<double>(layer.weights.size());
+  }
+  constexpr double kPapersCost = 4.3e3 * 40;  // rho 40-40-40-40-1
+  const double cost = weights * parts.at(names[0])->inputs();
+  return static_cast<int>(
+      std::clamp(kDefaultSearchRounds * kPapersCost / cost, 2.0, 1.0 * kDefaultSearchRounds));
+}
+
+/// The moved part of the function in coordinates x_k / scale_k, as the search of a weighted norm sees it. Rounded: a
+/// search only proposes points.
+struct Rescaled {
+  Weights network;
+  files::InputClamp clamp;
+};
+
+Rescaled rescaled(const Term& moved, const std::vector<double>& scale) {
+  Rescaled result{*moved.network, {}};
+  files::Layer& first = result.network.layers.front();
+  for (std::size_t i = 0; i < first.weights.size(); ++i) first.weights[i] *= scale[i % scale.size()];
+  if (moved.clamp == nullptr) return result;
+  result.clamp = *moved.clamp;
+  for (std::size_t k = 0; k < scale.size(); ++k) {
+    result.clamp.lower[k] /= scale[k];
+    result.clamp.upper[k] /= scale[k];
+  }
+  return result;
+}
+
+/// search_slope() in the claim's norm; `box` and `f` in the units of the inputs.
+SlopeWitness search_scaled(const SlopeFunction& f, const Claim& claim, SlopeSearchOptions search) {
+  const Rescaled moved = rescaled(f.moved, claim.scale);
+  SlopeFunction scaled = f;
+  scaled.moved = {&moved.network, f.moved.clamp == nullptr ? nullptr : &moved.clamp};
+  const std::optional<Box> box = search.box;
+  for (std::size_t k = 0; box && k < claim.scale.size(); ++k) {
+    search.box->lower[k] /= claim.scale[k];
+    search.box->upper[k] /= claim.scale[k];
+  }
+  const auto moved_size = static_cast<Eigen::Index>(claim.scale.size());
+  for (std::vector<Eigen::VectorXd>* points : {&search.starts, &search.places})
+    for (Eigen::VectorXd& point : *points)
+      for (Eigen::Index k = 0; k < std::min(point.size(), moved_size); ++k)
+        point(k) /= claim.scale[static_cast<std::size_t>(k)];
+  SlopeWitness found = search_slope(scaled, search);
+  const auto back = [&](std::vector<float>& x) {
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      x[k] = static_cast<float>(static_cast<double>(x[k]) * claim.scale[k]);
+      if (box && static_cast<double>(x[k]) < box->lower[k]) x[k] = std::nextafter(x[k], INFINITY);
+      if (box && static_cast<double>(x[k]) > box->upper[k]) x[k] = std::nextafter(x[k], -INFINITY);
+    }
+  };
+  back(found.x);
+  back(found.y);
+  if (found.x == found.y) return {};
+  found.slope = slope(f, found, search.block, claim.scale);
+  return found;
+}
+
+/// Points of a box as float32, nothing being a box that holds none.
+class FloatPoints {
+ public:
+  explicit FloatPoints(const std::map<std::string, Box>& domain) : domain_(domain) {}
+
+  /// The nearest to x in the box of `part`.
+  std::optional<std::vector<float>> nearest(const std::string& part, const Eigen::VectorXd& x) const {
+    constexpr double kMost = std::numeric_limits<float>::max();
+    const auto box = domain_.find(part);
+    std::vector<float> result;
+    for (Eigen::Index k = 0; k < x.size(); ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const double low = box == domain_.end() ? -kMost : std::max(box->second.lower[i], -kMost),
+                   high = box == domain_.end() ? kMost : std::min(box->second.upper[i], kMost);
+      const std::optional<float> there = nearest_float(x[k], low, high);
+      if (!there) return std::nullopt;
+      result.push_back(*there);
+    }
+    return result;
+  }
+
+ private:
+  const std::map<std::string, Box>& domain_;
+};
+
+/// The steepest of several pairs around a place. Short ones are steeper where the function is smooth, long ones keep
+/// their direction when they are rounded to float32.
+void try_pairs(const SlopeFunction& f, const std::string& moved, const SteepPlace& place, const Claim& claim,
+               const std::vector<int>& block, const FloatPoints& points, SlopePoints& pair,
+               FoundSlope& found) {
+  constexpr double kLengths[] = {0.125, 1, 8, 64, 512, 8192};  // of half a step
+  for (const double length : kLengths) {
+    const Eigen::VectorXd step = length * place.half_step * place.direction;
+    const auto x = points.nearest(moved, place.x + step), y = points.nearest(moved, place.x - step);
+    if (!x || !y || *x == *y) continue;
+    pair.x = *x;
+    pair.y = *y;
+    const LowerBound slope_of_pair = slope(f, pair, block, claim.scale);
+    if (found.witness && found.witness->slope.value() >= slope_of_pair.value()) continue;
+    found.witness.emplace();
+    static_cast<SlopePoints&>(*found.witness) = pair;
+    found.witness->slope = slope_of_pair;
+  }
+}
+
+/// Of functions that are not linear by parts, or whose parts search_slope() does not know.
+FoundSlope sampled_lower_bound(const Network& network, const Claim& claim,
+                               const std::map<std::string, Box>& domain, const LowerBoundOptions& options,
+                               int rounds) {
+  const std::map<std::string, Box> boxes = claim.domain == "box" ? domain : std::map<std::string, Box>();
+  SlopeEstimateOptions search;
+  search.seed = options.seed;
+  search.domain = boxes;
+  search.moved = options.moved;
+  search.starts = rounds;
+  search.stop = Stop(options.cancelled, options.seconds);
+  const SteepPlace place = steep_place(network, claim, search);
+  FoundSlope found;
+  found.rounds = place.starts;
+  found.interrupted = place.interrupted;
+  if (is_silent(network, claim, place.other_networks)) return found;
+  const std::string moving = files::networks_of(claim.function).front();
+  std::map<std::string, Box> box_of_moving = boxes;
+  if (options.moved) box_of_moving[moving] = *options.moved;
+  const FloatPoints points(boxes), moving_points(box_of_moving);
+  SlopePoints pair;
+  for (std::size_t j = 0; j < place.others.size(); ++j) {
+    std::optional<std::vector<float>> other = points.nearest(place.other_networks[j], place.others[j]);
+    if (!other) return found;
+    pair.others.push_back(std::move(*other));
+  }
+  found.other_networks = place.other_networks;
+  try_pairs(slope_function(network, claim.function, place.other_networks), moving, place, claim,
+            files::block_coordinates(network, claim.function, claim.block), moving_points, pair, found);
+  return found;
+}
+
+}  // namespace
+
+bool has_relu_only(const Network& network, const std::string& function) {
+  const std::vector<std::string> names = files::networks_of(function);
+  const std::map<std::string, const Weights*> parts = files::parts(network);
+  return std::all_of(parts.begin(), parts.end(), [&names](const auto& part) {
+    const bool enters = std::find(names.begin(), names.end(), part.first) != names.end() ||
+                        (names.size() == 2 && files::is_phi(part.first));
+    return part.second->is_relu() || !enters;
+  });
+}
+
+FoundSlope lower_bound(const Network& network, const Claim& claim, const std::map<std::string, Box>& domain,
+                       const LowerBoundOptions& options) {
+  FoundSlope best;
+  const int rounds = options.rounds.value_or(default_rounds(network, claim.function));
+  if (rounds == 0) return best;
+  if (!has_relu_only(network, claim.function))
+    return sampled_lower_bound(network, claim, domain, options, rounds);
+  const std::vector<std::string> names = files::networks_of(claim.function);
+  const int cases = names.size() == 2 ? kMostNeighbours : 1;  // they share the rounds and the seconds
+  for (int neighbours = 1; neighbours <= cases; ++neighbours) {
+    const std::vector<std::string> others = other_networks(network, claim, neighbours);
+    if (is_silent(network, claim, others)) continue;
+    const SlopeFunction f = slope_function(network, claim.function, others);
+    SlopeSearchOptions search;
+    search.seed = options.seed + static_cast<std::uint64_t>(neighbours) * 1000003;
+    search.rounds = (rounds + cases - 1) / cases;
+    search.seconds = options.seconds / cases;
+    search.cancelled = options.cancelled;
+    search.starts = options.starts;
+    search.places = options.places;
+    search.regions = options.regions;
+    if (claim.block != "all") search.block = files::block_coordinates(network, claim.function, claim.block);
+    if (claim.domain == "box") {
+      search.box = options.moved ? *options.moved : domain.at(names[0]);
+      for (const std::string& name : others) search.other_boxes.emplace_back(domain.at(name));
+    }
+    SlopeWitness found = claim.scale.empty() ? search_slope(f, search) : search_scaled(f, claim, search);
+    best.rounds += found.rounds_done;
+    best.interrupted = best.interrupted || found.interrupted;
+    if (found.x.empty()) continue;  // the box holds no two points
+    if (!best.witness || found.slope.value() > best.witness->slope.value()) {
+      best.witness = std::move(found);
+      best.other_networks = others;
+    }
+  }
+  return best;
+}
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,40 @@
+/// @file A chain in double, without the neurons that no input reaches or that reach no output. Not for users.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "lipschitz/checker/dyadic.h"
+#include "lipschitz/solver/lipsdp_solver.h"
+
+namespace swarmcert::lipschitz {
+
+/// M_1 .. M_K to the nearest doubles.
+ReluChain rounded(const std::vector<check::Matrix>& stages);
+
+/// What a search for multipliers works on, and the way back to multipliers of the whole chain.
+class LiveChain {
+ public:
+  explicit LiveChain(const std::vector<check::Matrix>& stages);
+
+  /// Without hidden layers the whole chain.
+  const ReluChain& live() const { return live_; }
+  /// Whether no neuron is live, so that the function is constant.
+  bool is_constant() const { return !neurons_.empty() && neurons_.front().empty(); }
+
+  /// The live neurons of each hidden layer.
+  const std::vector<std::vector<Eigen::Index>>& neurons() const { return neurons_; }
+
+  /// Multipliers of the whole chain, one per hidden neuron. A neuron that does not reach the output gets 0, which
+  /// empties its row of the inequality. A neuron that does, but has no input, gets a multiplier so large, larger in
+  /// earlier layers, that its coupling to the next layer does not matter.
+  /// @param t one per live neuron, first layer first.
+  std::vector<double> multipliers(const Eigen::VectorXd& t) const;
+
+ private:
+  ReluChain chain_;
+  std::vector<std::vector<Eigen::Index>> neurons_;  ///< the live ones, per hidden layer
+  ReluChain live_;
+};
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,163 @@
+#include "lipschitz/values/value_bounds.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "lipschitz/base/rounding.h"
+#include "lipschitz/checker/centred_form.h"
+#include "lipschitz/checker/values.h"
+#include "lipschitz/values/float32_error.h"
+#include "lipschitz/values/range.h"
+#include "nn/weights/compositions.h"
+#include "nn/weights/functions.h"
+
+namespace swarmcert::lipschitz {
+namespace {
+
+using check::Bounded;
+using check::Dyadic;
+using Row = std::vector<double>;
+
+Row each(const std::vector<Dyadic>& values, double (*rounded)(const Dyadic&)) {
+  Row result;
+  for (const Dyadic& x : values) result.push_back(rounded(x));
+  return result;
+}
+
+std::vector<Dyadic> exact_numbers(const Row& values) { return {values.begin(), values.end()}; }
+
+bool all_finite(const Row& values) {
+  return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+}
+
+/// Follows the values of one function through its layers, as the checker will.
+class Values {
+ public:
+  Values(const files::Network& network, std::map<std::string, Box> domain, const ValueOptions& options)
+      : network_(network), parts_(files::parts(network)), domain_(std::move(domain)), options_(options) {}
+
+  std::optional<CertifiedValues> of(const std::string& function, int neighbours,
+                                    const std::map<std::string, double>& rho_bound) const {
+    CertifiedValues found;
+    found.function = function;
+    found.neighbours = neighbours;
+    found.in_clamp = options_.in_clamp;
+    const std::vector<std::string> names = files::networks_of(function);
+    std::vector<std::string> inputs = {names[0]};
+    if (names.size() == 2 && parts_.count(files::kGroundPhi) == 1) inputs.emplace_back(files::kGroundPhi);
+    Bounded values;
+    std::vector<check::SumTerm> terms;
+    for (const std::string& name : inputs) {
+      const Box& box = domain_.at(name);
+      values = {{exact_numbers(box.lower), exact_numbers(box.upper)}, {}};
+      if (options_.float32) {
+        found.input_error[name] = input_errors(box, options_.input_step);
+        values.error = exact_numbers(found.input_error[name]);
+      }
+      if (!through_layers(name, values, found)) return std::nullopt;
+      const bool is_ground = name == files::kGroundPhi;
+      terms.push_back({values, is_ground ? 1 : 0, is_ground ? 1 : neighbours});
+    }
+    if (names.size() == 2) {
+      const auto size = static_cast<std::size_t>(parts_.at(names[1])->inputs());
+      const double slope = rho_bound.at(files::kind_of(names[1]));
+      const Dyadic square = Dyadic(slope) * slope * check::largest_square(terms.front().values);
+      found.jump = sqrt_up(check::larger(square, check::silent_step_square(network_, function, boxes())));
+      found.sum = rounded(check::sum_intervals(terms, size),
+                          options_.float32 ? check::sum_error(terms, size) : std::nullopt, values);
+      if (!found.sum || !std::isfinite(*found.jump) || !through_layers(names[1], values, found))
+        return std::nullopt;
+    }
+    state_ends(found);
+    if (!options_.float32) return found;
+    found.float32_error = sqrt_up(check::square(values.error));
+    return std::isfinite(*found.float32_error) ? std::optional(found) : std::nullopt;
+  }
+
+ private:
+  std::function<check::Intervals(const std::string&)> boxes() const {
+    return [this](const std::string& part) {
+      const Box& box = domain_.at(part);
+      return check::Intervals{exact_numbers(box.lower), exact_numbers(box.upper)};
+    };
+  }
+
+  void state_ends(CertifiedValues& found) const {
+    const VectorBounds& last = found.layers.at(files::networks_of(found.function).back()).back();
+    found.lower = last.lower;
+    found.upper = last.upper;
+    const long silent = files::silent_up_to(network_, found.function, found.neighbours);
+    for (std::size_t i = 0; silent > 0 && i < found.lower.size(); ++i) {
+      const bool is_always = silent == found.neighbours + 1;
+      found.lower[i] = is_always ? 0 : std::min(0.0, found.lower[i]);
+      found.upper[i] = is_always ? 0 : std::max(0.0, found.upper[i]);
+    }
+  }
+
+  /// Rounds outwards what the checker computes, and makes it the values from here on. Nothing where it is not finite.
+  std::optional<VectorBounds> rounded(const check::Intervals& exact,
+                                      const std::optional<std::vector<Dyadic>>& error,
+                                      Bounded& values) const {
+    VectorBounds result{each(exact.lower, rounded_down), each(exact.upper, rounded_up), {}};
+    if (options_.float32) {
+      if (!error) return std::nullopt;
+      result.error = each(*error, rounded_up);
+    }
+    if (!all_finite(result.lower) || !all_finite(result.upper) || !all_finite(result.error))
+      return std::nullopt;
+    values = {{exact_numbers(result.lower), exact_numbers(result.upper)}, exact_numbers(result.error)};
+    return result;
+  }
+
+  bool through_layers(const std::string& name, Bounded& values, CertifiedValues& found) const {
+    std::vector<VectorBounds>& layers = found.layers[name];
+    if (!parts_.at(name)->is_relu()) {
+      for (const check::Intervals& exact : check::layers_on_box(*parts_.at(name), values.values)) {
+        const std::optional<VectorBounds> bounds = rounded(exact, std::nullopt, values);
+        if (!bounds) return false;
+        layers.push_back(*bounds);
+      }
+      return true;
+    }
+    for (const files::Layer& layer : parts_.at(name)->layers) {
+      if (!layers.empty()) values.values = check::relu_intervals(std::move(values.values));
+      const check::Intervals exact = check::layer_intervals(layer, values.values);
+      const auto error =
+          options_.float32 ? check::layer_error(layer, values.values, values.error) : std::nullopt;
+      const std::optional<VectorBounds> bounds = rounded(exact, error, values);
+      if (!bounds) return false;
+      layers.push_back(*bounds);
+    }
+    return true;
+  }
+
+  const files::Network& network_;
+  std::map<std::string, const files::Weights*> parts_;
+  std::map<std::string, Box> domain_;
+  ValueOptions options_;
+};
+
+}  // namespace
+
+std::vector<CertifiedValues> certified_values(const files::Network& network,
+                                              const std::map<std::string, Box>& domain,
+                                              const std::map<std::string, double>& rho_bound,
+                                              const ValueOptions& options, const std::string& only) {
+  const std::map<std::string, Box> inner = clamped(network, domain);
+  ValueOptions exact_only = options;
+  exact_only.float32 = false;
+  const Values values(network, inner, options), without_float32(network, inner, exact_only);
+  std::vector<CertifiedValues> result;
+  for (const std::string& function : value_functions(network)) {
+    if (!only.empty() && function != only) continue;
+    const bool is_set = files::is_set(function);
+    for (int n = is_set ? 1 : 0; n <= (is_set ? options.neighbours : 0); ++n) {
+      std::optional<CertifiedValues> found = values.of(function, n, rho_bound);
+      if (!found && options.float32) found = without_float32.of(function, n, rho_bound);
+      if (found) result.push_back(std::move(*found));
+    }
+  }
+  return result;
+}
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,93 @@
+/// @file Follows an ONNX graph from its input to its output and builds the chain that is the same function.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "nn/weights/onnx/model.h"
+#include "nn/weights/onnx/operators.h"
+#include "nn/weights/relu_chain.h"
+
+namespace swarmcert::files {
+
+inline constexpr char kReadSorting[] =
+    "MaxMin is read as Split in two halves, Max and Min of them, Concat; or as ReduceMax and ReduceMin of "
+    "pairs "
+    "along the last axis, Concat; GroupSort as TopK of the whole last axis; or save the state dict, and "
+    "certify "
+    "it with --activation maxmin:halves, maxmin:pairs or groupsort:SIZE";
+
+class OnnxGraph {
+ public:
+  OnnxGraph(OnnxModel model, const std::string& path);
+
+  /// Layers, precision and notes; order and hash are left to the caller.
+  /// @throws InputError that names the node, its offset and what to do.
+  Weights run();
+
+ private:
+  using Node = OnnxNode;
+
+  [[noreturn]] void refuse(std::size_t offset, const std::string& field, const std::string& what,
+                           const std::string& hint = kReexportOnnx) const;
+
+  OnnxShape input_shape() const;
+  std::int64_t inputs_by_first_node() const;
+  const OnnxTensor* stored_anywhere(const std::string& name) const;
+  void count_uses();
+  void follow(const Node& node);
+  bool follow_constant(const Node& node);
+  void compute_constant(const Node& node);
+  OnnxValue computed(const Node& node);
+  OnnxValue computed_affine(const Node& node);
+  OnnxValue computed_layout(const Node& node);
+  OnnxValue computed_activation(const Node& node);
+  OnnxValue computed_smooth(const Node& node);
+
+  const OnnxTensor* constant(const Node& node, std::size_t k) const;
+  const OnnxTensor& needed_constant(const Node& node, std::size_t k) const;
+  const OnnxValue& value(const Node& node, std::size_t k) const;
+  bool is_value(const Node& node, std::size_t k) const;
+  std::vector<std::int64_t> integers(const Node& node, std::size_t k, const char* attribute) const;
+
+  OnnxValue applied(const Node& node, const AffineMap& map, const OnnxShape& shape, const OnnxTensor* weight);
+  OnnxValue padded(const Node& node, const OnnxValue& x) const;
+  OnnxValue concatenated(const Node& node) const;
+  OnnxValue elementwise(const Node& node);
+  OnnxValue largest(const Node& node, OnnxValue from, std::vector<std::vector<int>> windows, OnnxShape shape);
+  OnnxValue largest_of_inputs(const Node& node);
+  OnnxValue clipped(const Node& node, const OnnxValue& x, const OnnxTensor* least, const OnnxTensor* most);
+  OnnxValue sum_of_relus(const Node& node, const OnnxValue& x, const std::vector<AffineMap>& terms,
+                         const std::vector<std::vector<Enclosed>>& factors,
+                         const std::vector<Enclosed>& shift);
+  AffineMap relu(const Node& node, const AffineMap& rows, const std::string& name,
+                 const std::vector<AffineMap*>& also_carried);
+  OnnxNode* only_user(const std::string& name);
+  bool holds(const std::string& name, double wanted, double error) const;
+  void join_smooth_activations();
+  std::vector<OnnxNode*> users_of(const std::string& name);
+  OnnxNode* joined_by_concat(const std::vector<OnnxNode*>& pair);
+  void join_sorting();
+  OnnxValue sorted(const Node& node, const OnnxValue& x, Activation activation);
+  OnnxValue sorted_by_concat(const Node& node);
+  OnnxValue sorted_by_top(const Node& node);
+  std::vector<AffineMap*> needed_after(const Node& node);
+  std::string layer_name(const std::string& weight);
+  void require_finite(const Node& node, const AffineMap& map) const;
+
+  OnnxModel model_;
+  const std::string& path_;
+  ReluChain chain_;
+  std::map<std::string, OnnxValue> values_;  ///< those that a later node takes
+  std::map<std::string, int> uses_;          ///< by later nodes
+  std::set<std::string> names_;
+  int layers_ = 0;
+  std::set<std::string> notes_;
+  /// Of a Concat that stands for MaxMin, by its output: the Split, or ReduceMax and ReduceMin, before it.
+  std::map<std::string, std::vector<OnnxNode>> joined_;
+};
+
+}  // namespace swarmcert::files
