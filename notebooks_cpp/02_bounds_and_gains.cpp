@@ -13,7 +13,7 @@
 #include <fmt/format.h>
 
 #include "notebooks_cpp/notebook.h"
-#include "stability/bounds/axis_loop.h"
+#include "stability/bounds/loops/axis_loop.h"
 #include "stability/bounds/theorem.h"
 #include "stability/bounds/tracking_bounds.h"
 

@@ -6,7 +6,7 @@
 
 #include "stability/bounds/tracking_bounds.h"
 #include "stability/bounds/tracking_setup.h"
-#include "stability/bounds/uncertain_norms.h"
+#include "stability/bounds/uncertain/uncertain_norms.h"
 
 namespace swarmcert::gate {
 

@@ -7,11 +7,11 @@
 #include <optional>
 #include <set>
 
+#include "analysis/identification/balance/torque_balance.h"
 #include "analysis/identification/closed_loop.h"
 #include "analysis/identification/column_memory.h"
 #include "analysis/identification/scan/named_forms.h"
 #include "analysis/identification/swinging_load.h"
-#include "analysis/identification/torque_balance.h"
 #include "nn/base/doubles.h"
 #include "stability/effects/registry.h"
 

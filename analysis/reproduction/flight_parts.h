@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "analysis/reproduction/gain_flights.h"
-#include "stability/bounds/attitude_cascade.h"
+#include "stability/bounds/loops/attitude_cascade.h"
 
 namespace swarmcert::reproduction {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "stability/bounds/tracking_bounds.h"
-#include "stability/bounds/uncertain_norms.h"
+#include "stability/bounds/uncertain/uncertain_norms.h"
 
 namespace swarmcert::analysis {
 

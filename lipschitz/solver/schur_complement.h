@@ -1,5 +1,5 @@
+/// @file The linear system of an interior-point step for a RankTwoInequality. Not for users.
 #pragma once
-// The linear system of an interior-point step for a RankTwoInequality.
 
 #include <Eigen/Core>
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "stability/bounds/axis_loop.h"
 #include "stability/bounds/error_parts.h"
+#include "stability/bounds/loops/axis_loop.h"
 
 namespace swarmcert::stability {
 

@@ -6,9 +6,9 @@
 
 #include "nn/base/doubles.h"
 #include "stability/bounds/disturbance_bounds.h"
-#include "stability/bounds/kernel_sum.h"
-#include "stability/bounds/reference_jerk.h"
-#include "stability/bounds/sampled_adjoint.h"
+#include "stability/bounds/loops/kernel_sum.h"
+#include "stability/bounds/loops/reference_jerk.h"
+#include "stability/bounds/loops/sampled_adjoint.h"
 #include "stability/bounds/sampled_bounds.h"
 
 namespace swarmcert::stability {

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "stability/bounds/sampled_loop.h"
+#include "stability/bounds/loops/sampled_loop.h"
 
 namespace swarmcert::stability {
 

@@ -4,7 +4,7 @@
 #include <queue>
 
 #include "nn/base/doubles.h"
-#include "stability/bounds/interval_functions.h"
+#include "stability/bounds/enclosures/interval_functions.h"
 #include "stability/effects/wake_shape.h"
 
 namespace swarmcert::stability {

@@ -5,7 +5,7 @@
 
 #include "nn/base/doubles.h"
 #include "stability/bounds/amplitude_and_rate.h"
-#include "stability/bounds/sampled_adjoint.h"
+#include "stability/bounds/loops/sampled_adjoint.h"
 
 namespace swarmcert::stability {
 namespace {

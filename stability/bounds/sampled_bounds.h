@@ -3,7 +3,7 @@
 #pragma once
 
 #include "stability/bounds/disturbance_bounds.h"
-#include "stability/bounds/sampled_loop.h"
+#include "stability/bounds/loops/sampled_loop.h"
 
 namespace swarmcert::stability {
 

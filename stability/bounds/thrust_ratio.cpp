@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "nn/base/doubles.h"
-#include "stability/bounds/kernel_sum.h"
-#include "stability/bounds/sampled_adjoint.h"
-#include "stability/bounds/uncertain_norms.h"
+#include "stability/bounds/loops/kernel_sum.h"
+#include "stability/bounds/loops/sampled_adjoint.h"
+#include "stability/bounds/uncertain/uncertain_norms.h"
 
 namespace swarmcert::stability {
 namespace {

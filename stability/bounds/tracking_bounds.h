@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "stability/bounds/disturbance_bounds.h"
-#include "stability/bounds/sampled_loop.h"
+#include "stability/bounds/loops/sampled_loop.h"
+#include "stability/bounds/loops/vector_gain.h"
 #include "stability/bounds/theorem.h"
-#include "stability/bounds/vector_gain.h"
 #include "stability/gains.h"
 
 namespace swarmcert::stability {

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "nn/base/doubles.h"
+#include "stability/bounds/enclosures/interval_functions.h"
 #include "stability/bounds/field_slope.h"
-#include "stability/bounds/interval_functions.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::stability {

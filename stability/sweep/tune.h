@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "stability/bounds/attitude_cascade.h"
-#include "stability/bounds/sampled_loop.h"
+#include "stability/bounds/loops/attitude_cascade.h"
+#include "stability/bounds/loops/sampled_loop.h"
 
 namespace swarmcert::stability {
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "analysis/identification/balance/mean_fit.h"
 #include "analysis/identification/labels/exchanged_streams.h"
 #include "analysis/identification/labels/mislabelled.h"
-#include "analysis/identification/mean_fit.h"
 #include "analysis/residuals/inputs.h"
 #include "data.h"
 

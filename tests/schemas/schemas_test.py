@@ -238,7 +238,7 @@ def test_the_readers_take_no_key_that_the_schemas_do_not_know():
         "columns": ["analysis/logs/columns.cpp"],
         "box": ["lipschitz/base/claims.cpp"],
         "grid": ["stability/sweep/grid.cpp"],
-        "swarm": ["stability/bounds/coupled_swarm.cpp"],
+        "swarm": ["stability/bounds/swarms/coupled_swarm.cpp"],
         "policy": ["analysis/gate/policy.cpp", *map(str, (SOURCE / "analysis/gate/checks").glob("*.cpp"))],
     }
     for name, files in readers.items():

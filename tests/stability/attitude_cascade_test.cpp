@@ -1,11 +1,11 @@
-#include "stability/bounds/attitude_cascade.h"
+#include "stability/bounds/loops/attitude_cascade.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <complex>
 
-#include "stability/bounds/axis_loop.h"
+#include "stability/bounds/loops/axis_loop.h"
 #include "stability/model.h"
 
 namespace swarmcert::stability {

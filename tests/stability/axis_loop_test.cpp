@@ -1,5 +1,5 @@
 // Expected norms: closed forms, e.g. 1 / (m a^3) of a triple pole at -a, and SciPy's DOP853 at a tolerance of 1e-12.
-#include "stability/bounds/axis_loop.h"
+#include "stability/bounds/loops/axis_loop.h"
 
 #include <gtest/gtest.h>
 

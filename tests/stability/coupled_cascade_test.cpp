@@ -1,4 +1,4 @@
-#include "stability/bounds/coupled_cascade.h"
+#include "stability/bounds/loops/coupled_cascade.h"
 
 #include <gtest/gtest.h>
 

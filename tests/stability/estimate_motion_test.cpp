@@ -1,5 +1,5 @@
 // Errors of the estimates in a swarm: what they move a vehicle by, and no simulated swarm leaves its bound.
-#include "stability/bounds/estimate_motion.h"
+#include "stability/bounds/swarms/estimate_motion.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "stability/bounds/coupled_swarm.h"
+#include "stability/bounds/swarms/coupled_swarm.h"
 
 namespace swarmcert::stability {
 namespace {

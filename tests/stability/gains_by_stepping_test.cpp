@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <random>
 
-#include "stability/bounds/axis_loop.h"
+#include "stability/bounds/loops/axis_loop.h"
 #include "stepped_loop.h"
 
 namespace swarmcert::stability {

@@ -1,13 +1,13 @@
 // Kernels cell by cell against the verified norms of the whole and against responses by exact recursion.
-#include "stability/bounds/kernel_cells.h"
+#include "stability/bounds/enclosures/kernel_cells.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "nn/base/random.h"
-#include "stability/bounds/axis_loop.h"
-#include "stability/bounds/verified_norms.h"
+#include "stability/bounds/enclosures/verified_norms.h"
+#include "stability/bounds/loops/axis_loop.h"
 
 namespace swarmcert::stability {
 namespace {

@@ -1,4 +1,4 @@
-#include "stability/bounds/kernel_sum.h"
+#include "stability/bounds/loops/kernel_sum.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Kernels of all lags of an interval against responses of single lags by exact recursion.
-#include "stability/bounds/lag_range_cells.h"
+#include "stability/bounds/enclosures/lag_range_cells.h"
 
 #include <gtest/gtest.h>
 

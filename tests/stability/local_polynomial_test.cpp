@@ -1,4 +1,4 @@
-#include "stability/bounds/local_polynomial.h"
+#include "stability/bounds/enclosures/local_polynomial.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Expected norms: a separate program that sums the response by SciPy's matrix exponential, at the worst sampling phase.
-#include "stability/bounds/sampled_loop.h"
+#include "stability/bounds/loops/sampled_loop.h"
 
 #include <gtest/gtest.h>
 

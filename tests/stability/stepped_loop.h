@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-#include "stability/bounds/sampled_loop.h"
+#include "stability/bounds/loops/sampled_loop.h"
 
 namespace swarmcert::stability {
 

@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "stability/bounds/small_gain.h"
-#include "stability/bounds/unstable_swarm.h"
+#include "stability/bounds/swarms/small_gain.h"
+#include "stability/bounds/swarms/unstable_swarm.h"
 #include "stability/vehicle.h"
 
 namespace swarmcert::stability {

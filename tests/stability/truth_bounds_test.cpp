@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "stability/bounds/interval_functions.h"
+#include "stability/bounds/enclosures/interval_functions.h"
 #include "stability/effects/registry.h"
 #include "stability/vehicle.h"
 

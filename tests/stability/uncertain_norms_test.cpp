@@ -1,4 +1,4 @@
-#include "stability/bounds/uncertain_norms.h"
+#include "stability/bounds/uncertain/uncertain_norms.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "stability/bounds/uncertain_part.h"
+#include "stability/bounds/uncertain/uncertain_part.h"
 #include "stability/stepped_loop.h"
 #include "stability/vehicle.h"
 

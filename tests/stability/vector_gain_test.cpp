@@ -1,5 +1,5 @@
 // Expected gains: the largest int |H(t)' eta| dt over unit vectors eta by Simpson's rule; a simulation attains it.
-#include "stability/bounds/vector_gain.h"
+#include "stability/bounds/loops/vector_gain.h"
 
 #include <gtest/gtest.h>
 

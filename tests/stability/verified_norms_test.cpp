@@ -1,4 +1,4 @@
-#include "stability/bounds/verified_norms.h"
+#include "stability/bounds/enclosures/verified_norms.h"
 
 #include <gtest/gtest.h>
 

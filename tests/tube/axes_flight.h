@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "analysis/tracking/tube/error_loops.h"
-#include "stability/bounds/axis_loop.h"
-#include "stability/bounds/sampled_loop.h"
+#include "stability/bounds/loops/axis_loop.h"
+#include "stability/bounds/loops/sampled_loop.h"
 #include "stability/tasks/task.h"
 #include "tube/forces.h"
 #include "tube/scenes.h"

@@ -17,7 +17,7 @@
 #include "analysis/commands/shared/label_output.h"
 #include "analysis/commands/shared/output_folder.h"
 #include "analysis/commands/shared/plausibility_output.h"
-#include "analysis/identification/balance_ladder.h"
+#include "analysis/identification/balance/balance_ladder.h"
 #include "analysis/identification/ladder.h"
 #include "analysis/identification/scan/proposal.h"
 #include "nn/base/file_io.h"

@@ -3,7 +3,7 @@
 #include <fmt/core.h>
 
 #include "analysis/commands/shared/effect_output.h"
-#include "analysis/identification/balance_ladder.h"
+#include "analysis/identification/balance/balance_ladder.h"
 
 namespace swarmcert::analysis {
 namespace {

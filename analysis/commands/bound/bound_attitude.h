@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "analysis/commands/shared/tracking_input.h"
-#include "stability/bounds/coupled_cascade.h"
+#include "stability/bounds/loops/coupled_cascade.h"
 
 namespace swarmcert::analysis {
 

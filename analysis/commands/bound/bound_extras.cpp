@@ -11,9 +11,9 @@
 #include "analysis/tracking/usual_uncertainty.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
-#include "stability/bounds/uncertain_norms.h"
-#include "stability/bounds/verified_norms.h"
-#include "stability/bounds/verified_sampled_norms.h"
+#include "stability/bounds/enclosures/verified_norms.h"
+#include "stability/bounds/enclosures/verified_sampled_norms.h"
+#include "stability/bounds/uncertain/uncertain_norms.h"
 
 namespace swarmcert::analysis {
 namespace {

@@ -6,7 +6,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "stability/bounds/polynomial.h"
+#include "stability/bounds/loops/polynomial.h"
 
 namespace swarmcert::analysis {
 namespace {

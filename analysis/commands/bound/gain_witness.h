@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
-#include "stability/bounds/axis_loop.h"
-#include "stability/bounds/sampled_loop.h"
-#include "stability/bounds/verified_norms.h"
+#include "stability/bounds/enclosures/verified_norms.h"
+#include "stability/bounds/loops/axis_loop.h"
+#include "stability/bounds/loops/sampled_loop.h"
 #include "stability/checker/gain_bounds.h"
 #include "stability/checker/sampled_gain_bounds.h"
 

@@ -4,7 +4,7 @@
 
 #include "analysis/commands/bound/bound_extras.h"
 #include "analysis/commands/bound/bound_output.h"
-#include "stability/bounds/coupled_swarm.h"
+#include "stability/bounds/swarms/coupled_swarm.h"
 
 namespace swarmcert::analysis {
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/cli/counted.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/bound/bound_output.h"
 #include "analysis/report/report.h"
@@ -299,9 +300,9 @@ Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube, cons
 
 void print_local_tube(const Json& tube) {
   const bool proved = tube["verdict"] == "proved";
-  fmt::print("\nTube around {} with {} vehicles, {:g} s, {} loop: {}\n", tube["task"].get<std::string>(),
-             tube["vehicles"].get<int>(), tube["duration_s"].get<double>(), tube["loop"].get<std::string>(),
-             tube["verdict"].get<std::string>());
+  fmt::print("\nTube around {} with {}, {:g} s, {} loop: {}\n", tube["task"].get<std::string>(),
+             counted(tube["vehicles"].get<std::size_t>(), "vehicle"), tube["duration_s"].get<double>(),
+             tube["loop"].get<std::string>(), tube["verdict"].get<std::string>());
   if (proved) {
     const Json& r = tube["radius_xyz_m"];
     fmt::print("  errors stay below x {:.4g} m, y {:.4g} m, z {:.4g} m\n", r[0].get<double>(),
@@ -348,9 +349,9 @@ void print_local_tube(const Json& tube) {
 
 void add_local_tube_plot(Report& report, const LocalTube& tube, const Json& json) {
   report.heading("Tube around the task");
-  report.paragraph(fmt::format("{} with {} vehicles, {:g} s, {} loop: {}.", json["task"].get<std::string>(),
-                               json["vehicles"].get<int>(), tube.duration_s, json["loop"].get<std::string>(),
-                               json["verdict"].get<std::string>()));
+  report.paragraph(fmt::format("{} with {}, {:g} s, {} loop: {}.", json["task"].get<std::string>(),
+                               counted(json["vehicles"].get<std::size_t>(), "vehicle"), tube.duration_s,
+                               json["loop"].get<std::string>(), json["verdict"].get<std::string>()));
   if (!tube.proved) report.paragraph(tube.why + ".");
   std::vector<std::vector<std::string>> rows;
   rows.push_back({"difference of both forces, slice by slice", radius_text(json["radius_m"]), "any"});

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "analysis/cli/command.h"
+#include "analysis/cli/counted.h"
 #include "analysis/commands/certify/branch_outlook.h"
 #include "nn/weights/chain.h"
 #include "nn/weights/compositions.h"
@@ -274,7 +275,7 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
         output.ranges_cut_short ? "; interrupted: one part of the box, so that it is wide" : "");
   for (const lipschitz::CertifiedRange& range : output.ranges) {
     const std::string many =
-        range.neighbours_at_most > 0 ? fmt::format(" up to {} neighbours", range.neighbours_at_most) : "";
+        range.neighbours_at_most > 0 ? " up to " + counted(range.neighbours_at_most, "neighbour") : "";
     fmt::print("  {}{}: {:.6g} ({:.6g}) .. ({:.6g}) {:.6g}", range.function, many, range.lower,
                range.least.value, range.greatest.value, range.upper);
     // Without silent compositions the jump hardly depends on the number of neighbours: it is printed once.
@@ -295,7 +296,7 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
         output_unit(network));
   for (const lipschitz::Float32Error& error : output.float32_errors) {
     const std::string many =
-        error.neighbours_at_most > 0 ? fmt::format(" up to {} neighbours", error.neighbours_at_most) : "";
+        error.neighbours_at_most > 0 ? " up to " + counted(error.neighbours_at_most, "neighbour") : "";
     fmt::print("  {}{}: {:.4g} (arithmetic {:.4g}, conversion of the inputs {:.4g})", error.function, many,
                error.total.value(), error.evaluation.value(), error.inputs.value());
     const auto* const stated = in_certificate(output, error.function, error.neighbours_at_most);

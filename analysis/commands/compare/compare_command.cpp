@@ -12,6 +12,7 @@
 #include <set>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/counted.h"
 #include "analysis/cli/host.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
@@ -291,7 +292,7 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   if (common.prints_text() && budget) print(*budget);
   if (common.prints_text() && inputs.found.flights.size() > 1) {
     const std::chrono::duration<double> run = std::chrono::steady_clock::now() - start;
-    fmt::print("Run time: {:.1f} s for {} flights.\n", run.count(), inputs.found.flights.size());
+    fmt::print("Run time: {:.1f} s for {}.\n", run.count(), counted(inputs.found.flights.size(), "flight"));
   }
   if (!options.report.empty()) {
     const std::string path =

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "analysis/cli/counted.h"
 #include "analysis/commands/compare/log_output.h"
 #include "analysis/commands/shared/collection_table.h"
 #include "analysis/commands/shared/flight_options.h"
@@ -345,8 +346,8 @@ void print_trajectories(const residuals::Trajectories& all) {
     fmt::print("\nTrajectories were not simulated: {} (--gains).\n", all.refused);
     return;
   }
-  fmt::print("\nClosed loop from the logs' set points, {} tracks, {:.0f} s; RMS over x, y, z, vector [mm]:\n",
-             all.tracks, all.seconds);
+  fmt::print("\nClosed loop from the logs' set points, {}, {:.0f} s; RMS over x, y, z, vector [mm]:\n",
+             counted(all.tracks, "track"), all.seconds);
   const auto line = [](const char* what, const residuals::Axes& a, double scale) {
     fmt::print("  {:<34}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}\n", what, scale * a.x, scale * a.y, scale * a.z,
                scale * a.total);
@@ -431,10 +432,11 @@ std::string vehicles_without_model(const residuals::Inputs& inputs) {
 void print_comparison(const Comparison& comparison, const residuals::Inputs& inputs, const Comparison* own) {
   for (const stability::Model& model : inputs.models) {
     if (inputs.rules.per_mass) break;
-    fmt::print("Model {}: {}, {}, {} effects\n", model.path, model.kind, residuals::mass_text(model.mass_kg),
-               model.effects.size());
+    fmt::print("Model {}: {}, {}, {}\n", model.path, model.kind, residuals::mass_text(model.mass_kg),
+               counted(model.effects.size(), "effect"));
   }
-  fmt::print("{} flights; force residual f_a = m a - model, in the world.\n", inputs.found.flights.size());
+  fmt::print("{}; force residual f_a = m a - model, in the world.\n",
+             counted(inputs.found.flights.size(), "flight"));
   if (inputs.rules.per_mass) {
     fmt::print(
         "No model is known: residuals are per mass, and thrust is in multiples of each log's hover thrust, "
@@ -450,7 +452,7 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
   print_doubts(comparison);
   for (const std::string& problem : comparison.problems) fmt::print("not judged: {}\n", problem);
   if (!inputs.found.skipped.empty())
-    fmt::print("{} files are no logs and were skipped\n", inputs.found.skipped.size());
+    fmt::print("Skipped, no flight logs: {}\n", counted(inputs.found.skipped.size(), "file"));
   const std::vector<CollectionRow> rows = collection_rows(inputs.words, outcomes_of(comparison, inputs));
   if (rows.size() > 1) print_collections(rows, "of the records that were compared");
 }

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "analysis/commands/shared/effect_output.h"
-#include "analysis/identification/accelerometer_balance.h"
-#include "analysis/identification/torque_balance.h"
+#include "analysis/identification/balance/accelerometer_balance.h"
+#include "analysis/identification/balance/torque_balance.h"
 #include "analysis/identification/verdict.h"
 #include "stability/effects/registry.h"
 

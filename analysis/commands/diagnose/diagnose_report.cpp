@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/counted.h"
 #include "analysis/commands/diagnose/diagnose_output.h"
 #include "analysis/commands/diagnose/each_output.h"
 #include "analysis/commands/diagnose/remainder_output.h"
@@ -119,8 +120,8 @@ std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses,
     const Diagnosis& diagnosis = diagnoses[i];
     report.heading(diagnosis.vehicle.empty() ? "Vehicles of kind " + diagnosis.kind
                                              : "Vehicle " + diagnosis.vehicle);
-    report.paragraph(fmt::format("{} records of {} flights, {} blocks of 2 s.", diagnosis.records,
-                                 diagnosis.flights, diagnosis.blocks));
+    report.paragraph(fmt::format("{} records of {}, {} blocks of 2 s.", diagnosis.records,
+                                 counted(diagnosis.flights, "flight"), diagnosis.blocks));
     if (!diagnosis.too_poor.empty()) {
       report.paragraph("No answer: " + diagnosis.too_poor + ".");
       continue;

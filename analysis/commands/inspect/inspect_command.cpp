@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/counted.h"
 #include "analysis/cli/host.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/inspect/inspect_certificate.h"
@@ -298,8 +299,8 @@ void print_grouping(const files::Json& flights, const files::Json& skipped) {
     fmt::print("one flight, {}: {} of {} vehicles\n", flight["why"].get<std::string>(),
                flight["name"].get<std::string>(), flight["logs"].size());
   }
-  for (const auto& [why, count] : reasons) fmt::print("{} flights: {}\n", count, why);
-  if (!skipped.empty()) fmt::print("{} files are no logs and were skipped\n", skipped.size());
+  for (const auto& [why, count] : reasons) fmt::print("{}: {}\n", counted(count, "flight"), why);
+  if (!skipped.empty()) fmt::print("Skipped, no flight logs: {}\n", counted(skipped.size(), "file"));
 }
 
 /// Where names alone say too little, the log is inspected as the draft describes it.

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/counted.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/iss_check/iss_check_report.h"
@@ -165,7 +166,7 @@ void print_verdict(const IssCheckOptions& options, const IssCheck& check) {
                check.is_refuted() ? "VIOLATED" : "Exceeded", check.violations, run.kind, run.largest_m,
                run.at_s, shown_ratio(run), is_about_ball(run) ? "ball" : "transient bound");
   } else {
-    fmt::print("No violation found in {} runs{}.{}\n", options.check.runs,
+    fmt::print("No violation found in {}{}.{}\n", counted(options.check.runs, "run"),
                check.cancelled ? ", which were interrupted" : "",
                check.why_inconclusive().empty() ? " That is no proof." : "");
   }

@@ -4,6 +4,7 @@
 
 #include "analysis/cli/bundled.h"
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/counted.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/shared/plausibility_output.h"
@@ -48,7 +49,7 @@ int run_model(const ModelOptions& options, const CommonOptions& common) {
       options.columns.empty() ? logs::known_columns() : logs::read_columns(options.columns);
   const identification::ModelDraft draft = identification::draft_model(
       found, map, masses_kg, options.mass_kg, options.keep, stability::read_model(base));
-  std::vector<std::string> comments = {fmt::format("Drafted from {} logs.", draft.flights)};
+  std::vector<std::string> comments = {"Drafted from " + counted(draft.flights, "log") + "."};
   files::Json result = result_head("model", inputs);
   result["flights"] = draft.flights;
   result["parameters"] = files::Json::array();

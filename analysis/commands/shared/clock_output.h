@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/identification/clock_offset.h"
+#include "analysis/identification/clocks/clock_offset.h"
 #include "nn/base/json.h"
 
 namespace swarmcert::analysis {

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/counted.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/report/report.h"
@@ -73,9 +74,8 @@ Json result_json(const SimulateOptions& options, const std::vector<std::string>&
 }
 
 void print(const SimulateOptions& options, const stability::Simulation& flown, const stability::Task& task) {
-  fmt::print(
-      "{}: {} vehicles, {:g} s in the sampled loop (Runge-Kutta per control period, float32 control)\n",
-      options.task, flown.vehicles.size(), task.duration_s());
+  fmt::print("{}: {}, {:g} s in the sampled loop (Runge-Kutta per control period, float32 control)\n",
+             options.task, counted(flown.vehicles.size(), "vehicle"), task.duration_s());
   fmt::print("  {:<8} {:<8} {:>27}   {:>27}   {}\n", "vehicle", "kind", "largest error x, y, z [m]",
              "rms error x, y, z [m]", "thrust at its limit");
   for (std::size_t i = 0; i < flown.vehicles.size(); ++i) {
@@ -91,7 +91,7 @@ void print(const SimulateOptions& options, const stability::Simulation& flown, c
 
 void write_report(const SimulateOptions& options, const CommonOptions& common,
                   const stability::Simulation& flown, const Json& result) {
-  Report report(fmt::format("{} with {} vehicles", options.task, flown.vehicles.size()));
+  Report report(fmt::format("{} with {}", options.task, counted(flown.vehicles.size(), "vehicle")));
   report.made_by(command_to_copy());
   report.result(result);
   report.paragraph(

@@ -9,7 +9,7 @@
 #include "analysis/commands/shared/tracking_input.h"
 #include "analysis/commands/spacing/spacing_report.h"
 #include "nn/base/input_error.h"
-#include "stability/bounds/spacing.h"
+#include "stability/bounds/swarms/spacing.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::analysis {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "nn/base/json.h"
-#include "stability/bounds/spacing.h"
+#include "stability/bounds/swarms/spacing.h"
 
 namespace swarmcert::analysis {
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "analysis/cli/counted.h"
 #include "analysis/report/report.h"
 #include "analysis/report/report_text.h"
 
@@ -162,7 +163,7 @@ void add_front(Report& report, const MergedSweep& sweep) {
 void print_sweep(const MergedSweep& sweep) {
   const auto feasible = std::count_if(sweep.cells.begin(), sweep.cells.end(),
                                       [](const Cell& cell) { return cell.infeasible.empty(); });
-  fmt::print("{} cells, {} feasible\n", sweep.cells.size(), feasible);
+  fmt::print("{}, {} feasible\n", counted(sweep.cells.size(), "cell"), feasible);
   for (const auto& [reason, count] : reasons(sweep)) fmt::print("  {:>7} infeasible: {}\n", count, reason);
   for (std::size_t q = 0; q < sweep.compute.size(); ++q) {
     const Cell* best = nullptr;
@@ -175,7 +176,7 @@ void print_sweep(const MergedSweep& sweep) {
     fmt::print("  best {:<21} {:.6g} {} at {}\n", sweep.compute[q], best->values[q],
                unit_of(sweep.compute[q]), where(sweep, *best));
   }
-  if (!sweep.front.empty()) fmt::print("  Pareto front: {} cells\n", sweep.front.size());
+  if (!sweep.front.empty()) fmt::print("  Pareto front: {}\n", counted(sweep.front.size(), "cell"));
 }
 
 std::string write_sweep_report(const MergedSweep& sweep, const std::string& folder, bool overwrite) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "analysis/cli/command.h"
+#include "analysis/cli/counted.h"
 #include "analysis/commands/shared/plausibility_output.h"
 #include "nn/base/json_number.h"
 
@@ -142,8 +143,8 @@ void print_training(const TrainOptions& options, const LearningData& data, const
   std::map<std::string, int> flights[3];
   for (const learning::TrackSamples& track : data.tracks)
     ++flights[static_cast<int>(track.use)][track.flight];
-  fmt::print("{} samples: {} to fit ({} flights), {} to select ({}), {} to test ({})\n",
-             data.samples.samples(), data.indices(Use::kFit).size(), flights[0].size(),
+  fmt::print("{} samples: {} to fit ({}), {} to select ({}), {} to test ({})\n", data.samples.samples(),
+             data.indices(Use::kFit).size(), counted(flights[0].size(), "flight"),
              data.indices(Use::kSelect).size(), flights[1].size(), data.indices(Use::kTest).size(),
              flights[2].size());
   if (data.split_by_blocks)

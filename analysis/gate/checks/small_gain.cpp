@@ -5,7 +5,7 @@
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
 #include "nn/base/toml.h"
-#include "stability/bounds/coupled_swarm.h"
+#include "stability/bounds/swarms/coupled_swarm.h"
 #include "stability/bounds/tracking_setup.h"
 
 namespace swarmcert::gate {

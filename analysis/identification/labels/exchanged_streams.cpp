@@ -4,8 +4,8 @@
 #include <cmath>
 #include <optional>
 
-#include "analysis/identification/force_means.h"
-#include "analysis/identification/mean_fit.h"
+#include "analysis/identification/balance/force_means.h"
+#include "analysis/identification/balance/mean_fit.h"
 
 namespace swarmcert::identification {
 namespace {

@@ -6,9 +6,9 @@
 #include <map>
 #include <optional>
 
+#include "analysis/identification/balance/mean_fit.h"
 #include "analysis/identification/column_run.h"
 #include "analysis/identification/labels/exchanged_streams.h"
-#include "analysis/identification/mean_fit.h"
 #include "analysis/residuals/force_residual.h"
 #include "analysis/residuals/plausibility.h"
 

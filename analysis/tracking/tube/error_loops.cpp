@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "nn/base/interval.h"
-#include "stability/bounds/lag_range_cells.h"
-#include "stability/bounds/sampled_loop.h"
+#include "stability/bounds/enclosures/lag_range_cells.h"
+#include "stability/bounds/loops/sampled_loop.h"
 
 namespace swarmcert::analysis {
 

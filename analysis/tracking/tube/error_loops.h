@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "nn/base/interval.h"
-#include "stability/bounds/kernel_cells.h"
+#include "stability/bounds/enclosures/kernel_cells.h"
 #include "stability/bounds/tracking_setup.h"
 
 namespace swarmcert::analysis {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stability/bounds/interval_functions.h"
+#include "stability/bounds/enclosures/interval_functions.h"
 #include "stability/bounds/truth_bounds.h"
 #include "stability/effects/registry.h"
 #include "stability/effects/wake_shape.h"

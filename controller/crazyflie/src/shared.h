@@ -1,4 +1,4 @@
-/* What the controller, the network's task and the parameter system share. C and C++ read it. */
+/** @file What the controller, the network's task and the parameter system share. C and C++ read it. */
 #pragma once
 
 #include <stdbool.h>

@@ -1,0 +1,242 @@
+#include "analysis/identification/clocks/clock_offset.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "analysis/identification/clocks/clock_search.h"
+#include "analysis/residuals/force_residual.h"
+#include "nn/base/parallel.h"
+
+namespace swarmcert::identification {
+namespace {
+
+using residuals::Track;
+
+/// Of what two vehicles explain of each other, that the offset of their clocks has to add. Among n clocks a tie of two
+/// puts these apart by the offset d and, at best, half way to the others, by d / 2 in 2 (n - 2) pairs: of all n (n - 1)
+/// / 2 pairs, d^2 / (n - 1) on average where the loss goes with the square.
+constexpr double kLeastGain = 0.05;
+constexpr double kLeastZ = 3;
+constexpr double kStudent90 = 1.833;  ///< nine degrees of freedom
+
+/// The vehicles of a flight whose vertical force is judged, and which of them share a clock.
+struct Clocks {
+  std::vector<const Track*> tracks;
+  std::vector<int> of;  ///< each track; 0: that of the first log
+  int count = 0;
+
+  int logs(int clock) const { return static_cast<int>(std::count(of.begin(), of.end(), clock)); }
+};
+
+Clocks clocks_of(const std::vector<Track>& tracks) {
+  Clocks clocks;
+  bool has_first = false;
+  for (const Track& track : tracks) {
+    if (track.position_only || track.judged.z() != 1) continue;
+    clocks.tracks.push_back(&track);
+    const bool is_known = track.has_reference_clock || track.has_absolute_clock || track.clock_onsets > 0;
+    has_first = has_first || is_known;
+    clocks.of.push_back(is_known ? 0 : ++clocks.count);
+  }
+  // Where nothing is related to the first log, the first vehicle that is judged takes its place.
+  if (!has_first)
+    for (int& clock : clocks.of) --clock;
+  clocks.count += has_first ? 1 : 0;
+  return clocks;
+}
+
+/// The most clocks whose vehicles feel one another around a circle, so that delays and offsets are told apart.
+std::vector<int> circle(ClockSearch& search, const ClockSteps& steps, int clocks) {
+  const auto count = static_cast<std::size_t>(clocks);
+  std::vector<std::vector<char>> reaches(count, std::vector<char>(count, 0));
+  for (int a = 0; a < clocks; ++a)
+    for (int b = 0; b < clocks; ++b)
+      if (a != b)
+        reaches[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)] = search.feels(a, b, steps);
+  for (std::size_t via = 0; via < count; ++via)
+    for (std::size_t a = 0; a < count; ++a)
+      for (std::size_t b = 0; b < count; ++b)
+        if (reaches[a][via] != 0 && reaches[via][b] != 0) reaches[a][b] = 1;
+  std::vector<int> largest;
+  for (std::size_t a = 0; a < count; ++a) {
+    std::vector<int> around;
+    for (std::size_t b = 0; b < count; ++b)
+      if (a == b || (reaches[a][b] != 0 && reaches[b][a] != 0)) around.push_back(static_cast<int>(b));
+    if (around.size() > largest.size()) largest = around;
+  }
+  return largest;
+}
+
+/// The clocks of `around`: those that more logs share first, of these those in the middle first.
+std::vector<int> from_the_middle(const Clocks& clocks, std::vector<int> around,
+                                 const Eigen::VectorXd& offsets_s) {
+  const std::vector<int> all = around;
+  // In nanoseconds, so that rounding decides nothing.
+  const auto away_ns = [&](int clock) {
+    double sum_s = 0;
+    for (const int other : all) sum_s += std::abs(offsets_s(other) - offsets_s(clock));
+    return std::llround(1e9 * sum_s);
+  };
+  std::stable_sort(around.begin(), around.end(), [&](int a, int b) {
+    if (clocks.logs(a) != clocks.logs(b)) return clocks.logs(a) > clocks.logs(b);
+    return away_ns(a) < away_ns(b);
+  });
+  return around;
+}
+
+/// The offsets of all clocks without each tenth of the flight.
+std::array<Eigen::VectorXd, kClockTenths> left_out(ClockSearch& search, const ClockSteps& steps) {
+  std::array<Eigen::VectorXd, kClockTenths> offsets_s;
+  for (int t = 0; t < kClockTenths; ++t)
+    offsets_s[static_cast<std::size_t>(t)] = search.offsets_s(search.climbed(steps, t), t);
+  return offsets_s;
+}
+
+double jackknife_s(const std::array<Eigen::VectorXd, kClockTenths>& offsets_s, int clock, int reference) {
+  double mean = 0, variance = 0;
+  const auto of = [&](const Eigen::VectorXd& one) { return one(clock) - one(reference); };
+  for (const Eigen::VectorXd& one : offsets_s) mean += of(one) / kClockTenths;
+  for (const Eigen::VectorXd& one : offsets_s) variance += (of(one) - mean) * (of(one) - mean);
+  // Offsets between the steps of the grid are read off a parabola.
+  return std::hypot(std::sqrt(variance * (kClockTenths - 1) / kClockTenths), kClockStep_s / 4);
+}
+
+/// A clock that may differ from the reference.
+struct Suspect {
+  int clock = 0;
+  double alike_N2 = 0;  ///< what is explained with both clocks alike
+};
+
+std::vector<Suspect> suspects(ClockSearch& search, const ClockSteps& steps, const std::vector<int>& around,
+                              int reference, int clocks) {
+  std::vector<Suspect> found;
+  const double all_N2 = search.value(steps);
+  const auto at = [&](int clock) { return steps.clock[static_cast<std::size_t>(clock)]; };
+  for (const int clock : around) {
+    if (clock == reference || at(clock) == at(reference) ||
+        std::abs(at(clock) - at(reference)) >= kClockSteps)
+      continue;
+    const ClockSteps alike = search.best({std::min(clock, reference), std::max(clock, reference)});
+    const double alike_N2 = search.value(alike);
+    if (all_N2 - alike_N2 > kLeastGain / (clocks - 1) * all_N2) found.push_back({clock, alike_N2});
+  }
+  return found;
+}
+
+/// Of a flight whose clocks are estimated.
+struct Estimate {
+  ClockSteps steps;
+  Eigen::VectorXd offsets_s;
+  std::array<Eigen::VectorXd, kClockTenths> without_s;  ///< each tenth
+};
+
+ClockOffset offset_of(const Clocks& clocks, ClockSearch& search, const Estimate& estimate,
+                      const Suspect& suspect, int reference) {
+  const double squares_N2 = search.squares_N2(), n = search.records();
+  const auto rmse_N = [&](double explained_N2) {
+    return std::sqrt(std::max(0.0, squares_N2 - explained_N2) / n);
+  };
+  const auto first = [&](int clock) {
+    return clocks.tracks[static_cast<std::size_t>(std::find(clocks.of.begin(), clocks.of.end(), clock) -
+                                                  clocks.of.begin())];
+  };
+  ClockOffset found;
+  found.offset_s = estimate.offsets_s(suspect.clock) - estimate.offsets_s(reference);
+  const double deviation_s = jackknife_s(estimate.without_s, suspect.clock, reference);
+  found.interval = {found.offset_s - kStudent90 * deviation_s, found.offset_s + kStudent90 * deviation_s};
+  found.delay_s = estimate.steps.delay * kClockStep_s;
+  found.records = search.records();
+  found.z = std::abs(found.offset_s) / deviation_s;
+  found.rmse_before_N = rmse_N(suspect.alike_N2);
+  found.rmse_after_N = rmse_N(search.value(estimate.steps));
+  found.logs = static_cast<int>(clocks.tracks.size());
+  const Track &own = *first(suspect.clock), &other = *first(reference);
+  found.flight = own.flight;
+  found.vehicle = own.vehicle;
+  found.kind = own.kind;
+  found.path = own.path;
+  found.against = other.path;
+  found.against_vehicle = other.vehicle;
+  found.correction_s = own.clock_offset_s + found.offset_s;
+  return found;
+}
+
+std::vector<ClockOffset> offsets_of(const Clocks& clocks, ClockSearch search) {
+  if (!search.is_rich()) return {};
+  Estimate estimate = {search.best(), {}, {}};
+  const std::vector<int> around = circle(search, estimate.steps, clocks.count);
+  if (around.size() < 2) return {};
+  estimate.offsets_s = search.offsets_s(estimate.steps, -1);
+  // Clocks on both sides of the one in the middle may differ though neither surely differs from it.
+  for (const int reference : from_the_middle(clocks, around, estimate.offsets_s)) {
+    std::vector<ClockOffset> result;
+    for (const Suspect& suspect : suspects(search, estimate.steps, around, reference, clocks.count)) {
+      if (estimate.without_s[0].size() == 0) estimate.without_s = left_out(search, estimate.steps);
+      ClockOffset found = offset_of(clocks, search, estimate, suspect, reference);
+      if (found.z > kLeastZ) result.push_back(std::move(found));
+    }
+    if (!result.empty()) return result;
+  }
+  return {};
+}
+
+ClockSearch search_of(const residuals::Inputs& inputs, const Clocks& clocks) {
+  std::vector<Interplay> interplays;
+  for (const Track* track : clocks.tracks) {
+    std::vector<const Track*> others = clocks.tracks;
+    others.erase(std::find(others.begin(), others.end(), track));
+    const auto r = force_residual(inputs.model_for(*track), inputs.kinds, inputs.rules, *track);
+    interplays.emplace_back(*track, r, others);
+  }
+  return {std::move(interplays), clocks.of, clocks.count};
+}
+
+}  // namespace
+
+std::vector<ClockOffset> clock_offsets(const residuals::Inputs& inputs, int jobs) {
+  const std::size_t count = inputs.found.flights.size();
+  std::vector<std::vector<ClockOffset>> found(count);
+  files::parallel_for(static_cast<int>(count), jobs, [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    if (inputs.found.flights[i].logs.size() < 2) return;
+    std::vector<std::string> problems;  // the diagnosis tells them
+    const std::vector<Track> tracks = inputs.load(i, problems);
+    const Clocks clocks = clocks_of(tracks);
+    if (clocks.count > 1) found[i] = offsets_of(clocks, search_of(inputs, clocks));
+  });
+  std::vector<ClockOffset> result;
+  for (std::vector<ClockOffset>& some : found)
+    std::move(some.begin(), some.end(), std::back_inserter(result));
+  return result;
+}
+
+void correct_clocks(const std::vector<ClockOffset>& offsets, residuals::Inputs& inputs) {
+  for (const ClockOffset& offset : offsets) {
+    for (residuals::FlightFiles& flight : inputs.found.flights) {
+      const bool has_log = std::any_of(flight.logs.begin(), flight.logs.end(),
+                                       [&](const auto& log) { return log.second == offset.path; });
+      if (has_log) flight.clock_offsets_s[offset.path] = offset.correction_s;
+    }
+  }
+}
+
+std::vector<ClockOffset> find_and_correct_clocks(residuals::Inputs& inputs, int jobs) {
+  std::vector<ClockOffset> offsets = clock_offsets(inputs, jobs);
+  correct_clocks(offsets, inputs);
+  return offsets;
+}
+
+std::string in_words(const ClockOffset& offset) {
+  const auto log = [](const std::string& path) { return std::filesystem::path(path).filename().string(); };
+  return fmt::format("the clock of {} is {:.3f} s {} that of {} ({:+.3f} .. {:+.3f})", log(offset.path),
+                     std::abs(offset.offset_s), offset.offset_s > 0 ? "ahead of" : "behind",
+                     offset.logs == 2 ? "the other log" : log(offset.against), offset.interval.lower,
+                     offset.interval.upper);
+}
+
+}  // namespace swarmcert::identification

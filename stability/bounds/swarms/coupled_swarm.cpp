@@ -1,0 +1,88 @@
+#include "stability/bounds/swarms/coupled_swarm.h"
+
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/toml.h"
+#include "stability/bounds/swarms/estimate_motion.h"
+
+namespace swarmcert::stability {
+namespace {
+
+std::string number_text(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
+}  // namespace
+
+CoupledSwarm read_coupled_swarm(const std::string& path) {
+  const std::string text = files::read_file(path);
+  const auto document = files::parse_toml(text, path);
+  const files::TomlTable top(document, path);
+  top.require_schema("swarmcert/swarm/1");
+  top.allow_only({"schema", "vehicles", "coupling"});
+  const double vehicles = top.number("vehicles");
+  if (!(vehicles >= 1 && vehicles <= 200) || vehicles != std::floor(vehicles)) {
+    top.refuse("vehicles", number_text(vehicles), "must be a whole number from 1 to 200");
+  }
+  CoupledSwarm swarm;
+  swarm.vehicles = static_cast<int>(vehicles);
+  for (const files::TomlTable& table : top.tables("coupling")) {
+    table.allow_only({"on", "by", "position_N_m", "velocity_N_s_m", "speed_m_s", "acceleration_m_s2",
+                      "cross_rate_N_s", "direction"});
+    const auto vehicle = [&](const char* key) {
+      const double value = table.number(key);
+      if (!(value >= 0 && value < vehicles) || value != std::floor(value)) {
+        table.refuse(key, number_text(value), "must be a vehicle from 0 to " + number_text(vehicles - 1));
+      }
+      return static_cast<int>(value);
+    };
+    const auto number = [&](const char* key) {
+      const double value = table.has(key) ? table.number(key) : 0;
+      if (value < 0) table.refuse(key, number_text(value), "must not be negative");
+      return value;
+    };
+    Coupling c{vehicle("on"),           vehicle("by"),
+               number("position_N_m"),  number("velocity_N_s_m"),
+               number("speed_m_s"),     number("acceleration_m_s2"),
+               number("cross_rate_N_s")};
+    if (table.has("direction")) c.direction = table.choice("direction", {"apart", "together"}) == 0 ? 1 : -1;
+    if (c.on == c.by) table.refuse("by", std::to_string(c.by), "is the vehicle itself");
+    swarm.couplings.push_back(c);
+  }
+  return swarm;
+}
+
+Disturbance no_force() {
+  Disturbance none;
+  none.amplitude_N = none.rate_N_s = none.variation_N = none.impulse_N_s = 0;
+  return none;
+}
+
+CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant,
+                      const OtherErrors& others, const Disturbance& force) {
+  const std::optional<AxisLoop> loop = axis_loop(gains, plant, 2);
+  if (!loop) throw std::invalid_argument("Lambda or K couples the z axis to others");
+  AxisLoop acting = *loop;
+  if (const auto sampled = sampled_axis_loop(gains, plant, 2)) acting.Ki = effective_Ki(*sampled);
+  const RateGains rate = rate_gains(acting);
+  const auto vehicles = static_cast<std::size_t>(swarm.vehicles);
+  const std::vector<LoopGains> loops(vehicles, {rate.position, rate.velocity, rate.acceleration});
+  CoupledVerdict verdict;
+  verdict.of_estimates = estimate_motion(acting, others);
+  verdict.of_force = force_motion(acting, force, others.bias_N);
+  const OwnMotion own = {verdict.of_estimates.error_m + verdict.of_force.error_m,
+                         verdict.of_estimates.speed_m_s + verdict.of_force.speed_m_s,
+                         verdict.of_estimates.acceleration_m_s2 + verdict.of_force.acceleration_m_s2};
+  verdict.small_gain = small_gain(loops, swarm.couplings, std::vector<OwnMotion>(vehicles, own));
+  if (!verdict.small_gain.proved)
+    verdict.unstable = find_unstable_swarm(acting, swarm.vehicles, swarm.couplings);
+  return verdict;
+}
+
+}  // namespace swarmcert::stability

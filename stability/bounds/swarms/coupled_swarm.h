@@ -1,0 +1,46 @@
+/// @file swarm.toml: vehicles of one kind whose forces depend on each other's motion, and whether their errors stay
+/// bounded.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stability/bounds/swarms/small_gain.h"
+#include "stability/bounds/swarms/unstable_swarm.h"
+#include "stability/bounds/tracking_bounds.h"
+
+namespace swarmcert::stability {
+
+struct CoupledSwarm {
+  int vehicles = 0;
+  std::vector<Coupling> couplings;
+};
+
+/// Reads swarm.toml (schema swarmcert/swarm/1): vehicles = N, [[coupling]] on, by, position_N_m, velocity_N_s_m,
+/// speed_m_s, acceleration_m_s2, cross_rate_N_s, direction = "apart" | "together" where the force's sign is known.
+/// @throws files::InputError with line, key, value and hint.
+CoupledSwarm read_coupled_swarm(const std::string& path);
+
+/// A class without any force.
+Disturbance no_force();
+
+struct CoupledVerdict {
+  SmallGain small_gain;
+  OwnMotion of_estimates;  ///< of every vehicle, by errors of its estimates
+  OwnMotion of_force;      ///< likewise, by its force error beside the couplings
+  /// Small gain is sufficient, not necessary: where it fails, an unstable instance of the class decides the matter.
+  std::optional<UnstableSwarm> unstable;
+  bool is_refuted() const { return unstable && unstable->is_declared; }
+};
+
+/// Small gain of the z loops (continuous, command channel, the integrator as it acts when sampled) of vehicles that all
+/// have these gains. The couplings hold for how vehicles really move; what a network makes of wrong estimates of its
+/// inputs is not in them, and belongs into cross_rate_N_s.
+/// @param others velocity_error, position_error and bias_N of every vehicle's z axis; nothing else of it is read.
+/// @param force class of every vehicle's force error along z beside the bias and the couplings.
+/// @throws std::invalid_argument if Lambda or K couples the z axis to others.
+CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant,
+                      const OtherErrors& others = {}, const Disturbance& force = no_force());
+
+}  // namespace swarmcert::stability
