@@ -240,6 +240,44 @@ void check_outputs(const CompareOptions& options, const CommonOptions& common) {
   }
 }
 
+/// What was asked for beside the comparison.
+struct Extras {
+  std::optional<residuals::Comparison> own;  ///< With this tool's filter instead of the published one.
+  std::optional<identification::Budget> budget;
+};
+
+Extras add_extras(const CompareOptions& options, const residuals::Inputs& inputs, const CommonOptions& common,
+                  const residuals::Progress& show, files::Json& result) {
+  Extras extras;
+  if (options.flights.published_filter) {
+    FlightOptions without = options.flights;
+    without.published_filter = false;
+    extras.own = residuals::compare(read_flights(without, true), common.jobs, show);
+    result["mean_square_z_gf2_own_filter"] = mean_squares_gf2(*extras.own);
+  }
+  if (!options.budget.empty()) {
+    extras.budget = budget_of(options, inputs, common);
+    result["budget"] = json_of(*extras.budget);
+    if (!options.fitted.empty()) write_fitted(*extras.budget, inputs.fleet, options.fitted, common.force);
+  }
+  if (!options.inject.empty()) result["injected"] = inject(inputs, options.inject, common.force);
+  if (!options.promise.empty()) result["promise"] = kept_promise_json(inputs, options.promise, common.jobs);
+  return extras;
+}
+
+/// Nothing that could be read is bad input; flights that say too little are inconclusive.
+int exit_code_of(const residuals::Comparison& comparison) {
+  if (comparison.overall.statistics.samples > 0) return kDone;
+  note("no usable record: nothing was compared" + (comparison.problems.empty()
+                                                       ? "; 'swarmcert inspect LOG' says what is in a log"
+                                                       : ": " + comparison.problems[0]));
+  const bool refused = std::any_of(comparison.tracks.begin(), comparison.tracks.end(), [](const auto& track) {
+    return std::any_of(track.doubts.begin(), track.doubts.end(),
+                       [](const auto& d) { return d.refuses_force; });
+  });
+  return refused || comparison.tracks.empty() ? kBadInput : kInconclusive;
+}
+
 int run_compare(const CompareOptions& options, const CommonOptions& common) {
   const auto start = std::chrono::steady_clock::now();
   check_outputs(options, common);
@@ -271,44 +309,22 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
     for (auto& flight : errors) std::move(flight.begin(), flight.end(), std::back_inserter(all));
     add_flight_errors(all, result);
   }
-  std::optional<residuals::Comparison> own;
-  if (options.flights.published_filter) {
-    FlightOptions without = options.flights;
-    without.published_filter = false;
-    own = residuals::compare(read_flights(without, true), common.jobs, show);
-    result["mean_square_z_gf2_own_filter"] = mean_squares_gf2(*own);
-  }
-  std::optional<identification::Budget> budget;
-  if (!options.budget.empty()) {
-    budget = budget_of(options, inputs, common);
-    result["budget"] = json_of(*budget);
-    if (!options.fitted.empty()) write_fitted(*budget, inputs.fleet, options.fitted, common.force);
-  }
-  if (!options.inject.empty()) result["injected"] = inject(inputs, options.inject, common.force);
-  if (!options.promise.empty()) result["promise"] = kept_promise_json(inputs, options.promise, common.jobs);
+  const Extras extras = add_extras(options, inputs, common, show, result);
   write_result(common, result);
-  if (common.prints_text()) print_comparison(comparison, inputs, own ? &*own : nullptr);
-  if (common.prints_text() && !options.promise.empty()) print_promise_kept(result["promise"]);
-  if (common.prints_text() && budget) print(*budget);
-  if (common.prints_text() && inputs.found.flights.size() > 1) {
+  if (common.prints_text()) {
+    print_comparison(comparison, inputs, extras.own ? &*extras.own : nullptr);
+    if (!options.promise.empty()) print_promise_kept(result["promise"]);
+    if (extras.budget) print(*extras.budget);
     const std::chrono::duration<double> run = std::chrono::steady_clock::now() - start;
-    fmt::print("Run time: {:.1f} s for {}.\n", run.count(), counted(inputs.found.flights.size(), "flight"));
+    if (inputs.found.flights.size() > 1)
+      fmt::print("Run time: {:.1f} s for {}.\n", run.count(), counted(inputs.found.flights.size(), "flight"));
   }
   if (!options.report.empty()) {
     const std::string path =
         write_compare_report(comparison, inputs, unit, result, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
-  if (comparison.overall.statistics.samples > 0) return kDone;
-  note("no usable record: nothing was compared" + (comparison.problems.empty()
-                                                       ? "; 'swarmcert inspect LOG' says what is in a log"
-                                                       : ": " + comparison.problems[0]));
-  const bool refused = std::any_of(comparison.tracks.begin(), comparison.tracks.end(), [](const auto& track) {
-    return std::any_of(track.doubts.begin(), track.doubts.end(),
-                       [](const auto& d) { return d.refuses_force; });
-  });
-  // Nothing that could be read is bad input; flights that say too little are inconclusive.
-  return refused || comparison.tracks.empty() ? kBadInput : kInconclusive;
+  return exit_code_of(comparison);
 }
 
 }  // namespace

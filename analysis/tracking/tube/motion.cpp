@@ -18,6 +18,76 @@ Interval snapped(Interval x) {
   return {std::floor(x.lower / kGrid) * kGrid, std::ceil(x.upper / kGrid) * kGrid};
 }
 
+/// Where the set points of all vehicles are: from `memory_s` before a slice on, in it, and from `held_s` before it on.
+struct SliceRanges {
+  std::vector<SetpointRange> ranges, now, held;
+  bool complete = false;  ///< The task knows all of them.
+};
+
+SliceRanges ranges_of(const stability::Task& task, int vehicles, int slice, double slice_s, double memory_s,
+                      double held_s) {
+  SliceRanges result;
+  // A little more than the slice: slice * slice_s is rounded.
+  const double margin_s = 1e-12 * (slice + 2);
+  const auto add_ranges = [&](double before_s, std::vector<SetpointRange>& to) {
+    const double from_s = std::max(0.0, slice * slice_s - before_s - margin_s);
+    for (int i = 0; i < vehicles; ++i) {
+      const std::optional<SetpointRange> range = task.over(i, from_s, (slice + 1) * slice_s + margin_s);
+      if (range) to.push_back(*range);
+    }
+    return to.size() == static_cast<std::size_t>(vehicles);
+  };
+  result.complete =
+      add_ranges(memory_s, result.ranges) && add_ranges(0, result.now) && add_ranges(held_s, result.held);
+  return result;
+}
+
+/// A stretch and its numbers: stretches with equal numbers are the same one.
+struct KeyedStretch {
+  Stretch stretch;
+  std::vector<double> key;
+
+  Interval kept(Interval x) {
+    const Interval outer = snapped(x);
+    key.push_back(outer.lower);
+    key.push_back(outer.upper);
+    return outer;
+  }
+
+  /// How vehicle `other` moves relative to `own`.
+  void add_neighbour(const SetpointRange& own, const SetpointRange& other) {
+    for (int a = 0; a < 3; ++a) stretch.state.push_back(kept(other.p_W_m[a] - own.p_W_m[a]));
+    for (int a = 0; a < 3; ++a) stretch.state.push_back(kept(other.v_W_m_s[a] - own.v_W_m_s[a]));
+    Interval squares;
+    for (int a = 0; a < 3; ++a) {
+      const Interval size = abs(other.a_W_m_s2[a] - own.a_W_m_s2[a]);
+      squares += size * size;
+    }
+    key.push_back(snapped({0, sqrt(squares).mag()}).upper);
+    stretch.relative_acceleration_m_s2.push_back(key.back());
+  }
+};
+
+/// The stretch of vehicle `i` in a slice.
+KeyedStretch stretch_in(const SliceRanges& slice, int i) {
+  const auto at = static_cast<std::size_t>(i);
+  const SetpointRange& own = slice.ranges[at];
+  KeyedStretch result;
+  Stretch& stretch = result.stretch;
+  stretch.vehicle = i;
+  result.key = {static_cast<double>(i)};
+  for (std::size_t j = 0; j < slice.ranges.size(); ++j)
+    if (j != at) result.add_neighbour(own, slice.ranges[j]);
+  stretch.state.push_back(result.kept(own.p_W_m[2]));
+  for (int a = 0; a < 3; ++a) stretch.state.push_back(result.kept(own.v_W_m_s[a]));
+  for (int a = 0; a < 3; ++a) {
+    stretch.acceleration_m_s2[a] = result.kept(own.a_W_m_s2[a]);
+    stretch.acceleration_now_m_s2[a] = result.kept(slice.now[at].a_W_m_s2[a]);
+    stretch.jerk_m_s3[a] = result.kept(slice.held[at].jerk_W_m_s3[a]);
+  }
+  return result;
+}
+
 }  // namespace
 
 double whole_periods_s(double duration_s, double period_s, double longest_s) {
@@ -36,60 +106,13 @@ Motion sliced(const stability::Task& task, int vehicles, double memory_s, double
   motion.stretch_of.resize(static_cast<std::size_t>(vehicles));
   std::map<std::vector<double>, int> known;
   for (int k = 0; k < motion.slices; ++k) {
-    std::vector<SetpointRange> ranges, now, held;
-    // A little more than the slice: k slice_s is rounded.
-    const double margin_s = 1e-12 * (k + 2);
-    const auto add_ranges = [&](double before_s, std::vector<SetpointRange>& to) {
-      const double from_s = std::max(0.0, k * motion.slice_s - before_s - margin_s);
-      for (int i = 0; i < vehicles; ++i) {
-        const std::optional<SetpointRange> range = task.over(i, from_s, (k + 1) * motion.slice_s + margin_s);
-        if (range) to.push_back(*range);
-      }
-      return to.size() == static_cast<std::size_t>(vehicles);
-    };
-    if (!add_ranges(memory_s, ranges) || !add_ranges(0, now) || !add_ranges(held_s, held)) return {};
+    const SliceRanges ranges = ranges_of(task, vehicles, k, motion.slice_s, memory_s, held_s);
+    if (!ranges.complete) return {};
     for (int i = 0; i < vehicles; ++i) {
-      const SetpointRange& own = ranges[static_cast<std::size_t>(i)];
-      Stretch stretch;
-      stretch.vehicle = i;
-      std::vector<double> key = {static_cast<double>(i)};
-      const auto add = [&](Interval x) {
-        stretch.state.push_back(snapped(x));
-        key.push_back(stretch.state.back().lower);
-        key.push_back(stretch.state.back().upper);
-      };
-      const auto largest = [&](Interval x) {
-        key.push_back(snapped({0, x.mag()}).upper);
-        return key.back();
-      };
-      for (int j = 0; j < vehicles; ++j) {
-        if (j == i) continue;
-        const SetpointRange& other = ranges[static_cast<std::size_t>(j)];
-        for (int a = 0; a < 3; ++a) add(other.p_W_m[a] - own.p_W_m[a]);
-        for (int a = 0; a < 3; ++a) add(other.v_W_m_s[a] - own.v_W_m_s[a]);
-        Interval squares;
-        for (int a = 0; a < 3; ++a) {
-          const Interval size = abs(other.a_W_m_s2[a] - own.a_W_m_s2[a]);
-          squares += size * size;
-        }
-        stretch.relative_acceleration_m_s2.push_back(largest(sqrt(squares)));
-      }
-      add(own.p_W_m[2]);
-      for (int a = 0; a < 3; ++a) add(own.v_W_m_s[a]);
-      for (int a = 0; a < 3; ++a) {
-        const auto kept = [&key](Interval x) {
-          const Interval outer = snapped(x);
-          key.push_back(outer.lower);
-          key.push_back(outer.upper);
-          return outer;
-        };
-        const auto at = static_cast<std::size_t>(i);
-        stretch.acceleration_m_s2[a] = kept(own.a_W_m_s2[a]);
-        stretch.acceleration_now_m_s2[a] = kept(now[at].a_W_m_s2[a]);
-        stretch.jerk_m_s3[a] = kept(held[at].jerk_W_m_s3[a]);
-      }
-      const auto [found, is_new] = known.emplace(std::move(key), static_cast<int>(motion.stretches.size()));
-      if (is_new) motion.stretches.push_back(std::move(stretch));
+      KeyedStretch next = stretch_in(ranges, i);
+      const auto [found, is_new] =
+          known.emplace(std::move(next.key), static_cast<int>(motion.stretches.size()));
+      if (is_new) motion.stretches.push_back(std::move(next.stretch));
       motion.stretch_of[static_cast<std::size_t>(i)].push_back(found->second);
     }
   }

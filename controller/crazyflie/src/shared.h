@@ -1,4 +1,4 @@
-/** @file What the controller, the network's task and the parameter system share. C and C++ read it. */
+/* What the controller, the network's task and the parameter system share. C and C++ read it. */
 #pragma once
 
 #include <stdbool.h>
