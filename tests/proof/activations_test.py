@@ -188,8 +188,10 @@ def refuses_what_only_relu_has(folder, generator):
     net, certificate = one_network(folder, "tanh", generator)
     lower = certify(net, "--method", "sdp", rounds=1)
     assert check(lower, net).returncode == 0 and lower["bounds"][0]["lower_witness"]
+    lower = certify(net, "--activation", "gelu", rounds=1)
+    not_checked(lower, net, f"bound network all >= {lower['bounds'][0]['lower_hex']}: of GELU")
     lower = certify(net, "--activation", "tanh", rounds=1)
-    not_checked(lower, net, f"bound network all >= {lower['bounds'][0]['lower_hex']}: of activations that are not ReLU")
+    assert check(lower, net).returncode == 0 and lower["bounds"][0]["lower_witness"]
     for keys, reason in ((["lower_witness"], "lower: expected text"),
                          (["lower", "lower_hex"], "lower without a witness")):
         changed = copy.deepcopy(lower)
@@ -401,23 +403,84 @@ def with_op(certificate, part, op):
     return changed
 
 
-def sums_with_terms_that_are_not_relu_are_not_checked_from_below(folder, generator):
-    """A witness of a sum is evaluated exactly, so that every term of it has to be: also those that stand still."""
+def sums_with_smooth_terms_have_lower_bounds(folder, generator):
+    """Terms of several activations, those that stand still as well, the ground and rho: accepted as found, and not a
+    step more by any checker. With GELU anywhere the values are not checked."""
     networks = {part: layers(sizes, generator) for part, sizes in PARTS.items()}
-    net = network_toml(folder / "ground", networks, {})
-    relu = certify(net, "--neighbours", "1", "--method", "sdp", rounds=1)
-    assert check(relu, net).returncode == 0
-    ops = dict.fromkeys(PARTS, "relu")
-    ops["phi:ground"] = "tanh"
-    certificate = with_activations(relu, ops)
-    assert any(b["lower_witness"] and b["lower_witness"]["others"] for b in certificate["bounds"])
+    ops = {"phi:small": "silu", "phi:large": "softplus", "phi:ground": "tanh", "rho:small": "selu"}
+    net = network_toml(folder / "smooth", networks, ops)
+    certificate = certify(net, "--neighbours", "1", "--method", "product", rounds=1)
+    sums = [b for b in certificate["bounds"] if b["lower_witness"] and b["lower_witness"]["others"]]
+    assert sums and decided(certificate, net) == 0
+    for bound in sums[:2]:
+        lower = bound["lower"]
+        with_lower(bound, math.nextafter(lower, math.inf))
+        assert decided(certificate, net) == 1
+        with_lower(bound, lower)
+    net = network_toml(folder / "smooth", networks, {**ops, "phi:ground": "gelu"})
+    certificate = certify(net, "--neighbours", "1", "--method", "product", rounds=1)
     done = check(certificate, net)
-    assert done.returncode == 4 and "not checked: bound set:" in done.stdout, done
-    for bound in certificate["bounds"]:
-        if bound["function"].startswith("set:"):
-            bound.update(lower=None, lower_hex=None, lower_witness=None)
-    done = check(certificate, net)
-    assert done.returncode == 0 and any(b["lower_witness"] for b in certificate["bounds"]), done
+    assert done.returncode == 4 and "not checked: bound set:" in done.stdout and ": of GELU\n" in done.stdout, done
+
+
+def with_lower(bound, lower):
+    bound.update(lower=lower, lower_hex=lower.hex())
+
+
+FUNCTIONS = {"tanh": math.tanh, "sigmoid": lambda t: 1 / (1 + math.exp(-t)),
+             "softplus": lambda t: max(t, 0) + math.log1p(math.exp(-abs(t))),
+             "elu": lambda t: max(t, math.expm1(min(t, 0))),
+             "selu": lambda t: 1.0507009873554805 * (t if t > 0 else 1.6732632423543772 * math.expm1(t)),
+             "silu": lambda t: t / (1 + math.exp(-t))}
+
+
+def values_of_activations_are_those_of_the_functions(folder, generator):
+    """The slope between f(t) and f(u) of one neuron: all but 2^-40 of it is accepted, and 2^-40 more is not."""
+    net, decided_by_all = folder / "value.safetensors", 0
+    net.write_bytes(safetensors([([[1.0]], [0.0]), ([[1.0]], [0.0])]))
+    points = [(-1.2784, -1.2785), (0.0, 2.0 ** -20), (-3.0, 0.5), (-40.0, 2.0), (1.5, 190.0), (-1000.0, -0.75)]
+    for op, function in FUNCTIONS.items():
+        certificate = certify(net, "--activation", op, rounds=1)
+        bound = certificate["bounds"][0]
+        for t, u in points:
+            t, u = struct.unpack("<2f", struct.pack("<2f", t, u))
+            if max(abs(t), abs(u)) > 700 and op != "tanh":
+                t = -650.0
+            bound["lower_witness"] = {"x": [t.hex()], "y": [u.hex()], "others": []}
+            slope = abs(function(t) - function(u)) / abs(t - u)
+            with_upper(bound, 2.0)
+            bound["upper_method"], bound["proof"] = "product", None
+            tolerance = 2.0 ** -40 + 2.0 ** -50 / abs(function(t) - function(u))  # of the functions of Python
+            for factor, code in (1 - tolerance, 0), (1 + tolerance, 1):
+                with_lower(bound, factor * slope)
+                if generator.random() < 0.25:
+                    decided_by_all += 1
+                    assert decided(certificate, net) == code, (op, t, u, factor)
+                else:
+                    assert check(certificate, net).returncode == code, (op, t, u, factor)
+    assert decided_by_all > 9
+
+
+def witnesses_of_any_activation_are_decided_alike(folder, generator):
+    """As found, at other points, and with other claims."""
+    net, codes = folder / "witness.safetensors", Counter()
+    net.write_bytes(safetensors(layers([3, 4, 8, 2], generator)))
+    for ops in "tanh", "silu", "softplus,elu", "groupsort:4", "maxmin:halves", "maxmin:pairs,selu":
+        certificate = certify(net, "--activation", ops, "--method", "product", rounds=1)
+        assert decided(certificate, net) == 0
+        bound = certificate["bounds"][0]
+        lower = bound["lower"]
+        with_lower(bound, math.nextafter(lower, math.inf))
+        assert decided(certificate, net) == 1
+        for _ in range(3):
+            changed = copy.deepcopy(certificate)
+            bound = changed["bounds"][0]
+            point = bound["lower_witness"][generator.choice("xy")]
+            k = generator.randrange(len(point))
+            point[k] = (float.fromhex(point[k]) + generator.choice((-0.125, 0.5, 64.0))).hex()
+            with_lower(bound, generator.choice((0.01, 0.5, 0.95)) * lower)
+            codes[decided(changed, net)] += 1
+    assert codes[0] > 2 and codes[1] > 2 and set(codes) == {0, 1}, codes
 
 
 def onnx_files_state_their_activation(folder, generator):
@@ -533,7 +596,8 @@ def main():
                       functions_that_are_not_monotone_have_an_inequality_of_their_own, refuses_what_only_relu_has,
                       products_count_the_activations, sorting_layers_have_products_only,
                       each_part_has_its_own_activation,
-                      sums_with_terms_that_are_not_relu_are_not_checked_from_below, onnx_files_state_their_activation,
+                      sums_with_smooth_terms_have_lower_bounds, values_of_activations_are_those_of_the_functions,
+                      witnesses_of_any_activation_are_decided_alike, onnx_files_state_their_activation,
                       onnx_files_state_what_they_sort,
                       weights_behind_a_descending_sort_are_those_behind_an_ascending_one,
                       several_activations_in_one_network, onnx_files_state_each_activation):

@@ -63,6 +63,9 @@ let eqb b1 b2 =
 
 module Nat =
  struct
+  (** val div2 : int -> int **)
+
+  let rec div2 = fun n -> n/2
  end
 
 module Pos =
@@ -306,6 +309,76 @@ module Z =
         (fun y' -> compOpp (Pos.compare x' y'))
         y)
       x
+
+  (** val pos_div_eucl : Big.t -> Big.t -> Big.t * Big.t **)
+
+  let rec pos_div_eucl a b =
+    (fun _ _ _ _ -> assert false)
+      (fun a' ->
+      let (q, r) = pos_div_eucl a' b in
+      let r' =
+        Big.add
+          (Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one)) r)
+          ((fun p -> p) Big.one)
+      in
+      if Big.lt r' b
+      then ((Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one)) q),
+             r')
+      else ((Big.add
+              (Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one))
+                q) ((fun p -> p) Big.one)), (Big.sub r' b)))
+      (fun a' ->
+      let (q, r) = pos_div_eucl a' b in
+      let r' =
+        Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one)) r
+      in
+      if Big.lt r' b
+      then ((Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one)) q),
+             r')
+      else ((Big.add
+              (Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one))
+                q) ((fun p -> p) Big.one)), (Big.sub r' b)))
+      (fun _ ->
+      if Big.leq ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one)) b
+      then (Big.zero, ((fun p -> p) Big.one))
+      else (((fun p -> p) Big.one), Big.zero))
+      a
+
+  (** val div_eucl : Big.t -> Big.t -> Big.t * Big.t **)
+
+  let div_eucl a b =
+    (fun _ _ _ _ -> assert false)
+      (fun _ -> (Big.zero, Big.zero))
+      (fun a' ->
+      (fun _ _ _ _ -> assert false)
+        (fun _ -> (Big.zero, a))
+        (fun _ -> pos_div_eucl a' b)
+        (fun b' ->
+        let (q, r) = pos_div_eucl a' ((fun p -> p) b') in
+        ((fun _ _ _ _ -> assert false)
+           (fun _ -> ((Big.neg q), Big.zero))
+           (fun _ -> ((Big.neg (Big.add q ((fun p -> p) Big.one))),
+           (Big.add b r)))
+           (fun _ -> ((Big.neg (Big.add q ((fun p -> p) Big.one))),
+           (Big.add b r)))
+           r))
+        b)
+      (fun a' ->
+      (fun _ _ _ _ -> assert false)
+        (fun _ -> (Big.zero, a))
+        (fun _ ->
+        let (q, r) = pos_div_eucl a' b in
+        ((fun _ _ _ _ -> assert false)
+           (fun _ -> ((Big.neg q), Big.zero))
+           (fun _ -> ((Big.neg (Big.add q ((fun p -> p) Big.one))),
+           (Big.sub b r)))
+           (fun _ -> ((Big.neg (Big.add q ((fun p -> p) Big.one))),
+           (Big.sub b r)))
+           r))
+        (fun b' ->
+        let (q, r) = pos_div_eucl a' ((fun p -> p) b') in (q, (Big.neg r)))
+        b)
+      a
 
   (** val div2 : Big.t -> Big.t **)
 
@@ -606,6 +679,59 @@ type activation =
 | Silu
 | Gelu
 | Sorted of sorting
+
+(** val inserted :
+    ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 list -> 'a1 list **)
+
+let rec inserted low high a = function
+| [] -> a :: []
+| b :: l' -> (low a b) :: (inserted low high (high a b) l')
+
+(** val ascending :
+    ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list **)
+
+let ascending low high l =
+  fold_right (inserted low high) [] l
+
+(** val sorted_groups :
+    ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> int -> int -> 'a1 list ->
+    'a1 list **)
+
+let rec sorted_groups low high n k l =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> [])
+    (fun n' ->
+    app (ascending low high (firstn k l))
+      (sorted_groups low high n' k (skipn k l)))
+    n
+
+(** val both : ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list -> 'a1 list **)
+
+let both f u v =
+  map (fun p -> f (fst p) (snd p)) (combine u v)
+
+(** val of_halves : ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list **)
+
+let of_halves f l =
+  let h = Nat.div2 (length l) in both f (firstn h l) (skipn h l)
+
+(** val of_pairs : ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list **)
+
+let rec of_pairs f = function
+| [] -> []
+| a :: l0 -> (match l0 with
+              | [] -> []
+              | b :: l' -> (f a b) :: (of_pairs f l'))
+
+(** val sorted_by :
+    ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> sorting -> 'a1 list -> 'a1
+    list **)
+
+let sorted_by low high s l =
+  match s with
+  | Groups k -> sorted_groups low high (length l) k l
+  | Halves -> app (of_halves high l) (of_halves low l)
+  | Pairs -> app (of_pairs high l) (of_pairs low l)
 
 (** val weighted_gram :
     'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
@@ -1133,19 +1259,6 @@ let positive_scale scale0 =
 let reluD x =
   if is_nonnegative x then x else zero
 
-(** val affineD : matrixD -> dyadic list -> dyadic list -> dyadic list **)
-
-let affineD m b x =
-  plus add0 (apply zero add0 mul0 m x) b
-
-(** val networkD : layerD list -> layerD -> dyadic list -> dyadic list **)
-
-let rec networkD hidden0 last0 x =
-  match hidden0 with
-  | [] -> affineD (fst last0) (snd last0) x
-  | l :: hidden' ->
-    let (m, b) = l in networkD hidden' last0 (map reluD (affineD m b x))
-
 (** val minusD : dyadic list -> dyadic list -> dyadic list **)
 
 let minusD u v =
@@ -1446,6 +1559,660 @@ let rec sum_fits count0 m e errors =
         | x :: errors' ->
           (&&) (rounding_fits count0 a b x) (sum_fits count0 m' e' errors')))
 
+type fixed = Big.t * Big.t
+
+(** val unit_of_fixed : Big.t **)
+
+let unit_of_fixed =
+  (fun a n -> Big.shift_left a (Big.to_int n)) ((fun p -> p) Big.one)
+    ((fun p -> p) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) Big.one)))))))))
+
+(** val least : Big.t -> Big.t -> Big.t **)
+
+let least a b =
+  if Big.leq a b then a else b
+
+(** val greatest : Big.t -> Big.t -> Big.t **)
+
+let greatest a b =
+  if Big.leq a b then b else a
+
+(** val ceil_shift : Big.t -> Big.t -> Big.t **)
+
+let ceil_shift a n =
+  Big.neg ((fun a n -> Big.shift_right a (Big.to_int n)) (Big.neg a) n)
+
+(** val ceil_quotient : Big.t -> Big.t -> Big.t **)
+
+let ceil_quotient a b =
+  Big.neg (Big.fdiv (Big.neg a) b)
+
+(** val floor_at : Big.t -> dyadic -> Big.t **)
+
+let floor_at u x =
+  let e = Big.sub (snd x) u in
+  if Big.leq Big.zero e
+  then (fun a n -> Big.shift_left a (Big.to_int n)) (fst x) e
+  else (fun a n -> Big.shift_right a (Big.to_int n)) (fst x) (Big.neg e)
+
+(** val ceil_at : Big.t -> dyadic -> Big.t **)
+
+let ceil_at u x =
+  Big.neg (floor_at u (neg x))
+
+(** val floor_to : Big.t -> dyadic -> dyadic **)
+
+let floor_to u x =
+  if Big.leq u (snd x) then x else ((floor_at u x), u)
+
+(** val ceil_to : Big.t -> dyadic -> dyadic **)
+
+let ceil_to u x =
+  if Big.leq u (snd x) then x else ((ceil_at u x), u)
+
+(** val of_dyadic : dyadic -> fixed **)
+
+let of_dyadic x =
+  ((floor_at (Big.neg ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) Big.one))))))))) x),
+    (ceil_at (Big.neg ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) Big.one))))))))) x))
+
+(** val oneF : fixed **)
+
+let oneF =
+  (unit_of_fixed, unit_of_fixed)
+
+(** val addF : fixed -> fixed -> fixed **)
+
+let addF a b =
+  ((Big.add (fst a) (fst b)), (Big.add (snd a) (snd b)))
+
+(** val negF : fixed -> fixed **)
+
+let negF a =
+  ((Big.neg (snd a)), (Big.neg (fst a)))
+
+(** val mulF : fixed -> fixed -> fixed **)
+
+let mulF a b =
+  let (l, h) = a in
+  let (m, k) = b in
+  let p = Big.mul l m in
+  let q = Big.mul l k in
+  let r = Big.mul h m in
+  let s = Big.mul h k in
+  (((fun a n -> Big.shift_right a (Big.to_int n))
+     (least (least p q) (least r s)) ((fun p -> p)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     Big.one)))))))))),
+  (ceil_shift (greatest (greatest p q) (greatest r s)) ((fun p -> p)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    Big.one)))))))))))
+
+(** val overF : fixed -> Big.t -> fixed **)
+
+let overF a n =
+  ((Big.fdiv (fst a) n), (ceil_quotient (snd a) n))
+
+(** val ratioF : Big.t -> Big.t -> fixed **)
+
+let ratioF n d =
+  ((Big.fdiv
+     ((fun a n -> Big.shift_left a (Big.to_int n)) n ((fun p -> p)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       Big.one)))))))))) d),
+    (ceil_quotient
+      ((fun a n -> Big.shift_left a (Big.to_int n)) n ((fun p -> p)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        Big.one)))))))))) d))
+
+(** val divF : fixed -> fixed -> fixed **)
+
+let divF a b =
+  let l =
+    (fun a n -> Big.shift_left a (Big.to_int n)) (fst a) ((fun p -> p)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      Big.one)))))))))
+  in
+  let h =
+    (fun a n -> Big.shift_left a (Big.to_int n)) (snd a) ((fun p -> p)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      Big.one)))))))))
+  in
+  let m = greatest unit_of_fixed (fst b) in
+  let k = greatest unit_of_fixed (snd b) in
+  ((Big.fdiv l (if Big.leq Big.zero l then k else m)),
+  (ceil_quotient h (if Big.leq Big.zero h then m else k)))
+
+(** val exp_series : int -> Big.t -> fixed -> fixed -> fixed -> fixed **)
+
+let rec exp_series n k y term0 sum0 =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> sum0)
+    (fun n' ->
+    let t = overF (mulF term0 y) k in
+    exp_series n' (Big.add k ((fun p -> p) Big.one)) y t (addF sum0 t))
+    n
+
+(** val squares : int -> fixed -> fixed **)
+
+let rec squares n f =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> f)
+    (fun n' -> squares n' (mulF f f))
+    n
+
+(** val vanishing : Big.t **)
+
+let vanishing =
+  Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    Big.one)))))))) unit_of_fixed
+
+(** val exp_by_series : fixed -> fixed **)
+
+let exp_by_series x =
+  let sum0 =
+    exp_series (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ 0)))))))))))))))))))))))))))))))) ((fun p -> p)
+      Big.one)
+      (((fun a n -> Big.shift_right a (Big.to_int n)) (fst x) ((fun p -> p)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))),
+      (ceil_shift (snd x) ((fun p -> p) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.succ (Big.shift_left p 1)) Big.one)))))) oneF oneF
+  in
+  squares (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    0))))))))))))
+    (divF oneF ((fst sum0), (Big.add (snd sum0) ((fun p -> p) Big.one))))
+
+(** val exp_of_minus : fixed -> fixed **)
+
+let exp_of_minus x =
+  if Big.leq vanishing (fst x)
+  then (Big.zero, ((fun p -> p) Big.one))
+  else if Big.leq vanishing (snd x)
+       then (Big.zero, (snd (exp_by_series ((fst x), vanishing))))
+       else exp_by_series x
+
+(** val log_series : int -> Big.t -> fixed -> fixed -> fixed -> fixed **)
+
+let rec log_series n k square power sum0 =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> sum0)
+    (fun n' ->
+    log_series n'
+      (Big.add k ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one)))
+      square (mulF power square) (addF sum0 (overF power k)))
+    n
+
+(** val confirmed_log : Big.t -> Big.t -> fixed -> fixed **)
+
+let confirmed_log low high e =
+  let square =
+    (fun a n -> Big.shift_left a (Big.to_int n)) unit_of_fixed ((fun p -> p)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      Big.one)))))))))
+  in
+  ((if (&&) (Big.leq Big.zero low)
+         (Big.leq square
+           (Big.mul (fst (exp_of_minus (low, low)))
+             (Big.add unit_of_fixed (greatest Big.zero (fst e)))))
+    then low
+    else Big.zero),
+  (if (&&) (Big.leq Big.zero high)
+        (Big.leq
+          (Big.mul (snd (exp_of_minus (high, high)))
+            (Big.add unit_of_fixed (snd e))) square)
+   then high
+   else snd e))
+
+(** val log_of_one_plus : fixed -> fixed **)
+
+let log_of_one_plus e =
+  let z0 = divF e (addF (addF oneF oneF) e) in
+  let c =
+    log_series (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+      (Stdlib.Int.succ (Stdlib.Int.succ
+      0)))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))
+      ((fun p -> p) Big.one) (mulF z0 z0) z0 (Big.zero, Big.zero)
+  in
+  confirmed_log
+    (Big.sub
+      (Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one)) (fst c))
+      ((fun a n -> Big.shift_left a (Big.to_int n)) ((fun p -> p) Big.one)
+        ((fun p -> p) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.succ (Big.shift_left p 1))
+        ((fun p -> Big.succ (Big.shift_left p 1))
+        ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))))
+    (Big.add
+      (Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one)) (snd c))
+      ((fun a n -> Big.shift_left a (Big.to_int n)) ((fun p -> p) Big.one)
+        ((fun p -> p) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.succ (Big.shift_left p 1))
+        ((fun p -> Big.succ (Big.shift_left p 1))
+        ((fun p -> Big.succ (Big.shift_left p 1)) Big.one)))))))) e
+
+(** val selu_scaleF : fixed **)
+
+let selu_scaleF =
+  ratioF ((fun p -> p) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1)
+    Big.one))))))))))))))))))))))))))))))))))))))))))))))))))))))
+    ((fun p -> p) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    Big.one))))))))))))))))))))))))))))))))))))))))))))))))))))))
+
+(** val selu_alphaF : fixed **)
+
+let selu_alphaF =
+  ratioF ((fun p -> p) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    Big.one))))))))))))))))))))))))))))))))))))))))))))))))))))))
+    ((fun p -> p) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    Big.one))))))))))))))))))))))))))))))))))))))))))))))))))))))
+
+(** val exp_of_minus_size : dyadic -> fixed **)
+
+let exp_of_minus_size t =
+  exp_of_minus (of_dyadic (abs t))
+
+(** val sigmoidF : dyadic -> fixed **)
+
+let sigmoidF t =
+  let e = exp_of_minus_size t in
+  divF (if is_nonnegative t then oneF else e) (addF oneF e)
+
+(** val tanhF : dyadic -> fixed **)
+
+let tanhF t =
+  let e = exp_of_minus_size (shift ((fun p -> p) Big.one) t) in
+  let v = divF (addF oneF (negF e)) (addF oneF e) in
+  if is_nonnegative t then v else negF v
+
+(** val softplusF : dyadic -> fixed **)
+
+let softplusF t =
+  addF (if is_nonnegative t then of_dyadic t else (Big.zero, Big.zero))
+    (log_of_one_plus (exp_of_minus_size t))
+
+(** val eluF : dyadic -> fixed **)
+
+let eluF t =
+  if is_nonnegative t
+  then of_dyadic t
+  else addF (exp_of_minus_size t) (negF oneF)
+
+(** val seluF : dyadic -> fixed **)
+
+let seluF t =
+  mulF selu_scaleF
+    (if is_nonnegative t
+     then of_dyadic t
+     else mulF selu_alphaF (addF (exp_of_minus_size t) (negF oneF)))
+
+(** val value_at : activation -> dyadic -> fixed **)
+
+let value_at a t =
+  match a with
+  | Tanh -> tanhF t
+  | Sigmoid -> sigmoidF t
+  | Softplus -> softplusF t
+  | Elu -> eluF t
+  | Selu -> seluF t
+  | Silu -> mulF (of_dyadic t) (sigmoidF t)
+  | _ -> (Big.zero, Big.zero)
+
+(** val is_enclosed : activation -> bool **)
+
+let is_enclosed = function
+| Gelu -> false
+| _ -> true
+
+(** val silu_minimum : (dyadic * dyadic) * dyadic **)
+
+let silu_minimum =
+  ((((Big.neg ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    Big.one))))))))))))))))))))), (Big.neg ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) Big.one)))))), ((Big.neg
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    Big.one))))))))))))))))))))), (Big.neg ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) Big.one))))))), ((Big.neg
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    Big.one))))))))))))))))), (Big.neg ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) Big.one)))))))
+
+(** val smaller : dyadic -> dyadic -> dyadic **)
+
+let smaller x y =
+  if at_most x y then x else y
+
+(** val below : dyadic -> dyadic -> bool **)
+
+let below x y =
+  negb (at_most y x)
+
+(** val values_between :
+    activation -> (dyadic * dyadic) -> dyadic * dyadic **)
+
+let values_between a i =
+  let v = value_at a (fst i) in
+  let w = if same (fst i) (snd i) then v else value_at a (snd i) in
+  let low = ((fst v), (Big.neg ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) Big.one))))))))))
+  in
+  let high = ((snd w), (Big.neg ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) Big.one))))))))))
+  in
+  if is_rising a
+  then ((floor_to (Big.neg ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.shift_left p 1) Big.one))))))) low),
+         (ceil_to (Big.neg ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.shift_left p 1) Big.one))))))) high))
+  else let (p, value) = silu_minimum in
+       let (from, to0) = p in
+       ((floor_to (Big.neg ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.shift_left p 1) Big.one)))))))
+          (if (||) (below (snd i) from) (below to0 (fst i))
+           then smaller low ((fst w), (Big.neg ((fun p -> Big.shift_left p 1)
+                  ((fun p -> Big.shift_left p 1)
+                  ((fun p -> Big.shift_left p 1)
+                  ((fun p -> Big.shift_left p 1)
+                  ((fun p -> Big.shift_left p 1)
+                  ((fun p -> Big.shift_left p 1)
+                  ((fun p -> Big.shift_left p 1)
+                  ((fun p -> Big.shift_left p 1) Big.one))))))))))
+           else value)),
+       (ceil_to (Big.neg ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) Big.one)))))))
+         (larger high ((snd v), (Big.neg ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.shift_left p 1) Big.one)))))))))))))
+
+(** val least_ends :
+    (dyadic * dyadic) -> (dyadic * dyadic) -> dyadic * dyadic **)
+
+let least_ends i j =
+  ((smaller (fst i) (fst j)), (smaller (snd i) (snd j)))
+
+(** val greatest_ends :
+    (dyadic * dyadic) -> (dyadic * dyadic) -> dyadic * dyadic **)
+
+let greatest_ends i j =
+  ((larger (fst i) (fst j)), (larger (snd i) (snd j)))
+
+(** val activated_ends : activation -> box -> box **)
+
+let activated_ends a b =
+  match a with
+  | Relu -> map relu_ends b
+  | Sorted s -> sorted_by least_ends greatest_ends s b
+  | _ -> map (values_between a) b
+
+(** val plus_ends : box -> box -> box **)
+
+let rec plus_ends a b =
+  match a with
+  | [] -> b
+  | p :: a' ->
+    let (l, h) = p in
+    (match b with
+     | [] -> a
+     | p0 :: b' ->
+       let (m, k) = p0 in ((add0 l m), (add0 h k)) :: (plus_ends a' b'))
+
+(** val affine_ends : layerD -> box -> box **)
+
+let affine_ends l b =
+  plus_ends (map (fun row -> row_ends row b) (fst l))
+    (map (fun c -> (c, c)) (snd l))
+
+(** val network_ends :
+    activation list -> layerD list -> layerD -> box -> box **)
+
+let rec network_ends between0 hidden0 last0 b =
+  match hidden0 with
+  | [] -> affine_ends last0 b
+  | l :: hidden' ->
+    network_ends (tl between0) hidden' last0
+      (activated_ends (hd Relu between0) (affine_ends l b))
+
 type hints = { slope_between : (dyadic -> dyadic -> dyadic);
                rounded_up : (dyadic -> dyadic);
                factor_number : (int -> matrixD -> factor option) }
@@ -1474,21 +2241,21 @@ let line_of o low high =
 (** val through_relu :
     dyadic list -> line list -> bool list -> dyadic list * dyadic **)
 
-let rec through_relu c lines below =
+let rec through_relu c lines below0 =
   match c with
   | [] -> ([], zero)
   | a :: c' ->
     (match lines with
      | [] -> ([], zero)
      | l :: lines' ->
-       let (d, k) = through_relu c' lines' (tl below) in
+       let (d, k) = through_relu c' lines' (tl below0) in
        (match l with
         | On -> ((a :: d), k)
         | Off -> ((zero :: d), k)
         | Open (low, high, s, t) ->
           if is_nonnegative a
           then (((mul0 a s) :: d), (add0 (mul0 a t) k))
-          else if hd (is_positive (add0 low high)) below
+          else if hd (is_positive (add0 low high)) below0
                then ((a :: d), k)
                else ((zero :: d), k)))
 
@@ -1509,22 +2276,22 @@ let rec combined z0 m =
     (layerD * line list) list -> bool list list -> dyadic list -> dyadic ->
     dyadic list * dyadic **)
 
-let rec form_above before below c k =
+let rec form_above before below0 c k =
   match before with
   | [] -> (c, k)
   | p :: before' ->
     let (l, lines) = p in
     let (w, bias) = l in
-    let (d, j) = through_relu c lines (hd [] below) in
-    form_above before' (tl below) (combined d w)
+    let (d, j) = through_relu c lines (hd [] below0) in
+    form_above before' (tl below0) (combined d w)
       (add0 (add0 k j) (dot zero add0 mul0 d bias))
 
 (** val most0 :
     (layerD * line list) list -> bool list list -> dyadic list -> dyadic ->
     box -> dyadic **)
 
-let most0 before below c k b =
-  let (d, j) = form_above before below c k in add0 j (snd (row_ends d b))
+let most0 before below0 c k b =
+  let (d, j) = form_above before below0 c k in add0 j (snd (row_ends d b))
 
 type decision = { neuron : int; is_on : bool; lower_slopes : bool list list }
 
@@ -2030,11 +2797,11 @@ let rec with_units w n =
 
 (** val coupled : part -> part -> dyadic list -> part **)
 
-let coupled phi0 rho least =
+let coupled phi0 rho least0 =
   let (w, c) = joined_layer phi0.outer (first_layer rho) in
   { hidden =
   (app (passing (inputs_of phi0) (length w) phi0.hidden) (((with_units w 0),
-    (plus add0 c least)) :: (tl rho.hidden))); outer = rho.outer; clamp =
+    (plus add0 c least0)) :: (tl rho.hidden))); outer = rho.outer; clamp =
   phi0.clamp; between = [] }
 
 type range_tree =
@@ -2426,19 +3193,43 @@ let check_slope_among ps p rho moves scale0 b others u r o ranges t =
          None o t
      | None -> false)
 
-(** val valueD : part -> dyadic list -> dyadic list **)
+(** val enclosed_between : part -> bool **)
 
-let valueD p x =
-  networkD p.hidden p.outer (clampedD p.clamp x)
+let enclosed_between p =
+  forallb is_enclosed p.between
 
-(** val value_ofD :
-    part list -> function0 -> dyadic list -> dyadic list -> dyadic list **)
+(** val value_ends : part -> box -> box **)
 
-let value_ofD ps f rest0 x =
+let value_ends p b =
+  network_ends p.between p.hidden p.outer (clamp_ends p.clamp b)
+
+(** val value_of_ends : part list -> function0 -> box -> box -> box **)
+
+let value_of_ends ps f rest0 x =
   match f with
-  | Alone p -> valueD (part_at ps p) x
+  | Alone p -> value_ends (part_at ps p) x
   | Set_of (phi0, rho) ->
-    valueD (part_at ps rho) (plus add0 (valueD (part_at ps phi0) x) rest0)
+    value_ends (part_at ps rho)
+      (plus_ends (value_ends (part_at ps phi0) x) rest0)
+
+(** val at_point : dyadic list -> box **)
+
+let at_point x =
+  map (fun a -> (a, a)) x
+
+(** val least_square : box -> box -> dyadic **)
+
+let rec least_square a b =
+  match a with
+  | [] -> zero
+  | p :: a' ->
+    let (l, h) = p in
+    (match b with
+     | [] -> zero
+     | p0 :: b' ->
+       let (m, k) = p0 in
+       let d = larger zero (larger (add0 l (neg k)) (add0 m (neg h))) in
+       add0 (mul0 d d) (least_square a' b'))
 
 (** val agreeD : bool list -> dyadic list -> dyadic list -> bool **)
 
@@ -2475,8 +3266,9 @@ let rec fraction_in scale0 = function
 
 let check_points ps silent f moves scale0 l x y others =
   let rest0 =
-    fold_right (plus add0) []
-      (map (fun o -> valueD (part_at ps (fst o)) (snd o)) others)
+    fold_right plus_ends []
+      (map (fun o -> value_ends (part_at ps (fst o)) (at_point (snd o)))
+        others)
   in
   let (n, m) = fraction_in scale0 (minusD x y) in
   (&&)
@@ -2487,8 +3279,8 @@ let check_points ps silent f moves scale0 l x y others =
             ((&&)
               ((&&)
                 ((&&)
-                  ((&&) (forallb relu_between (parts_of ps f))
-                    (forallb (fun o -> relu_between (part_at ps (fst o)))
+                  ((&&) (forallb enclosed_between (parts_of ps f))
+                    (forallb (fun o -> enclosed_between (part_at ps (fst o)))
                       others))
                   (negb (is_silent silent ((moved f) :: (map fst others)))))
                 (positive_scale scale0)) (is_nonnegative l))
@@ -2499,8 +3291,8 @@ let check_points ps silent f moves scale0 l x y others =
       (is_positive n))
     (at_most (mul0 (mul0 l l) n)
       (mul0
-        (squareD (minusD (value_ofD ps f rest0 x) (value_ofD ps f rest0 y)))
-        m))
+        (least_square (value_of_ends ps f rest0 (at_point x))
+          (value_of_ends ps f rest0 (at_point y))) m))
 
 (** val same_moves : bool list -> bool list -> bool **)
 
@@ -2539,7 +3331,7 @@ let rec find_slope accepted phi0 rho moves =
 
 (** val total_of : claim list -> bool -> kind list -> int -> dyadic option **)
 
-let rec total_of accepted squares kinds rho =
+let rec total_of accepted squares0 kinds rho =
   match kinds with
   | [] -> Some zero
   | k :: kinds' ->
@@ -2547,12 +3339,12 @@ let rec total_of accepted squares kinds rho =
     let (phi0, moves) = p in
     (match find_slope accepted phi0 rho moves with
      | Some k0 ->
-       (match total_of accepted squares kinds' rho with
+       (match total_of accepted squares0 kinds' rho with
         | Some rest0 ->
           if (&&) (is_nonnegative k0) (Big.leq Big.zero n)
           then Some
                  (add0
-                   (mul0 (n, Big.zero) (if squares then mul0 k0 k0 else k0))
+                   (mul0 (n, Big.zero) (if squares0 then mul0 k0 k0 else k0))
                    rest0)
           else None
         | None -> None)
@@ -2610,7 +3402,7 @@ let rec find_slope_in accepted phi0 rho moves b =
 (** val total_in :
     claim list -> bool -> (kind * box) list -> int -> dyadic option **)
 
-let rec total_in accepted squares kinds rho =
+let rec total_in accepted squares0 kinds rho =
   match kinds with
   | [] -> Some zero
   | p :: kinds' ->
@@ -2619,12 +3411,12 @@ let rec total_in accepted squares kinds rho =
     let (phi0, moves) = p0 in
     (match find_slope_in accepted phi0 rho moves b with
      | Some k0 ->
-       (match total_in accepted squares kinds' rho with
+       (match total_in accepted squares0 kinds' rho with
         | Some rest0 ->
           if (&&) (is_nonnegative k0) (Big.leq Big.zero n)
           then Some
                  (add0
-                   (mul0 (n, Big.zero) (if squares then mul0 k0 k0 else k0))
+                   (mul0 (n, Big.zero) (if squares0 then mul0 k0 k0 else k0))
                    rest0)
           else None
         | None -> None)
@@ -2643,9 +3435,9 @@ let check_law_in_box ps accepted stacked kinds rho u =
 (** val term_among : Big.t -> ((kind * box) * Big.t) -> term **)
 
 let term_among less k =
-  let least = Big.sub (snd k) less in
+  let least0 = Big.sub (snd k) less in
   { phi = (fst (fst (fst (fst k)))); inputs_in = (snd (fst k)); fewest =
-  (if Big.leq Big.zero least then least else Big.zero); most =
+  (if Big.leq Big.zero least0 then least0 else Big.zero); most =
   (Big.sub (snd (fst (fst k))) less) }
 
 (** val others_of :
@@ -2703,7 +3495,7 @@ let rec find_slope_among accepted p rho moves b others =
     claim list -> bool -> ((kind * box) * Big.t) list ->
     ((kind * box) * Big.t) list -> int -> dyadic option **)
 
-let rec total_among accepted squares before kinds rho =
+let rec total_among accepted squares0 before kinds rho =
   match kinds with
   | [] -> Some zero
   | k :: kinds' ->
@@ -2720,11 +3512,12 @@ let rec total_among accepted squares before kinds rho =
     in
     (match bound with
      | Some u ->
-       (match total_among accepted squares (app before (k :: [])) kinds' rho with
+       (match total_among accepted squares0 (app before (k :: [])) kinds' rho with
         | Some rest0 ->
           if (&&) (is_nonnegative u) (Big.leq Big.zero n)
           then Some
-                 (add0 (mul0 (n, Big.zero) (if squares then mul0 u u else u))
+                 (add0
+                   (mul0 (n, Big.zero) (if squares0 then mul0 u u else u))
                    rest0)
           else None
         | None -> None)

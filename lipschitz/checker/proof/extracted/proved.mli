@@ -28,6 +28,7 @@ val eqb : bool -> bool -> bool
 
 module Nat :
  sig
+  val div2 : int -> int
  end
 
 module Pos :
@@ -66,6 +67,10 @@ module Z :
   val pos_sub : Big.t -> Big.t -> Big.t
 
   val compare : Big.t -> Big.t -> comparison
+
+  val pos_div_eucl : Big.t -> Big.t -> Big.t * Big.t
+
+  val div_eucl : Big.t -> Big.t -> Big.t * Big.t
 
   val div2 : Big.t -> Big.t
  end
@@ -162,6 +167,26 @@ type activation =
 | Silu
 | Gelu
 | Sorted of sorting
+
+val inserted :
+  ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 list -> 'a1 list
+
+val ascending :
+  ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
+
+val sorted_groups :
+  ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> int -> int -> 'a1 list -> 'a1
+  list
+
+val both : ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list -> 'a1 list
+
+val of_halves : ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
+
+val of_pairs : ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
+
+val sorted_by :
+  ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> sorting -> 'a1 list -> 'a1
+  list
 
 val weighted_gram :
   'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
@@ -335,10 +360,6 @@ val positive_scale : dyadic list -> bool
 
 val reluD : dyadic -> dyadic
 
-val affineD : matrixD -> dyadic list -> dyadic list -> dyadic list
-
-val networkD : layerD list -> layerD -> dyadic list -> dyadic list
-
 val minusD : dyadic list -> dyadic list -> dyadic list
 
 val squareD : dyadic list -> dyadic
@@ -387,6 +408,98 @@ val check_roundings :
 val add_ends : Big.t -> Big.t -> box -> box -> box
 
 val sum_fits : Big.t -> dyadic list -> dyadic list -> dyadic list -> bool
+
+type fixed = Big.t * Big.t
+
+val unit_of_fixed : Big.t
+
+val least : Big.t -> Big.t -> Big.t
+
+val greatest : Big.t -> Big.t -> Big.t
+
+val ceil_shift : Big.t -> Big.t -> Big.t
+
+val ceil_quotient : Big.t -> Big.t -> Big.t
+
+val floor_at : Big.t -> dyadic -> Big.t
+
+val ceil_at : Big.t -> dyadic -> Big.t
+
+val floor_to : Big.t -> dyadic -> dyadic
+
+val ceil_to : Big.t -> dyadic -> dyadic
+
+val of_dyadic : dyadic -> fixed
+
+val oneF : fixed
+
+val addF : fixed -> fixed -> fixed
+
+val negF : fixed -> fixed
+
+val mulF : fixed -> fixed -> fixed
+
+val overF : fixed -> Big.t -> fixed
+
+val ratioF : Big.t -> Big.t -> fixed
+
+val divF : fixed -> fixed -> fixed
+
+val exp_series : int -> Big.t -> fixed -> fixed -> fixed -> fixed
+
+val squares : int -> fixed -> fixed
+
+val vanishing : Big.t
+
+val exp_by_series : fixed -> fixed
+
+val exp_of_minus : fixed -> fixed
+
+val log_series : int -> Big.t -> fixed -> fixed -> fixed -> fixed
+
+val confirmed_log : Big.t -> Big.t -> fixed -> fixed
+
+val log_of_one_plus : fixed -> fixed
+
+val selu_scaleF : fixed
+
+val selu_alphaF : fixed
+
+val exp_of_minus_size : dyadic -> fixed
+
+val sigmoidF : dyadic -> fixed
+
+val tanhF : dyadic -> fixed
+
+val softplusF : dyadic -> fixed
+
+val eluF : dyadic -> fixed
+
+val seluF : dyadic -> fixed
+
+val value_at : activation -> dyadic -> fixed
+
+val is_enclosed : activation -> bool
+
+val silu_minimum : (dyadic * dyadic) * dyadic
+
+val smaller : dyadic -> dyadic -> dyadic
+
+val below : dyadic -> dyadic -> bool
+
+val values_between : activation -> (dyadic * dyadic) -> dyadic * dyadic
+
+val least_ends : (dyadic * dyadic) -> (dyadic * dyadic) -> dyadic * dyadic
+
+val greatest_ends : (dyadic * dyadic) -> (dyadic * dyadic) -> dyadic * dyadic
+
+val activated_ends : activation -> box -> box
+
+val plus_ends : box -> box -> box
+
+val affine_ends : layerD -> box -> box
+
+val network_ends : activation list -> layerD list -> layerD -> box -> box
 
 type hints = { slope_between : (dyadic -> dyadic -> dyadic);
                rounded_up : (dyadic -> dyadic);
@@ -652,10 +765,15 @@ val check_slope_among :
   part list -> int -> int -> bool list -> dyadic list -> box -> term list ->
   dyadic -> dyadic -> hints -> (box * range_tree) list -> tree -> bool
 
-val valueD : part -> dyadic list -> dyadic list
+val enclosed_between : part -> bool
 
-val value_ofD :
-  part list -> function0 -> dyadic list -> dyadic list -> dyadic list
+val value_ends : part -> box -> box
+
+val value_of_ends : part list -> function0 -> box -> box -> box
+
+val at_point : dyadic list -> box
+
+val least_square : box -> box -> dyadic
 
 val agreeD : bool list -> dyadic list -> dyadic list -> bool
 

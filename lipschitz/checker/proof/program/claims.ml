@@ -238,14 +238,14 @@ let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~
     let lower = Exact.of_float (Exact.number (where ^ " lower") (find where "lower" bound)
         (find where "lower_hex" bound)) in
     let in_box = find where "domain" bound = Text "box" in
-    let proof, silent, is_relu = Witness.read state.net state.json (where ^ ": lower_witness") names ~in_box ~neighbours
+    let proof, silent, is_enclosed = Witness.read state.net state.json (where ^ ": lower_witness") names ~in_box ~neighbours
         ~moves witness in
-    if is_relu then begin
+    if is_enclosed then begin
       prove state (Slope_at_least (silent, func, moves, exact_scale, lower)) proof
           (where ^ ": lower_witness: claims more than the slope between x and y");
       state.lower_bounds <- state.lower_bounds + 1
     end else
-      not_checked state (Printf.sprintf "%s >= %s: of activations that are not ReLU" where
+      not_checked state (Printf.sprintf "%s >= %s: of GELU" where
           (text where (find where "lower_hex" bound)))
 
 let check_bound state bound =

@@ -21,8 +21,7 @@ let point net certificate where ~in_box part json =
       "%s: a point is outside of the box" where;
   values
 
-(* And in which compositions the function is silent, and whether only ReLU networks enter: of those alone the theorems
-   have values. *)
+(* And in which compositions the function is silent, and whether the theorems have values of all networks that enter. *)
 let read net certificate where names ~in_box ~neighbours ~moves json =
   require_keys where [ "x"; "y"; "others" ] json;
   let moved = List.hd names in
@@ -52,4 +51,4 @@ let read net certificate where names ~in_box ~neighbours ~moves json =
   let exact = List.map Exact.of_float in
   Proved.By_points (exact x, exact y, List.map (fun (part, x) -> Functions.index net part, exact x) others),
   silent,
-  List.for_all (Functions.is_relu net) (here @ List.tl names)
+  List.for_all (Functions.is_enclosed net) (here @ List.tl names)

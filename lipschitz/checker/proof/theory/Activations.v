@@ -9,24 +9,29 @@ Open Scope R_scope.
 Inductive sorting := Groups (k : nat) | Halves | Pairs.
 Inductive activation := Relu | Tanh | Sigmoid | Softplus | Elu | Selu | Silu | Gelu | Sorted (s : sorting).
 
+(** Of numbers or of intervals: `low` and `high` give the smaller and the larger one of two. *)
+Section Sorting.
+Context {T : Type} (low high : T -> T -> T).
 (** By compare and swap: `a` into a list that is in ascending order. *)
-Fixpoint inserted (a : R) (l : list R) : list R :=
-  match l with [] => [a] | b :: l' => Rmin a b :: inserted (Rmax a b) l' end.
-Definition ascending (l : list R) : list R := fold_right inserted [] l.
+Fixpoint inserted (a : T) (l : list T) : list T :=
+  match l with [] => [a] | b :: l' => low a b :: inserted (high a b) l' end.
+Definition ascending (l : list T) : list T := fold_right inserted [] l.
 (** n groups; a last one may be shorter. *)
-Fixpoint sorted_groups (n k : nat) (l : list R) : list R :=
+Fixpoint sorted_groups (n k : nat) (l : list T) : list T :=
   match n with O => [] | S n' => ascending (firstn k l) ++ sorted_groups n' k (skipn k l) end.
-Definition both (f : R -> R -> R) (u v : list R) : list R := map (fun p => f (fst p) (snd p)) (combine u v).
-Definition of_halves (f : R -> R -> R) (l : list R) : list R :=
+Definition both (f : T -> T -> T) (u v : list T) : list T := map (fun p => f (fst p) (snd p)) (combine u v).
+Definition of_halves (f : T -> T -> T) (l : list T) : list T :=
   let h := Nat.div2 (length l) in both f (firstn h l) (skipn h l).
-Fixpoint of_pairs (f : R -> R -> R) (l : list R) : list R :=
+Fixpoint of_pairs (f : T -> T -> T) (l : list T) : list T :=
   match l with a :: b :: l' => f a b :: of_pairs f l' | _ => [] end.
-Definition sort_layer (s : sorting) (l : list R) : list R :=
+Definition sorted_by (s : sorting) (l : list T) : list T :=
   match s with
   | Groups k => sorted_groups (length l) k l
-  | Halves => of_halves Rmax l ++ of_halves Rmin l
-  | Pairs => of_pairs Rmax l ++ of_pairs Rmin l
+  | Halves => of_halves high l ++ of_halves low l
+  | Pairs => of_pairs high l ++ of_pairs low l
   end.
+End Sorting.
+Definition sort_layer : sorting -> list R -> list R := sorted_by Rmin Rmax.
 
 Definition relu (x : R) : R := Rmax 0 x.
 Definition sigmoid (x : R) : R := / (1 + exp (- x)).

@@ -1,12 +1,15 @@
 (** The theorems, and what they rest on; compared with assumptions.txt. *)
 From Coq Require Import List Reals.
-From Swarmcert Require Import Activations Form Network Sorting Checker Meaning Steepness Sets Claims Silent Sound.
+From Swarmcert Require Import Activations Form Network Sorting Checker Meaning Steepness Sets Enclosures Intervals
+  Claims Silent Sound.
 Open Scope R_scope.
 Set Printing Width 120.
 Check rising_slopes.
 Print Assumptions rising_slopes.
 Check all_slopes.
 Print Assumptions all_slopes.
+Check values_between_lies.
+Print Assumptions values_between_lies.
 Check sorting_contracts.
 Print Assumptions sorting_contracts.
 Check check_sound.

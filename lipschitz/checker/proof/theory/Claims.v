@@ -1,7 +1,7 @@
 (** The checker of claims, and what its acceptance means: `step_sound`. *)
 From Coq Require Import List ZArith Reals Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Blocks Lower Values
-  Parts Coupled.
+  Enclosures Parts Coupled.
 Import ListNotations.
 
 Inductive proof :=
@@ -152,11 +152,21 @@ Definition check_slope_among ps p rho moves scale (b : box) others u r (o : hint
      end.
 
 (** Slopes from below, between two points. *)
-Definition valueD (p : part) (x : list dyadic) : list dyadic := networkD (hidden p) (outer p) (clampedD (clamp p) x).
-Definition value_ofD (ps : list part) (f : function) (rest x : list dyadic) : list dyadic :=
+Definition enclosed_between (p : part) : bool := forallb is_enclosed (between p).
+Definition value_ends (p : part) (b : box) : box :=
+  network_ends (between p) (hidden p) (outer p) (clamp_ends (clamp p) b).
+Definition value_of_ends (ps : list part) (f : function) (rest x : box) : box :=
   match f with
-  | Alone p => valueD (part_at ps p) x
-  | Set_of phi rho => valueD (part_at ps rho) (plus add (valueD (part_at ps phi) x) rest)
+  | Alone p => value_ends (part_at ps p) x
+  | Set_of phi rho => value_ends (part_at ps rho) (plus_ends (value_ends (part_at ps phi) x) rest)
+  end.
+Definition at_point (x : list dyadic) : box := map (fun a => (a, a)) x.
+(** At most the square of the distance of any two vectors in a and b. *)
+Fixpoint least_square (a b : box) : dyadic :=
+  match a, b with
+  | (l, h) :: a', (m, k) :: b' =>
+      let d := larger zero (larger (add l (neg k)) (add m (neg h))) in add (mul d d) (least_square a' b')
+  | _, _ => zero
   end.
 Fixpoint agreeD (moves : list bool) (x y : list dyadic) : bool :=
   match moves, x, y with
@@ -173,13 +183,14 @@ Fixpoint fraction_in (scale : list dyadic) (d : list dyadic) : dyadic * dyadic :
       let (n, m) := fraction_in (tl scale) d' in (add (mul n (mul s s)) (mul (mul a a) m), mul m (mul s s))
   end.
 Definition check_points ps silent f moves scale l x y others : bool :=
-  let rest := fold_right (plus add) [] (map (fun o => valueD (part_at ps (fst o)) (snd o)) others) in
+  let rest := fold_right plus_ends [] (map (fun o => value_ends (part_at ps (fst o)) (at_point (snd o))) others) in
   let (n, m) := fraction_in scale (minusD x y) in
-  forallb relu_between (parts_of ps f) && forallb (fun o => relu_between (part_at ps (fst o))) others
+  forallb enclosed_between (parts_of ps f) && forallb (fun o => enclosed_between (part_at ps (fst o))) others
   && negb (is_silent silent (moved f :: map fst others))
   && positive_scale scale && is_nonnegative l && agreeD moves x y && (length x =? inputs_of (part_at ps (moved f)))%nat
   && forallb (fun o => length (snd o) =? inputs_of (part_at ps (fst o)))%nat others && is_positive n
-  && at_most (mul (mul l l) n) (mul (squareD (minusD (value_ofD ps f rest x) (value_ofD ps f rest y))) m).
+  && at_most (mul (mul l l) n)
+       (mul (least_square (value_of_ends ps f rest (at_point x)) (value_of_ends ps f rest (at_point y))) m).
 
 (** Laws: one term of the sum after the other. *)
 Fixpoint same_moves (a b : list bool) : bool :=

@@ -13,6 +13,9 @@ Extract Inlined Constant Z.abs => "Big.abs".
 Extract Inlined Constant Z.eqb => "Big.equal".
 Extract Inlined Constant Z.leb => "Big.leq".
 Extract Inlined Constant Z.ltb => "Big.lt".
-(* Called with a distance that is not negative. Big.to_int raises if it is huge, Big.shift_left if it is negative. *)
+(* Called with distances that are not negative, and Z.div with a positive divisor. Big.to_int raises if a distance is
+   huge, Big.shift_left and Big.shift_right if it is negative, Big.fdiv if the divisor is 0; all round down. *)
+Extract Inlined Constant Z.div => "Big.fdiv".
 Extract Inlined Constant Z.shiftl => "(fun a n -> Big.shift_left a (Big.to_int n))".
+Extract Inlined Constant Z.shiftr => "(fun a n -> Big.shift_right a (Big.to_int n))".
 Extraction "proved.ml" step.

@@ -1,12 +1,10 @@
 (** An accepted law for several terms that move holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Claims Slopes.
+    Values Enclosures Intervals Claims Slopes.
 Import ListNotations.
 Open Scope R_scope.
 
-Lemma same_eq x y : same x y = true -> x = y.
-Proof. destruct x, y. unfold same. simpl. intros H. both H. apply Z.eqb_eq in H, H0. congruence. Qed.
 Lemma same_box_eq x y : same_box x y = true -> x = y.
 Proof.
   revert y. induction x as [|[a b] x IH]; intros [|[c d] y]; simpl; auto; try discriminate. intros H. do 2 both H.

@@ -1,7 +1,7 @@
 (** Accepted claims of values over boxes hold: intervals layer by layer, sums of terms, and jumps. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Float Meaning Steepness Sets Distance Blocks
-    Lower Values Claims Slopes Witness Laws.
+    Lower Values Enclosures Intervals Claims Slopes Witness Laws.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -10,55 +10,16 @@ Proof.
   revert y. induction x as [|a x IH]; intros [|b y]; simpl; auto; try discriminate. intros H. both H.
   apply same_eq in H. f_equal; auto.
 Qed.
-Lemma within_length b x : within b x -> length x = length b.
-Proof. revert x. induction b as [|[l h] b IH]; intros [|a x]; simpl; try tauto. intros [_ H]. f_equal; auto. Qed.
 Lemma contains_within a b x : contains a b = true -> within b x -> within a x.
 Proof.
   revert b x. induction a as [|[l h] a IH]; intros [|[l' h'] b] [|y x]; simpl; try tauto; try discriminate.
   intros H [G1 G2]. do 2 both H. apply at_most_real in H, H1. split; [lra|]. eauto.
-Qed.
-Fixpoint below (x y : list R) : Prop :=
-  match x, y with a :: x', b :: y' => a <= b /\ below x' y' | [], [] => True | _, _ => False end.
-Lemma below_clamped c x y : below x y -> below (clamped c x) (clamped c y).
-Proof.
-  revert x y. induction c as [|[l h] c IH]; intros [|a x] [|b y]; simpl; try tauto. intros [H G]. split; auto.
-  apply Rle_min_compat_r, Rle_max_compat_r, H.
-Qed.
-Lemma within_below b x : within b x <-> below (reals (map fst b)) x /\ below x (reals (map snd b)).
-Proof.
-  revert x. induction b as [|[l h] b IH]; intros [|a x]; simpl; try tauto. rewrite IH. tauto.
-Qed.
-Lemma below_combine l h x : below (reals l) x -> below x (reals h) -> within (combine l h) x.
-Proof.
-  revert h x. induction l as [|a l IH]; intros [|b h] [|c x]; simpl; try tauto. intros [H1 H2] [G1 G2]. auto.
-Qed.
-Lemma within_clamped c b x : within b x -> within (clamp_ends c b) (clamped c x).
-Proof.
-  intros H. apply within_below in H. destruct H as [H G]. apply below_combine; rewrite real_clamped;
-    now apply below_clamped.
-Qed.
-Lemma row_ends_within row b x : within b x ->
-  real (fst (row_ends row b)) <= dotR (reals row) x <= real (snd (row_ends row b)).
-Proof.
-  revert b x. induction row as [|w row IH]; intros [|[l h] b] [|a x]; simpl; try tauto; try (rewrite real_zero; lra).
-  intros [H G]. specialize (IH _ _ G). destruct (row_ends row b) as [s t]. simpl in *.
-  destruct (is_nonnegative w) eqn:E; simpl; rewrite !real_add, !real_mul.
-  - apply real_nonnegative in E. nra.
-  - assert (real w <= 0) by (pose proof (at_most_false zero w) as F; unfold at_most in F; rewrite real_zero in F;
-    apply F;
-      unfold add, neg, zero; destruct w; simpl in *; destruct (Z.eqb_spec z 0); [subst; simpl in E; discriminate|];
-      simpl; exact E). nra.
 Qed.
 Lemma encloses_within w c b v x : encloses w c b v = true -> within b x -> within v (affine (realm w) (reals c) x).
 Proof.
   revert c v. induction w as [|row w IH]; intros [|a c] [|[l h] v]; simpl; try discriminate; auto.
   intros H G. pose proof (row_ends_within row b x G) as E. destruct (row_ends row b) as [s t]. do 2 both H.
   apply at_most_real in H, H1. rewrite real_add in H, H1. simpl in E. split; [simpl; lra|]. now apply IH.
-Qed.
-Lemma relu_within b x : within b x -> within (map relu_ends b) (map relu x).
-Proof.
-  revert x. induction b as [|[l h] b IH]; intros [|a x]; simpl; try tauto. intros [H G]. rewrite !real_relu.
-  split; [|auto]. unfold relu. split; apply Rle_max_compat_l; lra.
 Qed.
 Lemma layers_within hid last b bounds v x : check_layers hid last b bounds v = true -> within b x ->
   within v (network (relu_layers hid) (real_layer last) x).
@@ -116,11 +77,7 @@ Proof.
     try discriminate.
   intros [H1 H2] [G1 G2] L. split; [|apply IH; auto]. rewrite !real_add, !real_mul.
   assert (forall n, real (n, 0%Z) = IZR n) as R by (intros n; unfold real; simpl; ring).
-  assert (forall x, is_nonnegative x = false -> real x <= 0) as N.
-  { intros x E. pose proof (at_most_false zero x) as F. unfold at_most in F. rewrite real_zero in F. apply F.
-    unfold add, neg, zero. destruct x as [m e]. simpl in *. destruct (Z.eqb_spec m 0); [subst; simpl in E;
-      discriminate|].
-    simpl. exact E. }
+  assert (forall x, is_nonnegative x = false -> real x <= 0) as N by (intros x E; now apply Rlt_le, negative_real).
   rewrite !R. split.
   - destruct (is_nonnegative l) eqn:E; [apply real_nonnegative in E|apply N in E]; nra.
   - destruct (is_nonnegative h) eqn:E; [apply real_nonnegative in E|apply N in E]; nra.
@@ -164,12 +121,6 @@ Proof.
 Qed.
 
 (** Jumps *)
-Lemma real_larger x y : real (larger x y) = Rmax (real x) (real y).
-Proof.
-  unfold larger, Rmax. destruct (at_most x y) eqn:E.
-  - apply at_most_real in E. destruct (Rle_dec _ _); lra.
-  - apply at_most_false in E. destruct (Rle_dec _ _); lra.
-Qed.
 Lemma largest_abs_above i a : real (fst i) <= a <= real (snd i) -> Rabs a <= real (largest_abs i).
 Proof.
   intros [H G]. unfold largest_abs. rewrite real_larger, !real_abs.

@@ -1,7 +1,7 @@
 (** The lines that the checker finds for the neurons of a box hold all over it. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Parts Claims Slopes Witness Laws Ranges.
+    Values Enclosures Intervals Parts Claims Slopes Witness Laws Ranges.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -54,7 +54,7 @@ Proof. unfold up. destruct (at_most x _) eqn:E; [now apply at_most_real|lra]. Qe
 Lemma larger_left x y : real x <= real (larger x y).
 Proof. unfold larger. destruct (at_most x y) eqn:E; [now apply at_most_real|lra]. Qed.
 Lemma larger_right x y : real y <= real (larger x y).
-Proof. unfold larger. destruct (at_most x y) eqn:E; [lra|now apply at_most_false]. Qed.
+Proof. unfold larger. destruct (at_most x y) eqn:E; [lra|now apply Rlt_le, at_most_false]. Qed.
 Lemma larger_least x y z : real x <= z -> real y <= z -> real (larger x y) <= z.
 Proof. unfold larger. now destruct (at_most x y). Qed.
 Lemma nonpositive x : is_nonnegative (neg x) = true -> real x <= 0.

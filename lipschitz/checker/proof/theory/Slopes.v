@@ -1,20 +1,10 @@
 (** Accepted norms and slopes hold: by a matrix inequality, by a vector, by a product of norms. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Sorting Checker Meaning Steepness Sets Distance Blocks
-    Lower Values Claims.
+    Lower Values Fixed Enclosures Intervals Claims.
 Import ListNotations.
 Open Scope R_scope.
 
-Ltac both H := apply andb_prop in H; destruct H as [H ?].
-
-Lemma at_most_real x y : at_most x y = true -> real x <= real y.
-Proof. intros H. apply real_nonnegative in H. rewrite real_add, real_neg in H. lra. Qed.
-Lemma at_most_false x y : at_most x y = false -> real y <= real x.
-Proof.
-  unfold at_most. intros H. assert (is_nonnegative (neg (add y (neg x))) = true) as N.
-  { unfold is_nonnegative, neg in *. simpl. apply Z.leb_le. apply Z.leb_gt in H. lia. }
-  apply real_nonnegative in N. rewrite real_neg, real_add, real_neg in N. lra.
-Qed.
 Lemma realm_apply m v : reals (apply zero add mul m v) = applyR (realm m) (reals v).
 Proof. apply (f_apply zero add mul 0 Rplus Rmult real real_zero real_add real_mul). Qed.
 Lemma real_square v : real (squareD v) = square (reals v).

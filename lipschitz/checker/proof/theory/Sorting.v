@@ -4,6 +4,10 @@ From Swarmcert Require Import Algebra Activations Form Network.
 Import ListNotations.
 Open Scope R_scope.
 
+Notation insertedR := (inserted Rmin Rmax).
+Notation ascendingR := (ascending Rmin Rmax).
+Notation groupsR := (sorted_groups Rmin Rmax).
+
 Lemma compare_and_swap a b c d :
   (Rmin a b - Rmin c d) * (Rmin a b - Rmin c d) + (Rmax a b - Rmax c d) * (Rmax a b - Rmax c d)
     <= (a - c) * (a - c) + (b - d) * (b - d).
@@ -21,24 +25,24 @@ Proof.
   - rewrite !apart_cons, IH by lia. ring.
 Qed.
 
-Lemma length_inserted a l : length (inserted a l) = S (length l).
+Lemma length_inserted a l : length (insertedR a l) = S (length l).
 Proof. revert a. induction l as [|b l IH]; intros a; simpl; auto. Qed.
 Lemma inserted_contracts a b u v : length u = length v ->
-  apart (inserted a u) (inserted b v) <= (a - b) * (a - b) + apart u v.
+  apart (insertedR a u) (insertedR b v) <= (a - b) * (a - b) + apart u v.
 Proof.
   revert a b v. induction u as [|c u IH]; intros a b [|d v]; simpl; try discriminate; intros H.
   - rewrite apart_cons. lra.
   - rewrite !apart_cons. specialize (IH (Rmax a c) (Rmax b d) v ltac:(lia)).
     pose proof (compare_and_swap a c b d). lra.
 Qed.
-Lemma length_ascending l : length (ascending l) = length l.
+Lemma length_ascending l : length (ascendingR l) = length l.
 Proof. induction l as [|a l IH]; simpl; auto. unfold ascending in *. simpl. now rewrite length_inserted, IH. Qed.
-Lemma ascending_contracts u v : length u = length v -> apart (ascending u) (ascending v) <= apart u v.
+Lemma ascending_contracts u v : length u = length v -> apart (ascendingR u) (ascendingR v) <= apart u v.
 Proof.
   revert v. induction u as [|a u IH]; intros [|b v]; try discriminate; intros H; simpl in H; [simpl; lra|].
-  rewrite apart_cons. change (ascending (a :: u)) with (inserted a (ascending u)).
-  change (ascending (b :: v)) with (inserted b (ascending v)).
-  pose proof (inserted_contracts a b (ascending u) (ascending v) ltac:(rewrite !length_ascending; lia)).
+  rewrite apart_cons. change (ascendingR (a :: u)) with (insertedR a (ascendingR u)).
+  change (ascendingR (b :: v)) with (insertedR b (ascendingR v)).
+  pose proof (inserted_contracts a b (ascendingR u) (ascendingR v) ltac:(rewrite !length_ascending; lia)).
   specialize (IH v ltac:(lia)). lra.
 Qed.
 Lemma length_firstn_same (k : nat) (u v : list R) : length u = length v -> length (firstn k u) = length (firstn k v).
@@ -48,7 +52,7 @@ Proof. intros H. now rewrite !skipn_length, H. Qed.
 Lemma apart_split k u v : length u = length v ->
   apart u v = apart (firstn k u) (firstn k v) + apart (skipn k u) (skipn k v).
 Proof. intros H. rewrite <- apart_app by now apply length_firstn_same. now rewrite !firstn_skipn. Qed.
-Lemma groups_contract n k u v : length u = length v -> apart (sorted_groups n k u) (sorted_groups n k v) <= apart u v.
+Lemma groups_contract n k u v : length u = length v -> apart (groupsR n k u) (groupsR n k v) <= apart u v.
 Proof.
   revert u v. induction n as [|n IH]; intros u v H; simpl; [rewrite apart_nil; apply apart_nonneg|].
   pose proof (length_firstn_same k u v H) as F. rewrite apart_app by now rewrite !length_ascending.
@@ -67,7 +71,7 @@ Proof.
     + unfold both in *. simpl. rewrite !apart_cons. specialize (IH u' v v' ltac:(lia) ltac:(lia)).
       pose proof (compare_and_swap a c b d). lra.
 Qed.
-Lemma length_both f u v : length (both f u v) = Nat.min (length u) (length v).
+Lemma length_both f (u v : list R) : length (both f u v) = Nat.min (length u) (length v).
 Proof. unfold both. now rewrite map_length, combine_length. Qed.
 Lemma halves_contract u v : length u = length v ->
   apart (of_halves Rmax u ++ of_halves Rmin u) (of_halves Rmax v ++ of_halves Rmin v) <= apart u v.

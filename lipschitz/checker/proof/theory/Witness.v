@@ -1,36 +1,42 @@
 (** A slope from below, accepted for two points, holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Claims Slopes.
+    Values Enclosures Intervals Claims Slopes.
 Import ListNotations.
 Open Scope R_scope.
 
-Lemma real_clamped c x : reals (clampedD c x) = clamped c (reals x).
+Lemma value_within p b x : enclosed_between p = true -> within b x -> within (value_ends p b) (value p x).
+Proof. intros E H. apply network_within; auto. now apply within_clamped. Qed.
+Lemma value_of_within ps f rest b r x : forallb enclosed_between (parts_of ps f) = true -> within rest r ->
+  within b x ->
+  within (value_of_ends ps f rest b) (value_of ps f r x).
 Proof.
-  revert x. induction c as [|[l h] c IH]; intros [|a x]; simpl; auto. f_equal; auto.
-  assert (forall p q, real (if at_most p q then q else p) = Rmax (real p) (real q)) as M.
-  { intros p q. unfold Rmax. destruct (at_most p q) eqn:E.
-    - apply at_most_real in E. destruct (Rle_dec _ _); lra.
-    - apply at_most_false in E. destruct (Rle_dec _ _); lra. }
-  rewrite <- M. set (b := if at_most a l then l else a). unfold Rmin. destruct (at_most b h) eqn:E.
-  - apply at_most_real in E. destruct (Rle_dec _ _); lra.
-  - apply at_most_false in E. destruct (Rle_dec _ _); lra.
+  destruct f; simpl; intros E R H; apply andb_prop in E; destruct E as [E E']; [now apply value_within|].
+  apply andb_prop in E'. destruct E' as [E' _].
+  apply value_within; auto. apply plus_within; auto. now apply value_within.
 Qed.
-Lemma real_value p x : relu_between p = true -> reals (valueD p x) = value p (reals x).
-Proof. intros H. unfold valueD, value. now rewrite real_network, real_clamped, relu_network. Qed.
-Lemma real_value_of ps f rest x : forallb relu_between (parts_of ps f) = true ->
-  reals (value_ofD ps f rest x) = value_of ps f (reals rest) (reals x).
+Lemma point_within x : within (at_point x) (reals x).
+Proof. induction x; simpl; auto. split; [lra|auto]. Qed.
+Lemma rest_within ps others : forallb (fun o => enclosed_between (part_at ps (fst o))) others = true ->
+  within (fold_right plus_ends [] (map (fun o => value_ends (part_at ps (fst o)) (at_point (snd o))) others))
+    (vector_sum (map (fun o => value (part_at ps (fst o)) (snd o)) (map
+      (fun o : nat * list dyadic => (fst o, reals (snd o))) others))).
 Proof.
-  destruct f; simpl; intros H; both H; [now rewrite real_value|]. both H0.
-  now rewrite real_value, (f_plus add Rplus real real_add), real_value.
+  induction others as [|o others IH]; simpl; auto. intros H. both H. apply plus_within; auto.
+  apply value_within; auto. apply point_within.
 Qed.
-Lemma real_rest ps others : forallb (fun o => relu_between (part_at ps (fst o))) others = true ->
-  reals (fold_right (plus add) [] (map (fun o => valueD (part_at ps (fst o)) (snd o)) others)) =
-  vector_sum (map (fun o => value (part_at ps (fst o)) (snd o)) (map
-      (fun o : nat * list dyadic => (fst o, reals (snd o))) others)).
+Lemma least_square_below a b x y : within a x -> within b y -> real (least_square a b) <= square (minus x y).
 Proof.
-  induction others as [|o others IH]; simpl; auto. intros H. both H.
-  now rewrite (f_plus add Rplus real real_add), IH, real_value.
+  revert b x y. induction a as [|[l h] a IH]; intros [|[m k] b] x y; try (intros; simpl least_square; rewrite real_zero;
+    apply square_nonneg). destruct x as [|c x], y as [|d y]; simpl; try tauto. unfold square, minus. simpl.
+  intros [H H'] [G G']. specialize (IH _ _ _ H' G'). unfold square, minus in IH.
+  rewrite real_add, real_mul, !real_larger, !real_add, !real_neg.
+  rewrite real_zero. set (e := Rmax 0 _).
+  assert (0 <= e <= Rabs (c + -1 * d)) as [E F].
+  { unfold e. split; [apply Rmax_l|]. apply Rmax_lub; [apply Rabs_pos|]. pose proof (Rle_abs (c + -1 * d)) as P.
+    pose proof (Rle_abs (- (c + -1 * d))) as N. rewrite Rabs_Ropp in N. apply Rmax_lub; lra. }
+  assert (e * e <= (c + -1 * d) * (c + -1 * d)); [|lra].
+  rewrite <- (Rabs_pos_eq ((c + -1 * d) * (c + -1 * d))), Rabs_mult by (apply Rle_0_sqr). now apply Rmult_le_compat.
 Qed.
 Lemma agree_real moves x y : agreeD moves x y = true -> agree moves (reals x) (reals y).
 Proof.
@@ -72,8 +78,10 @@ Proof.
   - rewrite forallb_forall in Ho. apply Forall_map, Forall_forall. intros o G. simpl. rewrite map_length.
       now apply Nat.eqb_eq, Ho.
   - rewrite map_map. simpl. now apply negb_true_iff.
-  - rewrite <- real_rest by auto. fold rest. rewrite <- !real_value_of by auto.
-    rewrite !real_mul, real_square, real_minus, En in Hr. unfold distance, norm.
+  - pose proof (rest_within ps others Hro) as R. fold rest in R.
+    pose proof (least_square_below _ _ _ _ (value_of_within ps f _ _ _ _ H R (point_within x))
+      (value_of_within ps f _ _ _ _ H R (point_within y))) as L.
+    rewrite !real_mul, En in Hr. unfold distance, norm.
     rewrite <- (sqrt_square (real l)) at 1 by auto. rewrite <- sqrt_mult_alt by nra. apply sqrt_le_1_alt.
-    apply (Rmult_le_reg_r (real m)); auto. lra.
+    apply (Rmult_le_reg_r (real m)); auto. apply (Rmult_le_compat_r (real m)) in L; lra.
 Qed.
