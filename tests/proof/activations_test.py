@@ -202,8 +202,9 @@ def refuses_what_only_relu_has(folder, generator):
     box.write_text('schema = "swarmcert/box/1"\nlower = [-1, -1, -1]\nupper = [1, 1, 1]\n')
     on_box = certify(net, "--domain", box, "--range", "--method", "sdp")
     assert on_box["values"]
-    not_checked(with_activations(on_box, {"network": "tanh"}), net,
-                "values of network: of activations that are not ReLU")
+    not_checked(certify(net, "--activation", "gelu", "--domain", box, "--range", "--method", "sdp"), net,
+                "values of network: of GELU")
+    refused(with_activations(on_box, {"network": "softplus"}), net, "the values leave the bounds")
     local = certify(net, "--activation", "tanh", "--domain", box)
     assert local["bounds"][0]["upper_method"] == "local_sdp"
     not_checked(local, net, "from the slopes that activations have on a box")
@@ -461,6 +462,34 @@ def values_of_activations_are_those_of_the_functions(folder, generator):
     assert decided_by_all > 9
 
 
+def values_over_a_box_are_decided_alike(folder, generator):
+    """Ranges as certified, with one end of a layer or of the range moved to the next double, and over another box. Boxes
+    reach over minima, kinks and saturation, and down to points."""
+    net, box, codes = folder / "range.safetensors", folder / "range.toml", Counter()
+    net.write_bytes(safetensors(layers([3, 6, 4, 2], generator)))
+    boxes = ([-1, -0.5, 0.25], [1, 0.5, 0.5]), ([-40, 0, -3], [90, 0, 1000]), ([0.25, -0.125, 2], [0.25, -0.125, 2])
+    every = "tanh", "sigmoid", "softplus", "elu", "selu", "silu", "groupsort:2", "maxmin:halves,silu", "relu,selu"
+    for number, ops in enumerate(every):
+        lower, upper = boxes[number % len(boxes)]
+        box.write_text(f'schema = "swarmcert/box/1"\nlower = {lower}\nupper = {upper}\n')
+        certificate = certify(net, "--activation", ops, "--domain", box, "--range")
+        certificate["bounds"] = certify(net, "--activation", ops, "--method", "product")["bounds"]
+        certificate["bounds"][0]["domain"] = "box"
+        assert certificate["values"] and decided(certificate, net) == 0, ops
+        for key, towards in ("lower", math.inf), ("upper", -math.inf):
+            changed = copy.deepcopy(certificate)
+            layer = changed["values"][0]["networks"]["network"][generator.randrange(3)]
+            words = layer[key].split()
+            place = generator.randrange(len(words))
+            words[place] = math.nextafter(float.fromhex(words[place]), towards).hex()
+            layer[key] = " ".join(words)
+            codes[decided(changed, net)] += 1
+        changed = copy.deepcopy(certificate)
+        changed["box"]["network"]["upper"][0] = (upper[0] + 2.0 ** -20).hex()
+        codes[decided(changed, net)] += 1
+    assert codes[1] > 2 * len(every) and set(codes) <= {0, 1}, codes
+
+
 def witnesses_of_any_activation_are_decided_alike(folder, generator):
     """As found, at other points, and with other claims."""
     net, codes = folder / "witness.safetensors", Counter()
@@ -597,8 +626,8 @@ def main():
                       products_count_the_activations, sorting_layers_have_products_only,
                       each_part_has_its_own_activation,
                       sums_with_smooth_terms_have_lower_bounds, values_of_activations_are_those_of_the_functions,
-                      witnesses_of_any_activation_are_decided_alike, onnx_files_state_their_activation,
-                      onnx_files_state_what_they_sort,
+                      values_over_a_box_are_decided_alike, witnesses_of_any_activation_are_decided_alike,
+                      onnx_files_state_their_activation, onnx_files_state_what_they_sort,
                       weights_behind_a_descending_sort_are_those_behind_an_ascending_one,
                       several_activations_in_one_network, onnx_files_state_each_activation):
             claim(folder, generator)

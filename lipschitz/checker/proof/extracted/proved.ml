@@ -2213,6 +2213,393 @@ let rec network_ends between0 hidden0 last0 b =
     network_ends (tl between0) hidden' last0
       (activated_ends (hd Relu between0) (affine_ends l b))
 
+(** val bumpF : fixed -> fixed **)
+
+let bumpF e =
+  divF e (mulF (addF oneF e) (addF oneF e))
+
+(** val is_below_zero : dyadic -> bool **)
+
+let is_below_zero x =
+  negb (is_nonnegative x)
+
+(** val slope_at : activation -> dyadic -> fixed **)
+
+let slope_at a t =
+  match a with
+  | Tanh ->
+    mulF
+      ((Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) Big.one))) unit_of_fixed),
+      (Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) Big.one))) unit_of_fixed))
+      (bumpF (exp_of_minus_size (shift ((fun p -> p) Big.one) t)))
+  | Sigmoid -> bumpF (exp_of_minus_size t)
+  | Softplus -> sigmoidF t
+  | Elu -> if is_positive t then oneF else exp_of_minus_size t
+  | Selu ->
+    if is_positive t
+    then selu_scaleF
+    else mulF (mulF selu_scaleF selu_alphaF) (exp_of_minus_size t)
+  | Silu ->
+    addF (sigmoidF t) (mulF (of_dyadic t) (bumpF (exp_of_minus_size t)))
+  | _ -> (Big.zero, Big.zero)
+
+(** val nearest : (dyadic * dyadic) -> dyadic **)
+
+let nearest i =
+  if (&&) (is_below_zero (fst i)) (is_positive (snd i))
+  then zero
+  else smaller (abs (fst i)) (abs (snd i))
+
+(** val farthest : (dyadic * dyadic) -> dyadic **)
+
+let farthest i =
+  larger (abs (fst i)) (abs (snd i))
+
+(** val steepest_place : dyadic * dyadic **)
+
+let steepest_place =
+  ((((fun p -> p) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) Big.one))))))))))))), (Big.neg
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    Big.one))))), (((fun p -> p) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) Big.one))))))))))))), (Big.neg
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    Big.one))))))
+
+(** val derivatives : activation -> (dyadic * dyadic) -> dyadic * dyadic **)
+
+let derivatives a i =
+  let negative = is_below_zero (fst i) in
+  let positive0 = is_positive (snd i) in
+  (match a with
+   | Relu ->
+     ((if (||) negative (negb positive0) then zero else one),
+       (if positive0 then one else zero))
+   | Tanh ->
+     (((fst (slope_at a (farthest i))), (Big.neg
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       Big.one)))))))))), ((snd (slope_at a (nearest i))), (Big.neg
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       Big.one)))))))))))
+   | Sigmoid ->
+     (((fst (slope_at a (farthest i))), (Big.neg
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       Big.one)))))))))), ((snd (slope_at a (nearest i))), (Big.neg
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       Big.one)))))))))))
+   | Selu ->
+     if negative
+     then let least0 = ((fst (slope_at Selu (fst i))), (Big.neg
+            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+            Big.one))))))))))
+          in
+          ((if positive0
+            then smaller least0 ((fst selu_scaleF), (Big.neg
+                   ((fun p -> Big.shift_left p 1)
+                   ((fun p -> Big.shift_left p 1)
+                   ((fun p -> Big.shift_left p 1)
+                   ((fun p -> Big.shift_left p 1)
+                   ((fun p -> Big.shift_left p 1)
+                   ((fun p -> Big.shift_left p 1)
+                   ((fun p -> Big.shift_left p 1)
+                   ((fun p -> Big.shift_left p 1) Big.one))))))))))
+            else least0),
+          ((snd (slope_at Selu (if positive0 then zero else snd i))),
+          (Big.neg ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.shift_left p 1) Big.one)))))))))))
+     else (((fst selu_scaleF), (Big.neg ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.shift_left p 1) Big.one)))))))))),
+            ((snd selu_scaleF), (Big.neg ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.shift_left p 1) Big.one)))))))))))
+   | Silu ->
+     let s = slope_at Silu (fst i) in
+     let t = slope_at Silu (snd i) in
+     let (p, q) = steepest_place in
+     ((if (||) (below (neg p) (fst i)) (below (snd i) (neg q))
+       then smaller ((fst s), (Big.neg ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) Big.one)))))))))) ((fst t),
+              (Big.neg ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) Big.one))))))))))
+       else add0 one (neg (steepest Silu))),
+     (if (||) (below q (fst i)) (below (snd i) p)
+      then larger ((snd s), (Big.neg ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) Big.one)))))))))) ((snd t),
+             (Big.neg ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) Big.one))))))))))
+      else steepest Silu))
+   | _ ->
+     (((fst (slope_at a (fst i))), (Big.neg ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) Big.one)))))))))),
+       ((snd (slope_at a (snd i))), (Big.neg ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) Big.one))))))))))))
+
+(** val slopes_between :
+    activation -> (dyadic * dyadic) -> dyadic * dyadic **)
+
+let slopes_between a i =
+  let (l, h) = derivatives a i in
+  ((larger
+     (add0
+       (ceil_to (Big.neg ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))) l) ((Big.neg
+       Big.one), (Big.neg ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+       ((fun p -> Big.succ (Big.shift_left p 1)) Big.one)))))))
+     (if is_rising a then zero else add0 one (neg (steepest a)))),
+  (smaller
+    (add0
+      (floor_to (Big.neg ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))) h)
+      (((fun p -> p) Big.one), (Big.neg ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))) (steepest a)))
+
+(** val half : dyadic -> dyadic **)
+
+let half x =
+  shift (Big.neg Big.one) x
+
+(** val fits_layer : layerD -> bool **)
+
+let fits_layer l =
+  (=) (length (snd l)) (length (fst l))
+
+(** val grid : dyadic **)
+
+let grid =
+  (((fun p -> p) Big.one), (Big.neg ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) Big.one))))))))
+
+type linear = { slope : dyadic list; middle : dyadic; error : dyadic }
+
+type known = (dyadic * dyadic) * linear
+
+(** val inputs_known : int -> box -> known list **)
+
+let rec inputs_known k = function
+| [] -> []
+| i :: b' ->
+  (i, { slope = (app (repeat zero k) (one :: [])); middle =
+    (half (add0 (fst i) (snd i))); error =
+    zero }) :: (inputs_known (Stdlib.Int.succ k) b')
+
+(** val radius_of : box -> dyadic list **)
+
+let radius_of b =
+  map (fun i -> half (add0 (snd i) (neg (fst i)))) b
+
+(** val rounding_of : dyadic list -> dyadic **)
+
+let rounding_of radius =
+  mul0 grid (add0 one (total radius))
+
+(** val row_form : dyadic list -> known list -> linear **)
+
+let rec row_form row s =
+  match row with
+  | [] -> { slope = []; middle = zero; error = zero }
+  | w :: row' ->
+    (match s with
+     | [] -> { slope = []; middle = zero; error = zero }
+     | n :: s' ->
+       let f = row_form row' s' in
+       { slope = (plus add0 (scale mul0 w (snd n).slope) f.slope); middle =
+       (add0 (mul0 w (snd n).middle) f.middle); error =
+       (add0 (mul0 (abs w) (snd n).error) f.error) })
+
+(** val rounded : dyadic -> linear -> linear **)
+
+let rounded rounding f =
+  { slope =
+    (map
+      (floor_to (Big.neg ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) Big.one)))))))) f.slope); middle =
+    (floor_to (Big.neg ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) Big.one))))))) f.middle); error =
+    (ceil_to (Big.neg ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) Big.one))))))) (add0 f.error rounding)) }
+
+(** val met : dyadic list -> (dyadic * dyadic) -> linear -> known **)
+
+let met radius i f =
+  let spread = add0 f.error (dot zero add0 mul0 (map abs f.slope) radius) in
+  (((larger (fst i) (add0 f.middle (neg spread))),
+  (smaller (snd i) (add0 f.middle spread))), f)
+
+(** val passed :
+    dyadic list -> dyadic -> matrixD -> dyadic list -> known list -> known
+    list **)
+
+let rec passed radius rounding w c s =
+  match w with
+  | [] -> []
+  | row :: w' ->
+    (match c with
+     | [] -> []
+     | a :: c' ->
+       let (l, h) = row_ends row (map fst s) in
+       let f = row_form row s in
+       (met radius ((add0 l a), (add0 h a))
+         (rounded rounding { slope = f.slope; middle = (add0 f.middle a);
+           error = f.error })) :: (passed radius rounding w' c' s))
+
+(** val ends_of : activation -> (dyadic * dyadic) -> dyadic * dyadic **)
+
+let ends_of a i =
+  match a with
+  | Relu -> relu_ends i
+  | _ -> values_between a i
+
+(** val activated_form : activation -> dyadic -> known -> known **)
+
+let activated_form a rounding = function
+| (i, f) ->
+  let p = larger (fst i) (smaller f.middle (snd i)) in
+  let (l, h) = slopes_between a i in
+  let v = ends_of a (p, p) in
+  let mean = half (add0 l h) in
+  let reach = larger (add0 (snd i) (neg p)) (add0 p (neg (fst i))) in
+  ((ends_of a i),
+  (rounded rounding { slope = (scale mul0 mean f.slope); middle =
+    (add0 (fst v) (mul0 mean (add0 f.middle (neg p)))); error =
+    (add0 (mul0 (abs mean) f.error)
+      (add0 (mul0 (half (add0 h (neg l))) reach) (add0 (snd v) (neg (fst v))))) }))
+
+(** val constant_form : (dyadic * dyadic) -> known **)
+
+let constant_form i =
+  (i, { slope = []; middle =
+    (floor_to (Big.neg ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) Big.one)))))))
+      (half (add0 (fst i) (snd i)))); error =
+    (add0
+      (ceil_to (Big.neg ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) Big.one)))))))
+        (half (add0 (snd i) (neg (fst i))))) grid) })
+
+(** val activated_known : activation -> dyadic -> known list -> known list **)
+
+let activated_known a rounding s =
+  match a with
+  | Sorted k ->
+    map constant_form (sorted_by least_ends greatest_ends k (map fst s))
+  | _ -> map (activated_form a rounding) s
+
+(** val contains_known : box -> known list -> bool **)
+
+let rec contains_known a s =
+  match a with
+  | [] -> (match s with
+           | [] -> true
+           | _ :: _ -> false)
+  | p :: a' ->
+    let (l, h) = p in
+    (match s with
+     | [] -> false
+     | k0 :: s' ->
+       let (p0, _) = k0 in
+       let (m, k) = p0 in
+       (&&) ((&&) (at_most l m) (at_most k h)) (contains_known a' s'))
+
+(** val check_centred :
+    dyadic list -> dyadic -> activation list -> layerD list -> layerD ->
+    known list -> box list -> box -> bool **)
+
+let rec check_centred radius rounding between0 hidden0 last0 s bounds0 v =
+  match hidden0 with
+  | [] ->
+    (match bounds0 with
+     | [] ->
+       (&&) (fits_layer last0)
+         (contains_known v (passed radius rounding (fst last0) (snd last0) s))
+     | _ :: _ -> false)
+  | l :: hidden' ->
+    (match bounds0 with
+     | [] -> false
+     | b :: bounds' ->
+       let t = passed radius rounding (fst l) (snd l) s in
+       (&&) ((&&) (fits_layer l) (contains_known b t))
+         (check_centred radius rounding (tl between0) hidden' last0
+           (activated_known (hd Relu between0) rounding t) bounds' v))
+
+(** val check_layers_centred :
+    activation list -> layerD list -> layerD -> box -> box list -> box -> bool **)
+
+let check_layers_centred between0 hidden0 last0 b bounds0 v =
+  let radius = radius_of b in
+  check_centred radius (rounding_of radius) between0 hidden0 last0
+    (inputs_known 0 b) bounds0 v
+
 type hints = { slope_between : (dyadic -> dyadic -> dyadic);
                rounded_up : (dyadic -> dyadic);
                factor_number : (int -> matrixD -> factor option) }
@@ -2304,11 +2691,11 @@ let new_line o b before row bias around =
   let high = up o (most0 before [] row bias b) in
   (match around with
    | [] -> line_of o low high
-   | known :: _ ->
-     (match known with
+   | known0 :: _ ->
+     (match known0 with
       | Open (l, h, _, _) ->
         line_of o (larger l low) (if at_most h high then h else high)
-      | _ -> known))
+      | _ -> known0))
 
 (** val new_lines :
     hints -> box -> (layerD * line list) list -> matrixD -> dyadic list ->
@@ -2402,9 +2789,9 @@ let rec outer_sum_of p q =
 let quadratic ps =
   fold_right (fun p s -> sum add0 (outer_sum_of (fst p) (snd p)) s) [] ps
 
-(** val half : dyadic -> dyadic **)
+(** val half0 : dyadic -> dyadic **)
 
-let half x =
+let half0 x =
   shift (Big.neg Big.one) x
 
 (** val unit_form : int -> dyadic list **)
@@ -2415,7 +2802,7 @@ let unit_form n =
 (** val minus_squares : matrixD -> pair_of_forms list **)
 
 let minus_squares ys =
-  map (fun y -> ((map neg y), (map half y))) ys
+  map (fun y -> ((map neg y), (map half0 y))) ys
 
 (** val half_last : dyadic list -> dyadic list **)
 
@@ -2423,7 +2810,7 @@ let rec half_last = function
 | [] -> []
 | a :: u' ->
   (match u' with
-   | [] -> (half a) :: []
+   | [] -> (half0 a) :: []
    | _ :: _ -> a :: (half_last u'))
 
 (** val form_pairs :
@@ -2601,7 +2988,7 @@ let most_factors =
 (** val input_pairs : dyadic -> int -> pair_of_forms list **)
 
 let input_pairs rho n =
-  map (fun k -> ((unit_form k), (scale mul0 (half rho) (unit_form k))))
+  map (fun k -> ((unit_form k), (scale mul0 (half0 rho) (unit_form k))))
     (seq 0 n)
 
 (** val output_pairs : matrixD option -> matrixD -> pair_of_forms list **)
@@ -2820,10 +3207,10 @@ let rec all_before ls lines before =
      | [] -> before
      | a :: lines' -> all_before ls' lines' ((l, a) :: before))
 
-(** val ends_of :
+(** val ends_of0 :
     (layerD * line list) list -> matrixD -> dyadic list -> box -> box **)
 
-let rec ends_of before w c b =
+let rec ends_of0 before w c b =
   match w with
   | [] -> []
   | row :: w' ->
@@ -2831,12 +3218,12 @@ let rec ends_of before w c b =
      | [] -> []
      | a :: c' ->
        ((neg (most0 before [] (map neg row) (neg a) b)),
-         (most0 before [] row a b)) :: (ends_of before w' c' b))
+         (most0 before [] row a b)) :: (ends_of0 before w' c' b))
 
 (** val narrowed : box -> box -> box **)
 
-let rec narrowed known v =
-  match known with
+let rec narrowed known0 v =
+  match known0 with
   | [] -> v
   | p :: known' ->
     let (l, h) = p in
@@ -2851,20 +3238,20 @@ let rec narrowed known v =
     hints -> layerD list -> layerD -> box -> line list list -> box -> box ->
     range_tree -> bool **)
 
-let rec check_range o ls last0 b around known v = function
+let rec check_range o ls last0 b around known0 v = function
 | Range_leaf ds ->
   (match bounds o b [] ls around ds with
    | Some lines ->
      contains v
-       (narrowed known
-         (ends_of (all_before ls lines []) (fst last0) (snd last0) b))
+       (narrowed known0
+         (ends_of0 (all_before ls lines []) (fst last0) (snd last0) b))
    | None -> false)
 | Range_halves (ds, k, m, lower, upper) ->
   (match bounds o b [] ls around ds with
    | Some lines ->
      let e =
-       narrowed known
-         (ends_of (all_before ls lines []) (fst last0) (snd last0) b)
+       narrowed known0
+         (ends_of0 (all_before ls lines []) (fst last0) (snd last0) b)
      in
      (&&) (check_range o ls last0 (cut k m false b) lines e v lower)
        (check_range o ls last0 (cut k m true b) lines e v upper)
@@ -3599,8 +3986,11 @@ let rec sum_ends accepted n = function
 
 let check_within ps p b bounds0 v =
   let q = part_at ps p in
-  (&&) (relu_between q)
-    (check_layers q.hidden q.outer (clamp_ends q.clamp b) bounds0 v)
+  let c = clamp_ends q.clamp b in
+  if relu_between q
+  then check_layers q.hidden q.outer c bounds0 v
+  else (&&) (forallb is_enclosed q.between)
+         (check_layers_centred q.between q.hidden q.outer c bounds0 v)
 
 (** val number_of : (term -> Big.t) -> int -> term list -> Big.t **)
 

@@ -501,6 +501,64 @@ val affine_ends : layerD -> box -> box
 
 val network_ends : activation list -> layerD list -> layerD -> box -> box
 
+val bumpF : fixed -> fixed
+
+val is_below_zero : dyadic -> bool
+
+val slope_at : activation -> dyadic -> fixed
+
+val nearest : (dyadic * dyadic) -> dyadic
+
+val farthest : (dyadic * dyadic) -> dyadic
+
+val steepest_place : dyadic * dyadic
+
+val derivatives : activation -> (dyadic * dyadic) -> dyadic * dyadic
+
+val slopes_between : activation -> (dyadic * dyadic) -> dyadic * dyadic
+
+val half : dyadic -> dyadic
+
+val fits_layer : layerD -> bool
+
+val grid : dyadic
+
+type linear = { slope : dyadic list; middle : dyadic; error : dyadic }
+
+type known = (dyadic * dyadic) * linear
+
+val inputs_known : int -> box -> known list
+
+val radius_of : box -> dyadic list
+
+val rounding_of : dyadic list -> dyadic
+
+val row_form : dyadic list -> known list -> linear
+
+val rounded : dyadic -> linear -> linear
+
+val met : dyadic list -> (dyadic * dyadic) -> linear -> known
+
+val passed :
+  dyadic list -> dyadic -> matrixD -> dyadic list -> known list -> known list
+
+val ends_of : activation -> (dyadic * dyadic) -> dyadic * dyadic
+
+val activated_form : activation -> dyadic -> known -> known
+
+val constant_form : (dyadic * dyadic) -> known
+
+val activated_known : activation -> dyadic -> known list -> known list
+
+val contains_known : box -> known list -> bool
+
+val check_centred :
+  dyadic list -> dyadic -> activation list -> layerD list -> layerD -> known
+  list -> box list -> box -> bool
+
+val check_layers_centred :
+  activation list -> layerD list -> layerD -> box -> box list -> box -> bool
+
 type hints = { slope_between : (dyadic -> dyadic -> dyadic);
                rounded_up : (dyadic -> dyadic);
                factor_number : (int -> matrixD -> factor option) }
@@ -557,7 +615,7 @@ val outer_sum_of : dyadic list -> dyadic list -> matrixD
 
 val quadratic : pair_of_forms list -> matrixD
 
-val half : dyadic -> dyadic
+val half0 : dyadic -> dyadic
 
 val unit_form : int -> dyadic list
 
@@ -668,7 +726,7 @@ val all_before :
   layerD list -> line list list -> (layerD * line list) list ->
   (layerD * line list) list
 
-val ends_of :
+val ends_of0 :
   (layerD * line list) list -> matrixD -> dyadic list -> box -> box
 
 val narrowed : box -> box -> box

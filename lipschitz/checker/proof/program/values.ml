@@ -81,13 +81,13 @@ let check_jump (state : Claims.t) where phi ~box ~values rho jump =
 (* Exact intervals of the layers of part p over a box, proved; those of the last one. *)
 let prove_exact (state : Claims.t) where p box =
   let part = Proved.part_at state.parts p in
-  let ends (rows, biases) box =
-    List.map2 (fun row bias -> let low, high = Proved.row_ends row box in Claims.plus low bias, Claims.plus high bias)
-      rows biases in
-  let hidden, input = List.fold_left (fun (found, box) layer ->
-      let bounds = ends layer box in bounds :: found, List.map Proved.relu_ends bounds)
-      ([], Proved.clamp_ends part.clamp box) part.hidden in
-  let last = ends part.outer input in
+  let through (found, box, between) layer =
+    let bounds = Proved.affine_ends layer box in
+    let activation, behind = match between with a :: rest -> a, rest | [] -> Proved.Relu, [] in
+    bounds :: found, Proved.activated_ends activation bounds, behind in
+  let hidden, input, _ =
+    List.fold_left through ([], Proved.clamp_ends part.clamp box, part.between) part.hidden in
+  let last = Proved.affine_ends part.outer input in
   Claims.prove state (Within (p, box, last)) (By_layers (List.rev hidden)) (leaves where);
   last
 
@@ -96,9 +96,9 @@ let check_step (state : Claims.t) where entry ~silent phi rho jump =
   let names = Array.of_list (List.map fst state.net.parts) in
   let compositions = Proved.beside silent phi in
   let here = List.sort_uniq compare (phi :: List.concat compositions) in
-  if not (List.for_all (fun p -> Functions.is_relu state.net names.(p)) here) then
+  if not (List.for_all (fun p -> Functions.is_enclosed state.net names.(p)) here) then
     Claims.not_checked state
-      (where ^ ": the step to compositions without a network: of activations that are not ReLU")
+      (where ^ ": the step to compositions without a network: of GELU")
   else begin
     let boxes = List.map (fun p -> p, input_box state where names.(p) entry) here in
     List.iter (fun (p, box) -> ignore (prove_exact state where p box)) boxes;
@@ -115,7 +115,7 @@ let check_step (state : Claims.t) where entry ~silent phi rho jump =
     Claims.prove state (Step_at_most (silent, boxes, phi, rho, jump)) (Proved.By_steps sums) reason
   end
 
-let check_relu (state : Claims.t) entry f names =
+let check_by_theorems (state : Claims.t) entry f names =
   let where = "values of " ^ shown f in
   let is_set = List.length names = 2 in
   require (if is_set then List.hd names <> "phi:ground" else f = "network")
@@ -136,7 +136,9 @@ let check_relu (state : Claims.t) entry f names =
     require (List.length (members where (find where "input_error" entry)) = List.length inputs)
       "%s: input_error is not of the function's inputs" where;
     require (List.for_all (fun name -> (weights name).precision = "float32") (inputs @ rho))
-      "%s: a float32 error of weights that are not float32" where
+      "%s: a float32 error of weights that are not float32" where;
+    require (List.for_all (Functions.is_relu state.net) (inputs @ rho))
+      "%s: a float32 error of a network with other activations than ReLU" where
   end;
   let bounds name = layers (where ^ ": " ^ name) (weights name) ~with_error (find where name networks) in
   let numbers key = List.map Exact.of_float (Exact.hex_floats where (find where key entry)) in
@@ -189,12 +191,12 @@ let check_relu (state : Claims.t) entry f names =
          (Proved.By_rounded_sum (sums, sum_errors)) (too_little where));
   state.values <- state.values + 1
 
-(* Of other activations: beyond the theorems. *)
+(* With GELU: beyond the theorems. *)
 let check (state : Claims.t) entry =
   require_keys "values" keys entry;
   let f = text "values" (find "values" "function" entry) in
   require (not state.net.invariants) "values of %s: of a function of rotation invariants" (shown f);
   let names = Functions.networks_of f in
   let used = names @ if List.length names = 2 && Functions.has_ground state.net then [ "phi:ground" ] else [] in
-  if List.for_all (Functions.is_relu state.net) used then check_relu state entry f names
-  else Claims.not_checked state (Printf.sprintf "values of %s: of activations that are not ReLU" (shown f))
+  if List.for_all (Functions.is_enclosed state.net) used then check_by_theorems state entry f names
+  else Claims.not_checked state (Printf.sprintf "values of %s: of GELU" (shown f))

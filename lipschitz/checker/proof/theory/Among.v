@@ -1,7 +1,8 @@
 (** A bound in a box among a given number of neighbours, shown of phi and rho as one network, holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Enclosures Intervals Parts Coupled Claims Slopes Witness Laws Ranges Silent Relaxation Increments Signs
+    Values Enclosures Intervals Centred Parts Coupled Claims Slopes Witness Laws Ranges Silent Relaxation Increments
+      Signs
       Cover Everywhere.
 Import ListNotations.
 Open Scope R_scope.

@@ -1,7 +1,7 @@
 (** The checker of claims, and what its acceptance means: `step_sound`. *)
 From Coq Require Import List ZArith Reals Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Blocks Lower Values
-  Enclosures Parts Coupled.
+  Enclosures Centred Parts Coupled.
 Import ListNotations.
 
 Inductive proof :=
@@ -342,7 +342,10 @@ Fixpoint sum_ends (accepted : list claim) (n : nat) (terms : list term) : option
       end
   end.
 Definition check_within ps p b bounds v : bool :=
-  let q := part_at ps p in relu_between q && check_layers (hidden q) (outer q) (clamp_ends (clamp q) b) bounds v.
+  let q := part_at ps p in
+  let c := clamp_ends (clamp q) b in
+  if relu_between q then check_layers (hidden q) (outer q) c bounds v
+  else forallb is_enclosed (between q) && check_layers_centred (between q) (hidden q) (outer q) c bounds v.
 (** How many terms of network p there are, by the fewest or the most of each entry. *)
 Definition number_of (number : term -> Z) (p : nat) (terms : list term) : Z :=
   fold_right (fun t n => if (phi t =? p)%nat then (number t + n)%Z else n) 0%Z terms.

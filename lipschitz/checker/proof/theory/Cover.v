@@ -1,7 +1,7 @@
 (** A bound on every part of a box is a bound on the box. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Enclosures Intervals Parts Claims Slopes Witness Laws Ranges Relaxation Increments Signs.
+    Values Enclosures Intervals Centred Parts Claims Slopes Witness Laws Ranges Relaxation Increments Signs.
 Import ListNotations.
 Open Scope R_scope.
 

@@ -1,7 +1,7 @@
 (** Parts of boxes that hold a multiple of every (x, 1) bound the slope everywhere. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Enclosures Intervals Parts Claims Slopes Witness Laws Ranges Relaxation Increments Signs Cover.
+    Values Enclosures Intervals Centred Parts Claims Slopes Witness Laws Ranges Relaxation Increments Signs Cover.
 Import ListNotations.
 Open Scope R_scope.
 

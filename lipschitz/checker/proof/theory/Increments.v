@@ -1,7 +1,7 @@
 (** The inequality of one part: increments between two points at which the same neurons are on and off. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Enclosures Intervals Parts Claims Slopes Witness Laws Ranges Relaxation.
+    Values Enclosures Intervals Centred Parts Claims Slopes Witness Laws Ranges Relaxation.
 Import ListNotations.
 Open Scope R_scope.
 

@@ -11,7 +11,6 @@ Ltac both H := apply andb_prop in H; destruct H as [H ?].
 Definition silu_sign (t : R) : R := exp t + 1 + t.
 Lemma silu_sign_rises x y : x <= y -> silu_sign x <= silu_sign y.
 Proof. intros L. pose proof (exp_rises x y L). unfold silu_sign. lra. Qed.
-Definition silu_slope (x : R) : R := (1 * (1 + exp (- x)) - - exp (- x) * x) / Rsqr (1 + exp (- x)).
 Lemma silu_slope_sign x : exists k, 0 < k /\ silu_slope x = k * silu_sign x.
 Proof.
   pose proof (exp_pos (- x)). pose proof (exp_opp x) as O. exists (exp (- x) / Rsqr (1 + exp (- x))). split.

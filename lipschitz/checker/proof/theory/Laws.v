@@ -1,7 +1,7 @@
 (** An accepted law for several terms that move holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Enclosures Intervals Claims Slopes.
+    Values Enclosures Intervals Centred Claims Slopes.
 Import ListNotations.
 Open Scope R_scope.
 

@@ -2,7 +2,7 @@
     are by then. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Enclosures Intervals Parts Coupled Claims Slopes Witness Laws Ranges Silent.
+    Values Enclosures Intervals Centred Parts Coupled Claims Slopes Witness Laws Ranges Silent.
 Import ListNotations.
 Open Scope R_scope.
 

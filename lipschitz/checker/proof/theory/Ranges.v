@@ -1,7 +1,7 @@
 (** Accepted claims of values over boxes hold: intervals layer by layer, sums of terms, and jumps. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Float Meaning Steepness Sets Distance Blocks
-    Lower Values Enclosures Intervals Claims Slopes Witness Laws.
+    Lower Values Enclosures Intervals Centred Claims Slopes Witness Laws.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -30,8 +30,9 @@ Proof.
 Qed.
 Lemma within_sound ps p b bounds v : check_within ps p b bounds v = true -> holds ps (Within p b v).
 Proof.
-  unfold check_within. intros H x Hx. both H. unfold value. rewrite relu_network by auto.
-  eapply layers_within; eauto. now apply within_clamped.
+  unfold check_within. intros H x Hx. apply (within_clamped (clamp (part_at ps p))) in Hx. unfold value.
+  destruct (relu_between (part_at ps p)) eqn:R; [rewrite relu_network by auto; eapply layers_within; eauto|].
+  both H. eapply centred_sound; eauto.
 Qed.
 Lemma find_within_sound ps accepted p b v : Forall (holds ps) accepted -> find_within accepted p b = Some v ->
   holds ps (Within p b v).

@@ -1,7 +1,7 @@
 (** The lines that the checker finds for the neurons of a box hold all over it. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Enclosures Intervals Parts Claims Slopes Witness Laws Ranges.
+    Values Enclosures Intervals Centred Parts Claims Slopes Witness Laws Ranges.
 Import ListNotations.
 Open Scope R_scope.
 

@@ -1,7 +1,7 @@
 (** Accepted bounds on how far a float32 evaluation is from the exact function hold. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Float Meaning Steepness Sets Distance Blocks
-    Lower Values Enclosures Intervals Claims Slopes Witness Laws Ranges.
+    Lower Values Enclosures Intervals Centred Claims Slopes Witness Laws Ranges.
 Import ListNotations.
 Open Scope R_scope.
 #[local] Arguments Z.add : simpl never.

@@ -2,7 +2,7 @@
     one does. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Enclosures Intervals Parts Claims Slopes Witness Laws Ranges Relaxation Increments.
+    Values Enclosures Intervals Centred Parts Claims Slopes Witness Laws Ranges Relaxation Increments.
 Import ListNotations.
 Open Scope R_scope.
 

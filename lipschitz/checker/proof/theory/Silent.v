@@ -2,7 +2,7 @@
     silence; ranges hold the 0; and a term that comes or goes. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool Permutation.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Enclosures Intervals Parts Claims Slopes Witness Laws Ranges.
+    Values Enclosures Intervals Centred Parts Claims Slopes Witness Laws Ranges.
 Import ListNotations.
 Open Scope R_scope.
 

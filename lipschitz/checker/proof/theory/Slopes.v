@@ -1,7 +1,7 @@
 (** Accepted norms and slopes hold: by a matrix inequality, by a vector, by a product of norms. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Sorting Checker Meaning Steepness Sets Distance Blocks
-    Lower Values Fixed Enclosures Intervals Claims.
+    Lower Values Fixed Enclosures Intervals Centred Claims.
 Import ListNotations.
 Open Scope R_scope.
 

@@ -1,7 +1,7 @@
 (** An accepted claim holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Enclosures Intervals Claims Slopes Witness Laws Ranges Silent Roundings
+    Values Enclosures Intervals Centred Claims Slopes Witness Laws Ranges Silent Roundings
     Relaxation Increments Cover Among Laws_among Everywhere.
 Import ListNotations.
 Open Scope R_scope.

@@ -124,8 +124,8 @@ Qed.
 
 (** SiLU: t / (1 + e^-t). Its derivative is at most c if (c - 1) e^t + c e^-t + 2 c - 1 - t is not negative, which is
   convex in t. *)
-Lemma silu_derivative x : derivable_pt_lim (act Silu) x
-    ((1 * (1 + exp (- x)) - - exp (- x) * x) / Rsqr (1 + exp (- x))).
+Definition silu_slope (x : R) : R := (1 * (1 + exp (- x)) - - exp (- x) * x) / Rsqr (1 + exp (- x)).
+Lemma silu_derivative x : derivable_pt_lim (act Silu) x (silu_slope x).
 Proof.
   pose proof (exp_pos (- x)).
   apply (derivable_pt_lim_div id (fun x => 1 + exp (- x))); [apply derivable_pt_lim_id|apply one_and_exp|lra].
@@ -173,13 +173,14 @@ Proof.
     (72089 / 65536 * ((e + f * e) * (e + f * e))) in U by ring.
   rewrite P in U. nra.
 Qed.
-Lemma silu_slopes : slopes (act Silu) (1 - 72089 / 65536) (72089 / 65536).
+Lemma silu_slope_between x : 1 - 72089 / 65536 <= silu_slope x <= 72089 / 65536.
 Proof.
-  apply (slopes_of_derivative _ _ _ _ silu_derivative). intros x. pose proof (silu_steepest x).
-  pose proof (silu_least x).
+  pose proof (silu_steepest x). pose proof (silu_least x). unfold silu_slope.
   pose proof (exp_pos (- x)). set (e := exp (- x)) in *. unfold Rsqr.
   assert (0 < (1 + e) * (1 + e)) by nra. split; [apply divided_below|apply divided]; auto; nra.
 Qed.
+Lemma silu_slopes : slopes (act Silu) (1 - 72089 / 65536) (72089 / 65536).
+Proof. apply (slopes_of_derivative _ _ _ _ silu_derivative). exact silu_slope_between. Qed.
 
 Lemma real_silu : real (steepest Silu) = 72089 / 65536.
 Proof. unfold steepest. rewrite real_below. change (Pos.to_nat 16) with 16%nat. lra. Qed.

@@ -1,7 +1,7 @@
 (** A slope from below, accepted for two points, holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Enclosures Intervals Claims Slopes.
+    Values Enclosures Intervals Centred Claims Slopes.
 Import ListNotations.
 Open Scope R_scope.
 
