@@ -462,9 +462,38 @@ def values_of_activations_are_those_of_the_functions(folder, generator):
     assert decided_by_all > 9
 
 
+def products_of_slopes_on_a_box_are_decided_alike(folder, generator):
+    """As certified; of a network, not a step less by any checker; of sums, with laws that rest on them."""
+    net, box, tried = folder / "local.safetensors", folder / "local.toml", 0
+    net.write_bytes(safetensors(layers([3, 6, 4, 2], generator)))
+    box.write_text('schema = "swarmcert/box/1"\nlower = [1.9, -1.1, 1.4]\nupper = [2.1, -0.9, 1.5]\n')
+    for ops in "tanh", "sigmoid", "softplus", "elu", "selu,silu", "silu", "maxmin:pairs,tanh":
+        certificate = certify(net, "--activation", ops, "--domain", box, "--method", "product")
+        bound = certificate["bounds"][0]
+        if bound["upper_method"] != "local_product":
+            continue
+        tried += 1
+        assert decided(certificate, net) == 0, ops
+        with_upper(bound, math.nextafter(bound["upper"], 0))
+        smaller = decided(certificate, net)
+        with_upper(bound, 0.999 * bound["upper"])
+        assert smaller in (0, 1) and decided(certificate, net) == 1, ops
+    assert tried > 3, tried
+    networks = {part: layers(sizes, generator) for part, sizes in PARTS.items()}
+    ops = {"phi:small": "softplus", "phi:large": "elu", "phi:ground": "silu", "rho:small": "tanh"}
+    net = network_toml(folder / "locals", networks, ops)
+    box.write_text('schema = "swarmcert/box/1"\nlower = [-0.5, -0.5, -0.5, -0.5, -0.5, -0.5]\n'
+                   'upper = [-0.25, -0.25, 0.25, 0.5, -0.25, -0.25]\n')
+    certificate = certify(net, "--domain", box, "--method", "product", "--neighbours", "large=2,small=1")
+    methods = Counter(bound["upper_method"] for bound in certificate["bounds"])
+    assert methods["local_product"] > 2 and certificate["laws"] and decided(certificate, net) == 0, methods
+    with_upper(certificate["laws"][0], 0.999 * certificate["laws"][0]["upper"])
+    assert decided(certificate, net) == 1
+
+
 def values_over_a_box_are_decided_alike(folder, generator):
-    """Ranges as certified, with one end of a layer or of the range moved to the next double, and over another box. Boxes
-    reach over minima, kinks and saturation, and down to points."""
+    """Ranges as certified, with one end of a layer or of the range moved to the next double, and over another box.
+    Boxes reach over minima, kinks and saturation, and down to points."""
     net, box, codes = folder / "range.safetensors", folder / "range.toml", Counter()
     net.write_bytes(safetensors(layers([3, 6, 4, 2], generator)))
     boxes = ([-1, -0.5, 0.25], [1, 0.5, 0.5]), ([-40, 0, -3], [90, 0, 1000]), ([0.25, -0.125, 2], [0.25, -0.125, 2])
@@ -626,8 +655,9 @@ def main():
                       products_count_the_activations, sorting_layers_have_products_only,
                       each_part_has_its_own_activation,
                       sums_with_smooth_terms_have_lower_bounds, values_of_activations_are_those_of_the_functions,
-                      values_over_a_box_are_decided_alike, witnesses_of_any_activation_are_decided_alike,
-                      onnx_files_state_their_activation, onnx_files_state_what_they_sort,
+                      products_of_slopes_on_a_box_are_decided_alike, values_over_a_box_are_decided_alike,
+                      witnesses_of_any_activation_are_decided_alike, onnx_files_state_their_activation,
+                      onnx_files_state_what_they_sort,
                       weights_behind_a_descending_sort_are_those_behind_an_ascending_one,
                       several_activations_in_one_network, onnx_files_state_each_activation):
             claim(folder, generator)

@@ -3286,6 +3286,7 @@ type proof =
 | By_inequality of dyadic * dyadic list * factor
 | By_vector of dyadic list
 | By_product
+| By_local_product
 | By_points of dyadic list * dyadic list * (int * dyadic list) list
 | By_triangle
 | By_parts of dyadic * proved_form option * hints * tree
@@ -3443,30 +3444,78 @@ let rec largest m = function
 | [] -> m
 | s :: scale' -> largest (if at_most m s then s else m) scale'
 
-(** val product_of : part list -> claim list -> function0 -> dyadic option **)
+(** val behind_of : part list -> claim list -> function0 -> dyadic option **)
 
-let product_of ps accepted = function
-| Alone p -> norm_of ps accepted p
-| Set_of (phi0, rho) ->
-  (match norm_of ps accepted phi0 with
-   | Some a ->
-     (match norm_of ps accepted rho with
-      | Some b -> Some (mul0 a b)
-      | None -> None)
-   | None -> None)
+let behind_of ps accepted = function
+| Alone _ -> Some one
+| Set_of (_, rho) -> norm_of ps accepted rho
+
+(** val check_product_with :
+    part list -> claim list -> function0 -> bool list -> dyadic list ->
+    dyadic -> dyadic option -> bool **)
+
+let check_product_with ps accepted f moves scale0 u first0 =
+  let m = largest (hd one scale0) scale0 in
+  (&&)
+    ((&&) ((&&) (well_formed ps f moves scale0) (at_most (hd one scale0) m))
+      (forallb (fun s -> at_most s m) scale0))
+    (match first0 with
+     | Some a ->
+       (match behind_of ps accepted f with
+        | Some b -> at_most (mul0 m (mul0 a b)) u
+        | None -> false)
+     | None -> false)
 
 (** val check_product :
     part list -> claim list -> function0 -> bool list -> dyadic list ->
     dyadic -> bool **)
 
 let check_product ps accepted f moves scale0 u =
-  let m = largest (hd one scale0) scale0 in
-  (&&)
-    ((&&) ((&&) (well_formed ps f moves scale0) (at_most (hd one scale0) m))
-      (forallb (fun s -> at_most s m) scale0))
-    (match product_of ps accepted f with
-     | Some k -> at_most (mul0 m k) u
-     | None -> false)
+  check_product_with ps accepted f moves scale0 u
+    (norm_of ps accepted (moved f))
+
+(** val steepest_known : activation -> known list -> dyadic **)
+
+let steepest_known a s =
+  match a with
+  | Sorted _ -> one
+  | _ ->
+    fold_right (fun n m ->
+      let (l, h) = slopes_between a (fst n) in larger (larger h (neg l)) m)
+      zero s
+
+(** val steepest_centred :
+    dyadic list -> dyadic -> activation list -> layerD list -> known list ->
+    dyadic **)
+
+let rec steepest_centred radius rounding between0 hidden0 s =
+  match hidden0 with
+  | [] -> one
+  | l :: hidden' ->
+    let t = passed radius rounding (fst l) (snd l) s in
+    let a = hd Relu between0 in
+    mul0 (steepest_known a t)
+      (steepest_centred radius rounding (tl between0) hidden'
+        (activated_known a rounding t))
+
+(** val steepest_on_box : part -> box -> dyadic **)
+
+let steepest_on_box p b =
+  let c = clamp_ends p.clamp b in
+  let radius = radius_of c in
+  steepest_centred radius (rounding_of radius) p.between p.hidden
+    (inputs_known 0 c)
+
+(** val check_local_product :
+    part list -> claim list -> function0 -> bool list -> dyadic list -> box
+    -> dyadic -> bool **)
+
+let check_local_product ps accepted f moves scale0 b u =
+  let p = part_at ps (moved f) in
+  (&&) (forallb is_enclosed p.between)
+    (check_product_with ps accepted f moves scale0 u
+      (option_map (mul0 (steepest_on_box p b))
+        (norms accepted (moved f) 0 (layers p))))
 
 (** val check_parts_with :
     part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic ->
@@ -4253,6 +4302,7 @@ let check_claim ps accepted c p =
      | _ -> false)
   | Slope_in_box (f, moves, scale0, b, u) ->
     (match p with
+     | By_local_product -> check_local_product ps accepted f moves scale0 b u
      | By_parts (r, form, o, t) ->
        check_parts_of_box ps f moves scale0 b u r form o t
      | _ -> false)

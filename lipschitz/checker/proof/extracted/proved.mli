@@ -743,6 +743,7 @@ type proof =
 | By_inequality of dyadic * dyadic list * factor
 | By_vector of dyadic list
 | By_product
+| By_local_product
 | By_points of dyadic list * dyadic list * (int * dyadic list) list
 | By_triangle
 | By_parts of dyadic * proved_form option * hints * tree
@@ -795,11 +796,27 @@ val norm_of : part list -> claim list -> int -> dyadic option
 
 val largest : dyadic -> dyadic list -> dyadic
 
-val product_of : part list -> claim list -> function0 -> dyadic option
+val behind_of : part list -> claim list -> function0 -> dyadic option
+
+val check_product_with :
+  part list -> claim list -> function0 -> bool list -> dyadic list -> dyadic
+  -> dyadic option -> bool
 
 val check_product :
   part list -> claim list -> function0 -> bool list -> dyadic list -> dyadic
   -> bool
+
+val steepest_known : activation -> known list -> dyadic
+
+val steepest_centred :
+  dyadic list -> dyadic -> activation list -> layerD list -> known list ->
+  dyadic
+
+val steepest_on_box : part -> box -> dyadic
+
+val check_local_product :
+  part list -> claim list -> function0 -> bool list -> dyadic list -> box ->
+  dyadic -> bool
 
 val check_parts_with :
   part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic ->

@@ -33,7 +33,7 @@ let rec prove_by state claim proofs reason = match proofs () with
     | Some accepted -> state.accepted <- accepted; state.log <- (claim, proof) :: state.log
     | None -> prove_by state claim others reason
 
-(* By parts of boxes: what --coq cannot write, because such proofs hold guesses of floating point as functions. *)
+(* On boxes: what --coq does not write; proofs by parts hold guesses of floating point as functions. *)
 let prove_unwritten state claim proof reason = match Proved.step state.parts state.accepted claim proof with
   | Some accepted -> state.accepted <- accepted; state.unwritten <- state.unwritten + 1
   | None -> rejected "%s" (reason ())
@@ -149,6 +149,8 @@ let bound_keys = [ "function"; "domain"; "block"; "law"; "norm"; "scale"; "unit"
     "lower";
                    "lower_hex"; "lower_witness"; "proof"; "status" ]
 
+let too_little where = where ^ ": claims less than the product of the norms"
+
 let check_product state where names claim scale upper =
   let largest = match scale with [] -> 1. | first :: rest -> List.fold_left Float.max first rest in
   let total = List.fold_left (fun total name -> match Hashtbl.find_opt state.norms name with
@@ -156,9 +158,13 @@ let check_product state where names claim scale upper =
         List.fold_left (fun total activation -> times total (Proved.steepest activation)) (times total norm)
           (Weights.between (Functions.weights state.net name))
       | None -> rejected "%s: there is no network %s" where (shown name)) (Exact.of_float largest) names in
-  require (at_most total upper) "%s: claims less than the product of the norms" where;
-  prove state claim Proved.By_product (where ^ ": claims less than the product of the norms");
+  require (at_most total upper) "%s" (too_little where);
+  prove state claim Proved.By_product (too_little where);
   Proved_here
+
+(* The box of a part; the theorems apply the clamp themselves. *)
+let box_of state where part =
+  List.map (fun (low, high) -> Exact.of_float low, Exact.of_float high) (Witness.box where state.json part)
 
 (* By parts of boxes: the claim is one of the box. *)
 let check_parts state where bound names ~func ~moves ~scale ~exact_scale ~neighbours ~upper =
@@ -200,15 +206,24 @@ let check_of_invariants state bound f where ~scale ~neighbours upper =
   not_checked state (Printf.sprintf "%s <= %s:%s" where (text where (find where "upper_hex" bound)) of_);
   Hashtbl.replace state.uppers (f, "all", neighbours) (upper, Not_checked)
 
-(* From the slopes that activations have on the box: beyond the theorems. *)
+(* From the slopes that activations have on the box: with a matrix inequality, or with GELU, beyond the theorems. *)
 let local_methods = [ Text "local_sdp"; Text "local_product" ]
-let check_local state where bound names =
+let check_local state where bound names ~func ~moves ~exact_scale ~upper =
   require (find where "domain" bound = Text "box" && not (Functions.starts_with "rho:" (List.hd names)))
     "%s: slopes on a box of a bound without one" where;
   require (not state.net.invariants) "%s: slopes on a box of a network of rotation invariants" where;
-  let upper = text where (find where "upper_hex" bound) in
-  not_checked state (Printf.sprintf "%s <= %s: from the slopes that activations have on a box" where upper);
-  Not_checked
+  let is_product = find where "upper_method" bound = Text "local_product" in
+  require (not is_product || find where "proof" bound = Null) "%s: unknown upper_method" where;
+  if is_product && Functions.is_enclosed state.net (List.hd names) then begin
+    let box = box_of state where (List.hd names) in
+    prove_unwritten state (Slope_in_box (func, moves, exact_scale, box, upper)) By_local_product
+      (fun () -> too_little where);
+    In_box
+  end else begin
+    let upper = text where (find where "upper_hex" bound) in
+    not_checked state (Printf.sprintf "%s <= %s: from the slopes that activations have on a box" where upper);
+    Not_checked
+  end
 
 (* The proof of a bound of function `f`, and of the lower one where there is a witness. *)
 let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~upper =
@@ -220,7 +235,8 @@ let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~
       let neurons = hidden_neurons state names in
       let proofs = inequality state claim where ~neurons ~upper (find where "proof" bound) in
       prove_by state claim proofs (no_factor where); Proved_here
-    | method_ when List.mem method_ local_methods -> check_local state where bound names
+    | method_ when List.mem method_ local_methods ->
+      check_local state where bound names ~func ~moves ~exact_scale ~upper
     | Text "branch" -> check_parts state where bound names ~func ~moves ~scale ~exact_scale ~neighbours ~upper
     | Text "product" when find where "proof" bound = Null -> check_product state where names claim scale upper
     | _ -> rejected "%s: unknown upper_method" where in
@@ -238,8 +254,8 @@ let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~
     let lower = Exact.of_float (Exact.number (where ^ " lower") (find where "lower" bound)
         (find where "lower_hex" bound)) in
     let in_box = find where "domain" bound = Text "box" in
-    let proof, silent, is_enclosed = Witness.read state.net state.json (where ^ ": lower_witness") names ~in_box ~neighbours
-        ~moves witness in
+    let proof, silent, is_enclosed =
+      Witness.read state.net state.json (where ^ ": lower_witness") names ~in_box ~neighbours ~moves witness in
     if is_enclosed then begin
       prove state (Slope_at_least (silent, func, moves, exact_scale, lower)) proof
           (where ^ ": lower_witness: claims more than the slope between x and y");
@@ -311,8 +327,7 @@ let check_law state law =
     not_checked state (Printf.sprintf "%s: rests on a bound that is not checked" where)
   else begin
     let kind (f, n, _, _) = (Functions.index state.net (part f), Functions.moves state.net f block), Z.of_int n in
-    let in_box ((f, _, _, _) as bound) =
-      let box, _, _ = Box_parts.box_of state.net state.json (part f) where in kind bound, box in
+    let in_box ((f, _, _, _) as bound) = kind bound, box_of state where (part f) in
     let rho = Functions.index state.net ("rho:" ^ rho) in
     let law = Proved.Law (stacked, List.map kind bounds, rho, upper) in
     if List.exists (fun (_, _, _, source) -> source = Among) bounds then begin

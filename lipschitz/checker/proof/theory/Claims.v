@@ -1,13 +1,14 @@
 (** The checker of claims, and what its acceptance means: `step_sound`. *)
 From Coq Require Import List ZArith Reals Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Blocks Lower Values
-  Enclosures Centred Parts Coupled.
+  Enclosures Derivatives Centred Parts Coupled.
 Import ListNotations.
 
 Inductive proof :=
 | By_inequality (rho : dyadic) (t : list dyadic) (f : factor)
 | By_vector (v : list dyadic)
 | By_product
+| By_local_product
 | By_points (x y : list dyadic) (others : list (nat * list dyadic))
 | By_triangle
 | By_parts (rho : dyadic) (form : option proved_form) (o : hints) (t : tree)
@@ -88,16 +89,42 @@ Definition norm_of (ps : list part) (accepted : list claim) (p : nat) : option d
   let q := part_at ps p in option_map (with_slopes (between q) (hidden q)) (norms accepted p O (layers q)).
 Fixpoint largest (m : dyadic) (scale : list dyadic) : dyadic :=
   match scale with [] => m | s :: scale' => largest (if at_most m s then s else m) scale' end.
-Definition product_of (ps : list part) (accepted : list claim) (f : function) : option dyadic :=
-  match f with
-  | Alone p => norm_of ps accepted p
-  | Set_of phi rho =>
-      match norm_of ps accepted phi, norm_of ps accepted rho with Some a, Some b => Some (mul a b) | _, _ => None end
-  end.
-Definition check_product ps accepted f moves scale u : bool :=
+(** What is behind the part that moves. *)
+Definition behind_of (ps : list part) (accepted : list claim) (f : function) : option dyadic :=
+  match f with Alone _ => Some one | Set_of _ rho => norm_of ps accepted rho end.
+(** `first`: a bound of the part that moves. *)
+Definition check_product_with ps accepted f moves scale u (first : option dyadic) : bool :=
   let m := largest (hd one scale) scale in
   well_formed ps f moves scale && at_most (hd one scale) m && forallb (fun s => at_most s m) scale
-  && match product_of ps accepted f with Some k => at_most (mul m k) u | None => false end.
+  && match first, behind_of ps accepted f with Some a, Some b => at_most (mul m (mul a b)) u | _, _ => false end.
+Definition check_product ps accepted f moves scale u : bool :=
+  check_product_with ps accepted f moves scale u (norm_of ps accepted (moved f)).
+
+(** The same in a box, with the largest slope that the functions of the part that moves have there. *)
+Definition steepest_known (a : activation) (s : list known) : dyadic :=
+  match a with
+  | Sorted _ => one
+  | _ => fold_right (fun n m => let (l, h) := slopes_between a (fst n) in larger (larger h (neg l)) m) zero s
+  end.
+Fixpoint steepest_centred (radius : list dyadic) (rounding : dyadic) (between : list activation) (hidden : list layerD)
+    (s : list known) : dyadic :=
+  match hidden with
+  | [] => one
+  | l :: hidden' =>
+      let t := passed radius rounding (fst l) (snd l) s in
+      let a := hd Relu between in
+      mul (steepest_known a t)
+        (steepest_centred radius rounding (tl between) hidden' (activated_known a rounding t))
+  end.
+Definition steepest_on_box (p : part) (b : box) : dyadic :=
+  let c := clamp_ends (clamp p) b in
+  let radius := radius_of c in
+  steepest_centred radius (rounding_of radius) (between p) (hidden p) (inputs_known 0 c).
+Definition check_local_product ps accepted f moves scale (b : box) u : bool :=
+  let p := part_at ps (moved f) in
+  forallb is_enclosed (between p)
+  && check_product_with ps accepted f moves scale u
+       (option_map (mul (steepest_on_box p b)) (norms accepted (moved f) O (layers p))).
 
 (** Slopes in a box, part by part. *)
 Definition check_parts_with ps f moves scale u r (form : option proved_form) (covers : option matrixD -> bool) : bool :=
@@ -464,6 +491,7 @@ Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p :
   | Slope_at_most f moves scale u, By_product => check_product ps accepted f moves scale u
   | Slope_at_most f moves scale u, By_all_parts r form o radius ts => check_parts_of_all ps f moves scale u r form o
     radius ts
+  | Slope_in_box f moves scale b u, By_local_product => check_local_product ps accepted f moves scale b u
   | Slope_in_box f moves scale b u, By_parts r form o t => check_parts_of_box ps f moves scale b u r form o t
   | Slope_at_least silent f moves scale l, By_points x y others => check_points ps silent f moves scale l x y others
   | Law stacked kinds rho u, By_triangle => check_law ps accepted stacked kinds rho u

@@ -1,7 +1,7 @@
 (** Accepted norms and slopes hold: by a matrix inequality, by a vector, by a product of norms. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Sorting Checker Meaning Steepness Sets Distance Blocks
-    Lower Values Fixed Enclosures Intervals Centred Claims.
+    Lower Values Fixed Enclosures Intervals Derivatives Centred Claims.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -334,13 +334,18 @@ Proof.
       congruence.
   - apply Rmult_le_compat_l; [nra|]. apply square_in_clamped. congruence.
 Qed.
-Lemma product_sound ps accepted f moves scale u : Forall (holds ps) accepted ->
-  check_product ps accepted f moves scale u = true -> holds ps (Slope_at_most f moves scale u).
+Lemma moved_fits ps f moves scale : well_formed ps f moves scale = true -> fits_part (part_at ps (moved f)) = true.
+Proof. unfold well_formed. intros H. do 4 both H. destruct f; simpl in *; now both H. Qed.
+Lemma product_with_sound ps accepted f moves scale u a rest x y : Forall (holds ps) accepted ->
+  check_product_with ps accepted f moves scale u (Some a) = true -> agree moves x y -> 0 <= real a ->
+  (let p := part_at ps (moved f) in let c := clamped (clamp p) in
+    norm (minus (value p x) (value p y)) <= real a * norm (minus (c x) (c y))) ->
+  norm (minus (value_of ps f rest x) (value_of ps f rest y)) <= real u * distance scale x y.
 Proof.
-  intros HA. unfold check_product. set (m := largest _ _). intros H rest x y Ha Hx. do 3 both H.
+  intros HA. unfold check_product_with. set (m := largest _ _). intros H Ha Ka Ba. do 3 both H.
   unfold well_formed in H. do 4 both H. rename H3 into Hl, H4 into Hs, H6 into Hc.
-  destruct (product_of ps accepted f) as [k|] eqn:Hk; [|discriminate]. apply at_most_real in H0, H2.
-      rewrite real_mul in H0.
+  destruct (behind_of ps accepted f) as [b|] eqn:Hb; [|discriminate]. apply at_most_real in H0, H2.
+  rewrite !real_mul in H0.
   assert (Forall (fun s => real s <= real m) scale) as Hm.
   { rewrite forallb_forall in H1. apply Forall_forall. intros s G. now apply at_most_real, H1. }
   destruct (positive_hd _ Hs) as [Hp _].
@@ -349,21 +354,121 @@ Proof.
   assert (forall c, norm (minus (clamped c x) (clamped c y)) <= real m * distance scale x y) as D
     by (intros c; apply (norm_in_largest _ _ moves); auto; lra).
   pose proof (distance_nonneg scale x y) as Dn.
-  assert (forall z e, 0 <= z -> 0 <= real k -> e <= real k * z -> z <= real m * distance scale x y ->
-      e <= real u * distance scale x y) as G.
-  { intros z e Z K E F. apply Rle_trans with (real k * (real m * distance scale x y)).
+  set (first := norm (minus (value (part_at ps (moved f)) x) (value (part_at ps (moved f)) y))) in *.
+  assert (first <= real a * (real m * distance scale x y)) as F
+    by (eapply Rle_trans; [exact Ba|]; now apply Rmult_le_compat_l).
+  assert (forall e, 0 <= real b -> e <= real b * first -> e <= real u * distance scale x y) as G.
+  { intros e K E. apply Rle_trans with (real b * (real a * (real m * distance scale x y))).
     - eapply Rle_trans; [exact E|]. now apply Rmult_le_compat_l.
-    - rewrite <- Rmult_assoc, (Rmult_comm (real k)). apply Rmult_le_compat_r; auto. }
-  destruct f as [p|phi r]; cbn [parts_of forallb tl value_of product_of] in *.
-  - both H. destruct (part_bound _ _ _ _ HA H Hk) as [K B]. unfold value.
-    eapply G; [apply norm_nonneg | auto | apply B | apply D].
-  - both H. both H3. both Hc.
-    destruct (norm_of ps accepted phi) as [a|] eqn:Ea; [|discriminate].
-    destruct (norm_of ps accepted r) as [b|] eqn:Eb; [|discriminate]. inversion Hk. subst k.
-    destruct (part_bound _ _ _ _ HA H Ea) as [Ka Ba]. destruct (part_bound _ _ _ _ HA H3 Eb) as [Kb Bb].
-    unfold value at 1 3. destruct (clamp (part_at ps r)) eqn:E; [|discriminate]. simpl clamped.
-    apply (G (norm (minus (clamped (clamp (part_at ps phi)) x) (clamped (clamp (part_at ps phi)) y))));
-      [apply norm_nonneg | rewrite real_mul; nra | | apply D].
-    rewrite real_mul, (Rmult_comm (real a)), Rmult_assoc. eapply Rle_trans; [apply Bb|]. apply Rmult_le_compat_l; auto.
-    eapply Rle_trans; [apply norm_le|apply Ba]. rewrite square_shifted by (now rewrite !length_value). apply Rle_refl.
+    - replace (real b * (real a * (real m * distance scale x y))) with (real m * (real a * real b) * distance scale x y)
+        by ring. now apply Rmult_le_compat_r. }
+  destruct f as [p|phi r]; cbn [parts_of forallb tl value_of behind_of moved] in *.
+  - inversion Hb as [E]. rewrite <- E, real_one in G. apply G; [lra|]. rewrite Rmult_1_l. apply Rle_refl.
+  - both H. both H3. both Hc. destruct (part_bound _ _ _ _ HA H3 Hb) as [Kb Bb].
+    unfold value at 1 3. destruct (clamp (part_at ps r)) eqn:E; [|discriminate]. simpl clamped. apply G; auto.
+    eapply Rle_trans; [apply Bb|]. apply Rmult_le_compat_l; auto. apply norm_le. unfold first, norm.
+    rewrite square_shifted by (now rewrite !length_value). apply Rle_refl.
+Qed.
+Lemma product_sound ps accepted f moves scale u : Forall (holds ps) accepted ->
+  check_product ps accepted f moves scale u = true -> holds ps (Slope_at_most f moves scale u).
+Proof.
+  intros HA H rest x y Ha _. unfold check_product in H. destruct (norm_of ps accepted (moved f)) as [a|] eqn:E.
+  - pose proof H as W. unfold check_product_with in W. do 3 both W. apply moved_fits in W.
+    destruct (part_bound _ _ _ _ HA W E) as [K B]. apply (product_with_sound _ _ _ _ _ _ _ _ _ _ HA H Ha K). apply B.
+  - unfold check_product_with in H. both H. discriminate.
+Qed.
+
+(** By the slopes in a box *)
+Lemma contracts_in (a : activation) c t p q d e : 0 <= c ->
+  (forall n, In n t -> let (l, h) := slopes_between a (fst n) in real h <= c /\ - real l <= c) ->
+  is_entrywise a = true -> is_enclosed a = true -> Forall2 (follows d) t p -> Forall2 (follows e) t q ->
+  square (minus (map (act a) p) (map (act a) q)) <= c * c * square (minus p q).
+Proof.
+  intros C H E Q P. revert q. unfold square, minus. induction P as [|n y t p [L _] P IH]; intros q G; inversion G as
+    [|? z ? q' [M _] G']; subst; simpl; [lra|].
+  assert (forall n, In n t -> let (l, h) := slopes_between a (fst n) in real h <= c /\ - real l <= c) as H'
+    by (intros; apply H; now right). specialize (IH H' q' G'). specialize (H n (or_introl eq_refl)).
+  pose proof (slopes_between_hold a (fst n) E Q) as S. destruct (slopes_between a (fst n)) as [l h]. cbn [fst snd] in S.
+  destruct H as [Hh Hl], L as [L1 L2], M as [M1 M2].
+  assert (forall u v, real (fst (fst n)) <= u -> u <= v -> v <= real (snd (fst n)) ->
+    (act a v - act a u) * (act a v - act a u) <= c * c * ((v - u) * (v - u))) as K.
+  { intros u v U V W. destruct (S u v U V W) as [S1 S2].
+    assert (- (c * (v - u)) <= act a v - act a u <= c * (v - u)) by nra.
+    replace (c * c * ((v - u) * (v - u))) with ((c * (v - u)) * (c * (v - u))) by ring. nra. }
+  assert ((act a y + -1 * act a z) * (act a y + -1 * act a z) <= c * c * ((y + -1 * z) * (y + -1 * z))) as Y.
+  { destruct (Rle_lt_dec z y) as [O|O]; [specialize (K z y M1 O L2)|specialize (K y z L1 ltac:(lra) M2)]; lra. }
+  lra.
+Qed.
+Lemma steepest_known_above a t : is_entrywise a = true -> 0 <= real (steepest_known a t) /\
+  forall n, In n t -> let (l, h) := slopes_between a (fst n) in
+    real h <= real (steepest_known a t) /\ - real l <= real (steepest_known a t).
+Proof.
+  intros E. assert (steepest_known a t =
+    fold_right (fun n m => let (l, h) := slopes_between a (fst n) in larger (larger h (neg l)) m) zero t) as ->
+    by (destruct a; auto; discriminate).
+  induction t as [|n t [P IH]]; simpl; [rewrite real_zero; split; [lra|tauto]|].
+  set (m := fold_right _ _ _) in *. destruct (slopes_between a (fst n)) as [l h] eqn:S.
+  rewrite !real_larger, real_neg. pose proof (Rmax_l (Rmax (real h) (- real l)) (real m)).
+  pose proof (Rmax_r (Rmax (real h) (- real l)) (real m)). pose proof (Rmax_l (real h) (- real l)).
+  pose proof (Rmax_r (real h) (- real l)). split; [lra|]. intros k [<-|I]; [rewrite S; lra|].
+  specialize (IH k I). destruct (slopes_between a (fst k)). lra.
+Qed.
+Lemma activated_contracts_in a t p q d e : is_enclosed a = true -> Forall2 (follows d) t p -> Forall2 (follows e) t q ->
+  0 <= real (steepest_known a t) /\
+  norm (minus (activated a p) (activated a q)) <= real (steepest_known a t) * norm (minus p q).
+Proof.
+  intros Q P G. destruct (is_entrywise a) eqn:E.
+  - destruct (steepest_known_above a t E) as [C H]. split; auto. set (c := real (steepest_known a t)) in *.
+    assert (activated a p = map (act a) p /\ activated a q = map (act a) q) as [-> ->]
+      by (destruct a; auto; discriminate).
+    unfold norm. rewrite <- (sqrt_square c) by auto. rewrite <- sqrt_mult_alt by nra. apply sqrt_le_1_alt.
+    now apply (contracts_in a c t p q d e).
+  - destruct a; try discriminate. simpl steepest_known. rewrite real_one, Rmult_1_l. split; [lra|].
+    apply norm_le, sorting_contracts. now rewrite <- (related_length _ _ _ P), <- (related_length _ _ _ G).
+Qed.
+Lemma centred_layers_bound radius d e between hs l us s : bounded_by radius d -> bounded_by radius e ->
+  forallb is_enclosed between = true -> Forall2 norm_bound_of (hs ++ [l]) us ->
+  (forall k, In k (hs ++ [l]) -> length (snd k) = length (fst k)) -> forall x y,
+  Forall2 (follows d) s x -> Forall2 (follows e) s y ->
+  let g := layer_by_layer between (map real_layer hs) (real_layer l) in
+  let c := real (steepest_centred radius (rounding_of radius) between hs s) in
+  0 <= c /\ norm (minus (g x) (g y)) <= c * product_R us * norm (minus x y).
+Proof.
+  intros D E. revert between us s. induction hs as [|k hs IH]; intros between us s Q H L x y X Y; simpl in *.
+  - inversion H as [|? u ? us' Hu Hus]; subst. inversion Hus; subst. simpl. rewrite real_one, Rmult_1_r, Rmult_1_l.
+    split; [lra|]. apply affine_bound; auto.
+  - inversion H as [|? u ? us' Hu Hus]; subst. set (a := hd Relu between).
+    set (t := passed radius (rounding_of radius) (fst k) (snd k) s).
+    set (p := affine (fst (real_layer k)) (snd (real_layer k)) x).
+    set (q := affine (fst (real_layer k)) (snd (real_layer k)) y).
+    assert (Forall2 (follows d) t p) as P by (apply passed_follow; auto).
+    assert (Forall2 (follows e) t q) as G by (apply passed_follow; auto).
+    assert (is_enclosed a = true /\ forallb is_enclosed (tl between) = true) as [A Q']
+      by (unfold a; destruct between; auto; simpl in *; now both Q).
+    destruct (activated_contracts_in a t p q d e A P G) as [C B].
+    destruct (IH (tl between) us' (activated_known a (rounding_of radius) t) Q' Hus ltac:(auto) (activated a p)
+      (activated a q) ltac:(now apply activated_known_follow) ltac:(now apply activated_known_follow)) as [C' B'].
+    pose proof (product_nonneg _ _ Hus) as Up. pose proof (affine_bound k u x y Hu ltac:(auto)) as F. fold p q in F.
+    rewrite real_mul. split; [now apply Rmult_le_pos|]. eapply Rle_trans; [exact B'|].
+    set (c := real (steepest_known a t)) in *. set (c' := real (steepest_centred _ _ _ _ _)) in *.
+    apply Rle_trans with (c' * product_R us' * (c * (u * norm (minus x y)))).
+    + apply Rmult_le_compat_l; [now apply Rmult_le_pos|]. eapply Rle_trans; [exact B|]. now apply Rmult_le_compat_l.
+    + right. simpl. ring.
+Qed.
+Lemma local_product_sound ps accepted f moves scale b u : Forall (holds ps) accepted ->
+  check_local_product ps accepted f moves scale b u = true -> holds ps (Slope_in_box f moves scale b u).
+Proof.
+  intros HA H rest x y Ha _ X Y. unfold check_local_product in H. both H. rename H into Q.
+  set (p := part_at ps (moved f)) in *. destruct (norms accepted (moved f) 0 (layers p)) as [v|] eqn:E.
+  2: { unfold check_product_with in H0. both H0. discriminate. }
+  simpl option_map in H0. pose proof H0 as W. unfold check_product_with in W. do 3 both W. apply moved_fits in W.
+  fold p in W. destruct (norms_sound ps accepted (moved f) v HA _ [] eq_refl E) as (us & B & Ev).
+  apply (within_clamped (clamp p)) in X, Y.
+  destruct (inputs_follow _ _ X) as (d & D & _ & F). destruct (inputs_follow _ _ Y) as (e & D' & _ & F').
+  specialize (F O [] eq_refl). specialize (F' O [] eq_refl).
+  destruct (centred_layers_bound _ d e (between p) (hidden p) (outer p) us _ D D' Q B
+    (fun k => fits_layer p k W) _ _ F F') as [C N].
+  apply (product_with_sound _ _ _ _ _ _ _ _ _ _ HA H0 Ha); rewrite real_mul, Ev.
+  - apply Rmult_le_pos; [exact C|]. eapply product_nonneg; eauto.
+  - exact N.
 Qed.
