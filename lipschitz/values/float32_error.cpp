@@ -25,6 +25,7 @@ using Eigen::VectorXd;
 using files::Network;
 
 constexpr double kFloatUnit = 0x1p-24;
+constexpr int kUsualRoundingNodes = 8000;
 
 /// All sums here are of numbers that are not negative, with far fewer than 2^20 operations: their rounding in double is
 /// below this relative amount.
@@ -266,7 +267,8 @@ std::vector<Float32Error> float32_errors(const Network& network, const std::map<
   files::parallel_for(static_cast<int>(functions.size()), options.jobs, [&](int index) {
     const std::string& function = functions[static_cast<std::size_t>(index)];
     const std::vector<std::string> names = files::networks_of(function);
-    const SetError error(network, function, inflated_domain, options.nodes, options.stop);
+    const int nodes = options.nodes > 0 ? options.nodes : usual_nodes(network, function, kUsualRoundingNodes);
+    const SetError error(network, function, inflated_domain, nodes, options.stop);
     double evaluation = 0;
     for (int n = names.size() == 1 ? 1 : 0; n <= (names.size() == 1 ? 1 : options.neighbours); ++n) {
       evaluation = std::max(evaluation, names.size() == 1 ? error.plain() : error.set(n));

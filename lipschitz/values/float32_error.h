@@ -26,7 +26,7 @@ struct Float32Error {
 struct Float32Options {
   int neighbours = 1;     ///< up to this many
   double input_step = 0;  ///< inputs are multiples of this, rounded to nearest; 0: only rounded to float32
-  int nodes = 1000;       ///< parts of the box per function
+  int nodes = 0;          ///< parts of the box per function; 0: 8000, fewer for large networks, at least 600
   int jobs = 0;
   Stop stop;  ///< ends the semidefinite programs of the tails: bounds layer by layer in their place
 };
@@ -43,8 +43,9 @@ std::vector<double> input_errors(const Box& box, double step);
 ///   sum_k min(L_k |delta_k|_2, |S_k delta_k|_2),
 /// where L_k is a proved Lipschitz bound of what follows layer k (LipSDP of the tail, which holds at every point, hence
 /// for any other neighbours), and S_k bounds its derivative over the part of the box (sensitivities()). Values of
-/// layers come from bounds over parts of the box (reach.h), plus what was computed wrong before. Sums over n neighbours
-/// add gamma_{n-1} sum_j |phi_j| in front of rho, gamma_n with the ground's term: what is added to zero is exact.
+/// layers come from bounds over parts of the box (reach.h, affine_forms.h), plus what was computed wrong before. Sums
+/// over n neighbours add gamma_{n-1} sum_j |phi_j| in front of rho, gamma_n with the ground's term: what is added to
+/// zero is exact.
 ///
 /// @param domain by part, finite.
 /// @param lipschitz proved bounds by function: of "network" or the set functions, the ground's among them.

@@ -1,6 +1,8 @@
 #include "lipschitz/values/float32_layers.h"
 
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "nn/base/doubles.h"
 
@@ -53,50 +55,111 @@ void through_relu(const Bounds& bounds, const VectorXd& error, MatrixXd& middle,
   }
 }
 
+/// Where the computed input of layer k lies, which is off by `error` from the exact one in `input`.
+Bounds computed_bounds(const ReachNetwork& chain, const Reach& reach, std::size_t k, const Bounds& input,
+                       const VectorXd& error) {
+  Bounds result{input.lower - error, input.upper + error};
+  for (double& x : result.lower) x = down(x);
+  for (double& x : result.upper) x = up(x);
+  if (k == 0 || !chain[k - 1].has_relu) return result;
+  // What is computed behind a ReLU is not negative either, and is zero where the neuron was off in float32 too.
+  const VectorXd& y = reach.before_relu(k - 1).upper;
+  for (Index j = 0; j < y.size(); ++j)
+    if (y(j) + error(j) < 0) result.upper(j) = 0;
+  result.lower = result.lower.cwiseMax(0.0);
+  return result;
+}
+
+/// The exact value of b + w_1 h_1 + ... + w_j h_j for each output, as far as it was added up.
+class PartialSums {
+ public:
+  PartialSums(const ReachLayer& layer, const AffineForms* forms)
+      : layer_(layer),
+        forms_(forms),
+        slack_(safe(2 * layer.weights.cols() + 1)),
+        least_(layer.bias.array() - layer.bias_radius.array()),
+        most_(layer.bias.array() + layer.bias_radius.array()),
+        size_(layer.bias.cwiseAbs().array() + layer.bias_radius.array()) {
+    if (forms == nullptr) return;
+    input_sizes_ = forms->centre.cwiseAbs() + forms->deviation();
+    slopes_ = Eigen::ArrayXXd::Zero(size_.size(), forms->slopes.cols());
+    centre_ = layer.bias;
+    radius_ = layer.bias_radius;
+    form_size_ = size_;
+  }
+
+  void add(Index j, double low, double high) {
+    const ArrayXd w = layer_.weights.col(j).array();
+    const ArrayXd at_low = w * low, at_high = w * high;
+    least_ += at_low.min(at_high);
+    most_ += at_low.max(at_high);
+    size_ += w.abs() * std::max(std::abs(low), std::abs(high));
+    if (forms_ == nullptr) return;
+    slopes_ += (w.matrix() * forms_->slopes.row(j)).array();
+    centre_ += w * forms_->centre(j);
+    radius_ += w.abs() * forms_->radius(j);
+    form_size_ += w.abs() * input_sizes_(j);
+  }
+
+  /// At least the absolute values. Of two intervals that hold the sum, rounding aside, the sum is in both.
+  ArrayXd largest() const {
+    if (forms_ == nullptr) return least_.abs().max(most_.abs()) + slack_ * size_;
+    const ArrayXd deviation = slopes_.abs().rowwise().sum() + radius_;
+    const ArrayXd least = least_.max(centre_ - deviation), most = most_.min(centre_ + deviation);
+    return least.abs().max(most.abs()) + slack_ * (size_ + 2 * form_size_);
+  }
+
+  /// Of all terms together.
+  const ArrayXd& size() const { return size_; }
+
+ private:
+  const ReachLayer& layer_;
+  const AffineForms* forms_;
+  double slack_;  ///< what rounding changes, per unit of the terms' sizes
+  ArrayXd least_, most_, size_;
+  // Of the forms.
+  VectorXd input_sizes_;
+  Eigen::ArrayXXd slopes_;
+  ArrayXd centre_, radius_, form_size_;
+};
+
 }  // namespace
 
-VectorXd layer_rounding(const ReachLayer& layer, const VectorXd& lower, const VectorXd& upper) {
-  ArrayXd least = layer.bias.array() - layer.bias_radius.array();
-  ArrayXd most = layer.bias.array() + layer.bias_radius.array();
-  ArrayXd size = layer.bias.cwiseAbs().array() + layer.bias_radius.array();
-  ArrayXd error = ArrayXd::Zero(size.size());
-  const double slack = safe(2 * lower.size() + 1);
+VectorXd layer_rounding(const ReachLayer& layer, const VectorXd& lower, const VectorXd& upper,
+                        const AffineForms* forms) {
+  PartialSums sums(layer, forms);
+  ArrayXd error = ArrayXd::Zero(layer.bias.size());
   for (Index j = 0; j < lower.size(); ++j) {
-    const double low = lower(j), high = upper(j), largest = std::max(std::abs(low), std::abs(high));
+    const double largest = std::max(std::abs(lower(j)), std::abs(upper(j)));
     if (largest == 0) continue;
-    const ArrayXd w = layer.weights.col(j).array();
-    const ArrayXd at_low = w * low, at_high = w * high;
-    least += at_low.min(at_high);
-    most += at_low.max(at_high);
-    const ArrayXd product = w.abs() * largest;
-    size += product;
-    error += kFloatUnit * product + 0x1p-150;
-    error += kFloatUnit * (least.abs().max(most.abs()) + slack * size + error);
+    sums.add(j, lower(j), upper(j));
+    error += kFloatUnit * (layer.weights.col(j).array().abs() * largest) + 0x1p-150;
+    error += kFloatUnit * (sums.largest() + error);
   }
-  error *= 1 + slack;
+  error *= 1 + safe(2 * lower.size() + 1);
   for (Index i = 0; i < error.size(); ++i)
-    if (!(size(i) + error(i) < kLargest)) error(i) = kInfinity;
+    if (!(sums.size()(i) + error(i) < kLargest)) error(i) = kInfinity;
   return error.matrix();
 }
 
 LayerErrors layer_errors(const ReachNetwork& chain, const Reach& reach, const VectorXd& before) {
   LayerErrors errors;
   VectorXd error = before;
+  std::optional<AffineForms> exact;
+  if (before.size() <= kMostFormInputs) exact = forms_of(reach.box());
   for (std::size_t k = 0; k < chain.size(); ++k) {
-    const Bounds input = input_bounds(chain, reach, k);
-    VectorXd lower = input.lower - error, upper = input.upper + error;
-    for (double& x : lower) x = down(x);
-    for (double& x : upper) x = up(x);
-    if (k > 0 && chain[k - 1].has_relu) {
-      // What is computed behind a ReLU is not negative either, and is zero where the neuron was off in float32 too.
-      const VectorXd& y = reach.before_relu(k - 1).upper;
-      for (Index j = 0; j < upper.size(); ++j)
-        if (y(j) + error(j) < 0) upper(j) = 0;
-      lower = lower.cwiseMax(0.0);
-    }
-    errors.made.push_back(layer_rounding(chain[k], lower, upper));
+    const Bounds input =
+        exact ? within(input_bounds(chain, reach, k), *exact) : input_bounds(chain, reach, k);
+    const Bounds computed = computed_bounds(chain, reach, k, input, error);
+    std::optional<AffineForms> off = exact;
+    if (off) off->radius += (1 + kSafe) * error;
+    errors.made.push_back(layer_rounding(chain[k], computed.lower, computed.upper, off ? &*off : nullptr));
     error = (1 + safe(error.size())) * (chain[k].weights.cwiseAbs() * error) + errors.made.back();
     errors.total.push_back(error);
+    if (!exact) continue;
+    exact = layer_forms(chain[k], *exact);
+    if (chain[k].has_relu) exact = relu_forms(std::move(*exact), reach.before_relu(k));
+    if (!exact->all_finite()) exact.reset();
   }
   return errors;
 }

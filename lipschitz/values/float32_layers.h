@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "lipschitz/values/affine_forms.h"
 #include "lipschitz/values/reach.h"
 
 namespace swarmcert::lipschitz {
@@ -15,8 +16,9 @@ namespace swarmcert::lipschitz {
 /// The sum starts from b; each product is rounded, off by at most u |w_j h_j| + 2^-150, and so is each sum, off by at
 /// most u times its size, u = 2^-24. The size of a partial sum comes from the interval of its exact value and from what
 /// was off before. A product with h_j = 0 is exact, and so is its addition. Fused products round less often.
+/// @param forms where h lies as well, so that partial sums lie in the intervals of their own forms; null: nowhere else.
 Eigen::VectorXd layer_rounding(const ReachLayer& layer, const Eigen::VectorXd& lower,
-                               const Eigen::VectorXd& upper);
+                               const Eigen::VectorXd& upper, const AffineForms* forms = nullptr);
 
 /// Errors of a float32 evaluation over a part of the box, entry by entry and layer by layer.
 struct LayerErrors {
@@ -24,6 +26,10 @@ struct LayerErrors {
   std::vector<Eigen::VectorXd> total;  ///< of y_k: with what the layers before got wrong
 };
 
+/// Forms cost a layer as much as so many intervals.
+inline constexpr Eigen::Index kMostFormInputs = 32;
+
+/// Values lie in their bounds and in affine forms, which are left away with more than kMostFormInputs inputs.
 /// @param before the error of what the first layer takes in.
 LayerErrors layer_errors(const ReachNetwork& chain, const Reach& reach, const Eigen::VectorXd& before);
 

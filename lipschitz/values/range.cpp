@@ -19,15 +19,7 @@ namespace {
 
 using files::Network;
 
-/// Boxes per search where nobody says: a box costs about the square of the number of weights.
-int usual_nodes(const Network& network, const std::string& function) {
-  constexpr double kNodes = 16000, kFewest = 600, kWeights = 8000;
-  double weights = 0;
-  const auto parts = files::parts(network);
-  for (const std::string& name : files::networks_of(function))
-    for (const files::Layer& layer : parts.at(name)->layers) weights += layer.inputs * layer.outputs;
-  return static_cast<int>(std::clamp(kNodes * std::pow(kWeights / weights, 2), kFewest, kNodes));
-}
+constexpr int kUsualRangeNodes = 16000;
 
 /// The ends of one output among some neighbours; the function is 0 throughout where it is silent.
 struct Ends {
@@ -53,7 +45,8 @@ class RangesOf {
         neighbours_(options.neighbours),
         searched_(std::move(searched)),
         values_(network, domain, function_,
-                options.nodes > 0 ? options.nodes : usual_nodes(network, function_), options.jobs) {
+                options.nodes > 0 ? options.nodes : usual_nodes(network, function_, kUsualRangeNodes),
+                options.jobs) {
     if (!is_set_) return;
     jump_at_any_sum_ = up(values_.jump_norm() * rho_bound.at(files::kind_of(names_[1])));
     // Of one kind, all steps are seen one after the other.
@@ -205,6 +198,15 @@ std::map<std::string, Box> clamp_domain(const Network& network) {
     result[files::phi_name(kind)] = {network.clamp->lower, network.clamp->upper};
   if (network.plain) result["network"] = {network.clamp->lower, network.clamp->upper};
   return result;
+}
+
+int usual_nodes(const Network& network, const std::string& function, int most) {
+  constexpr double kFewest = 600, kWeights = 8000;
+  double weights = 0;
+  const auto parts = files::parts(network);
+  for (const std::string& name : files::networks_of(function))
+    for (const files::Layer& layer : parts.at(name)->layers) weights += layer.inputs * layer.outputs;
+  return static_cast<int>(std::clamp(most * std::pow(kWeights / weights, 2), kFewest, 1.0 * most));
 }
 
 std::vector<std::string> value_functions(const Network& network) {

@@ -46,6 +46,10 @@ struct RangeOptions {
   std::function<void(int done, int total)> progress;  ///< searches; may be empty
 };
 
+/// Boxes per search for a function of NET where nobody says: `most`, at least 600, or fewer in between for networks of
+/// more than 8000 weights: a box costs about the square of their number.
+int usual_nodes(const files::Network& network, const std::string& function, int most);
+
 /// The functions whose values are enclosed: the network, or each set function of neighbours.
 std::vector<std::string> value_functions(const files::Network& network);
 

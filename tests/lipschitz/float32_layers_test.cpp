@@ -4,6 +4,7 @@
 #include <gmpxx.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -123,6 +124,129 @@ TEST(LayerRounding, IsInfiniteWhereFloat32MightOverflow) {
   const Sum sum{{0x1p100f}, 0};
   EXPECT_TRUE(std::isinf(bound(sum, VectorXd::Zero(1), VectorXd::Constant(1, 0x1p27))));
   EXPECT_TRUE(std::isfinite(bound(sum, VectorXd::Zero(1), VectorXd::Constant(1, 0x1p20))));
+}
+
+/// h = (x, x, x, ...) with weights 1, -1, 1, ...: the sums are x and 0 by turns, which intervals cannot know.
+TEST(LayerRounding, KnowsWhatTheTermsOfAPartialSumHaveInCommon) {
+  constexpr Index kInputs = 20;
+  Sum sum;
+  for (Index j = 0; j < kInputs; ++j) sum.weights.push_back(j % 2 == 0 ? 1.0f : -1.0f);
+  const VectorXd ones = VectorXd::Ones(kInputs);
+  const lipschitz::AffineForms forms{MatrixXd::Ones(kInputs, 1), VectorXd::Zero(kInputs),
+                                     VectorXd::Zero(kInputs)};
+  const double u = 0x1p-24;
+  const double with_forms = lipschitz::layer_rounding(sum.layer(), -ones, ones, &forms)(0);
+  EXPECT_NEAR(with_forms, (kInputs + kInputs / 2) * u, 1e-4 * u);  // products, and every other sum
+  EXPECT_NEAR(bound(sum, -ones, ones), (kInputs + kInputs * (kInputs + 1) / 2) * u, 1e-4 * u);
+}
+
+/// Layer by layer in exact arithmetic, but for double's rounding, and by the loop that flies.
+struct BothWays {
+  std::vector<VectorXd> exact, computed;
+
+  BothWays(const ReachNetwork& network, const VectorXd& x) {
+    VectorXd h = x;
+    std::vector<float> flown(x.data(), x.data() + x.size());
+    for (const lipschitz::ReachLayer& layer : network) {
+      const VectorXd y = layer.weights * h + layer.bias;
+      exact.push_back(y);
+      h = layer.has_relu ? VectorXd(y.cwiseMax(0.0)) : y;
+      flown = flown_layer(layer, flown);
+      computed.push_back(Eigen::Map<const Eigen::VectorXf>(flown.data(), y.size()).cast<double>());
+      for (float& value : flown)
+        if (layer.has_relu) value = std::max(value, 0.0f);
+    }
+  }
+
+ private:
+  static std::vector<float> flown_layer(const lipschitz::ReachLayer& layer, const std::vector<float>& h) {
+    const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> weights =
+        layer.weights.cast<float>();
+    const Eigen::VectorXf biases = layer.bias.cast<float>();
+    std::vector<float> y(static_cast<std::size_t>(biases.size()));
+    nn::apply<1>(nn::DenseLayer<float>{weights.data(), biases.data(), static_cast<int>(weights.rows()),
+                                       static_cast<int>(weights.cols())},
+                 h.data(), y.data(), nn::Activation::kNone);
+    return y;
+  }
+};
+
+/// All weights are float32 numbers.
+ReachNetwork float32_network(std::mt19937& generator) {
+  ReachNetwork network = lipschitz::reach_network(tests::random_network({3, 8, 10, 6, 2}, generator));
+  for (lipschitz::ReachLayer& layer : network) {
+    layer.weights = layer.weights.cast<float>().cast<double>();
+    layer.bias = layer.bias.cast<float>().cast<double>();
+  }
+  return network;
+}
+
+TEST(LayerErrors, AreNeverExceededAndFormsHoldInEveryLayer) {
+  std::mt19937 generator(8);
+  Random random(9);
+  double closest = 0;
+  for (int round = 0; round < 40; ++round) {
+    const ReachNetwork network = float32_network(generator);
+    const double half = std::exp2(-static_cast<double>(random.below(12)));
+    lipschitz::Box box;
+    for (int k = 0; k < 3; ++k) {
+      const double middle = random.symmetric();
+      box.lower.push_back(middle - half);
+      box.upper.push_back(middle + half * random.uniform());
+    }
+    const Reach reach(network, box);
+    const lipschitz::LayerErrors errors = lipschitz::layer_errors(network, reach, VectorXd::Zero(3));
+    std::vector<lipschitz::AffineForms> forms;
+    lipschitz::AffineForms h = lipschitz::forms_of(box);
+    for (std::size_t k = 0; k < network.size(); ++k) {
+      forms.push_back(lipschitz::layer_forms(network[k], h));
+      h = lipschitz::relu_forms(forms.back(), reach.before_relu(k));
+    }
+    for (int sample = 0; sample < 300; ++sample) {
+      VectorXd x(3), xi(3);
+      for (Index j = 0; j < 3; ++j) {
+        const auto i = static_cast<std::size_t>(j);
+        const double width = box.upper[i] - box.lower[i];
+        x(j) =
+            static_cast<double>(static_cast<float>(box.lower[i] + width * (0.01 + 0.98 * random.uniform())));
+        xi(j) = (x(j) - box.lower[i] - width / 2) / (width / 2);
+      }
+      const BothWays values(network, x);
+      for (std::size_t k = 0; k < network.size(); ++k) {
+        const VectorXd off = (values.computed[k] - values.exact[k]).cwiseAbs();
+        ASSERT_TRUE((off.array() <= errors.total[k].array() + 1e-14).all());
+        closest = std::max(closest, (off.array() / errors.total[k].array()).maxCoeff());
+        const VectorXd beside = values.exact[k] - forms[k].centre - forms[k].slopes * xi;
+        ASSERT_TRUE((beside.cwiseAbs().array() <= forms[k].radius.array() + 1e-12).all());
+        const lipschitz::Bounds both = lipschitz::within(reach.before_relu(k), forms[k]);
+        ASSERT_TRUE((values.exact[k].array() >= both.lower.array() - 1e-12).all());
+        ASSERT_TRUE((values.exact[k].array() <= both.upper.array() + 1e-12).all());
+      }
+    }
+  }
+  EXPECT_GT(closest, 0.3) << "the samples do not come near the bounds: they test nothing";
+}
+
+TEST(AffineForms, AreTheValuesAtAPointAndNotFiniteWhereTheBoundsAreNot) {
+  std::mt19937 generator(10);
+  const ReachNetwork network = float32_network(generator);
+  const VectorXd x = VectorXd::LinSpaced(3, -0.5, 0.75);
+  const lipschitz::Box point{{x(0), x(1), x(2)}, {x(0), x(1), x(2)}};
+  const Reach reach(network, point);
+  const BothWays values(network, x);
+  lipschitz::AffineForms h = lipschitz::forms_of(point);
+  for (std::size_t k = 0; k < network.size(); ++k) {
+    const lipschitz::AffineForms y = lipschitz::layer_forms(network[k], h);
+    EXPECT_LT((y.centre - values.exact[k]).cwiseAbs().maxCoeff(), 1e-12);
+    EXPECT_LT(y.deviation().maxCoeff(), 1e-9);
+    h = lipschitz::relu_forms(y, reach.before_relu(k));
+  }
+  lipschitz::Bounds bounds = reach.before_relu(0);
+  bounds.lower(0) = -INFINITY;
+  bounds.upper(0) = INFINITY;
+  const lipschitz::AffineForms unknown =
+      lipschitz::relu_forms(lipschitz::layer_forms(network[0], lipschitz::forms_of(point)), bounds);
+  EXPECT_FALSE(unknown.all_finite());
 }
 
 /// d y_K / d y_k at x, for k = 0 .. K.
