@@ -73,9 +73,10 @@ double behind(const ReachNetwork& chain, const Reach& reach, const LayerErrors& 
 }
 
 /// The largest value over the box of `cost`, a function of the bounds over a part of it: best first, up to `nodes`
-/// parts.
+/// parts, fewer where it is stopped.
 template <class Cost>
-double largest_over_parts(const ReachNetwork& chain, const Box& box, int nodes, const Cost& cost) {
+double largest_over_parts(const ReachNetwork& chain, const Box& box, int nodes, const Stop& stop,
+                          const Cost& cost) {
   struct Part {
     double cost;
     std::shared_ptr<const Reach> reach;
@@ -87,7 +88,7 @@ double largest_over_parts(const ReachNetwork& chain, const Box& box, int nodes, 
   };
   std::priority_queue<Part> queue;
   queue.push(part_of(box, nullptr, kInfinity));
-  for (int done = 1; done + 2 <= nodes; done += 2) {
+  for (int done = 1; done + 2 <= nodes && !stop.now(); done += 2) {
     const Part top = queue.top();
     const VectorXd slope = top.reach->influence(Eigen::RowVectorXd::Ones(chain.back().weights.rows()));
     Index widest = -1;
@@ -131,7 +132,11 @@ class SetError {
  public:
   SetError(const Network& network, const std::string& function, const std::map<std::string, Box>& domain,
            int nodes, const Stop& stop)
-      : names_(files::networks_of(function)), parts_(files::parts(network)), domain_(domain), nodes_(nodes) {
+      : names_(files::networks_of(function)),
+        parts_(files::parts(network)),
+        domain_(domain),
+        nodes_(nodes),
+        stop_(stop) {
     has_ground_ =
         names_.size() == 2 && names_[0] != files::kGroundPhi && parts_.count(files::kGroundPhi) == 1;
     phi_ = reach_network(*parts_.at(names_[0]));
@@ -155,7 +160,7 @@ class SetError {
   }
 
   double plain() const {
-    return largest_over_parts(phi_, domain_.at(names_[0]), nodes_, [&](const Reach& reach) {
+    return largest_over_parts(phi_, domain_.at(names_[0]), nodes_, stop_, [&](const Reach& reach) {
       return behind(phi_, reach, layer_errors(phi_, reach, exact_inputs(phi_)), phi_tails_, 1);
     });
   }
@@ -173,7 +178,7 @@ class SetError {
     TermError result;
     const Box& box = domain_.at(part);
     result.values = hull(network, box, nodes_).bounds;
-    result.weighted = largest_over_parts(network, box, nodes_, [&](const Reach& reach) {
+    result.weighted = largest_over_parts(network, box, nodes_, stop_, [&](const Reach& reach) {
       return behind(network, reach, layer_errors(network, reach, exact_inputs(network)), tail, rho_bound_);
     });
     result.output = layer_errors(network, Reach(network, box), exact_inputs(network)).total.back();
@@ -220,7 +225,7 @@ class SetError {
     chain.insert(chain.end(), rho_.begin(), rho_.end());
     std::vector<double> tail = phi_tails_;
     tail.insert(tail.end(), rho_tails_.begin(), rho_tails_.end());
-    return largest_over_parts(chain, domain_.at(names_[0]), nodes_, [&](const Reach& reach) {
+    return largest_over_parts(chain, domain_.at(names_[0]), nodes_, stop_, [&](const Reach& reach) {
       return behind(chain, reach, layer_errors(chain, reach, exact_inputs(chain)), tail, 1);
     });
   }
@@ -229,6 +234,7 @@ class SetError {
   std::map<std::string, const files::Weights*> parts_;
   const std::map<std::string, Box>& domain_;
   int nodes_;
+  Stop stop_;
   bool has_ground_ = false;
   ReachNetwork phi_, rho_;
   std::vector<double> phi_tails_, rho_tails_;

@@ -28,7 +28,8 @@ struct Float32Options {
   double input_step = 0;  ///< inputs are multiples of this, rounded to nearest; 0: only rounded to float32
   int nodes = 0;          ///< parts of the box per function; 0: 8000, fewer for large networks, at least 600
   int jobs = 0;
-  Stop stop;  ///< ends the semidefinite programs of the tails: bounds layer by layer in their place
+  /// Ends the semidefinite programs of the tails, for bounds layer by layer in their place, and the search of parts.
+  Stop stop;
 };
 
 /// How far an input's conversion may move it, per coordinate: rounding to float32, and half a step.

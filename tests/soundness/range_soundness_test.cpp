@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <optional>
 #include <random>
@@ -282,6 +283,23 @@ TEST(RangeSoundness, NoClimbFindsAFloat32EvaluationFurtherOffThanItsBound) {
     EXPECT_LE(found, bound + 1e-14);  // f is evaluated in double here
     EXPECT_LE(bound, 40 * found);
   }
+}
+
+TEST(RangeSoundness, AFloat32ErrorWhoseSearchIsStoppedIsLargerAndFinite) {
+  std::mt19937 generator(8);
+  const Network network = tests::deep_set(tests::random_network({6, 8, 5, 4}, generator),
+                                          tests::random_network({4, 6, 1}, generator));
+  const std::map<std::string, double> bounds = {{"set:default:default", 1}};
+  lipschitz::Float32Options options;
+  const auto evaluation = [&] {
+    return lipschitz::float32_errors(network, domain_of(network), bounds, options).at(0).evaluation.value();
+  };
+  const double searched = evaluation();
+  const std::atomic<bool> cancelled = true;
+  options.stop = lipschitz::Stop(&cancelled);
+  const double stopped = evaluation();
+  EXPECT_GT(stopped, 1.5 * searched);
+  EXPECT_TRUE(std::isfinite(stopped));
 }
 
 TEST(RangeSoundness, FlownNetworksAreWithinRangeAndFloat32IsWithinTwoHundredthsOfAGram) {
