@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <type_traits>
 #include <utility>
@@ -34,23 +35,23 @@ struct Kernel {
   int block;
   decltype(&narrow::strengths) strengths;
   decltype(&narrow::swarm_forces) swarm_forces;
-  decltype(&narrow::composed_of_one) composed_of_one;
+  decltype(&narrow::compose_row) compose_row;
   decltype(&narrow::logarithm_of_one) logarithm_of_one;
 };
 
 /// The narrowest that takes `count` at once, or the widest of this processor.
 const Kernel& kernel_for([[maybe_unused]] int count) {
 #if defined(SWARMCERT_WIDE_KERNELS)
-  static constexpr Kernel kAvx2 = {avx2::kBlock, avx2::strengths, avx2::swarm_forces, avx2::composed_of_one,
+  static constexpr Kernel kAvx2 = {avx2::kBlock, avx2::strengths, avx2::swarm_forces, avx2::compose_row,
                                    avx2::logarithm_of_one};
   static constexpr Kernel kAvx512 = {avx512::kBlock, avx512::strengths, avx512::swarm_forces,
-                                     avx512::composed_of_one, avx512::logarithm_of_one};
+                                     avx512::compose_row, avx512::logarithm_of_one};
   if (count > avx2::kBlock && widest_kernels() == KernelWidth::kAvx512) return kAvx512;
   // Also for fewer: the narrow one has no fused operations of its own.
   if (widest_kernels() >= KernelWidth::kAvx2) return kAvx2;
 #endif
   static constexpr Kernel kNarrow = {narrow::kBlock, narrow::strengths, narrow::swarm_forces,
-                                     narrow::composed_of_one, narrow::logarithm_of_one};
+                                     narrow::compose_row, narrow::logarithm_of_one};
   return kNarrow;
 }
 
@@ -77,35 +78,58 @@ EffectInfo Downwash::describe() {
 }
 
 void Downwash::columns(const Instant& now, const double* shape, Wrench* columns) const {
-  // The same arithmetic as for a whole swarm, a handful of neighbours at a time.
+  columns_along(&now, 1, shape, columns);
+}
+
+void Downwash::columns_along(const Instant* instants, int count, const double* shape, Wrench* columns) const {
+  drifted_columns(instants, count, shape, 0, Eigen::Vector3d::Zero(), columns);
+}
+
+// The same arithmetic as for a whole swarm, for the pairs of several instants at a time.
+void Downwash::drifted_columns(const Instant* instants, int count, const double* shape, double delay_s,
+                               const Eigen::Vector3d& wind_m_s, Wrench* columns) const {
   constexpr int kMost = 4 * kRowLength;
-  alignas(kRowLength * sizeof(double)) double rows[6][kMost], power[kMost];
-  double sum = 0, last_mass_kg = 0;
-  for (int next = 0; next < now.num_neighbours;) {
-    int count = 0;
-    for (; next < now.num_neighbours && count < kMost; ++next) {
-      const Neighbour& neighbour = now.neighbours[next];
-      if (neighbour.dp_W_m.z() <= kWakeTouching_m) continue;  // does nothing, as in the kernel
-      const int k = count++;
-      rows[0][k] = neighbour.dp_W_m.x();
-      rows[1][k] = neighbour.dp_W_m.y();
-      rows[2][k] = neighbour.dp_W_m.z();
-      rows[3][k] = neighbour.v_W_m_s.x();
-      rows[4][k] = neighbour.v_W_m_s.y();
-      const bool is_as_before = k > 0 && neighbour.mass_kg == last_mass_kg;
-      rows[5][k] = is_as_before ? rows[5][k - 1] : pair_constant(neighbour.mass_kg, shape);
-      last_mass_kg = neighbour.mass_kg;
-    }
-    if (count == 0) break;
-    for (auto& row : rows) std::fill(row + count, row + round_up(count, kRowLength), row[count - 1]);
-    const Kernel& kernel = kernel_for(count);
-    kernel.strengths({rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]}, round_up(count, kernel.block),
+  alignas(kRowLength * sizeof(double)) double rows[6][kMost], power[kMost], sums[kMost], composed[kMost];
+  int of_instant[kMost], pairs = 0;
+  double last_mass_kg = std::numeric_limits<double>::quiet_NaN(), last_constant = 0;
+  const auto add_up = [&] {
+    if (pairs == 0) return;
+    for (auto& row : rows) std::fill(row + pairs, row + round_up(pairs, kRowLength), row[pairs - 1]);
+    const Kernel& kernel = kernel_for(pairs);
+    kernel.strengths({rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]}, round_up(pairs, kernel.block),
                      shape, power);
-    for (int k = 0; k < count; ++k) sum += power[k];
+    for (int k = 0; k < pairs; ++k) sums[of_instant[k]] += power[k];
+    pairs = 0;
+  };
+  for (int first = 0; first < count; first += kMost) {
+    const int some = std::min(count - first, kMost);
+    std::fill(std::begin(sums), std::end(sums), 0.0);
+    for (int i = 0; i < some; ++i) {
+      const Instant& now = instants[first + i];
+      for (int j = 0; j < now.num_neighbours; ++j) {
+        const Neighbour& neighbour = now.neighbours[j];
+        Eigen::Vector3d dp_W_m = neighbour.dp_W_m;
+        if (delay_s != 0) dp_W_m += delay_s * (wind_m_s - neighbour.v_W_m_s);
+        if (dp_W_m.z() <= kWakeTouching_m) continue;  // does nothing, as in the kernel
+        if (pairs == kMost) add_up();
+        if (neighbour.mass_kg != last_mass_kg) {
+          last_mass_kg = neighbour.mass_kg;
+          last_constant = pair_constant(last_mass_kg, shape);
+        }
+        const double numbers[] = {
+            dp_W_m.x(), dp_W_m.y(), dp_W_m.z(), neighbour.v_W_m_s.x(), neighbour.v_W_m_s.y(), last_constant};
+        for (int row = 0; row < 6; ++row) rows[row][pairs] = numbers[row];
+        of_instant[pairs++] = i;
+      }
+    }
+    add_up();
+    const Kernel& kernel = kernel_for(some);
+    kernel.compose_row(sums, round_up(some, kernel.block), 1 / shape[kNorm], composed);
+    for (int i = 0; i < some; ++i) {
+      columns[first + i] = {};
+      if (sums[i] != 0) columns[first + i].force_W_N.z() = -composed[i];  // also where it is no number
+    }
   }
-  columns[0] = {};
-  // Also where it is no number.
-  if (sum != 0) columns[0].force_W_N.z() = -kernel_for(1).composed_of_one(sum, 1 / shape[kNorm]);
 }
 
 double Downwash::pair_constant(double neighbour_mass_kg, const double* shape) const {

@@ -22,6 +22,11 @@ class Downwash : public Effect {
   Downwash() : Effect(describe()) {}
   static EffectInfo describe();
   void columns(const Instant& now, const double* shape, Wrench* columns) const override;
+  void columns_along(const Instant* instants, int count, const double* shape, Wrench* columns) const override;
+  /// columns_along() of wakes that arrive `delay_s` after they left, as if neighbours were at p_j + delay_s (w - v_j).
+  /// @param wind_m_s w
+  void drifted_columns(const Instant* instants, int count, const double* shape, double delay_s,
+                       const Eigen::Vector3d& wind_m_s, Wrench* columns) const;
   bool takes_pairs() const override { return true; }
   bool pairs_need_velocity(const double* shape) const override { return shape[kConvection] != 0; }
   /// The logarithm of the part of g^p that neither place nor motion changes.

@@ -11,6 +11,9 @@ class InstantStream : public ColumnStream {
   InstantStream(const Effect& effect, std::vector<double> shape)
       : effect_(effect), shape_(std::move(shape)) {}
   void advance(const Instant& now, Wrench* columns) override { effect_.columns(now, shape_.data(), columns); }
+  void advance_along(const Instant* instants, int count, int, Wrench* columns) override {
+    effect_.columns_along(instants, count, shape_.data(), columns);
+  }
 
  private:
   const Effect& effect_;
@@ -18,6 +21,14 @@ class InstantStream : public ColumnStream {
 };
 
 }  // namespace
+
+void ColumnStream::advance_along(const Instant* instants, int count, int width, Wrench* columns) {
+  for (int i = 0; i < count; ++i) advance(instants[i], columns + i * width);
+}
+
+void Effect::columns_along(const Instant* instants, int count, const double* shape, Wrench* columns) const {
+  for (int i = 0; i < count; ++i) this->columns(instants[i], shape, columns + i * num_columns());
+}
 
 std::unique_ptr<ColumnStream> Effect::stream(const double* shape) const {
   return std::make_unique<InstantStream>(*this, std::vector<double>(shape, shape + info_.shape.size()));

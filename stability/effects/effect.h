@@ -8,7 +8,7 @@
 /// Effects that remember (motor lag, delays) have no column of one instant. They give a stream of columns over a
 /// time series, and tell the simulator their place in the path of the signal (signal_path.h).
 ///
-/// Costs: identification calls advance() once per log record, effect and theta: no heap there, and none in columns().
+/// Costs: identification goes along every log record with every effect and theta: no heap in advance(), nor in columns().
 #pragma once
 
 #include <Eigen/Core>
@@ -112,6 +112,10 @@ class ColumnStream {
   /// @param now     times ascend from call to call.
   /// @param columns [info().linear.size()]; force and torque per unit of each coefficient.
   virtual void advance(const Instant& now, Wrench* columns) = 0;
+  /// advance() for instants in a row, which is faster where several fit into the processor's registers.
+  /// @param width   info().linear.size().
+  /// @param columns [count x width], instant by instant.
+  virtual void advance_along(const Instant* instants, int count, int width, Wrench* columns);
 };
 
 struct SignalPath;
@@ -132,6 +136,8 @@ class Effect {
   /// @param shape   theta, [info().shape.size()].
   /// @param columns [num_columns()], overwritten.
   virtual void columns(const Instant& now, const double* shape, Wrench* columns) const = 0;
+  /// columns() of several instants, the same bits. @param columns [count x num_columns()], instant by instant.
+  virtual void columns_along(const Instant* instants, int count, const double* shape, Wrench* columns) const;
 
   /// Whether add_force_z() gives this effect's one column, which then is a vertical force that depends on nothing but
   /// pairs: the fast way for simulated swarms.

@@ -69,8 +69,12 @@ class WakeDelay : public Effect {
                 false,
                 true}) {}
   void columns(const Instant& now, const double* shape, Wrench* columns) const override {
-    std::array<Neighbour, kMostAtOnce> past;
-    wake_.columns(with_past_neighbours(now, shape, past.data()), downwash_shape(shape).data(), columns);
+    columns_along(&now, 1, shape, columns);
+  }
+  void columns_along(const Instant* instants, int count, const double* shape,
+                     Wrench* columns) const override {
+    wake_.drifted_columns(instants, count, downwash_shape(shape).data(), shape[kDelay],
+                          {shape[kWindX], shape[kWindY], 0}, columns);
   }
   bool in_support(const Instant& now, const double* shape) const override {
     std::array<Neighbour, kMostAtOnce> past;

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <set>
 
@@ -130,6 +131,37 @@ TEST(Effects, ForceIsColumnsTimesCoefficientsAtRandomStates) {
     }
   }
   EXPECT_GT(acting, 1500) << "the states must reach the effects";
+}
+
+TEST(Effects, GiveTheSameBitsForInstantsInARowAsForEachAlone) {
+  std::mt19937_64 random(11);
+  for (const std::string& name : effect_names()) {
+    if (effect_info(name).remembers) continue;
+    SCOPED_TRACE(name);
+    const std::unique_ptr<Effect> effect = make_effect(spec_of(name), kContext);
+    // More than registers hold, and more pairs than the downwash takes at once; with vehicles that are alone.
+    std::deque<RandomInstant> states;
+    std::vector<Instant> instants;
+    for (int i = 0; i < 77; ++i) instants.push_back(states.emplace_back(random, i % 7 == 6 ? 50 : i % 5).now);
+    const int width = effect->num_columns();
+    std::vector<Wrench> in_a_row(instants.size() * static_cast<std::size_t>(width));
+    std::vector<std::vector<double>> shapes = effect->grid({0.05, 1.2});
+    shapes.push_back(AppliedEffect(spec_of(name), kContext).shape());
+    for (const std::vector<double>& shape : shapes) {
+      effect->stream(shape.data())
+          ->advance_along(instants.data(), static_cast<int>(instants.size()), width, in_a_row.data());
+      const std::unique_ptr<ColumnStream> stream = effect->stream(shape.data());
+      std::vector<Wrench> alone(static_cast<std::size_t>(width));
+      for (std::size_t i = 0; i < instants.size(); ++i) {
+        stream->advance(instants[i], alone.data());
+        for (std::size_t k = 0; k < alone.size(); ++k) {
+          const Wrench& other = in_a_row[i * alone.size() + k];
+          ASSERT_EQ(other.force_W_N, alone[k].force_W_N) << i;
+          ASSERT_EQ(other.torque_B_Nm, alone[k].torque_B_Nm) << i;
+        }
+      }
+    }
+  }
 }
 
 /// Force in gram-force on a vehicle `dz_m` below another at horizontal distance `r_m`.
