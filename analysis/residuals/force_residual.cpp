@@ -113,17 +113,19 @@ const AccelerometerFilter::Response& AccelerometerFilter::known_response(double 
 template <int kCount>
 void AccelerometerFilter::advance_block(Eigen::Index first, double* values) {
   using Numbers = Eigen::Array<double, kCount, 1>;
-  const Eigen::Map<const Numbers> u(values + first), last(input_.data() + first);
+  Eigen::Map<Numbers> value(values + first), last(input_.data() + first);
   Eigen::Map<Numbers> y(output_.data() + first), slope(slope_.data() + first);
-  const Numbers ramp = (u - last) * response_.inverse_step_1_s, delayed = ramp * (1 / rate_1_s_);
+  const Numbers u = value, ramp = (u - last) * response_.inverse_step_1_s, delayed = ramp * (1 / rate_1_s_);
   const Numbers start = y - last + delayed, bend = slope - ramp;
   y = u - delayed + response_.start_to_output * start + response_.bend_to_output * bend;
   slope = ramp + response_.bend_to_slope * bend - response_.start_to_slope * start;
+  last = u;
+  value = y;
 }
 
 void AccelerometerFilter::advance(double time_s, Eigen::Matrix3Xd& values) {
   if (!has_past_) {
-    output_ = values;
+    input_ = output_ = values;
     slope_.setZero();
   } else {
     const double step_s = time_s - time_s_;
@@ -136,8 +138,6 @@ void AccelerometerFilter::advance(double time_s, Eigen::Matrix3Xd& values) {
   }
   has_past_ = true;
   time_s_ = time_s;
-  input_ = values;
-  values = output_;
 }
 
 MeasuredForce::MeasuredForce(const Track& track, const stability::Model& model, int channels)
