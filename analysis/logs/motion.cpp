@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <utility>
 
 #include "analysis/logs/interpretation.h"
 #include "analysis/logs/smoother.h"
@@ -13,9 +14,9 @@ using Source = SignalInfo::Source;
 
 /// Standard deviation of the noise of a derived acceleration: what the smoother leaves of a column is held to be its
 /// noise, and goes through the smoother's weights. Correlated noise of an estimator counts as its runs last.
-double noise_of_slope(const SignalTable& t, const std::vector<double>& column, double window_s, int degree,
-                      int derivative) {
-  const std::vector<double> smooth = local_derivative(t, column, window_s, degree, 0);
+/// @param smooth local_derivative() number 0.
+double noise_of_slope(const SignalTable& t, const std::vector<double>& column,
+                      const std::vector<double>& smooth, double window_s, int derivative) {
   std::vector<double> left(column.size());
   for (std::size_t i = 0; i < column.size(); ++i) left[i] = column[i] - smooth[i];
   // A vehicle that stands shows less noise than one that flies.
@@ -262,15 +263,19 @@ void derive_kinematics(Draft& draft) {
     auto& acceleration = draft.acceleration_m_s2[static_cast<std::size_t>(k)];
     double axis_noise = std::nan("");
     if (t.has(kVelocity + k)) {
-      acceleration = local_derivative(t, t[kVelocity + k], velocity_s, 2, 1);
-      axis_noise = noise_of_slope(t, t[kVelocity + k], velocity_s, 2, 1);
+      std::vector<std::vector<double>> fits = local_derivatives(t, t[kVelocity + k], velocity_s, 2, {0, 1});
+      acceleration = std::move(fits[1]);
+      axis_noise = noise_of_slope(t, t[kVelocity + k], fits[0], velocity_s, 1);
     } else if (t.has(kPosition + k)) {
-      t[kVelocity + k] = local_derivative(t, t[kPosition + k], velocity_s, 2, 1);
-      velocity_noise = std::max(velocity_noise, noise_of_slope(t, t[kPosition + k], velocity_s, 2, 1));
+      const std::vector<double>& position = t[kPosition + k];
+      std::vector<std::vector<double>> fits = local_derivatives(t, position, velocity_s, 2, {0, 1});
+      t[kVelocity + k] = std::move(fits[1]);
+      velocity_noise = std::max(velocity_noise, noise_of_slope(t, position, fits[0], velocity_s, 1));
       for (double& v : t[kVelocity + k]) v = std::isfinite(v) ? v : 0;
       velocity_from += axes[k];
-      acceleration = local_derivative(t, t[kPosition + k], position_s, 3, 2);
-      axis_noise = noise_of_slope(t, t[kPosition + k], position_s, 3, 2);
+      fits = local_derivatives(t, position, position_s, 3, {0, 2});
+      acceleration = std::move(fits[1]);
+      axis_noise = noise_of_slope(t, position, fits[0], position_s, 2);
     } else {
       continue;
     }

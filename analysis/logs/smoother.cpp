@@ -4,43 +4,56 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace swarmcert::logs {
-
 namespace {
 
-/// The coefficient of tau^power of the least-squares polynomial that has these normal equations.
-template <int Degree>
-double fitted_coefficient(const Eigen::Matrix4d& normal, const Eigen::Vector4d& right, int power) {
-  using Matrix = Eigen::Matrix<double, Degree + 1, Degree + 1>;
-  const Eigen::LDLT<Matrix> solver(normal.topLeftCorner<Degree + 1, Degree + 1>());
-  return solver.solve(right.head<Degree + 1>())[power];
-}
-
 /// The normal equations of a polynomial in tau, of which the solver reads the lower triangle.
+template <int Degree>
 struct NormalEquations {
-  Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
-  Eigen::Vector4d right = Eigen::Vector4d::Zero();
+  using Matrix = Eigen::Matrix<double, Degree + 1, Degree + 1>;
+  using Vector = Eigen::Matrix<double, Degree + 1, 1>;
+  Matrix matrix = Matrix::Zero();
+  Vector right = Vector::Zero();
   int count = 0;
 
-  template <int Degree>
-  void add(double tau, double value) {
-    const double powers[4] = {1, tau, tau * tau, tau * tau * tau};
-    for (int row = 0; row <= Degree; ++row) {
-      for (int column = 0; column <= row; ++column) matrix(row, column) += powers[row] * powers[column];
-      right[row] += value * powers[row];
+  /// Of the finite ones of values[first] to values[end - 1].
+  /// @param from, half of tau = (t - from) / half
+  void add(const std::vector<double>& times, const std::vector<double>& values, std::size_t first,
+           std::size_t end, double from, double half) {
+    // Plain arrays and known loops: the sums stay in registers.
+    double sums[Degree + 1][Degree + 1] = {}, products[Degree + 1] = {}, powers[Degree + 1] = {1};
+    for (std::size_t k = first; k < end; ++k) {
+      if (!std::isfinite(values[k])) continue;
+      const double tau = (times[k] - from) / half;
+#pragma GCC unroll 4
+      for (int row = 0; row <= Degree; ++row) {
+        if (row > 0) powers[row] = powers[row - 1] * tau;
+#pragma GCC unroll 4
+        for (int column = 0; column <= row; ++column) sums[row][column] += powers[row] * powers[column];
+        products[row] += values[k] * powers[row];
+      }
+      ++count;
     }
-    ++count;
+    for (int row = 0; row <= Degree; ++row) {
+      for (int column = 0; column <= row; ++column) matrix(row, column) = sums[row][column];
+      right[row] = products[row];
+    }
   }
 };
 
 template <int Degree>
-std::vector<double> derivative_of_fits(const SignalTable& table, const std::vector<double>& series,
-                                       double window_s, int derivative) {
+std::vector<std::vector<double>> derivatives_of_fits(const SignalTable& table,
+                                                     const std::vector<double>& series, double window_s,
+                                                     const std::vector<int>& derivatives) {
   const std::size_t n = table.size();
-  std::vector<double> result(n, std::numeric_limits<double>::quiet_NaN());
+  std::vector<std::vector<double>> results(derivatives.size(),
+                                           std::vector<double>(n, std::numeric_limits<double>::quiet_NaN()));
   const double half_us = 0.5e6 * window_s;
-  const double scale = std::pow(2 / window_s, derivative) * (derivative == 2 ? 2 : derivative == 3 ? 6 : 1);
+  std::vector<double> scales;
+  for (const int order : derivatives)
+    scales.push_back(std::pow(2 / window_s, order) * (order == 2 ? 2 : order == 3 ? 6 : 1));
   std::size_t first = 0, end = 0, stretch = 0;
   for (std::size_t i = 0; i < n; ++i) {
     if (table.restarts[i] != 0) stretch = first = i;
@@ -48,28 +61,33 @@ std::vector<double> derivative_of_fits(const SignalTable& table, const std::vect
     if (end <= i) end = i + 1;
     while (end < n && table.restarts[end] == 0 && table.time_us[end] <= table.time_us[i] + half_us) ++end;
     if (first < stretch) first = stretch;
-    NormalEquations sums;  // of tau = (t - t_i) / half
-    for (std::size_t k = first; k < end; ++k)
-      if (std::isfinite(series[k]))
-        sums.add<Degree>((table.time_us[k] - table.time_us[i]) / half_us, series[k]);
-    if (sums.count > Degree)
-      result[i] = fitted_coefficient<Degree>(sums.matrix, sums.right, derivative) * scale;
+    NormalEquations<Degree> equations;
+    equations.add(table.time_us, series, first, end, table.time_us[i], half_us);
+    if (equations.count <= Degree) continue;
+    const typename NormalEquations<Degree>::Vector fitted = equations.matrix.ldlt().solve(equations.right);
+    for (std::size_t d = 0; d < derivatives.size(); ++d) results[d][i] = fitted[derivatives[d]] * scales[d];
   }
-  return result;
+  return results;
 }
 
 }  // namespace
 
-std::vector<double> local_derivative(const SignalTable& table, const std::vector<double>& series,
-                                     double window_s, int degree, int derivative) {
+std::vector<std::vector<double>> local_derivatives(const SignalTable& table,
+                                                   const std::vector<double>& series, double window_s,
+                                                   int degree, const std::vector<int>& derivatives) {
   switch (degree) {
     case 1:
-      return derivative_of_fits<1>(table, series, window_s, derivative);
+      return derivatives_of_fits<1>(table, series, window_s, derivatives);
     case 2:
-      return derivative_of_fits<2>(table, series, window_s, derivative);
+      return derivatives_of_fits<2>(table, series, window_s, derivatives);
     default:
-      return derivative_of_fits<3>(table, series, window_s, derivative);
+      return derivatives_of_fits<3>(table, series, window_s, derivatives);
   }
+}
+
+std::vector<double> local_derivative(const SignalTable& table, const std::vector<double>& series,
+                                     double window_s, int degree, int derivative) {
+  return std::move(local_derivatives(table, series, window_s, degree, {derivative})[0]);
 }
 
 }  // namespace swarmcert::logs

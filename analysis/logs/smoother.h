@@ -22,4 +22,9 @@ inline double position_window_s(double step_s) { return std::max(kPositionWindow
 std::vector<double> local_derivative(const SignalTable& table, const std::vector<double>& series,
                                      double window_s, int degree, int derivative);
 
+/// Several derivatives of the same polynomials, in this order.
+std::vector<std::vector<double>> local_derivatives(const SignalTable& table,
+                                                   const std::vector<double>& series, double window_s,
+                                                   int degree, const std::vector<int>& derivatives);
+
 }  // namespace swarmcert::logs
