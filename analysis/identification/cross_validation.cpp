@@ -114,9 +114,10 @@ Eigen::VectorXd CrossValidation::solve(const Sum& sum, const Members& members) c
       upper[i++] = p.upper;
     }
   }
-  const Eigen::MatrixXd to = from_model(members);
-  return to * box_least_squares(to.transpose() * part_of_gram(sum.gram, all) * to,
-                                to.transpose() * part_of(sum.b, all), lower, upper);
+  const Eigen::MatrixXd gram = part_of_gram(sum.gram, all), to = from_model(members);
+  const Eigen::VectorXd b = part_of(sum.b, all);
+  if (to.isIdentity(0)) return box_least_squares(gram, b, lower, upper);
+  return to * box_least_squares(to.transpose() * gram * to, to.transpose() * b, lower, upper);
 }
 
 Eigen::MatrixXd CrossValidation::from_model(const Members& members) const {
@@ -154,6 +155,12 @@ double CrossValidation::mean_square(const Members& members) const {
 }
 
 double CrossValidation::mean_square(const Members& members, const Folds& folds) const {
+  const auto [known, is_new] = mean_squares_.emplace(Question(&folds == &by_flight_, members), 0);
+  if (is_new) known->second = made_mean_square(members, folds);
+  return known->second;
+}
+
+double CrossValidation::made_mean_square(const Members& members, const Folds& folds) const {
   const std::vector<int> all = columns(members);
   double error = 0;
   for (std::size_t f = 0; f < kFolds; ++f) {
@@ -169,7 +176,14 @@ std::vector<double> CrossValidation::block_errors(const Members& members) const 
   return block_errors(members, folds_for(members));
 }
 
-std::vector<double> CrossValidation::block_errors(const Members& members, const Folds& folds) const {
+const std::vector<double>& CrossValidation::block_errors(const Members& members, const Folds& folds) const {
+  const auto [known, is_new] =
+      block_errors_.emplace(Question(&folds == &by_flight_, members), std::vector<double>());
+  if (is_new) known->second = made_block_errors(members, folds);
+  return known->second;
+}
+
+std::vector<double> CrossValidation::made_block_errors(const Members& members, const Folds& folds) const {
   const std::vector<int> all = columns(members);
   std::array<Eigen::VectorXd, kFolds> fits;
   for (std::size_t f = 0; f < kFolds && !all.empty(); ++f) fits[f] = solve(folds.outside[f], members);

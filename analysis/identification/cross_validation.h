@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "analysis/identification/block_grams.h"
@@ -12,6 +14,9 @@ namespace swarmcert::identification {
 struct Member {
   int candidate = 0, theta = 0;
   bool operator==(const Member& other) const { return candidate == other.candidate && theta == other.theta; }
+  bool operator<(const Member& other) const {
+    return candidate != other.candidate ? candidate < other.candidate : theta < other.theta;
+  }
 };
 using Members = std::vector<Member>;
 
@@ -25,6 +30,7 @@ struct Fit {
   Eigen::MatrixXd covariance;  ///< see sandwich()
 };
 
+/// What was predicted once is remembered: the passes of a selection ask for the same again. For one thread at a time.
 class CrossValidation {
  public:
   /// @param grams must outlive this.
@@ -70,13 +76,18 @@ class CrossValidation {
   };
   const Folds& folds_for(const Members& members) const;
   double mean_square(const Members& members, const Folds& folds) const;
-  std::vector<double> block_errors(const Members& members, const Folds& folds) const;
+  const std::vector<double>& block_errors(const Members& members, const Folds& folds) const;
   /// As block_errors(), about the mean residual of each track: what differs from flight to flight, as a trim does,
   /// takes no part.
   std::vector<double> trimmed_errors(const Members& members, const Folds& folds) const;
 
  private:
+  /// What a prediction depends on: whether whole flights are left out, and of which effects it is.
+  using Question = std::pair<bool, Members>;
+
   void divide(Folds& folds) const;
+  double made_mean_square(const Members& members, const Folds& folds) const;
+  std::vector<double> made_block_errors(const Members& members, const Folds& folds) const;
   std::vector<int> columns(const Members& members) const;
   Eigen::VectorXd solve(const Sum& sum, const Members& members) const;
   /// T of c = T c_model: ones on the diagonal, and where a stage of the thrust meets its scale.
@@ -86,6 +97,8 @@ class CrossValidation {
   Folds random_, by_flight_;
   bool has_flights_ = false;
   Sum total_;
+  mutable std::map<Question, double> mean_squares_;
+  mutable std::map<Question, std::vector<double>> block_errors_;
 };
 
 }  // namespace swarmcert::identification

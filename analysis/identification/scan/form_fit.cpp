@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "nn/base/doubles.h"
 
@@ -72,6 +73,8 @@ FormFit improved(const Form& form, const FormData& data, FormFit best) {
   std::vector<double> steps;
   for (std::size_t k = 0; k < form.shape.size(); ++k)
     steps.push_back(first_step(form.shape[k], best.theta[k]));
+  // The error only falls: what was tried once is never better later.
+  std::set<std::vector<double>> tried = {best.theta};
   int halved = 0;
   for (int round = 0; round < kMostRounds && halved < kHalvings; ++round) {
     bool moved = false;
@@ -80,6 +83,7 @@ FormFit improved(const Form& form, const FormData& data, FormFit best) {
         if (steps[k] == 0) continue;
         std::vector<double> theta = best.theta;
         theta[k] = std::clamp(theta[k] + sign * steps[k], form.shape[k].lower, form.shape[k].upper);
+        if (!tried.insert(theta).second) continue;
         FormFit next = fit_coefficients(form, data, theta);
         if (!(next.mean_square < best.mean_square * (1 - 1e-9))) continue;
         best = std::move(next);
