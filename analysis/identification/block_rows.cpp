@@ -6,6 +6,40 @@
 
 namespace swarmcert::identification {
 
+namespace {
+
+/// Counts where the effects of a run act, block by block.
+class SupportCount {
+ public:
+  /// @param support gets what close() finds; must outlive this.
+  SupportCount(const TrackBlocks& cut, std::vector<Support>& support)
+      : cut_(cut), support_(support), records_(support.size()) {}
+
+  void add(const ColumnRun& run, const stability::Instant& now, int block) {
+    if (block != current_) close();
+    current_ = block;
+    run.count_support(now, records_);
+  }
+
+  /// Ends the block.
+  void close() {
+    if (current_ < 0) return;
+    for (std::size_t s = 0; s < records_.size(); ++s) {
+      support_[s].records += static_cast<std::size_t>(records_[s]);
+      if (20 * records_[s] >= cut_.blocks[static_cast<std::size_t>(current_)].records) ++support_[s].blocks;
+    }
+    std::fill(records_.begin(), records_.end(), 0);
+  }
+
+ private:
+  const TrackBlocks& cut_;
+  std::vector<Support>& support_;
+  std::vector<int> records_;
+  int current_ = -1;
+};
+
+}  // namespace
+
 void run_blocks(const residuals::Inputs& inputs, const ModelledTrack& modelled, const Grams& grams,
                 const Noise* noise, std::vector<Support>& support,
                 const std::function<void(int block, const Eigen::MatrixXd& rows)>& add) {
@@ -16,54 +50,60 @@ void run_blocks(const residuals::Inputs& inputs, const ModelledTrack& modelled, 
   if (noise != nullptr) whitening.emplace(*noise);
   Eigen::Matrix3Xd row(3, grams.columns + 1);
   Eigen::MatrixXd rows;
-  std::vector<int> in_support(support.size());
-  int current = -1, count = 0;
-  const auto close = [&] {
-    if (current < 0) return;
-    add(current, rows);
-    for (std::size_t s = 0; s < in_support.size(); ++s) {
-      support[s].records += static_cast<std::size_t>(in_support[s]);
-      if (20 * in_support[s] >= cut.blocks[static_cast<std::size_t>(current)].records) ++support[s].blocks;
-    }
-  };
-  for (std::size_t i = 0; i < track.instants.size(); ++i) {
+  SupportCount shown(cut, support);
+  int current = -1;
+  Eigen::Index next = 0;
+  run.along(track.instants, [&](std::size_t i, const Eigen::Matrix3Xd& columns) {
     const bool restart = track.restarts[i] != 0;
-    row << run.advance(track.instants[i], restart), modelled.residual_N[i];
+    const int block = cut.of_record[i];
+    if (block < 0 && !whitening) return;
+    row << columns, modelled.residual_N[i];
     if (whitening)
       row = whitening->advance(row, restart ? 0 : track.instants[i].time_s - track.instants[i - 1].time_s,
                                restart);
-    const int block = cut.of_record[i];
-    if (block < 0) continue;
+    if (block < 0) return;
     if (block != current) {
-      close();
+      if (current >= 0) add(current, rows);
       current = block;
-      count = 0;
+      next = 0;
       rows.resize(Eigen::Index(3) * cut.blocks[static_cast<std::size_t>(block)].records, grams.columns + 1);
-      std::fill(in_support.begin(), in_support.end(), 0);
     }
-    rows.middleRows<3>(Eigen::Index(3) * count++) = row;
-    run.count_support(track.instants[i], in_support);
-  }
-  close();
+    rows.middleRows<3>(next) = row;
+    next += 3;
+    shown.add(run, track.instants[i], block);
+  });
+  if (current >= 0) add(current, rows);
+  shown.close();
 }
 
-std::vector<Eigen::MatrixXd> block_columns(const residuals::Inputs& inputs, const ModelledTrack& modelled,
-                                           const Grams& grams,
-                                           const std::vector<stability::Instant>& instants) {
-  const TrackBlocks& cut = modelled.cut;
-  std::vector<Eigen::MatrixXd> blocks;
-  for (const TrackBlock& block : cut.blocks)
-    blocks.emplace_back(Eigen::Index(3) * block.records, grams.columns);
-  std::vector<Eigen::Index> next(blocks.size(), 0);
+Eigen::MatrixXd columns_along(const residuals::Inputs& inputs, const ModelledTrack& modelled,
+                              const Grams& grams, const std::vector<stability::Instant>& instants,
+                              std::vector<Support>* support) {
+  Eigen::MatrixXd rows(modelled.cut.rows(), grams.columns);
+  Eigen::Index next = 0;
   ColumnRun run(grams, inputs, modelled.model, modelled.track);
-  for (std::size_t i = 0; i < instants.size(); ++i) {
-    const Eigen::Matrix3Xd& columns = run.advance(instants[i], modelled.track.restarts[i] != 0);
-    if (cut.of_record[i] < 0) continue;
-    const auto b = static_cast<std::size_t>(cut.of_record[i]);
-    blocks[b].middleRows<3>(next[b]) = columns;
-    next[b] += 3;
+  std::optional<SupportCount> shown;
+  if (support != nullptr) shown.emplace(modelled.cut, *support);
+  run.along(instants, [&](std::size_t i, const Eigen::Matrix3Xd& columns) {
+    const int block = modelled.cut.of_record[i];
+    if (block < 0) return;
+    rows.middleRows<3>(next) = columns;
+    next += 3;
+    if (shown) shown->add(run, instants[i], block);
+  });
+  if (shown) shown->close();
+  return rows;
+}
+
+Eigen::VectorXd residual_along(const ModelledTrack& modelled) {
+  Eigen::VectorXd rows(modelled.cut.rows());
+  Eigen::Index next = 0;
+  for (std::size_t i = 0; i < modelled.residual_N.size(); ++i) {
+    if (modelled.cut.of_record[i] < 0) continue;
+    rows.segment<3>(next) = modelled.residual_N[i];
+    next += 3;
   }
-  return blocks;
+  return rows;
 }
 
 Block condensed(const Eigen::Ref<const Eigen::MatrixXd>& rows) {

@@ -17,10 +17,15 @@ void run_blocks(const residuals::Inputs& inputs, const ModelledTrack& modelled, 
                 const Noise* noise, std::vector<Support>& support,
                 const std::function<void(int block, const Eigen::MatrixXd& rows)>& add);
 
-/// The columns of `grams` along `instants`, the track's or others of the same times: [3 x records, columns] by block.
-std::vector<Eigen::MatrixXd> block_columns(const residuals::Inputs& inputs, const ModelledTrack& modelled,
-                                           const Grams& grams,
-                                           const std::vector<stability::Instant>& instants);
+/// The columns of `grams` along `instants`, the track's or others of the same times, at the records of blocks:
+/// [modelled.cut.rows(), columns], one block below the other.
+/// @param support as of run_blocks(), where somebody asks
+Eigen::MatrixXd columns_along(const residuals::Inputs& inputs, const ModelledTrack& modelled,
+                              const Grams& grams, const std::vector<stability::Instant>& instants,
+                              std::vector<Support>* support = nullptr);
+
+/// The residual likewise, in newton.
+Eigen::VectorXd residual_along(const ModelledTrack& modelled);
 
 /// Gram matrix, products and sums of a block.
 /// @param rows as run_blocks() gives them

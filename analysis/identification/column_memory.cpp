@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <numeric>
 #include <utility>
 
 #include "analysis/identification/block_rows.h"
@@ -33,7 +34,7 @@ Candidate of_one_vehicle(const Candidate& candidate) {
   return result;
 }
 
-/// The block with columns of its kept ones. @param source which; -1: zero
+/// The block with columns of its kept ones, without the number of its records. @param source which; -1: zero
 Block gathered(const KeptBlock& kept, const std::vector<int>& source) {
   const auto n = static_cast<Eigen::Index>(source.size());
   Block block;
@@ -60,75 +61,64 @@ Block gathered(const KeptBlock& kept, const std::vector<int>& source) {
   }
   block.sums.col(n) = kept.residual_sum_N;
   block.y = kept.y;
-  block.records = static_cast<int>(kept.r.size() / 3);
   return block;
 }
 
-/// Column `at` of X.
-auto kept_column(const KeptBlock& block, int at) {
-  auto piece = block.pieces.begin();
-  for (; at >= piece->cols(); ++piece) at -= static_cast<int>(piece->cols());
-  return piece->col(at);
-}
-
-/// Columns of the block, of which those after the kept ones are in `more`. @param source which; -1: zero
-void assemble(const KeptBlock& kept, const Eigen::MatrixXd& more, const std::vector<int>& source,
-              Eigen::Ref<Eigen::MatrixXd> columns) {
-  const int known = kept.columns();
-  for (std::size_t j = 0; j < source.size(); ++j) {
-    auto to = columns.col(static_cast<Eigen::Index>(j));
-    if (source[j] >= known)
-      to = more.col(source[j] - known);
-    else if (source[j] >= 0)
-      to = kept_column(kept, source[j]);
+/// Columns side by side. @param source which; -1: zero
+Eigen::MatrixXd assembled(Eigen::Index rows, const std::vector<const double*>& columns,
+                          const std::vector<int>& source) {
+  Eigen::MatrixXd result(rows, static_cast<Eigen::Index>(source.size()));
+  double* to = result.data();
+  for (const int from : source) {
+    if (from < 0)
+      std::fill(to, to + rows, 0.0);
     else
-      to.setZero();
+      std::copy(columns[static_cast<std::size_t>(from)], columns[static_cast<std::size_t>(from)] + rows, to);
+    to += rows;
   }
+  return result;
 }
 
-/// gathered(), likewise.
-Block condensed_from(const KeptBlock& kept, const Eigen::MatrixXd& more, const std::vector<int>& source) {
-  const auto n = static_cast<Eigen::Index>(source.size());
-  Eigen::MatrixXd rows(kept.r.size(), n + 1);
-  assemble(kept, more, source, rows.leftCols(n));
-  rows.col(n) = kept.r;
-  return condensed(rows);
+KeptTrack kept_track(ModelledTrack track) {
+  KeptTrack kept;
+  kept.residual_N = residual_along(track);
+  for (const TrackBlock& block : track.cut.blocks) {
+    const Eigen::VectorXd r = kept.residual_N.segment(block.first_row, Eigen::Index(3) * block.records);
+    kept.blocks.emplace_back();
+    kept.blocks.back().y = r.squaredNorm();
+    for (int i = 0; i < block.records; ++i)
+      kept.blocks.back().residual_sum_N += r.segment<3>(Eigen::Index(3) * i);
+  }
+  kept.known = std::move(track);
+  return kept;
 }
 
-std::vector<KeptBlock> blocks_without_columns(const ModelledTrack& known) {
-  std::vector<KeptBlock> blocks;
-  for (const TrackBlock& block : known.cut.blocks) {
-    blocks.emplace_back();
-    blocks.back().r.resize(Eigen::Index(3) * block.records);
+/// Keeps further columns. @param fresh columns_along() the track
+void append(Eigen::MatrixXd fresh, KeptTrack& track) {
+  const Eigen::Index more = fresh.cols();
+  for (std::size_t at = 0; at < track.blocks.size(); ++at) {
+    const TrackBlock& cut = track.known.cut.blocks[at];
+    KeptBlock& block = track.blocks[at];
+    const Eigen::Index first = cut.first_row, rows = Eigen::Index(3) * cut.records;
+    const auto of_block = [&](const Eigen::MatrixXd& columns) { return columns.middleRows(first, rows); };
+    const auto x = of_block(fresh);
+    const auto known = static_cast<Eigen::Index>(block.b.size());
+    Eigen::MatrixXd products(known + more, more);
+    Eigen::Index row = 0;
+    for (const Eigen::MatrixXd& piece : track.pieces) {
+      products.middleRows(row, piece.cols()).noalias() = of_block(piece).transpose() * x;
+      row += piece.cols();
+    }
+    products.bottomRows(more).noalias() = x.transpose() * x;
+    const Eigen::VectorXd b = x.transpose() * track.residual_N.segment(first, rows);
+    for (Eigen::Index j = 0; j < more; ++j) {
+      const double* const column = products.col(j).data();
+      block.gram.insert(block.gram.end(), column, column + known + j + 1);
+      block.b.push_back(b[j]);
+      block.sums.emplace_back(x.col(j).reshaped(3, cut.records).rowwise().sum());
+    }
   }
-  std::vector<Eigen::Index> count(blocks.size(), 0);
-  for (std::size_t i = 0; i < known.residual_N.size(); ++i) {
-    if (known.cut.of_record[i] < 0) continue;
-    const auto b = static_cast<std::size_t>(known.cut.of_record[i]);
-    blocks[b].r.segment<3>(3 * count[b]++) = known.residual_N[i];
-    blocks[b].residual_sum_N += known.residual_N[i];
-  }
-  for (KeptBlock& block : blocks) block.y = block.r.squaredNorm();
-  return blocks;
-}
-
-void append(Eigen::MatrixXd fresh, KeptBlock& block) {
-  const Eigen::Index known = block.columns(), more = fresh.cols();
-  Eigen::MatrixXd products(known + more, more);
-  Eigen::Index at = 0;
-  for (const Eigen::MatrixXd& piece : block.pieces) {
-    products.middleRows(at, piece.cols()).noalias() = piece.transpose() * fresh;
-    at += piece.cols();
-  }
-  products.bottomRows(more).noalias() = fresh.transpose() * fresh;
-  const Eigen::VectorXd b = fresh.transpose() * block.r;
-  for (Eigen::Index j = 0; j < more; ++j) {
-    const double* const column = products.col(j).data();
-    block.gram.insert(block.gram.end(), column, column + known + j + 1);
-    block.b.push_back(b[j]);
-    block.sums.emplace_back(fresh.col(j).reshaped(3, fresh.rows() / 3).rowwise().sum());
-  }
-  block.pieces.push_back(std::move(fresh));
+  track.pieces.push_back(std::move(fresh));
 }
 
 }  // namespace
@@ -249,8 +239,8 @@ void ColumnMemory::forget_kept() {
   for (Flight& flight : flights_) {
     for (KeptTrack& track : flight.tracks) {
       track.support.clear();
-      for (KeptBlock& block : track.blocks)
-        block = {{}, std::move(block.r), block.y, block.residual_sum_N, {}, {}, {}};
+      track.pieces = {};
+      for (KeptBlock& block : track.blocks) block = {block.y, block.residual_sum_N, {}, {}, {}};
     }
   }
 }
@@ -258,48 +248,43 @@ void ColumnMemory::forget_kept() {
 std::vector<KeptTrack>& ColumnMemory::tracks(const Passes& passes, std::size_t flight) {
   Flight& known = flights_[flight];
   if (known.is_loaded) return known.tracks;
-  for (ModelledTrack& track : modelled_tracks(passes.inputs, passes.kind, passes.flights[flight])) {
-    known.tracks.emplace_back();
-    known.tracks.back().known = std::move(track);
-    known.tracks.back().blocks = blocks_without_columns(known.tracks.back().known);
-  }
+  for (ModelledTrack& track : modelled_tracks(passes.inputs, passes.kind, passes.flights[flight]))
+    known.tracks.push_back(kept_track(std::move(track)));
   known.is_loaded = true;
   return known.tracks;
 }
 
-std::vector<Eigen::MatrixXd> ColumnMemory::more_columns(const Passes& passes, const Request& request,
-                                                        Along along, const Place& at, KeptTrack& track,
-                                                        std::map<std::string, Support>& support) const {
-  std::vector<Eigen::MatrixXd> made(track.blocks.size());
+std::vector<const double*> ColumnMemory::columns_of_track(const Passes& passes, const Request& request,
+                                                          Along along, const Place& at,
+                                                          const KeptTrack& track, Eigen::MatrixXd& made,
+                                                          std::map<std::string, Support>& support) const {
   std::vector<Support> made_support(request.more.size());
-  if (request.fresh.columns > 0 && along == Along::kFlown) {
-    run_blocks(passes.inputs, track.known, request.fresh, nullptr, made_support,
-               [&](int block, const Eigen::MatrixXd& rows) {
-                 made[static_cast<std::size_t>(block)] = rows.leftCols(request.fresh.columns);
-               });
-  } else if (request.fresh.columns > 0) {
-    made = block_columns(passes.inputs, track.known, request.fresh, track.wanted);
+  if (request.fresh.columns > 0) {
+    made = along == Along::kFlown ? columns_along(passes.inputs, track.known, request.fresh,
+                                                  track.known.track.instants, &made_support)
+                                  : columns_along(passes.inputs, track.known, request.fresh, track.wanted);
   }
-  std::vector<Eigen::MatrixXd> result(track.blocks.size());
-  const bool is_all = request.fresh.columns == request.more_columns;
-  for (std::size_t b = 0; b < result.size() && !is_all; ++b)
-    result[b].resize(track.blocks[b].r.size(), request.more_columns);
-  Eigen::Index from = 0, to = 0;
+  std::vector<const double*> columns;
+  const auto add = [&](const Eigen::MatrixXd& rows, Eigen::Index first, Eigen::Index count) {
+    for (Eigen::Index c = first; c < first + count; ++c) columns.push_back(rows.col(c).data());
+  };
+  for (const Eigen::MatrixXd& piece : track.pieces) add(piece, 0, piece.cols());
+  Eigen::Index from = 0;
   auto shown = made_support.begin();
   for (const Request::More& more : request.more) {
     TrackColumns* const place =
         more.recent != nullptr ? &more.recent->flights[at.flight].at(at.track) : nullptr;
-    for (std::size_t b = 0; b < result.size() && more.is_new && place != nullptr; ++b)
-      place->blocks.emplace_back(made[b].middleCols(from, more.columns));
-    for (std::size_t b = 0; b < result.size() && !is_all; ++b)
-      result[b].middleCols(to, more.columns) =
-          more.is_new ? made[b].middleCols(from, more.columns) : place->blocks[b].leftCols(more.columns);
-    if (more.is_new && place != nullptr) place->support = *shown;
-    support[more.key] = more.is_new ? *shown++ : place->support;
-    if (more.is_new) from += more.columns;
-    to += more.columns;
+    if (!more.is_new) {
+      add(place->rows, 0, more.columns);
+      support[more.key] = place->support;
+      continue;
+    }
+    if (place != nullptr) *place = {made.middleCols(from, more.columns), *shown};
+    add(made, from, more.columns);
+    support[more.key] = *shown++;
+    from += more.columns;
   }
-  return is_all ? made : result;
+  return columns;
 }
 
 void ColumnMemory::make_places(const Request& request, std::size_t flight) const {
@@ -312,18 +297,33 @@ void ColumnMemory::make_places(const Request& request, std::size_t flight) const
 void ColumnMemory::add_track(const Passes& passes, const Grams& asked, const Request& request,
                              const Place& at, KeptTrack& track, FlightPart& part) const {
   std::map<std::string, Support> support;
-  std::vector<Eigen::MatrixXd> more = more_columns(passes, request, Along::kFlown, at, track, support);
-  const std::vector<int> source = request.sources(asked, track.known.track.vehicle);
+  Eigen::MatrixXd made_rows;
+  std::vector<const double*> columns =
+      columns_of_track(passes, request, Along::kFlown, at, track, made_rows, support);
+  const Eigen::Index length = track.residual_N.size();
+  if (request.keeps && request.more_columns > 0) {
+    std::vector<int> fresh(static_cast<std::size_t>(request.more_columns));
+    std::iota(fresh.begin(), fresh.end(), columns_);
+    append(assembled(length, columns, fresh), track);
+  }
+  std::vector<int> source = request.sources(asked, track.known.track.vehicle);
+  const bool has_all = request.keeps || request.more_columns == 0;
+  Eigen::MatrixXd rows;
+  if (!has_all) {
+    source.push_back(static_cast<int>(columns.size()));
+    columns.push_back(track.residual_N.data());
+    rows = assembled(length, columns, source);
+  }
   const int number = part.tracks++;
   for (std::size_t b = 0; b < track.blocks.size(); ++b) {
-    KeptBlock& kept = track.blocks[b];
-    if (request.keeps && request.more_columns > 0) append(std::move(more[b]), kept);
-    const bool has_all = request.keeps || request.more_columns == 0;
-    part.blocks.push_back(has_all ? gathered(kept, source) : condensed_from(kept, more[b], source));
+    const TrackBlock& cut = track.known.cut.blocks[b];
+    part.blocks.push_back(has_all ? gathered(track.blocks[b], source)
+                                  : condensed(rows.middleRows(cut.first_row, Eigen::Index(3) * cut.records)));
     Block& block = part.blocks.back();
+    block.records = cut.records;
     block.flight = passes.flights[at.flight];
     block.track = number;
-    block.follows = track.known.cut.blocks[b].follows;
+    block.follows = cut.follows;
   }
   std::size_t stream = 0;
   for (const Candidate& candidate : asked.candidates) {
@@ -368,16 +368,11 @@ Grams ColumnMemory::grams(const Passes& passes, std::vector<Candidate> candidate
 void ColumnMemory::over_columns(const Passes& passes, const Grams& asked, const UseColumns& use) {
   const Request flown = planned(asked, Kept::kNo, Along::kFlown);
   const Request wanted = planned(asked, Kept::kNo, Along::kWanted);
-  const auto columns = [&](const Request& request, Along along, const Place& at, KeptTrack& track) {
+  const auto columns = [&](const Request& request, Along along, const Place& at, const KeptTrack& track) {
     std::map<std::string, Support> support;
-    const std::vector<Eigen::MatrixXd> more = more_columns(passes, request, along, at, track, support);
-    const std::vector<int> source = request.sources(asked, track.known.track.vehicle);
-    std::vector<Eigen::MatrixXd> blocks;
-    for (std::size_t b = 0; b < more.size(); ++b) {
-      blocks.emplace_back(track.blocks[b].r.size(), asked.columns);
-      assemble(track.blocks[b], more[b], source, blocks.back());
-    }
-    return blocks;
+    Eigen::MatrixXd made;
+    const auto all = columns_of_track(passes, request, along, at, track, made, support);
+    return assembled(track.residual_N.size(), all, request.sources(asked, track.known.track.vehicle));
   };
   files::parallel_for(static_cast<int>(flights_.size()), passes.jobs, [&](int i) {
     const auto k = static_cast<std::size_t>(i);

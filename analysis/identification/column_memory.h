@@ -23,30 +23,27 @@ struct FlightPart;
 /// Everything about candidates that a fit depends on: equal texts, equal results.
 std::string text_of(const std::vector<Candidate>& candidates);
 
-/// One block of a track with the kept columns X and the residual r, in newton.
+/// One block of a track with the kept columns X and the residual r.
 struct KeptBlock {
-  /// X [3 x records, columns], in the pieces in which it grew.
-  std::vector<Eigen::MatrixXd> pieces;
-  Eigen::VectorXd r;  ///< [3 x records]
-  double y = 0;       ///< r'r
+  double y = 0;  ///< r'r
   Eigen::Vector3d residual_sum_N = Eigen::Vector3d::Zero();
   std::vector<double> gram;           ///< X'X, packed as Block::gram
   std::vector<double> b;              ///< X'r
   std::vector<Eigen::Vector3d> sums;  ///< of each column over the records
-
-  int columns() const { return static_cast<int>(b.size()); }
 };
 
-/// Columns along one track of one effect with one theta, by block.
+/// Columns of one effect with one theta.
 struct TrackColumns {
-  std::vector<Eigen::MatrixXd> blocks;
+  Eigen::MatrixXd rows;  ///< columns_along() the track
   Support support;
 };
 
 struct KeptTrack {
   ModelledTrack known;
   std::vector<stability::Instant> wanted;  ///< as_commanded(), once it was asked for
+  Eigen::VectorXd residual_N;              ///< residual_along()
   std::vector<KeptBlock> blocks;
+  std::vector<Eigen::MatrixXd> pieces;  ///< columns_along(): the kept ones, in the pieces in which they grew
   std::map<std::string, Support> support;  ///< by the key of a column, see ColumnMemory
 };
 
@@ -68,10 +65,9 @@ class ColumnMemory {
   /// @param kept   whether columns that are not kept yet will be asked for again
   Grams grams(const Passes& passes, std::vector<Candidate> candidates, Kept kept);
 
-  /// What blocks a track has, with the columns of `asked` as flown and as_commanded(): [3 x records, columns] each.
+  /// A track, with columns_along() it as flown and as_commanded().
   using UseColumns = std::function<void(std::size_t flight, const ModelledTrack& track,
-                                        const std::vector<Eigen::MatrixXd>& flown,
-                                        const std::vector<Eigen::MatrixXd>& wanted)>;
+                                        const Eigen::MatrixXd& flown, const Eigen::MatrixXd& wanted)>;
   /// Calls use() for each track, several flights at a time. Precondition: all tracks have set points.
   void over_columns(const Passes& passes, const Grams& asked, const UseColumns& use);
 
@@ -107,10 +103,12 @@ class ColumnMemory {
   Request planned(const Grams& asked, Kept kept, Along along);
   /// Gives recent columns that are new in this pass a place for each track of the flight.
   void make_places(const Request& request, std::size_t flight) const;
-  /// By block: the columns of request.more. @param support gets theirs, by key.
-  std::vector<Eigen::MatrixXd> more_columns(const Passes& passes, const Request& request, Along along,
-                                            const Place& at, KeptTrack& track,
-                                            std::map<std::string, Support>& support) const;
+  /// The kept columns of the track and those of request.more, in the order of Request::first.
+  /// @param made    gets those that are new
+  /// @param support gets that of request.more, by key.
+  std::vector<const double*> columns_of_track(const Passes& passes, const Request& request, Along along,
+                                              const Place& at, const KeptTrack& track, Eigen::MatrixXd& made,
+                                              std::map<std::string, Support>& support) const;
   void add_track(const Passes& passes, const Grams& asked, const Request& request, const Place& at,
                  KeptTrack& track, FlightPart& part) const;
   /// Recent columns beyond what the memory may hold.

@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kBlock_s = 2, kPurge_s = 0.15, kLongestPause_s = 0.5;
 constexpr int kFewestRecords = 40;
+constexpr std::size_t kAtOnce = 32;  ///< records that effects take in a row
 
 }  // namespace
 
@@ -25,8 +26,9 @@ struct ColumnRun::Stream {
 ColumnRun::ColumnRun(const Grams& grams, const residuals::Inputs& inputs, const stability::Model& model,
                      const residuals::Track& track)
     : filtered_(!inputs.rules.has_published_signals()),
+      restarts_(track.restarts),
       measured_(track, model, grams.columns),
-      values_(Eigen::Matrix3Xd::Zero(3, grams.columns)) {
+      values_(kAtOnce, Eigen::Matrix3Xd::Zero(3, grams.columns)) {
   stability::EffectContext context;
   context.kind = model.kind;
   context.kinds = inputs.kinds.names;
@@ -52,20 +54,35 @@ ColumnRun::ColumnRun(const Grams& grams, const residuals::Inputs& inputs, const 
 
 ColumnRun::~ColumnRun() = default;
 
-const Eigen::Matrix3Xd& ColumnRun::advance(const stability::Instant& now, bool restart) {
-  if (restart) {
-    measured_.restart();
-    for (const Stream& s : streams_) s.stream->restart();
-    values_.setZero();
-  }
-  stability::Wrench columns[stability::kMostColumns];
+void ColumnRun::restart() {
+  measured_.restart();
+  for (const Stream& s : streams_) s.stream->restart();
+}
+
+void ColumnRun::advance(const stability::Instant* instants, int count) {
+  stability::Wrench columns[kAtOnce * stability::kMostColumns];
   for (const Stream& s : streams_) {
-    s.stream->advance(now, columns);
-    for (int c = 0; c < s.columns; ++c) values_.col(s.first + c) = s.scale * columns[c].force_W_N;
+    s.stream->advance_along(instants, count, s.columns, columns);
+    const stability::Wrench* next = columns;
+    for (int i = 0; i < count; ++i) {
+      Eigen::Matrix3Xd& values = values_[static_cast<std::size_t>(i)];
+      for (int c = 0; c < s.columns; ++c) values.col(s.first + c) = s.scale * (next++)->force_W_N;
+    }
   }
   // Columns of other vehicles' candidates are zero, and stay zero behind the filter.
-  if (filtered_) measured_.apply(now, values_);
-  return values_;
+  for (int i = 0; i < count && filtered_; ++i)
+    measured_.apply(instants[i], values_[static_cast<std::size_t>(i)]);
+}
+
+void ColumnRun::along(const std::vector<stability::Instant>& instants, const Use& use) {
+  for (std::size_t first = 0, end = 0; first < instants.size(); first = end) {
+    do {
+      ++end;
+    } while (end < instants.size() && end - first < kAtOnce && restarts_[end] == 0);
+    if (restarts_[first] != 0) restart();
+    advance(&instants[first], static_cast<int>(end - first));
+    for (std::size_t i = first; i < end; ++i) use(i, values_[i - first]);
+  }
 }
 
 void ColumnRun::count_support(const stability::Instant& now, std::vector<int>& counts) const {
@@ -87,7 +104,7 @@ TrackBlocks cut_into_blocks(const residuals::Track& track) {
     if (static_cast<int>(kept) >= kFewestRecords) {
       for (std::size_t i = 0; i < kept; ++i)
         result.of_record[members[i]] = static_cast<int>(result.blocks.size());
-      result.blocks.push_back({static_cast<int>(kept), follows && !dropped});
+      result.blocks.push_back({static_cast<int>(kept), result.rows(), follows && !dropped});
       dropped = false;
     } else {
       dropped = true;

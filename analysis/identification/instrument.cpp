@@ -25,23 +25,30 @@ struct Moments {
   bool follows = false;  ///< the block before it, of the same track
 };
 
-/// @param flown, wanted columns of the blocks as flown and as set points ask for them
-/// @param mix [columns x unknowns]: what is fitted, as sums of columns.
-std::vector<Moments> moments_of(const ModelledTrack& track, const std::vector<Eigen::MatrixXd>& flown,
-                                const std::vector<Eigen::MatrixXd>& wanted, const Eigen::MatrixXd& mix) {
-  std::vector<Eigen::VectorXd> residual;
-  for (const TrackBlock& block : track.cut.blocks) residual.emplace_back(Eigen::Index(3) * block.records);
-  std::vector<Eigen::Index> next(residual.size(), 0);
-  for (std::size_t i = 0; i < track.residual_N.size(); ++i) {
-    if (track.cut.of_record[i] < 0) continue;
-    const auto b = static_cast<std::size_t>(track.cut.of_record[i]);
-    residual[b].segment<3>(3 * next[b]++) = track.residual_N[i];
+/// columns * mix, of which most is zero.
+Eigen::MatrixXd mixed(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& mix) {
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(columns.rows(), mix.cols());
+  for (Eigen::Index j = 0; j < mix.cols(); ++j) {
+    for (Eigen::Index i = 0; i < mix.rows(); ++i) {
+      if (mix(i, j) != 0) sums.col(j) += mix(i, j) * columns.col(i);
+    }
   }
+  return sums;
+}
+
+/// @param flown, wanted columns_along() the track as flown and as set points ask for it
+/// @param mix [columns x unknowns]: what is fitted, as sums of columns.
+std::vector<Moments> moments_of(const ModelledTrack& track, const Eigen::MatrixXd& flown,
+                                const Eigen::MatrixXd& wanted, const Eigen::MatrixXd& mix) {
+  const Eigen::MatrixXd x_of_all = mixed(flown, mix), z_of_all = mixed(wanted, mix);
+  const Eigen::VectorXd r_of_all = residual_along(track);
   std::vector<Moments> blocks;
-  for (std::size_t b = 0; b < residual.size(); ++b) {
-    const Eigen::MatrixXd x = flown[b] * mix, z = wanted[b] * mix;
-    blocks.push_back({z.transpose() * x, x.transpose() * x, z.transpose() * residual[b],
-                      x.transpose() * residual[b], track.cut.blocks[b].follows});
+  for (const TrackBlock& block : track.cut.blocks) {
+    const Eigen::Index first = block.first_row, rows = Eigen::Index(3) * block.records;
+    const auto x = x_of_all.middleRows(first, rows), z = z_of_all.middleRows(first, rows);
+    const auto r = r_of_all.segment(first, rows);
+    blocks.push_back(
+        {z.transpose() * x, x.transpose() * x, z.transpose() * r, x.transpose() * r, block.follows});
   }
   return blocks;
 }
@@ -52,8 +59,8 @@ std::vector<InstrumentedValue> made_estimates(const Passes& passes, const Grams&
   const Eigen::Index n = mix.cols();
   std::vector<std::vector<Moments>> pieces(passes.flights.size());
   std::vector<char> complete(passes.flights.size(), 1);
-  const auto add = [&](std::size_t k, const ModelledTrack& track, const std::vector<Eigen::MatrixXd>& flown,
-                       const std::vector<Eigen::MatrixXd>& wanted) {
+  const auto add = [&](std::size_t k, const ModelledTrack& track, const Eigen::MatrixXd& flown,
+                       const Eigen::MatrixXd& wanted) {
     for (Moments& block : moments_of(track, flown, wanted, mix)) pieces[k].push_back(std::move(block));
   };
   const bool remembers = passes.memory != nullptr;
@@ -62,8 +69,8 @@ std::vector<InstrumentedValue> made_estimates(const Passes& passes, const Grams&
     if (track.targets.size() != track.instants.size())
       complete[k] = 0;
     else if (n > 0 && !remembers)
-      add(k, modelled, block_columns(passes.inputs, modelled, columns, track.instants),
-          block_columns(passes.inputs, modelled, columns, as_commanded(track, modelled.model.mass_kg)));
+      add(k, modelled, columns_along(passes.inputs, modelled, columns, track.instants),
+          columns_along(passes.inputs, modelled, columns, as_commanded(track, modelled.model.mass_kg)));
   });
   if (n == 0 || std::find(complete.begin(), complete.end(), 0) != complete.end()) return {};
   if (remembers) passes.memory->over_columns(passes, columns, add);

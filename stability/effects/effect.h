@@ -8,7 +8,7 @@
 /// Effects that remember (motor lag, delays) have no column of one instant. They give a stream of columns over a
 /// time series, and tell the simulator their place in the path of the signal (signal_path.h).
 ///
-/// Costs: identification goes along every log record with every effect and theta: no heap in advance(), nor in columns().
+/// Costs: identification goes along all log records with every effect and theta: no heap in advance() or columns().
 #pragma once
 
 #include <Eigen/Core>
