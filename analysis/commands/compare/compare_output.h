@@ -11,7 +11,7 @@ files::Json json_of(const residuals::VelocityError& error);
 
 /// Fields of the result of compare, in newton and metres; without its head.
 void add_comparison(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
-                    files::Json& result);
+                    files::Json& json);
 
 /// Mean square of the vertical residual by composition, in gf^2: the unit in which the networks were published.
 files::Json mean_squares_gf2(const residuals::Comparison& comparison);
