@@ -10,7 +10,7 @@ namespace swarmcert::identification {
 namespace {
 
 constexpr double kFlagRatio = 3;
-constexpr double kLeastShare =
+constexpr double kLeastExplained =
     0.02;  ///< of the squared residual that the means over a variable's regions explain
 
 }  // namespace
@@ -39,7 +39,7 @@ Remainder remainder(const Passes& passes, const std::vector<stability::EffectSpe
   std::array<double, residuals::kNumVariables> shares = left.region_shares;
   for (int rank = 0; rank < residuals::kNumVariables; ++rank) {
     const auto largest = std::max_element(shares.begin(), shares.end());
-    if (*largest < kLeastShare) break;
+    if (*largest < kLeastExplained) break;
     result.depends_on.emplace_back(residuals::variable_name(static_cast<int>(largest - shares.begin())));
     *largest = 0;
   }
