@@ -18,13 +18,13 @@ namespace {
 constexpr double kDraftBlock_s = 2, kDraftQuantile90 = 1.645;
 
 /// Mean of several estimates with the interval that their scatter gives.
-struct Estimate {
+struct DraftEstimate {
   double value = 0, lower = 0, upper = 0;
   std::size_t count = 0;
 };
 
-Estimate estimate(const std::vector<double>& values) {
-  Estimate result;
+DraftEstimate estimate(const std::vector<double>& values) {
+  DraftEstimate result;
   result.count = values.size();
   if (values.empty()) return result;
   for (const double value : values) result.value += value / static_cast<double>(values.size());
@@ -273,7 +273,7 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
         {found.flights[0].logs[0].second, "", "thrust", "", "no log here has a force and a flight",
          draft.problems.empty() ? "'swarmcert inspect' says what a log lacks" : draft.problems[0]});
   }
-  const Estimate carried = estimate(carried_kg), ratio = estimate(ratios);
+  const DraftEstimate carried = estimate(carried_kg), ratio = estimate(ratios);
   stability::Model& model = draft.model;
   if (mass_kg > 0 || ratio.count > 0) {
     double sum = 0;
@@ -294,7 +294,7 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
   }
   scale_body(base, draft);
   if (!hover.empty()) {
-    const Estimate command = estimate(hover);
+    const DraftEstimate command = estimate(hover);
     draft.parameters.push_back({"hover_command", command.value, hover.size() > 1, command.lower,
                                 command.upper, "fit: mean motor command that carries the weight"});
     if (motors->motors > 0) {
@@ -329,7 +329,7 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
                                 "fit: mass over what the thrust carries"});
   }
   if (!delays_s.empty()) {
-    const Estimate delay = estimate(delays_s);
+    const DraftEstimate delay = estimate(delays_s);
     draft.parameters.push_back({"thrust_delay_s", delay.value, delays_s.size() > 1, delay.lower, delay.upper,
                                 "fit: correlation of thrust and acceleration; 'add motor_lag' splits it"});
   }

@@ -21,7 +21,7 @@ std::uint32_t checksum(const unsigned char* bytes, std::size_t size, std::uint32
   return static_cast<std::uint32_t>(crc32(before, bytes, static_cast<uInt>(size)));
 }
 
-struct Header {
+struct UsdHeader {
   std::vector<std::string> names;
   std::vector<BinaryVariable> variables;
   std::size_t record_bytes = 0;
@@ -40,7 +40,8 @@ struct Header {
 };
 
 /// "name(type)" ended by `end`. The name may not hold control characters.
-void read_token(ByteWindow& window, const std::string& path, char end, std::uint32_t* sum, Header& header) {
+void read_token(ByteWindow& window, const std::string& path, char end, std::uint32_t* sum,
+                UsdHeader& header) {
   const std::size_t start = window.offset();
   const std::size_t size = window.left(kLongestName_bytes);
   const auto* const bytes = size > 0 ? window.peek(size) : nullptr;
@@ -60,7 +61,7 @@ void read_token(ByteWindow& window, const std::string& path, char end, std::uint
   window.skip(token.size() + 1);
 }
 
-void decode(const Header& header, const unsigned char* record, double* values) {
+void decode(const UsdHeader& header, const unsigned char* record, double* values) {
   for (std::size_t i = 0; i < header.variables.size(); ++i)
     values[i] = value_of(header.variables[i].type, record + header.variables[i].offset);
 }
@@ -68,7 +69,7 @@ void decode(const Header& header, const unsigned char* record, double* values) {
 /// Looks for sound blocks of the old format.
 class Blocks {
  public:
-  Blocks(ByteWindow& window, const Header& header) : window_(window), header_(header) {}
+  Blocks(ByteWindow& window, const UsdHeader& header) : window_(window), header_(header) {}
 
   /// Bytes of the sound block that starts here; 0 if none does.
   std::size_t sound_block() {
@@ -96,7 +97,7 @@ class Blocks {
 
  private:
   ByteWindow& window_;
-  const Header& header_;
+  const UsdHeader& header_;
   std::size_t work_bytes_ = 0;
 };
 
@@ -110,7 +111,7 @@ void read_usd(std::istream& in, const std::string& path, RecordSink& sink, LogHe
   if (num_variables == 0) refuse(path, 0, "number of variables", "0", "no variable was logged", "");
   std::uint32_t sum = checksum(first, 1);
   window.skip(1);
-  Header header;
+  UsdHeader header;
   while (header.names.size() < num_variables) read_token(window, path, ',', &sum, header);
   const unsigned char* const stored = window.peek(kChecksum_bytes);
   if (stored == nullptr) refuse(path, window.offset(), "header", "", "the file ends inside the header", "");
@@ -151,7 +152,7 @@ void read_usd(std::istream& in, const std::string& path, RecordSink& sink, LogHe
 namespace {
 
 struct Event {
-  Header header;
+  UsdHeader header;
   std::string name;
 };
 
@@ -195,7 +196,7 @@ class EventReader {
       searching = false;
       const unsigned char* const record = window_.peek(size);
       const std::size_t index = event_of(little_endian<std::uint16_t>(record));
-      const Header& header = events_[index].second.header;
+      const UsdHeader& header = events_[index].second.header;
       RawTopic& topic = log.topics[index];
       last_time = time_of(record);
       values.resize(header.variables.size());

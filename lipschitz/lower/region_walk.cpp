@@ -32,7 +32,7 @@ constexpr double kLadderNearest = 1e-3, kLadderFarthest = 1e5;
 /// How far out along a ray the slope at infinity is looked for, and in which steps.
 constexpr double kFarOut = 1e12, kFarther = 4;
 /// A slope along a ray counts as that at infinity within this, relatively.
-constexpr double kSameSlope = 1e-9;
+constexpr double kSlopeAtInfinity = 1e-9;
 
 /// H = normals diag(1/d^2) normals' + diag(bounds), and H^-1 times something: by Cholesky of H or, where there are
 /// more variables than neurons, of I + S' diag(bounds)^-1 S with S = normals diag(1/d) (Woodbury).
@@ -193,7 +193,7 @@ RegionWalk::Candidate RegionWalk::start_at_infinity() {
   for (double t = 1; t < kFarOut; t *= kFarther) {
     steepest.z = t * direction;
     steepest.slope = local_slope(network_, steepest.z).slope;
-    if (steepest.slope >= slope * (1 - kSameSlope)) break;
+    if (steepest.slope >= slope * (1 - kSlopeAtInfinity)) break;
   }
   return steepest;
 }

@@ -24,7 +24,6 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using files::Network;
 
-constexpr double kFloatUnit = 0x1p-24;
 constexpr int kUsualRoundingNodes = 8000;
 
 /// All sums here are of numbers that are not negative, with far fewer than 2^20 operations: their rounding in double is

@@ -14,7 +14,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kFloatUnit = 0x1p-24;
 /// Far above what rounding in double does to a few operations, relatively to their sizes.
 constexpr double kSafe = 0x1p-40;
 /// Below the overflow of float32, with room for what is off.

@@ -10,6 +10,9 @@
 
 namespace swarmcert::lipschitz {
 
+/// u: a sum or a product in float32 is off by at most this share of itself.
+inline constexpr double kFloatUnit = 0x1p-24;
+
 /// How far fl(W h + b) in the order of nn/dense_layer.h is at most from W h + b, entry by entry, for any float32 h with
 /// lower <= h <= upper; infinite where it might overflow.
 ///

@@ -22,10 +22,10 @@ using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
 /// Parts that are kept, at most: about two kilobytes each.
-constexpr std::size_t kMostParts = 100000;
+constexpr std::size_t kMostPartsOfTree = 100000;
 /// Parts that a form has halved between two looks at its queue: fixed, for the same result with any number of threads.
-constexpr int kHalvedAtOnce = 16;
-constexpr Index kSamples = 2000;
+constexpr int kPartsHalvedAtOnce = 16;
+constexpr Index kClimbSamples = 2000;
 /// Searches that are kept, to go on where the same form is asked for again.
 constexpr std::size_t kMostForms = 2000;
 
@@ -36,8 +36,8 @@ VectorXd ends(const std::vector<double>& values) {
 /// Points of the box, half of their coordinates at an end.
 MatrixXd sample_points(const Box& box) {
   files::Random random(1);
-  MatrixXd points(static_cast<Index>(box.lower.size()), kSamples);
-  for (Index sample = 0; sample < kSamples; ++sample)
+  MatrixXd points(static_cast<Index>(box.lower.size()), kClimbSamples);
+  for (Index sample = 0; sample < kClimbSamples; ++sample)
     for (Index k = 0; k < points.rows(); ++k) {
       const auto i = static_cast<std::size_t>(k);
       const double share = std::clamp(2 * random.uniform() - 0.5, 0.0, 1.0);
@@ -196,11 +196,11 @@ PartTree::Form& PartTree::form_of(const RowVectorXd& direction) {
 }
 
 void PartTree::choose(std::size_t index, Form& form, const PartSearch& search, Work& wanted) {
-  for (int i = 0; i < kHalvedAtOnce && !form.queue.empty() && form.halved < search.halved; ++i) {
+  for (int i = 0; i < kPartsHalvedAtOnce && !form.queue.empty() && form.halved < search.halved; ++i) {
     const auto [upper, part] = form.queue.top();
     if (!(upper > form.value + search.gap * form.spread)) return;
     if (parts_[part].first_child == 0) {
-      if (parts_.size() + 2 > kMostParts || parts_[part].box.lower == parts_[part].box.upper) return;
+      if (parts_.size() + 2 > kMostPartsOfTree || parts_[part].box.lower == parts_[part].box.upper) return;
       parts_[part].first_child = parts_.size();
       parts_.resize(parts_.size() + 2);
     }

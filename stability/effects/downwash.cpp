@@ -31,7 +31,7 @@ constexpr int round_up(int count, int block) { return (count + block - 1) / bloc
 #define SWARMCERT_KERNEL_FILE "stability/effects/downwash_kernel.inc"
 #include "stability/bodies/kernel_widths.inc"
 
-struct Kernel {
+struct WakeKernel {
   int block;
   decltype(&narrow::strengths) strengths;
   decltype(&narrow::swarm_forces) swarm_forces;
@@ -40,18 +40,18 @@ struct Kernel {
 };
 
 /// The narrowest that takes `count` at once, or the widest of this processor.
-const Kernel& kernel_for([[maybe_unused]] int count) {
+const WakeKernel& kernel_for([[maybe_unused]] int count) {
 #if defined(SWARMCERT_WIDE_KERNELS)
-  static constexpr Kernel kAvx2 = {avx2::kBlock, avx2::strengths, avx2::swarm_forces, avx2::compose_row,
-                                   avx2::logarithm_of_one};
-  static constexpr Kernel kAvx512 = {avx512::kBlock, avx512::strengths, avx512::swarm_forces,
-                                     avx512::compose_row, avx512::logarithm_of_one};
+  static constexpr WakeKernel kAvx2 = {avx2::kBlock, avx2::strengths, avx2::swarm_forces, avx2::compose_row,
+                                       avx2::logarithm_of_one};
+  static constexpr WakeKernel kAvx512 = {avx512::kBlock, avx512::strengths, avx512::swarm_forces,
+                                         avx512::compose_row, avx512::logarithm_of_one};
   if (count > avx2::kBlock && widest_kernels() == KernelWidth::kAvx512) return kAvx512;
   // Also for fewer: the narrow one has no fused operations of its own.
   if (widest_kernels() >= KernelWidth::kAvx2) return kAvx2;
 #endif
-  static constexpr Kernel kNarrow = {narrow::kBlock, narrow::strengths, narrow::swarm_forces,
-                                     narrow::compose_row, narrow::logarithm_of_one};
+  static constexpr WakeKernel kNarrow = {narrow::kBlock, narrow::strengths, narrow::swarm_forces,
+                                         narrow::compose_row, narrow::logarithm_of_one};
   return kNarrow;
 }
 
@@ -95,7 +95,7 @@ void Downwash::drifted_columns(const Instant* instants, int count, const double*
   const auto add_up = [&] {
     if (pairs == 0) return;
     for (auto& row : rows) std::fill(row + pairs, row + round_up(pairs, kRowLength), row[pairs - 1]);
-    const Kernel& kernel = kernel_for(pairs);
+    const WakeKernel& kernel = kernel_for(pairs);
     kernel.strengths({rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]}, round_up(pairs, kernel.block),
                      shape, power);
     for (int k = 0; k < pairs; ++k) sums[of_instant[k]] += power[k];
@@ -123,7 +123,7 @@ void Downwash::drifted_columns(const Instant* instants, int count, const double*
       }
     }
     add_up();
-    const Kernel& kernel = kernel_for(some);
+    const WakeKernel& kernel = kernel_for(some);
     kernel.compose_row(sums, round_up(some, kernel.block), 1 / shape[kNorm], composed);
     for (int i = 0; i < some; ++i) {
       columns[first + i] = {};

@@ -10,7 +10,7 @@
 namespace swarmcert::stability {
 namespace {
 
-controller::Vector3<double> vector(const PerAxis& v) { return {v[0], v[1], v[2]}; }
+controller::Vector3<double> vector_of(const PerAxis& v) { return {v[0], v[1], v[2]}; }
 
 /// Cycle of a loop whose rate is not given: that of the fastest position loop of the published firmware.
 constexpr double kUnstatedPeriod_s = 0.002;
@@ -25,7 +25,7 @@ FloatErrors float_errors(const TrackingSetup& input, const TrackingReport& repor
   law.is_composite = gains.composite.has_value();
   if (gains.composite) law.composite = *gains.composite;
   if (gains.pid) law.pid = *gains.pid;
-  law.integrator = {vector(gains.integrator_limit_m_s),
+  law.integrator = {vector_of(gains.integrator_limit_m_s),
                     gains.rate_hz > 0 ? gains.integrator_step_s : kUnstatedPeriod_s};
   constexpr double kAttitudePeriod_s = 0.002;
   Pilot<double>(gains, input.model, kAttitudePeriod_s).with_settings([&law](const auto& settings) {

@@ -13,7 +13,7 @@ constexpr double kRadius_m = 0.5;
 constexpr double kCircleHeight_m = 0.6;
 /// The speed rises from zero over this time; the angle follows the integral of a rest-to-rest ramp.
 constexpr double kRamp_s = 2;
-constexpr double kTwoPi = 6.28318530717958647692;
+constexpr double kFullTurn = 6.28318530717958647692;
 
 /// Integral of s(x) from RestToRest over [0, x].
 double ramp_integral(double x) {
@@ -27,11 +27,11 @@ class Circle : public TimedTask {
   static constexpr char kSummary[] = "follow one another on a circle, one turn in 6 s";
   explicit Circle(const TaskOptions& options) : TimedTask(options, 20) {}
   Setpoint at(int vehicle, double time_s) const override {
-    const double full_rad_s = kTwoPi / kTurn_s;
+    const double full_rad_s = kFullTurn / kTurn_s;
     const RestToRest ramp(time_s / kRamp_s);
     const double progress_s = time_s < kRamp_s ? kRamp_s * ramp_integral(time_s / kRamp_s)
                                                : kRamp_s * ramp_integral(1) + time_s - kRamp_s;
-    const double angle_rad = kTwoPi * vehicle / vehicles_ + full_rad_s * progress_s;
+    const double angle_rad = kFullTurn * vehicle / vehicles_ + full_rad_s * progress_s;
     const double rate_rad_s = full_rad_s * ramp.s;
     const double acceleration_rad_s2 = full_rad_s * ramp.ds / kRamp_s;
     const Eigen::Vector3d outward(std::cos(angle_rad), std::sin(angle_rad), 0);

@@ -255,6 +255,62 @@ TEST(Layout, InstalledHeadersAreForUsersAndIncludeOnlySuch) {
   }
 }
 
+/// The sources of each library, by path from the source tree.
+std::map<std::string, std::vector<std::string>> library_sources() {
+  std::map<std::string, std::vector<std::string>> found;
+  for (const std::string& list : files_in({"nn", "lipschitz", "stability", "analysis"}, {".txt"})) {
+    std::ifstream in(fs::path(SWARMCERT_SOURCE_DIR) / list);
+    const std::string start = "add_library(";
+    std::string library;
+    for (std::string word; in >> word;) {
+      if (word.rfind(start, 0) == 0) library = word.substr(start.size());
+      const std::string name = word.substr(0, word.find(')'));
+      if (!library.empty() && fs::path(name).extension() == ".cpp")
+        found[library].push_back((fs::path(list).parent_path() / name).generic_string());
+      if (word.find(')') != std::string::npos) library.clear();
+    }
+  }
+  return found;
+}
+
+/// Constants and types that a source defines in its unnamed namespaces.
+std::vector<std::string> unnamed_names(const std::string& source) {
+  std::ifstream in(fs::path(SWARMCERT_SOURCE_DIR) / source);
+  std::vector<std::string> found;
+  bool is_unnamed = false;
+  for (std::string line; std::getline(in, line);) {
+    if (line == "namespace {") is_unnamed = true;
+    if (line == "}  // namespace") is_unnamed = false;
+    if (!is_unnamed || line.empty()) continue;
+    for (const std::string word : {"constexpr ", "struct ", "class ", "enum class "}) {
+      if (line.rfind(word, 0) != 0) continue;
+      const bool is_constant = word == "constexpr ";
+      if (is_constant && line.find('(') < line.find('=')) continue;  // a function
+      std::string declared = line.substr(0, line.find_first_of(is_constant ? "=[{" : ":{;"));
+      declared = declared.substr(0, declared.find(" final"));
+      while (declared.back() == ' ') declared.pop_back();
+      found.push_back(declared.substr(declared.rfind(' ') + 1));
+    }
+  }
+  return found;
+}
+
+// Several sources are compiled as one, in units of 10 or 20.
+TEST(Layout, ConstantsAndTypesInUnnamedNamespacesHaveNamesOfTheirOwnInALibrary) {
+  std::size_t seen = 0;
+  for (const auto& [library, sources] : library_sources()) {
+    std::map<std::string, std::string> places;
+    for (const std::string& source : sources) {
+      for (const std::string& name : unnamed_names(source)) {
+        const auto [known, is_new] = places.emplace(name, source);
+        EXPECT_TRUE(is_new) << library << ": " << name << " in " << known->second << " and " << source;
+        ++seen;
+      }
+    }
+  }
+  EXPECT_GT(seen, 500U);
+}
+
 /// The README of every folder that holds one of `sources` is at most a page long and names each of them, by its name
 /// without the ending.
 /// @return the number of folders

@@ -19,9 +19,9 @@ constexpr double kTimesBetter = 2;
 int block_at(double time_s) { return static_cast<int>(std::floor(time_s / kStreamBlock_s)); }
 
 /// A quantity of a track between its records; calls come in order of time.
-class Reader {
+class StreamReader {
  public:
-  explicit Reader(const Track& track) : track_(track) {}
+  explicit StreamReader(const Track& track) : track_(track) {}
 
   /// Nothing outside of the track and in its gaps.
   template <typename Value>
@@ -62,7 +62,7 @@ bool has_set_points(const Track& track) { return track.targets.size() == track.i
 
 std::map<int, double> set_point_misfit(const Track& own, const Track& other) {
   if (own.instants.empty() || !has_set_points(own) || !has_set_points(other)) return {};
-  Reader reader(other);
+  StreamReader reader(other);
   BlockMeans blocks;
   double next_s = own.instants[0].time_s;
   for (std::size_t i = 0; i < own.instants.size(); ++i) {
@@ -91,7 +91,7 @@ std::vector<Felt> felt_by(const Track& track) {
 }
 
 std::map<int, double> sensor_misfit(const std::vector<Felt>& felt, const Track& path) {
-  Reader from(path), to(path);
+  StreamReader from(path), to(path);
   const auto velocity = [&](std::size_t k) { return path.instants[k].v_W_m_s; };
   std::vector<std::pair<double, Vector3d>> misfits;
   Vector3d mean = Vector3d::Zero();

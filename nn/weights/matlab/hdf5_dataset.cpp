@@ -9,7 +9,7 @@
 namespace swarmcert::files {
 namespace {
 
-constexpr std::uint64_t kMostDimensions = 8;
+constexpr std::uint64_t kMostRank = 8;
 constexpr std::uint64_t kInteger = 0, kFloat = 1, kText = 3, kCompound = 6, kReference = 7;
 constexpr std::uint64_t kMostText_bytes = 4096;
 constexpr char kSaveAsDouble[] = "convert in MATLAB with double(...) or single(...) and save again";
@@ -22,7 +22,7 @@ std::vector<std::uint64_t> shape_of(Hdf5Piece message) {
   if (version == 1) message.skip(4);
   if (version == 2 && kind > 1)
     message.refuse("type of a dataspace", std::to_string(kind), "has no extent", kSaveAsVersion7);
-  if (rank > kMostDimensions)
+  if (rank > kMostRank)
     message.refuse("dimensions", std::to_string(rank), "a dataset has more than 8", kSaveAsVersion7);
   std::vector<std::uint64_t> shape;
   for (std::uint64_t k = 0; k < rank; ++k) shape.push_back(message.number(8));

@@ -5,7 +5,7 @@
 namespace swarmcert::files {
 namespace {
 
-constexpr std::uint64_t kMostEntries = std::uint64_t{1} << 20;
+constexpr std::uint64_t kMostGroupEntries = std::uint64_t{1} << 20;
 constexpr std::uint64_t kMostRead_bytes = std::uint64_t{1} << 27;
 constexpr std::size_t kMostMessages = 1024;
 constexpr std::size_t kMostContinuations = 64;
@@ -133,7 +133,7 @@ Hdf5TreeNode Hdf5File::tree_node(std::uint64_t address, std::uint64_t type,
 }
 
 void Hdf5File::count_entry(const Hdf5Piece& piece) {
-  if (++entries_ > kMostEntries)
+  if (++entries_ > kMostGroupEntries)
     piece.refuse("", "", "the file has more entries than any network needs", kSaveAsVersion7);
 }
 

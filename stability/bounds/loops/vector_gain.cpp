@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 /// about kFine^2/8 of the gain), and of the one on which the worst direction is searched.
 constexpr double kFine = 0.0012;
 constexpr double kCoarse = 0.02;
-constexpr double kNegligible = 45;
+constexpr double kNegligibleExponent = 45;
 constexpr int kMostTriangles = 800;
 
 /// H on a graded partition of time, with the integral of H over each cell.
@@ -55,11 +55,11 @@ Partition partition(const Matrix3d& Lambda, const Matrix3d& K, double mass_kg, d
   double active = fastest;
   double length_s = 0;
   MatrixXd step;
-  while (slowest * t_s < kNegligible) {
+  while (slowest * t_s < kNegligibleExponent) {
     double still = slowest;
     for (const Vector3d* rates : {&of_Lambda, &of_K}) {
       for (const double rate : *rates) {
-        if (rate * t_s < kNegligible) still = std::max(still, rate);
+        if (rate * t_s < kNegligibleExponent) still = std::max(still, rate);
       }
     }
     if (length_s == 0 || still < active / 2) {
