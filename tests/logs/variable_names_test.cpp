@@ -16,6 +16,7 @@
 #include "data.h"
 #include "logs/rosbag_writer.h"
 #include "nn/base/input_error.h"
+#include "nn/temp_folder.h"
 
 namespace swarmcert::tests {
 namespace {
@@ -134,19 +135,13 @@ std::string generic_bag(const std::string& topic) {
 
 class BagBesideYaml : public testing::Test {
  protected:
-  BagBesideYaml() : folder_(std::filesystem::path(testing::TempDir()) / "swarmcert-crazyflies-yaml") {
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  ~BagBesideYaml() override { std::filesystem::remove_all(folder_); }
-
   logs::Log read(const std::string& topic, const std::string& yaml) {
     std::ofstream(folder_ / "flight.db3", std::ios::binary) << generic_bag(topic);
     std::ofstream(folder_ / "crazyflies.yaml") << yaml;
-    return logs::read_log((folder_ / "flight.db3").string());
+    return logs::read_log(folder_ / "flight.db3");
   }
 
-  const std::filesystem::path folder_;
+  const TempFolder folder_;
 };
 
 TEST_F(BagBesideYaml, ValuesAreSignalsWithoutAColumnsToml) {
