@@ -155,9 +155,10 @@ double CrossValidation::mean_square(const Members& members) const {
 }
 
 double CrossValidation::mean_square(const Members& members, const Folds& folds) const {
-  const auto [known, is_new] = mean_squares_.emplace(Question(&folds == &by_flight_, members), 0);
-  if (is_new) known->second = made_mean_square(members, folds);
-  return known->second;
+  const Question question(&folds == &by_flight_, members);
+  const auto known = mean_squares_.find(question);
+  if (known != mean_squares_.end()) return known->second;
+  return mean_squares_.emplace(question, made_mean_square(members, folds)).first->second;
 }
 
 double CrossValidation::made_mean_square(const Members& members, const Folds& folds) const {
@@ -177,10 +178,10 @@ std::vector<double> CrossValidation::block_errors(const Members& members) const 
 }
 
 const std::vector<double>& CrossValidation::block_errors(const Members& members, const Folds& folds) const {
-  const auto [known, is_new] =
-      block_errors_.emplace(Question(&folds == &by_flight_, members), std::vector<double>());
-  if (is_new) known->second = made_block_errors(members, folds);
-  return known->second;
+  const Question question(&folds == &by_flight_, members);
+  const auto known = block_errors_.find(question);
+  if (known != block_errors_.end()) return known->second;
+  return block_errors_.emplace(question, made_block_errors(members, folds)).first->second;
 }
 
 std::vector<double> CrossValidation::made_block_errors(const Members& members, const Folds& folds) const {

@@ -12,9 +12,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Far above what rounding in double does to a sum of so many products, relatively to the sum of their sizes:
-/// gamma_(terms + 2) is below (terms + 3) 2^-53 (Higham 2002, section 3.1).
-double sum_rounding(Index terms) { return 0x1p-40 + 0x1p-50 * static_cast<double>(terms); }
 /// More than what products lose to underflow.
 constexpr double kLostInForms = 0x1p-900;
 

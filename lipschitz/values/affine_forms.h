@@ -7,6 +7,10 @@
 
 namespace swarmcert::lipschitz {
 
+/// A bound, with a wide margin, on the rounding in double of a sum of `terms` products, relative to the sum of their
+/// absolute values: gamma_(terms + 2) is below (terms + 3) 2^-53 (Higham 2002, section 3.1).
+constexpr double sum_rounding(Eigen::Index terms) { return 0x1p-40 + 0x1p-50 * static_cast<double>(terms); }
+
 /// y_i = centre_i + (slopes xi)_i + e_i at the point middle + half xi of the box, |xi_k| <= 1 and |e_i| <= radius_i, in
 /// exact arithmetic. Sums of the y keep what they have in common, which intervals forget.
 struct AffineForms {
@@ -18,14 +22,14 @@ struct AffineForms {
   bool all_finite() const;
 };
 
-/// Of the inputs.
+/// The forms of the inputs.
 AffineForms forms_of(const Box& box);
-/// Of W h + b + e, |e| <= bias_radius, for h as in `inputs`.
+/// The forms of W h + b + e, |e| <= bias_radius, for h as in `inputs`.
 AffineForms layer_forms(const ReachLayer& layer, const AffineForms& inputs);
-/// Of relu(y), where y also lies within `bounds`: s y <= relu(y) <= s y + t for l < 0 < u, s near u / (u - l). Not
-/// finite where the bounds are not.
+/// The forms of relu(y), where y also lies within `bounds`: s y <= relu(y) <= s y + t for l < 0 < u, s near
+/// u / (u - l). Not finite where the bounds are not.
 AffineForms relu_forms(AffineForms y, const Bounds& bounds);
-/// What is left of `bounds` by the forms.
+/// The intersection of `bounds` with the intervals of the forms.
 Bounds within(const Bounds& bounds, const AffineForms& forms);
 
 }  // namespace swarmcert::lipschitz

@@ -14,14 +14,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Far above what rounding in double does to a few operations, relatively to their sizes.
+/// A bound, with a wide margin, on the relative rounding of a few operations in double.
 constexpr double kSafe = 0x1p-40;
 /// Below the overflow of float32, with room for what is off.
 constexpr double kLargest = 0x1p126;
-
-/// The same of a sum of so many terms: (terms - 1) 2^-53 times the sum of their sizes (Higham 2002, section 4.2), and
-/// eight times that.
-double safe(Index terms) { return kSafe + 0x1p-50 * static_cast<double>(terms); }
 
 VectorXd side(const std::vector<double>& values) {
   return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
@@ -75,7 +71,7 @@ class PartialSums {
   PartialSums(const ReachLayer& layer, const AffineForms* forms)
       : layer_(layer),
         forms_(forms),
-        slack_(safe(2 * layer.weights.cols() + 1)),
+        slack_(sum_rounding(2 * layer.weights.cols() + 1)),
         least_(layer.bias.array() - layer.bias_radius.array()),
         most_(layer.bias.array() + layer.bias_radius.array()),
         size_(layer.bias.cwiseAbs().array() + layer.bias_radius.array()) {
@@ -135,7 +131,7 @@ VectorXd layer_rounding(const ReachLayer& layer, const VectorXd& lower, const Ve
     error += kFloatUnit * (layer.weights.col(j).array().abs() * largest) + 0x1p-150;
     error += kFloatUnit * (sums.largest() + error);
   }
-  error *= 1 + safe(2 * lower.size() + 1);
+  error *= 1 + sum_rounding(2 * lower.size() + 1);
   for (Index i = 0; i < error.size(); ++i)
     if (!(sums.size()(i) + error(i) < kLargest)) error(i) = kInfinity;
   return error.matrix();
@@ -153,7 +149,7 @@ LayerErrors layer_errors(const ReachNetwork& chain, const Reach& reach, const Ve
     std::optional<AffineForms> off = exact;
     if (off) off->radius += (1 + kSafe) * error;
     errors.made.push_back(layer_rounding(chain[k], computed.lower, computed.upper, off ? &*off : nullptr));
-    error = (1 + safe(error.size())) * (chain[k].weights.cwiseAbs() * error) + errors.made.back();
+    error = (1 + sum_rounding(error.size())) * (chain[k].weights.cwiseAbs() * error) + errors.made.back();
     errors.total.push_back(error);
     if (!exact) continue;
     exact = layer_forms(chain[k], *exact);
@@ -171,7 +167,7 @@ std::vector<MatrixXd> sensitivities(const ReachNetwork& chain, const Reach& reac
   result.back() = middle;
   for (std::size_t j = chain.size() - 1; j > 0; --j) {
     const MatrixXd size = chain[j].weights.cwiseAbs();
-    const double slack = safe(size.rows());
+    const double slack = sum_rounding(size.rows());
     radius = ((1 + slack) * radius + slack * middle.cwiseAbs()) * size;
     middle = (middle * chain[j].weights).eval();
     if (chain[j - 1].has_relu) through_relu(reach.before_relu(j - 1), errors.total[j - 1], middle, radius);

@@ -29,10 +29,10 @@ struct LayerErrors {
   std::vector<Eigen::VectorXd> total;  ///< of y_k: with what the layers before got wrong
 };
 
-/// Forms cost a layer as much as so many intervals.
+/// With affine forms a layer costs about as much as intervals times the number of inputs: not used above this number.
 inline constexpr Eigen::Index kMostFormInputs = 32;
 
-/// Values lie in their bounds and in affine forms, which are left away with more than kMostFormInputs inputs.
+/// Values lie in their bounds and, with at most kMostFormInputs inputs, in affine forms.
 /// @param before the error of what the first layer takes in.
 LayerErrors layer_errors(const ReachNetwork& chain, const Reach& reach, const Eigen::VectorXd& before);
 

@@ -82,12 +82,12 @@ void Downwash::columns(const Instant& now, const double* shape, Wrench* columns)
 }
 
 void Downwash::columns_along(const Instant* instants, int count, const double* shape, Wrench* columns) const {
-  drifted_columns(instants, count, shape, 0, Eigen::Vector3d::Zero(), columns);
+  drifted_columns(instants, count, shape, {}, columns);
 }
 
 // The same arithmetic as for a whole swarm, for the pairs of several instants at a time.
-void Downwash::drifted_columns(const Instant* instants, int count, const double* shape, double delay_s,
-                               const Eigen::Vector3d& wind_m_s, Wrench* columns) const {
+void Downwash::drifted_columns(const Instant* instants, int count, const double* shape,
+                               const WakeDrift& drift, Wrench* columns) const {
   constexpr int kMost = 4 * kRowLength;
   alignas(kRowLength * sizeof(double)) double rows[6][kMost], power[kMost], sums[kMost], composed[kMost];
   int of_instant[kMost], pairs = 0;
@@ -108,8 +108,7 @@ void Downwash::drifted_columns(const Instant* instants, int count, const double*
       const Instant& now = instants[first + i];
       for (int j = 0; j < now.num_neighbours; ++j) {
         const Neighbour& neighbour = now.neighbours[j];
-        Eigen::Vector3d dp_W_m = neighbour.dp_W_m;
-        if (delay_s != 0) dp_W_m += delay_s * (wind_m_s - neighbour.v_W_m_s);
+        const Eigen::Vector3d dp_W_m = drift.dp_W_m(neighbour);
         if (dp_W_m.z() <= kWakeTouching_m) continue;  // does nothing, as in the kernel
         if (pairs == kMost) add_up();
         if (neighbour.mass_kg != last_mass_kg) {

@@ -14,6 +14,18 @@
 
 namespace swarmcert::stability {
 
+/// Wakes that arrive `delay_s` after they left the rotors, carried along by a wind w: as if neighbours were at
+/// p_j + delay_s (w - v_j), their velocity taken as constant meanwhile.
+struct WakeDrift {
+  double delay_s = 0;
+  Eigen::Vector3d wind_m_s = Eigen::Vector3d::Zero();  ///< w
+
+  Eigen::Vector3d dp_W_m(const Neighbour& neighbour) const {
+    if (delay_s == 0) return neighbour.dp_W_m;
+    return neighbour.dp_W_m + delay_s * (wind_m_s - neighbour.v_W_m_s);
+  }
+};
+
 class Downwash : public Effect {
  public:
   /// Places in theta.
@@ -23,10 +35,9 @@ class Downwash : public Effect {
   static EffectInfo describe();
   void columns(const Instant& now, const double* shape, Wrench* columns) const override;
   void columns_along(const Instant* instants, int count, const double* shape, Wrench* columns) const override;
-  /// columns_along() of wakes that arrive `delay_s` after they left, as if neighbours were at p_j + delay_s (w - v_j).
-  /// @param wind_m_s w
-  void drifted_columns(const Instant* instants, int count, const double* shape, double delay_s,
-                       const Eigen::Vector3d& wind_m_s, Wrench* columns) const;
+  /// columns_along() of wakes that drift.
+  void drifted_columns(const Instant* instants, int count, const double* shape, const WakeDrift& drift,
+                       Wrench* columns) const;
   bool takes_pairs() const override { return true; }
   bool pairs_need_velocity(const double* shape) const override { return shape[kConvection] != 0; }
   /// The logarithm of the part of g^p that neither place nor motion changes.

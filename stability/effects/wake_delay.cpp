@@ -32,24 +32,24 @@ std::array<double, 7> downwash_shape(const double* shape) {
           0};
 }
 
+WakeDrift drift_of(const double* shape) { return {shape[kDelay], {shape[kWindX], shape[kWindY], 0}}; }
+
 /// `now` among its nearest neighbours where their wakes, which arrive now, have drifted to; `past` is scratch of
 /// kMostAtOnce.
 Instant with_past_neighbours(const Instant& now, const double* shape, Neighbour* past) {
-  const double delay_s = shape[kDelay];
-  const Eigen::Vector3d wind_m_s(shape[kWindX], shape[kWindY], 0);
+  const WakeDrift drift = drift_of(shape);
   Instant then = now;
   then.neighbours = past;
   then.num_neighbours = std::min(now.num_neighbours, kMostAtOnce);
   for (int j = 0; j < then.num_neighbours; ++j) {
     past[j] = now.neighbours[j];
-    past[j].dp_W_m += delay_s * (wind_m_s - past[j].v_W_m_s);
+    past[j].dp_W_m = drift.dp_W_m(past[j]);
   }
   return then;
 }
 
-/// The wake of downwash.h, of neighbours where they were delay_s ago, carried along by a horizontal wind w since: as if
-/// they were at p_j + delay_s (w - v_j), their velocity taken as constant meanwhile. With a delay of 0 it is the
-/// downwash without convection.
+/// The wake of downwash.h with a WakeDrift, in a horizontal wind. With a delay of 0 it is the downwash without
+/// convection.
 class WakeDelay : public Effect {
  public:
   WakeDelay()
@@ -73,8 +73,7 @@ class WakeDelay : public Effect {
   }
   void columns_along(const Instant* instants, int count, const double* shape,
                      Wrench* columns) const override {
-    wake_.drifted_columns(instants, count, downwash_shape(shape).data(), shape[kDelay],
-                          {shape[kWindX], shape[kWindY], 0}, columns);
+    wake_.drifted_columns(instants, count, downwash_shape(shape).data(), drift_of(shape), columns);
   }
   bool in_support(const Instant& now, const double* shape) const override {
     std::array<Neighbour, kMostAtOnce> past;
