@@ -65,10 +65,18 @@ double Interplay::total() const {
   return size() == 0 ? 0 : (force_N.array() - force_N.mean()).square().sum();
 }
 
-const Interplay::Explained& Interplay::explained(const std::vector<int>& shifts) {
-  const auto known = known_.find(shifts);
-  if (known != known_.end()) return known->second;
-  return known_[shifts] = fitted_to(sums_at(shifts));
+double Interplay::explained(const std::vector<int>& shifts, int without) {
+  if (without < 0) {
+    const auto [known, is_new] = of_all_.try_emplace(shifts);
+    if (is_new) known->second = fitted_to(sums_at(shifts), -1);
+    return known->second;
+  }
+  const auto [known, is_new] = without_.try_emplace(shifts);
+  if (is_new) {
+    const std::vector<Sums> tenths = sums_at(shifts);
+    for (int t = 0; t < kClockTenths; ++t) known->second[static_cast<std::size_t>(t)] = fitted_to(tenths, t);
+  }
+  return known->second[static_cast<std::size_t>(without)];
 }
 
 void Interplay::read(const Track& own, const std::vector<Vector3d>& r) {
@@ -157,28 +165,24 @@ std::vector<Interplay::Sums> Interplay::sums_at(const std::vector<int>& shifts) 
   return tenths;
 }
 
-Interplay::Explained Interplay::fitted_to(const std::vector<Sums>& tenths) const {
+double Interplay::fitted_to(const std::vector<Sums>& tenths, int without) const {
   const Index size_of_all = maps_ * map_size();
-  Explained result{};
-  for (int without = -1; without < kClockTenths; ++without) {
-    Sums all = {MatrixXd::Zero(size_of_all, size_of_all), VectorXd::Zero(size_of_all),
-                VectorXd::Zero(size_of_all)};
-    for (int t = 0; t < kClockTenths; ++t) {
-      if (t == without) continue;
-      const Sums& one = tenths[static_cast<std::size_t>(t)];
-      all.gram += one.gram;
-      all.b += one.b;
-      all.columns += one.columns;
-      all.sum += one.sum;
-      all.count += one.count;
-    }
-    // Hats add up to a constant: a constant force is among the maps. The ridge keeps places that were hardly visited
-    // at zero.
-    all.b -= all.sum / std::max(all.count, 1.0) * all.columns;
-    all.gram.diagonal().array() += 1e-2 * all.count / static_cast<double>(map_size());
-    result[static_cast<std::size_t>(without + 1)] = all.b.dot(all.gram.ldlt().solve(all.b));
+  Sums all = {MatrixXd::Zero(size_of_all, size_of_all), VectorXd::Zero(size_of_all),
+              VectorXd::Zero(size_of_all)};
+  for (int t = 0; t < kClockTenths; ++t) {
+    if (t == without) continue;
+    const Sums& one = tenths[static_cast<std::size_t>(t)];
+    all.gram += one.gram;
+    all.b += one.b;
+    all.columns += one.columns;
+    all.sum += one.sum;
+    all.count += one.count;
   }
-  return result;
+  // Hats add up to a constant: a constant force is among the maps. The ridge keeps places that were hardly visited at
+  // zero.
+  all.b -= all.sum / std::max(all.count, 1.0) * all.columns;
+  all.gram.diagonal().array() += 1e-2 * all.count / static_cast<double>(map_size());
+  return all.b.dot(all.gram.ldlt().solve(all.b));
 }
 
 }  // namespace swarmcert::identification

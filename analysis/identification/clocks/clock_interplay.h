@@ -23,9 +23,6 @@ inline constexpr int kClockTenths = 10;         ///< parts of a flight that are 
 class Interplay {
  public:
   static constexpr int kAbsent = std::numeric_limits<int>::min();
-  /// What the maps explain of total(): of the whole flight, then without one tenth each, N^2.
-  using Explained = std::array<double, kClockTenths + 1>;
-
   /// @param r force_residual() of `own`, in W. @param others vehicles on the clock of `own`, save for what is sought
   Interplay(const residuals::Track& own, const std::vector<Eigen::Vector3d>& r,
             const std::vector<const residuals::Track*>& others);
@@ -34,9 +31,10 @@ class Interplay {
   bool is_rich() const;
   /// Sum of squares about the mean, N^2.
   double total() const;
-  /// @param shifts of each of the others, in steps from -kClockSteps - kWakeSteps to kClockSteps, or kAbsent. What was
-  ///     asked once is remembered.
-  const Explained& explained(const std::vector<int>& shifts);
+  /// What the maps explain of total(), N^2. What was asked once is remembered.
+  /// @param shifts  of each of the others, in steps from -kClockSteps - kWakeSteps to kClockSteps, or kAbsent.
+  /// @param without the tenth of the flight that is left out; -1: none
+  double explained(const std::vector<int>& shifts, int without = -1);
 
  private:
   struct Path {
@@ -56,13 +54,14 @@ class Interplay {
   void keep_what_every_shift_knows();
   const std::vector<SparseRow>& rows_at(Path& path, int shift) const;
   std::vector<Sums> sums_at(const std::vector<int>& shifts);
-  Explained fitted_to(const std::vector<Sums>& tenths) const;
+  double fitted_to(const std::vector<Sums>& tenths, int without) const;
 
   std::vector<double> time_s_, force_N_;
   std::vector<Eigen::Vector3d> own_m_;
   std::vector<Path> others_;
   int maps_ = 0;
-  std::map<std::vector<int>, Explained> known_;
+  std::map<std::vector<int>, double> of_all_;                             ///< explained(), by the shifts
+  std::map<std::vector<int>, std::array<double, kClockTenths>> without_;  ///< each tenth
 };
 
 }  // namespace swarmcert::identification

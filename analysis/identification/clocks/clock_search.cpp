@@ -58,7 +58,7 @@ double ClockSearch::value(const ClockSteps& steps, int without) {
   if (!is_on_grid(steps)) return -kInfinity;
   double sum = 0;
   for (std::size_t v = 0; v < interplays_.size(); ++v)
-    sum += interplays_[v].explained(shifts_of(v, steps))[static_cast<std::size_t>(without + 1)];
+    sum += interplays_[v].explained(shifts_of(v, steps), without);
   return sum;
 }
 
@@ -71,7 +71,7 @@ void ClockSearch::measure_pairs() {
       std::vector<int> shifts(count - 1, Interplay::kAbsent);
       for (int shift = kLeastShift; shift <= kClockSteps; ++shift) {
         shifts[other < v ? other : other - 1] = shift;
-        pairs_[v][other].push_back(interplays_[v].explained(shifts)[0]);
+        pairs_[v][other].push_back(interplays_[v].explained(shifts));
       }
     }
   }
@@ -206,10 +206,10 @@ bool ClockSearch::feels(int feels, int felt, const ClockSteps& steps) {
   for (std::size_t v = 0; v < interplays_.size(); ++v) {
     if (clock_of_[v] != feels) continue;
     std::vector<int> shifts = shifts_of(v, steps);
-    const double with = interplays_[v].explained(shifts)[0];
+    const double with = interplays_[v].explained(shifts);
     for (std::size_t other = 0; other < interplays_.size(); ++other)
       if (other != v && clock_of_[other] == felt) shifts[other < v ? other : other - 1] = Interplay::kAbsent;
-    if (with - interplays_[v].explained(shifts)[0] > least * interplays_[v].total()) return true;
+    if (with - interplays_[v].explained(shifts) > least * interplays_[v].total()) return true;
   }
   return false;
 }
