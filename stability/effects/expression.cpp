@@ -3,7 +3,9 @@
 #include <muParser.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <random>
 
@@ -22,6 +24,23 @@ const std::vector<std::string> kVariables = {
     "wz",    "T",   "V",   "m",  "g",  "t",  "time", "battery", "heading", "tilt", "speed",
     "climb", "vbx", "vby", "dx", "dy", "dz", "dvx",  "dvy",     "dvz",     "mj"};
 constexpr std::size_t kFirstOfNeighbour = 25;  // "dx"
+
+/// Where `formula` is "rest + name" with nothing that binds weaker than a sum, how long the rest is; else 0.
+std::size_t length_before(const std::string& name, const std::string& formula) {
+  const std::size_t plus = formula.rfind('+');
+  if (plus == std::string::npos || plus == 0) return 0;
+  const auto is_of_name = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
+  const std::size_t from = formula.find_first_not_of(' ', plus + 1), to = formula.find_last_not_of(' ');
+  const std::size_t last = formula.find_last_not_of(' ', plus - 1);
+  if (from == std::string::npos || formula.substr(from, to + 1 - from) != name) return 0;
+  if (last == std::string::npos || (!is_of_name(formula[last]) && formula[last] != ')')) return 0;
+  int depth = 0;
+  for (std::size_t i = 0; i < plus; ++i) {
+    depth += formula[i] == '(' ? 1 : formula[i] == ')' ? -1 : 0;
+    if (depth == 0 && std::strchr("<>=!&|?:,", formula[i]) != nullptr) return 0;
+  }
+  return depth == 0 ? plus : 0;
+}
 
 /// Shape parameters without a grid vary as well: by a factor of two to both sides where they are one or two, in small
 /// steps from where they are where they are more. Those at zero have no scale, those with equal bounds are held.
@@ -83,6 +102,9 @@ struct ExpressionEffect::Formulas {
   struct Formula {
     std::size_t target;
     mu::Parser parser;
+    /// A coefficient that is added to what `parser` gives, which does not contain it and is linear in the others: with
+    /// nothing but this one, the formula need not be evaluated.
+    const double* constant = nullptr;
   };
   std::vector<Formula> formulas;
 
@@ -97,7 +119,9 @@ struct ExpressionEffect::Formulas {
     std::vector<std::string> known = kVariables;
     if (!per_neighbour) known.resize(kFirstOfNeighbour);
     try {
-      for (std::size_t i = 0; i < known.size(); ++i) formula.parser.DefineVar(known[i], &variables[i]);
+      for (std::size_t i = 0; i < known.size(); ++i) {  // each that is defined takes time
+        if (text.find(known[i]) != std::string::npos) formula.parser.DefineVar(known[i], &variables[i]);
+      }
       for (std::size_t k = 0; k < info.linear.size(); ++k) {
         formula.parser.DefineVar(info.linear[k].name, &linear[k]);
         known.push_back(info.linear[k].name);
@@ -106,7 +130,7 @@ struct ExpressionEffect::Formulas {
         formula.parser.DefineVar(info.shape[k].name, &shape[k]);
         known.push_back(info.shape[k].name);
       }
-      formula.parser.SetExpr(text);
+      set_text(text, info, formula);
       for (const auto& used : formula.parser.GetUsedVar()) {
         turns = turns || used.first == "heading" || used.first == "tilt";
         if (std::find(known.begin(), known.end(), used.first) == known.end()) {
@@ -118,6 +142,18 @@ struct ExpressionEffect::Formulas {
     } catch (const mu::Parser::exception_type& error) {
       refuse(kTargets[target], files::in_quotes(text), "is not a formula (" + error.GetMsg() + ")", "");
     }
+  }
+
+  void set_text(const std::string& text, const EffectInfo& info, Formula& formula) {
+    for (std::size_t k = 0; k < info.linear.size(); ++k) {
+      const std::size_t length = length_before(info.linear[k].name, text);
+      if (length == 0) continue;
+      formula.parser.SetExpr(text.substr(0, length));
+      if (formula.parser.GetUsedVar().count(info.linear[k].name) != 0) break;
+      formula.constant = &linear[k];
+      return;
+    }
+    formula.parser.SetExpr(text);
   }
 
   void set_own(const Instant& now) {
@@ -159,10 +195,12 @@ struct ExpressionEffect::Formulas {
     to[6] = neighbour.mass_kg;
   }
 
-  /// Adds what the formulas give now to `sum`.
-  void add_value(const Instant& now, Wrench* sum) {
+  /// Adds what the formulas give now to `sum`. @param only the one coefficient that is not zero, where there is one
+  void add_value(const Instant& now, const double* only, Wrench* sum) {
     for (Formula& formula : formulas) {
-      const double value = formula.parser.Eval();
+      const double* const constant = formula.constant;
+      double value = constant != nullptr && constant == only ? 0 : formula.parser.Eval();
+      if (constant != nullptr) value += *constant;
       if (!std::isfinite(value)) {
         refuse(kTargets[formula.target], std::to_string(value),
                "is not finite at z = " + std::to_string(now.p_W_m.z()) +
@@ -179,12 +217,12 @@ struct ExpressionEffect::Formulas {
     }
   }
 
-  Wrench evaluate(const Instant& now) {
+  Wrench evaluate(const Instant& now, const double* only = nullptr) {
     Wrench sum;
-    if (!per_neighbour) add_value(now, &sum);
+    if (!per_neighbour) add_value(now, only, &sum);
     for (int j = 0; per_neighbour && j < now.num_neighbours; ++j) {
       set_neighbour(now.neighbours[j]);
-      add_value(now, &sum);
+      add_value(now, only, &sum);
     }
     return sum;
   }
@@ -279,7 +317,7 @@ void ExpressionEffect::columns(const Instant& now, const double* shape, Wrench* 
   std::fill(formulas_->linear.begin(), formulas_->linear.end(), 0.0);
   for (std::size_t k = 0; k < formulas_->linear.size(); ++k) {
     formulas_->linear[k] = 1;
-    columns[k] = formulas_->evaluate(now);
+    columns[k] = formulas_->evaluate(now, &formulas_->linear[k]);
     formulas_->linear[k] = 0;
   }
 }

@@ -512,6 +512,42 @@ TEST(ExpressionEffect, EqualsTheBuiltInEffectThatItSpells) {
   }
 }
 
+TEST(ExpressionEffect, ACoefficientAtTheEndOfASumHasTheColumnOfTheWholeFormula) {
+  const struct {
+    const char* formula;
+    double (*column)(double x, double z);
+  } cases[] = {
+      {"a * x + c", [](double, double) { return 1.0; }},
+      {"a * max(x, z)  +  c ", [](double, double) { return 1.0; }},
+      {"a * (x > z ? 1 : 0) + c", [](double, double) { return 1.0; }},
+      {"x > z ? a * x : a * z + c", [](double x, double z) { return x > z ? 0.0 : 1.0; }},
+      {"x > z ? a + c : a * z + c", [](double, double) { return 1.0; }},
+      {"c * z + a * x + c", [](double, double z) { return z + 1; }},
+      {"a * x - 2 * (z * a + c)", [](double, double) { return -2.0; }},
+      {"a * x * + c", nullptr},
+  };
+  std::mt19937_64 random(13);
+  for (const auto& one : cases) {
+    EffectSpec spec;
+    spec.name = "mine";
+    spec.parameters = {{"a", 2.0}, {"c", 3.0}};
+    spec.expression.formulas = {{"force_z_N", one.formula}};
+    spec.expression.linear = {"a", "c"};
+    if (one.column == nullptr) {
+      EXPECT_THROW(make_effect(spec, kContext), files::InputError) << one.formula;
+      continue;
+    }
+    const std::unique_ptr<Effect> effect = make_effect(spec, kContext);
+    for (int trial = 0; trial < 20; ++trial) {
+      const RandomInstant state(random, 0);
+      Wrench columns[2];
+      effect->columns(state.now, nullptr, columns);
+      const Eigen::Vector3d& p_m = state.now.p_W_m;
+      EXPECT_NEAR(columns[1].force_W_N.z(), one.column(p_m.x(), p_m.z()), 1e-12) << one.formula;
+    }
+  }
+}
+
 TEST(ExpressionEffect, SumsOverNeighbours) {
   EffectSpec spec;
   spec.name = "mine";
