@@ -214,6 +214,10 @@ ColumnMemory::Request ColumnMemory::planned(const Grams& asked, Kept kept, Along
     if (more.is_new && are_recent) {
       more.recent = &recent_[more.key];
       more.recent->columns = more.columns;
+      if (const auto spare = spare_.find(more.columns); spare != spare_.end()) {
+        more.recent->flights = std::move(spare->second);
+        spare_.erase(spare);
+      }
       more.recent->flights.resize(flights_.size());
     }
     if (more.recent != nullptr) more.recent->last_use = requests_;
@@ -224,16 +228,19 @@ ColumnMemory::Request ColumnMemory::planned(const Grams& asked, Kept kept, Along
 void ColumnMemory::forget_old() {
   int columns = 0;
   for (const auto& [key, recent] : recent_) columns += recent.columns;
+  spare_.clear();
   while (bytes_of(columns) > kMostRecent_bytes) {
     const auto oldest = std::min_element(recent_.begin(), recent_.end(), [](const auto& a, const auto& b) {
       return a.second.last_use < b.second.last_use;
     });
     columns -= oldest->second.columns;
+    spare_.emplace(oldest->second.columns, std::move(oldest->second.flights));
     recent_.erase(oldest);
   }
 }
 
 void ColumnMemory::forget_kept() {
+  spare_.clear();
   first_column_.clear();
   columns_ = 0;
   for (Flight& flight : flights_) {
@@ -279,7 +286,10 @@ std::vector<const double*> ColumnMemory::columns_of_track(const Passes& passes, 
       support[more.key] = place->support;
       continue;
     }
-    if (place != nullptr) *place = {made.middleCols(from, more.columns), *shown};
+    if (place != nullptr) {
+      place->rows = made.middleCols(from, more.columns);
+      place->support = *shown;
+    }
     add(made, from, more.columns);
     support[more.key] = *shown++;
     from += more.columns;
@@ -304,7 +314,8 @@ void ColumnMemory::add_track(const Passes& passes, const Grams& asked, const Req
   if (request.keeps && request.more_columns > 0) {
     std::vector<int> fresh(static_cast<std::size_t>(request.more_columns));
     std::iota(fresh.begin(), fresh.end(), columns_);
-    append(assembled(length, columns, fresh), track);
+    const bool are_new = request.fresh.columns == request.more_columns;
+    append(are_new ? std::move(made_rows) : assembled(length, columns, fresh), track);
   }
   std::vector<int> source = request.sources(asked, track.known.track.vehicle);
   const bool has_all = request.keeps || request.more_columns == 0;

@@ -87,11 +87,12 @@ class ColumnMemory {
     std::vector<KeptTrack> tracks;
   };
   struct Request;
-  /// Columns by flight and track, which a pass fills.
+  using OfFlights = std::vector<std::vector<TrackColumns>>;  ///< by flight and track
+  /// Columns that a pass fills.
   struct Recent {
     std::size_t last_use = 0;
     int columns = 0;
-    std::vector<std::vector<TrackColumns>> flights;
+    OfFlights flights;
   };
 
   enum class Along { kFlown, kWanted };  ///< the track, or as_commanded()
@@ -119,6 +120,8 @@ class ColumnMemory {
   std::map<std::string, int> first_column_;  ///< of kept columns, by a text of effect and theta
   int columns_ = 0;                          ///< kept
   std::map<std::string, Recent> recent_;     ///< by the same text
+  /// What the last pass forgot, by the number of columns: room for as many new ones, which need not be asked for.
+  std::multimap<int, OfFlights> spare_;
   std::size_t requests_ = 0;
 };
 
