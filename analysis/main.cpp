@@ -2,6 +2,10 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
+
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -25,6 +29,15 @@ void hold_standard_streams() {
   if (descriptor >= 0) ::close(descriptor);
 }
 
+/// Passes over flights free and ask for the same megabytes again and again: given back to the system in between, they
+/// come as pages that have to be cleared first.
+void keep_freed_memory() {
+#if defined(__GLIBC__)
+  ::mallopt(M_TRIM_THRESHOLD, 256 << 20);  // bytes that may stay free at the end of the heap
+  ::mallopt(M_MMAP_THRESHOLD, 32 << 20);   // bytes from which on a piece has pages of its own
+#endif
+}
+
 /// If standard output could not be written, a success becomes a failure.
 int after_printing(int code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
@@ -36,6 +49,7 @@ int after_printing(int code) {
 
 int main(int argc, char** argv) {
   hold_standard_streams();
+  keep_freed_memory();
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is an error of writing, with its message
   try {
     return after_printing(swarmcert::analysis::run_command(argc, argv));
