@@ -56,12 +56,14 @@ Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& colu
 }
 
 Eigen::MatrixXd part_of_gram(const Eigen::VectorXd& packed, const std::vector<int>& columns) {
-  const auto n = static_cast<int>(columns.size());
+  const auto n = static_cast<Eigen::Index>(columns.size());
   Eigen::MatrixXd g(n, n);
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j <= i; ++j) {
-      g(i, j) = g(j, i) =
-          packed[Grams::packed(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)])];
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const int row = columns[static_cast<std::size_t>(i)];
+    const double* const upper = packed.data() + Grams::packed(0, row);
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const int column = columns[static_cast<std::size_t>(j)];
+      g(i, j) = g(j, i) = column <= row ? upper[column] : packed[Grams::packed(row, column)];
     }
   }
   return g;

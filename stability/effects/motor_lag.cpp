@@ -26,8 +26,9 @@ class MotorLagStream : public ColumnStream {
       if (h != step_s_) {
         step_s_ = h;
         decay_ = std::exp(-h / tau_s_);
+        in_steps_ = tau_s_ / h;
       }
-      const Vector4 ramp = (tau_s_ / h) * (input - input_);
+      const Vector4 ramp = in_steps_ * (input - input_);
       lagged_ = input - ramp + decay_ * (lagged_ - input_ + ramp);
     }
     has_past_ = true;
@@ -40,7 +41,7 @@ class MotorLagStream : public ColumnStream {
  private:
   const double tau_s_;
   bool has_past_ = false;
-  double time_s_ = 0, step_s_ = 0, decay_ = 1;
+  double time_s_ = 0, step_s_ = 0, decay_ = 1, in_steps_ = 0;  ///< the last: tau
   Vector4 input_, lagged_;
 };
 
