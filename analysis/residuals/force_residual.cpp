@@ -62,16 +62,32 @@ double commanded_thrust_N(const stability::Model& model, const Track& track, std
   return thrust_N;
 }
 
-/// Turns each column. Eigen's own product of the whole needs a copy of all columns; sums are in its order.
+/// rotation * (x, y, z), for one vector or for several side by side. Sums are in the order of Eigen's own product.
+template <typename Numbers>
+void turn(const Eigen::Matrix3d& r, Numbers& x, Numbers& y, Numbers& z) {
+  const Numbers turned_x = (r(0, 0) * x + r(0, 1) * y) + r(0, 2) * z;
+  const Numbers turned_y = (r(1, 0) * x + r(1, 1) * y) + r(1, 2) * z;
+  z = r(2, 0) * x + (r(2, 1) * y + r(2, 2) * z);
+  x = turned_x;
+  y = turned_y;
+}
+
+/// Turns each column, two at a time. Eigen's own product of the whole needs a copy of all columns.
 void turn(const Eigen::Matrix3d& rotation, Eigen::Matrix3Xd& vectors) {
+  using Two = double __attribute__((vector_size(2 * sizeof(double))));
   const Eigen::Matrix3d r = rotation;  // no other name leads here, so that it stays in registers
   double* at = vectors.data();
-  for (Eigen::Index k = 0; k < vectors.cols(); ++k, at += 3) {
-    const double x = at[0], y = at[1], z = at[2];
-    at[0] = (r(0, 0) * x + r(0, 1) * y) + r(0, 2) * z;
-    at[1] = (r(1, 0) * x + r(1, 1) * y) + r(1, 2) * z;
-    at[2] = r(2, 0) * x + (r(2, 1) * y + r(2, 2) * z);
+  double* const end = at + vectors.size();
+  for (; end - at >= 6; at += 6) {
+    Two x = {at[0], at[3]}, y = {at[1], at[4]}, z = {at[2], at[5]};
+    turn(r, x, y, z);
+    for (int i = 0; i < 2; ++i) {
+      at[3 * i] = x[i];
+      at[3 * i + 1] = y[i];
+      at[3 * i + 2] = z[i];
+    }
   }
+  if (at != end) turn(r, at[0], at[1], at[2]);
 }
 
 void pass_published_lag(Track& track) {
