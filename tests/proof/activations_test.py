@@ -206,8 +206,10 @@ def refuses_what_only_relu_has(folder, generator):
                 "values of network: of GELU")
     refused(with_activations(on_box, {"network": "softplus"}), net, "the values leave the bounds")
     local = certify(net, "--activation", "tanh", "--domain", box)
-    assert local["bounds"][0]["upper_method"] == "local_sdp"
-    not_checked(local, net, "from the slopes that activations have on a box")
+    assert local["bounds"][0]["upper_method"] == "local_sdp" and check(local, net).returncode == 0
+    of_gelu = certify(net, "--activation", "gelu", "--domain", box)
+    assert of_gelu["bounds"][0]["upper_method"] == "local_sdp"
+    not_checked(of_gelu, net, "from the slopes that activations have on a box")
     local["bounds"][0]["domain"] = "global"
     refused(local, net, "slopes on a box of a bound without one")
     assert check(certificate, net, "--activation", "tanh").returncode == 0
@@ -491,6 +493,89 @@ def products_of_slopes_on_a_box_are_decided_alike(folder, generator):
     assert decided(certificate, net) == 1
 
 
+def inequalities_of_slopes_on_a_box_are_decided_alike(folder, generator):
+    """As certified, and no step less; with numbers of the proof, the box, or the activation changed; of sums, whose rho
+    has the slopes that it has anywhere, with laws that rest on them; with the factor left out; where a neuron is
+    decided, and where none is, so that the inputs are not in the matrix."""
+    net, box, codes = folder / "inequality.safetensors", folder / "inequality.toml", Counter()
+    net.write_bytes(safetensors(layers([3, 6, 4, 2], generator)))
+    every = "tanh", "softplus", "elu,sigmoid", "selu,silu", "relu,tanh"
+    for ops in every:
+        box.write_text('schema = "swarmcert/box/1"\nlower = [1.9, -1.1, 1.4]\nupper = [2.1, -0.9, 1.5]\n')
+        certificate = certify(net, "--activation", ops, "--domain", box, rounds=1)
+        assert certificate["bounds"][0]["upper_method"] == "local_sdp" and decided(certificate, net) == 0, ops
+        for changed in changed_inequalities(certificate, generator):
+            codes[decided(changed, net)] += 1
+    assert codes[1] > 4 * len(every) and codes[0] and set(codes) <= {0, 1}, codes
+    net.write_bytes(safetensors(layers([3, 34, 34, 2], generator)))
+    for ops in "silu", "tanh,selu":
+        certificate = certify(net, "--activation", ops, "--domain", box)
+        bound = certificate["bounds"][0]
+        assert bound["upper_method"] == "local_sdp" and bound["proof"]["factor"] is None
+        assert decided(certificate, net) == 0, ops
+        bound["proof"]["rho"] = (0.99 * float.fromhex(bound["proof"]["rho"])).hex()
+        assert decided(certificate, net) == 1, ops
+    net.write_bytes(safetensors(layers([3, 6, 4, 2], generator)))
+    box.write_text('schema = "swarmcert/box/1"\nlower = [-9, -9, -9]\nupper = [9, 9, 9]\n')
+    undecided = certify(net, "--activation", "relu", "--method", "sdp")
+    undecided["box"] = certify(net, "--activation", "tanh", "--domain", box)["box"]
+    undecided["bounds"][0].update(domain="box", upper_method="local_sdp")
+    assert decided(undecided, net) == 0
+    undecided["box"]["network"]["upper"] = [(-8.5).hex()] * 3  # some neuron is decided: another matrix
+    assert decided(undecided, net) == 1
+    networks = {part: layers(sizes, generator) for part, sizes in PARTS.items()}
+    net = network_toml(folder / "inequalities", networks,
+                       {"phi:small": "softplus", "phi:large": "elu", "phi:ground": "silu", "rho:small": "silu"})
+    box.write_text('schema = "swarmcert/box/1"\nlower = [-0.5, -0.5, -0.5, -0.5, -0.5, -0.5]\n'
+                   'upper = [-0.25, -0.25, 0.25, 0.5, -0.25, -0.25]\n')
+    certificate = certify(net, "--domain", box, "--neighbours", "large=2,small=1", "--blocks=velocity", "--scale",
+                          "1,1,1,2,2,2", rounds=1)
+    methods = Counter(bound["upper_method"] for bound in certificate["bounds"])
+    assert methods["local_sdp"] > 2 and certificate["laws"] and decided(certificate, net) == 0, methods
+    with_upper(certificate["laws"][0], 0.999 * certificate["laws"][0]["upper"])
+    assert decided(certificate, net) == 1
+    with_upper(certificate["laws"][0], 2 * certificate["laws"][0]["upper"])
+    assert decided(certificate, net) == 0
+    for part, other in ("rho:small", "tanh"), ("phi:small", "elu"), ("phi:ground", "tanh"):
+        stated = network_toml(folder / "inequalities", networks, {part: other})
+        certificate["network"]["description_sha256"] = hashlib.sha256(stated.read_bytes()).hexdigest()
+        assert decided(with_op(certificate, part, other), stated) in (0, 1)
+
+
+def changed_inequalities(certificate, generator):
+    """One number of the proof, an end of the box, or the activations changed; none claims less than before."""
+    def copy_and_bound():
+        changed = copy.deepcopy(certificate)
+        return changed, changed["bounds"][0]
+    changed, bound = copy_and_bound()
+    bound["proof"]["rho"] = (0.999 * float.fromhex(bound["proof"]["rho"])).hex()
+    yield changed
+    for factor in 0.5, 1 + 2.0 ** -50, 1.5:
+        changed, bound = copy_and_bound()
+        place = generator.randrange(len(bound["proof"]["t"]))
+        bound["proof"]["t"][place] = (factor * float.fromhex(bound["proof"]["t"][place])).hex()
+        yield changed
+    changed, bound = copy_and_bound()
+    bound["proof"]["t"].pop()
+    yield changed
+    changed, bound = copy_and_bound()
+    with_upper(bound, math.nextafter(math.sqrt(float.fromhex(bound["proof"]["rho"])), 0) * (1 - 2.0 ** -40))
+    yield changed
+    for key, step in ("lower", -0.5), ("upper", 0.5), ("lower", 2.0 ** -30):
+        changed, bound = copy_and_bound()
+        ends = changed["box"]["network"][key]
+        place = generator.randrange(len(ends))
+        ends[place] = (float.fromhex(ends[place]) + step).hex()
+        bound.update(lower=None, lower_hex=None, lower_witness=None)
+        yield changed
+    for op in "relu", "tanh", "silu", "selu":
+        yield with_activations_again(certificate, op)
+    for domain, method in ("global", "local_sdp"), ("box", "sdp"), ("box", "eclipse_fast"), ("box", "local_product"):
+        changed, bound = copy_and_bound()
+        bound.update(domain=domain, upper_method=method)
+        yield changed
+
+
 def values_over_a_box_are_decided_alike(folder, generator):
     """Ranges as certified, with one end of a layer or of the range moved to the next double, and over another box.
     Boxes reach over minima, kinks and saturation, and down to points."""
@@ -655,7 +740,8 @@ def main():
                       products_count_the_activations, sorting_layers_have_products_only,
                       each_part_has_its_own_activation,
                       sums_with_smooth_terms_have_lower_bounds, values_of_activations_are_those_of_the_functions,
-                      products_of_slopes_on_a_box_are_decided_alike, values_over_a_box_are_decided_alike,
+                      products_of_slopes_on_a_box_are_decided_alike,
+                      inequalities_of_slopes_on_a_box_are_decided_alike, values_over_a_box_are_decided_alike,
                       witnesses_of_any_activation_are_decided_alike, onnx_files_state_their_activation,
                       onnx_files_state_what_they_sort,
                       weights_behind_a_descending_sort_are_those_behind_an_ascending_one,

@@ -440,6 +440,12 @@ let rec last l d =
                 | [] -> a
                 | _ :: _ -> last l0 d)
 
+(** val concat : 'a1 list list -> 'a1 list **)
+
+let rec concat = function
+| [] -> []
+| x :: l0 -> app x (concat l0)
+
 (** val map : ('a1 -> 'a2) -> 'a1 list -> 'a2 list **)
 
 let rec map f = function
@@ -743,7 +749,27 @@ let rec weighted_gram zero0 add1 mul1 s m = match m with
   (map (dot zero0 add1 mul1 (times mul1 s row)) m) :: (weighted_gram zero0
                                                         add1 mul1 s m')
 
-type 't bent_layer = ('t * 't list) * 't list list
+type 't bent_layer = (('t * 't) list * 't list) * 't list list
+
+(** val ranges_of : 'a1 bent_layer -> ('a1 * 'a1) list **)
+
+let ranges_of k =
+  fst (fst k)
+
+(** val multipliers_of : 'a1 bent_layer -> 'a1 list **)
+
+let multipliers_of k =
+  snd (fst k)
+
+(** val sums : ('a1 -> 'a1 -> 'a1) -> ('a1 * 'a1) list -> 'a1 list **)
+
+let sums add1 r =
+  map (fun i -> add1 (fst i) (snd i)) r
+
+(** val products : ('a1 -> 'a1 -> 'a1) -> ('a1 * 'a1) list -> 'a1 list **)
+
+let products mul1 r =
+  map (fun i -> mul1 (fst i) (snd i)) r
 
 (** val bends :
     'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> int -> 'a1
@@ -753,22 +779,27 @@ let rec bends zero0 add1 mul1 n = function
 | [] -> []
 | b :: hidden' ->
   let (p, m) = b in
-  let (g, t) = p in
-  app (weighted_gram zero0 add1 mul1 (scale mul1 g t) (columns zero0 n m))
-    (bends zero0 add1 mul1 (length t) hidden')
+  let (r, t) = p in
+  app
+    (weighted_gram zero0 add1 mul1 (times mul1 t (products mul1 r))
+      (columns zero0 n m)) (bends zero0 add1 mul1 (length t) hidden')
 
-(** val unbent : 'a1 bent_layer list -> ('a1 list * 'a1 list list) list **)
+(** val weighted :
+    ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 bent_layer list -> ('a1
+    list * 'a1 list list) list **)
 
-let unbent hidden0 =
-  map (fun k -> ((snd (fst k)), (snd k))) hidden0
+let weighted add1 mul1 hidden0 =
+  map (fun k -> ((multipliers_of k),
+    (scale_rows mul1 (sums add1 (ranges_of k)) (snd k)))) hidden0
 
 (** val bent_lmi :
-    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1 ->
-    'a1 list -> 'a1 bent_layer list -> 'a1 list list -> 'a1 list list **)
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1
+    list -> 'a1 bent_layer list -> 'a1 list list -> 'a1 list list **)
 
-let bent_lmi zero0 add1 mul1 two minus_one minus_two t hidden0 last0 =
-  sum add1 (band zero0 add1 mul1 two minus_one t (unbent hidden0) last0)
-    (scale_all mul1 minus_two (bends zero0 add1 mul1 (length t) hidden0))
+let bent_lmi zero0 add1 mul1 two minus_one t hidden0 last0 =
+  sum add1
+    (band zero0 add1 mul1 two minus_one t (weighted add1 mul1 hidden0) last0)
+    (scale_all mul1 two (bends zero0 add1 mul1 (length t) hidden0))
 
 (** val dotZ : Big.t list -> Big.t list -> Big.t **)
 
@@ -961,11 +992,20 @@ let inputs hidden0 last0 =
 let is_zero x =
   Big.equal (fst x) Big.zero
 
-(** val matrix_inequality :
-    dyadic list -> matrixD list -> matrixD -> dyadic -> dyadic list -> matrixD **)
+type rangeD = dyadic * dyadic
 
-let matrix_inequality gs hidden0 last0 rho t =
-  if forallb is_zero gs
+(** val is_unit_range : rangeD -> bool **)
+
+let is_unit_range r =
+  (&&) (is_zero (fst r))
+    (is_zero (add0 (snd r) ((Big.neg Big.one), Big.zero)))
+
+(** val matrix_inequality :
+    rangeD list list -> matrixD list -> matrixD -> dyadic -> dyadic list ->
+    matrixD **)
+
+let matrix_inequality ranges hidden0 last0 rho t =
+  if forallb (forallb is_unit_range) ranges
   then (match hidden0 with
         | [] ->
           let n = length (hd [] last0) in
@@ -977,10 +1017,9 @@ let matrix_inequality gs hidden0 last0 rho t =
             (neg rho) (firstn (length first0) t) first0
             (combine (split (skipn (length first0) t) later) later) last0)
   else bent_lmi zero add0 mul0 (((fun p -> p) Big.one), ((fun p -> p)
-         Big.one)) ((Big.neg Big.one), Big.zero) ((Big.neg Big.one),
-         ((fun p -> p) Big.one))
+         Big.one)) ((Big.neg Big.one), Big.zero)
          (repeat (shift (Big.neg Big.one) rho) (inputs hidden0 last0))
-         (combine (combine gs (split t hidden0)) hidden0) last0
+         (combine (combine ranges (split t hidden0)) hidden0) last0
 
 (** val shapes : int -> matrixD list -> matrixD -> bool **)
 
@@ -992,10 +1031,10 @@ let rec shapes n hidden0 last0 =
       (shapes (length m) hidden' last0)
 
 (** val check :
-    dyadic list -> matrixD list -> matrixD -> dyadic -> dyadic -> dyadic list
-    -> factor -> bool **)
+    rangeD list list -> matrixD list -> matrixD -> dyadic -> dyadic -> dyadic
+    list -> factor -> bool **)
 
-let check gs hidden0 last0 upper rho t f =
+let check ranges hidden0 last0 upper rho t f =
   (&&) (shapes (inputs hidden0 last0) hidden0 last0)
     ((&&)
       ((&&)
@@ -1005,7 +1044,7 @@ let check gs hidden0 last0 upper rho t f =
               (forallb is_nonnegative t)) (is_positive rho))
           (is_nonnegative upper))
         (is_nonnegative (add0 (mul0 upper upper) (neg rho))))
-      (shows_nonnegative (matrix_inequality gs hidden0 last0 rho t) f))
+      (shows_nonnegative (matrix_inequality ranges hidden0 last0 rho t) f))
 
 type stack = matrixD list * matrixD
 
@@ -1185,17 +1224,20 @@ let is_relu = function
 | Relu -> true
 | _ -> false
 
+(** val range_of : activation -> rangeD **)
+
+let range_of a =
+  ((if is_rising a then zero else add0 one (neg (steepest a))), (steepest a))
+
 (** val unit_of : activation -> dyadic **)
 
 let unit_of a =
   if is_rising a then steepest a else one
 
-(** val bend_of : activation -> dyadic **)
+(** val divided_range : activation -> rangeD **)
 
-let bend_of a =
-  if is_rising a
-  then zero
-  else mul0 (steepest a) (add0 (steepest a) (neg one))
+let divided_range a =
+  if is_rising a then (zero, one) else range_of a
 
 (** val set_stages :
     matrixD list -> matrixD -> matrixD list -> matrixD -> matrixD
@@ -1212,12 +1254,12 @@ let outputs hidden0 n =
   length (last hidden0 (repeat [] n))
 
 (** val check_parts :
-    dyadic list -> stack -> stack list -> dyadic -> dyadic -> dyadic list ->
-    factor -> bool **)
+    rangeD list list -> stack -> stack list -> dyadic -> dyadic -> dyadic
+    list -> factor -> bool **)
 
-let rec check_parts gs p ps upper r t f =
+let rec check_parts ranges p ps upper r t f =
   match ps with
-  | [] -> check gs (fst p) (snd p) upper r t f
+  | [] -> check ranges (fst p) (snd p) upper r t f
   | q :: ps' ->
     let joined = set_stages (fst p) (snd p) (fst q) (snd q) in
     let n = inputs (fst p) (snd p) in
@@ -1228,7 +1270,7 @@ let rec check_parts gs p ps upper r t f =
             ((=) (inputs (fst joined) (snd joined)) n))
           (shapes n (fst p) (snd p)))
         (shapes (length (snd p)) (fst q) (snd q)))
-      (check_parts gs joined ps' upper r t f)
+      (check_parts ranges joined ps' upper r t f)
 
 (** val count : bool list -> int **)
 
@@ -3287,6 +3329,7 @@ type proof =
 | By_vector of dyadic list
 | By_product
 | By_local_product
+| By_local_inequality of dyadic * dyadic list * factor
 | By_points of dyadic list * dyadic list * (int * dyadic list) list
 | By_triangle
 | By_parts of dyadic * proved_form option * hints * tree
@@ -3355,10 +3398,11 @@ let matrices p =
     in
     (((fst first0) :: (fst rest0)), (snd rest0))
 
-(** val bends_of : part -> dyadic list **)
+(** val ranges_by : (activation -> rangeD) -> part -> rangeD list list **)
 
-let bends_of p =
-  map (fun l -> bend_of (fst l)) (following p.between p.hidden)
+let ranges_by range p =
+  map (fun l -> map (fun _ -> range (fst l)) (fst (snd l)))
+    (following p.between p.hidden)
 
 (** val relu_between : part -> bool **)
 
@@ -3398,7 +3442,7 @@ let check_slope ps f moves scale0 u rho t factor0 =
     ((&&)
       ((&&) (well_formed ps f moves scale0)
         (forallb entrywise_between (parts_of ps f))) (is_nonnegative u))
-    (check_parts (flat_map bends_of (parts_of ps f)) ([],
+    (check_parts (flat_map (ranges_by divided_range) (parts_of ps f)) ([],
       (selector moves scale0)) (map matrices (parts_of ps f)) u rho t factor0)
 
 (** val find_norm : claim list -> int -> int -> dyadic option **)
@@ -3516,6 +3560,60 @@ let check_local_product ps accepted f moves scale0 b u =
     (check_product_with ps accepted f moves scale0 u
       (option_map (mul0 (steepest_on_box p b))
         (norms accepted (moved f) 0 (layers p))))
+
+(** val ranges_centred :
+    dyadic list -> dyadic -> activation list -> layerD list -> known list ->
+    rangeD list list **)
+
+let rec ranges_centred radius rounding between0 hidden0 s =
+  match hidden0 with
+  | [] -> []
+  | l :: hidden' ->
+    let t = passed radius rounding (fst l) (snd l) s in
+    let a = hd Relu between0 in
+    (map (fun n -> slopes_between a (fst n)) t) :: (ranges_centred radius
+                                                     rounding (tl between0)
+                                                     hidden'
+                                                     (activated_known a
+                                                       rounding t))
+
+(** val ranges_on_box : part -> box -> rangeD list list **)
+
+let ranges_on_box p b =
+  let c = clamp_ends p.clamp b in
+  let radius = radius_of c in
+  ranges_centred radius (rounding_of radius) p.between p.hidden
+    (inputs_known 0 c)
+
+(** val local_ranges :
+    part list -> function0 -> box -> rangeD list list list **)
+
+let local_ranges ps f b =
+  (ranges_on_box (part_at ps (moved f)) b) :: (match f with
+                                               | Alone _ -> []
+                                               | Set_of (_, rho) ->
+                                                 (ranges_by range_of
+                                                   (part_at ps rho)) :: [])
+
+(** val undivided_matrices : part -> stack **)
+
+let undivided_matrices p =
+  ((map fst p.hidden), (fst p.outer))
+
+(** val check_local_slope :
+    part list -> function0 -> bool list -> dyadic list -> box -> dyadic ->
+    dyadic -> dyadic list -> factor -> bool **)
+
+let check_local_slope ps f moves scale0 b u rho t factor0 =
+  (&&)
+    ((&&)
+      ((&&)
+        ((&&) (well_formed ps f moves scale0)
+          (forallb entrywise_between (parts_of ps f)))
+        (forallb is_enclosed (part_at ps (moved f)).between))
+      (is_nonnegative u))
+    (check_parts (concat (local_ranges ps f b)) ([], (selector moves scale0))
+      (map undivided_matrices (parts_of ps f)) u rho t factor0)
 
 (** val check_parts_with :
     part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic ->
@@ -4087,13 +4185,13 @@ let always_silent silent terms =
     part list -> claim list -> int list list -> term list -> int -> box ->
     box -> bool **)
 
-let check_sum_within ps accepted silent terms rho v sums =
+let check_sum_within ps accepted silent terms rho v sums0 =
   match sum_ends accepted (inputs_of (part_at ps rho)) terms with
   | Some s ->
-    (match find_within accepted rho sums with
+    (match find_within accepted rho sums0 with
      | Some w ->
        (&&)
-         ((&&) (contains sums s)
+         ((&&) (contains sums0 s)
            ((||) (contains v w) (always_silent silent terms)))
          ((||) (negb (may_be_silent silent terms))
            (contains v (repeat (zero, zero) (outputs_of (part_at ps rho)))))
@@ -4161,14 +4259,14 @@ let rec terms_of boxes = function
     part list -> claim list -> (int * box) list -> int -> dyadic -> int list
     -> box -> bool **)
 
-let check_value_among ps accepted boxes rho u those sums =
+let check_value_among ps accepted boxes rho u those sums0 =
   match terms_of boxes those with
   | Some ts ->
     (match sum_ends accepted (inputs_of (part_at ps rho)) ts with
      | Some s ->
-       (match find_within accepted rho sums with
+       (match find_within accepted rho sums0 with
         | Some w ->
-          (&&) (contains sums s)
+          (&&) (contains sums0 s)
             (at_most (squareD (map largest_abs w)) (mul0 u u))
         | None -> false)
      | None -> false)
@@ -4178,13 +4276,13 @@ let check_value_among ps accepted boxes rho u those sums =
     part list -> claim list -> (int * box) list -> int -> dyadic -> int list
     list -> box list -> bool **)
 
-let rec check_all_among ps accepted boxes rho u compositions sums =
+let rec check_all_among ps accepted boxes rho u compositions sums0 =
   match compositions with
-  | [] -> (match sums with
+  | [] -> (match sums0 with
            | [] -> true
            | _ :: _ -> false)
   | c :: compositions' ->
-    (match sums with
+    (match sums0 with
      | [] -> false
      | s :: sums' ->
        (&&) (check_value_among ps accepted boxes rho u c s)
@@ -4194,7 +4292,7 @@ let rec check_all_among ps accepted boxes rho u compositions sums =
     part list -> claim list -> int list list -> (int * box) list -> int ->
     int -> dyadic -> box list -> bool **)
 
-let check_step ps accepted silent boxes p rho u sums =
+let check_step ps accepted silent boxes p rho u sums0 =
   (&&)
     ((&&)
       ((&&) (is_nonnegative u)
@@ -4208,7 +4306,7 @@ let check_step ps accepted silent boxes p rho u sums =
           | Some w -> at_most w u
           | None -> false)
        | None -> false))
-    (check_all_among ps accepted boxes rho u (beside silent p) sums)
+    (check_all_among ps accepted boxes rho u (beside silent p) sums0)
 
 (** val check_error :
     part list -> int -> box -> dyadic list -> dyadic list -> dyadic -> box
@@ -4255,7 +4353,7 @@ let rec sum_errors accepted n = function
     part list -> claim list -> (term * dyadic list) list -> int -> dyadic ->
     box -> dyadic list -> bool **)
 
-let check_sum_error ps accepted terms rho u sums errors =
+let check_sum_error ps accepted terms rho u sums0 errors =
   let n = inputs_of (part_at ps rho) in
   (match sum_ends accepted n (map fst terms) with
    | Some s ->
@@ -4263,12 +4361,13 @@ let check_sum_error ps accepted terms rho u sums errors =
       | Some p ->
         let (p0, e) = p in
         let (count0, m) = p0 in
-        (match find_error accepted rho sums errors with
+        (match find_error accepted rho sums0 errors with
          | Some p1 ->
            let (_, w) = p1 in
            (&&)
              ((&&)
-               ((&&) ((&&) (contains sums s) (is_nil (part_at ps rho).clamp))
+               ((&&)
+                 ((&&) (contains sums0 s) (is_nil (part_at ps rho).clamp))
                  ((=) (length errors) n)) (sum_fits count0 m e errors))
              (at_most w u)
          | None -> false)
@@ -4303,6 +4402,8 @@ let check_claim ps accepted c p =
   | Slope_in_box (f, moves, scale0, b, u) ->
     (match p with
      | By_local_product -> check_local_product ps accepted f moves scale0 b u
+     | By_local_inequality (rho, t, r) ->
+       check_local_slope ps f moves scale0 b u rho t r
      | By_parts (r, form, o, t) ->
        check_parts_of_box ps f moves scale0 b u r form o t
      | _ -> false)
@@ -4320,7 +4421,7 @@ let check_claim ps accepted c p =
      | _ -> false)
   | Sum_within (silent, terms, rho, v) ->
     (match p with
-     | By_sum sums -> check_sum_within ps accepted silent terms rho v sums
+     | By_sum sums0 -> check_sum_within ps accepted silent terms rho v sums0
      | _ -> false)
   | Jump_at_most (p0, b, rho, u) ->
     (match p with
@@ -4333,8 +4434,8 @@ let check_claim ps accepted c p =
      | _ -> false)
   | Sum_float_error (terms, rho, u) ->
     (match p with
-     | By_rounded_sum (sums, errors) ->
-       check_sum_error ps accepted terms rho u sums errors
+     | By_rounded_sum (sums0, errors) ->
+       check_sum_error ps accepted terms rho u sums0 errors
      | _ -> false)
   | Slope_among (p0, rho, moves, scale0, b, others, u) ->
     (match p with
@@ -4347,7 +4448,7 @@ let check_claim ps accepted c p =
      | _ -> false)
   | Step_at_most (silent, boxes, p0, rho, u) ->
     (match p with
-     | By_steps sums -> check_step ps accepted silent boxes p0 rho u sums
+     | By_steps sums0 -> check_step ps accepted silent boxes p0 rho u sums0
      | _ -> false)
 
 (** val step :

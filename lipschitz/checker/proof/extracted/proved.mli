@@ -85,6 +85,8 @@ val nth_error : 'a1 list -> int -> 'a1 option
 
 val last : 'a1 list -> 'a1 -> 'a1
 
+val concat : 'a1 list list -> 'a1 list
+
 val map : ('a1 -> 'a2) -> 'a1 list -> 'a2 list
 
 val flat_map : ('a1 -> 'a2 list) -> 'a1 list -> 'a2 list
@@ -192,17 +194,27 @@ val weighted_gram :
   'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
   list -> 'a1 list list
 
-type 't bent_layer = ('t * 't list) * 't list list
+type 't bent_layer = (('t * 't) list * 't list) * 't list list
+
+val ranges_of : 'a1 bent_layer -> ('a1 * 'a1) list
+
+val multipliers_of : 'a1 bent_layer -> 'a1 list
+
+val sums : ('a1 -> 'a1 -> 'a1) -> ('a1 * 'a1) list -> 'a1 list
+
+val products : ('a1 -> 'a1 -> 'a1) -> ('a1 * 'a1) list -> 'a1 list
 
 val bends :
   'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> int -> 'a1 bent_layer
   list -> 'a1 list list
 
-val unbent : 'a1 bent_layer list -> ('a1 list * 'a1 list list) list
+val weighted :
+  ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 bent_layer list -> ('a1
+  list * 'a1 list list) list
 
 val bent_lmi :
-  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1 ->
-  'a1 list -> 'a1 bent_layer list -> 'a1 list list -> 'a1 list list
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1 list
+  -> 'a1 bent_layer list -> 'a1 list list -> 'a1 list list
 
 val dotZ : Big.t list -> Big.t list -> Big.t
 
@@ -264,14 +276,19 @@ val inputs : matrixD list -> matrixD -> int
 
 val is_zero : dyadic -> bool
 
+type rangeD = dyadic * dyadic
+
+val is_unit_range : rangeD -> bool
+
 val matrix_inequality :
-  dyadic list -> matrixD list -> matrixD -> dyadic -> dyadic list -> matrixD
+  rangeD list list -> matrixD list -> matrixD -> dyadic -> dyadic list ->
+  matrixD
 
 val shapes : int -> matrixD list -> matrixD -> bool
 
 val check :
-  dyadic list -> matrixD list -> matrixD -> dyadic -> dyadic -> dyadic list
-  -> factor -> bool
+  rangeD list list -> matrixD list -> matrixD -> dyadic -> dyadic -> dyadic
+  list -> factor -> bool
 
 type stack = matrixD list * matrixD
 
@@ -339,9 +356,11 @@ val is_entrywise : activation -> bool
 
 val is_relu : activation -> bool
 
+val range_of : activation -> rangeD
+
 val unit_of : activation -> dyadic
 
-val bend_of : activation -> dyadic
+val divided_range : activation -> rangeD
 
 val set_stages :
   matrixD list -> matrixD -> matrixD list -> matrixD -> matrixD list * matrixD
@@ -349,8 +368,8 @@ val set_stages :
 val outputs : matrixD list -> int -> int
 
 val check_parts :
-  dyadic list -> stack -> stack list -> dyadic -> dyadic -> dyadic list ->
-  factor -> bool
+  rangeD list list -> stack -> stack list -> dyadic -> dyadic -> dyadic list
+  -> factor -> bool
 
 val count : bool list -> int
 
@@ -744,6 +763,7 @@ type proof =
 | By_vector of dyadic list
 | By_product
 | By_local_product
+| By_local_inequality of dyadic * dyadic list * factor
 | By_points of dyadic list * dyadic list * (int * dyadic list) list
 | By_triangle
 | By_parts of dyadic * proved_form option * hints * tree
@@ -772,7 +792,7 @@ val scaled_matrices :
 
 val matrices : part -> stack
 
-val bends_of : part -> dyadic list
+val ranges_by : (activation -> rangeD) -> part -> rangeD list list
 
 val relu_between : part -> bool
 
@@ -817,6 +837,20 @@ val steepest_on_box : part -> box -> dyadic
 val check_local_product :
   part list -> claim list -> function0 -> bool list -> dyadic list -> box ->
   dyadic -> bool
+
+val ranges_centred :
+  dyadic list -> dyadic -> activation list -> layerD list -> known list ->
+  rangeD list list
+
+val ranges_on_box : part -> box -> rangeD list list
+
+val local_ranges : part list -> function0 -> box -> rangeD list list list
+
+val undivided_matrices : part -> stack
+
+val check_local_slope :
+  part list -> function0 -> bool list -> dyadic list -> box -> dyadic ->
+  dyadic -> dyadic list -> factor -> bool
 
 val check_parts_with :
   part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic ->

@@ -34,21 +34,28 @@ let rec prove_by state claim proofs reason = match proofs () with
     | None -> prove_by state claim others reason
 
 (* On boxes: what --coq does not write; proofs by parts hold guesses of floating point as functions. *)
-let prove_unwritten state claim proof reason = match Proved.step state.parts state.accepted claim proof with
-  | Some accepted -> state.accepted <- accepted; state.unwritten <- state.unwritten + 1
-  | None -> rejected "%s" (reason ())
+let rec prove_unwritten_by state claim proofs reason = match proofs () with
+  | Seq.Nil -> rejected "%s" (reason ())
+  | Seq.Cons (proof, others) ->
+    match Proved.step state.parts state.accepted claim proof with
+    | Some accepted -> state.accepted <- accepted; state.unwritten <- state.unwritten + 1
+    | None -> prove_unwritten_by state claim others reason
+let prove_unwritten state claim proof = prove_unwritten_by state claim (Seq.return proof)
 
 let prove state claim proof reason = prove_by state claim (Seq.return proof) reason
 
-(* The chain of matrices that a bound is about, with what is known of the functions between them. *)
-let stages state claim = match claim with
+(* The chain of matrices that a bound is about, and between which slopes the functions between them lie. *)
+let stages state claim =
+  let joined f moves scale matrices =
+    List.fold_left (fun (hidden, last) part -> let w, v = matrices part in Proved.set_stages hidden last w v)
+      ([], Proved.selector moves scale) (Proved.parts_of state.parts f) in
+  match claim with
   | Proved.Norm_at_most (p, k, _) -> [], ([], Proved.matrix_at state.parts p k)
   | Slope_at_most (f, moves, scale, _) ->
-    let parts = Proved.parts_of state.parts f in
-    List.concat_map Proved.bends_of parts,
-    List.fold_left (fun (hidden, last) part ->
-        let w, v = Proved.matrices part in Proved.set_stages hidden last w v)
-      ([], Proved.selector moves scale) parts
+    List.concat_map (Proved.ranges_by Proved.divided_range) (Proved.parts_of state.parts f),
+    joined f moves scale Proved.matrices
+  | Slope_in_box (f, moves, scale, box, _) ->
+    List.concat (Proved.local_ranges state.parts f box), joined f moves scale Proved.undivided_matrices
   | _ -> assert false
 
 let not_checked state what = state.not_checked <- what :: state.not_checked
@@ -72,11 +79,13 @@ let inequality state claim where ~neurons ~upper json =
   require (Proved.is_positive rho && List.for_all Proved.is_nonnegative t)
       "%s: rho is not positive, or a t negative" where;
   require (at_most rho (times upper upper)) "%s: claims less than sqrt(rho)" where;
-  let by factor = Proved.By_inequality (rho, t, factor) in
+  let by factor = match claim with
+    | Proved.Slope_in_box _ -> Proved.By_local_inequality (rho, t, factor)
+    | _ -> By_inequality (rho, t, factor) in
   match find here "factor" json with
   | Null ->
-    let bends, (hidden, last) = stages state claim in
-    Seq.map by (Proposal.factors (Proved.matrix_inequality bends hidden last rho t))
+    let ranges, (hidden, last) = stages state claim in
+    Seq.map by (Proposal.factors (Proved.matrix_inequality ranges hidden last rho t))
   | factor -> Seq.return (by (Exact.factor (where ^ ".factor") factor))
 
 let no_factor where = where ^ ": the factor does not show that the matrix inequality holds"
@@ -206,18 +215,21 @@ let check_of_invariants state bound f where ~scale ~neighbours upper =
   not_checked state (Printf.sprintf "%s <= %s:%s" where (text where (find where "upper_hex" bound)) of_);
   Hashtbl.replace state.uppers (f, "all", neighbours) (upper, Not_checked)
 
-(* From the slopes that activations have on the box: with a matrix inequality, or with GELU, beyond the theorems. *)
+(* From the slopes that activations have on the box; with GELU, beyond the theorems. *)
 let local_methods = [ Text "local_sdp"; Text "local_product" ]
 let check_local state where bound names ~func ~moves ~exact_scale ~upper =
   require (find where "domain" bound = Text "box" && not (Functions.starts_with "rho:" (List.hd names)))
     "%s: slopes on a box of a bound without one" where;
   require (not state.net.invariants) "%s: slopes on a box of a network of rotation invariants" where;
-  let is_product = find where "upper_method" bound = Text "local_product" in
-  require (not is_product || find where "proof" bound = Null) "%s: unknown upper_method" where;
-  if is_product && Functions.is_enclosed state.net (List.hd names) then begin
-    let box = box_of state where (List.hd names) in
-    prove_unwritten state (Slope_in_box (func, moves, exact_scale, box, upper)) By_local_product
-      (fun () -> too_little where);
+  let is_product = find where "upper_method" bound = Text "local_product" and proof = find where "proof" bound in
+  require (not is_product || proof = Null) "%s: unknown upper_method" where;
+  if Functions.is_enclosed state.net (List.hd names) then begin
+    let claim = Proved.Slope_in_box (func, moves, exact_scale, box_of state where (List.hd names), upper) in
+    if is_product then prove_unwritten state claim By_local_product (fun () -> too_little where)
+    else begin
+      let proofs = inequality state claim where ~neurons:(hidden_neurons state names) ~upper proof in
+      prove_unwritten_by state claim proofs (fun () -> no_factor where)
+    end;
     In_box
   end else begin
     let upper = text where (find where "upper_hex" bound) in

@@ -65,7 +65,8 @@ let proof out = function
   | By_points (x, y, others) ->
     Printf.bprintf out "By_points %a %a %a" numbers x numbers y (list (pair natural numbers)) others
   | By_triangle -> Buffer.add_string out "By_triangle"
-  | By_parts _ | By_all_parts _ | By_parts_among _ | By_local_product -> assert false  (* not written *)
+  | By_parts _ | By_all_parts _ | By_parts_among _ | By_local_product | By_local_inequality _ ->
+    assert false  (* not written *)
   | By_layers bounds -> Printf.bprintf out "By_layers %a" (list box) bounds
   | By_sum sums -> Printf.bprintf out "By_sum %a" box sums
   | By_norm -> Buffer.add_string out "By_norm"

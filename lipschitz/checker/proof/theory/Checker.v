@@ -66,10 +66,13 @@ Definition neurons (ms : list matrixD) : nat := fold_right (fun m n => (length m
 
 Definition inputs (hidden : list matrixD) (last : matrixD) : nat := length (hd [] (hd last hidden)).
 Definition is_zero (x : dyadic) : bool := fst x =? 0.
-(** `gs`: one number for each hidden layer, zero where slopes lie in [0, 1], else as in Network.v. *)
-Definition matrix_inequality (gs : list dyadic) (hidden : list matrixD) (last : matrixD) (rho : dyadic)
+(** Slopes of one neuron lie between these. *)
+Definition rangeD := (dyadic * dyadic)%type.
+Definition is_unit_range (r : rangeD) : bool := is_zero (fst r) && is_zero (add (snd r) (-1, 0)).
+(** `ranges`: of the neurons of each hidden layer. If all are [0, 1], the inputs are minimised out. *)
+Definition matrix_inequality (ranges : list (list rangeD)) (hidden : list matrixD) (last : matrixD) (rho : dyadic)
     (t : list dyadic) : matrixD :=
-  if forallb is_zero gs then
+  if forallb (forallb is_unit_range) ranges then
     match hidden with
     | [] =>
         let n := length (hd [] last) in
@@ -79,8 +82,8 @@ Definition matrix_inequality (gs : list dyadic) (hidden : list matrixD) (last : 
           (List.combine (split (skipn (length first) t) later) later) last
     end
   else
-    bent_lmi zero add mul (1, 1) (-1, 0) (-1, 1) (repeat (shift (-1) rho) (inputs hidden last))
-      (List.combine (List.combine gs (split t hidden)) hidden) last.
+    bent_lmi zero add mul (1, 1) (-1, 0) (repeat (shift (-1) rho) (inputs hidden last))
+      (List.combine (List.combine ranges (split t hidden)) hidden) last.
 (** Every row as long as the stage before it has rows; the first stage takes n inputs. *)
 Fixpoint shapes (n : nat) (hidden : list matrixD) (last : matrixD) : bool :=
   match hidden with
@@ -88,12 +91,12 @@ Fixpoint shapes (n : nat) (hidden : list matrixD) (last : matrixD) : bool :=
   | m :: hidden' => forallb (fun row => length row =? n)%nat m && shapes (length m) hidden' last
   end.
 (** Accepts |f(x) - f(x')| <= upper |x - x'| of the chain with these stages. *)
-Definition check (gs : list dyadic) (hidden : list matrixD) (last : matrixD) (upper rho : dyadic) (t : list dyadic)
-    (f : factor) : bool :=
+Definition check (ranges : list (list rangeD)) (hidden : list matrixD) (last : matrixD) (upper rho : dyadic)
+    (t : list dyadic) (f : factor) : bool :=
   shapes (inputs hidden last) hidden last &&
   ((length t =? neurons hidden)%nat && forallb is_nonnegative t && is_positive rho && is_nonnegative upper
   && is_nonnegative (add (mul upper upper) (neg rho))
-  && shows_nonnegative (matrix_inequality gs hidden last rho t) f).
+  && shows_nonnegative (matrix_inequality ranges hidden last rho t) f).
 
 (** Meaning *)
 Open Scope R_scope.
@@ -254,15 +257,15 @@ Proof.
   - apply IH; [rewrite skipn_length; lia|]. rewrite <- (firstn_skipn (length m) t) in Ht. now apply Forall_app in Ht.
 Qed.
 
-(** A network with these matrices, any biases and any functions; and what is known of the slopes of these. *)
+(** A network with these matrices, any biases and any functions. *)
 Definition stack := (list matrixD * matrixD)%type.
 Definition real_stack := (list ((R -> R) * layer) * layer)%type.
 Definition run (l : real_stack) : list R -> list R := network (fst l) (snd l).
 Definition of_matrix (m : matrixD) (l : layer) := fst l = realm m /\ length (snd l) = length m.
 Definition of_stage (m : matrixD) (k : (R -> R) * layer) := of_matrix m (snd k).
 Definition instance (p : stack) (l : real_stack) := Forall2 of_stage (fst p) (fst l) /\ of_matrix (snd p) (snd l).
-Definition has_bend (g : dyadic) (f : R -> R) := bent (real g) f.
-Definition functions (l : real_stack) : list (R -> R) := map fst (fst l).
+Definition real_range (r : rangeD) : range := (real (fst r), real (snd r)).
+Definition real_ranges : list (list rangeD) -> list (list range) := map (map real_range).
 
 Lemma matrix_fits m l : of_matrix m l -> bias_fits l.
 Proof. intros [E H]. unfold bias_fits. now rewrite E, map_length. Qed.
@@ -273,25 +276,31 @@ Proof.
   - constructor; auto. eapply matrix_fits; eauto.
   - f_equal; auto. apply H.
 Qed.
-Lemma stages_tame gs ks : Forall (fun k => bias_fits (snd k)) ks -> Forall2 has_bend gs (map fst ks) ->
-  forallb is_zero gs = true -> Forall tame ks.
+Lemma is_zero_real x : is_zero x = true -> real x = 0.
+Proof. unfold is_zero, real. intros H. apply Z.eqb_eq in H. rewrite H. ring. Qed.
+Lemma unit_ranges ranges : forallb (forallb is_unit_range) ranges = true ->
+  Forall (Forall unit_range) (real_ranges ranges).
 Proof.
-  intros H. revert gs. induction H as [|k ks Hk H IH]; simpl; intros gs G Z; inversion G as [|[m e] ? gs' ? B G'];
-    subst;
-    constructor; simpl in Z; apply andb_prop in Z; destruct Z as [Z Zs]; [|now apply (IH gs')].
-  apply Z.eqb_eq in Z. simpl in Z. subst m. split; auto. unfold has_bend in B.
-  replace (real (0, e)%Z) with 0 in B; auto.
-  unfold real. simpl. ring.
+  unfold real_ranges. intros H. rewrite forallb_forall in H. apply Forall_map, Forall_forall. intros r Hr.
+  specialize (H r Hr). rewrite forallb_forall in H. apply Forall_map, Forall_forall. intros [a b] Hi.
+  apply H, andb_prop in Hi. destruct Hi as [Ha Hb]. apply is_zero_real in Ha, Hb. cbn [fst snd] in *.
+  rewrite real_add in Hb. replace (real (-1, 0)%Z) with (-1) in Hb by (unfold real; simpl; ring).
+  unfold unit_range, real_range. cbn [fst snd]. f_equal; lra.
 Qed.
-Lemma stages_bend gs ms ks ts : Forall2 has_bend gs (map fst ks) -> Forall2 of_stage ms ks ->
+Lemma stages_bent ranges ms ks ts h h' : along ks (real_ranges ranges) h h' -> Forall2 of_stage ms ks ->
   Forall2 fits (map realm ms) (map reals ts) ->
-  Forall2 bends_as ks (images real (List.combine (List.combine gs ts) ms)).
+  let bs := images real (List.combine (List.combine ranges ts) ms) in
+  Forall2 bent_as ks bs /\ map ranges_of bs = real_ranges ranges.
 Proof.
-  revert gs ms ts. induction ks as [|k ks IH]; intros gs ms ts G M F; inversion G as [|g ? gs' ? B G']; subst;
-    inversion M as [|m ? ms' ? Hm Hms]; subst; simpl; [constructor|].
-  destruct ts as [|t ts]; simpl in F; inversion F; subst. simpl. constructor; [|now apply IH].
-  pose proof (matrix_fits _ _ Hm) as L. destruct Hm as [E _]. unfold bends_as, weights. simpl.
-  rewrite E. repeat split; auto; apply H2.
+  simpl. intros A M. revert ranges ts h h' A.
+  induction M as [|m [f [m' c]] ms ks Hm Hms IH]; intros [|r ranges] ts h h' A F; simpl in A; try contradiction;
+    [split; constructor|].
+  destruct ts as [|t ts]; simpl in F; inversion F as [|? ? ? ? H F']; subst. destruct A as [_ A].
+  destruct (IH ranges ts _ _ A F') as [B E]. pose proof (matrix_fits _ _ Hm) as L. destruct Hm as [Em _].
+  split; cbn [List.combine images map].
+  - constructor; [|exact B]. unfold bent_as, weights, multipliers_of. cbn [fst snd] in *. subst m'.
+    split; [exact L|]. split; [reflexivity|exact H].
+  - unfold real_ranges in *. cbn [map]. now rewrite <- E.
 Qed.
 
 Lemma norm_bound upper rho f x x' : 0 <= upper -> rho <= upper * upper ->
@@ -302,12 +311,13 @@ Proof.
 Qed.
 
 (** (d) *)
-Theorem check_sound gs hidden last upper rho t f : check gs hidden last upper rho t f = true ->
-  forall l, instance (hidden, last) l -> Forall2 has_bend gs (functions l) ->
+Theorem check_sound ranges hidden last upper rho t f : check ranges hidden last upper rho t f = true ->
+  forall l, instance (hidden, last) l ->
   forall x x', length x = inputs hidden last -> length x' = inputs hidden last ->
+  along (fst l) (real_ranges ranges) x x' ->
   norm (minus (run l x) (run l x')) <= real upper * norm (minus x x').
 Proof.
-  unfold check. intros H [ks [last' b]] [Hks Hb] G x x' Hx Hx'. unfold functions in G. simpl in Hks, Hb, G.
+  unfold check. intros H [ks [last' b]] [Hks Hb] x x' Hx Hx' A. simpl in Hks, Hb, A.
   apply andb_prop in H. destruct H as [_ H]. repeat (apply andb_prop in H; destruct H as [H ?]).
   apply Nat.eqb_eq in H. rename H into Hn, H0 into HP, H1 into Hur, H2 into Hu, H3 into Hrho, H4 into Ht.
   apply shows_nonnegative_sound in HP. apply real_nonnegative in Hu, Hur. apply real_positive in Hrho.
@@ -316,18 +326,19 @@ Proof.
   apply (norm_bound (real upper) (real rho) (run (ks, (realm last, b)))); [auto|lra|]. unfold run. simpl.
   assert (real (-1, 0)%Z = -1) as M by (unfold real; simpl; ring).
   rewrite forallb_forall, <- Forall_forall in Ht. pose proof (split_fits t hidden Hn Ht) as F.
-  unfold matrix_inequality in HP. destruct (forallb is_zero gs) eqn:Z.
-  - destruct (stages_fit _ _ Hks) as [B W]. pose proof (stages_tame _ _ B G Z) as T.
+  unfold matrix_inequality in HP. destruct (forallb _ ranges) eqn:Z.
+  - destruct (stages_fit _ _ Hks) as [B W]. apply unit_ranges in Z.
     destruct Hks as [|first [g [m c]] later ks [E Hc] Hks]; simpl in HP.
     + rewrite real_norm_inequality in HP.
       destruct (length last <=? _)%nat.
       * now apply norm_lmi_bounds.
       * rewrite (f_columns zero 0 real real_zero) in HP. eapply norm_lmi_columns_bounds; eauto.
-    + simpl in E, Hc. subst m. inversion T; subst. inversion W as [W']. inversion F; subst.
+    + simpl in E, Hc. subst m. inversion B; subst. inversion W as [W']. inversion F; subst.
       rewrite (f_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M, real_mul, real_neg in HP.
       replace (real (1, 1)%Z) with 2 in HP by (unfold real; simpl; ring).
-      apply lmi_bounds with
-          (t := reals (firstn (length first) t)) (ts := map reals (split (skipn (length first) t) later)); auto.
+      destruct ranges as [|r ranges]; [contradiction|].
+      apply lmi_bounds with (r := map real_range r) (ranges := real_ranges ranges)
+        (t := reals (firstn (length first) t)) (ts := map reals (split (skipn (length first) t) later)); auto.
       * now rewrite W'.
       * rewrite W'. assert (forall ts (ms : list matrixD), pairs real (List.combine ts ms) =
           List.combine (map reals ts) (map realm ms)) as Q.
@@ -335,9 +346,9 @@ Proof.
         now rewrite Q in HP.
   - rewrite (f_bent_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M in HP.
     replace (real (1, 1)%Z) with 2 in HP by (unfold real; simpl; ring).
-    replace (real (-1, 1)%Z) with (-2) in HP by (unfold real; simpl; ring).
     assert (reals (repeat (shift (-1) rho) (inputs hidden last)) = repeat (real rho / 2) (inputs hidden last)) as Q.
     { generalize (inputs hidden last). intros n. induction n as [|n IH]; simpl; auto. rewrite IH, real_shift.
       f_equal. simpl. field. }
-    rewrite Q in HP. eapply bent_lmi_bounds; eauto. now apply stages_bend.
+    rewrite Q in HP. destruct (stages_bent _ _ _ _ _ _ A Hks F) as [B R].
+    eapply bent_lmi_bounds; eauto. now rewrite R.
 Qed.

@@ -9,6 +9,7 @@ Inductive proof :=
 | By_vector (v : list dyadic)
 | By_product
 | By_local_product
+| By_local_inequality (rho : dyadic) (t : list dyadic) (f : factor)
 | By_points (x y : list dyadic) (others : list (nat * list dyadic))
 | By_triangle
 | By_parts (rho : dyadic) (form : option proved_form) (o : hints) (t : tree)
@@ -50,8 +51,9 @@ Definition matrices (p : part) : stack :=
       let rest := scaled_matrices (unit_of (hd Relu (between p))) (tl (between p)) later (outer p) in
       (fst first :: fst rest, snd rest)
   end.
-(** Of each hidden layer. *)
-Definition bends_of (p : part) : list dyadic := map (fun l => bend_of (fst l)) (following (between p) (hidden p)).
+(** Of each hidden neuron, with the range that its function has. *)
+Definition ranges_by (range : activation -> rangeD) (p : part) : list (list rangeD) :=
+  map (fun l => map (fun _ => range (fst l)) (fst (snd l))) (following (between p) (hidden p)).
 Definition relu_between (p : part) : bool := forallb is_relu (between p).
 Definition entrywise_between (p : part) : bool := forallb is_entrywise (between p).
 Definition parts_of (ps : list part) (f : function) : list part :=
@@ -63,8 +65,8 @@ Definition well_formed (ps : list part) (f : function) (moves : list bool) (scal
   && positive_scale scale && (is_nil scale || (length scale =? length moves)%nat).
 Definition check_slope ps f moves scale u rho t factor : bool :=
   well_formed ps f moves scale && forallb entrywise_between (parts_of ps f) && is_nonnegative u
-  && check_parts (flat_map bends_of (parts_of ps f)) ([],
-    selector moves scale) (map matrices (parts_of ps f)) u rho t factor.
+  && check_parts (flat_map (ranges_by divided_range) (parts_of ps f)) ([], selector moves scale)
+       (map matrices (parts_of ps f)) u rho t factor.
 
 (** Slopes by products of norms that were accepted before. *)
 Fixpoint find_norm (accepted : list claim) (p layer : nat) : option dyadic :=
@@ -125,6 +127,33 @@ Definition check_local_product ps accepted f moves scale (b : box) u : bool :=
   forallb is_enclosed (between p)
   && check_product_with ps accepted f moves scale u
        (option_map (mul (steepest_on_box p b)) (norms accepted (moved f) O (layers p))).
+
+(** In a box, by a matrix inequality with the slopes that each neuron of the part that moves has there; no function is
+  divided. Behind it, terms of a sum may be anything. *)
+Fixpoint ranges_centred (radius : list dyadic) (rounding : dyadic) (between : list activation) (hidden : list layerD)
+    (s : list known) : list (list rangeD) :=
+  match hidden with
+  | [] => []
+  | l :: hidden' =>
+      let t := passed radius rounding (fst l) (snd l) s in
+      let a := hd Relu between in
+      map (fun n => slopes_between a (fst n)) t
+      :: ranges_centred radius rounding (tl between) hidden' (activated_known a rounding t)
+  end.
+Definition ranges_on_box (p : part) (b : box) : list (list rangeD) :=
+  let c := clamp_ends (clamp p) b in
+  let radius := radius_of c in
+  ranges_centred radius (rounding_of radius) (between p) (hidden p) (inputs_known 0 c).
+(** Of each part. *)
+Definition local_ranges (ps : list part) (f : function) (b : box) : list (list (list rangeD)) :=
+  ranges_on_box (part_at ps (moved f)) b
+  :: match f with Alone _ => [] | Set_of _ rho => [ranges_by range_of (part_at ps rho)] end.
+Definition undivided_matrices (p : part) : stack := (map fst (hidden p), fst (outer p)).
+Definition check_local_slope ps f moves scale (b : box) u rho t factor : bool :=
+  well_formed ps f moves scale && forallb entrywise_between (parts_of ps f)
+  && forallb is_enclosed (between (part_at ps (moved f))) && is_nonnegative u
+  && check_parts (concat (local_ranges ps f b)) ([], selector moves scale) (map undivided_matrices (parts_of ps f)) u
+       rho t factor.
 
 (** Slopes in a box, part by part. *)
 Definition check_parts_with ps f moves scale u r (form : option proved_form) (covers : option matrixD -> bool) : bool :=
@@ -492,6 +521,7 @@ Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p :
   | Slope_at_most f moves scale u, By_all_parts r form o radius ts => check_parts_of_all ps f moves scale u r form o
     radius ts
   | Slope_in_box f moves scale b u, By_local_product => check_local_product ps accepted f moves scale b u
+  | Slope_in_box f moves scale b u, By_local_inequality rho t r => check_local_slope ps f moves scale b u rho t r
   | Slope_in_box f moves scale b u, By_parts r form o t => check_parts_of_box ps f moves scale b u r form o t
   | Slope_at_least silent f moves scale l, By_points x y others => check_points ps silent f moves scale l x y others
   | Law stacked kinds rho u, By_triangle => check_law ps accepted stacked kinds rho u

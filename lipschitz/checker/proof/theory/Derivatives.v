@@ -99,11 +99,7 @@ Proof.
   rewrite real_larger, real_smaller, !real_add.
   pose proof (ceil_to_close (-24) l) as C. pose proof (floor_to_close (-24) h) as F.
   assert (real (-1, -24)%Z = - real (1, -24)%Z) as N by (unfold real; simpl; ring). rewrite N.
-  destruct (H x y L1 L L2) as [A B]. assert (slopes (act a) (real (if is_rising a then zero else add one (neg (steepest
-    a)))) (real (steepest a))) as S.
-  { destruct (is_rising a) eqn:R; [rewrite real_zero; now apply rising_slopes|].
-    rewrite real_add, real_neg, real_one. destruct a; try discriminate; rewrite ?real_silu, ?real_gelu;
-      [exact silu_slopes|]. intros u v Q. pose proof (ErrorFunction.gelu_slopes u v Q). lra. }
+  destruct (H x y L1 L L2) as [A B]. pose proof (range_holds a) as S. unfold range_of in S. cbn [fst snd] in S.
   destruct (S x y L) as [S1 S2]. split.
   - unfold Rmax. destruct (Rle_dec _ _); [exact S1|]. nra.
   - unfold Rmin. destruct (Rle_dec _ _); [|exact S2]. nra.

@@ -1,4 +1,4 @@
-(** Networks over the reals, and what a nonnegative form says about those whose activations have slopes in [0, 1]. *)
+(** Networks over the reals, and what a nonnegative form says about those whose activations have bounded slopes. *)
 From Coq Require Import List Reals Lra Lia Psatz.
 From Swarmcert Require Import Algebra Activations Form.
 Import ListNotations.
@@ -15,13 +15,28 @@ Fixpoint network (hidden : list ((R -> R) * layer)) (last : layer) (x : list R) 
   | (f, (m, b)) :: hidden' => network hidden' last (map f (affine m b x))
   end.
 Definition bias_fits (l : layer) := length (snd l) = length (fst l).
-(** What the inequality of a layer rests on: with slopes in [0, 1], g = 0; with slopes in [1 - c, c], g = c (c - 1). *)
-Definition bent (g : R) (f : R -> R) :=
-  forall y y', 0 <= (f y - f y') * ((y - y') - (f y - f y')) + g * ((y - y') * (y - y')).
-(** A hidden layer whose biases fit, followed by a function with slopes in [0, 1]. *)
-Definition tame (k : (R -> R) * layer) := bent 0 (fst k) /\ bias_fits (snd k).
 Definition weights (k : (R -> R) * layer) : matrix := fst (snd k).
 Definition norm (u : list R) := sqrt (square u).
+
+(** What the inequality rests on: slopes of f between the numbers of y and y' lie in a range [a, b] for each. *)
+Notation range := (R * R)%type.
+Fixpoint increments_within (f : R -> R) (ranges : list range) (y y' : list R) : Prop :=
+  match ranges, y, y' with
+  | (a, b) :: ranges', u :: v, u' :: v' =>
+      0 <= (f u - f u' - a * (u - u')) * (b * (u - u') - (f u - f u')) /\ increments_within f ranges' v v'
+  | [], [], [] => True
+  | _, _, _ => False
+  end.
+(** The same of all hidden layers, from what enters the first. *)
+Fixpoint along (hidden : list ((R -> R) * layer)) (ranges : list (list range)) (h h' : list R) : Prop :=
+  match hidden, ranges with
+  | (f, (m, b)) :: hidden', r :: ranges' =>
+      increments_within f r (affine m b h) (affine m b h')
+      /\ along hidden' ranges' (map f (affine m b h)) (map f (affine m b h'))
+  | [], [] => True
+  | _, _ => False
+  end.
+Definition unit_range (r : range) := r = (0, 1).
 
 Lemma minus_affine m b x x' : length b = length m -> minus (affine m b x) (affine m b x') = applyR m (minus x x').
 Proof.
@@ -39,22 +54,41 @@ Qed.
 Lemma length_minus u v : length v = length u -> length (minus u v) = length u.
 Proof. unfold minus. revert v. induction u as [|a u IH]; intros [|b v]; simpl; try discriminate; auto. Qed.
 
-(** dz (dy - dz) >= 0, with multipliers. *)
-Lemma slope_increment f y y' : slopes f 0 1 -> 0 <= (f y - f y') * ((y - y') - (f y - f y')).
-Proof. intros S. destruct (Rle_dec y y'); [specialize (S y y')|specialize (S y' y)]; nra. Qed.
-Lemma slopes_bent f : slopes f 0 1 -> bent 0 f.
-Proof. intros S y y'. pose proof (slope_increment f y y' S). lra. Qed.
-Lemma bent_constraint g f t y y' : bent g f -> Forall (Rle 0) t -> length y' = length y ->
-  let dz := minus (map f y) (map f y') in let dy := minus y y' in
-  dotR dz (timesR t dz) <= dotR dz (timesR t dy) + g * dotR dy (timesR t dy).
+Lemma slope_increment f a b u u' : slopes f a b ->
+  0 <= (f u - f u' - a * (u - u')) * (b * (u - u') - (f u - f u')).
+Proof. intros S. destruct (Rle_dec u u'); [specialize (S u u')|specialize (S u' u)]; nra. Qed.
+Lemma increments_lengths f r y y' : increments_within f r y y' -> length y = length r /\ length y' = length r.
 Proof.
-  simpl. unfold minus. intros S Ht. revert y y'.
-  induction Ht as [|a t Ha Ht IH]; intros [|b y] [|c y']; simpl; try discriminate; intros; try lra.
-  specialize (IH y y' ltac:(lia)). pose proof (Rmult_le_pos _ _ Ha (S b c)). nra.
+  revert y y'. induction r as [|[a b] r IH]; intros [|u y] [|u' y']; simpl; try tauto.
+  intros [_ H]. destruct (IH y y' H). lia.
 Qed.
-Lemma slope_constraint f t y y' : bent 0 f -> Forall (Rle 0) t -> length y' = length y ->
+(** Of a function with one range everywhere. *)
+Lemma slopes_increments f a b y y' : slopes f a b -> length y' = length y ->
+  increments_within f (repeat (a, b) (length y)) y y'.
+Proof.
+  intros S. revert y'. induction y as [|u y IH]; intros [|u' y']; simpl; try discriminate; auto.
+  intros H. split; [now apply slope_increment|]. apply IH. lia.
+Qed.
+
+(** dz ((a + b) dy - dz) - a b dy^2 >= 0, with multipliers. *)
+Definition sums_of (r : list range) := map (fun i => fst i + snd i) r.
+Definition products_of (r : list range) := map (fun i => fst i * snd i) r.
+Lemma increments_constraint f r t y y' : increments_within f r y y' -> Forall (Rle 0) t ->
+  let dz := minus (map f y) (map f y') in let dy := minus y y' in
+  dotR dz (timesR t dz) <= dotR dz (timesR t (timesR (sums_of r) dy)) - dotR dy (timesR (timesR t (products_of r)) dy).
+Proof.
+  simpl. unfold minus. intros H Ht. revert r y y' H.
+  induction Ht as [|c t Hc Ht IH]; intros [|[a b] r] [|u y] [|u' y']; simpl; try tauto; try lra.
+  intros [S H]. specialize (IH r y y' H). pose proof (Rmult_le_pos _ _ Hc S). nra.
+Qed.
+Lemma slope_constraint f r t y y' : increments_within f r y y' -> Forall unit_range r -> Forall (Rle 0) t ->
   let dz := minus (map f y) (map f y') in dotR dz (timesR t dz) <= dotR dz (timesR t (minus y y')).
-Proof. intros S Ht H. pose proof (bent_constraint 0 f t y y' S Ht H). simpl in *. lra. Qed.
+Proof.
+  simpl. unfold minus. intros H U Ht. revert r y y' H U.
+  induction Ht as [|c t Hc Ht IH]; intros [|[a b] r] [|u y] [|u' y']; simpl; try tauto; try lra.
+  intros [S H] U. inversion U as [|? ? E U']; subst. inversion E; subst. specialize (IH r y y' H U').
+  pose proof (Rmult_le_pos _ _ Hc S). nra.
+Qed.
 
 Definition fits (m : matrix) (t : list R) := length t = length m /\ Forall (Rle 0) t.
 
@@ -66,34 +100,36 @@ Lemma length_scale_rows t m : length t = length m -> length (scale_rowsR t m) = 
 Proof. revert m. induction t as [|a t IH]; intros [|r m]; simpl; try discriminate; auto. Qed.
 
 (** From the first hidden layer's activations h, h' on. *)
-Lemma later_layers rho t hidden ts last b h h' :
+Lemma later_layers rho t hidden ranges ts last b h h' :
   0 < rho -> length t = length h -> length h' = length h -> length b = length last ->
-  Forall tame hidden -> Forall2 fits (map weights hidden) ts ->
+  Forall (fun k => bias_fits (snd k)) hidden -> along hidden ranges h h' -> Forall (Forall unit_range) ranges ->
+  Forall2 fits (map weights hidden) ts ->
   let dz := minus h h' in
   exists rest, form (bandR (2 * rho) (- rho) t (List.combine ts (map weights hidden)) last) (dz ++ rest) <=
     2 * rho * dotR dz (timesR t dz) - rho * square (minus (network hidden (last, b) h) (network hidden (last, b) h')).
 Proof.
-  simpl. intros Hr. revert t ts h h'.
-  induction hidden as [|[f [m c]] hidden IH]; intros t ts h h' Ht Hh Hb Hbs Hts.
+  simpl. intros Hr. revert t ranges ts h h'.
+  induction hidden as [|[f [m c]] hidden IH]; intros t ranges ts h h' Ht Hh Hb Hbs Hal U Hts.
   - exists []. inversion Hts; subst. simpl. rewrite app_nil_r, form_sum, form_scale, minus_affine by auto.
     assert (length (minus h h') = length t) as <- by (rewrite length_minus; auto).
     rewrite form_gram_columns, form_diagonal by (unfold scale; rewrite map_length, length_minus; auto).
     apply Req_le. unfold Rminus. f_equal; [|ring].
     now rewrite times_scale, dot_scale_r.
-  - inversion Hbs as [|? ? [Hf Hc] Hbs']; inversion Hts as [|? t2 ? ts' [Ht2 Hp2] Hts']; subst. simpl in *.
-      unfold bias_fits, weights in *. simpl in *.
+  - destruct ranges as [|r ranges]; [contradiction|]. destruct Hal as [Hf Hal].
+    inversion Hbs as [|? ? Hc Hbs']; inversion Hts as [|? t2 ? ts' [Ht2 Hp2] Hts']; inversion U as [|? ? U1 U2]; subst.
+    unfold bias_fits, weights in *. simpl in *.
     set (z := map f (affine m c h)). set (z' := map f (affine m c h')).
     assert (length z = length m) as Hz by (unfold z; now rewrite map_length, length_affine).
     assert (length z' = length m) as Hz' by (unfold z'; now rewrite map_length, length_affine).
-    destruct (IH t2 ts' z z') as [rest Hrest]; try congruence; auto.
+    destruct (IH t2 ranges ts' z z') as [rest Hrest]; try congruence; auto.
     exists (minus z z' ++ rest).
     assert (length (minus h h') = length t) as L by (rewrite length_minus; auto).
     rewrite <- L, form_block by (unfold scale; rewrite ?map_length, ?length_columns; auto).
     rewrite dot_columns, (dot_comm (_ ++ _)), dot_app_short
       by (rewrite length_minus by congruence; unfold apply, scale_all; rewrite !map_length, length_scale_rows; lia).
     rewrite apply_scale_all, apply_scale_rows, dot_scale_l, (dot_comm _ (minus z z')), times_scale, dot_scale_r.
-    pose proof (slope_constraint f t2 (affine m c h) (affine m c h') Hf Hp2 ltac:(now rewrite !length_affine)) as C.
-    rewrite minus_affine in C by auto. fold z z' in C. simpl in C. nra.
+    pose proof (slope_constraint f r t2 (affine m c h) (affine m c h') Hf U1 Hp2) as C.
+    cbv zeta in C. rewrite minus_affine in C by auto. fold z z' in C. simpl in C. nra.
 Qed.
 
 (** Completes the square rho^2 |dx|^2 - 2 rho l dx + |l|^2. *)
@@ -104,22 +140,21 @@ Proof.
       H. nra.
 Qed.
 
-Definition bounded rho (f : list R -> list R) := forall x x', square (minus (f x) (f x')) <= rho * square (minus x x').
-
-Theorem lmi_bounds rho t f first b1 hidden ts last b :
-  0 < rho -> tame (f, (first, b1)) -> Forall tame hidden -> bias_fits (last, b) ->
+Theorem lmi_bounds rho t f first b1 hidden r ranges ts last b x x' :
+  0 < rho -> bias_fits (first, b1) -> Forall (fun k => bias_fits (snd k)) hidden -> bias_fits (last, b) ->
+  along ((f, (first, b1)) :: hidden) (r :: ranges) x x' -> Forall (Forall unit_range) (r :: ranges) ->
   fits first t -> Forall2 fits (map weights hidden) ts ->
   nonnegative (lmi 0 Rplus Rmult (-1) (2 * rho) (- rho) t first (List.combine ts (map weights hidden)) last) ->
-  bounded rho (network ((f, (first, b1)) :: hidden) (last, b)).
+  let g := network ((f, (first, b1)) :: hidden) (last, b) in
+  square (minus (g x) (g x')) <= rho * square (minus x x').
 Proof.
-  intros Hr [Hf H1] Hh Hl [Ht Hp] Hts HP x x'. simpl. unfold bias_fits in *. simpl in *.
-  set (z := map f (affine first b1 x)). set (z' := map f (affine first b1 x')).
+  intros Hr H1 Hh Hl [Hf Hal] U [Ht Hp] Hts HP. inversion U as [|? ? U1 U2]; subst. simpl. unfold bias_fits in *.
+  simpl in *. set (z := map f (affine first b1 x)) in *. set (z' := map f (affine first b1 x')) in *.
   assert (length z = length first) as Hz by (unfold z; now rewrite map_length, length_affine).
   assert (length z' = length first) as Hz' by (unfold z'; now rewrite map_length, length_affine).
-  destruct (later_layers rho t hidden ts last b z z') as [rest Hrest]; try congruence; auto.
-  pose proof (slope_constraint f t (affine first b1 x) (affine first b1 x') Hf Hp ltac:(now rewrite !length_affine))
-    as C.
-  rewrite minus_affine in C by auto. fold z z' in C. simpl in C.
+  destruct (later_layers rho t hidden ranges ts last b z z') as [rest Hrest]; try congruence; auto.
+  pose proof (slope_constraint f r t (affine first b1 x) (affine first b1 x') Hf U1 Hp) as C.
+  cbv zeta in C. rewrite minus_affine in C by auto. fold z z' in C.
   specialize (HP (minus z z' ++ rest)). unfold lmi in HP. rewrite form_sum, form_scale, form_gram in HP.
   set (l := combine_rows _ _) in HP.
   assert (dotR l (minus x x') = dotR (minus z z') (timesR t (applyR first (minus x x')))) as E.
@@ -133,7 +168,8 @@ Qed.
 
 (** No hidden layer. *)
 Theorem norm_lmi_bounds rho m b : 0 < rho -> bias_fits (m, b) ->
-  nonnegative (norm_lmi 0 Rplus Rmult (-1) rho m) -> bounded rho (network [] (m, b)).
+  nonnegative (norm_lmi 0 Rplus Rmult (-1) rho m) -> forall x x',
+  square (minus (network [] (m, b) x) (network [] (m, b) x')) <= rho * square (minus x x').
 Proof.
   intros Hr H HP x x'. simpl. rewrite minus_affine by auto. set (y := applyR m (minus x x')).
   assert (length (map (fun _ => rho) m) = length y) as L by (unfold y, apply; now rewrite !map_length).

@@ -9,18 +9,18 @@ Definition set_stages (phi : list matrixD) (w : matrixD) (rho : list matrixD) (l
     matrixD :=
   match rho with [] => (phi, productD last w) | v :: rho' => (phi ++ productD v w :: rho', last) end.
 Definition outputs (hidden : list matrixD) (n : nat) : nat := length (List.last hidden (repeat [] n)).
-(** One function after the other: `p`, then each of `ps`, nothing but an added vector between them. `gs`: of all hidden
-  layers. *)
-Fixpoint check_parts (gs : list dyadic) (p : stack) (ps : list stack) (upper r : dyadic) (t : list dyadic) (f :
-  factor) :
-  bool :=
+(** One function after the other: `p`, then each of `ps`, nothing but an added vector between them. `ranges`: of all
+  hidden layers. *)
+Fixpoint check_parts (ranges : list (list rangeD)) (p : stack) (ps : list stack) (upper r : dyadic) (t : list dyadic)
+    (f : factor) : bool :=
   match ps with
-  | [] => check gs (fst p) (snd p) upper r t f
+  | [] => check ranges (fst p) (snd p) upper r t f
   | q :: ps' =>
       let joined := set_stages (fst p) (snd p) (fst q) (snd q) in
       let n := inputs (fst p) (snd p) in
       (length (hd [] (snd p)) =? outputs (fst p) n)%nat && (inputs (fst joined) (snd joined) =? n)%nat
-      && shapes n (fst p) (snd p) && shapes (length (snd p)) (fst q) (snd q) && check_parts gs joined ps' upper r t f
+      && shapes n (fst p) (snd p) && shapes (length (snd p)) (fst q) (snd q)
+      && check_parts ranges joined ps' upper r t f
   end.
 
 Open Scope R_scope.
@@ -94,39 +94,64 @@ Proof.
   - split; [|exact Hl]. apply Forall2_app; [exact Hp|]. constructor; [|exact Hr]. now apply L.
 Qed.
 
-Lemma functions_join l s k : functions (join l s k) = functions l ++ functions k.
+Lemma along_app h1 h2 r1 r2 x x' : along h1 r1 x x' -> along h2 r2 (through h1 x) (through h1 x') ->
+  along (h1 ++ h2) (r1 ++ r2) x x'.
 Proof.
-  destruct l as [phi [w b]], k as [[|[f v] rho] last]; unfold functions, join; simpl; [now rewrite app_nil_r|].
-  now rewrite map_app.
+  unfold through. revert r1 x x'. induction h1 as [|[f [m b]] h1 IH]; intros [|r r1] x x'; simpl; try tauto.
+  intros [H A] B. split; auto.
+Qed.
+Lemma along_joined phi w b s rho last r1 r2 x x' :
+  length (hd [] w) = length (through phi x) -> length (hd [] w) = length (through phi x') ->
+  let y := network phi (w, b) x in let y' := network phi (w, b) x' in
+  along phi r1 x x' -> along rho r2 (plusR y s) (plusR y' s) -> along (fst (joined phi w b s rho last)) (r1 ++ r2) x x'.
+Proof.
+  simpl. intros L L' A B. rewrite !(network_end phi) in B. cbn [fst snd] in B.
+  destruct rho as [|[f [v c]] rho], r2 as [|r r2]; try contradiction; cbn [joined fst].
+  - now rewrite app_nil_r.
+  - apply along_app; auto. cbn [fst snd along] in *. now rewrite !affine_join by auto.
 Qed.
 
 Lemma run_join p l s k x : instance p l -> length x = inputs (fst p) (snd p) ->
-  length (hd [] (snd p)) = outputs (fst p) (inputs (fst p) (snd p)) -> run (join l s k) x = run k (plusR (run l x) s).
+  length (hd [] (snd p)) = outputs (fst p) (inputs (fst p) (snd p)) ->
+  length (hd [] (fst (snd l))) = length (through (fst l) x) /\ run (join l s k) x = run k (plusR (run l x) s).
 Proof.
   destruct l as [lp [w' b]]. intros [Hp [E Hb]] Hx Hw. simpl in *. subst w'. destruct (stages_fit _ _ Hp) as [F M].
-  unfold join. simpl. rewrite network_joined; auto. rewrite M. unfold outputs in Hw.
-  assert (length (hd [] (realm (snd p))) = length (hd [] (snd p))) as ->
-      by (destruct (snd p); simpl; auto using map_length).
-  rewrite Hw, <- Hx. generalize (length x). intros n. clear. induction (fst p) as [|m phi IH]; simpl;
-      [now rewrite !repeat_length|].
-  destruct phi; simpl in *; [now rewrite map_length | exact IH].
+  assert (length (hd [] (realm (snd p))) = length (List.last (map weights lp) (repeat [] (length x)))) as L.
+  { rewrite M. unfold outputs in Hw.
+    assert (length (hd [] (realm (snd p))) = length (hd [] (snd p))) as ->
+        by (destruct (snd p); simpl; auto using map_length).
+    rewrite Hw, <- Hx. generalize (length x). intros n. clear. induction (fst p) as [|m phi IH]; simpl;
+        [now rewrite !repeat_length|].
+    destruct phi; simpl in *; [now rewrite map_length | exact IH]. }
+  split; [|now apply network_joined]. rewrite L. symmetry. now apply length_through.
 Qed.
 
 (** Each of `ks` after a vector has been added to what came before. *)
 Fixpoint run_after (ks : list (list R * real_stack)) (y : list R) : list R :=
   match ks with [] => y | (s, k) :: ks' => run_after ks' (run k (plusR y s)) end.
 
-Theorem check_parts_sound gs ps p upper r t f : check_parts gs p ps upper r t f = true ->
+Fixpoint along_after (ks : list (list R * real_stack)) (rs : list (list (list rangeD))) (y y' : list R) : Prop :=
+  match ks, rs with
+  | (s, k) :: ks', r :: rs' =>
+      along (fst k) (real_ranges r) (plusR y s) (plusR y' s)
+      /\ along_after ks' rs' (run k (plusR y s)) (run k (plusR y' s))
+  | [], [] => True
+  | _, _ => False
+  end.
+
+Theorem check_parts_sound r rs ps p upper rho t f : check_parts (r ++ concat rs) p ps upper rho t f = true ->
   forall l ks, instance p l -> Forall2 (fun q k => instance q (snd k)) ps ks ->
-  Forall2 has_bend gs (functions l ++ flat_map (fun k => functions (snd k)) ks) ->
   forall x x', length x = inputs (fst p) (snd p) -> length x' = inputs (fst p) (snd p) ->
+  along (fst l) (real_ranges r) x x' -> along_after ks rs (run l x) (run l x') ->
   norm (minus (run_after ks (run l x)) (run_after ks (run l x'))) <= real upper * norm (minus x x').
 Proof.
-  revert p. induction ps as [|q ps IH]; intros p H l ks Hl Hks G x x' Hx Hx'; inversion Hks as [|? [s k] ? ks' Hk Hks'];
-      subst; simpl in *.
-  - destruct p. rewrite app_nil_r in G. exact (check_sound _ _ _ _ _ _ _ H l Hl G x x' Hx Hx').
+  revert r rs p. induction ps as [|q ps IH]; intros r rs p H l ks Hl Hks x x' Hx Hx' A B;
+      inversion Hks as [|? [s k] ? ks' Hk Hks']; subst; destruct rs as [|r2 rs]; try contradiction; simpl in *.
+  - destruct p. rewrite app_nil_r in H. exact (check_sound _ _ _ _ _ _ _ H l Hl x x' Hx Hx' A).
   - do 3 (apply andb_prop in H; destruct H as [H ?HC]). apply andb_prop in H. destruct H as [HW HI]. apply Nat.eqb_eq in
-      HW, HI.
-    rewrite <- !(run_join p l s k) by auto.
-    eapply IH; eauto using instance_join; try congruence. now rewrite functions_join, <- app_assoc.
+      HW, HI. destruct B as [B B'].
+    destruct (run_join p l s k x Hl Hx HW) as [L E]. destruct (run_join p l s k x' Hl Hx' HW) as [L' E'].
+    rewrite <- E, <- E' in *. rewrite app_assoc in HC.
+    apply (IH _ _ _ HC (join l s k) ks'); eauto using instance_join; try congruence.
+    unfold real_ranges. rewrite map_app. destruct l as [phi [w b]], k as [hidden last]. now apply along_joined.
 Qed.

@@ -19,8 +19,8 @@ Proof.
   intros H d. set (n := inputs [] w). set (b := repeat 0 (length w)).
   assert (length b = length w) as Hb by apply repeat_length.
   assert (instance ([], w) ([], (realm w, b))) as I by (split; [constructor|split; auto]).
-  pose proof (check_sound [] [] w u rho t f H _ I (Forall2_nil _) (trim n d) (repeat 0 n) (length_trim n d)
-    (repeat_length 0 n)) as B.
+  pose proof (check_sound [] [] w u rho t f H _ I (trim n d) (repeat 0 n) (length_trim n d) (repeat_length 0 n)
+    Logic.I) as B.
   unfold run in B. simpl in B. rewrite minus_affine in B by (now rewrite map_length).
   rewrite <- (length_trim n d) in B at 2 4. rewrite minus_zeros in B.
   assert (is_nonnegative u = true /\ shapes n [] w = true) as [Hu Hs].
@@ -72,7 +72,8 @@ Proof.
 Qed.
 Lemma scale_divided a x : scaleR (real (unit_of a)) (map (divided_act a) x) = map (act a) x.
 Proof.
-  destruct (function_bent a) as [P _]. unfold scale, divided_act. rewrite map_map. apply map_ext. intros t. field. lra.
+  destruct (divided_range_holds a) as [P _]. unfold scale, divided_act. rewrite map_map. apply map_ext. intros t.
+  field. lra.
 Qed.
 Lemma scaled_run b between later last x : run (scaled_layers b between later last) x =
   network (functions_and_layers between later) last (scaleR b x).
@@ -120,11 +121,18 @@ Proof.
   - apply IH. constructor.
   - now apply IH.
 Qed.
-Lemma bends_hold p : Forall2 has_bend (bends_of p) (functions (stack_of p)).
+Lemma map_const {A B} (i : B) (l : list A) : map (fun _ => i) l = repeat i (length l).
+Proof. induction l; simpl; congruence. Qed.
+(** Functions that have one range everywhere. *)
+Lemma along_everywhere hidden ranges x x' : Forall (fun k => bias_fits (snd k)) hidden ->
+  Forall2 (fun (k : (R -> R) * layer) r => exists i, r = repeat i (length (weights k)) /\
+    slopes (fst k) (real (fst i)) (real (snd i))) hidden ranges ->
+  along hidden (real_ranges ranges) x x'.
 Proof.
-  unfold bends_of, functions, stack_of. destruct (hidden p) as [|first later]; [constructor|]. simpl.
-  constructor; [apply function_bent|]. generalize (real (unit_of (hd Relu (between p)))) as b, (tl (between p)) as s.
-  induction later as [|l later IH]; intros b s; simpl; constructor; [apply function_bent|]. apply IH.
+  intros B H. revert x x'. induction H as [|[f [m c]] r hidden ranges [i [-> S]] H IH]; intros x x'; cbn; auto.
+  inversion B as [|? ? Bm B']; subst. unfold bias_fits, weights in *. cbn [fst snd] in *. split; auto.
+  rewrite <- (map_const i m), map_map, map_const, <- (length_affine m c x Bm).
+  apply slopes_increments; auto. now rewrite !length_affine.
 Qed.
 Lemma fits_layer p l : fits_part p = true -> In l (layers p) -> length (snd l) = length (fst l).
 Proof. unfold fits_part. rewrite forallb_forall. intros H G. now apply Nat.eqb_eq, H. Qed.
@@ -153,6 +161,17 @@ Proof.
         split; [|exact I2]. constructor; [|exact I1]. apply Q'. now left. }
     intros b s. destruct (I b s) as [I1 I2]. split; [|exact I2]. constructor; [exact F1|exact I1].
 Qed.
+Lemma divided_along p x x' : fits_part p = true ->
+  along (fst (stack_of p)) (real_ranges (ranges_by divided_range p)) x x'.
+Proof.
+  intros H. destruct (instance_matrices p H) as [I _].
+  apply along_everywhere; [now apply (stages_fit (fst (matrices p)))|].
+  clear. unfold ranges_by, stack_of. destruct (hidden p) as [|first later]; [constructor|]. cbn.
+  constructor; [|generalize (real (unit_of (hd Relu (between p)))) as b, (tl (between p)) as s;
+    induction later as [|l later IH]; intros b s; cbn; constructor; [|apply IH]];
+    eexists; (split; [rewrite map_const; unfold weights, scale_all; cbn; now rewrite ?map_length|
+      apply divided_range_holds]).
+Qed.
 Lemma length_value p x : fits_part p = true -> length (value p x) = length (fst (outer p)).
 Proof.
   intros H. assert (length (snd (outer p)) = length (fst (outer p))) as L
@@ -163,48 +182,72 @@ Proof.
 Qed.
 Lemma distance_nonneg scale x y : 0 <= distance scale x y. Proof. apply sqrt_pos. Qed.
 
-Lemma moved_bound moves scale c u (g : list R -> list R) x y :
+(** For a bound of n by movements in units of their scale. *)
+Lemma moved_bound moves scale c u n x y :
   positive_scale scale = true -> 0 <= u -> agree moves x y ->
   (forall v w base, length v = count moves -> length w = count moves -> length base = length moves ->
-    norm (minus (g (plusR (applyR (realm (selector moves scale)) v) base))
-                (g (plusR (applyR (realm (selector moves scale)) w) base))) <= u * norm (minus v w)) ->
-  norm (minus (g (clamped c x)) (g (clamped c y))) <= u * distance scale x y.
+    plusR (applyR (realm (selector moves scale)) v) base = clamped c x ->
+    plusR (applyR (realm (selector moves scale)) w) base = clamped c y -> n <= u * norm (minus v w)) ->
+  n <= u * distance scale x y.
 Proof.
-  intros Hs Hu Ha Hg. pose proof (agree_clamped c _ _ _ Ha) as Hc. destruct (agree_lengths _ _ _ Hc) as [Hx Hy].
-  rewrite <- (selected moves scale (clamped c x)), <- (selected moves scale (clamped c y)),
-      <- (agree_staying _ _ _ Hc) by auto.
-  eapply Rle_trans; [apply Hg; auto using length_movement, length_staying|].
-  apply Rmult_le_compat_l; auto. unfold norm. rewrite square_movement by auto. apply sqrt_le_1_alt, square_in_clamped.
-  destruct (agree_lengths _ _ _ Ha). congruence.
+  intros Hs Hu Ha Hn. pose proof (agree_clamped c _ _ _ Ha) as Hc. destruct (agree_lengths _ _ _ Hc) as [Hx Hy].
+  eapply Rle_trans.
+  - apply (Hn (movement moves scale (clamped c x)) (movement moves scale (clamped c y)) (staying moves (clamped c x)));
+      auto using length_movement, length_staying; [|rewrite (agree_staying _ _ _ Hc)]; now apply selected.
+  - apply Rmult_le_compat_l; auto. unfold norm. rewrite square_movement by auto. apply sqrt_le_1_alt, square_in_clamped.
+    destruct (agree_lengths _ _ _ Ha). congruence.
 Qed.
 
-Lemma slope_sound ps f moves scale u rho t factor :
-  check_slope ps f moves scale u rho t factor = true -> holds ps (Slope_at_most f moves scale u).
+(** The parts of f, each after a vector has been added to what came before. *)
+Definition stacks_of ps (f : function) (rest : list R) (of_part : part -> real_stack) : list (list R * real_stack) :=
+  match f with
+  | Alone p => [([], of_part (part_at ps p))]
+  | Set_of phi rho => [([], of_part (part_at ps phi)); (rest, of_part (part_at ps rho))]
+  end.
+Lemma chain_sound ps f moves scale u rho t factor (matrices_of : part -> stack) (of_part : part -> real_stack) ranges
+    rest x y :
+  well_formed ps f moves scale = true -> forallb entrywise_between (parts_of ps f) = true -> is_nonnegative u = true ->
+  check_parts (concat ranges) ([], selector moves scale) (map matrices_of (parts_of ps f)) u rho t factor = true ->
+  (forall p, fits_part p = true -> instance (matrices_of p) (of_part p)) ->
+  (forall p z, entrywise_between p = true -> value p z = run (of_part p) (clamped (clamp p) z)) ->
+  agree moves x y -> let c := clamped (clamp (part_at ps (moved f))) in
+  along_after (stacks_of ps f rest of_part) ranges (c x) (c y) ->
+  norm (minus (value_of ps f rest x) (value_of ps f rest y)) <= real u * distance scale x y.
 Proof.
-  unfold check_slope, well_formed. intros H rest x y Ha Hx. do 3 both H. do 4 both H.
-  rename H0 into HP, H1 into Hu, H2 into He, H3 into Hl, H4 into Hs, H5 into Hm, H6 into Hc.
+  unfold well_formed. intros H He Hu HP HI HV Ha A. do 4 both H.
+  rename H0 into Hl, H1 into Hs, H2 into Hm, H3 into Hc.
   apply real_nonnegative in Hu. set (S := selector moves scale) in *.
   assert (forall base, length base = length moves -> instance ([], S) ([], (realm S, base))) as I.
   { intros base Hb. split; [constructor|]. split; auto. simpl. unfold S. now rewrite length_selector. }
   assert (inputs [] S = count moves) as Hi by apply selector_columns.
-  pose proof (check_parts_sound _ _ _ _ _ _ _ HP) as C. clear HP. cbn [fst snd] in C.
-  destruct f as [p|phi k]; cbn [parts_of map forallb tl moved value_of flat_map] in *.
-  - both H. apply instance_matrices in H. both He. rewrite !value_run by auto.
-    apply (moved_bound moves scale); auto. intros v w base Hv Hw Hb.
-    pose proof (C _ [([], stack_of (part_at ps p))] (I base Hb)
-      (Forall2_cons (matrices (part_at ps p)) ([], stack_of (part_at ps p)) H (Forall2_nil _))
-      (Forall2_app (bends_hold _) (Forall2_nil _)) v w) as B.
-    simpl in B. rewrite !plus_nil_r in B. apply B; congruence.
-  - both H. both H0. apply instance_matrices in H, H0. apply andb_prop in He. destruct He as [He He']. both He'.
-    both Hc. rewrite !value_run by auto. destruct (clamp (part_at ps k)) eqn:E; [|discriminate]. simpl clamped.
-    apply (moved_bound moves scale _ _
-        (fun z => run (stack_of (part_at ps k)) (plusR (run (stack_of (part_at ps phi)) z) rest))); auto.
-    intros v w base Hv Hw Hb.
-    pose proof (C _ [([], stack_of (part_at ps phi)); (rest, stack_of (part_at ps k))] (I base Hb)
-      (Forall2_cons (matrices (part_at ps phi)) ([], stack_of (part_at ps phi)) H
-        (Forall2_cons (matrices (part_at ps k)) (rest, stack_of (part_at ps k)) H0 (Forall2_nil _)))
-      (Forall2_app (bends_hold _) (Forall2_app (bends_hold _) (Forall2_nil _))) v w) as B.
-    simpl in B. rewrite !plus_nil_r in B. apply B; congruence.
+  pose proof (check_parts_sound [] ranges _ _ _ _ _ _ HP) as C. clear HP. cbn [fst snd] in C.
+  destruct f as [p|phi k]; cbn [parts_of map forallb tl moved value_of stacks_of] in *.
+  - both H. both He. rewrite !HV by auto.
+    apply (moved_bound moves scale (clamp (part_at ps p))); auto. intros v w base Hv Hw Hb Ex Ey.
+    pose proof (C _ [([], of_part (part_at ps p))] (I base Hb)
+      (Forall2_cons (matrices_of (part_at ps p)) ([], of_part (part_at ps p)) (HI _ H) (Forall2_nil _)) v w) as B.
+    assert (forall z, run ([], (realm S, base)) z = plusR (applyR (realm S) z) base) as E1 by reflexivity.
+    fold S in Ex, Ey. rewrite !E1, Ex, Ey in B. cbn [run_after] in B. rewrite !plus_nil_r in B.
+    apply B; auto; first [congruence|exact Logic.I].
+  - both H. both H0. apply andb_prop in He. destruct He as [He He']. both He'.
+    both Hc. rewrite !HV by auto. destruct (clamp (part_at ps k)) eqn:E; [|discriminate]. simpl clamped.
+    apply (moved_bound moves scale (clamp (part_at ps phi))); auto. intros v w base Hv Hw Hb Ex Ey.
+    pose proof (C _ [([], of_part (part_at ps phi)); (rest, of_part (part_at ps k))] (I base Hb)
+      (Forall2_cons (matrices_of (part_at ps phi)) ([], of_part (part_at ps phi)) (HI _ H)
+        (Forall2_cons (matrices_of (part_at ps k)) (rest, of_part (part_at ps k)) (HI _ H0) (Forall2_nil _))) v w) as B.
+    assert (forall z, run ([], (realm S, base)) z = plusR (applyR (realm S) z) base) as E1 by reflexivity.
+    fold S in Ex, Ey. rewrite !E1, Ex, Ey in B. cbn [run_after] in B. rewrite !plus_nil_r in B.
+    apply B; auto; first [congruence|exact Logic.I].
+Qed.
+Lemma slope_sound ps f moves scale u rho t factor :
+  check_slope ps f moves scale u rho t factor = true -> holds ps (Slope_at_most f moves scale u).
+Proof.
+  unfold check_slope. intros H rest x y Ha _. do 3 both H. rewrite flat_map_concat_map in H0.
+  apply (chain_sound ps f moves scale u rho t factor matrices stack_of _ rest x y H H2 H1 H0 instance_matrices
+    (fun p z E => value_run p z E) Ha).
+  unfold well_formed in H. do 4 both H. destruct f as [p|phi k]; cbn in *.
+  - both H. split; auto. now apply divided_along.
+  - both H. both H7. split; [now apply divided_along|]. split; auto. now apply divided_along.
 Qed.
 
 (** Slopes by products of norms *)
@@ -471,4 +514,79 @@ Proof.
   apply (product_with_sound _ _ _ _ _ _ _ _ _ _ HA H0 Ha); rewrite real_mul, Ev.
   - apply Rmult_le_pos; [exact C|]. eapply product_nonneg; eauto.
   - exact N.
+Qed.
+
+(** By a matrix inequality with these slopes *)
+Definition undivided_stack (p : part) : real_stack :=
+  (functions_and_layers (between p) (map real_layer (hidden p)), real_layer (outer p)).
+Lemma undivided_value p x : entrywise_between p = true -> value p x = run (undivided_stack p) (clamped (clamp p) x).
+Proof. intros H. unfold value. now rewrite unclamped_network. Qed.
+Lemma undivided_instance p : fits_part p = true -> instance (undivided_matrices p) (undivided_stack p).
+Proof.
+  intros H. assert (forall l, In l (layers p) -> of_matrix (fst l) (real_layer l)) as F.
+  { intros l Hl. split; [reflexivity|]. simpl. rewrite map_length. now apply (fits_layer p). }
+  split; [|apply F; unfold layers; apply in_or_app; right; now left].
+  unfold undivided_matrices, undivided_stack, functions_and_layers. cbn [fst].
+  assert (forall l, In l (hidden p) -> of_matrix (fst l) (real_layer l)) as G
+    by (intros; apply F; unfold layers; apply in_or_app; now left).
+  clear F. generalize (between p) as s. induction (hidden p) as [|l ls IH]; intros s; cbn; constructor.
+  - apply G. now left.
+  - apply IH. intros. apply G. now right.
+Qed.
+Lemma undivided_along p x x' : fits_part p = true ->
+  along (fst (undivided_stack p)) (real_ranges (ranges_by range_of p)) x x'.
+Proof.
+  intros H. destruct (undivided_instance p H) as [I _].
+  apply along_everywhere; [now apply (stages_fit (fst (undivided_matrices p)))|]. clear.
+  unfold ranges_by, undivided_stack, functions_and_layers. cbn [fst]. generalize (between p) as s.
+  induction (hidden p) as [|l ls IH]; intros s; cbn; constructor; [|apply IH].
+  eexists. split; [rewrite map_const; unfold weights; cbn; now rewrite map_length|]. apply range_holds.
+Qed.
+Lemma increments_in a t p q d e : is_entrywise a = true -> is_enclosed a = true -> Forall2 (follows d) t p ->
+  Forall2 (follows e) t q ->
+  increments_within (act a) (map real_range (map (fun n => slopes_between a (fst n)) t)) p q.
+Proof.
+  intros E Q P. revert q. induction P as [|n y t p [[L1 L2] _] P IH]; intros q G;
+    inversion G as [|? z ? q' [[M1 M2] _] G']; subst; cbn; auto. split; auto.
+  pose proof (slopes_between_hold a (fst n) E Q) as S.
+  destruct (Rle_lt_dec y z) as [O|O]; [specialize (S y z L1 O M2)|specialize (S z y M1 ltac:(lra) L2)]; nra.
+Qed.
+Lemma centred_along radius d e between hs s : bounded_by radius d -> bounded_by radius e ->
+  forallb is_entrywise between = true -> forallb is_enclosed between = true ->
+  (forall k, In k hs -> length (snd k) = length (fst k)) -> forall x y,
+  Forall2 (follows d) s x -> Forall2 (follows e) s y ->
+  along (functions_and_layers between (map real_layer hs))
+    (real_ranges (ranges_centred radius (rounding_of radius) between hs s)) x y.
+Proof.
+  intros D E. revert between s. induction hs as [|k hs IH]; intros between s N Q L x y X Y; cbn; auto.
+  set (a := hd Relu between).
+  assert (is_enclosed a = true /\ forallb is_enclosed (tl between) = true) as [A Q']
+    by (unfold a; destruct between; auto; simpl in *; now both Q).
+  destruct (entrywise_first between N) as [A' N']. fold a in A'.
+  assert (forall z, activated a z = map (act a) z) as M by (intros; destruct a; auto; discriminate).
+  pose proof (passed_follow radius d (fst k) (snd k) s x D (L k (or_introl eq_refl)) X) as P.
+  pose proof (passed_follow radius e (fst k) (snd k) s y E (L k (or_introl eq_refl)) Y) as G.
+  split; [now apply (increments_in a _ _ _ d e)|]. apply IH; auto.
+  - intros. apply L. now right.
+  - rewrite <- M. now apply activated_known_follow.
+  - rewrite <- M. now apply activated_known_follow.
+Qed.
+Lemma local_slope_sound ps f moves scale b u rho t factor :
+  check_local_slope ps f moves scale b u rho t factor = true -> holds ps (Slope_in_box f moves scale b u).
+Proof.
+  unfold check_local_slope. intros H rest x y Ha _ X Y. do 4 both H.
+  apply (chain_sound ps f moves scale u rho t factor undivided_matrices undivided_stack _ rest x y H H3 H1 H0
+    undivided_instance undivided_value Ha).
+  pose proof (moved_fits _ _ _ _ H) as W. set (p := part_at ps (moved f)) in *.
+  assert (entrywise_between p = true) as N by (destruct f; cbn in H3; now both H3).
+  apply (within_clamped (clamp p)) in X, Y.
+  destruct (inputs_follow _ _ X) as (d & D & _ & F). destruct (inputs_follow _ _ Y) as (e & D' & _ & F').
+  specialize (F O [] eq_refl). specialize (F' O [] eq_refl).
+  assert (along (fst (undivided_stack p)) (real_ranges (ranges_on_box p b)) (clamped (clamp p) x) (clamped (clamp p) y))
+    as A.
+  { apply (centred_along _ d e); auto. intros k K. apply (fits_layer p k W). unfold layers. apply in_or_app. now left. }
+  unfold local_ranges, p in *. destruct f as [q|phi k]; cbn [stacks_of moved along_after] in *; rewrite !plus_nil_r.
+  - now split.
+  - split; auto. split; auto. apply undivided_along. unfold well_formed in H. do 4 both H. cbn in H.
+    apply andb_prop in H. destruct H as [_ H]. now both H.
 Qed.

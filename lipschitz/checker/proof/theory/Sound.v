@@ -16,6 +16,7 @@ Proof.
   - now apply slope_everywhere_sound in H.
   - now apply points_sound in H.
   - now apply local_product_sound in H.
+  - now apply local_slope_sound in H.
   - now apply slope_in_box_sound in H.
   - now apply law_sound in H.
   - now apply law_in_box_sound in H.

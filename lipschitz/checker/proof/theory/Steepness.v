@@ -210,31 +210,29 @@ Proof.
     + intros x y L. pose proof (gelu_slopes x y L). nra.
 Qed.
 
-(** For the matrix inequality: what functions are divided by, and what then is known of them (`bent` in Network.v). *)
+(** For the matrix inequality: no slope is outside of these. *)
+Definition range_of (a : activation) : rangeD :=
+  (if is_rising a then zero else add one (neg (steepest a)), steepest a).
+Theorem range_holds a : slopes (act a) (real (fst (range_of a))) (real (snd (range_of a))).
+Proof.
+  unfold range_of. cbn [fst snd]. destruct (is_rising a) eqn:E; [rewrite real_zero; now apply rising_slopes|].
+  rewrite real_add, real_neg, real_one. destruct a; try discriminate; rewrite ?real_silu, ?real_gelu;
+    [exact silu_slopes|]. intros x y L. pose proof (gelu_slopes x y L). lra.
+Qed.
+(** What functions are divided by, and between which slopes they are then. *)
 Definition unit_of (a : activation) : dyadic := if is_rising a then steepest a else one.
-Definition bend_of (a : activation) : dyadic :=
-  if is_rising a then zero else mul (steepest a) (add (steepest a) (neg one)).
+Definition divided_range (a : activation) : rangeD := if is_rising a then (zero, one) else range_of a.
 Lemma divided_slopes (f : R -> R) b : 0 < b -> slopes f 0 b -> slopes (fun t => / b * f t) 0 1.
 Proof.
   intros P S x y L. specialize (S x y L). pose proof (Rinv_0_lt_compat b P) as Q.
   assert (/ b * (b * (y - x)) = y - x) as E by (field; lra). nra.
 Qed.
-(** (dz - (1 - c) dy) (c dy - dz) >= 0. *)
-Lemma slopes_beyond_one f c : slopes f (1 - c) c -> bent (c * (c - 1)) f.
+Theorem divided_range_holds a : 0 < real (unit_of a) /\
+  slopes (fun t => / real (unit_of a) * act a t) (real (fst (divided_range a))) (real (snd (divided_range a))).
 Proof.
-  intros S y y'.
-  assert (forall a b, a <= b -> 0 <= (f b - f a - (1 - c) * (b - a)) * (c * (b - a) - (f b - f a))) as P
-    by (intros a b L; specialize (S a b L); nra).
-  destruct (Rle_dec y y') as [L|L]; [specialize (P y y' L)|specialize (P y' y ltac:(lra))]; lra.
-Qed.
-Theorem function_bent a : 0 < real (unit_of a) /\ bent (real (bend_of a)) (fun t => / real (unit_of a) * act a t).
-Proof.
-  unfold unit_of, bend_of. destruct (is_rising a) eqn:E.
-  - destruct (rising_slopes a E) as [P S]. split; auto. rewrite real_zero. now apply slopes_bent, divided_slopes.
-  - rewrite real_one, real_mul, real_add, real_neg, real_one. split; [lra|].
-    assert (forall f g, (forall x, f x = g x) -> bent (real (steepest a) * (real (steepest a) + - (1))) f ->
-      bent (real (steepest a) * (real (steepest a) + - (1))) g) as X by (intros f g F B y y'; rewrite <- !F; apply B).
-    apply (X (act a)); [intros; rewrite Rinv_1; ring|].
-    apply slopes_beyond_one. destruct a; try discriminate; rewrite ?real_silu, ?real_gelu; [exact silu_slopes|].
-    intros x y L. pose proof (gelu_slopes x y L). nra.
+  unfold unit_of, divided_range. destruct (is_rising a) eqn:E.
+  - destruct (rising_slopes a E) as [P S]. split; auto. cbn [fst snd]. rewrite real_zero, real_one.
+    now apply divided_slopes.
+  - rewrite real_one. split; [lra|]. apply (slopes_extensional (act a)); [intros; rewrite Rinv_1; ring|].
+    apply range_holds.
 Qed.
