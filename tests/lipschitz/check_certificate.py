@@ -1337,7 +1337,11 @@ def shows_or_finds(p, factor):
                 for i in range(n)]
     except OverflowError:
         return False
-    shift = 2.0 ** -53 * (n + max(sum(map(abs, row)) for row in rows) * 2)
+    sums = [sum(map(abs, row)) for row in rows]
+    for i, row in enumerate(rows):
+        for j, x in zip(range(first[i], i), row):
+            sums[j] += abs(x)
+    shift = 2.0 ** -56 * (n + max(sums, default=0.0))  # an eighth of the first one of the writer, who adds otherwise
     while shift < 1e-7:
         found = factorised(rows, first, shift)
         if found is None:

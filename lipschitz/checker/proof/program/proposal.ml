@@ -46,8 +46,11 @@ let factors (p : Proved.dyadic list list) : Proved.factor Seq.t =
       let j = ref 0 in
       while !j < i && Z.sign (fst (at i !j)) = 0 do incr j done; !j) in
   let rows = Array.init n (fun i -> Array.init (i + 1 - first.(i)) (fun k -> entry i (first.(i) + k))) in
-  let widest = Array.fold_left (fun most row ->
-      Float.max most (2. *. Array.fold_left (fun sum x -> sum +. Float.abs x) 0. row)) 0. rows in
+  let sums = Array.make n 0. in
+  Array.iteri (fun i row -> Array.iteri (fun k x ->
+      sums.(i) <- sums.(i) +. Float.abs x;
+      if first.(i) + k < i then sums.(first.(i) + k) <- sums.(first.(i) + k) +. Float.abs x) row) rows;
+  let widest = Array.fold_left Float.max 0. sums in
   let integers i row =
     List.init i (fun _ -> Z.zero)
     @ List.map (fun x -> Z.of_float (Float.round (Float.ldexp x 60))) (Array.to_list row) in
@@ -59,4 +62,4 @@ let factors (p : Proved.dyadic list list) : Proved.factor Seq.t =
       let found = { Proved.unit0 = Z.of_int (-60); scales = List.map Z.of_int (Array.to_list scales);
                     rows = List.mapi (fun i row -> integers first.(i) row) (Array.to_list r) } in
       Seq.Cons (found, from (shift *. 8.)) in
-  from (ldexp (float n +. widest) (-53))
+  from (ldexp (float n +. widest) (-56))  (* an eighth of the first one of the writer, who adds in another order *)
