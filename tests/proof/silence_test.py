@@ -162,25 +162,16 @@ def descriptions(folder):
 
 
 def smooth_neighbours(folder):
-    """Beside neighbours with tanh the step is proved as well, and a smaller one refused by all; with GELU it is beyond
-    the theorems, and the rest is not."""
+    """Beside neighbours with tanh or GELU the step is proved as well, and a smaller one refused by all."""
     for activation in "tanh", "gelu":
         net = network(folder, "beside.toml", ["large+small>small"])
         stated = f'"large.safetensors"\nactivation = "{activation}"'
         net.write_text(net.read_text().replace('"large.safetensors"', stated))
         certificate = certify(net, "--domain", folder / "box.toml", "--neighbours", "1", "--method", "product")
         certificate["values"] = [entry for entry in certificate["values"] if entry["function"] == "set:small:small"]
-        if activation == "tanh":
-            accepted(certificate, net)
-            jump = certificate["values"][-1]["jump"]
-            assert all(decided(with_values(certificate, "set:small:small", **one_unit_less(jump)), net))
-            continue
-        certificate["content_sha256"] = second.content_sha256(certificate)
-        path = folder / "beside.json"
-        path.write_text(json.dumps(certificate))
-        three = run(CHECKER, path, net)
-        assert three.returncode == 4, three
-        assert "values of set:small:small: the step to compositions without a network: of GELU" in three.stdout, three
+        accepted(certificate, net)
+        jump = certificate["values"][-1]["jump"]
+        assert all(decided(with_values(certificate, "set:small:small", **one_unit_less(jump)), net))
 
 
 def kernel(net, certificate, coqc, theory):

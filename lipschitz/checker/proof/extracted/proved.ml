@@ -50,6 +50,10 @@ let compOpp = function
 
 let rec add = (+)
 
+(** val mul : int -> int -> int **)
+
+let rec mul = ( * )
+
 (** val sub : int -> int -> int **)
 
 let rec sub = fun n m -> Stdlib.max 0 (n-m)
@@ -457,6 +461,13 @@ let rec map f = function
 let rec flat_map f = function
 | [] -> []
 | x :: t -> app (f x) (flat_map f t)
+
+(** val fold_left : ('a1 -> 'a2 -> 'a1) -> 'a2 list -> 'a1 -> 'a1 **)
+
+let rec fold_left f l a0 =
+  match l with
+  | [] -> a0
+  | b :: t -> fold_left f t (f a0 b)
 
 (** val fold_right : ('a2 -> 'a1 -> 'a1) -> 'a1 -> 'a2 list -> 'a1 **)
 
@@ -1818,6 +1829,488 @@ let exp_of_minus x =
        then (Big.zero, (snd (exp_by_series ((fst x), vanishing))))
        else exp_by_series x
 
+(** val in_words : Big.t list -> Big.t **)
+
+let in_words words =
+  fold_left (fun n w ->
+    Big.add
+      ((fun a n -> Big.shift_left a (Big.to_int n)) n ((fun p -> p)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        Big.one)))))))) w) words Big.zero
+
+(** val inverse_rootF : fixed **)
+
+let inverse_rootF =
+  ((in_words (((fun p -> p) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     Big.one))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))) :: (((fun p -> p)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     Big.one)))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))) :: (((fun p -> p)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     Big.one)))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))) :: (((fun p -> p)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     Big.one)))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))) :: []))))),
+    (in_words (((fun p -> p) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      Big.one))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))) :: (((fun p -> p)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      Big.one)))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))) :: (((fun p -> p)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      Big.one)))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))) :: (((fun p -> p)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.shift_left p 1)
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      Big.one)))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))))) :: []))))))
+
+(** val normal_series :
+    int -> Big.t -> fixed -> fixed -> fixed -> (Big.t * fixed) * fixed **)
+
+let rec normal_series n k square term0 sum0 =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> ((k, term0), sum0))
+    (fun n' ->
+    if Big.leq (snd term0) ((fun p -> p) Big.one)
+    then ((k, term0), sum0)
+    else let t = overF (mulF term0 square) k in
+         normal_series n'
+           (Big.add k ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one)))
+           square t (addF sum0 t))
+    n
+
+(** val halfF : fixed **)
+
+let halfF =
+  (((fun a n -> Big.shift_left a (Big.to_int n)) ((fun p -> p) Big.one)
+     ((fun p -> p) ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1))
+     ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))))),
+    ((fun a n -> Big.shift_left a (Big.to_int n)) ((fun p -> p) Big.one)
+      ((fun p -> p) ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))))))
+
+(** val densityF : fixed -> fixed **)
+
+let densityF x =
+  let s = mulF x x in
+  mulF
+    (exp_of_minus
+      (overF ((greatest Big.zero (fst s)), (snd s)) ((fun p -> p)
+        ((fun p -> Big.shift_left p 1) Big.one)))) inverse_rootF
+
+(** val most_terms : int **)
+
+let most_terms =
+  mul (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    0)))))))))))))))))))) (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    0))))))))))))))))))))))))))))))
+
+(** val far : Big.t **)
+
+let far =
+  Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) Big.one)))) unit_of_fixed
+
+(** val probability_of_positive : fixed -> fixed **)
+
+let probability_of_positive x =
+  if Big.leq far (fst x)
+  then ((Big.sub unit_of_fixed
+          ((fun a n -> Big.shift_left a (Big.to_int n)) ((fun p -> p)
+            Big.one) ((fun p -> p) ((fun p -> Big.succ (Big.shift_left p 1))
+            ((fun p -> Big.succ (Big.shift_left p 1))
+            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.succ (Big.shift_left p 1))
+            ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))))),
+         unit_of_fixed)
+  else let square = mulF x x in
+       let (p, sum0) =
+         normal_series most_terms ((fun p -> p)
+           ((fun p -> Big.succ (Big.shift_left p 1)) Big.one)) square x x
+       in
+       let (k, term0) = p in
+       let p0 =
+         addF halfF
+           (mulF (densityF x) ((fst sum0), (Big.add (snd sum0) (snd term0))))
+       in
+       ((fst p0),
+       (if Big.leq
+             (Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one))
+               (snd square))
+             (Big.mul
+               (Big.sub k ((fun p -> p) ((fun p -> Big.shift_left p 1)
+                 Big.one))) unit_of_fixed)
+        then least (snd p0) unit_of_fixed
+        else unit_of_fixed))
+
+(** val probabilityF : dyadic -> fixed **)
+
+let probabilityF t =
+  let p = probability_of_positive (of_dyadic (abs t)) in
+  if is_nonnegative t then p else addF oneF (negF p)
+
 (** val log_series : int -> Big.t -> fixed -> fixed -> fixed -> fixed **)
 
 let rec log_series n k square power sum0 =
@@ -2091,17 +2584,62 @@ let value_at a t =
   | Elu -> eluF t
   | Selu -> seluF t
   | Silu -> mulF (of_dyadic t) (sigmoidF t)
+  | Gelu -> mulF (of_dyadic t) (probabilityF t)
   | _ -> (Big.zero, Big.zero)
 
-(** val is_enclosed : activation -> bool **)
+(** val minimum_of : activation -> (dyadic * dyadic) * dyadic **)
 
-let is_enclosed = function
-| Gelu -> false
-| _ -> true
-
-(** val silu_minimum : (dyadic * dyadic) * dyadic **)
-
-let silu_minimum =
+let minimum_of = function
+| Gelu ->
+  ((((Big.neg ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))))))))))))))))),
+    (Big.neg ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) Big.one)))))), ((Big.neg
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))))))))))))))))),
+    (Big.neg ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) Big.one))))))), ((Big.neg
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    Big.one))))))))))))))))))))), (Big.neg
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    Big.one)))))))
+| _ ->
   ((((Big.neg ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
     ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
@@ -2181,7 +2719,7 @@ let values_between a i =
            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
            ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
            ((fun p -> Big.shift_left p 1) Big.one))))))) high))
-  else let (p, value) = silu_minimum in
+  else let (p, value) = minimum_of a in
        let (from, to0) = p in
        ((floor_to (Big.neg ((fun p -> Big.shift_left p 1)
           ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
@@ -2255,6 +2793,11 @@ let rec network_ends between0 hidden0 last0 b =
     network_ends (tl between0) hidden' last0
       (activated_ends (hd Relu between0) (affine_ends l b))
 
+(** val gelu_slopeF : dyadic -> fixed **)
+
+let gelu_slopeF t =
+  addF (probabilityF t) (mulF (of_dyadic t) (densityF (of_dyadic (abs t))))
+
 (** val bumpF : fixed -> fixed **)
 
 let bumpF e =
@@ -2285,6 +2828,7 @@ let slope_at a t =
     else mulF (mulF selu_scaleF selu_alphaF) (exp_of_minus_size t)
   | Silu ->
     addF (sigmoidF t) (mulF (of_dyadic t) (bumpF (exp_of_minus_size t)))
+  | Gelu -> gelu_slopeF t
   | _ -> (Big.zero, Big.zero)
 
 (** val nearest : (dyadic * dyadic) -> dyadic **)
@@ -2299,9 +2843,28 @@ let nearest i =
 let farthest i =
   larger (abs (fst i)) (abs (snd i))
 
-(** val steepest_place : dyadic * dyadic **)
+(** val steepest_place : activation -> dyadic * dyadic **)
 
-let steepest_place =
+let steepest_place = function
+| Gelu ->
+  ((((fun p -> p) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    Big.one))))))))), (Big.neg ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    Big.one))))), (((fun p -> p) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    Big.one))))))))))))), (Big.neg ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    Big.one))))))
+| _ ->
   ((((fun p -> p) ((fun p -> Big.succ (Big.shift_left p 1))
     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
     ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
@@ -2392,9 +2955,9 @@ let derivatives a i =
             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
             ((fun p -> Big.shift_left p 1) Big.one)))))))))))
    | Silu ->
-     let s = slope_at Silu (fst i) in
-     let t = slope_at Silu (snd i) in
-     let (p, q) = steepest_place in
+     let s = slope_at a (fst i) in
+     let t = slope_at a (snd i) in
+     let (p, q) = steepest_place a in
      ((if (||) (below (neg p) (fst i)) (below (snd i) (neg q))
        then smaller ((fst s), (Big.neg ((fun p -> Big.shift_left p 1)
               ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
@@ -2406,7 +2969,7 @@ let derivatives a i =
               ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
               ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
               ((fun p -> Big.shift_left p 1) Big.one))))))))))
-       else add0 one (neg (steepest Silu))),
+       else fst (range_of a)),
      (if (||) (below q (fst i)) (below (snd i) p)
       then larger ((snd s), (Big.neg ((fun p -> Big.shift_left p 1)
              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
@@ -2418,7 +2981,35 @@ let derivatives a i =
              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
              ((fun p -> Big.shift_left p 1) Big.one))))))))))
-      else steepest Silu))
+      else steepest a))
+   | Gelu ->
+     let s = slope_at a (fst i) in
+     let t = slope_at a (snd i) in
+     let (p, q) = steepest_place a in
+     ((if (||) (below (neg p) (fst i)) (below (snd i) (neg q))
+       then smaller ((fst s), (Big.neg ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) Big.one)))))))))) ((fst t),
+              (Big.neg ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+              ((fun p -> Big.shift_left p 1) Big.one))))))))))
+       else fst (range_of a)),
+     (if (||) (below q (fst i)) (below (snd i) p)
+      then larger ((snd s), (Big.neg ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) Big.one)))))))))) ((snd t),
+             (Big.neg ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+             ((fun p -> Big.shift_left p 1) Big.one))))))))))
+      else steepest a))
    | _ ->
      (((fst (slope_at a (fst i))), (Big.neg ((fun p -> Big.shift_left p 1)
        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
@@ -3556,10 +4147,9 @@ let steepest_on_box p b =
 
 let check_local_product ps accepted f moves scale0 b u =
   let p = part_at ps (moved f) in
-  (&&) (forallb is_enclosed p.between)
-    (check_product_with ps accepted f moves scale0 u
-      (option_map (mul0 (steepest_on_box p b))
-        (norms accepted (moved f) 0 (layers p))))
+  check_product_with ps accepted f moves scale0 u
+    (option_map (mul0 (steepest_on_box p b))
+      (norms accepted (moved f) 0 (layers p)))
 
 (** val ranges_centred :
     dyadic list -> dyadic -> activation list -> layerD list -> known list ->
@@ -3607,11 +4197,8 @@ let undivided_matrices p =
 let check_local_slope ps f moves scale0 b u rho t factor0 =
   (&&)
     ((&&)
-      ((&&)
-        ((&&) (well_formed ps f moves scale0)
-          (forallb entrywise_between (parts_of ps f)))
-        (forallb is_enclosed (part_at ps (moved f)).between))
-      (is_nonnegative u))
+      ((&&) (well_formed ps f moves scale0)
+        (forallb entrywise_between (parts_of ps f))) (is_nonnegative u))
     (check_parts (concat (local_ranges ps f b)) ([], (selector moves scale0))
       (map undivided_matrices (parts_of ps f)) u rho t factor0)
 
@@ -3727,11 +4314,6 @@ let check_slope_among ps p rho moves scale0 b others u r o ranges t =
          None o t
      | None -> false)
 
-(** val enclosed_between : part -> bool **)
-
-let enclosed_between p =
-  forallb is_enclosed p.between
-
 (** val value_ends : part -> box -> box **)
 
 let value_ends p b =
@@ -3811,12 +4393,7 @@ let check_points ps silent f moves scale0 l x y others =
         ((&&)
           ((&&)
             ((&&)
-              ((&&)
-                ((&&)
-                  ((&&) (forallb enclosed_between (parts_of ps f))
-                    (forallb (fun o -> enclosed_between (part_at ps (fst o)))
-                      others))
-                  (negb (is_silent silent ((moved f) :: (map fst others)))))
+              ((&&) (negb (is_silent silent ((moved f) :: (map fst others))))
                 (positive_scale scale0)) (is_nonnegative l))
             (agreeD moves x y))
           ((=) (length x) (inputs_of (part_at ps (moved f)))))
@@ -4136,8 +4713,7 @@ let check_within ps p b bounds0 v =
   let c = clamp_ends q.clamp b in
   if relu_between q
   then check_layers q.hidden q.outer c bounds0 v
-  else (&&) (forallb is_enclosed q.between)
-         (check_layers_centred q.between q.hidden q.outer c bounds0 v)
+  else check_layers_centred q.between q.hidden q.outer c bounds0 v
 
 (** val number_of : (term -> Big.t) -> int -> term list -> Big.t **)
 

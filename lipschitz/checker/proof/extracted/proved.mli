@@ -20,6 +20,8 @@ val compOpp : comparison -> comparison
 
 val add : int -> int -> int
 
+val mul : int -> int -> int
+
 val sub : int -> int -> int
 
 
@@ -90,6 +92,8 @@ val concat : 'a1 list list -> 'a1 list
 val map : ('a1 -> 'a2) -> 'a1 list -> 'a2 list
 
 val flat_map : ('a1 -> 'a2 list) -> 'a1 list -> 'a2 list
+
+val fold_left : ('a1 -> 'a2 -> 'a1) -> 'a2 list -> 'a1 -> 'a1
 
 val fold_right : ('a2 -> 'a1 -> 'a1) -> 'a1 -> 'a2 list -> 'a1
 
@@ -474,6 +478,25 @@ val exp_by_series : fixed -> fixed
 
 val exp_of_minus : fixed -> fixed
 
+val in_words : Big.t list -> Big.t
+
+val inverse_rootF : fixed
+
+val normal_series :
+  int -> Big.t -> fixed -> fixed -> fixed -> (Big.t * fixed) * fixed
+
+val halfF : fixed
+
+val densityF : fixed -> fixed
+
+val most_terms : int
+
+val far : Big.t
+
+val probability_of_positive : fixed -> fixed
+
+val probabilityF : dyadic -> fixed
+
 val log_series : int -> Big.t -> fixed -> fixed -> fixed -> fixed
 
 val confirmed_log : Big.t -> Big.t -> fixed -> fixed
@@ -498,9 +521,7 @@ val seluF : dyadic -> fixed
 
 val value_at : activation -> dyadic -> fixed
 
-val is_enclosed : activation -> bool
-
-val silu_minimum : (dyadic * dyadic) * dyadic
+val minimum_of : activation -> (dyadic * dyadic) * dyadic
 
 val smaller : dyadic -> dyadic -> dyadic
 
@@ -520,6 +541,8 @@ val affine_ends : layerD -> box -> box
 
 val network_ends : activation list -> layerD list -> layerD -> box -> box
 
+val gelu_slopeF : dyadic -> fixed
+
 val bumpF : fixed -> fixed
 
 val is_below_zero : dyadic -> bool
@@ -530,7 +553,7 @@ val nearest : (dyadic * dyadic) -> dyadic
 
 val farthest : (dyadic * dyadic) -> dyadic
 
-val steepest_place : dyadic * dyadic
+val steepest_place : activation -> dyadic * dyadic
 
 val derivatives : activation -> (dyadic * dyadic) -> dyadic * dyadic
 
@@ -873,8 +896,6 @@ val check_term_ranges :
 val check_slope_among :
   part list -> int -> int -> bool list -> dyadic list -> box -> term list ->
   dyadic -> dyadic -> hints -> (box * range_tree) list -> tree -> bool
-
-val enclosed_between : part -> bool
 
 val value_ends : part -> box -> box
 

@@ -215,7 +215,7 @@ let check_of_invariants state bound f where ~scale ~neighbours upper =
   not_checked state (Printf.sprintf "%s <= %s:%s" where (text where (find where "upper_hex" bound)) of_);
   Hashtbl.replace state.uppers (f, "all", neighbours) (upper, Not_checked)
 
-(* From the slopes that activations have on the box; with GELU, beyond the theorems. *)
+(* From the slopes that activations have on the box. *)
 let local_methods = [ Text "local_sdp"; Text "local_product" ]
 let check_local state where bound names ~func ~moves ~exact_scale ~upper =
   require (find where "domain" bound = Text "box" && not (Functions.starts_with "rho:" (List.hd names)))
@@ -223,19 +223,13 @@ let check_local state where bound names ~func ~moves ~exact_scale ~upper =
   require (not state.net.invariants) "%s: slopes on a box of a network of rotation invariants" where;
   let is_product = find where "upper_method" bound = Text "local_product" and proof = find where "proof" bound in
   require (not is_product || proof = Null) "%s: unknown upper_method" where;
-  if Functions.is_enclosed state.net (List.hd names) then begin
-    let claim = Proved.Slope_in_box (func, moves, exact_scale, box_of state where (List.hd names), upper) in
-    if is_product then prove_unwritten state claim By_local_product (fun () -> too_little where)
-    else begin
-      let proofs = inequality state claim where ~neurons:(hidden_neurons state names) ~upper proof in
-      prove_unwritten_by state claim proofs (fun () -> no_factor where)
-    end;
-    In_box
-  end else begin
-    let upper = text where (find where "upper_hex" bound) in
-    not_checked state (Printf.sprintf "%s <= %s: from the slopes that activations have on a box" where upper);
-    Not_checked
-  end
+  let claim = Proved.Slope_in_box (func, moves, exact_scale, box_of state where (List.hd names), upper) in
+  if is_product then prove_unwritten state claim By_local_product (fun () -> too_little where)
+  else begin
+    let proofs = inequality state claim where ~neurons:(hidden_neurons state names) ~upper proof in
+    prove_unwritten_by state claim proofs (fun () -> no_factor where)
+  end;
+  In_box
 
 (* The proof of a bound of function `f`, and of the lower one where there is a witness. *)
 let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~upper =
@@ -266,15 +260,11 @@ let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~
     let lower = Exact.of_float (Exact.number (where ^ " lower") (find where "lower" bound)
         (find where "lower_hex" bound)) in
     let in_box = find where "domain" bound = Text "box" in
-    let proof, silent, is_enclosed =
+    let proof, silent =
       Witness.read state.net state.json (where ^ ": lower_witness") names ~in_box ~neighbours ~moves witness in
-    if is_enclosed then begin
-      prove state (Slope_at_least (silent, func, moves, exact_scale, lower)) proof
-          (where ^ ": lower_witness: claims more than the slope between x and y");
-      state.lower_bounds <- state.lower_bounds + 1
-    end else
-      not_checked state (Printf.sprintf "%s >= %s: of GELU" where
-          (text where (find where "lower_hex" bound)))
+    prove state (Slope_at_least (silent, func, moves, exact_scale, lower)) proof
+        (where ^ ": lower_witness: claims more than the slope between x and y");
+    state.lower_bounds <- state.lower_bounds + 1
 
 let check_bound state bound =
   require_keys "bound" (bound_keys @ if has "neighbours" bound then [ "neighbours" ] else []) bound;

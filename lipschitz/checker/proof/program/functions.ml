@@ -18,8 +18,6 @@ let index (net : Network.t) part =
       if name = part then k else go (k + 1) rest in
   go 0 net.parts
 let is_relu net part = Weights.is_relu (weights net part)
-(* Whether the theorems have intervals of values and slopes of all its activations. *)
-let is_enclosed net part = List.for_all Proved.is_enclosed (Weights.between (weights net part))
 let inputs net part = Weights.inputs (Weights.first_layer (weights net part))
 (* Set functions that take states, and whose phi sees invariants of them: beyond the theorems. *)
 let maps_to_invariants (net : Network.t) f = net.invariants && starts_with "set:" f

@@ -96,27 +96,25 @@ let check_step (state : Claims.t) where entry ~silent phi rho jump =
   let names = Array.of_list (List.map fst state.net.parts) in
   let compositions = Proved.beside silent phi in
   let here = List.sort_uniq compare (phi :: List.concat compositions) in
-  if not (List.for_all (fun p -> Functions.is_enclosed state.net names.(p)) here) then
-    Claims.not_checked state
-      (where ^ ": the step to compositions without a network: of GELU")
-  else begin
-    let boxes = List.map (fun p -> p, input_box state where names.(p) entry) here in
-    List.iter (fun (p, box) -> ignore (prove_exact state where p box)) boxes;
-    let size = Proved.inputs_of (Proved.part_at state.parts rho) in
-    let sum_of composition =
-      match Option.bind (Proved.terms_of boxes composition) (Proved.sum_ends state.accepted size) with
-      | Some sum -> sum | None -> rejected "%s: no range of a term" where in
-    let sums = List.map sum_of compositions in
-    let reason = where ^ ": claims less than the step to neighbours among which the network is silent" in
-    List.iter (fun sum ->
-        let values = prove_exact state where rho sum in
-        let square = sum_of_squares values in
-        require (Claims.at_most square (Claims.times jump jump)) "%s" reason) sums;
-    Claims.prove state (Step_at_most (silent, boxes, phi, rho, jump)) (Proved.By_steps sums) reason
-  end
+  let boxes = List.map (fun p -> p, input_box state where names.(p) entry) here in
+  List.iter (fun (p, box) -> ignore (prove_exact state where p box)) boxes;
+  let size = Proved.inputs_of (Proved.part_at state.parts rho) in
+  let sum_of composition =
+    match Option.bind (Proved.terms_of boxes composition) (Proved.sum_ends state.accepted size) with
+    | Some sum -> sum | None -> rejected "%s: no range of a term" where in
+  let sums = List.map sum_of compositions in
+  let reason = where ^ ": claims less than the step to neighbours among which the network is silent" in
+  List.iter (fun sum ->
+      let values = prove_exact state where rho sum in
+      let square = sum_of_squares values in
+      require (Claims.at_most square (Claims.times jump jump)) "%s" reason) sums;
+  Claims.prove state (Step_at_most (silent, boxes, phi, rho, jump)) (Proved.By_steps sums) reason
 
-let check_by_theorems (state : Claims.t) entry f names =
-  let where = "values of " ^ shown f in
+let check (state : Claims.t) entry =
+  require_keys "values" keys entry;
+  let f = text "values" (find "values" "function" entry) in
+  let where = "values of " ^ shown f and names = Functions.networks_of f in
+  require (not state.net.invariants) "%s: of a function of rotation invariants" where;
   let is_set = List.length names = 2 in
   require (if is_set then List.hd names <> "phi:ground" else f = "network")
     "%s: only of the network, or of a sum over neighbours" where;
@@ -190,13 +188,3 @@ let check_by_theorems (state : Claims.t) entry f names =
        Claims.prove state (Sum_float_error (List.map (fun (t, errors, _) -> t, errors) terms, r, norm))
          (Proved.By_rounded_sum (sums, sum_errors)) (too_little where));
   state.values <- state.values + 1
-
-(* With GELU: beyond the theorems. *)
-let check (state : Claims.t) entry =
-  require_keys "values" keys entry;
-  let f = text "values" (find "values" "function" entry) in
-  require (not state.net.invariants) "values of %s: of a function of rotation invariants" (shown f);
-  let names = Functions.networks_of f in
-  let used = names @ if List.length names = 2 && Functions.has_ground state.net then [ "phi:ground" ] else [] in
-  if List.for_all (Functions.is_enclosed state.net) used then check_by_theorems state entry f names
-  else Claims.not_checked state (Printf.sprintf "values of %s: of GELU" (shown f))

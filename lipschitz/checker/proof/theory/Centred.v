@@ -187,24 +187,24 @@ Proof.
       exact N.
 Qed.
 
-Lemma ends_of_lie a i y : is_entrywise a = true -> is_enclosed a = true -> lies i y -> lies (ends_of a i) (act a y).
+Lemma ends_of_lie a i y : is_entrywise a = true -> lies i y -> lies (ends_of a i) (act a y).
 Proof.
-  intros E C H. destruct (is_relu a) eqn:R.
+  intros E H. destruct (is_relu a) eqn:R.
   - destruct a; try discriminate. destruct H as [L H]. unfold lies, ends_of, relu_ends. cbn [fst snd act].
     rewrite !real_relu. unfold relu. split; apply Rle_max_compat_l; auto.
-  - pose proof (values_between_lies a i y R E C H). destruct a; try discriminate; assumption.
+  - pose proof (values_between_lies a i y R E H). destruct a; try discriminate; assumption.
 Qed.
-Lemma activated_form_follows a radius d n y : bounded_by radius d -> is_entrywise a = true -> is_enclosed a = true ->
-  follows d n y -> follows d (activated_form a (rounding_of radius) n) (act a y).
+Lemma activated_form_follows a radius d n y : bounded_by radius d -> is_entrywise a = true -> follows d n y ->
+  follows d (activated_form a (rounding_of radius) n) (act a y).
 Proof.
-  intros B E C [L N]. destruct n as [i f].
-  cbn [fst snd] in *. unfold activated_form. pose proof (slopes_between_hold a i E C) as K.
+  intros B E [L N]. destruct n as [i f].
+  cbn [fst snd] in *. unfold activated_form. pose proof (slopes_between_hold a i E) as K.
   destruct (slopes_between a i) as [l h]. cbn [fst snd] in K. split; cbn [fst snd]; [now apply ends_of_lie|].
   set (p := larger (fst i) (smaller (middle f) (snd i))).
   assert (real (fst i) <= real p <= real (snd i)) as P.
   { destruct L as [L1 L2]. unfold p. rewrite real_larger, real_smaller. split; [apply Rmax_l|].
     apply Rmax_lub; [lra|apply Rmin_r]. }
-  assert (lies (p, p) (real p)) as Pp by (split; simpl; lra). pose proof (ends_of_lie a _ _ E C Pp) as V.
+  assert (lies (p, p) (real p)) as Pp by (split; simpl; lra). pose proof (ends_of_lie a _ _ E Pp) as V.
   set (v := ends_of a (p, p)) in *. destruct V as [V1 V2]. apply rounded_near; auto.
   unfold near, form_at in *. cbn [slope middle error].
   rewrite (f_scale mul Rmult real real_mul), dot_scale_l, !real_add, !real_mul, !real_half, !real_add, !real_abs,
@@ -240,10 +240,10 @@ Proof.
   pose proof (ceil_to_above (-64) (half (add (snd i) (neg (fst i))))) as C.
   rewrite real_half, real_add in F. rewrite real_half, real_add, real_neg in C. rewrite real_add. apply Rabs_le. lra.
 Qed.
-Lemma activated_known_follow a radius d s y : bounded_by radius d -> is_enclosed a = true -> Forall2 (follows d) s y ->
+Lemma activated_known_follow a radius d s y : bounded_by radius d -> Forall2 (follows d) s y ->
   Forall2 (follows d) (activated_known a (rounding_of radius) s) (activated a y).
 Proof.
-  intros B S H. destruct (is_entrywise a) eqn:E.
+  intros B H. destruct (is_entrywise a) eqn:E.
   - assert (Forall2 (follows d) (map (activated_form a (rounding_of radius)) s) (map (act a) y)) as F.
     { induction H; simpl; constructor; auto. now apply activated_form_follows. }
     destruct a; try discriminate; exact F.
@@ -258,18 +258,16 @@ Proof.
   intros C. do 2 both C. apply at_most_real in C, H1. cbn [fst snd] in *. split; [lra|auto].
 Qed.
 Lemma centred_within radius d between hidden last s bounds v h : bounded_by radius d ->
-  forallb is_enclosed between = true -> Forall2 (follows d) s h ->
+  Forall2 (follows d) s h ->
   check_centred radius (rounding_of radius) between hidden last s bounds v = true ->
   within v (layer_by_layer between (map real_layer hidden) (real_layer last) h).
 Proof.
-  intros B. revert between s bounds h. induction hidden as [|l hidden IH]; intros between s [|b bounds] h S F; simpl;
+  intros B. revert between s bounds h. induction hidden as [|l hidden IH]; intros between s [|b bounds] h F; simpl;
     try discriminate; intros C.
   - both C. apply (contains_known_within d _ _ _ H). apply passed_follow; auto. now apply Nat.eqb_eq.
   - do 2 both C. apply (IH (tl between) (activated_known (hd Relu between) (rounding_of radius)
       (passed radius (rounding_of radius) (fst l) (snd l) s)) bounds); auto.
-    + destruct between; auto. simpl in S. now both S.
-    + apply activated_known_follow; auto; [destruct between; auto; simpl in S; now both S|].
-      apply passed_follow; auto. now apply Nat.eqb_eq.
+    apply activated_known_follow, passed_follow; auto. now apply Nat.eqb_eq.
 Qed.
 Lemma dot_unit k : forall pre a (d : list R), length pre = k ->
   dotR (reals (repeat zero k ++ [one])) (pre ++ a :: d) = a.
@@ -292,10 +290,10 @@ Proof.
         fold m. replace (a - (a - m + m)) with 0 by ring. rewrite Rabs_R0, real_zero. lra.
       * specialize (F (S k) (pre ++ [a - m])). rewrite <- app_assoc in F. apply F. rewrite app_length. simpl. lia.
 Qed.
-Theorem centred_sound between hidden last b bounds v x : forallb is_enclosed between = true -> within b x ->
+Theorem centred_sound between hidden last b bounds v x : within b x ->
   check_layers_centred between hidden last b bounds v = true ->
   within v (layer_by_layer between (map real_layer hidden) (real_layer last) x).
 Proof.
-  intros S W C. destruct (inputs_follow b x W) as (d & B & _ & F). specialize (F O [] eq_refl).
-  exact (centred_within _ d _ _ _ _ _ _ _ B S F C).
+  intros W C. destruct (inputs_follow b x W) as (d & B & _ & F). specialize (F O [] eq_refl).
+  exact (centred_within _ d _ _ _ _ _ _ _ B F C).
 Qed.

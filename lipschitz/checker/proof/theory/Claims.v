@@ -124,9 +124,8 @@ Definition steepest_on_box (p : part) (b : box) : dyadic :=
   steepest_centred radius (rounding_of radius) (between p) (hidden p) (inputs_known 0 c).
 Definition check_local_product ps accepted f moves scale (b : box) u : bool :=
   let p := part_at ps (moved f) in
-  forallb is_enclosed (between p)
-  && check_product_with ps accepted f moves scale u
-       (option_map (mul (steepest_on_box p b)) (norms accepted (moved f) O (layers p))).
+  check_product_with ps accepted f moves scale u
+    (option_map (mul (steepest_on_box p b)) (norms accepted (moved f) O (layers p))).
 
 (** In a box, by a matrix inequality with the slopes that each neuron of the part that moves has there; no function is
   divided. Behind it, terms of a sum may be anything. *)
@@ -151,7 +150,7 @@ Definition local_ranges (ps : list part) (f : function) (b : box) : list (list (
 Definition undivided_matrices (p : part) : stack := (map fst (hidden p), fst (outer p)).
 Definition check_local_slope ps f moves scale (b : box) u rho t factor : bool :=
   well_formed ps f moves scale && forallb entrywise_between (parts_of ps f)
-  && forallb is_enclosed (between (part_at ps (moved f))) && is_nonnegative u
+  && is_nonnegative u
   && check_parts (concat (local_ranges ps f b)) ([], selector moves scale) (map undivided_matrices (parts_of ps f)) u
        rho t factor.
 
@@ -208,7 +207,6 @@ Definition check_slope_among ps p rho moves scale (b : box) others u r (o : hint
      end.
 
 (** Slopes from below, between two points. *)
-Definition enclosed_between (p : part) : bool := forallb is_enclosed (between p).
 Definition value_ends (p : part) (b : box) : box :=
   network_ends (between p) (hidden p) (outer p) (clamp_ends (clamp p) b).
 Definition value_of_ends (ps : list part) (f : function) (rest x : box) : box :=
@@ -241,8 +239,7 @@ Fixpoint fraction_in (scale : list dyadic) (d : list dyadic) : dyadic * dyadic :
 Definition check_points ps silent f moves scale l x y others : bool :=
   let rest := fold_right plus_ends [] (map (fun o => value_ends (part_at ps (fst o)) (at_point (snd o))) others) in
   let (n, m) := fraction_in scale (minusD x y) in
-  forallb enclosed_between (parts_of ps f) && forallb (fun o => enclosed_between (part_at ps (fst o))) others
-  && negb (is_silent silent (moved f :: map fst others))
+  negb (is_silent silent (moved f :: map fst others))
   && positive_scale scale && is_nonnegative l && agreeD moves x y && (length x =? inputs_of (part_at ps (moved f)))%nat
   && forallb (fun o => length (snd o) =? inputs_of (part_at ps (fst o)))%nat others && is_positive n
   && at_most (mul (mul l l) n)
@@ -401,7 +398,7 @@ Definition check_within ps p b bounds v : bool :=
   let q := part_at ps p in
   let c := clamp_ends (clamp q) b in
   if relu_between q then check_layers (hidden q) (outer q) c bounds v
-  else forallb is_enclosed (between q) && check_layers_centred (between q) (hidden q) (outer q) c bounds v.
+  else check_layers_centred (between q) (hidden q) (outer q) c bounds v.
 (** How many terms of network p there are, by the fewest or the most of each entry. *)
 Definition number_of (number : term -> Z) (p : nat) (terms : list term) : Z :=
   fold_right (fun t n => if (phi t =? p)%nat then (number t + n)%Z else n) 0%Z terms.

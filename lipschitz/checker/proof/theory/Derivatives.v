@@ -1,7 +1,7 @@
 (** Slopes of activations between two numbers, from below and above, as multiples of 2^-24. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
-From Swarmcert Require Import Exponential Activations Algebra Form Network Checker Fixed Meaning Steepness Sets Lower
-    Values Enclosures Intervals.
+From Swarmcert Require Import Exponential Activations ErrorFunction Algebra Form Network Checker Fixed Normal Meaning
+    Steepness Sets Lower Values Enclosures Intervals.
 Import ListNotations.
 Open Scope Z_scope.
 
@@ -17,14 +17,16 @@ Definition slope_at (a : activation) (t : dyadic) : fixed :=
   | Elu => if is_positive t then oneF else exp_of_minus_size t
   | Selu => if is_positive t then selu_scaleF else mulF (mulF selu_scaleF selu_alphaF) (exp_of_minus_size t)
   | Silu => addF (sigmoidF t) (mulF (of_dyadic t) (bumpF (exp_of_minus_size t)))
-  | Relu | Gelu | Sorted _ => (0, 0)
+  | Gelu => gelu_slopeF t
+  | Relu | Sorted _ => (0, 0)
   end.
 (** The absolute values of an interval's numbers. *)
 Definition nearest (i : dyadic * dyadic) : dyadic :=
   if is_below_zero (fst i) && is_positive (snd i) then zero else smaller (abs (fst i)) (abs (snd i)).
 Definition farthest (i : dyadic * dyadic) : dyadic := larger (abs (fst i)) (abs (snd i)).
-(** The derivative of SiLU is largest between these two numbers, and least between their negatives. *)
-Definition steepest_place : dyadic * dyadic := ((4913, -11), (4914, -11)).
+(** The derivatives of SiLU and GELU are largest between these two numbers, and least between their negatives. *)
+Definition steepest_place (a : activation) : dyadic * dyadic :=
+  match a with Gelu => ((362, -8), (5793, -12)) | _ => ((4913, -11), (4914, -11)) end.
 Definition derivatives (a : activation) (i : dyadic * dyadic) : dyadic * dyadic :=
   let negative := is_below_zero (fst i) in
   let positive := is_positive (snd i) in
@@ -38,14 +40,14 @@ Definition derivatives (a : activation) (i : dyadic * dyadic) : dyadic * dyadic 
         (if positive then smaller least (fst scale, -256) else least,
          (snd (slope_at Selu (if positive then zero else snd i)), -256))
       else ((fst scale, -256), (snd scale, -256))
-  | Silu =>
-      let s := slope_at Silu (fst i) in
-      let t := slope_at Silu (snd i) in
-      let (p, q) := steepest_place in
+  | Silu | Gelu =>
+      let s := slope_at a (fst i) in
+      let t := slope_at a (snd i) in
+      let (p, q) := steepest_place a in
       (if below (neg p) (fst i) || below (snd i) (neg q)
-       then smaller (fst s, -256) (fst t, -256) else add one (neg (steepest Silu)),
+       then smaller (fst s, -256) (fst t, -256) else fst (range_of a),
        if below q (fst i) || below (snd i) p
-       then larger (snd s, -256) (snd t, -256) else steepest Silu)
+       then larger (snd s, -256) (snd t, -256) else steepest a)
   | _ => ((fst (slope_at a (fst i)), -256), (snd (slope_at a (snd i)), -256))
   end.
 Definition slopes_between (a : activation) (i : dyadic * dyadic) : dyadic * dyadic :=
@@ -351,43 +353,47 @@ Proof.
   { unfold sigmoid. rewrite Ropp_0, exp_0. field. }
   rewrite E in Z. assert (x * (2 * sigmoid x - 1) <= y * (2 * sigmoid y - 1)); [|lra]. apply Rmult_le_compat; lra.
 Qed.
-Lemma silu_slope_rises x y : x <= y -> (forall c, x <= c <= y -> silu_bend c <= 0) -> silu_slope x <= silu_slope y.
+(** A derivative that rises where `bend` is negative, and falls elsewhere. *)
+Section Bent.
+Context (slope weight bend : R -> R) (derivative : forall x, derivable_pt_lim slope x (- (weight x * bend x)))
+  (positive : forall x, 0 <= weight x) (bend_rises : forall x y, Rabs x <= Rabs y -> bend x <= bend y).
+Lemma slope_rises x y : x <= y -> (forall c, x <= c <= y -> bend c <= 0) -> slope x <= slope y.
 Proof.
-  intros L H. enough (0 * (y - x) <= silu_slope y - silu_slope x) by lra.
-  apply (at_least_the_derivative _ (fun x => - (sigmoid_slope x * silu_bend x))); auto. intros c Hc.
-  split; [apply silu_slope_derivative|]. specialize (H c Hc). pose proof (sigmoid_slope_positive c). nra.
+  intros L H. enough (0 * (y - x) <= slope y - slope x) by lra.
+  apply (at_least_the_derivative _ (fun x => - (weight x * bend x))); auto. intros c Hc.
+  split; [apply derivative|]. specialize (H c Hc). pose proof (positive c). nra.
 Qed.
-Lemma silu_slope_falls x y : x <= y -> (forall c, x <= c <= y -> 0 <= silu_bend c) -> silu_slope y <= silu_slope x.
+Lemma slope_falls x y : x <= y -> (forall c, x <= c <= y -> 0 <= bend c) -> slope y <= slope x.
 Proof.
-  intros L H. enough (silu_slope y - silu_slope x <= 0 * (y - x)) by lra.
-  apply (at_most_the_derivative _ (fun x => - (sigmoid_slope x * silu_bend x))); auto. intros c Hc.
-  split; [apply silu_slope_derivative|]. specialize (H c Hc). pose proof (sigmoid_slope_positive c). nra.
+  intros L H. enough (slope y - slope x <= 0 * (y - x)) by lra.
+  apply (at_most_the_derivative _ (fun x => - (weight x * bend x))); auto. intros c Hc.
+  split; [apply derivative|]. specialize (H c Hc). pose proof (positive c). nra.
 Qed.
 (** Between l and h, where the place of the maximum, between p and q, is not. *)
-Lemma silu_slope_at_ends p q l h c : 0 <= p <= q -> silu_bend p <= 0 -> 0 <= silu_bend q -> l <= c <= h ->
-  q < l \/ h < p -> silu_slope c <= Rmax (silu_slope l) (silu_slope h).
+Lemma slope_at_ends p q l h c : 0 <= p <= q -> bend p <= 0 -> 0 <= bend q -> l <= c <= h ->
+  q < l \/ h < p -> slope c <= Rmax (slope l) (slope h).
 Proof.
-  intros O P Q C A. pose proof (Rmax_l (silu_slope l) (silu_slope h)).
-  pose proof (Rmax_r (silu_slope l) (silu_slope h)).
-  assert (forall z, Rabs z <= p -> silu_bend z <= 0) as Inner.
-  { intros z Hz. rewrite <- (Rabs_pos_eq p) in Hz by lra. pose proof (silu_bend_rises z p Hz). lra. }
-  assert (q < l -> silu_slope c <= silu_slope l) as Right.
-  { intros G. apply silu_slope_falls; [lra|]. intros z Hz.
-    pose proof (silu_bend_rises q z) as R. rewrite !Rabs_pos_eq in R by lra. specialize (R ltac:(lra)). lra. }
-  destruct A as [A|A]; [specialize (Right A); lra|]. destruct (Rle_lt_dec (silu_bend c) 0) as [B|B].
-  - enough (silu_slope c <= silu_slope h) by lra. apply silu_slope_rises; [lra|]. intros z Hz.
+  intros O P Q C A. pose proof (Rmax_l (slope l) (slope h)). pose proof (Rmax_r (slope l) (slope h)).
+  assert (forall z, Rabs z <= p -> bend z <= 0) as Inner.
+  { intros z Hz. rewrite <- (Rabs_pos_eq p) in Hz by lra. pose proof (bend_rises z p Hz). lra. }
+  assert (q < l -> slope c <= slope l) as Right.
+  { intros G. apply slope_falls; [lra|]. intros z Hz.
+    pose proof (bend_rises q z) as R. rewrite !Rabs_pos_eq in R by lra. specialize (R ltac:(lra)). lra. }
+  destruct A as [A|A]; [specialize (Right A); lra|]. destruct (Rle_lt_dec (bend c) 0) as [B|B].
+  - enough (slope c <= slope h) by lra. apply slope_rises; [lra|]. intros z Hz.
     destruct (Rle_lt_dec (Rabs z) p); [now apply Inner|].
     assert (Rabs z <= Rabs c) as S.
     { unfold Rabs in *. destruct (Rcase_abs z), (Rcase_abs c); lra. }
-    pose proof (silu_bend_rises z c S). lra.
-  - enough (silu_slope c <= silu_slope l) by lra.
+    pose proof (bend_rises z c S). lra.
+  - enough (slope c <= slope l) by lra.
     assert (c < 0).
     { destruct (Rle_lt_dec 0 c); auto. pose proof (Inner c) as I. rewrite Rabs_pos_eq in I by auto.
       specialize (I ltac:(lra)). lra. }
-    apply silu_slope_falls; [lra|]. intros z Hz. pose proof (silu_bend_rises c z) as R.
+    apply slope_falls; [lra|]. intros z Hz. pose proof (bend_rises c z) as R.
     rewrite !Rabs_left in R by lra. specialize (R ltac:(lra)). lra.
 Qed.
-Lemma steepest_place_holds : let (p, q) := steepest_place in
+End Bent.
+Lemma silu_place_holds : let (p, q) := steepest_place Silu in
   0 <= real p <= real q /\ silu_bend (real p) <= 0 /\ 0 <= silu_bend (real q).
 Proof.
   unfold steepest_place. pose proof (inside_ends _ _ (inside_sigmoid (4913, -11)%Z)) as [_ P].
@@ -399,46 +405,81 @@ Proof.
   rewrite !over_power in *. change (2 ^ 11)%Z with 2048%Z in *. change (2 ^ 24)%Z with 16777216%Z in *.
   set (s := sigmoid (4913 / 2048)) in *. set (t := sigmoid (4914 / 2048)) in *. clearbody s t. lra.
 Qed.
+Lemma gelu_place_holds : let (p, q) := steepest_place Gelu in
+  0 <= real p <= real q /\ gelu_bend (real p) <= 0 /\ 0 <= gelu_bend (real q).
+Proof.
+  unfold steepest_place, gelu_bend. rewrite !over_power. change (2 ^ 8)%Z with 256%Z.
+  change (2 ^ 12)%Z with 4096%Z. lra.
+Qed.
 Lemma inside_silu_slope t : inside (slope_at Silu t) (silu_slope (real t)).
 Proof.
   rewrite silu_slope_sum. cbn [slope_at]. apply inside_add; [apply inside_sigmoid|].
   apply inside_mul; [apply inside_dyadic|apply inside_sigmoid_slope].
 Qed.
-Lemma silu_slopes_in i : slopes_in i (act Silu) (real (fst (derivatives Silu i))) (real (snd (derivatives Silu i))).
+(** Of functions with such a derivative, whose values at x and - x add up to 1. *)
+Lemma bent_slopes_in a i slope weight bend : is_rising a = false ->
+  (forall x, derivable_pt_lim (act a) x (slope x)) ->
+  (forall x, derivable_pt_lim slope x (- (weight x * bend x))) -> (forall x, 0 <= weight x) ->
+  (forall x y, Rabs x <= Rabs y -> bend x <= bend y) -> (forall x, slope (- x) = 1 - slope x) ->
+  (forall x, real (fst (range_of a)) <= slope x <= real (steepest a)) ->
+  (forall t, inside (slope_at a t) (slope (real t))) ->
+  (let (p, q) := steepest_place a in 0 <= real p <= real q /\ bend (real p) <= 0 /\ 0 <= bend (real q)) ->
+  slopes_in i (act a) (real (fst (derivatives a i))) (real (snd (derivatives a i))).
 Proof.
-  pose proof steepest_place_holds as S. pose proof (inside_ends _ _ (inside_silu_slope (fst i))) as F.
-  pose proof (inside_ends _ _ (inside_silu_slope (snd i))) as G. cbn [derivatives].
-  destruct steepest_place as [p q]. destruct S as (O & P & Q).
-  set (s := slope_at Silu (fst i)) in *. set (t := slope_at Silu (snd i)) in *. clearbody s t. cbn [fst snd].
+  intros R Da D W B Opposite Range I S. pose proof (inside_ends _ _ (I (fst i))) as F.
+  pose proof (inside_ends _ _ (I (snd i))) as G.
+  assert (derivatives a i = let s := slope_at a (fst i) in let t := slope_at a (snd i) in
+    let (p, q) := steepest_place a in
+    (if below (neg p) (fst i) || below (snd i) (neg q)
+     then smaller (fst s, (-256)%Z) (fst t, (-256)%Z) else fst (range_of a),
+     if below q (fst i) || below (snd i) p
+     then larger (snd s, (-256)%Z) (snd t, (-256)%Z) else steepest a)) as ->
+    by (destruct a; try discriminate; reflexivity).
+  cbv zeta. destruct (steepest_place a) as [p q]. destruct S as (O & P & Q).
+  set (s := slope_at a (fst i)) in *. set (t := slope_at a (snd i)) in *. clearbody s t. cbn [fst snd].
+  pose proof (slope_at_ends slope weight bend D W B) as Ends.
   assert (forall c, real (fst i) <= c <= real (snd i) ->
     real (if below (neg p) (fst i) || below (snd i) (neg q)
-          then smaller (fst s, (-256)%Z) (fst t, (-256)%Z) else add one (neg (steepest Silu))) <= silu_slope c <=
+          then smaller (fst s, (-256)%Z) (fst t, (-256)%Z) else fst (range_of a)) <= slope c <=
     real (if below q (fst i) || below (snd i) p
-          then larger (snd s, (-256)%Z) (snd t, (-256)%Z) else steepest Silu)) as D.
-  { intros c C. pose proof (silu_slope_between c) as W. split.
-    - destruct (below (neg p) (fst i) || below (snd i) (neg q)) eqn:E.
-      2: { rewrite real_add, real_neg, real_one, real_silu. lra. }
-      rewrite real_smaller. pose proof (silu_slope_at_ends (real p) (real q) (- real (snd i)) (- real (fst i)) (- c) O
-        P Q
-        ltac:(lra)) as M. rewrite !silu_slope_opposite in M.
+          then larger (snd s, (-256)%Z) (snd t, (-256)%Z) else steepest a)) as Between.
+  { intros c C. pose proof (Range c) as Rc. split.
+    - destruct (below (neg p) (fst i) || below (snd i) (neg q)) eqn:E; [|lra].
+      rewrite real_smaller. pose proof (Ends (real p) (real q) (- real (snd i)) (- real (fst i)) (- c) O P Q
+        ltac:(lra)) as M. rewrite !Opposite in M.
       assert (real q < - real (snd i) \/ - real (fst i) < real p) as H.
       { apply orb_true_iff in E. destruct E as [E|E]; apply below_real in E; rewrite real_neg in E; lra. }
       specialize (M H). revert M. unfold Rmin, Rmax. destruct (Rle_dec _ _), (Rle_dec _ _); lra.
-    - destruct (below q (fst i) || below (snd i) p) eqn:E; [|rewrite real_silu; lra].
-      rewrite real_larger. pose proof (silu_slope_at_ends (real p) (real q) _ _ c O P Q C) as M.
+    - destruct (below q (fst i) || below (snd i) p) eqn:E; [|lra].
+      rewrite real_larger. pose proof (Ends (real p) (real q) _ _ c O P Q C) as M.
       assert (real q < real (fst i) \/ real (snd i) < real p) as H
         by (apply orb_true_iff in E; destruct E as [E|E]; apply below_real in E; lra).
       specialize (M H). revert M. unfold Rmax. destruct (Rle_dec _ _), (Rle_dec _ _); lra. }
   set (lo := real (if _ || _ then smaller _ _ else _)) in *. set (hi := real (if _ || _ then larger _ _ else _)) in *.
-  intros x y L1 L L2. split; [apply (at_least_the_derivative _ silu_slope)|apply (at_most_the_derivative _ silu_slope)];
-    auto; intros c Hc; (split; [apply silu_derivative|]); apply D; lra.
+  intros x y L1 L L2. split; [apply (at_least_the_derivative _ slope)|apply (at_most_the_derivative _ slope)];
+    auto; intros c Hc; (split; [apply Da|]); apply Between; lra.
+Qed.
+Lemma silu_slopes_in i : slopes_in i (act Silu) (real (fst (derivatives Silu i))) (real (snd (derivatives Silu i))).
+Proof.
+  apply (bent_slopes_in Silu i silu_slope sigmoid_slope silu_bend eq_refl silu_derivative silu_slope_derivative
+    sigmoid_slope_positive silu_bend_rises silu_slope_opposite); [|apply inside_silu_slope|apply silu_place_holds].
+  intros x. pose proof (silu_slope_between x). unfold range_of. cbn [is_rising fst].
+  rewrite real_add, real_neg, real_one, real_silu. lra.
+Qed.
+Lemma gelu_slopes_in i : slopes_in i (act Gelu) (real (fst (derivatives Gelu i))) (real (snd (derivatives Gelu i))).
+Proof.
+  apply (bent_slopes_in Gelu i gelu_derivative_at gelu_weight gelu_bend eq_refl gelu_derivative_holds
+    gelu_second_derivative gelu_weight_positive gelu_bend_rises gelu_derivative_opposite);
+    [|apply inside_gelu_slope|apply gelu_place_holds].
+  intros x. pose proof (gelu_slope_between (x / sqrt 2)). unfold range_of, gelu_derivative_at. cbn [is_rising fst].
+  rewrite real_add, real_neg, real_one, real_gelu. lra.
 Qed.
 
-Theorem slopes_between_hold a i : is_entrywise a = true -> is_enclosed a = true ->
+Theorem slopes_between_hold a i : is_entrywise a = true ->
   slopes_in i (act a) (real (fst (slopes_between a i))) (real (snd (slopes_between a i))).
 Proof.
-  intros E S. apply (rounded_slopes a i (fst (derivatives a i)) (snd (derivatives a i)) E); [|apply surjective_pairing].
-  destruct a; try discriminate; cbn [derivatives fst snd act].
+  intros E. apply (rounded_slopes a i (fst (derivatives a i)) (snd (derivatives a i)) E); [|apply surjective_pairing].
+  destruct a; try discriminate; [| | | | | |apply silu_slopes_in|apply gelu_slopes_in]; cbn [derivatives fst snd act].
   - intros x y L1 L L2. cbn [act]. unfold relu. destruct (is_below_zero (fst i)) eqn:B, (is_positive (snd i)) eqn:P;
     cbn [orb negb];
       rewrite ?real_one, ?real_zero; unfold is_below_zero in B;
@@ -472,5 +513,4 @@ Proof.
     + apply (inside_ends _ _ (K (snd i))).
     + apply slopes_of_tangents; [intros; apply elu_tangent|apply elu_slope_rises].
   - apply selu_slopes_in.
-  - apply silu_slopes_in.
 Qed.

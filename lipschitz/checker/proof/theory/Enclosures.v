@@ -1,7 +1,8 @@
 (** Intervals of the functions between layers, by which networks are evaluated: the values of activations from the
     exponential of Fixed.v, as multiples of 2^-64 rounded outwards. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
-From Swarmcert Require Import Exponential Activations Algebra Form Network Checker Fixed Meaning Steepness Lower Values.
+From Swarmcert Require Import Exponential Activations Algebra Form Network Checker Fixed Normal Meaning Steepness Lower
+  Values.
 Import ListNotations.
 Open Scope Z_scope.
 
@@ -44,15 +45,17 @@ Definition value_at (a : activation) (t : dyadic) : fixed :=
   | Elu => eluF t
   | Selu => seluF t
   | Silu => mulF (of_dyadic t) (sigmoidF t)
-  | Relu | Gelu | Sorted _ => (0, 0)
+  | Gelu => mulF (of_dyadic t) (probabilityF t)
+  | Relu | Sorted _ => (0, 0)
   end.
-(** Whether the activation has an interval here. The limit of the error function is no theorem here, so that GELU has
-    none. *)
-Definition is_enclosed (a : activation) : bool := match a with Gelu => false | _ => true end.
 
-(** SiLU falls up to its minimum, which lies between the first two numbers, and rises behind; it is nowhere below the
-    third one. *)
-Definition silu_minimum : dyadic * dyadic * dyadic := ((-1340568, -20), (-1340567, -20), (-72998, -18)).
+(** SiLU and GELU fall up to their minimum, which lies between the first two numbers, and rise behind; they are nowhere
+    below the third one. *)
+Definition minimum_of (a : activation) : dyadic * dyadic * dyadic :=
+  match a with
+  | Gelu => ((-1576622, -21), (-1576620, -21), (-1425822, -23))
+  | _ => ((-1340568, -20), (-1340567, -20), (-72998, -18))
+  end.
 Definition smaller (x y : dyadic) : dyadic := if at_most x y then x else y.
 Definition below (x y : dyadic) : bool := negb (at_most y x).
 Definition values_between (a : activation) (i : dyadic * dyadic) : dyadic * dyadic :=
@@ -62,7 +65,7 @@ Definition values_between (a : activation) (i : dyadic * dyadic) : dyadic * dyad
   let high := (snd w, -256) in
   if is_rising a then (floor_to (-64) low, ceil_to (-64) high)
   else
-    let '(from, to, value) := silu_minimum in
+    let '(from, to, value) := minimum_of a in
     (floor_to (-64) (if below (snd i) from || below to (fst i) then smaller low (fst w, -256) else value),
      ceil_to (-64) (larger high (snd v, -256))).
 
@@ -221,21 +224,22 @@ Proof.
   unfold selu_scale, selu_alpha. replace (10 ^ 16) with (IZR 10000000000000000) by (simpl; ring).
   split; apply inside_ratio; reflexivity.
 Qed.
-Theorem value_at_inside a t : is_relu a = false -> is_entrywise a = true -> is_enclosed a = true ->
+Theorem value_at_inside a t : is_relu a = false -> is_entrywise a = true ->
   inside (value_at a t) (act a (real t)).
 Proof.
   pose proof (inside_dyadic t) as T.
-  destruct a; try discriminate; intros _ _ _; cbn [value_at act].
+  destruct a; try discriminate; intros _ _; cbn [value_at].
   - apply inside_tanh.
   - apply inside_sigmoid.
   - apply inside_softplus.
-  - unfold eluF. destruct (is_nonnegative t) eqn:N.
+  - cbn [act]. unfold eluF. destruct (is_nonnegative t) eqn:N.
     + apply real_nonnegative in N. rewrite relu_right, falling_right, Rplus_0_r by auto. exact T.
     + destruct (inside_falling t N) as [F ->]. rewrite Rplus_0_l. exact F.
-  - unfold seluF. destruct inside_selu_constants as [S A]. destruct (is_nonnegative t) eqn:N.
+  - cbn [act]. unfold seluF. destruct inside_selu_constants as [S A]. destruct (is_nonnegative t) eqn:N.
     + apply real_nonnegative in N. rewrite relu_right, falling_right, Rmult_0_r, Rplus_0_r by auto.
       now apply inside_mul.
     + destruct (inside_falling t N) as [F ->]. rewrite Rmult_0_r, Rplus_0_l, Rmult_assoc.
       apply inside_mul; auto. now apply inside_mul.
-  - unfold Rdiv. apply inside_mul; [exact T|]. apply inside_sigmoid.
+  - cbn [act]. unfold Rdiv. apply inside_mul; [exact T|]. apply inside_sigmoid.
+  - rewrite gelu_probability. apply inside_mul; [exact T|]. apply inside_normal.
 Qed.

@@ -265,13 +265,16 @@ Lemma gelu_slope_left u : gelu_slope (- u) = 1 - gelu_slope u.
 Proof.
   unfold gelu_slope, bell. rewrite integral_odd, Rmult_opp_opp. field. apply Rgt_not_eq. pose proof root_pi_large. lra.
 Qed.
+Lemma gelu_slope_between u : - (529 / 4096) <= gelu_slope u <= 4625 / 4096.
+Proof.
+  destruct (Rle_lt_dec 0 u) as [H|H]; [pose proof (gelu_slope_right u H); lra|].
+  replace u with (- - u) by ring. rewrite gelu_slope_left. pose proof (gelu_slope_right (- u) ltac:(lra)). lra.
+Qed.
 Lemma gelu_slopes : slopes (act Gelu) (- (529 / 4096)) (4625 / 4096).
 Proof.
   intros x y L. rewrite !gelu_at. pose proof sqrt_2_positive as P. set (k := sqrt 2) in *.
   assert (x / k <= y / k) as Q by (apply Rmult_le_compat_r; auto; apply Rlt_le, Rinv_0_lt_compat, P).
-  assert (forall u, - (529 / 4096) <= gelu_slope u <= 4625 / 4096) as B.
-  { intros u. destruct (Rle_lt_dec 0 u) as [H|H]; [pose proof (gelu_slope_right u H); lra|].
-    replace u with (- - u) by ring. rewrite gelu_slope_left. pose proof (gelu_slope_right (- u) ltac:(lra)). lra. }
+  pose proof gelu_slope_between as B.
   pose proof (at_least_the_derivative gelu_scaled _ _ _ _ Q (fun c _ => conj (gelu_derivative c) (proj1 (B c)))) as D.
   pose proof (at_most_the_derivative gelu_scaled _ _ _ _ Q (fun c _ => conj (gelu_derivative c) (proj2 (B c)))) as U.
   apply (Rmult_le_compat_l k) in D, U; try lra.

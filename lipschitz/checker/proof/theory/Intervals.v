@@ -1,7 +1,7 @@
 (** Networks of intervals: what they enclose. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
-From Swarmcert Require Import Exponential Activations Algebra Form Network Checker Fixed Meaning Steepness Sets Lower
-    Values Enclosures.
+From Swarmcert Require Import Exponential Activations ErrorFunction Algebra Form Network Checker Fixed Normal Meaning
+    Steepness Sets Lower Values Enclosures.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -36,10 +36,10 @@ Lemma exp_at_least t u : at_most u (fst (exp_of_minus_size t), (-256)%Z) = true 
 Proof. intros H. apply at_most_real in H. pose proof (inside_ends _ _ (inside_exp_size t)). lra. Qed.
 Lemma over_power m p : real (m, Z.neg p) = IZR m / IZR (2 ^ Z.pos p).
 Proof. rewrite real_below, pow_IZR, positive_nat_Z. reflexivity. Qed.
-Lemma silu_minimum_holds : let '(from, to, value) := silu_minimum in
+Lemma silu_minimum_holds : let '(from, to, value) := minimum_of Silu in
   silu_sign (real from) <= 0 /\ 0 <= silu_sign (real to) /\ forall x, real value <= act Silu x.
 Proof.
-  unfold silu_minimum, silu_sign.
+  unfold minimum_of, silu_sign.
   pose proof (exp_at_most (-1340568, -20)%Z (291992, -20)%Z ltac:(vm_compute; reflexivity)) as A.
   pose proof (exp_at_least (-1340567, -20)%Z (291991, -20)%Z ltac:(vm_compute; reflexivity)) as B.
   pose proof (exp_at_most (-335142, -18)%Z (72998, -18)%Z ltac:(vm_compute; reflexivity)) as C.
@@ -54,6 +54,95 @@ Proof.
   assert (exp (- x) = exp (1 + w) * exp (- x - (1 + w))) as E by (rewrite <- exp_plus; f_equal; ring).
   assert (1 <= w * exp (1 + w)) by nra. assert (- x - w <= w * exp (- x)); [|nra].
   rewrite E. set (d := exp (- x - (1 + w))) in *. nra.
+Qed.
+
+(** GELU: between `from` and `to` its derivative is at most 2^-22. *)
+Lemma gelu_falls x y : x <= y -> gelu_derivative_at y <= 0 -> act Gelu y <= act Gelu x.
+Proof.
+  intros L S. enough (act Gelu y - act Gelu x <= 0 * (y - x)) by lra.
+  apply (at_most_the_derivative _ gelu_derivative_at); auto. intros c [_ Hc]. split; [apply gelu_derivative_holds|].
+  now apply (gelu_derivative_sign c y Hc).
+Qed.
+Lemma gelu_rises x y : x <= y -> 0 <= gelu_derivative_at x -> act Gelu x <= act Gelu y.
+Proof.
+  intros L S. enough (0 * (y - x) <= act Gelu y - act Gelu x) by lra.
+  apply (at_least_the_derivative _ gelu_derivative_at); auto. intros c [Hc _]. split; [apply gelu_derivative_holds|].
+  now apply (gelu_derivative_sign x c Hc).
+Qed.
+Definition gelu_slopeF (t : dyadic) : fixed :=
+  addF (probabilityF t) (mulF (of_dyadic t) (densityF (of_dyadic (abs t)))).
+Lemma inside_gelu_slope t : inside (gelu_slopeF t) (gelu_derivative_at (real t)).
+Proof.
+  rewrite gelu_derivative_sum. apply inside_add; [apply inside_normal|].
+  apply inside_mul; [apply inside_dyadic|apply inside_density_size].
+Qed.
+Lemma gelu_minimum_holds : let '(from, to, value) := minimum_of Gelu in
+  gelu_derivative_at (real from) <= 0 /\ 0 <= gelu_derivative_at (real to) /\ forall x, real value <= act Gelu x.
+Proof.
+  unfold minimum_of. set (from := (-1576622, -21)%Z). set (to := (-1576620, -21)%Z). set (value := (-1425822, -23)%Z).
+  pose proof (inside_ends _ _ (inside_gelu_slope from)) as [_ A]. pose proof (inside_ends _ _ (inside_gelu_slope to)) as
+    [B C].
+  pose proof (inside_ends _ _ (value_at_inside Gelu to eq_refl eq_refl)) as [V _].
+  assert (at_most (snd (gelu_slopeF from), (-256)%Z) zero = true) as A' by (vm_compute; reflexivity).
+  assert (at_most zero (fst (gelu_slopeF to), (-256)%Z) = true) as B' by (vm_compute; reflexivity).
+  assert (at_most (snd (gelu_slopeF to), (-256)%Z) (1, -22)%Z = true) as C' by (vm_compute; reflexivity).
+  assert (at_most (add value (1, -41)%Z) (fst (value_at Gelu to), (-256)%Z) = true) as V' by (vm_compute; reflexivity).
+  apply at_most_real in A', B', C', V'. rewrite real_zero in A', B'. rewrite real_add in V'.
+  assert (gelu_derivative_at (real from) <= 0) as F by lra. assert (0 <= gelu_derivative_at (real to)) as G by lra.
+  split; [exact F|]. split; [exact G|]. clear A A' B B' F. intros x.
+  generalize dependent (fst (value_at Gelu to), (-256)%Z). generalize dependent (snd (gelu_slopeF to), (-256)%Z).
+  intros d C C' v V V'. assert (real to - real from = real (1, -20)%Z) as W.
+  { unfold to, from. rewrite !over_power. change (2 ^ 21)%Z with (2 * 2 ^ 20)%Z. rewrite mult_IZR.
+    change (2 ^ 20)%Z with 1048576%Z. lra. }
+  assert (real (1, -22)%Z * real (1, -20)%Z <= real (1, -41)%Z) as Small.
+  { rewrite <- real_mul. apply at_most_real. reflexivity. }
+  assert (real from < real to) as O by (pose proof (real_positive (1, -20)%Z eq_refl); lra).
+  assert (- 1 <= real from / sqrt 2) as Inner.
+  { pose proof sqrt_2_positive as P. assert (1 <= sqrt 2) by (rewrite <- sqrt_1; apply sqrt_le_1_alt; lra).
+    apply (Rmult_le_reg_r (sqrt 2)); auto. rewrite over_root_2. assert (-1 <= real from); [|lra].
+    unfold from. rewrite over_power. change (2 ^ 21)%Z with 2097152%Z. lra. }
+  assert (real to < 0) as N by (unfold to; rewrite over_power; change (2 ^ 21)%Z with 2097152%Z; lra).
+  assert (forall z, real from <= z -> real value <= act Gelu z) as Right.
+  { intros z Hz. destruct (Rle_lt_dec (real to) z) as [L|L].
+    - pose proof (gelu_rises (real to) z L G). pose proof (real_positive (1, -41)%Z eq_refl). lra.
+    - assert (act Gelu (real to) - act Gelu z <= real (1, -22)%Z * (real to - z)) as D.
+      { apply (at_most_the_derivative _ gelu_derivative_at); [lra|]. intros c Hc.
+        split; [apply gelu_derivative_holds|]. apply Rle_trans with (gelu_derivative_at (real to)); [|lra].
+        unfold gelu_derivative_at. pose proof sqrt_2_positive as P. apply Rinv_0_lt_compat in P.
+        assert (forall a b, a <= b -> a / sqrt 2 <= b / sqrt 2) as M
+          by (intros a b Hab; unfold Rdiv; apply Rmult_le_compat_r; lra).
+        apply gelu_slope_rises; [|apply M; lra|].
+        - eapply Rle_trans; [exact Inner|]. apply M. lra.
+        - pose proof (M (real to) 0 ltac:(lra)) as M0. unfold Rdiv in M0 at 2. lra. }
+      assert (real (1, -22)%Z * (real to - z) <= real (1, -22)%Z * real (1, -20)%Z)
+        by (apply Rmult_le_compat_l; [left; now apply real_positive|lra]). lra. }
+  destruct (Rle_lt_dec (real from) x) as [L|L]; [now apply Right|].
+  pose proof (Right (real from) (Rle_refl _)). pose proof (inside_ends _ _ (inside_gelu_slope from)) as [_ A].
+  assert (at_most (snd (gelu_slopeF from), (-256)%Z) zero = true) as A' by (vm_compute; reflexivity).
+  apply at_most_real in A'. rewrite real_zero in A'. pose proof (gelu_falls x (real from) ltac:(lra) ltac:(lra)). lra.
+Qed.
+(** Of both. *)
+Lemma minimum_holds a : is_rising a = false -> let '(from, to, value) := minimum_of a in
+  (forall x y, x <= y -> y <= real from -> act a y <= act a x) /\
+  (forall x y, real to <= x -> x <= y -> act a x <= act a y) /\ (forall x, real value <= act a x) /\
+  (forall l x h, l <= x <= h -> act a x <= Rmax (act a l) (act a h)).
+Proof.
+  intros R. pose proof silu_minimum_holds as M. pose proof gelu_minimum_holds as N.
+  destruct a; try discriminate; [destruct (minimum_of Silu) as [[from to] value]; destruct M as (F & T & V)|
+    destruct (minimum_of Gelu) as [[from to] value]; destruct N as (F & T & V)];
+    (split; [|split; [|split; [exact V|]]]).
+  - intros x y L H. apply silu_falls; auto. pose proof (silu_sign_rises y (real from) H). lra.
+  - intros x y H L. apply silu_rises; auto. pose proof (silu_sign_rises (real to) x H). lra.
+  - intros l x h [L H]. pose proof (Rmax_l (act Silu l) (act Silu h)). pose proof (Rmax_r (act Silu l) (act Silu h)).
+    destruct (Rle_lt_dec (silu_sign x) 0) as [S|S].
+    + pose proof (silu_falls l x L S). lra.
+    + pose proof (silu_rises x h H ltac:(lra)). lra.
+  - intros x y L H. apply gelu_falls; auto. now apply (gelu_derivative_sign y (real from) H).
+  - intros x y H L. apply gelu_rises; auto. now apply (gelu_derivative_sign (real to) x H).
+  - intros l x h [L H]. pose proof (Rmax_l (act Gelu l) (act Gelu h)). pose proof (Rmax_r (act Gelu l) (act Gelu h)).
+    destruct (Rle_lt_dec (gelu_derivative_at x) 0) as [S|S].
+    + pose proof (gelu_falls l x L S). lra.
+    + pose proof (gelu_rises x h H ltac:(lra)). lra.
 Qed.
 
 Lemma within_length b x : within b x -> length x = length b.
@@ -126,36 +215,33 @@ Lemma same_value a i : (if same (fst i) (snd i) then value_at a (fst i) else val
 Proof. destruct (same (fst i) (snd i)) eqn:E; [apply same_eq in E; rewrite E|]; reflexivity. Qed.
 Lemma rising a x y : is_rising a = true -> x <= y -> act a x <= act a y.
 Proof. intros R L. destruct (rising_slopes a R) as [_ S]. specialize (S x y L). lra. Qed.
-Theorem values_between_lies a i x : is_relu a = false -> is_entrywise a = true -> is_enclosed a = true -> lies i x ->
+Theorem values_between_lies a i x : is_relu a = false -> is_entrywise a = true -> lies i x ->
   lies (values_between a i) (act a x).
 Proof.
-  intros R E C [L H]. unfold values_between. rewrite same_value.
-  destruct (inside_ends _ _ (value_at_inside a (fst i) R E C)) as [L1 L2].
-  destruct (inside_ends _ _ (value_at_inside a (snd i) R E C)) as [H1 H2].
+  intros R E [L H]. unfold values_between. rewrite same_value.
+  destruct (inside_ends _ _ (value_at_inside a (fst i) R E)) as [L1 L2].
+  destruct (inside_ends _ _ (value_at_inside a (snd i) R E)) as [H1 H2].
   set (v := value_at a (fst i)) in *. set (w := value_at a (snd i)) in *. clearbody v w.
   destruct (is_rising a) eqn:G.
   - unfold lies. cbn [fst snd]. pose proof (floor_to_below (-64) (fst v, (-256)%Z)).
     pose proof (ceil_to_above (-64) (snd w, (-256)%Z)). pose proof (rising a _ _ G L). pose proof (rising a _ _ G H).
     lra.
-  - assert (a = Silu) as -> by (destruct a; try discriminate; reflexivity). pose proof silu_minimum_holds as M.
-    destruct silu_minimum as [[from to] value]. destruct M as (F & T & V). unfold lies. cbn [fst snd].
+  - pose proof (minimum_holds a G) as M.
+    destruct (minimum_of a) as [[from to] value]. destruct M as (F & T & V & Most). unfold lies. cbn [fst snd].
     set (low := if below (snd i) from || below to (fst i) then smaller (fst v, (-256)%Z) (fst w, (-256)%Z) else value).
     pose proof (floor_to_below (-64) low).
     pose proof (ceil_to_above (-64) (larger (snd w, (-256)%Z) (snd v, (-256)%Z))) as Above.
     rewrite real_larger in Above.
     pose proof (Rmax_l (real (snd w, (-256)%Z)) (real (snd v, (-256)%Z))).
     pose proof (Rmax_r (real (snd w, (-256)%Z)) (real (snd v, (-256)%Z))). split.
-    + enough (real low <= act Silu x) by lra. unfold low.
+    + enough (real low <= act a x) by lra. unfold low.
       destruct (below (snd i) from) eqn:B; [|destruct (below to (fst i)) eqn:B']; cbn [orb]; [| |apply V];
         rewrite real_smaller; pose proof (Rmin_l (real (fst v, (-256)%Z)) (real (fst w, (-256)%Z)));
         pose proof (Rmin_r (real (fst v, (-256)%Z)) (real (fst w, (-256)%Z))).
-      * apply below_real in B. pose proof (silu_sign_rises (real (snd i)) (real from) ltac:(lra)).
-        pose proof (silu_falls x (real (snd i)) H ltac:(lra)). lra.
-      * apply below_real in B'. pose proof (silu_sign_rises (real to) (real (fst i)) ltac:(lra)).
-        pose proof (silu_rises (real (fst i)) x L ltac:(lra)). lra.
-    + destruct (Rle_lt_dec (silu_sign x) 0) as [S|S].
-      * pose proof (silu_falls (real (fst i)) x L S). lra.
-      * pose proof (silu_rises x (real (snd i)) H ltac:(lra)). lra.
+      * apply below_real in B. pose proof (F x (real (snd i)) H ltac:(lra)). lra.
+      * apply below_real in B'. pose proof (T (real (fst i)) x ltac:(lra) L). lra.
+    + specialize (Most (real (fst i)) x (real (snd i)) (conj L H)). revert Most. unfold Rmax in *.
+      repeat destruct (Rle_dec _ _); lra.
 Qed.
 
 (** Of layers *)
@@ -215,9 +301,9 @@ Proof.
   - unfold Rmin. repeat destruct (Rle_dec _ _); lra.
   - unfold Rmax. repeat destruct (Rle_dec _ _); lra.
 Qed.
-Lemma activated_within a b x : is_enclosed a = true -> within b x -> within (activated_ends a b) (activated a x).
+Lemma activated_within a b x : within b x -> within (activated_ends a b) (activated a x).
 Proof.
-  intros C H. destruct (is_relu a) eqn:Q; [destruct a; try discriminate; now apply relu_within|].
+  intros H. destruct (is_relu a) eqn:Q; [destruct a; try discriminate; now apply relu_within|].
   destruct (is_entrywise a) eqn:E; [|destruct a; try discriminate; now apply sorted_within].
   assert (within (map (values_between a) b) (map (act a) x)) as W.
   { rewrite within_lies in *. induction H; simpl; constructor; auto. now apply values_between_lies. }
@@ -235,10 +321,9 @@ Proof.
     destruct (row_ends row b). split; auto.
   - induction (snd l) as [|c cs IH]; simpl; auto. split; [lra|auto].
 Qed.
-Lemma network_within between hidden last b x : forallb is_enclosed between = true -> within b x ->
+Lemma network_within between hidden last b x : within b x ->
   within (network_ends between hidden last b) (layer_by_layer between (map real_layer hidden) (real_layer last) x).
 Proof.
-  revert between b x. induction hidden as [|l hidden IH]; intros between b x C H; simpl; [now apply affine_within|].
-  apply IH; [destruct between; auto; simpl in C; now both C|].
-  apply activated_within; [|now apply affine_within]. destruct between; auto. simpl in C. now both C.
+  revert between b x. induction hidden as [|l hidden IH]; intros between b x H; simpl; [now apply affine_within|].
+  apply IH. now apply activated_within, affine_within.
 Qed.

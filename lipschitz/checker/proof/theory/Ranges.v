@@ -32,7 +32,7 @@ Lemma within_sound ps p b bounds v : check_within ps p b bounds v = true -> hold
 Proof.
   unfold check_within. intros H x Hx. apply (within_clamped (clamp (part_at ps p))) in Hx. unfold value.
   destruct (relu_between (part_at ps p)) eqn:R; [rewrite relu_network by auto; eapply layers_within; eauto|].
-  both H. eapply centred_sound; eauto.
+  eapply centred_sound; eauto.
 Qed.
 Lemma find_within_sound ps accepted p b v : Forall (holds ps) accepted -> find_within accepted p b = Some v ->
   holds ps (Within p b v).

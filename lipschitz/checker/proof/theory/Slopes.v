@@ -424,14 +424,14 @@ Qed.
 (** By the slopes in a box *)
 Lemma contracts_in (a : activation) c t p q d e : 0 <= c ->
   (forall n, In n t -> let (l, h) := slopes_between a (fst n) in real h <= c /\ - real l <= c) ->
-  is_entrywise a = true -> is_enclosed a = true -> Forall2 (follows d) t p -> Forall2 (follows e) t q ->
+  is_entrywise a = true -> Forall2 (follows d) t p -> Forall2 (follows e) t q ->
   square (minus (map (act a) p) (map (act a) q)) <= c * c * square (minus p q).
 Proof.
-  intros C H E Q P. revert q. unfold square, minus. induction P as [|n y t p [L _] P IH]; intros q G; inversion G as
+  intros C H E P. revert q. unfold square, minus. induction P as [|n y t p [L _] P IH]; intros q G; inversion G as
     [|? z ? q' [M _] G']; subst; simpl; [lra|].
   assert (forall n, In n t -> let (l, h) := slopes_between a (fst n) in real h <= c /\ - real l <= c) as H'
     by (intros; apply H; now right). specialize (IH H' q' G'). specialize (H n (or_introl eq_refl)).
-  pose proof (slopes_between_hold a (fst n) E Q) as S. destruct (slopes_between a (fst n)) as [l h]. cbn [fst snd] in S.
+  pose proof (slopes_between_hold a (fst n) E) as S. destruct (slopes_between a (fst n)) as [l h]. cbn [fst snd] in S.
   destruct H as [Hh Hl], L as [L1 L2], M as [M1 M2].
   assert (forall u v, real (fst (fst n)) <= u -> u <= v -> v <= real (snd (fst n)) ->
     (act a v - act a u) * (act a v - act a u) <= c * c * ((v - u) * (v - u))) as K.
@@ -456,11 +456,11 @@ Proof.
   pose proof (Rmax_r (real h) (- real l)). split; [lra|]. intros k [<-|I]; [rewrite S; lra|].
   specialize (IH k I). destruct (slopes_between a (fst k)). lra.
 Qed.
-Lemma activated_contracts_in a t p q d e : is_enclosed a = true -> Forall2 (follows d) t p -> Forall2 (follows e) t q ->
+Lemma activated_contracts_in a t p q d e : Forall2 (follows d) t p -> Forall2 (follows e) t q ->
   0 <= real (steepest_known a t) /\
   norm (minus (activated a p) (activated a q)) <= real (steepest_known a t) * norm (minus p q).
 Proof.
-  intros Q P G. destruct (is_entrywise a) eqn:E.
+  intros P G. destruct (is_entrywise a) eqn:E.
   - destruct (steepest_known_above a t E) as [C H]. split; auto. set (c := real (steepest_known a t)) in *.
     assert (activated a p = map (act a) p /\ activated a q = map (act a) q) as [-> ->]
       by (destruct a; auto; discriminate).
@@ -470,14 +470,14 @@ Proof.
     apply norm_le, sorting_contracts. now rewrite <- (related_length _ _ _ P), <- (related_length _ _ _ G).
 Qed.
 Lemma centred_layers_bound radius d e between hs l us s : bounded_by radius d -> bounded_by radius e ->
-  forallb is_enclosed between = true -> Forall2 norm_bound_of (hs ++ [l]) us ->
+  Forall2 norm_bound_of (hs ++ [l]) us ->
   (forall k, In k (hs ++ [l]) -> length (snd k) = length (fst k)) -> forall x y,
   Forall2 (follows d) s x -> Forall2 (follows e) s y ->
   let g := layer_by_layer between (map real_layer hs) (real_layer l) in
   let c := real (steepest_centred radius (rounding_of radius) between hs s) in
   0 <= c /\ norm (minus (g x) (g y)) <= c * product_R us * norm (minus x y).
 Proof.
-  intros D E. revert between us s. induction hs as [|k hs IH]; intros between us s Q H L x y X Y; simpl in *.
+  intros D E. revert between us s. induction hs as [|k hs IH]; intros between us s H L x y X Y; simpl in *.
   - inversion H as [|? u ? us' Hu Hus]; subst. inversion Hus; subst. simpl. rewrite real_one, Rmult_1_r, Rmult_1_l.
     split; [lra|]. apply affine_bound; auto.
   - inversion H as [|? u ? us' Hu Hus]; subst. set (a := hd Relu between).
@@ -486,10 +486,8 @@ Proof.
     set (q := affine (fst (real_layer k)) (snd (real_layer k)) y).
     assert (Forall2 (follows d) t p) as P by (apply passed_follow; auto).
     assert (Forall2 (follows e) t q) as G by (apply passed_follow; auto).
-    assert (is_enclosed a = true /\ forallb is_enclosed (tl between) = true) as [A Q']
-      by (unfold a; destruct between; auto; simpl in *; now both Q).
-    destruct (activated_contracts_in a t p q d e A P G) as [C B].
-    destruct (IH (tl between) us' (activated_known a (rounding_of radius) t) Q' Hus ltac:(auto) (activated a p)
+    destruct (activated_contracts_in a t p q d e P G) as [C B].
+    destruct (IH (tl between) us' (activated_known a (rounding_of radius) t) Hus ltac:(auto) (activated a p)
       (activated a q) ltac:(now apply activated_known_follow) ltac:(now apply activated_known_follow)) as [C' B'].
     pose proof (product_nonneg _ _ Hus) as Up. pose proof (affine_bound k u x y Hu ltac:(auto)) as F. fold p q in F.
     rewrite real_mul. split; [now apply Rmult_le_pos|]. eapply Rle_trans; [exact B'|].
@@ -501,17 +499,17 @@ Qed.
 Lemma local_product_sound ps accepted f moves scale b u : Forall (holds ps) accepted ->
   check_local_product ps accepted f moves scale b u = true -> holds ps (Slope_in_box f moves scale b u).
 Proof.
-  intros HA H rest x y Ha _ X Y. unfold check_local_product in H. both H. rename H into Q.
+  intros HA H rest x y Ha _ X Y. unfold check_local_product in H.
   set (p := part_at ps (moved f)) in *. destruct (norms accepted (moved f) 0 (layers p)) as [v|] eqn:E.
-  2: { unfold check_product_with in H0. both H0. discriminate. }
-  simpl option_map in H0. pose proof H0 as W. unfold check_product_with in W. do 3 both W. apply moved_fits in W.
+  2: { unfold check_product_with in H. both H. discriminate. }
+  simpl option_map in H. pose proof H as W. unfold check_product_with in W. do 3 both W. apply moved_fits in W.
   fold p in W. destruct (norms_sound ps accepted (moved f) v HA _ [] eq_refl E) as (us & B & Ev).
   apply (within_clamped (clamp p)) in X, Y.
   destruct (inputs_follow _ _ X) as (d & D & _ & F). destruct (inputs_follow _ _ Y) as (e & D' & _ & F').
   specialize (F O [] eq_refl). specialize (F' O [] eq_refl).
-  destruct (centred_layers_bound _ d e (between p) (hidden p) (outer p) us _ D D' Q B
+  destruct (centred_layers_bound _ d e (between p) (hidden p) (outer p) us _ D D' B
     (fun k => fits_layer p k W) _ _ F F') as [C N].
-  apply (product_with_sound _ _ _ _ _ _ _ _ _ _ HA H0 Ha); rewrite real_mul, Ev.
+  apply (product_with_sound _ _ _ _ _ _ _ _ _ _ HA H Ha); rewrite real_mul, Ev.
   - apply Rmult_le_pos; [exact C|]. eapply product_nonneg; eauto.
   - exact N.
 Qed.
@@ -542,26 +540,23 @@ Proof.
   induction (hidden p) as [|l ls IH]; intros s; cbn; constructor; [|apply IH].
   eexists. split; [rewrite map_const; unfold weights; cbn; now rewrite map_length|]. apply range_holds.
 Qed.
-Lemma increments_in a t p q d e : is_entrywise a = true -> is_enclosed a = true -> Forall2 (follows d) t p ->
-  Forall2 (follows e) t q ->
+Lemma increments_in a t p q d e : is_entrywise a = true -> Forall2 (follows d) t p -> Forall2 (follows e) t q ->
   increments_within (act a) (map real_range (map (fun n => slopes_between a (fst n)) t)) p q.
 Proof.
-  intros E Q P. revert q. induction P as [|n y t p [[L1 L2] _] P IH]; intros q G;
+  intros E P. revert q. induction P as [|n y t p [[L1 L2] _] P IH]; intros q G;
     inversion G as [|? z ? q' [[M1 M2] _] G']; subst; cbn; auto. split; auto.
-  pose proof (slopes_between_hold a (fst n) E Q) as S.
+  pose proof (slopes_between_hold a (fst n) E) as S.
   destruct (Rle_lt_dec y z) as [O|O]; [specialize (S y z L1 O M2)|specialize (S z y M1 ltac:(lra) L2)]; nra.
 Qed.
 Lemma centred_along radius d e between hs s : bounded_by radius d -> bounded_by radius e ->
-  forallb is_entrywise between = true -> forallb is_enclosed between = true ->
+  forallb is_entrywise between = true ->
   (forall k, In k hs -> length (snd k) = length (fst k)) -> forall x y,
   Forall2 (follows d) s x -> Forall2 (follows e) s y ->
   along (functions_and_layers between (map real_layer hs))
     (real_ranges (ranges_centred radius (rounding_of radius) between hs s)) x y.
 Proof.
-  intros D E. revert between s. induction hs as [|k hs IH]; intros between s N Q L x y X Y; cbn; auto.
+  intros D E. revert between s. induction hs as [|k hs IH]; intros between s N L x y X Y; cbn; auto.
   set (a := hd Relu between).
-  assert (is_enclosed a = true /\ forallb is_enclosed (tl between) = true) as [A Q']
-    by (unfold a; destruct between; auto; simpl in *; now both Q).
   destruct (entrywise_first between N) as [A' N']. fold a in A'.
   assert (forall z, activated a z = map (act a) z) as M by (intros; destruct a; auto; discriminate).
   pose proof (passed_follow radius d (fst k) (snd k) s x D (L k (or_introl eq_refl)) X) as P.
@@ -574,11 +569,11 @@ Qed.
 Lemma local_slope_sound ps f moves scale b u rho t factor :
   check_local_slope ps f moves scale b u rho t factor = true -> holds ps (Slope_in_box f moves scale b u).
 Proof.
-  unfold check_local_slope. intros H rest x y Ha _ X Y. do 4 both H.
-  apply (chain_sound ps f moves scale u rho t factor undivided_matrices undivided_stack _ rest x y H H3 H1 H0
+  unfold check_local_slope. intros H rest x y Ha _ X Y. do 3 both H.
+  apply (chain_sound ps f moves scale u rho t factor undivided_matrices undivided_stack _ rest x y H H2 H1 H0
     undivided_instance undivided_value Ha).
   pose proof (moved_fits _ _ _ _ H) as W. set (p := part_at ps (moved f)) in *.
-  assert (entrywise_between p = true) as N by (destruct f; cbn in H3; now both H3).
+  assert (entrywise_between p = true) as N by (destruct f; cbn in H2; now both H2).
   apply (within_clamped (clamp p)) in X, Y.
   destruct (inputs_follow _ _ X) as (d & D & _ & F). destruct (inputs_follow _ _ Y) as (e & D' & _ & F').
   specialize (F O [] eq_refl). specialize (F' O [] eq_refl).

@@ -5,25 +5,22 @@ From Swarmcert Require Import Algebra Activations Form Network Checker Meaning S
 Import ListNotations.
 Open Scope R_scope.
 
-Lemma value_within p b x : enclosed_between p = true -> within b x -> within (value_ends p b) (value p x).
-Proof. intros E H. apply network_within; auto. now apply within_clamped. Qed.
-Lemma value_of_within ps f rest b r x : forallb enclosed_between (parts_of ps f) = true -> within rest r ->
-  within b x ->
+Lemma value_within p b x : within b x -> within (value_ends p b) (value p x).
+Proof. intros H. now apply network_within, within_clamped. Qed.
+Lemma value_of_within ps f rest b r x : within rest r -> within b x ->
   within (value_of_ends ps f rest b) (value_of ps f r x).
 Proof.
-  destruct f; simpl; intros E R H; apply andb_prop in E; destruct E as [E E']; [now apply value_within|].
-  apply andb_prop in E'. destruct E' as [E' _].
-  apply value_within; auto. apply plus_within; auto. now apply value_within.
+  destruct f; simpl; intros R H; [now apply value_within|].
+  apply value_within, plus_within; auto. now apply value_within.
 Qed.
 Lemma point_within x : within (at_point x) (reals x).
 Proof. induction x; simpl; auto. split; [lra|auto]. Qed.
-Lemma rest_within ps others : forallb (fun o => enclosed_between (part_at ps (fst o))) others = true ->
+Lemma rest_within ps others :
   within (fold_right plus_ends [] (map (fun o => value_ends (part_at ps (fst o)) (at_point (snd o))) others))
     (vector_sum (map (fun o => value (part_at ps (fst o)) (snd o)) (map
       (fun o : nat * list dyadic => (fst o, reals (snd o))) others))).
 Proof.
-  induction others as [|o others IH]; simpl; auto. intros H. both H. apply plus_within; auto.
-  apply value_within; auto. apply point_within.
+  induction others as [|o others IH]; simpl; auto. apply plus_within; auto. apply value_within, point_within.
 Qed.
 Lemma least_square_below a b x y : within a x -> within b y -> real (least_square a b) <= square (minus x y).
 Proof.
@@ -64,9 +61,8 @@ Lemma points_sound ps silent f moves scale l x y others :
   check_points ps silent f moves scale l x y others = true -> holds ps (Slope_at_least silent f moves scale l).
 Proof.
   unfold check_points. set (rest := fold_right _ _ _). intros H.
-  destruct (fraction_in scale (minusD x y)) as [n m] eqn:E. do 9 both H.
+  destruct (fraction_in scale (minusD x y)) as [n m] eqn:E. do 7 both H.
   rename H0 into Hr, H1 into Hn, H2 into Ho, H3 into Hx, H4 into Ha, H5 into Hl, H6 into Hs.
-  rename H7 into Hw, H8 into Hro.
   destruct (fraction_real scale (minusD x y) Hs) as [Pm En]. rewrite E, real_minus in *. simpl in *.
   apply real_positive in Hn. apply real_nonnegative in Hl. apply at_most_real in Hr.
   assert (0 < square_in scale (minus (reals x) (reals y))) as Ps by
@@ -78,9 +74,9 @@ Proof.
   - rewrite forallb_forall in Ho. apply Forall_map, Forall_forall. intros o G. simpl. rewrite map_length.
       now apply Nat.eqb_eq, Ho.
   - rewrite map_map. simpl. now apply negb_true_iff.
-  - pose proof (rest_within ps others Hro) as R. fold rest in R.
-    pose proof (least_square_below _ _ _ _ (value_of_within ps f _ _ _ _ H R (point_within x))
-      (value_of_within ps f _ _ _ _ H R (point_within y))) as L.
+  - pose proof (rest_within ps others) as R. fold rest in R.
+    pose proof (least_square_below _ _ _ _ (value_of_within ps f _ _ _ _ R (point_within x))
+      (value_of_within ps f _ _ _ _ R (point_within y))) as L.
     rewrite !real_mul, En in Hr. unfold distance, norm.
     rewrite <- (sqrt_square (real l)) at 1 by auto. rewrite <- sqrt_mult_alt by nra. apply sqrt_le_1_alt.
     apply (Rmult_le_reg_r (real m)); auto. apply (Rmult_le_compat_r (real m)) in L; lra.
