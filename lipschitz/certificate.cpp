@@ -68,7 +68,7 @@ Json local_json(const LocalProof& proof) {
   if (proof.others) {
     json["others"] = Json::object();
     for (const auto& [part, range] : *proof.others)
-      json["others"][part] = {
+      json["others"][part.name()] = {
           {"tree", range.tree}, {"least", hex_floats(range.least)}, {"most", hex_floats(range.most)}};
     json["forms"] = Json::array();
     for (const check::Form& form : proof.tree.forms)
@@ -95,7 +95,7 @@ Json local_json(const LocalProof& proof) {
 Json layer_json(const CertifiedLayer& layer) {
   const double lower = layer.norm.norm.lower.value();
   const double upper = layer.norm.norm.upper.value();
-  return {{"network", layer.network},
+  return {{"network", layer.network.name()},
           {"name", layer.name},
           {"spectral_norm", {lower, upper}},
           {"spectral_norm_hex", {hex_float(lower), hex_float(upper)}},
@@ -117,14 +117,15 @@ Json bound_json(const files::Network& network, const CertifiedBound& bound) {
   const SlopeWitness& witness = *bound.lower.witness;
   Json others = Json::array();
   for (std::size_t j = 0; j < witness.others.size(); ++j)
-    others.push_back({{"network", bound.lower.other_networks[j]}, {"x", hex_floats(witness.others[j])}});
+    others.push_back(
+        {{"network", bound.lower.other_networks[j].name()}, {"x", hex_floats(witness.others[j])}});
   json["lower_hex"] = hex_float(witness.slope.value());
   json["lower_witness"] = {
       {"x", hex_floats(witness.x)}, {"y", hex_floats(witness.y)}, {"others", std::move(others)}};
   return json;
 }
 
-Json samples_entry(const Certification& certification, const std::string& part) {
+Json samples_entry(const Certification& certification, const files::FunctionId& part) {
   const auto found = certification.samples.find(part);
   if (found == certification.samples.end()) return nullptr;
   const files::SampleAgreement& agreement = found->second;
@@ -161,13 +162,13 @@ void set_number(Json& json, const std::string& name, const std::optional<double>
 
 Json values_json(const CertifiedValues& values) {
   Json networks = Json::object();
-  for (const auto& [name, layers] : values.layers) {
-    networks[name] = Json::array();
-    for (const VectorBounds& layer : layers) networks[name].push_back(vector_json(layer));
+  for (const auto& [part, layers] : values.layers) {
+    networks[part.name()] = Json::array();
+    for (const VectorBounds& layer : layers) networks[part.name()].push_back(vector_json(layer));
   }
   Json input_error;
-  for (const auto& [name, errors] : values.input_error) input_error[name] = hex_floats(errors);
-  Json json = {{"function", values.function},
+  for (const auto& [part, errors] : values.input_error) input_error[part.name()] = hex_floats(errors);
+  Json json = {{"function", values.function.name()},
                {"neighbours", values.neighbours},
                {"domain", values.in_clamp ? "clamp" : "box"},
                {"input_error", std::move(input_error)},
@@ -183,10 +184,10 @@ Json values_json(const CertifiedValues& values) {
 }  // namespace
 
 Json summary(const files::Network& network, const CertifiedBound& bound) {
-  Json json = {{"function", bound.function},
+  Json json = {{"function", bound.function.name()},
                {"domain", bound.domain},
                {"block", bound.block},
-               {"law", files::is_set(bound.function) ? "one_neighbour" : "none"},
+               {"law", bound.function.is_set() ? "one_neighbour" : "none"},
                {"norm", bound.scale.empty() ? "l2" : "weighted_l2"},
                {"scale", bound.scale},
                {"unit", files::unit(network, bound.function, bound.block)},
@@ -202,13 +203,13 @@ Json summary(const files::Network& network, const CertifiedBound& bound) {
 Json summary(const files::Network& network, const CertifiedLaw& law) {
   const std::string kind = law.neighbours.begin()->first;
   const std::string shown = law.neighbours.size() == 1 ? kind : "mixed";
-  return {{"function", files::set_name(shown, law.rho)},
+  return {{"function", files::FunctionId::set(shown, law.rho).name()},
           {"domain", law.domain},
           {"block", law.block},
           {"law", name(law.law)},
           {"neighbours", law.neighbours},
           {"norm", "l2"},
-          {"unit", files::unit(network, files::set_name(kind, law.rho), law.block)},
+          {"unit", files::unit(network, files::FunctionId::set(kind, law.rho), law.block)},
           {"upper", law.upper.value()},
           {"upper_method", "law"},
           {"status", status(law.interrupted)},
@@ -217,11 +218,11 @@ Json summary(const files::Network& network, const CertifiedLaw& law) {
 
 Json certificate(const files::Network& network, const Certification& certification) {
   Json weights = Json::object();
-  for (const auto& [name, part] : files::parts(network)) {
-    weights[name] = {{"sha256", part->sha256},
-                     {"precision", files::name(part->precision)},
-                     {"chain", files::chain_json(files::chain(network, name))},
-                     {"samples", samples_entry(certification, name)}};
+  for (const auto& [part, stored] : files::parts(network)) {
+    weights[part.name()] = {{"sha256", stored->sha256},
+                            {"precision", files::name(stored->precision)},
+                            {"chain", files::chain_json(files::chain(network, part))},
+                            {"samples", samples_entry(certification, part)}};
   }
   Json layers = Json::array();
   for (const CertifiedLayer& layer : certification.layers) layers.push_back(layer_json(layer));
@@ -233,7 +234,7 @@ Json certificate(const files::Network& network, const Certification& certificati
   for (const CertifiedValues& entry : certification.values) values.push_back(values_json(entry));
   Json box;
   for (const auto& [part, sides] : certification.domain)
-    box[part] = {{"lower", hex_floats(sides.lower)}, {"upper", hex_floats(sides.upper)}};
+    box[part.name()] = {{"lower", hex_floats(sides.lower)}, {"upper", hex_floats(sides.upper)}};
   Json as = certification.as_float32 ? Json("float32") : Json();
   Json result = {
       {"schema", check::kCertificateSchema},

@@ -27,7 +27,7 @@ check::Dyadic power(double base, std::size_t exponent) {
 }
 
 /// Bounds on a box are of relative states; branch and bound is for ReLU as well. @throws std::invalid_argument.
-void require_what_is_bounded(const Network& network, const std::map<std::string, const Weights*>& parts,
+void require_what_is_bounded(const Network& network, const files::Parts& parts,
                              const CertifyOptions& options) {
   if (options.domain.empty() && options.method != UpperMethod::kBranch) return;
   if (network.invariants)
@@ -36,7 +36,7 @@ void require_what_is_bounded(const Network& network, const std::map<std::string,
   if (options.method != UpperMethod::kBranch) return;
   for (const auto& [name, weights] : parts) {
     if (weights->is_relu()) continue;
-    throw std::invalid_argument("--method branch: for ReLU networks only; " + name + " has " +
+    throw std::invalid_argument("--method branch: for ReLU networks only; " + name.name() + " has " +
                                 weights->activation_names() + " between its layers");
   }
 }
@@ -55,8 +55,8 @@ void settle(const Network& network, const std::vector<CertifiedBound>& bounds, C
   for (const auto& [kind, count] : neighbours) {
     const CertifiedBound* best = nullptr;
     for (const CertifiedBound& bound : bounds) {
-      const bool holds = bound.function == files::set_name(kind, law.rho) && bound.block == law.block &&
-                         bound.scale.empty() &&
+      const bool holds = bound.function == files::FunctionId::set(kind, law.rho) &&
+                         bound.block == law.block && bound.scale.empty() &&
                          (bound.neighbours.empty() || bound.neighbours == law.neighbours);
       if (holds && (best == nullptr || bound.upper.value() < best->upper.value())) best = &bound;
     }
@@ -141,12 +141,12 @@ void enclose_norms(const std::vector<const files::Layer*>& layers, int jobs, Wor
   if (result.gamma && result.gamma->scope == GammaStatement::Scope::kLayer) limit = result.gamma->value;
   files::parallel_for(static_cast<int>(layers.size()), jobs, [&](int i) {
     CertifiedLayer& layer = result.layers[static_cast<std::size_t>(i)];
-    progress.run("spectral norm of " + layer.network + " " + layer.name,
+    progress.run("spectral norm of " + layer.network.name() + " " + layer.name,
                  [&] { layer.norm = spectral_norm(*layers[static_cast<std::size_t>(i)], limit); });
   });
 }
 
-void judge_gamma(const std::map<std::string, const Weights*>& parts, Certification& result) {
+void judge_gamma(const files::Parts& parts, Certification& result) {
   if (!result.gamma) return;
   std::size_t next = 0;
   for (const auto& [name, weights] : parts) {
@@ -165,12 +165,12 @@ void judge_gamma(const std::map<std::string, const Weights*>& parts, Certificati
 
 /// The product of norms, of the slope of the map to invariants, of the scale and of the steepest slopes between the
 /// layers: the first upper bound.
-void multiply_norms(const Network& network, const std::map<std::string, const Weights*>& parts,
+void multiply_norms(const Network& network, const files::Parts& parts,
                     const std::vector<CertifiedLayer>& layers, CertifiedBound& bound) {
   std::vector<UpperBound> norms;
   if (!bound.scale.empty()) norms.emplace_back(*std::max_element(bound.scale.begin(), bound.scale.end()));
   norms.emplace_back(files::slope_of_inputs(network, bound.function));
-  for (const std::string& name : files::networks_of(bound.function)) {
+  for (const files::FunctionId& name : bound.function.parts()) {
     for (const CertifiedLayer& layer : layers) {
       if (layer.network == name) norms.push_back(layer.norm.norm.upper);
     }
@@ -196,7 +196,7 @@ Certification certify(const Network& network, const CertifyOptions& options) {
   if (result.gamma && !(result.gamma->value > 0))
     throw std::invalid_argument("certify: gamma must be positive");
   require_moderate(network);
-  const std::map<std::string, const Weights*> parts = files::parts(network);
+  const files::Parts parts = files::parts(network);
   require_what_is_bounded(network, parts, options);
   std::vector<const files::Layer*> layers;
   for (const auto& [name, weights] : parts) {

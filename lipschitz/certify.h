@@ -46,8 +46,8 @@ struct CertifyOptions : ClaimOptions {
 };
 
 struct CertifiedLayer {
-  std::string network;  ///< "network", "phi:<kind>" or "rho:<kind>"
-  std::string name;     ///< the layer's name in its file
+  files::FunctionId network;  ///< "network", "phi:<kind>" or "rho:<kind>"
+  std::string name;           ///< the layer's name in its file
   SpectralNorm norm;
   /// Whether the layer satisfies what was stated of gamma: proved, refuted, inconclusive; nothing where nothing was, or
   /// the layer is none of the file.
@@ -89,8 +89,8 @@ struct CertifiedLaw : LawClaim {
 struct Certification {
   std::optional<files::GammaStatement> gamma;
   bool as_float32 = false;  ///< the network was rounded to float32 before; for the certificate
-  std::map<std::string, Box> domain;
-  std::map<std::string, files::SampleAgreement>
+  Domain domain;
+  std::map<files::FunctionId, files::SampleAgreement>
       samples;  ///< by part: what it was held against; for the certificate
   std::vector<CertifiedLayer> layers;
   std::vector<CertifiedBound> bounds;

@@ -21,7 +21,8 @@ using files::Network;
 constexpr double kShareBeforeBranch = 0.3, kShareOfBoxes = 0.6;
 
 std::string called(const CertifiedBound& bound) {
-  return bound.function + " " + bound.block + (bound.neighbours.empty() ? "" : " with so many neighbours");
+  return bound.function.name() + " " + bound.block +
+         (bound.neighbours.empty() ? "" : " with so many neighbours");
 }
 
 bool has_program(UpperMethod method, const CertifiedBound& bound) {
@@ -29,7 +30,7 @@ bool has_program(UpperMethod method, const CertifiedBound& bound) {
 }
 
 bool is_branched(const CertifyOptions& options, const CertifiedBound& bound) {
-  return options.method == UpperMethod::kBranch && !files::is_rho(bound.function) && bound.is_relu;
+  return options.method == UpperMethod::kBranch && !bound.function.is_rho() && bound.is_relu;
 }
 
 /// The sooner of a limit of its own, 0: none, and a stop, in seconds; 0: no limit.
@@ -66,13 +67,13 @@ void solve_program(const Network& network, const CertifyOptions& options, const 
 
 /// Of the inputs that the bound is about, as they leave the clamp.
 Box box_of(const Network& network, const CertifyOptions& options, const CertifiedBound& bound) {
-  return clamped(network, options.domain).at(files::networks_of(bound.function).front());
+  return clamped(network, options.domain).at(bound.function.input_part());
 }
 
 /// The product, with the steepest slopes on the box in place of those of all inputs.
 void multiply_local_slopes(const Network& network, const check::Intervals& box,
                            const std::vector<CertifiedLayer>& layers, CertifiedBound& bound) {
-  const std::vector<std::string> names = files::networks_of(bound.function);
+  const std::vector<files::FunctionId> names = bound.function.parts();
   const auto parts = files::parts(network);
   check::Dyadic total = bound.scale.empty() ? 1.0 : *std::max_element(bound.scale.begin(), bound.scale.end());
   for (const CertifiedLayer& layer : layers)
@@ -119,8 +120,8 @@ void start_from_any_number(const std::vector<CertifiedBound>& bounds, CertifiedB
 }
 
 /// Replaces the bound for all inputs by a smaller one for the box, where there is one.
-void branch_further(const Network& network, const std::map<std::string, Box>& domain,
-                    const CertifyOptions& options, const Stop& stop, CertifiedBound& bound) {
+void branch_further(const Network& network, const Domain& domain, const CertifyOptions& options,
+                    const Stop& stop, CertifiedBound& bound) {
   BranchOptions branch = options.branch;
   branch.known = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
   branch.cancelled = options.cancelled;
@@ -152,7 +153,7 @@ void branch_further(const Network& network, const std::map<std::string, Box>& do
 /// Branch and bound for those of `bounds` that it is wanted for; those of any number of neighbours first.
 void branch_all(const Network& network, const CertifyOptions& options, const Stop& stop,
                 WorkProgress& progress, std::vector<CertifiedBound>& bounds) {
-  const std::map<std::string, Box> domain = clamped(network, options.domain);
+  const Domain domain = clamped(network, options.domain);
   const auto is_any = [&](const CertifiedBound& bound) { return is_branched(options, bound); };
   const auto tasks = static_cast<int>(std::count_if(bounds.begin(), bounds.end(), is_any));
   TimeShares shares(stop, tasks, options.jobs);

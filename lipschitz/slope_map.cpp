@@ -23,7 +23,7 @@ constexpr int kRegions = 15;
 bool has_map(const CertifiedBound& bound) {
   if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) return false;
   return bound.function == "network" ||
-         (files::is_set(bound.function) && files::networks_of(bound.function).front() != files::kGroundPhi);
+         (bound.function.is_set() && !bound.function.input_part().is_ground_phi());
 }
 
 int moving_inputs(const files::Network& network) {
@@ -87,7 +87,7 @@ class Cells {
     add_place(everywhere_.lower, lower.places);
     if (before != nullptr) add_place(before->lower, lower.places);
     cell.lower = lower_bound(network_, claim_, options_.domain, lower);
-    const std::string moving = files::networks_of(claim_.function).front();
+    const files::FunctionId moving = claim_.function.input_part();
     const Box box = clamped(network_, {{moving, cell.box}}).at(moving);
     if (bounds_) {
       branch(box, cell);
@@ -167,7 +167,7 @@ std::vector<SlopeMap> slope_maps(const files::Network& network, const Certificat
     if (!has_map(bound)) continue;
     functions.emplace_back(network, found, bound, options);
     maps.push_back({bound.function, {}});
-    const Box& box = options.domain.at(files::networks_of(bound.function).front());
+    const Box& box = options.domain.at(bound.function.input_part());
     for (int i = 0; i < options.cells[0] * options.cells[1]; ++i)
       maps.back().cells.push_back({cell_box(box, options, i), bound.upper, false, UpperMethod::kBranch, {}});
   }

@@ -16,8 +16,7 @@ namespace swarmcert::lipschitz {
 struct SlopeMapOptions {
   std::array<int, 2> coordinates{};  ///< of the moving input, different
   std::array<int, 2> cells{12, 12};  ///< along each, at least 1
-  std::map<std::string, Box>
-      domain;      ///< by part; finite. The other coordinates range over their whole intervals.
+  Domain domain;   ///< by part; finite. The other coordinates range over their whole intervals.
   int nodes = 50;  ///< boxes that branch and bound looks at, per cell of a ReLU network
   int rounds = 3;  ///< of the search for steep points, per cell, each of a few linear regions; 0: none
   std::uint64_t seed = 1;
@@ -35,7 +34,7 @@ struct SlopeCell {
 };
 
 struct SlopeMap {
-  std::string function;          ///< "network" or "set:<phi kind>:<rho kind>"
+  files::FunctionId function;    ///< "network" or "set:<phi kind>:<rho kind>"
   std::vector<SlopeCell> cells;  ///< the second coordinate fastest; together they cover the domain's box
 };
 

@@ -22,9 +22,9 @@ using namespace swarmcert;
 files::Network network_of(const learning::LearningData& data, const training::Vector& theta) {
   files::Network network;
   for (std::size_t part = 0; part < data.layout.parts().size(); ++part) {
-    const std::string& name = data.layout.parts()[part].name;  // "phi:small"
-    auto& group = name.rfind("phi:", 0) == 0 ? network.phi : network.rho;
-    group[name.substr(4)] = data.layout.stored(theta, static_cast<int>(part));
+    const files::FunctionId& id = data.layout.parts()[part].id;  // "phi:small"
+    auto& group = id.is_phi() ? network.phi : network.rho;
+    group[id.kind()] = data.layout.stored(theta, static_cast<int>(part));
   }
   return network;
 }

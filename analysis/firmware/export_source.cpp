@@ -34,11 +34,11 @@ std::string comment(std::string name) {
 }
 
 /// "phi:small" -> "phi_small"; anything a C name cannot hold becomes '_', made unique by a number.
-std::map<std::string, std::string> identifiers(const files::Network& network) {
-  std::map<std::string, std::string> result;
+std::map<files::FunctionId, std::string> identifiers(const files::Network& network) {
+  std::map<files::FunctionId, std::string> result;
   std::vector<std::string> used;
   for (const auto& [part, weights] : files::parts(network)) {
-    std::string name = part;
+    std::string name = part.name();
     for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
     std::string unique = name;
     for (int n = 2; std::find(used.begin(), used.end(), unique) != used.end(); ++n)
@@ -195,7 +195,8 @@ SelfTest self_test(int* failed);
 
 std::string header_text(const files::Network& network, const ExportOptions& options) {
   const std::vector<std::string> kinds = files::neighbour_kinds(network);
-  const int inputs = files::inputs(network, files::set_name(kinds.front(), network.rho.begin()->first));
+  const int inputs =
+      files::inputs(network, files::FunctionId::set(kinds.front(), network.rho.begin()->first));
   std::string neighbour_list, own_list, input_list;
   for (std::size_t i = 0; i < kinds.size(); ++i)
     neighbour_list += fmt::format("///   {}: {}\n", i, comment(kinds[i]));
@@ -289,7 +290,7 @@ SelfTest self_test(int* failed) {
 )";
 
 std::string source_text(const files::Network& network, const ExportOptions& options) {
-  const std::map<std::string, std::string> ids = identifiers(network);
+  const std::map<files::FunctionId, std::string> ids = identifiers(network);
   const std::vector<std::string> kinds = files::neighbour_kinds(network);
   std::string text = fmt::format(
       "// {} from certified weights. Do not edit.\n{}\n#include \"{}\"\n\nusing namespace swarmcert::nn;\n\n",
@@ -298,20 +299,19 @@ std::string source_text(const files::Network& network, const ExportOptions& opti
   for (const auto& [part, weights] : files::parts(network)) text += weights_source(*weights, ids.at(part));
   std::string phi, sets;
   for (const std::string& kind : kinds)
-    phi += mlp(ids.at(files::phi_name(kind)), network.phi.at(kind)) + ", ";
+    phi += mlp(ids.at(files::FunctionId::phi(kind)), network.phi.at(kind)) + ", ";
   text += fmt::format("static constexpr Mlp<float> phi[] = {{{}}};\n", phi);
   const bool has_ground = network.phi.count(files::kGroundKind) != 0;
   if (has_ground) {
-    const std::string part = files::kGroundPhi;
     text += fmt::format("static constexpr Mlp<float> ground = {};\n",
-                        mlp(ids.at(part), network.phi.at(files::kGroundKind)));
+                        mlp(ids.at(files::FunctionId::ground_phi()), network.phi.at(files::kGroundKind)));
   }
   if (network.clamp) {
     text += array("static constexpr float lower", narrow(network.clamp->lower)) +
             array("static constexpr float upper", narrow(network.clamp->upper));
   }
   for (const auto& [kind, weights] : network.rho) {
-    const std::string rho = ids.at(files::rho_name(kind));
+    const std::string rho = ids.at(files::FunctionId::rho(kind));
     const std::vector<int> silent = files::silent_counts(network, kind);
     if (!silent.empty())
       text += fmt::format(

@@ -22,9 +22,9 @@ class FlightEvaluator {
       : network_(network), most_(most_neighbours), scale_(newton_per_unit(network)) {
     for (const auto& [part, weights] : files::parts(network)) evaluators_.emplace(part, *weights);
     for (const std::string& kind : files::neighbour_kinds(network))
-      phi_.push_back(evaluators_.at(files::phi_name(kind)).mlp());
+      phi_.push_back(evaluators_.at(files::FunctionId::phi(kind)).mlp());
     if (network.phi.count(files::kGroundKind) != 0) {
-      ground_ = evaluators_.at(files::kGroundPhi).mlp();
+      ground_ = evaluators_.at(files::FunctionId::ground_phi()).mlp();
       has_ground_ = true;
     }
     if (network.clamp) {
@@ -39,7 +39,7 @@ class FlightEvaluator {
     const nn::DeepSet<float> set{has_ground_ ? &ground_ : nullptr,
                                  phi_.data(),
                                  static_cast<int>(phi_.size()),
-                                 evaluators_.at(files::rho_name(rho_kind)).mlp(),
+                                 evaluators_.at(files::FunctionId::rho(rho_kind)).mlp(),
                                  lower_.empty() ? nullptr : lower_.data(),
                                  upper_.empty() ? nullptr : upper_.data(),
                                  network_.invariants,
@@ -63,7 +63,7 @@ class FlightEvaluator {
   const files::Network& network_;
   int most_;
   float scale_;
-  std::map<std::string, files::Evaluator<float>> evaluators_;
+  std::map<files::FunctionId, files::Evaluator<float>> evaluators_;
   std::vector<nn::Mlp<float>> phi_;
   nn::Mlp<float> ground_{};
   bool has_ground_ = false;
@@ -84,7 +84,8 @@ GoldenVector random_vector(const files::Network& network, int neighbours, std::v
                            files::Random& random) {
   const auto within = [&](float range) { return range * static_cast<float>(random.symmetric()); };
   const std::vector<std::string> known = files::neighbour_kinds(network);
-  const int inputs = files::inputs(network, files::set_name(known.front(), network.rho.begin()->first));
+  const int inputs =
+      files::inputs(network, files::FunctionId::set(known.front(), network.rho.begin()->first));
   GoldenVector vector;
   for (int i = 0; i < files::kGroundInputs; ++i)
     vector.own.push_back(within(i == 0 ? kMostPosition_m : kMostVelocity_m_s));

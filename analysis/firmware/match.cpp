@@ -146,9 +146,9 @@ bool resembles(const Place& place, const Bits& expected) {
 
 MatchResult match(const files::Network& network, const std::vector<FloatBlock>& blocks) {
   MatchResult result;
-  const auto note = [&](const std::string& part, const std::string& layer, Difference difference) {
+  const auto note = [&](const files::FunctionId& part, const std::string& layer, Difference difference) {
     if (result.first_difference) return;
-    difference.part = part;
+    difference.part = part.name();
     difference.layer = layer;
     result.first_difference = std::move(difference);
   };

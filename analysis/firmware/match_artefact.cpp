@@ -50,7 +50,7 @@ std::string why_not_pure(const files::Network& network, const std::string& bytes
       const auto same = std::find_if(found.begin(), found.end(), [&weights = *weights](const auto& one) {
         return is_same(one.second, weights);
       });
-      if (same == found.end()) return "no object holds " + part + " alone";
+      if (same == found.end()) return "no object holds " + part.name() + " alone";
       found.erase(same);
     }
     if (!found.empty()) return "it also holds '" + found.begin()->first + "', which is not in the network";

@@ -97,7 +97,7 @@ const std::vector<LipschitzBound>& Evidence::bounds() {
   for (const files::Json& bound : certificate()["bounds"]) {
     if (!bound["scale"].empty() || bound.contains("neighbours"))
       continue;  // of the latter there may be fewer
-    const auto function = bound["function"].get<std::string>();
+    const files::FunctionId function = bound["function"].get<std::string>();
     const auto block = bound["block"].get<std::string>();
     LipschitzBound one{function,
                        block,
@@ -112,15 +112,15 @@ const std::vector<LipschitzBound>& Evidence::bounds() {
   return *bounds_;
 }
 
-std::map<std::string, double> Evidence::global_bounds() {
+std::map<files::FunctionId, double> Evidence::global_bounds() {
   const auto all_of = [](const std::vector<LipschitzBound>& bounds) {
-    std::map<std::string, double> result;
+    std::map<files::FunctionId, double> result;
     for (const LipschitzBound& bound : bounds)
       if (bound.block == "all" && bound.domain == "global") result[bound.function] = bound.upper;
     return result;
   };
-  std::map<std::string, double> result = all_of(bounds());
-  for (const std::string& function : files::functions(flown())) {
+  std::map<files::FunctionId, double> result = all_of(bounds());
+  for (const files::FunctionId& function : files::functions(flown())) {
     if (result.count(function) == 1) continue;
     compute_bounds();
     return all_of(*computed_);
@@ -128,10 +128,10 @@ std::map<std::string, double> Evidence::global_bounds() {
   return result;
 }
 
-std::map<std::string, lipschitz::Box> Evidence::domain() {
+lipschitz::Domain Evidence::domain() {
   if (!release().box.empty()) return lipschitz::read_domain(release().box, flown());
   if (flown().invariants) throw Unfounded("no box of relative states: name box in [release]");
-  std::map<std::string, lipschitz::Box> clamp = lipschitz::clamp_domain(flown());
+  lipschitz::Domain clamp = lipschitz::clamp_domain(flown());
   if (clamp.empty()) throw Unfounded("no box: name box in [release], or clamp the inputs in network.toml");
   return clamp;
 }

@@ -10,13 +10,11 @@
 #include <vector>
 
 #include "analysis/gate/policy.h"
+#include "lipschitz/base/box.h"
 #include "nn/base/json.h"
 
 namespace swarmcert::check {
 struct CheckResult;
-}
-namespace swarmcert::lipschitz {
-struct Box;
 }
 namespace swarmcert::residuals {
 struct Comparison;
@@ -37,7 +35,8 @@ struct Unfounded : std::runtime_error {
 
 /// A proved Lipschitz bound of one function for one block of inputs, Euclidean norms.
 struct LipschitzBound {
-  std::string function, block, domain;
+  files::FunctionId function;
+  std::string block, domain;
   double upper = 0;
   std::optional<double> lower;  ///< a slope that is attained
   std::string unit;
@@ -75,13 +74,13 @@ class Evidence {
   /// @throws Unfounded if the certificate is rejected and nothing else in the policy says so.
   const std::vector<LipschitzBound>& bounds();
   /// Bounds for all inputs and all their coordinates, by function; computed where the certificate lacks one.
-  std::map<std::string, double> global_bounds();
+  std::map<files::FunctionId, double> global_bounds();
 
   /// Why the certificate does not prove anything about what flies; empty if it does.
   std::string why_not_certified();
 
   /// box.toml of the release, else what the clamp lets through. @throws Unfounded if there is neither.
-  std::map<std::string, lipschitz::Box> domain();
+  lipschitz::Domain domain();
 
   const stability::TrackingSetup& tracking();
 

@@ -122,26 +122,27 @@ training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vecto
   }
   using Plane = std::array<int, 2>;
   std::vector<training::Part> parts;
-  const auto add = [&parts](const std::string& part, int inputs, const std::vector<int>& hidden, int outputs,
-                            std::vector<Plane> horizontal) {
+  const auto add = [&parts](const files::FunctionId& part, int inputs, const std::vector<int>& hidden,
+                            int outputs, std::vector<Plane> horizontal) {
     std::vector<int> all = {inputs};
     all.insert(all.end(), hidden.begin(), hidden.end());
     all.push_back(outputs);
     parts.push_back({part, std::move(all), 0, std::move(horizontal)});
   };
   if (sizes.ground && sizes.invariants) {
-    add(files::kGroundPhi, nn::kOwnInvariants, sizes.phi, sizes.features, {});
+    add(files::FunctionId::ground_phi(), nn::kOwnInvariants, sizes.phi, sizes.features, {});
   } else if (sizes.ground) {
-    add(files::kGroundPhi, files::kGroundInputs, sizes.phi, sizes.features, {Plane{1, 2}});
+    add(files::FunctionId::ground_phi(), files::kGroundInputs, sizes.phi, sizes.features, {Plane{1, 2}});
   }
   for (const std::string& kind : neighbours) {
     if (sizes.invariants)
-      add(files::phi_name(kind), nn::kNeighbourInvariants, sizes.phi, sizes.features, {});
+      add(files::FunctionId::phi(kind), nn::kNeighbourInvariants, sizes.phi, sizes.features, {});
     else
-      add(files::phi_name(kind), kNeighbourInputs, sizes.phi, sizes.features, {Plane{0, 1}, Plane{3, 4}});
+      add(files::FunctionId::phi(kind), kNeighbourInputs, sizes.phi, sizes.features,
+          {Plane{0, 1}, Plane{3, 4}});
   }
   for (const std::string& kind : own)
-    add(files::rho_name(kind), sizes.features, sizes.rho, info(target).components, {});
+    add(files::FunctionId::rho(kind), sizes.features, sizes.rho, info(target).components, {});
   return training::Layout(std::move(parts));
 }
 
@@ -165,10 +166,10 @@ void append_alike(LearningData& data, const RawTrack& raw, const std::vector<std
     neighbours.push_back(kinds[raw.neighbour_kind[j]]);
   about.composition = files::composition_name(std::move(neighbours), raw.kind);
   about.begin = data.samples.samples();
-  const int ground = data.layout.find(files::kGroundPhi);
-  const int rho = data.layout.find(files::rho_name(raw.kind));
+  const int ground = data.layout.find(files::FunctionId::ground_phi());
+  const int rho = data.layout.find(files::FunctionId::rho(raw.kind));
   std::vector<int> phi;
-  for (const std::string& kind : kinds) phi.push_back(data.layout.find(files::phi_name(kind)));
+  for (const std::string& kind : kinds) phi.push_back(data.layout.find(files::FunctionId::phi(kind)));
   for (std::size_t i = from; i < to; ++i) {
     if (ground >= 0)
       data.samples.add_input(ground, seen_of_own({raw.own[i].begin(), raw.own[i].end()}, data.invariants));
@@ -290,8 +291,8 @@ std::vector<RawTrack> fitted_tracks(const std::vector<std::vector<RawTrack>>& fl
 /// Appends a track of kinds that the network has; of others, the reason why it is left out.
 void append_if_known(LearningData& data, const RawTrack& track, const std::vector<std::string>& kinds,
                      Use use) {
-  const auto has_phi = [&](int kind) { return data.layout.find(files::phi_name(kinds[kind])) >= 0; };
-  if (data.layout.find(files::rho_name(track.kind)) >= 0 &&
+  const auto has_phi = [&](int kind) { return data.layout.find(files::FunctionId::phi(kinds[kind])) >= 0; };
+  if (data.layout.find(files::FunctionId::rho(track.kind)) >= 0 &&
       std::all_of(track.neighbour_kind.begin(), track.neighbour_kind.end(), has_phi)) {
     append(data, track, kinds, 0, track.target.size(), use);
   } else {

@@ -7,7 +7,7 @@
 
 #include "analysis/residuals/inputs.h"
 #include "nn/training/deep_set_loss.h"
-#include "nn/weights/function_names.h"
+#include "nn/weights/function_id.h"
 
 namespace swarmcert::learning {
 

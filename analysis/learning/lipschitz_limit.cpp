@@ -9,7 +9,7 @@
 #include "lipschitz/upper/spectral_norm.h"
 #include "nn/base/parallel.h"
 #include "nn/training/spectral_normalization.h"
-#include "nn/weights/function_names.h"
+#include "nn/weights/function_id.h"
 #include "nn/weights/invariants.h"
 #include "nn/weights/network.h"
 
@@ -38,18 +38,18 @@ std::vector<JointBound> joint_bounds(const training::Layout& layout, const train
   network.invariants = invariants;
   std::vector<JointBound> bounds;
   const auto count = static_cast<int>(layout.parts().size());
-  const auto kind = [&](int part) { return files::kind_of(layout.parts()[part].name); };
+  const auto kind = [&](int part) { return layout.parts()[part].id.kind(); };
   for (int p = 0; p < count; ++p) {
-    const bool is_phi = files::is_phi(layout.parts()[p].name);
+    const bool is_phi = layout.parts()[p].id.is_phi();
     (is_phi ? network.phi : network.rho)[kind(p)] = layout.stored(theta, p);
     for (int r = 0; is_phi && r < count; ++r) {
-      if (files::is_rho(layout.parts()[r].name)) bounds.push_back({p, r, 0});
+      if (layout.parts()[r].id.is_rho()) bounds.push_back({p, r, 0});
     }
   }
   files::parallel_for(static_cast<int>(bounds.size()), jobs, [&](int i) {
     JointBound& bound = bounds[static_cast<std::size_t>(i)];
     const std::string phi = kind(bound.phi), rho = kind(bound.rho);
-    const std::string function = files::set_name(phi, rho);
+    const files::FunctionId function = files::FunctionId::set(phi, rho);
     const lipschitz::SdpBound found = lipschitz::sdp_bound(check::stages(network, function));
     bound.upper =
         product_of_norms(network.phi.at(phi), network.rho.at(rho), files::slope_of_inputs(network, function))
@@ -65,7 +65,7 @@ std::vector<double> shares_of_product(double limit, training::Layers layers,
   std::vector<double> shares(parts.size(), 1.0);
   for (std::size_t phi = 0; phi < parts.size(); ++phi) {
     for (std::size_t rho = 0; rho < parts.size(); ++rho) {
-      if (!files::is_phi(parts[phi].name) || !files::is_rho(parts[rho].name)) continue;
+      if (!parts[phi].id.is_phi() || !parts[rho].id.is_rho()) continue;
       const int of_phi = parts[phi].layers(), of_rho = parts[rho].layers();
       const double product =
           limit * training::slack_of_product(layers, of_phi) * training::slack_of_product(layers, of_rho);
@@ -94,7 +94,7 @@ Tightening scale_to(double limit, const training::Layout& layout, int jobs, trai
     }
   }
   for (std::size_t p = 0; p < count; ++p) {
-    if (!files::is_rho(layout.parts()[p].name) || !(ratio[p] > 1)) continue;
+    if (!layout.parts()[p].id.is_rho() || !(ratio[p] > 1)) continue;
     const int part = static_cast<int>(p);
     layout.weights(theta, part, layout.parts()[p].layers() - 1) *=
         static_cast<float>((1 - kScalingHeadroom) / ratio[p]);

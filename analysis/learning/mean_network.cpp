@@ -3,7 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "nn/weights/function_names.h"
+#include "nn/weights/function_id.h"
 
 namespace swarmcert::learning {
 namespace {
@@ -17,7 +17,7 @@ void place(const training::Layout& one, const training::Vector& member, const tr
   const auto from = one.weights(member, part, layer);
   const auto biases = one.biases(member, part, layer);
   auto into = wide.weights(theta, part, layer);
-  const bool is_phi = files::is_phi(one.parts()[static_cast<std::size_t>(part)].name);
+  const bool is_phi = one.parts()[static_cast<std::size_t>(part)].id.is_phi();
   const bool reads_inputs = is_phi && layer == 0;
   const bool adds_up = !is_phi && layer + 1 == one.parts()[static_cast<std::size_t>(part)].layers();
   const auto root = static_cast<float>(std::sqrt(static_cast<double>(members)));
@@ -35,7 +35,7 @@ training::Layout layout_of_mean(const training::Layout& one, int members) {
   if (members < 1) throw std::invalid_argument("layout_of_mean: a mean of no networks");
   std::vector<Part> parts = one.parts();
   for (Part& part : parts) {
-    const bool is_phi = files::is_phi(part.name);
+    const bool is_phi = part.id.is_phi();
     for (std::size_t k = is_phi ? 1 : 0; k + (is_phi ? 0 : 1) < part.sizes.size(); ++k)
       part.sizes[k] *= members;
   }

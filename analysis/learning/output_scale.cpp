@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "nn/training/deep_set_loss.h"
-#include "nn/weights/function_names.h"
+#include "nn/weights/function_id.h"
 
 namespace swarmcert::learning {
 namespace {
@@ -111,7 +111,7 @@ void silence(const LearningData& data, const OutputSupport& support, training::M
 void scale_outputs(const training::Layout& layout, const std::map<std::string, double>& scales,
                    training::Vector& theta) {
   for (const auto& [kind, scale] : scales) {
-    const int part = layout.find(files::rho_name(kind));
+    const int part = layout.find(files::FunctionId::rho(kind));
     if (part < 0) continue;
     const int last = layout.parts()[static_cast<std::size_t>(part)].layers() - 1;
     layout.weights(theta, part, last) *= static_cast<float>(scale);

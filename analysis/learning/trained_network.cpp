@@ -8,7 +8,7 @@
 #include "analysis/residuals/published_lag.h"
 #include "nn/base/file_io.h"
 #include "nn/training/deep_set_loss.h"
-#include "nn/weights/function_names.h"
+#include "nn/weights/function_id.h"
 #include "nn/weights/record_samples.h"
 
 namespace swarmcert::learning {
@@ -19,10 +19,8 @@ namespace fs = std::filesystem;
 constexpr int kRecordedSamples = 64;  ///< of each part
 constexpr char kSamplesFile[] = "samples.json";
 
-std::string file_of(const std::string& part) {
-  std::string name = part;
-  name[name.find(':')] = '_';
-  return name + ".safetensors";
+std::string file_of(const files::FunctionId& part) {
+  return (part.is_phi() ? "phi_" : "rho_") + part.kind() + ".safetensors";
 }
 
 std::string network_toml(const LearningData& data, const files::GammaStatement& gamma,
@@ -40,9 +38,8 @@ std::string network_toml(const LearningData& data, const files::GammaStatement& 
       gamma.mode == files::GammaStatement::Mode::kClip ? "clip" : "equal",
       data.invariants ? "invariants = \"rotation\"\n" : "");
   for (const training::Part& part : data.layout.parts()) {
-    const std::size_t colon = part.name.find(':');
-    text += fmt::format("[{}.{}]\nweights = \"{}\"\n", part.name.substr(0, colon),
-                        part.name.substr(colon + 1), file_of(part.name));
+    text += fmt::format("[{}.{}]\nweights = \"{}\"\n", part.id.is_phi() ? "phi" : "rho", part.id.kind(),
+                        file_of(part.id));
   }
   return text;
 }
@@ -67,7 +64,7 @@ files::Network write_network(const LearningData& data, const training::Vector& t
   const training::Layout& layout = data.layout;
   for (std::size_t p = 0; p < layout.parts().size(); ++p) {
     files::save_safetensors(layout.stored(theta, static_cast<int>(p)),
-                            (fs::path(folder) / file_of(layout.parts()[p].name)).string(), true);
+                            (fs::path(folder) / file_of(layout.parts()[p].id)).string(), true);
   }
   const std::string path = (fs::path(folder) / "network.toml").string();
   files::write_file(path, network_toml(data, gamma, silent), true);
@@ -109,7 +106,7 @@ void write_models(const residuals::Inputs& inputs, const training::Layout& layou
                       true);
   };
   const auto is_learned = [&layout](const std::string& kind) {
-    return layout.find(files::rho_name(kind)) >= 0;
+    return layout.find(files::FunctionId::rho(kind)) >= 0;
   };
   for (const stability::Model& model : inputs.models)
     if (is_learned(model.kind)) write(model, model.kind);
@@ -148,7 +145,8 @@ Certified write_certificate(const files::Network& network, const std::string& fo
       certified.gamma = *layer.respects_gamma;
   }
   for (const lipschitz::CertifiedBound& bound : certified.found.bounds) {
-    if (files::is_set(bound.function)) certified.set_bounds.emplace_back(bound.function, bound.upper.value());
+    if (bound.function.is_set())
+      certified.set_bounds.emplace_back(bound.function.name(), bound.upper.value());
   }
   return certified;
 }

@@ -36,7 +36,7 @@ std::string fingerprint(const LearningData& data, const RunOptions& options) {
   std::string text = bytes(data.samples.x) + bytes(data.samples.phi) + bytes(data.samples.first) +
                      bytes(data.samples.rho) + bytes(data.samples.target) + bytes(data.samples.weight);
   for (const TrackSamples& track : data.tracks) text += name(track.use) + std::to_string(track.end);
-  for (const training::Part& part : data.layout.parts()) text += part.name + bytes(part.sizes);
+  for (const training::Part& part : data.layout.parts()) text += part.id.name() + bytes(part.sizes);
   const training::TrainerOptions& t = options.trainer;
   const std::array<double, 10> numbers = {t.gamma.value,
                                           t.learning_rate,

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "nn/weights/function_names.h"
+#include "nn/weights/function_id.h"
 
 namespace swarmcert::reproduction {
 namespace {
@@ -32,7 +32,7 @@ State invariants(double x, double y, double z, double vx, double vy, double vz) 
 /// Of the neighbour if there is one, else of the own height and velocity.
 State state_of(const learning::LearningData& data, Index sample) {
   const training::Dataset& samples = data.samples;
-  const int ground = data.layout.find(files::kGroundPhi);
+  const int ground = data.layout.find(files::FunctionId::ground_phi());
   const float* own = nullptr;
   for (Index i = samples.first[sample]; i < samples.first[sample + 1]; ++i) {
     const float* const input = samples.x.data() + i * samples.width;

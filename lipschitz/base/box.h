@@ -1,7 +1,10 @@
 /// @file Axis-parallel boxes: the domains of local bounds.
 #pragma once
 
+#include <map>
 #include <vector>
+
+#include "nn/weights/function_id.h"
 
 namespace swarmcert::lipschitz {
 
@@ -10,5 +13,8 @@ namespace swarmcert::lipschitz {
 struct Box {
   std::vector<double> lower, upper;
 };
+
+/// By part of NET, a plain network or a phi: where its inputs lie.
+using Domain = std::map<files::FunctionId, Box>;
 
 }  // namespace swarmcert::lipschitz

@@ -17,10 +17,10 @@ bool contains(const std::vector<std::string>& list, const std::string& text) {
 }
 
 /// Whether `function` takes inputs of NET rather than hidden values.
-bool takes_inputs(const std::string& function) { return !files::is_rho(function); }
+bool takes_inputs(const files::FunctionId& function) { return !function.is_rho(); }
 
 /// Whether there are claims of `function` with weights of its inputs.
-bool takes_scale(const files::Network& network, const std::string& function, std::size_t scales) {
+bool takes_scale(const files::Network& network, const files::FunctionId& function, std::size_t scales) {
   return takes_inputs(function) && !files::maps_to_invariants(network, function) &&
          static_cast<std::size_t>(files::inputs(network, function)) == scales;
 }
@@ -43,9 +43,9 @@ std::vector<Neighbours> groups(const files::Network& network, const ClaimOptions
 /// Claims that hold for a group of neighbours only: of the set functions whose moving term is in it, or the ground's.
 void add_counted(const files::Network& network, const ClaimOptions& options, std::vector<Claim>& claims) {
   for (const Neighbours& group : groups(network, options)) {
-    for (const std::string& function : files::functions(network)) {
-      if (!files::is_set(function)) continue;
-      const std::string kind = files::kind_of(files::networks_of(function).front());
+    for (const files::FunctionId& function : files::functions(network)) {
+      if (!function.is_set()) continue;
+      const std::string kind = function.input_part().kind();
       if (kind != files::kGroundKind && group.count(kind) == 0) continue;
       Claim claim;
       claim.function = function;
@@ -85,7 +85,7 @@ std::vector<Claim> claims(const files::Network& network, const ClaimOptions& opt
   for (const double scale : options.scale) {
     if (!(scale > 0) || std::isinf(scale)) throw std::invalid_argument("a scale must be positive");
   }
-  for (const std::string& function : files::functions(network)) {
+  for (const files::FunctionId& function : files::functions(network)) {
     Claim claim;
     claim.function = function;
     if (!options.domain.empty() && takes_inputs(function)) claim.domain = "box";
@@ -118,7 +118,7 @@ std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptio
     for (const Neighbours& group : named) {
       for (const std::string block : {"all", "position", "velocity"}) {
         const std::vector<std::string> has =
-            files::blocks(network, files::set_name(group.begin()->first, rho));
+            files::blocks(network, files::FunctionId::set(group.begin()->first, rho));
         const bool wanted = contains(options.blocks, block) || contains(options.blocks, "every");
         if (block != "all" && !(wanted && contains(has, block))) continue;
         for (const LawKind law : {LawKind::kAllStacked, LawKind::kAllMax, LawKind::kOwnState})
@@ -129,13 +129,13 @@ std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptio
   return result;
 }
 
-std::map<std::string, Box> read_domain(const std::string& path, const files::Network& network) {
+Domain read_domain(const std::string& path, const files::Network& network) {
   const std::string text = files::read_file(path);
   const toml::table document = files::parse_toml(text, path);
   const files::TomlTable top(document, path);
   top.require_schema("swarmcert/box/1");
   top.allow_only({"schema", "lower", "upper", "ground"});
-  std::map<std::string, Box> domain;
+  Domain domain;
   if (network.plain) {
     if (top.has("ground")) top.refuse("ground", "", "the network has no ground term");
     domain["network"] = read_box(top, static_cast<std::size_t>(network.plain->inputs()));
@@ -148,12 +148,12 @@ std::map<std::string, Box> read_domain(const std::string& path, const files::Net
   if (network.invariants) inputs = nn::kRelativeState;  // a box of states
   if (inputs > 0) {
     const Box box = read_box(top, inputs);
-    for (const auto& [kind, phi] : network.phi) domain[files::phi_name(kind)] = box;
+    for (const auto& [kind, phi] : network.phi) domain[files::FunctionId::phi(kind)] = box;
   }
   const bool has_ground = network.phi.count(files::kGroundKind) == 1;
   if (!has_ground && top.has("ground")) top.refuse("ground", "", "the network has no ground term");
   if (!has_ground) return domain;
-  Box& ground = domain[files::kGroundPhi];
+  Box& ground = domain[files::FunctionId::ground_phi()];
   if (top.has("ground")) {
     const files::TomlTable table = top.table("ground");
     table.allow_only({"lower", "upper"});

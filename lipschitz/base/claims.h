@@ -17,7 +17,7 @@ using Neighbours = std::map<std::string, int>;
 /// |f(x) - f(y)|_2 <= L |x - y| for all x and y of the domain that differ in `block` only; in a set function for one
 /// neighbour that moves.
 struct Claim {
-  std::string function;           ///< "network", "phi:<kind>", "rho:<kind>" or "set:<phi kind>:<rho kind>"
+  files::FunctionId function;     ///< "network", "phi:<kind>", "rho:<kind>" or "set:<phi kind>:<rho kind>"
   std::string block = "all";      ///< see files::block_coordinates()
   std::vector<double> scale;      ///< empty: |x - y|_2; else |x - y|^2 = sum_k ((x_k - y_k) / scale_k)^2
   std::string domain = "global";  ///< or "box"
@@ -54,7 +54,7 @@ struct ClaimOptions {
   Neighbours mixture;         ///< laws for this group as well; empty: none
   bool counted = false;       ///< claims for these numbers of neighbours as well, where there is a domain
   /// By part ("network", "phi:<kind>"): claims of functions of these inputs hold for them. Empty: all of R^n.
-  std::map<std::string, Box> domain;
+  Domain domain;
 };
 
 /// @throws std::invalid_argument if no function has a block of that name or as many inputs as `scale`, a scale is not
@@ -66,6 +66,6 @@ std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptio
 /// of the neighbours' phi; a table `ground` with the same keys for the ground's inputs (-z and -v), which otherwise
 /// get the last four intervals.
 /// @throws files::InputError with line, field, value and hint.
-std::map<std::string, Box> read_domain(const std::string& path, const files::Network& network);
+Domain read_domain(const std::string& path, const files::Network& network);
 
 }  // namespace swarmcert::lipschitz

@@ -45,16 +45,15 @@ double cover_radius(const files::Layer& layer) {
 
 /// The ranges of the other terms, and what they add up to before the first ReLU of rho.
 struct Others {
-  std::map<std::string, RangeProof> ranges;
+  std::map<files::FunctionId, RangeProof> ranges;
   std::vector<double> least, most;
 };
 
-Others others_of(const files::Network& network, const Claim& claim, const std::map<std::string, Box>& domain,
-                 int nodes) {
-  const std::vector<std::string> names = files::networks_of(claim.function);
-  const std::string ground = files::kGroundPhi;
-  std::map<std::string, int> counts;
-  for (const auto& [kind, count] : claim.neighbours) counts[files::phi_name(kind)] = count;
+Others others_of(const files::Network& network, const Claim& claim, const Domain& domain, int nodes) {
+  const std::vector<files::FunctionId> names = claim.function.parts();
+  const files::FunctionId ground = files::FunctionId::ground_phi();
+  std::map<files::FunctionId, int> counts;
+  for (const auto& [kind, count] : claim.neighbours) counts[files::FunctionId::phi(kind)] = count;
   if (names[0] == ground) {
     counts.erase(ground);
   } else {
@@ -124,10 +123,10 @@ std::vector<double> beginning(const std::vector<double>& t, const LocalChain& ch
 
 LocalBounds::LocalBounds(const files::Network& network, const Claim& claim,
                          const std::vector<double>& joint_t) {
-  const std::vector<std::string> names = files::networks_of(claim.function);
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const std::vector<files::FunctionId> names = claim.function.parts();
+  const files::Parts parts = files::parts(network);
   const std::vector<files::Layer>& layers = parts.at(names.front())->layers;
-  if (layers.size() < 2 || files::is_rho(names.front())) return;
+  if (layers.size() < 2 || names.front().is_rho()) return;
   if (names.size() == 2) {
     const std::vector<check::Matrix> rho = check::stages(network, names.back());
     const std::size_t hidden = check::hidden_neurons(rho);
@@ -174,17 +173,16 @@ LocalBound LocalBounds::everywhere(const BranchOptions& options) const {
   return result;
 }
 
-LocalBound local_bound(const files::Network& network, const Claim& claim,
-                       const std::map<std::string, Box>& domain, const std::vector<double>& joint_t,
-                       const BranchOptions& given) {
-  const std::vector<std::string> names = files::networks_of(claim.function);
+LocalBound local_bound(const files::Network& network, const Claim& claim, const Domain& domain,
+                       const std::vector<double>& joint_t, const BranchOptions& given) {
+  const std::vector<files::FunctionId> names = claim.function.parts();
   if (claim.neighbours.empty()) {
     const LocalBounds bounds(network, claim, joint_t);
     return claim.domain == "global" ? bounds.everywhere(given) : bounds.on(domain.at(names.front()), given);
   }
   LocalBound result;
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
-  if (parts.at(names.front())->layers.size() < 2 || files::is_rho(names.front()) ||
+  const files::Parts parts = files::parts(network);
+  if (parts.at(names.front())->layers.size() < 2 || names.front().is_rho() ||
       parts.at(names.back())->layers.size() < 2)
     return result;
   BranchOptions options = given;
@@ -208,7 +206,7 @@ LocalBound local_bound(const files::Network& network, const Claim& claim,
 
 LocalBound local_bound(const files::Network& network, const Claim& claim, const Box& box,
                        const std::vector<double>& joint_t, const BranchOptions& options) {
-  return local_bound(network, claim, {{files::networks_of(claim.function).front(), box}}, joint_t, options);
+  return local_bound(network, claim, {{claim.function.input_part(), box}}, joint_t, options);
 }
 
 }  // namespace swarmcert::lipschitz

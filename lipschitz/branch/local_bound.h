@@ -19,7 +19,7 @@ struct LocalProof {
   double rho = 0;
   std::optional<RhoForm> form;  ///< of a set function with any number of neighbours
   /// Of a set function with so many neighbours: the ranges of the other terms, by "phi:<kind>".
-  std::optional<std::map<std::string, RangeProof>> others;
+  std::optional<std::map<files::FunctionId, RangeProof>> others;
   std::vector<double> radius;  ///< of the projective cover, where the bound holds everywhere; else empty
   check::TreeProof tree;
 };
@@ -46,9 +46,8 @@ struct LocalBound {
 /// @param joint_t multipliers of the claim's global bound (UpperProof::t); empty: none, and then no proof for a set
 ///   function with any number of neighbours.
 /// @returns no proof for functions without hidden layers, and for rho alone.
-LocalBound local_bound(const files::Network& network, const Claim& claim,
-                       const std::map<std::string, Box>& domain, const std::vector<double>& joint_t,
-                       const BranchOptions& options);
+LocalBound local_bound(const files::Network& network, const Claim& claim, const Domain& domain,
+                       const std::vector<double>& joint_t, const BranchOptions& options);
 
 /// local_bound() for a claim without a number of neighbours on one box after the other: what these share is made once.
 class LocalBounds {

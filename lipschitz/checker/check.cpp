@@ -6,7 +6,7 @@
 #include "nn/weights/activation.h"
 #include "nn/weights/chain.h"
 #include "nn/weights/compositions.h"
-#include "nn/weights/function_names.h"
+#include "nn/weights/function_id.h"
 #include "nn/weights/invariants.h"
 
 namespace swarmcert::check {
@@ -56,9 +56,9 @@ CheckResult CertificateChecker::run() {
   require(certificate_["tool"].is_string(), "tool is not text");
   check_weights(certificate_["network"]);
   check_boxes(certificate_["box"]);
-  for (const auto& [name, weights] : parts_)
+  for (const auto& [part, weights] : parts_)
     for (const files::Layer& layer : weights->layers)
-      check_layer(certificate_["layers"].at(spectral_norms_), name, layer);
+      check_layer(certificate_["layers"].at(spectral_norms_), part, layer);
   require(certificate_["layers"].size() == static_cast<std::size_t>(spectral_norms_),
           "layers lists more than the networks have");
   require(certificate_["bounds"].is_array() && !certificate_["bounds"].empty(), "bounds is empty");
@@ -78,13 +78,13 @@ void CertificateChecker::check_weights(const Json& named) {
   require(named["description_sha256"] == network_.sha256,
           "network.description_sha256 is of another network.toml");
   require(named["weights"].size() == parts_.size(), "network.weights lists another number of networks");
-  for (const auto& [name, weights] : parts_) {
-    const Json& entry = named["weights"].at(name);
-    const std::string where = "network.weights." + name;
+  for (const auto& [part, weights] : parts_) {
+    const Json& entry = named["weights"].at(part.name());
+    const std::string where = "network.weights." + part.name();
     files::require_keys(entry, {"sha256", "precision", "chain", "samples"}, where);
     require(entry["sha256"] == weights->sha256 && entry["precision"] == files::name(weights->precision),
             where + " is of another file than " + weights->path);
-    check_chain(entry["chain"], name);
+    check_chain(entry["chain"], part);
     check_samples(entry["samples"], where + ".samples");
   }
 }
@@ -93,8 +93,9 @@ void CertificateChecker::check_boxes(const Json& boxes) const {
   if (boxes.is_null()) return;
   require(boxes.is_object() && !boxes.empty(), "box is neither null nor an object with boxes");
   for (const auto& [part, box] : boxes.items()) {
-    const auto found = parts_.find(part);
-    require(found != parts_.end() && !files::is_rho(part), "box." + part + " is of no network with a box");
+    const std::optional<files::FunctionId> named = files::FunctionId::parse(part);
+    const auto found = named ? parts_.find(*named) : parts_.end();
+    require(found != parts_.end() && !named->is_rho(), "box." + part + " is of no network with a box");
     files::require_keys(box, {"lower", "upper"}, "box." + part);
     const auto inputs = static_cast<std::size_t>(found->second->inputs());
     const std::vector<double> lower = files::parse_hex_floats(box["lower"]);
@@ -104,9 +105,9 @@ void CertificateChecker::check_boxes(const Json& boxes) const {
   }
 }
 
-void CertificateChecker::check_chain(const Json& stated, const std::string& name) const {
-  const std::vector<files::ChainStep> chain = files::chain(network_, name);
-  const std::string where = "network.weights." + name + ".chain";
+void CertificateChecker::check_chain(const Json& stated, const files::FunctionId& part) const {
+  const std::vector<files::ChainStep> chain = files::chain(network_, part);
+  const std::string where = "network.weights." + part.name() + ".chain";
   const auto fits = [&](std::size_t k) {
     const Json& step = stated[k];
     files::require_keys(step, {"op", "layer", "inputs", "outputs"}, where);
@@ -138,11 +139,12 @@ void CertificateChecker::check_samples(const Json& samples, const std::string& w
           where + ": the largest deviation is above the tolerance");
 }
 
-void CertificateChecker::check_layer(const Json& entry, const std::string& network,
+void CertificateChecker::check_layer(const Json& entry, const files::FunctionId& part,
                                      const files::Layer& layer) {
-  const std::string where = "layer " + network + " " + layer.name;
+  const std::string where = "layer " + part.name() + " " + layer.name;
   files::require_keys(entry, {"network", "name", "spectral_norm", "spectral_norm_hex", "proof"}, where);
-  require(entry["network"] == network && entry["name"] == layer.name, where + " is not where it is expected");
+  require(entry["network"] == part.name() && entry["name"] == layer.name,
+          where + " is not where it is expected");
   const double lower = number(entry["spectral_norm"].at(0), entry["spectral_norm_hex"].at(0), where);
   const double upper = number(entry["spectral_norm"].at(1), entry["spectral_norm_hex"].at(1), where);
   files::require_keys(entry["proof"], {"lower_vector", "upper"}, where + ".proof");
@@ -153,7 +155,7 @@ void CertificateChecker::check_layer(const Json& entry, const std::string& netwo
   require(squared_norm(product(w, v)) >= Dyadic(lower) * lower * squared_norm(v),
           where + ": claims more than |W v| / |v|");
   check_upper({{w}, {}}, entry["proof"]["upper"], upper, where);
-  norms_[network] = norms_.emplace(network, 1.0).first->second * upper;
+  norms_[part] = norms_.emplace(part, 1.0).first->second * upper;
   ++spectral_norms_;
 }
 
@@ -163,10 +165,10 @@ void CertificateChecker::check_bound(const Json& bound) {
                                 "lower",    "lower_hex", "lower_witness", "proof",     "status"};
   if (bound.contains("neighbours")) keys.insert("neighbours");
   files::require_keys(bound, keys, "bound");
-  const std::string function = bound["function"].get<std::string>();
+  const files::FunctionId function = bound["function"].get<std::string>();
   const std::string block = bound["block"].get<std::string>();
-  const std::string where = "bound " + function + " " + block;
-  const std::vector<std::string> names = files::networks_of(function);
+  const std::string where = "bound " + function.name() + " " + block;
+  const std::vector<files::FunctionId> names = function.parts();
   const std::vector<double> scale = files::parse_hex_floats(bound["scale"]);
   require(std::all_of(scale.begin(), scale.end(), [](double x) { return x > 0; }),
           where + ": scale is not positive");
@@ -208,30 +210,31 @@ void CertificateChecker::check_bound(const Json& bound) {
   ++lower_bounds_;
 }
 
-void CertificateChecker::check_product(const Json& bound, const std::vector<std::string>& names, double upper,
-                                       const std::vector<double>& scale, const std::string& where) const {
+void CertificateChecker::check_product(const Json& bound, const std::vector<files::FunctionId>& names,
+                                       double upper, const std::vector<double>& scale,
+                                       const std::string& where) const {
   const bool is_local = bound["upper_method"] == "local_product";
   require((is_local || bound["upper_method"] == "product") && bound["proof"].is_null(),
           where + ": unknown upper_method");
   Dyadic total = scale.empty() ? 1.0 : *std::max_element(scale.begin(), scale.end());
   total = total * files::slope_of_inputs(network_, bound["function"].get<std::string>());
-  for (const std::string& name : names) {
-    require(norms_.count(name) == 1, where + ": there is no network " + name);
-    total = total * norms_.at(name);
-    if (is_local && name == names.front()) {
-      total = total * steepest_on_box(*parts_.at(name), local_inputs(bound, name, where));
+  for (const files::FunctionId& part : names) {
+    require(norms_.count(part) == 1, where + ": there is no network " + part.name());
+    total = total * norms_.at(part);
+    if (is_local && part == names.front()) {
+      total = total * steepest_on_box(*parts_.at(part), local_inputs(bound, part, where));
       continue;
     }
-    for (const double steepest : parts_.at(name)->steepest_slopes()) total = total * steepest;
+    for (const double steepest : parts_.at(part)->steepest_slopes()) total = total * steepest;
   }
   require(Dyadic(upper) >= total, where + ": claims less than the product of the norms");
 }
 
-void CertificateChecker::check_activations(const Json& bound, const std::vector<std::string>& names,
+void CertificateChecker::check_activations(const Json& bound, const std::vector<files::FunctionId>& names,
                                            const std::string& where) const {
-  for (const std::string& name : names) {
-    require(parts_.count(name) == 1, where + ": there is no network " + name);
-    for (const files::Activation activation : parts_.at(name)->activations()) {
+  for (const files::FunctionId& part : names) {
+    require(parts_.count(part) == 1, where + ": there is no network " + part.name());
+    for (const files::Activation activation : parts_.at(part)->activations()) {
       if (activation == files::Activation::kRelu) continue;
       const files::ActivationFunction& function = files::function_of(activation);
       const std::string with = " of a network with " + function.words;
@@ -243,7 +246,7 @@ void CertificateChecker::check_activations(const Json& bound, const std::vector<
   }
 }
 
-void CertificateChecker::check_invariants(const Json& bound, const std::string& function,
+void CertificateChecker::check_invariants(const Json& bound, const files::FunctionId& function,
                                           const std::string& where) const {
   if (!files::maps_to_invariants(network_, function)) return;
   const std::string of = " of a function of rotation invariants";
@@ -254,10 +257,9 @@ void CertificateChecker::check_invariants(const Json& bound, const std::string& 
   require(bound["scale"].empty(), where + ": a scale" + of);
 }
 
-Intervals CertificateChecker::local_inputs(const Json& bound, const std::string& part,
+Intervals CertificateChecker::local_inputs(const Json& bound, const files::FunctionId& part,
                                            const std::string& where) const {
-  require(bound["domain"] == "box" && !files::is_rho(part),
-          where + ": slopes on a box of a bound without one");
+  require(bound["domain"] == "box" && !part.is_rho(), where + ": slopes on a box of a bound without one");
   require(!network_.invariants, where + ": slopes on a box of a network of rotation invariants");
   Row lower, upper;
   read_box(part, lower, upper, where);
@@ -268,22 +270,22 @@ CertificateChecker::Neighbours CertificateChecker::neighbours_of(const Json& bou
                                                                  const std::string& where) const {
   if (!bound.contains("neighbours")) return {};
   const Neighbours neighbours = bound["neighbours"].get<Neighbours>();
-  const std::vector<std::string> names = files::networks_of(bound["function"].get<std::string>());
-  require(names.size() == 2 && bound["domain"] == "box",
+  const files::FunctionId function = bound["function"].get<std::string>();
+  require(function.is_set() && bound["domain"] == "box",
           where + ": neighbours only of a set function on a box");
   for (const auto& [kind, count] : neighbours)
-    require(kind != files::kGroundKind && parts_.count(files::phi_name(kind)) == 1 && 1 <= count &&
+    require(kind != files::kGroundKind && parts_.count(files::FunctionId::phi(kind)) == 1 && 1 <= count &&
                 count <= kMostNeighbours,
             where + ": impossible neighbours");
   require(!neighbours.empty() &&
-              (names[0] == files::kGroundPhi || neighbours.count(files::kind_of(names[0])) == 1),
+              (function.input_part().is_ground_phi() || neighbours.count(function.phi_kind()) == 1),
           where + ": the neighbour that moves is none of those listed");
   return neighbours;
 }
 
-std::string CertificateChecker::key(const std::string& function, const std::string& block,
+std::string CertificateChecker::key(const files::FunctionId& function, const std::string& block,
                                     const Neighbours& neighbours) {
-  return function + " " + block + (neighbours.empty() ? "" : " " + Json(neighbours).dump());
+  return function.name() + " " + block + (neighbours.empty() ? "" : " " + Json(neighbours).dump());
 }
 
 void CertificateChecker::check_law(const Json& law) {
@@ -296,15 +298,16 @@ void CertificateChecker::check_law(const Json& law) {
   const Neighbours neighbours = law["neighbours"].get<Neighbours>();
   Neighbours terms = neighbours;
   require(terms.count(files::kGroundKind) == 0, where + ": the ground is no neighbour");
-  if (parts_.count(files::kGroundPhi) == 1) terms[files::kGroundKind] = 1;
+  if (parts_.count(files::FunctionId::ground_phi()) == 1) terms[files::kGroundKind] = 1;
   require(law["domain"] == "box" || law["domain"] == "global", where + ": unknown domain");
   Dyadic sum, sum_of_squares;
   for (const auto& [kind, count] : terms) {
     require(1 <= count && count <= kMostNeighbours, where + ": impossible number of neighbours");
     const Dyadic n = static_cast<double>(count);
-    const std::string function = files::set_name(kind, rho), any_number = key(function, block, {});
+    const files::FunctionId function = files::FunctionId::set(kind, rho);
+    const std::string any_number = key(function, block, {});
     require(proved_.count(any_number) == 1,
-            where + ": rests on a bound of " + function + " that is not there");
+            where + ": rests on a bound of " + function.name() + " that is not there");
     Dyadic k = proved_.at(any_number);
     if (law["domain"] == "box") {
       const auto fewer = proved_.find(key(function, block, neighbours));
@@ -359,11 +362,11 @@ std::string stated_activations(const files::Json& chain) {
 }  // namespace
 
 files::Network with_stated_activations(const files::Json& certificate, files::Network network) {
-  const auto adopt = [&certificate](const std::string& part, files::Weights& weights) {
+  const auto adopt = [&certificate](const files::FunctionId& part, files::Weights& weights) {
     if (weights.states_activation()) return;
     try {
       const std::string text =
-          stated_activations(certificate.at("network").at("weights").at(part).at("chain"));
+          stated_activations(certificate.at("network").at("weights").at(part.name()).at("chain"));
       if (text.empty() || !files::activation_misfit(weights, text).empty()) return;
       weights = files::with_activation(std::move(weights), text);
       weights.activation_is_given = false;  // by the certificate alone
@@ -372,8 +375,8 @@ files::Network with_stated_activations(const files::Json& certificate, files::Ne
     }
   };
   if (network.plain) adopt("network", *network.plain);
-  for (auto& [kind, weights] : network.phi) adopt(files::phi_name(kind), weights);
-  for (auto& [kind, weights] : network.rho) adopt(files::rho_name(kind), weights);
+  for (auto& [kind, weights] : network.phi) adopt(files::FunctionId::phi(kind), weights);
+  for (auto& [kind, weights] : network.rho) adopt(files::FunctionId::rho(kind), weights);
   return network;
 }
 

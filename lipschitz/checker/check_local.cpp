@@ -5,14 +5,14 @@
 #include "lipschitz/checker/certificate_checker.h"
 #include "lipschitz/checker/projective_cover.h"
 #include "lipschitz/checker/tree_proof.h"
-#include "nn/weights/function_names.h"
+#include "nn/weights/function_id.h"
 
 namespace swarmcert::check {
 
-void CertificateChecker::read_box(const std::string& part, std::vector<double>& lower,
+void CertificateChecker::read_box(const files::FunctionId& part, std::vector<double>& lower,
                                   std::vector<double>& upper, const std::string& where) const {
-  lower = files::parse_hex_floats(certificate_["box"].at(part).at("lower"));
-  upper = files::parse_hex_floats(certificate_["box"].at(part).at("upper"));
+  lower = files::parse_hex_floats(certificate_["box"].at(part.name()).at("lower"));
+  upper = files::parse_hex_floats(certificate_["box"].at(part.name()).at("upper"));
   const auto inputs = static_cast<std::size_t>(parts_.at(part)->inputs());
   require(lower.size() == inputs && upper.size() == inputs, where + ": the box has another size");
   for (std::size_t k = 0; k < inputs; ++k) {
@@ -24,20 +24,21 @@ void CertificateChecker::read_box(const std::string& part, std::vector<double>& 
   }
 }
 
-void CertificateChecker::check_others(const Json& others, const std::vector<std::string>& names,
+void CertificateChecker::check_others(const Json& others, const std::vector<files::FunctionId>& names,
                                       Neighbours counts, Row& least, Row& most,
                                       const std::string& where) const {
-  if (names[0] != files::kGroundPhi) {
-    if (--counts.at(files::kind_of(names[0])) == 0) counts.erase(files::kind_of(names[0]));
-    if (parts_.count(files::kGroundPhi) == 1) counts[files::kGroundKind] = 1;
+  if (!names[0].is_ground_phi()) {
+    if (--counts.at(names[0].kind()) == 0) counts.erase(names[0].kind());
+    if (parts_.count(files::FunctionId::ground_phi()) == 1) counts[files::kGroundKind] = 1;
   }
   require(others.is_object() && others.size() == counts.size(), where + ": others lists other kinds");
   const auto rows = static_cast<std::size_t>(parts_.at(names[1])->layers.front().outputs);
   least.assign(rows, 0.0);
   most.assign(rows, 0.0);
   for (const auto& [kind, count] : counts) {
-    const std::string part = files::phi_name(kind), here = where + "." + part;
-    const Json& range = others.at(part);
+    const files::FunctionId part = files::FunctionId::phi(kind);
+    const std::string here = where + "." + part.name();
+    const Json& range = others.at(part.name());
     files::require_keys(range, {"tree", "least", "most"}, here);
     const Row low = files::parse_hex_floats(range["least"]), high = files::parse_hex_floats(range["most"]);
     Row lower_end, upper_end;
@@ -66,10 +67,11 @@ void CertificateChecker::check_local(const Json& bound, double upper, const std:
   if (proof.contains("conflicts")) keys.insert("conflicts");
   if (is_coupled) keys.insert("forms");
   files::require_keys(proof, keys, where + ".proof");
-  const std::vector<std::string> names = files::networks_of(bound["function"].get<std::string>());
-  const std::string& moved = names.front();
+  const files::FunctionId function = bound["function"].get<std::string>();
+  const std::vector<files::FunctionId> names = function.parts();
+  const files::FunctionId& moved = names.front();
   const std::string block = bound["block"].get<std::string>();
-  require(!files::is_rho(moved), where + ": rho has no box");
+  require(!moved.is_rho(), where + ": rho has no box");
   const double rho = files::parse_hex_float(proof["rho"].get<std::string>());
   require(rho > 0 && Dyadic(upper) * upper >= Dyadic(rho), where + ": claims less than sqrt(rho)");
   LocalFunction f;
@@ -78,7 +80,7 @@ void CertificateChecker::check_local(const Json& bound, double upper, const std:
     require(!neighbours.empty(), where + ": a bound for any number of neighbours needs a form");
     Row least, most;
     check_others(proof["others"], names, neighbours, least, most, where + ".others");
-    f = coupled_function(network_, bound["function"].get<std::string>(), block, scale, least, most);
+    f = coupled_function(network_, function, block, scale, least, most);
   } else {
     require(proof["form"].is_null() == (names.size() == 1),
             where + ": a form for set functions, and only for those");
@@ -116,7 +118,7 @@ void CertificateChecker::check_local(const Json& bound, double upper, const std:
   ++on_boxes_;
 }
 
-Matrix CertificateChecker::checked_form(const Json& form, const std::string& rho,
+Matrix CertificateChecker::checked_form(const Json& form, const files::FunctionId& rho,
                                         const std::string& where) const {
   files::require_keys(form, {"q", "t", "factor"}, where);
   const std::vector<Matrix> chain = stages(network_, rho);

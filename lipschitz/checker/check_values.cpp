@@ -89,22 +89,22 @@ void CertificateChecker::check_values(const Json& entry) {
                       {"function", "neighbours", "domain", "input_error", "networks", "sum", "lower", "upper",
                        "jump", "jump_hex", "float32_error", "float32_error_hex"},
                       "values");
-  const std::string function = entry["function"].get<std::string>();
-  const std::string where = "values of " + function;
-  const std::vector<std::string> names = files::networks_of(function);
+  const files::FunctionId function = entry["function"].get<std::string>();
+  const std::string where = "values of " + function.name();
+  const std::vector<files::FunctionId> names = function.parts();
   const bool is_set = names.size() == 2;
-  for (const std::string& name : names)
-    require(parts_.count(name) == 1, where + ": there is no network " + name);
+  for (const files::FunctionId& part : names)
+    require(parts_.count(part) == 1, where + ": there is no network " + part.name());
   require(!network_.invariants, where + ": values of a function of rotation invariants");
-  require(is_set ? names[0] != files::kGroundPhi : function == "network",
+  require(is_set ? !names[0].is_ground_phi() : function.is_plain(),
           where + ": only of the network, or of a sum over neighbours");
-  const bool has_ground = is_set && parts_.count(files::kGroundPhi) == 1;
+  const bool has_ground = is_set && parts_.count(files::FunctionId::ground_phi()) == 1;
   require(entry["neighbours"].is_number_integer(), where + ": neighbours is not an integer");
   const long neighbours = entry["neighbours"].get<long>();
   require(is_set ? 1 <= neighbours && neighbours <= kMostNeighbours : neighbours == 0,
           where + ": impossible number of neighbours");
-  std::vector<std::string> inputs = {names[0]};
-  if (has_ground) inputs.emplace_back(files::kGroundPhi);
+  std::vector<files::FunctionId> inputs = {names[0]};
+  if (has_ground) inputs.push_back(files::FunctionId::ground_phi());
   require(entry["networks"].is_object() && entry["networks"].size() == inputs.size() + (is_set ? 1 : 0),
           where + ": networks lists others than the function has");
   const bool with_error = !entry["input_error"].is_null();
@@ -114,15 +114,15 @@ void CertificateChecker::check_values(const Json& entry) {
 
   Bounded result;
   std::vector<SumTerm> terms;
-  for (const std::string& name : inputs) {
-    Bounded input = values_input(entry, name, where);
-    result =
-        check_layers(*parts_.at(name), entry["networks"].at(name), std::move(input), where + ": " + name);
-    const bool is_ground = name == files::kGroundPhi;
+  for (const files::FunctionId& part : inputs) {
+    Bounded input = values_input(entry, part, where);
+    result = check_layers(*parts_.at(part), entry["networks"].at(part.name()), std::move(input),
+                          where + ": " + part.name());
+    const bool is_ground = part.is_ground_phi();
     terms.push_back({result, is_ground ? 1 : 0, is_ground ? 1 : neighbours});
   }
   require(entry["sum"].is_null() != is_set, where + ": a sum of set functions, and only of those");
-  if (is_set) result = check_sum(entry, terms, *parts_.at(names[1]), names[1], where);
+  if (is_set) result = check_sum(entry, terms, *parts_.at(names[1]), names[1].name(), where);
   const std::vector<Dyadic> lower = exact(files::parse_hex_floats(entry["lower"]));
   const std::vector<Dyadic> upper = exact(files::parse_hex_floats(entry["upper"]));
   require(lower.size() == result.values.lower.size() && upper.size() == lower.size(),
@@ -147,40 +147,41 @@ void CertificateChecker::check_values(const Json& entry) {
 }
 
 void CertificateChecker::check_jump(const Json& entry, const Bounded& moved,
-                                    const std::vector<std::string>& names, const std::string& where) const {
+                                    const std::vector<files::FunctionId>& names,
+                                    const std::string& where) const {
   const bool is_set = names.size() == 2;
   require(entry["jump"].is_null() != is_set && entry["jump_hex"].is_null() != is_set,
           where + ": a jump of set functions, and only of those");
   if (!is_set) return;
   const Dyadic jump = number(entry["jump"], entry["jump_hex"], where + " jump");
   const auto bound = proved_.find(key(names[1], "all", {}));
-  require(bound != proved_.end(), where + ": rests on a bound of " + names[1] + " that is not there");
+  require(bound != proved_.end(), where + ": rests on a bound of " + names[1].name() + " that is not there");
   require(jump * jump >= bound->second * bound->second * largest_square(moved.values),
           where + ": claims less than the jump");
-  const auto inputs = [&](const std::string& part) { return values_box(entry, part, where); };
+  const auto inputs = [&](const files::FunctionId& part) { return values_box(entry, part, where); };
   require(jump * jump >= silent_step_square(network_, entry["function"].get<std::string>(), inputs),
           where + ": claims less than the step to neighbours among which the network is silent");
 }
 
-Intervals CertificateChecker::values_box(const Json& entry, const std::string& name,
+Intervals CertificateChecker::values_box(const Json& entry, const files::FunctionId& part,
                                          const std::string& where) const {
   if (entry["domain"] == "box") {
     require(certificate_["box"].is_object(), where + ": there is no box");
     Row lower, upper;
-    read_box(name, lower, upper, where);
+    read_box(part, lower, upper, where);
     return {exact(lower), exact(upper)};
   }
-  require(entry["domain"] == "clamp" && network_.clamp && files::is_clamped(name),
+  require(entry["domain"] == "clamp" && network_.clamp && files::is_clamped(part),
           where + ": the domain is neither the box nor a clamp of this input");
   return {exact(network_.clamp->lower), exact(network_.clamp->upper)};
 }
 
-Bounded CertificateChecker::values_input(const Json& entry, const std::string& name,
+Bounded CertificateChecker::values_input(const Json& entry, const files::FunctionId& part,
                                          const std::string& where) const {
-  Bounded input{values_box(entry, name, where), {}};
+  Bounded input{values_box(entry, part, where), {}};
   if (entry["input_error"].is_null()) return input;
-  require(parts_.at(name)->precision == files::Precision::kFloat32, where + kNotFloat32);
-  input.error = exact(files::parse_hex_floats(entry["input_error"].at(name)));
+  require(parts_.at(part)->precision == files::Precision::kFloat32, where + kNotFloat32);
+  input.error = exact(files::parse_hex_floats(entry["input_error"].at(part.name())));
   require(
       input.error.size() == input.values.lower.size() &&
           std::all_of(input.error.begin(), input.error.end(), [](const Dyadic& x) { return x.sign() >= 0; }),

@@ -51,22 +51,22 @@ using FactorOf = std::function<Dyadic(const files::Weights& weights, std::size_t
 
 /// The stages of `function`, with `factor` of each layer in front of its activation multiplied to what the activation
 /// passes to the stage behind it.
-std::vector<Matrix> chained(const files::Network& network, const std::string& function,
+std::vector<Matrix> chained(const files::Network& network, const files::FunctionId& function,
                             const std::string& block, const std::vector<double>& scale,
                             const FactorOf& factor) {
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
-  const std::vector<std::string> names = files::networks_of(function);
+  const files::Parts parts = files::parts(network);
+  const std::vector<files::FunctionId> names = function.parts();
   const std::vector<int> coordinates = files::block_coordinates(network, function, block);
   const int inputs = parts.at(names.front())->inputs();
   const bool maps = files::maps_to_invariants(network, function);
   if (maps && !scale.empty())
-    throw std::invalid_argument(function + " takes states, whose invariants have no scale");
+    throw std::invalid_argument(function.name() + " takes states, whose invariants have no scale");
   if (!scale.empty() && scale.size() != static_cast<std::size_t>(inputs)) {
-    throw std::invalid_argument("scale has " + std::to_string(scale.size()) + " numbers, " + function +
+    throw std::invalid_argument("scale has " + std::to_string(scale.size()) + " numbers, " + function.name() +
                                 " has " + std::to_string(inputs) + " inputs");
   }
   std::vector<Matrix> chain;
-  for (const std::string& name : names) {
+  for (const files::FunctionId& name : names) {
     const files::Weights& weights = *parts.at(name);
     for (std::size_t k = 0; k < weights.layers.size(); ++k) {
       const files::Layer& layer = weights.layers[k];
@@ -94,22 +94,23 @@ const files::ActivationFunction& function_after(const files::Weights& weights, s
 
 }  // namespace
 
-std::vector<Matrix> stages(const files::Network& network, const std::string& function,
+std::vector<Matrix> stages(const files::Network& network, const files::FunctionId& function,
                            const std::string& block, const std::vector<double>& scale) {
   BentChain chain = bent_chain(network, function, block, scale);
   if (chain.is_bent())
-    throw std::domain_error(function + " has activations that are not monotone: slopes are not in [0, b]");
+    throw std::domain_error(function.name() +
+                            " has activations that are not monotone: slopes are not in [0, b]");
   return std::move(chain.stages);
 }
 
-BentChain bent_chain(const files::Network& network, const std::string& function, const std::string& block,
-                     const std::vector<double>& scale) {
+BentChain bent_chain(const files::Network& network, const files::FunctionId& function,
+                     const std::string& block, const std::vector<double>& scale) {
   BentChain result;  // what a layer keeps has slope 1, which lies in [0, 1] and in [1 - c, c]
   result.stages = chained(network, function, block, scale, [](const files::Weights& weights, std::size_t k) {
     return unit_of(function_after(weights, k)).slope;
   });
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
-  for (const std::string& name : files::networks_of(function)) {
+  const files::Parts parts = files::parts(network);
+  for (const files::FunctionId& name : function.parts()) {
     const files::Weights& weights = *parts.at(name);
     for (std::size_t k = 0; k + 1 < weights.layers.size(); ++k)
       result.slopes.insert(result.slopes.end(), static_cast<std::size_t>(weights.layers[k].outputs),
@@ -118,16 +119,17 @@ BentChain bent_chain(const files::Network& network, const std::string& function,
   return result;
 }
 
-BentChain chain_on_box(const files::Network& network, const std::string& function, const std::string& block,
-                       const std::vector<double>& scale, const Intervals& box) {
-  if (files::is_rho(function)) throw std::domain_error(function + " has no box");
-  if (network.invariants) throw std::domain_error(function + " is of rotation invariants, which have no box");
+BentChain chain_on_box(const files::Network& network, const files::FunctionId& function,
+                       const std::string& block, const std::vector<double>& scale, const Intervals& box) {
+  if (function.is_rho()) throw std::domain_error(function.name() + " has no box");
+  if (network.invariants)
+    throw std::domain_error(function.name() + " is of rotation invariants, which have no box");
   BentChain result;
   result.stages = chained(network, function, block, scale,
                           [](const files::Weights&, std::size_t) { return Dyadic(1.0); });
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
-  const std::vector<std::string> names = files::networks_of(function);
-  for (const std::string& name : names)
+  const files::Parts parts = files::parts(network);
+  const std::vector<files::FunctionId> names = function.parts();
+  for (const files::FunctionId& name : names)
     for (std::size_t k = 0; k + 1 < parts.at(name)->layers.size(); ++k)
       unit_of(function_after(*parts.at(name), k));  // refuses one that sorts
   for (const std::vector<Interval>& layer : slopes_on_box(*parts.at(names.front()), box))
@@ -161,18 +163,18 @@ HiddenLayer hidden_layer(const files::Layer& layer, bool has_relu) {
 }
 
 /// Parts of a box are decided for ReLU.
-const std::vector<files::Layer>& relu_layers(const files::Network& network, const std::string& part) {
+const std::vector<files::Layer>& relu_layers(const files::Network& network, const files::FunctionId& part) {
   const files::Weights& weights = *files::parts(network).at(part);
-  if (!weights.is_relu()) throw std::invalid_argument(part + " is no ReLU network");
+  if (!weights.is_relu()) throw std::invalid_argument(part.name() + " is no ReLU network");
   return weights.layers;
 }
 
 /// The moving coordinates of `part` and their weights.
-void set_coordinates(LocalFunction& f, const files::Network& network, const std::string& part,
+void set_coordinates(LocalFunction& f, const files::Network& network, const files::FunctionId& part,
                      const std::string& block, const std::vector<double>& scale) {
   f.coordinates = files::block_coordinates(network, part, block);
   if (!scale.empty() && scale.size() != static_cast<std::size_t>(f.hidden.front().inputs))
-    throw std::invalid_argument("scale has not one number per input of " + part);
+    throw std::invalid_argument("scale has not one number per input of " + part.name());
   for (const int k : f.coordinates)
     f.weight.push_back(scale.empty() ? 1.0 : scale.at(static_cast<std::size_t>(k)));
 }
@@ -188,13 +190,13 @@ Matrix gram(const files::Layer& last, const Matrix& q) {
 
 }  // namespace
 
-LocalFunction local_function(const files::Network& network, const std::string& part, const std::string& block,
-                             const std::vector<double>& scale, const Matrix& q) {
+LocalFunction local_function(const files::Network& network, const files::FunctionId& part,
+                             const std::string& block, const std::vector<double>& scale, const Matrix& q) {
   const std::vector<files::Layer>& layers = relu_layers(network, part);
   const files::Layer& last = layers.back();
-  if (layers.size() < 2) throw std::invalid_argument(part + " has no hidden layer");
+  if (layers.size() < 2) throw std::invalid_argument(part.name() + " has no hidden layer");
   if (q.rows != 0 && q.rows != last.outputs)
-    throw std::invalid_argument("the form is not of the outputs of " + part);
+    throw std::invalid_argument("the form is not of the outputs of " + part.name());
   LocalFunction f;
   for (std::size_t k = 0; k + 1 < layers.size(); ++k) f.hidden.push_back(hidden_layer(layers[k], true));
   f.gram = gram(last, q);
@@ -202,10 +204,10 @@ LocalFunction local_function(const files::Network& network, const std::string& p
   return f;
 }
 
-std::vector<HiddenLayer> term_layers(const files::Network& network, const std::string& phi,
-                                     const std::string& rho) {
+std::vector<HiddenLayer> term_layers(const files::Network& network, const files::FunctionId& phi,
+                                     const files::FunctionId& rho) {
   const std::vector<files::Layer>& behind = relu_layers(network, rho);
-  if (behind.size() < 2) throw std::invalid_argument(rho + " has no hidden layer");
+  if (behind.size() < 2) throw std::invalid_argument(rho.name() + " has no hidden layer");
   std::vector<HiddenLayer> result;
   for (const files::Layer& layer : relu_layers(network, phi)) result.push_back(hidden_layer(layer, true));
   result.back().without_relu = result.back().outputs;
@@ -214,15 +216,15 @@ std::vector<HiddenLayer> term_layers(const files::Network& network, const std::s
   return result;
 }
 
-LocalFunction coupled_function(const files::Network& network, const std::string& function,
+LocalFunction coupled_function(const files::Network& network, const files::FunctionId& function,
                                const std::string& block, const std::vector<double>& scale,
                                const std::vector<double>& least, const std::vector<double>& most) {
-  const std::vector<std::string> names = files::networks_of(function);
+  const std::vector<files::FunctionId> names = function.parts();
   LocalFunction f;
   f.hidden = term_layers(network, names[0], names[1]);
-  if (f.hidden.size() < 3) throw std::invalid_argument(names[0] + " has no hidden layer");
+  if (f.hidden.size() < 3) throw std::invalid_argument(names[0].name() + " has no hidden layer");
   f.hidden.resize(f.hidden.size() - 2);
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const files::Parts parts = files::parts(network);
   const std::vector<files::Layer>& behind = parts.at(names[1])->layers;
   f.behind = {hidden_layer(parts.at(names[0])->layers.back(), false)};
   for (std::size_t k = 0; k + 1 < behind.size(); ++k) f.behind.push_back(hidden_layer(behind[k], true));

@@ -130,15 +130,16 @@ Dyadic largest_square(const Intervals& intervals) {
   return sum;
 }
 
-Dyadic silent_step_square(const files::Network& network, const std::string& function,
-                          const std::function<Intervals(const std::string& part)>& inputs) {
+Dyadic silent_step_square(const files::Network& network, const files::FunctionId& function,
+                          const std::function<Intervals(const files::FunctionId& part)>& inputs) {
   Dyadic largest;
   const auto networks = files::parts(network);
-  for (std::vector<std::string> parts : files::beside_silent(network, function)) {
-    if (networks.count(files::kGroundPhi) == 1) parts.emplace_back(files::kGroundPhi);
-    const files::Weights& rho = *networks.at(files::networks_of(function).back());
+  for (std::vector<files::FunctionId> parts : files::beside_silent(network, function)) {
+    if (networks.count(files::FunctionId::ground_phi()) == 1)
+      parts.push_back(files::FunctionId::ground_phi());
+    const files::Weights& rho = *networks.at(function.output_part());
     std::vector<SumTerm> terms;
-    for (const std::string& part : parts)
+    for (const files::FunctionId& part : parts)
       terms.push_back({{network_intervals(*networks.at(part), inputs(part)), {}}, 1, 1});
     const Intervals sum = sum_intervals(terms, static_cast<std::size_t>(rho.inputs()));
     largest = larger(largest, largest_square(network_intervals(rho, sum)));

@@ -57,8 +57,8 @@ Dyadic largest_square(const Intervals& intervals);
 /// At least |f|^2 of the set function `function` among all neighbours from which one of its own kind comes or goes to a
 /// composition in which NET is silent, by exact intervals layer by layer: the square of what f steps by there.
 /// @param inputs the box of a part, as its first layer sees it.
-Dyadic silent_step_square(const files::Network& network, const std::string& function,
-                          const std::function<Intervals(const std::string& part)>& inputs);
+Dyadic silent_step_square(const files::Network& network, const files::FunctionId& function,
+                          const std::function<Intervals(const files::FunctionId& part)>& inputs);
 const Dyadic& larger(const Dyadic& a, const Dyadic& b);
 /// The sum of squares.
 Dyadic square(const std::vector<Dyadic>& values);

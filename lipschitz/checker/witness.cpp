@@ -274,24 +274,24 @@ double sqrt_down(const mpq_class& square) {
   return result;
 }
 
-SlopeFunction slope_function(const files::Network& network, const std::string& function,
-                             const std::vector<std::string>& others) {
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
-  const std::vector<std::string> names = files::networks_of(function);
-  if (files::maps_to_invariants(network, function)) refuse(function + " maps to rotation invariants");
-  std::vector<std::string> neighbours = others;
+SlopeFunction slope_function(const files::Network& network, const files::FunctionId& function,
+                             const std::vector<files::FunctionId>& others) {
+  const files::Parts parts = files::parts(network);
+  const std::vector<files::FunctionId> names = function.parts();
+  if (files::maps_to_invariants(network, function)) refuse(function.name() + " maps to rotation invariants");
+  std::vector<files::FunctionId> neighbours = others;
   neighbours.push_back(names[0]);
   if (files::is_silent_among(network, function, neighbours))
-    refuse(function + " is 0 among these neighbours");
-  const auto term = [&](const std::string& name) {
+    refuse(function.name() + " is 0 among these neighbours");
+  const auto term = [&](const files::FunctionId& name) {
     const bool clamped = network.clamp && files::is_clamped(name);
     return Term{parts.at(name), clamped ? &*network.clamp : nullptr};
   };
   SlopeFunction f{term(names[0]), {}, names.size() == 2 ? parts.at(names[1]) : nullptr};
-  const std::string ground = files::kGroundPhi;
+  const files::FunctionId ground = files::FunctionId::ground_phi();
   std::size_t grounds = names[0] == ground ? 1 : 0;
-  for (const std::string& name : others) {
-    if (!files::is_phi(name)) refuse(name + " is no neighbour");
+  for (const files::FunctionId& name : others) {
+    if (!name.is_phi()) refuse(name.name() + " is no neighbour");
     grounds += name == ground ? 1 : 0;
     f.others.push_back(term(name));
   }
@@ -301,12 +301,12 @@ SlopeFunction slope_function(const files::Network& network, const std::string& f
   return f;
 }
 
-std::vector<mpq_class> value(const files::Network& network, const std::string& function,
-                             const std::vector<std::string>& networks,
+std::vector<mpq_class> value(const files::Network& network, const files::FunctionId& function,
+                             const std::vector<files::FunctionId>& networks,
                              const std::vector<std::vector<float>>& points) {
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
-  const std::vector<std::string> names = files::networks_of(function);
-  if (files::maps_to_invariants(network, function)) refuse(function + " maps to rotation invariants");
+  const files::Parts parts = files::parts(network);
+  const std::vector<files::FunctionId> names = function.parts();
+  if (files::maps_to_invariants(network, function)) refuse(function.name() + " maps to rotation invariants");
   if (names.size() == 1 && networks.size() != 1) refuse("a plain network has one point");
   if (networks.size() != points.size()) refuse("there is not one point per network");
   DyadicVector sum;

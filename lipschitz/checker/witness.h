@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "lipschitz/checker/bounds.h"
+#include "nn/weights/function_id.h"
 #include "nn/weights/network.h"
 #include "nn/weights/weights.h"
 
@@ -38,15 +39,15 @@ struct SlopePoints {
 /// its clamp, and with the fixed neighbours `others` ("phi:<kind>" each), which only a set function has.
 /// @throws std::invalid_argument or std::out_of_range if NET has no such part, one of `others` is no neighbour, the
 ///   ground, where NET has one, does not enter the sum exactly once, or NET is silent among these neighbours.
-SlopeFunction slope_function(const files::Network& network, const std::string& function,
-                             const std::vector<std::string>& others);
+SlopeFunction slope_function(const files::Network& network, const files::FunctionId& function,
+                             const std::vector<files::FunctionId>& others);
 
 /// The value of "network" at one point, or of a set function at the sum of its terms: exact. `networks` names the part
 /// of each point; a set function may have none, and is 0 where NET is silent among them.
 /// @throws std::invalid_argument or std::out_of_range as slope_function(), or if a point does not fit its network, or
 ///   an activation is not ReLU.
-std::vector<mpq_class> value(const files::Network& network, const std::string& function,
-                             const std::vector<std::string>& networks,
+std::vector<mpq_class> value(const files::Network& network, const files::FunctionId& function,
+                             const std::vector<files::FunctionId>& networks,
                              const std::vector<std::vector<float>>& points);
 
 /// |f(x) - f(y)|_2^2 / |x - y|_2^2 for the weights as stored, as a rational number. Where all activations are ReLU or

@@ -21,26 +21,26 @@ constexpr int kMostNeighbours = 3;
 
 /// The fixed neighbours of a set function with `neighbours` neighbours in all: the moving one's own kind first, then
 /// the other kinds in turn, each as often as the claim allows; and the ground.
-std::vector<std::string> other_networks(const Network& network, const Claim& claim, int neighbours) {
-  const std::vector<std::string> names = files::networks_of(claim.function);
-  std::vector<std::string> others;
+std::vector<files::FunctionId> other_networks(const Network& network, const Claim& claim, int neighbours) {
+  const std::vector<files::FunctionId> names = claim.function.parts();
+  std::vector<files::FunctionId> others;
   if (names.size() == 1) return others;
-  const std::string ground = files::kGroundPhi;
+  const files::FunctionId ground = files::FunctionId::ground_phi();
   const bool ground_moves = names[0] == ground;
   if (!ground_moves && files::parts(network).count(ground) == 1) others.push_back(ground);
-  std::vector<std::string> kinds;
+  std::vector<files::FunctionId> kinds;
   if (!ground_moves) kinds.push_back(names[0]);
   for (const auto& [kind, weights] : network.phi) {
-    const std::string name = files::phi_name(kind);
+    const files::FunctionId name = files::FunctionId::phi(kind);
     if (name != ground && name != names[0]) kinds.push_back(name);
   }
   Neighbours left = claim.neighbours;
-  if (!ground_moves && !left.empty()) --left[files::kind_of(names[0])];
+  if (!ground_moves && !left.empty()) --left[names[0].kind()];
   std::size_t turn = 0;
   for (int j = ground_moves ? 0 : 1; j < neighbours; ++j) {
     for (std::size_t tries = 0; tries < kinds.size(); ++tries, ++turn) {
-      const std::string& name = kinds[turn % kinds.size()];
-      if (!claim.neighbours.empty() && left[files::kind_of(name)]-- <= 0) continue;
+      const files::FunctionId& name = kinds[turn % kinds.size()];
+      if (!claim.neighbours.empty() && left[name.kind()]-- <= 0) continue;
       others.push_back(name);
       ++turn;
       break;
@@ -50,17 +50,17 @@ std::vector<std::string> other_networks(const Network& network, const Claim& cla
 }
 
 /// Whether the claim's function is 0 among these neighbours and the one that moves.
-bool is_silent(const Network& network, const Claim& claim, std::vector<std::string> others) {
-  others.push_back(files::networks_of(claim.function).front());
+bool is_silent(const Network& network, const Claim& claim, std::vector<files::FunctionId> others) {
+  others.push_back(claim.function.input_part());
   return files::is_silent_among(network, claim.function, others);
 }
 
 /// Rounds that keep the search of a function to seconds: a region costs about (weights) x (moving inputs).
-int default_rounds(const Network& network, const std::string& function) {
-  const std::map<std::string, const Weights*> parts = files::parts(network);
-  const std::vector<std::string> names = files::networks_of(function);
+int default_rounds(const Network& network, const files::FunctionId& function) {
+  const files::Parts parts = files::parts(network);
+  const std::vector<files::FunctionId> names = function.parts();
   double weights = 0;
-  for (const std::string& name : names) {
+  for (const files::FunctionId& name : names) {
     for (const files::Layer& layer : parts.at(name)->layers)
       weights += static_cast<double>(layer.weights.size());
   }
@@ -123,10 +123,10 @@ SlopeWitness search_scaled(const SlopeFunction& f, const Claim& claim, SlopeSear
 /// Points of a box as float32, nothing being a box that holds none.
 class FloatPoints {
  public:
-  explicit FloatPoints(const std::map<std::string, Box>& domain) : domain_(domain) {}
+  explicit FloatPoints(const Domain& domain) : domain_(domain) {}
 
   /// The nearest to x in the box of `part`.
-  std::optional<std::vector<float>> nearest(const std::string& part, const Eigen::VectorXd& x) const {
+  std::optional<std::vector<float>> nearest(const files::FunctionId& part, const Eigen::VectorXd& x) const {
     constexpr double kMost = std::numeric_limits<float>::max();
     const auto box = domain_.find(part);
     std::vector<float> result;
@@ -142,14 +142,14 @@ class FloatPoints {
   }
 
  private:
-  const std::map<std::string, Box>& domain_;
+  const Domain& domain_;
 };
 
 /// The steepest of several pairs around a place. Short ones are steeper where the function is smooth, long ones keep
 /// their direction when they are rounded to float32.
-void try_pairs(const SlopeFunction& f, const std::string& moved, const SteepPlace& place, const Claim& claim,
-               const std::vector<int>& block, const FloatPoints& points, SlopePoints& pair,
-               FoundSlope& found) {
+void try_pairs(const SlopeFunction& f, const files::FunctionId& moved, const SteepPlace& place,
+               const Claim& claim, const std::vector<int>& block, const FloatPoints& points,
+               SlopePoints& pair, FoundSlope& found) {
   constexpr double kLengths[] = {0.125, 1, 8, 64, 512, 8192};  // of half a step
   for (const double length : kLengths) {
     const Eigen::VectorXd step = length * place.half_step * place.direction;
@@ -166,10 +166,9 @@ void try_pairs(const SlopeFunction& f, const std::string& moved, const SteepPlac
 }
 
 /// Of functions that are not linear by parts, or whose parts search_slope() does not know.
-FoundSlope sampled_lower_bound(const Network& network, const Claim& claim,
-                               const std::map<std::string, Box>& domain, const LowerBoundOptions& options,
-                               int rounds) {
-  const std::map<std::string, Box> boxes = claim.domain == "box" ? domain : std::map<std::string, Box>();
+FoundSlope sampled_lower_bound(const Network& network, const Claim& claim, const Domain& domain,
+                               const LowerBoundOptions& options, int rounds) {
+  const Domain boxes = claim.domain == "box" ? domain : Domain();
   SlopeEstimateOptions search;
   search.seed = options.seed;
   search.domain = boxes;
@@ -181,8 +180,8 @@ FoundSlope sampled_lower_bound(const Network& network, const Claim& claim,
   found.rounds = place.starts;
   found.interrupted = place.interrupted;
   if (is_silent(network, claim, place.other_networks)) return found;
-  const std::string moving = files::networks_of(claim.function).front();
-  std::map<std::string, Box> box_of_moving = boxes;
+  const files::FunctionId moving = claim.function.input_part();
+  Domain box_of_moving = boxes;
   if (options.moved) box_of_moving[moving] = *options.moved;
   const FloatPoints points(boxes), moving_points(box_of_moving);
   SlopePoints pair;
@@ -199,27 +198,27 @@ FoundSlope sampled_lower_bound(const Network& network, const Claim& claim,
 
 }  // namespace
 
-bool has_relu_only(const Network& network, const std::string& function) {
-  const std::vector<std::string> names = files::networks_of(function);
-  const std::map<std::string, const Weights*> parts = files::parts(network);
+bool has_relu_only(const Network& network, const files::FunctionId& function) {
+  const std::vector<files::FunctionId> names = function.parts();
+  const files::Parts parts = files::parts(network);
   return std::all_of(parts.begin(), parts.end(), [&names](const auto& part) {
     const bool enters = std::find(names.begin(), names.end(), part.first) != names.end() ||
-                        (names.size() == 2 && files::is_phi(part.first));
+                        (names.size() == 2 && part.first.is_phi());
     return part.second->is_relu() || !enters;
   });
 }
 
-FoundSlope lower_bound(const Network& network, const Claim& claim, const std::map<std::string, Box>& domain,
+FoundSlope lower_bound(const Network& network, const Claim& claim, const Domain& domain,
                        const LowerBoundOptions& options) {
   FoundSlope best;
   const int rounds = options.rounds.value_or(default_rounds(network, claim.function));
   if (rounds == 0) return best;
   if (!has_relu_only(network, claim.function))
     return sampled_lower_bound(network, claim, domain, options, rounds);
-  const std::vector<std::string> names = files::networks_of(claim.function);
+  const std::vector<files::FunctionId> names = claim.function.parts();
   const int cases = names.size() == 2 ? kMostNeighbours : 1;  // they share the rounds and the seconds
   for (int neighbours = 1; neighbours <= cases; ++neighbours) {
-    const std::vector<std::string> others = other_networks(network, claim, neighbours);
+    const std::vector<files::FunctionId> others = other_networks(network, claim, neighbours);
     if (is_silent(network, claim, others)) continue;
     const SlopeFunction f = slope_function(network, claim.function, others);
     SlopeSearchOptions search;
@@ -233,7 +232,7 @@ FoundSlope lower_bound(const Network& network, const Claim& claim, const std::ma
     if (claim.block != "all") search.block = files::block_coordinates(network, claim.function, claim.block);
     if (claim.domain == "box") {
       search.box = options.moved ? *options.moved : domain.at(names[0]);
-      for (const std::string& name : others) search.other_boxes.emplace_back(domain.at(name));
+      for (const files::FunctionId& name : others) search.other_boxes.emplace_back(domain.at(name));
     }
     SlopeWitness found = claim.scale.empty() ? search_slope(f, search) : search_scaled(f, claim, search);
     best.rounds += found.rounds_done;

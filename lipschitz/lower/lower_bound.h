@@ -31,22 +31,22 @@ struct LowerBoundOptions {
 
 /// Two points that prove a lower bound for a claim.
 struct FoundSlope {
-  std::optional<SlopeWitness> witness;      ///< nothing where no search ran or no two points exist
-  std::vector<std::string> other_networks;  ///< of witness->others, "phi:<kind>" each
+  std::optional<SlopeWitness> witness;            ///< nothing where no search ran or no two points exist
+  std::vector<files::FunctionId> other_networks;  ///< of witness->others, "phi:<kind>" each
   int rounds = 0;
   bool interrupted = false;  ///< stopped before all rounds were done
 };
 
 /// Whether all networks that enter `function` are ReLU networks: those that it passes through, and of a set function,
 /// whose other terms are of any kind, every phi.
-bool has_relu_only(const files::Network& network, const std::string& function);
+bool has_relu_only(const files::Network& network, const files::FunctionId& function);
 
 /// Searches for the steepest pair of points within the claim's block and domain, as steep in the claim's norm as
 /// slope() proves. Of ReLU networks by search_slope(), a set function with one to three neighbours, of every kind and
 /// with the ground; of others around the steep_place(). Never among neighbours where NET is silent.
 /// @param domain the boxes of a claim whose domain is "box", by part.
 /// @throws std::invalid_argument as slope_function(): of functions of rotation invariants there is no such proof.
-FoundSlope lower_bound(const files::Network& network, const Claim& claim,
-                       const std::map<std::string, Box>& domain, const LowerBoundOptions& options);
+FoundSlope lower_bound(const files::Network& network, const Claim& claim, const Domain& domain,
+                       const LowerBoundOptions& options);
 
 }  // namespace swarmcert::lipschitz

@@ -22,18 +22,18 @@ double random_number(std::mt19937_64& generator) {
   return std::ldexp(static_cast<double>(generator() >> 11), -52) - 1;
 }
 
-std::optional<Box> box_in(const std::map<std::string, Box>& domain, const std::string& part) {
+std::optional<Box> box_in(const Domain& domain, const files::FunctionId& part) {
   const auto found = domain.find(part);
   return found == domain.end() ? std::nullopt : std::optional<Box>(found->second);
 }
 
 }  // namespace
 
-SampledFunction::SampledFunction(const files::Network& network, const Claim& claim,
-                                 std::map<std::string, Box> domain, const std::optional<Box>& moved)
+SampledFunction::SampledFunction(const files::Network& network, const Claim& claim, Domain domain,
+                                 const std::optional<Box>& moved)
     : network_(network), domain_(std::move(domain)), half_step_(kHalfStep) {
-  const std::vector<std::string> names = files::networks_of(claim.function);
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const std::vector<files::FunctionId> names = claim.function.parts();
+  const files::Parts parts = files::parts(network);
   for (const auto& [name, weights] : parts) evaluators_.emplace(name, files::Evaluator<double>(*weights));
   first_ = names.front();
   box_ = moved ? moved : box_in(domain_, first_);
@@ -41,13 +41,13 @@ SampledFunction::SampledFunction(const files::Network& network, const Claim& cla
   maps_ = files::maps_to_invariants(network, claim.function);
   if (names.size() == 2) last_ = names.back();
   for (const auto& [name, weights] : parts)
-    if (last_ && claim.neighbours.empty() && files::is_phi(name) && name != files::kGroundPhi)
+    if (last_ && claim.neighbours.empty() && name.is_phi() && !name.is_ground_phi())
       other_kinds_.push_back(name);
   block_ = files::block_coordinates(network, claim.function, claim.block);
   narrow_steps(claim);
   for (const int k : block_)
     scale_.push_back(claim.scale.empty() ? 1.0 : claim.scale[static_cast<std::size_t>(k)]);
-  for (const std::string& name : names)
+  for (const files::FunctionId& name : names)
     for (const files::Layer& layer : parts.at(name)->layers)
       work_ += static_cast<double>(layer.inputs) * layer.outputs;
 }
@@ -70,7 +70,7 @@ void SampledFunction::narrow_steps(const Claim& claim) {
   }
 }
 
-std::optional<std::pair<double, double>> SampledFunction::interval(const std::string& part,
+std::optional<std::pair<double, double>> SampledFunction::interval(const files::FunctionId& part,
                                                                    const std::optional<Box>& box,
                                                                    Index k) const {
   const auto i = static_cast<std::size_t>(k);
@@ -93,8 +93,8 @@ VectorXd SampledFunction::random_point(std::mt19937_64& generator) const {
   return random_point_of(first_, box_, inputs_, generator);
 }
 
-VectorXd SampledFunction::random_point_of(const std::string& part, const std::optional<Box>& box, Index size,
-                                          std::mt19937_64& generator) const {
+VectorXd SampledFunction::random_point_of(const files::FunctionId& part, const std::optional<Box>& box,
+                                          Index size, std::mt19937_64& generator) const {
   const double scale = std::exp2(static_cast<double>(generator() % 8) - 4);
   VectorXd x(size);
   for (Index k = 0; k < size; ++k) {
@@ -113,31 +113,30 @@ void SampledFunction::place_others(std::mt19937_64& generator) {
     other_networks_.clear();
     others_.clear();
     others_sum_ = VectorXd::Zero(files::parts(network_).at(*last_)->inputs());
-    if (network_.phi.count(files::kGroundKind) == 1 && first_ != files::kGroundPhi)
-      add_other(files::kGroundPhi, generator);
+    if (network_.phi.count(files::kGroundKind) == 1 && !first_.is_ground_phi())
+      add_other(files::FunctionId::ground_phi(), generator);
     for (std::uint64_t count = other_kinds_.empty() ? 0 : generator() % 3; count > 0; --count)
       add_other(other_kinds_[generator() % other_kinds_.size()], generator);
-    std::vector<std::string> all = other_networks_;
+    std::vector<files::FunctionId> all = other_networks_;
     all.push_back(first_);
-    is_silent_ = files::is_silent_among(network_,
-                                        files::set_name(files::kind_of(first_), files::kind_of(*last_)), all);
+    is_silent_ = files::is_silent_among(network_, files::FunctionId::set(first_.kind(), last_->kind()), all);
     if (!is_silent_) return;
   }
 }
 
-void SampledFunction::add_other(const std::string& part, std::mt19937_64& generator) {
-  const Index size = files::inputs(network_, files::set_name(files::kind_of(part), files::kind_of(*last_)));
+void SampledFunction::add_other(const files::FunctionId& part, std::mt19937_64& generator) {
+  const Index size = files::inputs(network_, files::FunctionId::set(part.kind(), last_->kind()));
   other_networks_.push_back(part);
   others_.push_back(random_point_of(part, box_in(domain_, part), size, generator));
   others_sum_ += term(part, others_.back());
 }
 
-VectorXd SampledFunction::evaluated(const std::string& part, const VectorXd& x) const {
+VectorXd SampledFunction::evaluated(const files::FunctionId& part, const VectorXd& x) const {
   const std::vector<double> y = evaluators_.at(part)(std::vector<double>(x.data(), x.data() + x.size()));
   return VectorXd::Map(y.data(), static_cast<Index>(y.size()));
 }
 
-VectorXd SampledFunction::term(const std::string& part, VectorXd x) const {
+VectorXd SampledFunction::term(const files::FunctionId& part, VectorXd x) const {
   if (maps_) {
     const std::vector<double> seen = files::invariants_of(part, {x.data(), x.data() + x.size()});
     x = VectorXd::Map(seen.data(), static_cast<Index>(seen.size()));

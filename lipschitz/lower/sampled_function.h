@@ -25,7 +25,7 @@ class SampledFunction {
   };
 
   /// @param domain as it leaves the clamp. @param moved instead of the domain's box of the input that moves.
-  SampledFunction(const files::Network& network, const Claim& claim, std::map<std::string, Box> domain,
+  SampledFunction(const files::Network& network, const Claim& claim, Domain domain,
                   const std::optional<Box>& moved = std::nullopt);
 
   Eigen::Index inputs() const { return inputs_; }
@@ -35,7 +35,7 @@ class SampledFunction {
   void set_half_step(double half_step) { half_step_ = half_step; }
   /// Multiplications of one steepest().
   double work() const { return 2 * work_ * static_cast<double>(block_.size() + 1); }
-  const std::vector<std::string>& other_networks() const { return other_networks_; }
+  const std::vector<files::FunctionId>& other_networks() const { return other_networks_; }
   const std::vector<Eigen::VectorXd>& others() const { return others_; }
 
   /// 0, or the middle of the box.
@@ -58,33 +58,33 @@ class SampledFunction {
   /// In a box points move neither along inputs that it fixes nor, with the room that random_point() leaves, out of it.
   void narrow_steps(const Claim& claim);
   /// Where input k of `part` may be, which has this box; nothing: anywhere.
-  std::optional<std::pair<double, double>> interval(const std::string& part, const std::optional<Box>& box,
-                                                    Eigen::Index k) const;
-  Eigen::VectorXd random_point_of(const std::string& part, const std::optional<Box>& box, Eigen::Index size,
-                                  std::mt19937_64& generator) const;
-  void add_other(const std::string& part, std::mt19937_64& generator);
-  Eigen::VectorXd evaluated(const std::string& part, const Eigen::VectorXd& x) const;
-  Eigen::VectorXd term(const std::string& part, Eigen::VectorXd x) const;
+  std::optional<std::pair<double, double>> interval(const files::FunctionId& part,
+                                                    const std::optional<Box>& box, Eigen::Index k) const;
+  Eigen::VectorXd random_point_of(const files::FunctionId& part, const std::optional<Box>& box,
+                                  Eigen::Index size, std::mt19937_64& generator) const;
+  void add_other(const files::FunctionId& part, std::mt19937_64& generator);
+  Eigen::VectorXd evaluated(const files::FunctionId& part, const Eigen::VectorXd& x) const;
+  Eigen::VectorXd term(const files::FunctionId& part, Eigen::VectorXd x) const;
   /// (f(x + h d) - f(x - h d)) / (2 h) for d in the block, in units of the scale.
   Eigen::VectorXd quotient(const Eigen::VectorXd& x, const Eigen::VectorXd& direction) const;
   /// Of the box or the clamp, or 1.
   double width(Eigen::Index k) const;
 
   const files::Network& network_;
-  std::map<std::string, Box> domain_;  ///< of the others
-  std::optional<Box> box_;             ///< of the input that moves
+  Domain domain_;           ///< of the others
+  std::optional<Box> box_;  ///< of the input that moves
   double half_step_;
-  std::map<std::string, files::Evaluator<double>> evaluators_;
-  std::string first_;
-  std::optional<std::string> last_;
+  std::map<files::FunctionId, files::Evaluator<double>> evaluators_;
+  files::FunctionId first_;
+  std::optional<files::FunctionId> last_;
   Eigen::Index inputs_ = 0;
   bool maps_ = false;       ///< to invariants, before the clamp
   bool is_silent_ = false;  ///< among the one that moves and the others
   std::vector<int> block_;
   std::vector<double> scale_;
   double work_ = 0;
-  std::vector<std::string> other_kinds_;  ///< of neighbours that may stand beside the one that moves
-  std::vector<std::string> other_networks_;
+  std::vector<files::FunctionId> other_kinds_;  ///< of neighbours that may stand beside the one that moves
+  std::vector<files::FunctionId> other_networks_;
   std::vector<Eigen::VectorXd> others_;
   Eigen::VectorXd others_sum_;
 };

@@ -121,7 +121,7 @@ SteepPlace steep_place(const files::Network& network, const Claim& claim,
                        const SlopeEstimateOptions& options) {
   std::optional<Box> moved = options.moved;
   if (moved) {
-    const std::string part = files::networks_of(claim.function).front();
+    const files::FunctionId part = claim.function.input_part();
     moved = clamped(network, {{part, *moved}}).at(part);
   }
   SteepSearch search(SampledFunction(network, claim, clamped(network, options.domain), moved), options);

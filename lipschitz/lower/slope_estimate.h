@@ -18,7 +18,7 @@ namespace swarmcert::lipschitz {
 
 struct SlopeEstimateOptions {
   std::uint64_t seed = 1;
-  std::map<std::string, Box> domain;  ///< by part, as the claim's; empty: all inputs
+  Domain domain;             ///< by part, as the claim's; empty: all inputs
   std::optional<Box> moved;  ///< where the input that moves lies, instead of the domain's box of its part
   int starts = 24;  ///< random points, from each of which the slope is climbed; fewer for large networks
   Stop stop;        ///< a start that it cuts short counts for nothing, unless it is the first
@@ -31,7 +31,7 @@ struct SteepPlace {
   Eigen::VectorXd x, direction;  ///< [inputs]; the direction is in the block, of length 1 in the claim's norm
   double half_step = 0;          ///< in the claim's norm
   /// Of a set function: the networks whose terms do not move, "phi:<kind>" each, and where these are.
-  std::vector<std::string> other_networks;
+  std::vector<files::FunctionId> other_networks;
   std::vector<Eigen::VectorXd> others;
   int starts = 0;            ///< that were finished
   bool interrupted = false;  ///< stopped before all starts were

@@ -76,9 +76,9 @@ bool flip(const std::vector<MatrixXd>& chain, Pattern& pattern, double& slope, c
   return false;
 }
 
-std::vector<std::string> stage_names(const files::Network& network, const std::string& function) {
+std::vector<std::string> stage_names(const files::Network& network, const files::FunctionId& function) {
   const auto parts = files::parts(network);
-  const std::vector<std::string> names = files::networks_of(function);
+  const std::vector<files::FunctionId> names = function.parts();
   std::vector<std::string> result;
   for (const files::Layer& layer : parts.at(names[0])->layers) result.push_back(layer.name);
   if (names.size() == 1) return result;
@@ -150,7 +150,7 @@ PatternFloor pattern_floor(const std::vector<check::Matrix>& stages, int starts,
   return result;
 }
 
-Comparison compare(const files::Network& network, const std::string& function, const std::string& block,
+Comparison compare(const files::Network& network, const files::FunctionId& function, const std::string& block,
                    const std::vector<double>& scale, const Stop& stop) {
   const std::vector<check::Matrix> stages = check::stages(network, function, block, scale);
   Comparison result;

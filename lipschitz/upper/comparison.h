@@ -52,7 +52,7 @@ struct Comparison {
 };
 
 /// All of the above for one function and block of NET. What a stop leaves no time for is not there.
-Comparison compare(const files::Network& network, const std::string& function, const std::string& block,
+Comparison compare(const files::Network& network, const files::FunctionId& function, const std::string& block,
                    const std::vector<double>& scale, const Stop& stop = {});
 
 }  // namespace swarmcert::lipschitz

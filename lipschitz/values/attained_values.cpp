@@ -19,19 +19,19 @@ constexpr int kValueSamples = 400, kValueClimbs = 200;
 
 /// The inputs of the terms of a function, in the box.
 struct BoxPoint {
-  std::vector<std::string> networks;
+  std::vector<files::FunctionId> networks;
   std::vector<std::vector<float>> inputs;
 };
 
 class ValueSearch {
  public:
-  ValueSearch(const files::Network& network, const std::map<std::string, Box>& domain,
-              const std::string& function, int neighbours, std::uint64_t seed)
+  ValueSearch(const files::Network& network, const Domain& domain, const files::FunctionId& function,
+              int neighbours, std::uint64_t seed)
       : network_(network),
         function_(function),
         parts_(files::parts(network)),
         domain_(domain),
-        names_(files::networks_of(function)),
+        names_(function.parts()),
         neighbours_(neighbours),
         generator_(seed) {
     for (const auto& [name, weights] : parts_) evaluators_.emplace(name, files::Evaluator<double>(*weights));
@@ -76,7 +76,7 @@ class ValueSearch {
 
  private:
   /// What phi sees of a point: itself, or about its invariants, as they leave the clamp.
-  Box seen_at(const std::string& name, const std::vector<float>& x) const {
+  Box seen_at(const files::FunctionId& name, const std::vector<float>& x) const {
     const Box point{{x.begin(), x.end()}, {x.begin(), x.end()}};
     if (!files::maps_to_invariants(network_, function_)) return point;
     return clamped(network_, {{name, invariant_box(name, point)}}).at(name);
@@ -90,11 +90,12 @@ class ValueSearch {
     if (names_.size() == 2) {
       const int count = 1 + static_cast<int>(generator_() % static_cast<std::uint64_t>(neighbours_));
       point.networks.assign(static_cast<std::size_t>(count), names_[0]);
-      if (parts_.count(files::kGroundPhi) == 1) point.networks.emplace_back(files::kGroundPhi);
+      if (parts_.count(files::FunctionId::ground_phi()) == 1)
+        point.networks.emplace_back(files::FunctionId::ground_phi());
     } else {
       point.networks = {names_[0]};
     }
-    for (const std::string& name : point.networks) {
+    for (const files::FunctionId& name : point.networks) {
       const Box& box = domain_.at(name);
       std::vector<float> x;
       for (std::size_t k = 0; k < box.lower.size(); ++k) {
@@ -135,20 +136,20 @@ class ValueSearch {
   }
 
   const files::Network& network_;
-  std::string function_;
-  std::map<std::string, const files::Weights*> parts_;
-  const std::map<std::string, Box>& domain_;
-  std::vector<std::string> names_;
+  files::FunctionId function_;
+  files::Parts parts_;
+  const Domain& domain_;
+  std::vector<files::FunctionId> names_;
   int neighbours_;
   std::mt19937_64 generator_;
-  std::map<std::string, files::Evaluator<double>> evaluators_;
+  std::map<files::FunctionId, files::Evaluator<double>> evaluators_;
 };
 
 }  // namespace
 
-std::vector<AttainedEnds> attained_ends(const files::Network& network,
-                                        const std::map<std::string, Box>& domain, const std::string& function,
-                                        int neighbours, std::uint64_t seed) {
+std::vector<AttainedEnds> attained_ends(const files::Network& network, const Domain& domain,
+                                        const files::FunctionId& function, int neighbours,
+                                        std::uint64_t seed) {
   ValueSearch search(network, domain, function, neighbours, seed);
   std::vector<AttainedEnds> result;
   for (int output = 0; output < search.outputs(); ++output) {

@@ -22,8 +22,8 @@ struct AttainedEnds {
 /// box holds no float32.
 /// @param function "network" or "set:<phi kind>:<rho kind>", with 1 to `neighbours` of the kind and the ground's input.
 /// @param domain by part, finite, as it leaves the clamp; of states, before it, where the network has invariants.
-std::vector<AttainedEnds> attained_ends(const files::Network& network,
-                                        const std::map<std::string, Box>& domain, const std::string& function,
-                                        int neighbours, std::uint64_t seed = 1);
+std::vector<AttainedEnds> attained_ends(const files::Network& network, const Domain& domain,
+                                        const files::FunctionId& function, int neighbours,
+                                        std::uint64_t seed = 1);
 
 }  // namespace swarmcert::lipschitz

@@ -129,15 +129,11 @@ struct TermError {
 
 class SetError {
  public:
-  SetError(const Network& network, const std::string& function, const std::map<std::string, Box>& domain,
-           int nodes, const Stop& stop)
-      : names_(files::networks_of(function)),
-        parts_(files::parts(network)),
-        domain_(domain),
-        nodes_(nodes),
-        stop_(stop) {
-    has_ground_ =
-        names_.size() == 2 && names_[0] != files::kGroundPhi && parts_.count(files::kGroundPhi) == 1;
+  SetError(const Network& network, const files::FunctionId& function, const Domain& domain, int nodes,
+           const Stop& stop)
+      : names_(function.parts()), parts_(files::parts(network)), domain_(domain), nodes_(nodes), stop_(stop) {
+    has_ground_ = names_.size() == 2 && !names_[0].is_ground_phi() &&
+                  parts_.count(files::FunctionId::ground_phi()) == 1;
     phi_ = reach_network(*parts_.at(names_[0]));
     const std::vector<double> whole = tails(check::stages(network, function), stop);
     phi_tails_ = whole;
@@ -151,11 +147,11 @@ class SetError {
     neighbour_ = term(phi_, names_[0], phi_tails_);
     if (!has_ground_) return;
     std::vector<double> ground_tails =
-        tails(check::stages(network, files::set_name(files::kGroundKind, files::kind_of(names_[1]))), stop);
-    const ReachNetwork ground = reach_network(*parts_.at(files::kGroundPhi));
+        tails(check::stages(network, files::FunctionId::set(files::kGroundKind, names_[1].kind())), stop);
+    const ReachNetwork ground = reach_network(*parts_.at(files::FunctionId::ground_phi()));
     ground_tails.resize(ground.size() - 1);
     ground_tails.push_back(rho_bound_);
-    ground_ = term(ground, files::kGroundPhi, ground_tails);
+    ground_ = term(ground, files::FunctionId::ground_phi(), ground_tails);
   }
 
   double plain() const {
@@ -172,7 +168,7 @@ class SetError {
   }
 
  private:
-  TermError term(const ReachNetwork& network, const std::string& part,
+  TermError term(const ReachNetwork& network, const files::FunctionId& part,
                  const std::vector<double>& tail) const {
     TermError result;
     const Box& box = domain_.at(part);
@@ -229,9 +225,9 @@ class SetError {
     });
   }
 
-  std::vector<std::string> names_;
-  std::map<std::string, const files::Weights*> parts_;
-  const std::map<std::string, Box>& domain_;
+  std::vector<files::FunctionId> names_;
+  files::Parts parts_;
+  const Domain& domain_;
   int nodes_;
   Stop stop_;
   bool has_ground_ = false;
@@ -252,26 +248,26 @@ std::vector<double> input_errors(const Box& box, double step) {
   return result;
 }
 
-std::vector<Float32Error> float32_errors(const Network& network, const std::map<std::string, Box>& domain,
-                                         const std::map<std::string, double>& lipschitz,
+std::vector<Float32Error> float32_errors(const Network& network, const Domain& domain,
+                                         const std::map<files::FunctionId, double>& lipschitz,
                                          const Float32Options& options) {
   for (const auto& [name, weights] : files::parts(network)) {
     if (weights->precision != files::Precision::kFloat32)
-      throw std::invalid_argument("float32_errors: " + name + " is not stored in float32");
+      throw std::invalid_argument("float32_errors: " + name.name() + " is not stored in float32");
   }
-  const std::map<std::string, Box> inner = clamped(network, domain);
-  std::map<std::string, double> moved;  // |q(x) - x| per part
-  std::map<std::string, Box> inflated_domain;
+  const Domain inner = clamped(network, domain);
+  std::map<files::FunctionId, double> moved;  // |q(x) - x| per part
+  Domain inflated_domain;
   for (const auto& [part, box] : inner) {
     const std::vector<double> errors = input_errors(box, options.input_step);
     moved[part] = norm(errors);
     inflated_domain[part] = inflated(box, errors);
   }
-  const std::vector<std::string> functions = value_functions(network);
+  const std::vector<files::FunctionId> functions = value_functions(network);
   std::vector<std::vector<Float32Error>> found(functions.size());
   files::parallel_for(static_cast<int>(functions.size()), options.jobs, [&](int index) {
-    const std::string& function = functions[static_cast<std::size_t>(index)];
-    const std::vector<std::string> names = files::networks_of(function);
+    const files::FunctionId& function = functions[static_cast<std::size_t>(index)];
+    const std::vector<files::FunctionId> names = function.parts();
     const int nodes = options.nodes > 0 ? options.nodes : usual_nodes(network, function, kUsualRoundingNodes);
     const SetError error(network, function, inflated_domain, nodes, options.stop);
     double evaluation = 0;
@@ -279,9 +275,9 @@ std::vector<Float32Error> float32_errors(const Network& network, const std::map<
       evaluation = std::max(evaluation, names.size() == 1 ? error.plain() : error.set(n));
       if (n == 0) continue;
       double inputs = n * lipschitz.at(function) * moved.at(names[0]);
-      if (names.size() == 2 && moved.count(files::kGroundPhi) == 1) {
-        const std::string ground = files::set_name(files::kGroundKind, files::kind_of(names[1]));
-        inputs += lipschitz.at(ground) * moved.at(files::kGroundPhi);
+      if (names.size() == 2 && moved.count(files::FunctionId::ground_phi()) == 1) {
+        const files::FunctionId ground = files::FunctionId::set(files::kGroundKind, names[1].kind());
+        inputs += lipschitz.at(ground) * moved.at(files::FunctionId::ground_phi());
       }
       Float32Error one;
       one.function = function;

@@ -15,7 +15,7 @@ namespace swarmcert::lipschitz {
 /// |f32(q(x)) - f(x)|_2 over the box, f32 being nn/mlp.h and nn/deep_set.h in float, f the exact function of the
 /// weights as stored, q the conversion of the inputs to what the evaluation gets.
 struct Float32Error {
-  std::string function;        ///< "network" or "set:<phi kind>:<rho kind>"
+  files::FunctionId function;  ///< "network" or "set:<phi kind>:<rho kind>"
   int neighbours_at_most = 0;  ///< of the kind; 0 for a plain network
   UpperBound evaluation{0};    ///< |f32(x) - f(x)| for float32 inputs x
   UpperBound inputs{
@@ -51,9 +51,8 @@ std::vector<double> input_errors(const Box& box, double step);
 /// @param domain by part, finite.
 /// @param lipschitz proved bounds by function: of "network" or the set functions, the ground's among them.
 /// @throws std::invalid_argument if a network is not stored in float32: its evaluation rounds the weights first.
-std::vector<Float32Error> float32_errors(const files::Network& network,
-                                         const std::map<std::string, Box>& domain,
-                                         const std::map<std::string, double>& lipschitz,
+std::vector<Float32Error> float32_errors(const files::Network& network, const Domain& domain,
+                                         const std::map<files::FunctionId, double>& lipschitz,
                                          const Float32Options& options);
 
 }  // namespace swarmcert::lipschitz

@@ -72,8 +72,8 @@ bool within(const std::vector<float>& point, const Box& box) {
 
 const FormShares& shares(bool is_alike) { return is_alike ? kSharesOfHints : kShares; }
 
-std::vector<std::string> parts_of(const Composition& neighbours) {
-  std::vector<std::string> parts;
+std::vector<files::FunctionId> parts_of(const Composition& neighbours) {
+  std::vector<files::FunctionId> parts;
   for (const auto& [part, count] : neighbours)
     parts.insert(parts.end(), static_cast<std::size_t>(count), part);
   return parts;
@@ -87,16 +87,16 @@ double round_down(const mpq_class& exact) {
 
 }  // namespace
 
-FunctionRange::FunctionRange(const Network& network, const std::map<std::string, Box>& domain,
-                             const std::string& function, int nodes, int jobs)
+FunctionRange::FunctionRange(const Network& network, const Domain& domain, const files::FunctionId& function,
+                             int nodes, int jobs)
     : network_(network),
       domain_(domain),
-      names_(files::networks_of(function)),
+      names_(function.parts()),
       nodes_(nodes),
       jobs_(jobs),
       function_(function),
       parts_(files::parts(network)) {
-  has_ground_ = names_.size() == 2 && parts_.count(files::kGroundPhi) == 1;
+  has_ground_ = names_.size() == 2 && parts_.count(files::FunctionId::ground_phi()) == 1;
   if (names_.size() == 2) rho_ = reach_network(*parts_.at(names_[1]));
 }
 
@@ -140,7 +140,7 @@ Attained FunctionRange::attained(int output, double sign, const Candidates& cand
     Attained one;
     for (std::size_t j = 0; j < candidate.size(); ++j) {
       const bool is_ground = has_ground_ && j + 1 == candidate.size();
-      one.networks.push_back(is_ground ? std::string(files::kGroundPhi) : names_[0]);
+      one.networks.push_back(is_ground ? files::FunctionId::ground_phi() : names_[0]);
       one.points.push_back(float_point(candidate[j], domain_.at(one.networks.back())));
       if (!within(one.points.back(), domain_.at(one.networks.back())))
         return best;  // the box holds no float32
@@ -160,7 +160,7 @@ PartSearch FunctionRange::search_of_forms(double share) const {
   return {static_cast<int>(nodes_ * share) + 1, kCloseForms, jobs_};
 }
 
-const FunctionRange::Term& FunctionRange::term(const std::string& part) {
+const FunctionRange::Term& FunctionRange::term(const files::FunctionId& part) {
   Term& term = terms_[part];
   if (!term.network.empty()) return term;
   term.network = reach_network(*parts_.at(part));
@@ -172,7 +172,7 @@ FunctionRange::Terms FunctionRange::all_terms(const Composition& neighbours) con
   Terms all;
   for (const auto& [part, count] : neighbours)
     if (count > 0) all.emplace_back(part, count);
-  if (has_ground_) all.emplace_back(files::kGroundPhi, 1);
+  if (has_ground_) all.emplace_back(files::FunctionId::ground_phi(), 1);
   return all;
 }
 
@@ -188,7 +188,7 @@ const FunctionRange::Sums& FunctionRange::sums(const Composition& neighbours) {
   return sums;
 }
 
-VectorXd FunctionRange::middle(const std::string& part) const {
+VectorXd FunctionRange::middle(const files::FunctionId& part) const {
   const Box& box = domain_.at(part);
   VectorXd middle(static_cast<Index>(box.lower.size()));
   for (Index k = 0; k < middle.size(); ++k) {
@@ -207,14 +207,14 @@ std::vector<VectorXd> FunctionRange::middles(const Composition& neighbours) cons
 
 double FunctionRange::beside_one(const RowVectorXd& direction, const Composition& neighbour,
                                  Candidates& starts) {
-  const std::string part = parts_of(neighbour).front();
+  const files::FunctionId part = parts_of(neighbour).front();
   ReachNetwork chain = term(part).network;
   if (has_ground_) add_interval(chain.back(), sums({}).support.bounds());
   chain.insert(chain.end(), rho_.begin(), rho_.end());
   const Maximum found = maximise(chain, direction, domain_.at(part), search_of_boxes());
   starts.push_back({found.x});
   if (!has_ground_) return found.upper;
-  starts.back().push_back(middle(files::kGroundPhi));
+  starts.back().push_back(middle(files::FunctionId::ground_phi()));
   return std::min(found.upper, by_support(direction, neighbour, starts));
 }
 

@@ -17,7 +17,7 @@
 namespace swarmcert::lipschitz {
 
 /// How many neighbours there are, by network: "phi:<kind>".
-using Composition = std::map<std::string, int>;
+using Composition = std::map<files::FunctionId, int>;
 
 /// Points of the terms of a sum, one list per proposal: a point per neighbour, then the ground's.
 using Candidates = std::vector<std::vector<Eigen::VectorXd>>;
@@ -28,8 +28,8 @@ class FunctionRange {
  public:
   /// @param domain what each part sees, finite; it and the network must outlive this.
   /// @param nodes boxes per search.
-  FunctionRange(const files::Network& network, const std::map<std::string, Box>& domain,
-                const std::string& function, int nodes, int jobs);
+  FunctionRange(const files::Network& network, const Domain& domain, const files::FunctionId& function,
+                int nodes, int jobs);
 
   Eigen::Index outputs() const { return parts_.at(names_.back())->outputs(); }
   /// At least the largest |phi|_2 over the box.
@@ -58,15 +58,15 @@ class FunctionRange {
   };
 
   /// Networks and how often each is in the sum.
-  using Terms = std::vector<std::pair<std::string, int>>;
+  using Terms = std::vector<std::pair<files::FunctionId, int>>;
 
   MaximiseOptions search_of_boxes() const;
   PartSearch search_of_forms(double share) const;
-  const Term& term(const std::string& part);
+  const Term& term(const files::FunctionId& part);
   /// The neighbours, and the ground's term where there is one.
   Terms all_terms(const Composition& neighbours) const;
   const Sums& sums(const Composition& neighbours);
-  Eigen::VectorXd middle(const std::string& part) const;
+  Eigen::VectorXd middle(const files::FunctionId& part) const;
   std::vector<Eigen::VectorXd> middles(const Composition& neighbours) const;
 
   // Bounds on direction f. `starts`: where the terms of what lies above f are largest, one x per term.
@@ -86,14 +86,14 @@ class FunctionRange {
                Candidates& candidates);
 
   const files::Network& network_;
-  const std::map<std::string, Box>& domain_;
-  std::vector<std::string> names_;
+  const Domain& domain_;
+  std::vector<files::FunctionId> names_;
   int nodes_, jobs_;
-  std::string function_;
-  std::map<std::string, const files::Weights*> parts_;
+  files::FunctionId function_;
+  files::Parts parts_;
   bool has_ground_ = false;
   ReachNetwork rho_;
-  std::map<std::string, Term> terms_;
+  std::map<files::FunctionId, Term> terms_;
   std::map<Composition, Sums> sums_;
 };
 

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "lipschitz/base/rounding.h"
-#include "nn/weights/function_names.h"
+#include "nn/weights/function_id.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -45,10 +45,10 @@ void add_norm(const Interval& x, const Interval& y, Box& box) {
 
 }  // namespace
 
-Box invariant_box(const std::string& part, const Box& states) {
+Box invariant_box(const files::FunctionId& part, const Box& states) {
   const auto at = [&states](std::size_t k) { return Interval{states.lower[k], states.upper[k]}; };
   Box box;
-  if (part == files::kGroundPhi) {
+  if (part.is_ground_phi()) {
     add(at(0), box);
     add_norm(at(1), at(2), box);
     add(at(3), box);
@@ -62,8 +62,8 @@ Box invariant_box(const std::string& part, const Box& states) {
   return box;
 }
 
-std::map<std::string, Box> invariant_boxes(const std::map<std::string, Box>& states) {
-  std::map<std::string, Box> boxes;
+Domain invariant_boxes(const Domain& states) {
+  Domain boxes;
   for (const auto& [part, box] : states) boxes[part] = invariant_box(part, box);
   return boxes;
 }

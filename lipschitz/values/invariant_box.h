@@ -11,9 +11,9 @@ namespace swarmcert::lipschitz {
 /// Where the invariants lie that phi sees of states in a box (nn/invariants.h), each by itself: exact bounds, rounded
 /// outwards.
 /// @param part  "phi:<kind>"; states of "phi:ground" are the vehicle's own, of others those of a neighbour.
-Box invariant_box(const std::string& part, const Box& states);
+Box invariant_box(const files::FunctionId& part, const Box& states);
 
 /// Of every part.
-std::map<std::string, Box> invariant_boxes(const std::map<std::string, Box>& states);
+Domain invariant_boxes(const Domain& states);
 
 }  // namespace swarmcert::lipschitz

@@ -32,14 +32,13 @@ struct Ends {
 class RangesOf {
  public:
   /// @param states where the inputs are; `domain`: what phi sees of them.
-  RangesOf(const Network& network, const std::map<std::string, Box>& states,
-           const std::map<std::string, Box>& domain, std::string function,
+  RangesOf(const Network& network, const Domain& states, const Domain& domain, files::FunctionId function,
            const std::map<std::string, double>& rho_bound, const RangeOptions& options,
            std::function<void()> searched)
       : network_(network),
         states_(states),
         function_(std::move(function)),
-        names_(files::networks_of(function_)),
+        names_(function_.parts()),
         is_set_(names_.size() == 2),
         only_kind_(network.phi.size() == 1 + network.phi.count(files::kGroundKind)),
         neighbours_(options.neighbours),
@@ -48,7 +47,7 @@ class RangesOf {
                 options.nodes > 0 ? options.nodes : usual_nodes(network, function_, kUsualRangeNodes),
                 options.jobs) {
     if (!is_set_) return;
-    jump_at_any_sum_ = up(values_.jump_norm() * rho_bound.at(files::kind_of(names_[1])));
+    jump_at_any_sum_ = up(values_.jump_norm() * rho_bound.at(names_[1].kind()));
     // Of one kind, all steps are seen one after the other.
     if (!only_kind_) beside_silent_ = steps_of(network, function_);
   }
@@ -60,11 +59,11 @@ class RangesOf {
   }
 
   /// Compositions in which values are bounded beside those of the function's own kind, for the jump.
-  static std::vector<Composition> steps_of(const Network& network, const std::string& function) {
+  static std::vector<Composition> steps_of(const Network& network, const files::FunctionId& function) {
     std::vector<Composition> result;
-    for (const std::vector<std::string>& parts : files::beside_silent(network, function)) {
+    for (const std::vector<files::FunctionId>& parts : files::beside_silent(network, function)) {
       result.emplace_back();
-      for (const std::string& part : parts) ++result.back()[part];
+      for (const files::FunctionId& part : parts) ++result.back()[part];
     }
     return result;
   }
@@ -125,9 +124,9 @@ class RangesOf {
   }
 
   const Network& network_;
-  const std::map<std::string, Box>& states_;
-  std::string function_;
-  std::vector<std::string> names_;
+  const Domain& states_;
+  files::FunctionId function_;
+  std::vector<files::FunctionId> names_;
   bool is_set_, only_kind_;
   int neighbours_;
   std::function<void()> searched_;
@@ -138,21 +137,20 @@ class RangesOf {
 
 /// Whether branch and bound on values can follow `function`, and with it the ground's term, and those of neighbours
 /// beside which the network is silent.
-bool is_of_relu(const Network& network, const std::string& function) {
+bool is_of_relu(const Network& network, const files::FunctionId& function) {
   const auto is_relu = [&network](const std::string& kind) {
     const auto phi = network.phi.find(kind);
     return phi == network.phi.end() || phi->second.is_relu();
   };
-  for (const std::vector<std::string>& parts : files::beside_silent(network, function))
-    for (const std::string& part : parts)
-      if (!is_relu(files::kind_of(part))) return false;
+  for (const std::vector<files::FunctionId>& parts : files::beside_silent(network, function))
+    for (const files::FunctionId& part : parts)
+      if (!is_relu(part.kind())) return false;
   return files::is_relu(network, function) && is_relu(files::kGroundKind);
 }
 
 /// What a certificate states of a function with other activations, and values that it takes.
-std::vector<CertifiedRange> stated_ranges(const Network& network, const std::map<std::string, Box>& states,
-                                          const std::map<std::string, Box>& domain,
-                                          const std::string& function,
+std::vector<CertifiedRange> stated_ranges(const Network& network, const Domain& states, const Domain& domain,
+                                          const files::FunctionId& function,
                                           const std::map<std::string, double>& rho_bound,
                                           const RangeOptions& options) {
   std::vector<CertifiedRange> result;
@@ -178,8 +176,8 @@ std::vector<CertifiedRange> stated_ranges(const Network& network, const std::map
 
 }  // namespace
 
-std::map<std::string, Box> clamped(const Network& network, const std::map<std::string, Box>& domain) {
-  std::map<std::string, Box> result = domain;
+Domain clamped(const Network& network, const Domain& domain) {
+  Domain result = domain;
   if (!network.clamp) return result;
   for (auto& [part, box] : result) {
     if (!files::is_clamped(part)) continue;
@@ -191,54 +189,53 @@ std::map<std::string, Box> clamped(const Network& network, const std::map<std::s
   return result;
 }
 
-std::map<std::string, Box> clamp_domain(const Network& network) {
-  std::map<std::string, Box> result;
+Domain clamp_domain(const Network& network) {
+  Domain result;
   if (!network.clamp || network.phi.count(files::kGroundKind) == 1) return result;
   for (const auto& [kind, phi] : network.phi)
-    result[files::phi_name(kind)] = {network.clamp->lower, network.clamp->upper};
+    result[files::FunctionId::phi(kind)] = {network.clamp->lower, network.clamp->upper};
   if (network.plain) result["network"] = {network.clamp->lower, network.clamp->upper};
   return result;
 }
 
-int usual_nodes(const Network& network, const std::string& function, int most) {
+int usual_nodes(const Network& network, const files::FunctionId& function, int most) {
   constexpr double kFewest = 600, kWeights = 8000;
   double weights = 0;
   const auto parts = files::parts(network);
-  for (const std::string& name : files::networks_of(function))
+  for (const files::FunctionId& name : function.parts())
     for (const files::Layer& layer : parts.at(name)->layers) weights += layer.inputs * layer.outputs;
   return static_cast<int>(std::clamp(most * std::pow(kWeights / weights, 2), kFewest, 1.0 * most));
 }
 
-std::vector<std::string> value_functions(const Network& network) {
-  std::vector<std::string> functions;
-  for (const std::string& function : files::functions(network)) {
-    const bool is_set = files::is_set(function);
-    if (function == "network" || (is_set && files::networks_of(function)[0] != files::kGroundPhi))
+std::vector<files::FunctionId> value_functions(const Network& network) {
+  std::vector<files::FunctionId> functions;
+  for (const files::FunctionId& function : files::functions(network)) {
+    const bool is_set = function.is_set();
+    if (function == "network" || (is_set && !function.parts()[0].is_ground_phi()))
       functions.push_back(function);
   }
   return functions;
 }
 
-std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::string, Box>& domain,
+std::vector<CertifiedRange> ranges(const Network& network, const Domain& domain,
                                    const std::map<std::string, double>& rho_bound,
                                    const RangeOptions& options) {
-  const std::map<std::string, Box> inner =
-      clamped(network, network.invariants ? invariant_boxes(domain) : domain);
-  const std::map<std::string, Box>& states = network.invariants ? domain : inner;
+  const Domain inner = clamped(network, network.invariants ? invariant_boxes(domain) : domain);
+  const Domain& states = network.invariants ? domain : inner;
   // One function after the other: each search uses all threads.
   std::vector<CertifiedRange> result;
   int done = 0, total = 0;
-  const std::vector<std::string> functions = value_functions(network);
-  for (const std::string& function : functions) {
+  const std::vector<files::FunctionId> functions = value_functions(network);
+  for (const files::FunctionId& function : functions) {
     if (!is_of_relu(network, function)) continue;
-    const int outputs = files::parts(network).at(files::networks_of(function).back())->outputs();
+    const int outputs = files::parts(network).at(function.output_part())->outputs();
     const int steps = static_cast<int>(RangesOf::steps_of(network, function).size());
-    total += outputs * (files::is_set(function) ? 2 * (1 + options.neighbours + steps) : 2);
+    total += outputs * (function.is_set() ? 2 * (1 + options.neighbours + steps) : 2);
   }
   const auto searched = [&] {
     if (options.progress) options.progress(++done, total);
   };
-  for (const std::string& function : functions) {
+  for (const files::FunctionId& function : functions) {
     const std::vector<CertifiedRange> found =
         is_of_relu(network, function)
             ? RangesOf(network, states, inner, function, rho_bound, options, searched).all()

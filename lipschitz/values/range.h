@@ -18,13 +18,13 @@ namespace swarmcert::lipschitz {
 /// A value that the function takes, at float32 points of the box: evaluated exactly, or enclosed, and rounded inwards.
 struct Attained {
   double value = 0;
-  std::vector<std::string> networks;       ///< "phi:<kind>" per point, or "network"
-  std::vector<std::vector<float>> points;  ///< empty: no neighbours
+  std::vector<files::FunctionId> networks;  ///< "phi:<kind>" per point, or "network"
+  std::vector<std::vector<float>> points;   ///< empty: no neighbours
 };
 
 /// lower <= f <= upper in exact arithmetic, for the weights as stored, at every point of the box.
 struct CertifiedRange {
-  std::string function;        ///< "network" or "set:<phi kind>:<rho kind>"
+  files::FunctionId function;  ///< "network" or "set:<phi kind>:<rho kind>"
   int output = 0;              ///< index of the output
   int neighbours_at_most = 0;  ///< of the kind, each anywhere in its box; 0 for a plain network
   double lower = 0, upper = 0;
@@ -48,10 +48,10 @@ struct RangeOptions {
 
 /// Boxes per search for a function of NET where nobody says: `most`, at least 600, or fewer in between for networks of
 /// more than 8000 weights: a box costs about the square of their number.
-int usual_nodes(const files::Network& network, const std::string& function, int most);
+int usual_nodes(const files::Network& network, const files::FunctionId& function, int most);
 
 /// The functions whose values are enclosed: the network, or each set function of neighbours.
-std::vector<std::string> value_functions(const files::Network& network);
+std::vector<files::FunctionId> value_functions(const files::Network& network);
 
 /// Ranges of the plain network or of every set function, for 1, 2, ... neighbours of one kind; with the ground's term
 /// where there is one. The clamp of NET acts first: with it the range holds for every input, where its interval lies
@@ -68,15 +68,15 @@ std::vector<std::string> value_functions(const files::Network& network);
 /// Of networks of rotation invariants: over the boxes of invariants that hold those of the states.
 /// @param domain by part, finite; of states where NET has invariants.
 /// @param rho_bound a proved Lipschitz bound of rho, by its kind; for the jump |f - f'| <= L |phi(x)|.
-std::vector<CertifiedRange> ranges(const files::Network& network, const std::map<std::string, Box>& domain,
+std::vector<CertifiedRange> ranges(const files::Network& network, const Domain& domain,
                                    const std::map<std::string, double>& rho_bound,
                                    const RangeOptions& options);
 
 /// What the network's clamp lets through of a box, per part.
-std::map<std::string, Box> clamped(const files::Network& network, const std::map<std::string, Box>& domain);
+Domain clamped(const files::Network& network, const Domain& domain);
 
 /// The box that NET's clamp makes of all inputs, for every part that it clamps; empty if there is no clamp, or a part
 /// without one (the ground).
-std::map<std::string, Box> clamp_domain(const files::Network& network);
+Domain clamp_domain(const files::Network& network);
 
 }  // namespace swarmcert::lipschitz

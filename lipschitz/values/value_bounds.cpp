@@ -33,21 +33,22 @@ bool all_finite(const Row& values) {
 /// Follows the values of one function through its layers, as the checker will.
 class Values {
  public:
-  Values(const files::Network& network, std::map<std::string, Box> domain, const ValueOptions& options)
+  Values(const files::Network& network, Domain domain, const ValueOptions& options)
       : network_(network), parts_(files::parts(network)), domain_(std::move(domain)), options_(options) {}
 
-  std::optional<CertifiedValues> of(const std::string& function, int neighbours,
+  std::optional<CertifiedValues> of(const files::FunctionId& function, int neighbours,
                                     const std::map<std::string, double>& rho_bound) const {
     CertifiedValues found;
     found.function = function;
     found.neighbours = neighbours;
     found.in_clamp = options_.in_clamp;
-    const std::vector<std::string> names = files::networks_of(function);
-    std::vector<std::string> inputs = {names[0]};
-    if (names.size() == 2 && parts_.count(files::kGroundPhi) == 1) inputs.emplace_back(files::kGroundPhi);
+    const std::vector<files::FunctionId> names = function.parts();
+    std::vector<files::FunctionId> inputs = {names[0]};
+    if (names.size() == 2 && parts_.count(files::FunctionId::ground_phi()) == 1)
+      inputs.emplace_back(files::FunctionId::ground_phi());
     Bounded values;
     std::vector<check::SumTerm> terms;
-    for (const std::string& name : inputs) {
+    for (const files::FunctionId& name : inputs) {
       const Box& box = domain_.at(name);
       values = {{exact_numbers(box.lower), exact_numbers(box.upper)}, {}};
       if (options_.float32) {
@@ -55,12 +56,12 @@ class Values {
         values.error = exact_numbers(found.input_error[name]);
       }
       if (!through_layers(name, values, found)) return std::nullopt;
-      const bool is_ground = name == files::kGroundPhi;
+      const bool is_ground = name.is_ground_phi();
       terms.push_back({values, is_ground ? 1 : 0, is_ground ? 1 : neighbours});
     }
     if (names.size() == 2) {
       const auto size = static_cast<std::size_t>(parts_.at(names[1])->inputs());
-      const double slope = rho_bound.at(files::kind_of(names[1]));
+      const double slope = rho_bound.at(names[1].kind());
       const Dyadic square = Dyadic(slope) * slope * check::largest_square(terms.front().values);
       found.jump = sqrt_up(check::larger(square, check::silent_step_square(network_, function, boxes())));
       found.sum = rounded(check::sum_intervals(terms, size),
@@ -75,15 +76,15 @@ class Values {
   }
 
  private:
-  std::function<check::Intervals(const std::string&)> boxes() const {
-    return [this](const std::string& part) {
+  std::function<check::Intervals(const files::FunctionId&)> boxes() const {
+    return [this](const files::FunctionId& part) {
       const Box& box = domain_.at(part);
       return check::Intervals{exact_numbers(box.lower), exact_numbers(box.upper)};
     };
   }
 
   void state_ends(CertifiedValues& found) const {
-    const VectorBounds& last = found.layers.at(files::networks_of(found.function).back()).back();
+    const VectorBounds& last = found.layers.at(found.function.output_part()).back();
     found.lower = last.lower;
     found.upper = last.upper;
     const long silent = files::silent_up_to(network_, found.function, found.neighbours);
@@ -109,7 +110,7 @@ class Values {
     return result;
   }
 
-  bool through_layers(const std::string& name, Bounded& values, CertifiedValues& found) const {
+  bool through_layers(const files::FunctionId& name, Bounded& values, CertifiedValues& found) const {
     std::vector<VectorBounds>& layers = found.layers[name];
     if (!parts_.at(name)->is_relu()) {
       for (const check::Intervals& exact : check::layers_on_box(*parts_.at(name), values.values)) {
@@ -132,25 +133,25 @@ class Values {
   }
 
   const files::Network& network_;
-  std::map<std::string, const files::Weights*> parts_;
-  std::map<std::string, Box> domain_;
+  files::Parts parts_;
+  Domain domain_;
   ValueOptions options_;
 };
 
 }  // namespace
 
-std::vector<CertifiedValues> certified_values(const files::Network& network,
-                                              const std::map<std::string, Box>& domain,
+std::vector<CertifiedValues> certified_values(const files::Network& network, const Domain& domain,
                                               const std::map<std::string, double>& rho_bound,
-                                              const ValueOptions& options, const std::string& only) {
-  const std::map<std::string, Box> inner = clamped(network, domain);
+                                              const ValueOptions& options,
+                                              const std::optional<files::FunctionId>& only) {
+  const Domain inner = clamped(network, domain);
   ValueOptions exact_only = options;
   exact_only.float32 = false;
   const Values values(network, inner, options), without_float32(network, inner, exact_only);
   std::vector<CertifiedValues> result;
-  for (const std::string& function : value_functions(network)) {
-    if (!only.empty() && function != only) continue;
-    const bool is_set = files::is_set(function);
+  for (const files::FunctionId& function : value_functions(network)) {
+    if (only && function != *only) continue;
+    const bool is_set = function.is_set();
     for (int n = is_set ? 1 : 0; n <= (is_set ? options.neighbours : 0); ++n) {
       std::optional<CertifiedValues> found = values.of(function, n, rho_bound);
       if (!found && options.float32) found = without_float32.of(function, n, rho_bound);

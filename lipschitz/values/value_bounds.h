@@ -21,11 +21,12 @@ struct VectorBounds {
 /// of other activations than ReLU also by linear forms (checker/centred_form.h): wider than range.h and float32_error.h
 /// find by branch and bound, and as easy to verify.
 struct CertifiedValues {
-  std::string function;                                     ///< "network" or "set:<phi kind>:<rho kind>"
-  int neighbours = 0;                                       ///< at most, of the kind; 0 for a plain network
-  bool in_clamp = false;                                    ///< the box is what the input clamp lets through
-  std::map<std::string, std::vector<double>> input_error;   ///< by network; empty: nothing is said of float32
-  std::map<std::string, std::vector<VectorBounds>> layers;  ///< of each network, before its ReLU
+  files::FunctionId function;  ///< "network" or "set:<phi kind>:<rho kind>"
+  int neighbours = 0;          ///< at most, of the kind; 0 for a plain network
+  bool in_clamp = false;       ///< the box is what the input clamp lets through
+  std::map<files::FunctionId, std::vector<double>>
+      input_error;  ///< by network; empty: nothing is said of float32
+  std::map<files::FunctionId, std::vector<VectorBounds>> layers;  ///< of each network, before its ReLU
   std::optional<VectorBounds> sum;  ///< what rho takes in; nothing for a plain network
   /// Bounds of f: those of the last layer; widened to contain 0 if NET is silent for some composition of at most
   /// `neighbours` neighbours, and exactly 0 if it is silent for all of them.
@@ -46,10 +47,10 @@ struct ValueOptions {
 /// float32 errors where float32 might overflow.
 /// @param domain by part, finite, of every input.
 /// @param rho_bound a proved Lipschitz bound of rho, by its kind, which the certificate contains.
-/// @param function only of this one; empty: of all.
-std::vector<CertifiedValues> certified_values(const files::Network& network,
-                                              const std::map<std::string, Box>& domain,
+/// @param only of this function; nothing: of all.
+std::vector<CertifiedValues> certified_values(const files::Network& network, const Domain& domain,
                                               const std::map<std::string, double>& rho_bound,
-                                              const ValueOptions& options, const std::string& function = "");
+                                              const ValueOptions& options,
+                                              const std::optional<files::FunctionId>& only = std::nullopt);
 
 }  // namespace swarmcert::lipschitz

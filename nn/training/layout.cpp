@@ -9,19 +9,19 @@ namespace swarmcert::training {
 
 Layout::Layout(std::vector<Part> parts) : parts_(std::move(parts)) {
   for (Part& part : parts_) {
-    if (part.layers() < 1) throw std::invalid_argument(part.name + ": no layer");
+    if (part.layers() < 1) throw std::invalid_argument(part.id.name() + ": no layer");
     part.begin = size_;
     for (int k = 0; k < part.layers(); ++k) {
       if (part.sizes[k] < 1 || part.sizes[k + 1] < 1)
-        throw std::invalid_argument(part.name + ": empty layer");
+        throw std::invalid_argument(part.id.name() + ": empty layer");
       size_ += static_cast<Eigen::Index>(part.sizes[k] + 1) * part.sizes[k + 1];
     }
   }
 }
 
-int Layout::find(const std::string& name) const {
+int Layout::find(const files::FunctionId& id) const {
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    if (parts_[i].name == name) return static_cast<int>(i);
+    if (parts_[i].id == id) return static_cast<int>(i);
   }
   return -1;
 }
@@ -77,13 +77,13 @@ files::Weights Layout::stored(const Vector& theta, int part) const {
 void Layout::load(Vector& theta, int part, const files::Weights& stored_part) const {
   const Part& p = parts_[part];
   if (static_cast<int>(stored_part.layers.size()) != p.layers())
-    throw std::invalid_argument(p.name + ": other number of layers");
+    throw std::invalid_argument(p.id.name() + ": other number of layers");
   for (int k = 0; k < p.layers(); ++k) {
     const files::Layer& layer = stored_part.layers[k];
     Eigen::Map<Matrix> w = weights(theta, part, k);
     Eigen::Map<Vector> b = biases(theta, part, k);
     if (layer.outputs != w.rows() || layer.inputs != w.cols())
-      throw std::invalid_argument(p.name + ": other size of layer " + layer.name);
+      throw std::invalid_argument(p.id.name() + ": other size of layer " + layer.name);
     for (int i = 0; i < layer.outputs; ++i) {
       for (int j = 0; j < layer.inputs; ++j)
         w(i, j) = static_cast<float>(layer.weights[static_cast<std::size_t>(i) * layer.inputs + j]);

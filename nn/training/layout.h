@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "nn/weights/function_id.h"
 #include "nn/weights/weights.h"
 
 namespace swarmcert::training {
@@ -18,7 +19,7 @@ using Vector = Eigen::VectorXf;
 
 /// One multilayer perceptron of the set: "phi:small" or "rho:small".
 struct Part {
-  std::string name;
+  files::FunctionId id;    ///< a phi or a rho
   std::vector<int> sizes;  ///< inputs, hidden layers, outputs
   Eigen::Index begin = 0;  ///< first parameter: per layer W (column-major, [outputs x inputs]), then b
   /// Which inputs are x and y of one vector in the world frame: see turn_about_vertical().
@@ -38,8 +39,8 @@ class Layout {
 
   Eigen::Index size() const { return size_; }
   const std::vector<Part>& parts() const { return parts_; }
-  /// Index of a part; -1 if there is none of that name.
-  int find(const std::string& name) const;
+  /// Index of a part; -1 if there is none such.
+  int find(const files::FunctionId& id) const;
 
   Eigen::Map<Matrix> weights(Vector& theta, int part, int layer) const;
   Eigen::Map<const Matrix> weights(const Vector& theta, int part, int layer) const;

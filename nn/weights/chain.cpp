@@ -7,10 +7,10 @@
 
 namespace swarmcert::files {
 
-std::vector<ChainStep> chain(const Network& network, const std::string& name) {
-  const Weights& weights = *parts(network).at(name);
+std::vector<ChainStep> chain(const Network& network, const FunctionId& part) {
+  const Weights& weights = *parts(network).at(part);
   std::vector<ChainStep> result;
-  if (network.clamp && is_clamped(name)) result.push_back({"clamp", "", weights.inputs(), weights.inputs()});
+  if (network.clamp && is_clamped(part)) result.push_back({"clamp", "", weights.inputs(), weights.inputs()});
   for (const Layer& layer : weights.layers) {
     result.push_back({"linear", layer.name, layer.inputs, layer.outputs});
     if (&layer != &weights.layers.back())
@@ -44,14 +44,14 @@ std::string chain_words(const std::vector<ChainStep>& chain) {
 
 std::string chain_words(const Network& network) {
   std::vector<std::pair<std::string, std::string>> chains;  // words, and the parts that have them
-  for (const auto& [name, weights] : parts(network)) {
-    const std::string words = chain_words(chain(network, name));
+  for (const auto& [part, weights] : parts(network)) {
+    const std::string words = chain_words(chain(network, part));
     auto same = chains.begin();
     while (same != chains.end() && same->first != words) ++same;
     if (same == chains.end()) {
-      chains.emplace_back(words, name);
+      chains.emplace_back(words, part.name());
     } else {
-      same->second += ", " + name;
+      same->second += ", " + part.name();
     }
   }
   if (network.plain) return chains.front().first;

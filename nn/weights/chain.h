@@ -16,10 +16,10 @@ struct ChainStep {
   std::string words = {};  ///< of an activation, in texts
 };
 
-/// The operations of part `name` of NET, first applied first: the clamp where one acts on it, then its layers with an
+/// The operations of `part` of NET, first applied first: the clamp where one acts on it, then its layers with an
 /// activation after each but the last.
 /// @throws std::out_of_range if NET has no such part.
-std::vector<ChainStep> chain(const Network& network, const std::string& name);
+std::vector<ChainStep> chain(const Network& network, const FunctionId& part);
 
 /// `[{op, layer, inputs, outputs}]`; `layer` is null where the step is none.
 Json chain_json(const std::vector<ChainStep>& chain);

@@ -40,53 +40,52 @@ std::vector<int> silent_counts(const Network& network, const std::string& own) {
   return counts;
 }
 
-bool is_ever_silent(const Network& network, const std::string& function) {
-  return is_set(function) && network.silent.count(kind_of(networks_of(function).back())) == 1;
+bool is_ever_silent(const Network& network, const FunctionId& function) {
+  return function.is_set() && network.silent.count(function.rho_kind()) == 1;
 }
 
-bool is_silent_among(const Network& network, const std::string& function,
-                     const std::vector<std::string>& parts) {
-  if (!is_set(function)) return false;
-  const auto found = network.silent.find(kind_of(networks_of(function).back()));
+bool is_silent_among(const Network& network, const FunctionId& function,
+                     const std::vector<FunctionId>& parts) {
+  if (!function.is_set()) return false;
+  const auto found = network.silent.find(function.rho_kind());
   if (found == network.silent.end()) return false;
   std::vector<std::string> kinds;
-  for (const std::string& part : parts)
-    if (part != kGroundPhi) kinds.push_back(kind_of(part));
+  for (const FunctionId& part : parts)
+    if (!part.is_ground_phi()) kinds.push_back(part.kind());
   std::sort(kinds.begin(), kinds.end());
   return found->second.count(kinds) == 1;
 }
 
-long silent_up_to(const Network& network, const std::string& function, long most) {
+long silent_up_to(const Network& network, const FunctionId& function, long most) {
   if (!is_ever_silent(network, function)) return 0;
-  const std::vector<std::string> names = networks_of(function);
-  const auto& compositions = network.silent.at(kind_of(names.back()));
+  const auto& compositions = network.silent.at(function.rho_kind());
   return std::count_if(
       compositions.begin(), compositions.end(), [&](const std::vector<std::string>& neighbours) {
         return static_cast<long>(neighbours.size()) <= most &&
                std::all_of(neighbours.begin(), neighbours.end(),
-                           [&](const std::string& kind) { return kind == kind_of(names.front()); });
+                           [&](const std::string& kind) { return kind == function.phi_kind(); });
       });
 }
 
-std::set<std::vector<std::string>> beside_silent(const Network& network, const std::string& function) {
-  std::set<std::vector<std::string>> result;
+std::set<std::vector<FunctionId>> beside_silent(const Network& network, const FunctionId& function) {
+  std::set<std::vector<FunctionId>> result;
   if (!is_ever_silent(network, function)) return result;
-  const std::vector<std::string> names = networks_of(function);
-  if (names.front() == kGroundPhi) return result;  // the ground stays
-  for (const std::vector<std::string>& neighbours : network.silent.at(kind_of(names.back()))) {
-    std::vector<std::string> parts;
-    for (const std::string& kind : neighbours) parts.push_back(phi_name(kind));
-    const auto add = [&](std::vector<std::string> beside) {
+  const FunctionId own_phi = function.input_part();
+  if (own_phi.is_ground_phi()) return result;  // the ground stays
+  for (const std::vector<std::string>& neighbours : network.silent.at(function.rho_kind())) {
+    std::vector<FunctionId> parts;
+    for (const std::string& kind : neighbours) parts.push_back(FunctionId::phi(kind));
+    const auto add = [&](std::vector<FunctionId> beside) {
       std::sort(beside.begin(), beside.end());
       if (!is_silent_among(network, function, beside)) result.insert(std::move(beside));
     };
-    const auto own = std::find(parts.begin(), parts.end(), names.front());
+    const auto own = std::find(parts.begin(), parts.end(), own_phi);
     if (own != parts.end()) {
-      std::vector<std::string> fewer = parts;
+      std::vector<FunctionId> fewer = parts;
       fewer.erase(fewer.begin() + (own - parts.begin()));
       add(std::move(fewer));
     }
-    parts.push_back(names.front());
+    parts.push_back(own_phi);
     add(std::move(parts));
   }
   return result;

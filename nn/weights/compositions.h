@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "nn/weights/function_id.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::files {
@@ -25,18 +26,18 @@ std::vector<int> silent_counts(const Network& network, const std::string& own);
 /// Whether `function` is a set function that is 0 in some compositions. Then it is no composition of rho and a sum as a
 /// whole: slopes are bounded while the neighbours stay the same, and it steps where one that comes or goes makes or
 /// ends such a composition.
-bool is_ever_silent(const Network& network, const std::string& function);
+bool is_ever_silent(const Network& network, const FunctionId& function);
 
 /// Whether NET is silent for exactly these neighbours ("phi:<kind>" each, an entry for the ground is ignored), so that
 /// the set function `function` is 0.
-bool is_silent_among(const Network& network, const std::string& function,
-                     const std::vector<std::string>& parts);
+bool is_silent_among(const Network& network, const FunctionId& function,
+                     const std::vector<FunctionId>& parts);
 
 /// How many of the compositions of 0, 1, ... `most` neighbours of the set function's own kind are silent.
-long silent_up_to(const Network& network, const std::string& function, long most);
+long silent_up_to(const Network& network, const FunctionId& function, long most);
 
 /// The compositions with a network from which one neighbour of the set function's own kind comes or goes to a silent
 /// one: the neighbours of each, "phi:<kind>", in order of names. The function steps there by all of its value.
-std::set<std::vector<std::string>> beside_silent(const Network& network, const std::string& function);
+std::set<std::vector<FunctionId>> beside_silent(const Network& network, const FunctionId& function);
 
 }  // namespace swarmcert::files

@@ -30,10 +30,10 @@ std::vector<std::string> ground_names() {
 }
 
 /// Names that show which inputs are positions and which velocities; empty where nobody knows.
-std::vector<std::string> input_names(const Network& network, const std::string& function, int inputs) {
-  if (is_rho(function)) return {};
-  const bool is_ground = networks_of(function).front() == kGroundPhi;
-  if (network.invariants && is_phi(function))
+std::vector<std::string> input_names(const Network& network, const FunctionId& function, int inputs) {
+  if (function.is_rho()) return {};
+  const bool is_ground = function.input_part().is_ground_phi();
+  if (network.invariants && function.is_phi())
     return is_ground ? own_invariant_names() : neighbour_invariant_names();
   if (is_ground) return ground_names();
   if (!network.input_order.empty()) return network.input_order;
@@ -43,49 +43,41 @@ std::vector<std::string> input_names(const Network& network, const std::string& 
 
 }  // namespace
 
-std::map<std::string, const Weights*> parts(const Network& network) {
-  std::map<std::string, const Weights*> result;
-  if (network.plain) result["network"] = &*network.plain;
-  for (const auto& [kind, weights] : network.phi) result[phi_name(kind)] = &weights;
-  for (const auto& [kind, weights] : network.rho) result[rho_name(kind)] = &weights;
+Parts parts(const Network& network) {
+  Parts result;
+  if (network.plain) result[FunctionId()] = &*network.plain;
+  for (const auto& [kind, weights] : network.phi) result[FunctionId::phi(kind)] = &weights;
+  for (const auto& [kind, weights] : network.rho) result[FunctionId::rho(kind)] = &weights;
   return result;
 }
 
-std::vector<std::string> networks_of(const std::string& function) {
-  if (function == kPlainNetwork || is_phi(function) || is_rho(function)) return {function};
-  const std::size_t colon = function.find(':', 4);
-  if (!is_set(function) || colon == std::string::npos) {
-    throw std::invalid_argument("networks_of: no function is called \"" + function + "\"");
-  }
-  return {phi_name(function.substr(4, colon - 4)), rho_name(function.substr(colon + 1))};
-}
-
-std::vector<std::string> functions(const Network& network) {
-  std::vector<std::string> names;
-  for (const auto& [name, weights] : parts(network)) names.push_back(name);
+std::vector<FunctionId> functions(const Network& network) {
+  std::vector<FunctionId> result;
+  for (const auto& [part, weights] : parts(network)) result.push_back(part);
   for (const auto& [phi_kind, phi] : network.phi) {
-    for (const auto& [rho_kind, rho] : network.rho) names.push_back(set_name(phi_kind, rho_kind));
+    for (const auto& [rho_kind, rho] : network.rho) result.push_back(FunctionId::set(phi_kind, rho_kind));
   }
-  return names;
+  return result;
 }
 
-int inputs(const Network& network, const std::string& function) {
-  const std::string first = networks_of(function).front();
-  if (maps_to_invariants(network, function)) return first == kGroundPhi ? nn::kOwnState : nn::kRelativeState;
+int inputs(const Network& network, const FunctionId& function) {
+  const FunctionId first = function.input_part();
+  if (maps_to_invariants(network, function))
+    return first.is_ground_phi() ? nn::kOwnState : nn::kRelativeState;
   return parts(network).at(first)->inputs();
 }
 
-bool is_clamped(const std::string& name) {
-  return name == kPlainNetwork || (is_phi(name) && name != kGroundPhi);
+bool is_clamped(const FunctionId& part) {
+  return part.is_plain() || (part.is_phi() && !part.is_ground_phi());
 }
 
-std::vector<int> block_coordinates(const Network& network, const std::string& function,
+std::vector<int> block_coordinates(const Network& network, const FunctionId& function,
                                    const std::string& block) {
   const int count = inputs(network, function);
   const std::vector<std::string> names = input_names(network, function, count);
   std::vector<int> result;
   if (maps_to_invariants(network, function) && block != "all") {
-    throw std::invalid_argument("block_coordinates: " + function +
+    throw std::invalid_argument("block_coordinates: " + function.name() +
                                 " is bounded for all inputs together, not for \"" + block +
                                 "\": its phi sees invariants of them");
   }
@@ -99,13 +91,13 @@ std::vector<int> block_coordinates(const Network& network, const std::string& fu
     }
   }
   if (result.empty())
-    throw std::invalid_argument("block_coordinates: " + function + " has no block \"" + block + "\"");
+    throw std::invalid_argument("block_coordinates: " + function.name() + " has no block \"" + block + "\"");
   return result;
 }
 
-std::vector<std::string> blocks(const Network& network, const std::string& function) {
+std::vector<std::string> blocks(const Network& network, const FunctionId& function) {
   const int count = inputs(network, function);
-  if (is_rho(function) || count == 1 || maps_to_invariants(network, function)) return {};
+  if (function.is_rho() || count == 1 || maps_to_invariants(network, function)) return {};
   std::vector<std::string> result;
   const std::vector<std::string> names = input_names(network, function, count);
   const auto has = [&names](const char* suffix) {
@@ -116,7 +108,7 @@ std::vector<std::string> blocks(const Network& network, const std::string& funct
   return result;
 }
 
-std::string unit(const Network& network, const std::string& function, const std::string& block) {
+std::string unit(const Network& network, const FunctionId& function, const std::string& block) {
   const std::string output = network.output_unit.empty() ? "output" : network.output_unit;
   std::vector<std::string> moved;  // stays empty where NET states no names: then their units are unknown
   if (!network.input_order.empty()) moved = input_names(network, function, inputs(network, function));
@@ -126,8 +118,8 @@ std::string unit(const Network& network, const std::string& function, const std:
     moved = names;
   }
   const std::string input = input_unit(moved);
-  if (is_phi(function)) return "hidden/" + input;
-  if (is_rho(function)) return output + "/hidden";
+  if (function.is_phi()) return "hidden/" + input;
+  if (function.is_rho()) return output + "/hidden";
   return output + "/" + input;
 }
 

@@ -22,18 +22,17 @@ const std::vector<std::string>& own_invariant_names() {
   return kNames;
 }
 
-bool maps_to_invariants(const Network& network, const std::string& function) {
-  return network.invariants && is_set(function);
+bool maps_to_invariants(const Network& network, const FunctionId& function) {
+  return network.invariants && function.is_set();
 }
 
-double slope_of_inputs(const Network& network, const std::string& function) {
+double slope_of_inputs(const Network& network, const FunctionId& function) {
   if (!maps_to_invariants(network, function)) return 1;
-  return networks_of(function).front() == kGroundPhi ? nn::kOwnInvariantsSlope
-                                                     : nn::kNeighbourInvariantsSlope;
+  return function.input_part().is_ground_phi() ? nn::kOwnInvariantsSlope : nn::kNeighbourInvariantsSlope;
 }
 
-std::vector<double> invariants_of(const std::string& phi, const std::vector<double>& state) {
-  const bool is_ground = phi == kGroundPhi;
+std::vector<double> invariants_of(const FunctionId& phi, const std::vector<double>& state) {
+  const bool is_ground = phi.is_ground_phi();
   std::vector<double> invariants(is_ground ? nn::kOwnInvariants : nn::kNeighbourInvariants);
   if (is_ground)
     nn::own_invariants(state.data(), invariants.data());

@@ -344,16 +344,16 @@ void require_relu(const Network& network, const std::string& what) {
   for (const auto& [part, weights] : parts(network)) {
     if (weights->is_relu()) continue;
     throw InputError({weights->path, "", "activation", in_quotes(weights->activation_names()),
-                      "is between the layers of " + part + ", but " + what,
+                      "is between the layers of " + part.name() + ", but " + what,
                       "bounds for all inputs are what can be said of this network: certify it"});
   }
 }
 
-bool is_relu(const Network& network, const std::string& function) {
-  const std::map<std::string, const Weights*> stored = parts(network);
-  const std::vector<std::string> names = networks_of(function);
-  return std::all_of(names.begin(), names.end(),
-                     [&stored](const std::string& name) { return stored.at(name)->is_relu(); });
+bool is_relu(const Network& network, const FunctionId& function) {
+  const Parts stored = parts(network);
+  const std::vector<FunctionId> through = function.parts();
+  return std::all_of(through.begin(), through.end(),
+                     [&stored](const FunctionId& part) { return stored.at(part)->is_relu(); });
 }
 
 Network load_evaluated_network(const NetworkArguments& arguments) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "nn/weights/function_id.h"
 #include "nn/weights/weights.h"
 
 namespace swarmcert::files {
@@ -85,7 +86,7 @@ void require_relu(const Network& network, const std::string& what);
 
 /// Whether every network that `function` passes through has ReLU (functions.h).
 /// @throws std::out_of_range if NET has no such part.
-bool is_relu(const Network& network, const std::string& function);
+bool is_relu(const Network& network, const FunctionId& function);
 
 /// with_activation() of every part (activation.h).
 Network with_activation(Network network, const std::string& activation);

@@ -19,7 +19,7 @@ std::map<std::string, Samples> record_samples(const Network& network, const Part
   std::map<std::string, Samples> result;
   Random random(seed);
   for (const auto& [part, weights] : parts(network)) {
-    Samples& samples = result[part];
+    Samples& samples = result[part.name()];
     samples.inputs = weights->inputs();
     samples.outputs = weights->outputs();
     const bool has_clamp = network.clamp && is_clamped(part);
@@ -33,7 +33,7 @@ std::map<std::string, Samples> record_samples(const Network& network, const Part
         input.push_back(static_cast<float>(lower + share * (upper - lower)));
       }
       samples.x.insert(samples.x.end(), input.begin(), input.end());
-      const std::vector<double> y = output(part, input);
+      const std::vector<double> y = output(part.name(), input);
       samples.y.insert(samples.y.end(), y.begin(), y.end());
     }
   }
@@ -42,7 +42,8 @@ std::map<std::string, Samples> record_samples(const Network& network, const Part
 
 PartOutput float32_output(const Network& network) {
   const auto evaluators = std::make_shared<std::map<std::string, Evaluator<float>>>();
-  for (const auto& [part, weights] : parts(network)) evaluators->emplace(part, Evaluator<float>(*weights));
+  for (const auto& [part, weights] : parts(network))
+    evaluators->emplace(part.name(), Evaluator<float>(*weights));
   return [evaluators](const std::string& part, const std::vector<float>& input) {
     const std::vector<float> y = evaluators->at(part)(input);
     return std::vector<double>(y.begin(), y.end());

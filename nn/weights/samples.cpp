@@ -83,10 +83,10 @@ Json samples_json(const std::map<std::string, Samples>& samples) {
   return {{"schema", "swarmcert/samples/1"}, {"networks", std::move(networks)}};
 }
 
-SampleAgreement hold_against(const Network& network, const std::string& name, const Samples& samples,
+SampleAgreement hold_against(const Network& network, const FunctionId& part, const Samples& samples,
                              double relative) {
-  const Evaluator<double> evaluator(*parts(network).at(name));
-  const bool has_clamp = network.clamp && is_clamped(name);
+  const Evaluator<double> evaluator(*parts(network).at(part));
+  const bool has_clamp = network.clamp && is_clamped(part);
   const double tolerance = tolerance_of(samples, relative);
   const auto inputs = static_cast<std::size_t>(samples.inputs),
              outputs = static_cast<std::size_t>(samples.outputs);

@@ -57,7 +57,7 @@ inline constexpr double kSampleTolerance = 1e-5;
 /// The tolerance is `relative` times the spread of the recorded outputs (of the one that varies most; its largest
 /// magnitude where nothing varies), and 2^-20 of the largest output, 16 units in the last place of float32.
 /// @throws InputError with the worst sample, its inputs, recorded and computed output where one differs by more.
-SampleAgreement hold_against(const Network& network, const std::string& name, const Samples& samples,
+SampleAgreement hold_against(const Network& network, const FunctionId& part, const Samples& samples,
                              double relative = kSampleTolerance);
 
 }  // namespace swarmcert::files

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <string_view>
 
 #include "nn/base/csv.h"
@@ -188,11 +189,12 @@ void check_count(const Samples& samples) {
 
 Samples samples_of(const Network& network, const std::string& part, const std::string& bytes,
                    const std::string& path) {
-  const std::map<std::string, const Weights*> all = parts(network);
-  const auto found = all.find(part);
+  const Parts all = parts(network);
+  const std::optional<FunctionId> named = FunctionId::parse(part);
+  const auto found = named ? all.find(*named) : all.end();
   if (found == all.end()) {
     std::string list;
-    for (const auto& [name, weights] : all) list += (list.empty() ? "" : ", ") + name;
+    for (const auto& [name, weights] : all) list += (list.empty() ? "" : ", ") + name.name();
     throw InputError({path, "", in_quotes(part), "", "is no part of this network", "its parts are: " + list});
   }
   Samples samples;
@@ -208,7 +210,8 @@ std::string part_of(const std::string& argument, const Network& network) {
   const std::size_t equals = argument.find('=');
   if (equals == std::string::npos || std::filesystem::exists(argument)) return "";
   std::string part = argument.substr(0, equals);
-  if (parts(network).count(part + ":default") == 1) part += ":default";  // phi and rho of --phi and --rho
+  const std::optional<FunctionId> of_two_files = FunctionId::parse(part + ":default");  // --phi and --rho
+  if (of_two_files && parts(network).count(*of_two_files) == 1) part = of_two_files->name();
   return part;
 }
 

@@ -94,7 +94,7 @@ TEST(MeanNetwork, IsTheMeanOfItsMembersAndHasLayersOfAtMostTheirNorms) {
         for (const training::Vector& member : members)
           largest = std::max(largest, norm(one, member, static_cast<int>(p), layer));
         EXPECT_LE(norm(data.layout, mean, static_cast<int>(p), layer), largest * (1 + 1e-6))
-            << one.parts()[p].name << " layer " << layer;
+            << one.parts()[p].id << " layer " << layer;
       }
     }
   }

@@ -70,9 +70,9 @@ std::string boxes_for_one_percent(const lipschitz::LocalBound& bound, double wit
   return fmt::format("{:.1e}", bound.nodes * std::pow(gap / 0.01, 1 / std::log2(before / gap)));
 }
 
-void run(const std::string& name, const files::Network& network, const std::string& function,
+void run(const std::string& name, const files::Network& network, const files::FunctionId& function,
          const lipschitz::BranchOptions& given, const lipschitz::Neighbours& neighbours = {}) {
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const files::Parts parts = files::parts(network);
   const std::string part = function == "network" ? "network" : "phi:default";
   const files::Weights& weights = *parts.at(part);
   lipschitz::Box box;

@@ -90,7 +90,7 @@ Csdp run_csdp(const std::vector<check::Matrix>& stages) {
 void compare(const files::Network& network, const std::string& title) {
   fmt::print("\n{}\n{:<22} {:>14} {:>9} {:>9} {:>14} {:>9} {:>11} {:>8} {:>7}\n", title, "function", "proved",
              "solve s", "check s", "csdp", "csdp s", "product", "csdp/us", "prod/us");
-  for (const std::string& function : files::functions(network)) {
+  for (const files::FunctionId& function : files::functions(network)) {
     const std::vector<check::Matrix> stages = check::stages(network, function);
     lipschitz::SdpBound bound;
     const double solve = seconds([&] { bound = lipschitz::sdp_bound(stages); });
@@ -104,7 +104,7 @@ void compare(const files::Network& network, const std::string& title) {
       if (!check::shows_positive_semidefinite(lmi, bound.proof->factor)) std::exit(1);
     });
     std::vector<lipschitz::UpperBound> norms;
-    for (const std::string& name : files::networks_of(function)) {
+    for (const std::string& name : function.parts()) {
       for (const files::Layer& layer : files::parts(network).at(name)->layers) {
         norms.push_back(lipschitz::spectral_norm(layer).norm.upper);
       }

@@ -5,14 +5,14 @@
 #include <stdexcept>
 #include <string>
 
+#include "lipschitz/base/box.h"
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/values.h"
 #include "nn/random_network.h"
 
 namespace swarmcert::tests {
 
-/// By part of NET.
-using Domain = std::map<std::string, lipschitz::Box>;
+using lipschitz::Domain;
 
 inline files::Weights with(files::Weights weights, files::Activation activation) {
   set_activation(weights, activation);
@@ -46,10 +46,10 @@ inline lipschitz::CertifyOptions on_box(const Domain& domain,
 
 /// With respect to all inputs.
 inline const lipschitz::CertifiedBound& bound_of(const lipschitz::Certification& found,
-                                                 const std::string& function) {
+                                                 const files::FunctionId& function) {
   for (const lipschitz::CertifiedBound& bound : found.bounds)
     if (bound.function == function && bound.block == "all") return bound;
-  throw std::logic_error("no bound of " + function);
+  throw std::logic_error("no bound of " + function.name());
 }
 
 }  // namespace swarmcert::tests

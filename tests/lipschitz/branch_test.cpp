@@ -5,7 +5,9 @@
 #include <limits>
 
 #include "data.h"
+#include "lipschitz/branch/branch.h"
 #include "lipschitz/branch/local_bound.h"
+#include "lipschitz/branch/local_chain.h"
 #include "lipschitz/networks.h"
 #include "nn/weights/weights.h"
 
@@ -17,7 +19,7 @@ using tests::plain;
 using tests::proved;
 using tests::weights;
 
-Claim claim_of(const std::string& function) {
+Claim claim_of(const files::FunctionId& function) {
   Claim claim;
   claim.function = function;
   claim.domain = "box";
@@ -32,7 +34,7 @@ BranchOptions boxes(int nodes, double known = 0) {
 }
 
 double proved_on(const files::Network& network, const Box& box, int nodes,
-                 const std::string& function = "network", double known = 0) {
+                 const files::FunctionId& function = "network", double known = 0) {
   const SdpBound global = tests::sdp_bound_of(network, function);
   const LocalBound bound =
       local_bound(network, claim_of(function), box, global.proof ? global.proof->t : std::vector<double>(),

@@ -15,12 +15,12 @@ namespace {
 
 using files::Network;
 
-double block_bound(const Network& network, const std::string& function, const std::string& block,
+double block_bound(const Network& network, const files::FunctionId& function, const std::string& block,
                    const std::vector<double>& scale = {}) {
   return tests::proved(sdp_bound(check::stages(network, function, block, scale)));
 }
 
-const CertifiedBound& bound_of(const Certification& found, const std::string& function,
+const CertifiedBound& bound_of(const Certification& found, const files::FunctionId& function,
                                const std::string& block) {
   for (const CertifiedBound& bound : found.bounds)
     if (bound.function == function && bound.block == block && bound.scale.empty()) return bound;
@@ -247,7 +247,7 @@ TEST(Claims, WitnessesLieInTheBlockTheBoxAndTheNorm) {
     ASSERT_TRUE(bound.lower.witness) << bound.function << " " << bound.block;
     EXPECT_LE(bound.lower.witness->slope.value(), bound.upper.value())
         << bound.function << " " << bound.block;
-    EXPECT_EQ(bound.domain, bound.function.rfind("rho:", 0) == 0 ? "global" : "box");
+    EXPECT_EQ(bound.domain, bound.function.is_rho() ? "global" : "box");
     boxed += bound.domain == "box" ? 1 : 0;
     scaled += bound.scale.empty() ? 0 : 1;
   }

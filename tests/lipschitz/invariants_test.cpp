@@ -48,7 +48,7 @@ lipschitz::CertifyOptions quick() {
   return options;
 }
 
-const CertifiedBound& bound_of(const lipschitz::Certification& found, const std::string& function) {
+const CertifiedBound& bound_of(const lipschitz::Certification& found, const files::FunctionId& function) {
   return *std::find_if(found.bounds.begin(), found.bounds.end(),
                        [&](const CertifiedBound& bound) { return bound.function == function; });
 }
@@ -67,7 +67,7 @@ TEST(Invariants, BoundsOfSetsAreThoseOfTheirNetworksTimesTheSlopeOfTheMapAndPart
         << function;
     EXPECT_NEAR(mapped.product.value(), slope * alone.product.value(), 1e-12 * mapped.product.value())
         << function;
-    EXPECT_EQ(mapped.lower.witness.has_value(), !files::is_set(function)) << function;
+    EXPECT_EQ(mapped.lower.witness.has_value(), !files::FunctionId(function).is_set()) << function;
   }
   const files::Json certificate = lipschitz::certificate(network(), found);
   const check::CheckResult checked = check::check(certificate, network());
@@ -112,7 +112,7 @@ TEST(Invariants, NothingIsStatedOfABoxOfBlocksOfScalesOrWitnessesOfSets) {
   options.neighbours = 2;
   const lipschitz::Certification found = lipschitz::certify(net, options);
   for (const CertifiedBound& bound : found.bounds)
-    EXPECT_TRUE(bound.block == "all" || files::is_phi(bound.function)) << bound.function;
+    EXPECT_TRUE(bound.block == "all" || bound.function.is_phi()) << bound.function;
   EXPECT_EQ(found.laws.size(), 3u);
   const check::CheckResult checked = check::check(lipschitz::certificate(net, found), net);
   EXPECT_TRUE(checked.accepted) << checked.reason;

@@ -7,6 +7,7 @@
 #include "data.h"
 #include "lipschitz/branch/conflicts.h"
 #include "lipschitz/branch/local_bound.h"
+#include "lipschitz/branch/sum_range.h"
 #include "lipschitz/checker/projective_cover.h"
 #include "lipschitz/lower/lower_bound.h"
 #include "lipschitz/networks.h"
@@ -27,7 +28,7 @@ BranchOptions so_many_boxes(int nodes) {
   return options;
 }
 
-double bound_of(const files::Network& network, const Claim& claim, const std::map<std::string, Box>& domain,
+double bound_of(const files::Network& network, const Claim& claim, const lipschitz::Domain& domain,
                 int nodes) {
   const SdpBound global = tests::sdp_bound_of(network, claim.function);
   const LocalBound bound = local_bound(
@@ -36,7 +37,7 @@ double bound_of(const files::Network& network, const Claim& claim, const std::ma
   return bound.proof ? bound.upper.value() : std::nan("");
 }
 
-Claim counted(const std::string& function, const Neighbours& neighbours) {
+Claim counted(const files::FunctionId& function, const Neighbours& neighbours) {
   Claim claim;
   claim.function = function;
   claim.domain = "box";
@@ -49,7 +50,7 @@ TEST(CountedNeighbours, AreBoundedByTheSlopesThatSoManyCanReach) {
   const files::Network network =
       tests::deep_set(weights({layer(1, 1, {1}), layer(1, 1, {1})}),
                       weights({{"", 2, 1, {1, 1}, {0, -1.5}}, layer(1, 2, {1, 10})}));
-  const std::map<std::string, Box> domain = {{"phi:default", {{0}, {1}}}};
+  const lipschitz::Domain domain = {{"phi:default", {{0}, {1}}}};
   const std::string function = "set:default:default";
   EXPECT_NEAR(bound_of(network, counted(function, {{"default", 1}}), domain, 50), 1, 1e-3);
   EXPECT_NEAR(bound_of(network, counted(function, {{"default", 2}}), domain, 50), 11, 0.02);
@@ -66,7 +67,7 @@ TEST(CountedNeighbours, BoundIsAboveEverySampledSlope) {
     network.phi["large"] = tests::random_network({2, 6, 4}, generator);
     network.phi["small"] = tests::random_network({2, 5, 5, 4}, generator);
     network.rho["small"] = tests::random_network({4, 8, 8, 1}, generator);
-    std::map<std::string, Box> domain;
+    lipschitz::Domain domain;
     for (const auto& [kind, phi] : network.phi) domain["phi:" + kind] = {{-0.5, 0.1}, {0.5, 1}};
     const Neighbours group = {{"large", 1}, {"small", 2}};
     const double upper = bound_of(network, counted("set:small:small", group), domain, 400);
@@ -104,7 +105,7 @@ TEST(CountedNeighbours, WitnessHasNoMoreOfThemThanListed) {
   std::mt19937 generator(4);
   const files::Network network = tests::deep_set(tests::random_network({2, 5, 4}, generator),
                                                  tests::random_network({4, 6, 1}, generator));
-  const std::map<std::string, Box> domain = {{"phi:default", {{-1, -1}, {1, 1}}}};
+  const lipschitz::Domain domain = {{"phi:default", {{-1, -1}, {1, 1}}}};
   for (const int most : {1, 2}) {
     const FoundSlope found =
         lower_bound(network, counted("set:default:default", {{"default", most}}), domain, {});
@@ -242,7 +243,7 @@ TEST(ProjectiveCover, EndsWhereALayerIsZeroAndTheOneBeforeItSteep) {
   const files::Network network = plain(std::move(steep));
   const SdpBound global = tests::sdp_bound_of(network);
   EXPECT_LT(proved(global), 1e-40);
-  const std::map<std::string, Box> no_box;
+  const lipschitz::Domain no_box;
   EXPECT_GT(local_bound(network, everywhere(), no_box, global.proof->t, so_many_boxes(20)).nodes, 0);
 }
 

@@ -41,7 +41,7 @@ lipschitz::Certification certify_mixed(const Network& network, UpperMethod metho
 }
 
 CertifiedBound mixed_bound(const Network& network, UpperMethod method = UpperMethod::kAuto,
-                           const std::string& function = "network") {
+                           const files::FunctionId& function = "network") {
   for (const CertifiedBound& bound : certify_mixed(network, method).bounds)
     if (bound.function == function && bound.block == "all") return bound;
   ADD_FAILURE() << "no bound of " << function;

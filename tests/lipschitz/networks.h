@@ -37,7 +37,7 @@ inline files::Network deep_set(files::Weights phi, files::Weights rho) {
 }
 
 inline lipschitz::SdpBound sdp_bound_of(const files::Network& network,
-                                        const std::string& function = "network") {
+                                        const files::FunctionId& function = "network") {
   return lipschitz::sdp_bound(check::stages(network, function));
 }
 

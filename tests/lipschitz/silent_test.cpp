@@ -45,7 +45,8 @@ const Compositions kSomeSilent = {{"large", "small"}, {"small", "small"}};
 
 tests::Domain cubes(const Network& net) {
   tests::Domain domain;
-  for (const auto& [kind, phi] : net.phi) domain[files::phi_name(kind)] = tests::cube(phi.inputs(), 0.5);
+  for (const auto& [kind, phi] : net.phi)
+    domain[files::FunctionId::phi(kind)] = tests::cube(phi.inputs(), 0.5);
   return domain;
 }
 
@@ -60,7 +61,7 @@ lipschitz::CertifyOptions one_round() {
 std::map<std::string, double> rho_bounds(const lipschitz::Certification& found) {
   std::map<std::string, double> bounds;
   for (const CertifiedBound& bound : found.bounds)
-    if (files::is_rho(bound.function)) bounds[files::kind_of(bound.function)] = bound.upper.value();
+    if (bound.function.is_rho()) bounds[bound.function.kind()] = bound.upper.value();
   return bounds;
 }
 
@@ -82,9 +83,9 @@ class Flown {
     ground_ = point("phi:ground");
   }
 
-  std::vector<double> point(const std::string& part) {
+  std::vector<double> point(const files::FunctionId& part) {
     std::vector<double> x;
-    const auto inputs = static_cast<std::size_t>(part == files::kGroundPhi ? 4 : 6);
+    const auto inputs = static_cast<std::size_t>(part.is_ground_phi() ? 4 : 6);
     const lipschitz::Box box = tests::cube(static_cast<int>(inputs), 0.5);
     for (std::size_t k = 0; k < inputs; ++k) {
       const double r = std::clamp(1.5 * random_.uniform() - 0.25, 0.0, 1.0);
@@ -120,14 +121,14 @@ class Flown {
  private:
   const Network& net_;
   files::Random random_;
-  std::map<std::string, files::Evaluator<double>> evaluators_;
+  std::map<files::FunctionId, files::Evaluator<double>> evaluators_;
   std::vector<std::pair<std::string, std::vector<double>>> neighbours_;
   std::vector<double> ground_;
 };
 
 /// The certified values of `function` for at most `neighbours` neighbours.
 struct Stated {
-  std::string function;
+  files::FunctionId function;
   int neighbours;
   double lower, upper, jump;
 };
@@ -161,7 +162,7 @@ double expect_flights_within(const Network& net, int neighbours) {
   constexpr double kRounding = 1e-9;
   double largest_silent_step = 0;
   for (const Stated& one : all) {
-    const std::string kind = one.function.substr(4, 5), own = one.function.substr(10);
+    const std::string kind = one.function.phi_kind(), own = one.function.rho_kind();
     Flown flown(net);
     files::Random random(7);
     for (int sample = 0; sample < 300; ++sample) {
@@ -190,7 +191,7 @@ TEST(Silent, NoValueLeavesTheRangeAndNoStepTheJumpAmongAllCompositions) {
     const double step = expect_flights_within(net, 3);
     double plain_jump = 0;
     for (const Stated& one : all_stated(two_kinds({}, with_ground), 3))
-      if (one.function.substr(10) == "small") plain_jump = std::max(plain_jump, one.jump);
+      if (one.function.rho_kind() == "small") plain_jump = std::max(plain_jump, one.jump);
     EXPECT_GT(step, plain_jump) << "the jump of the network that never is silent would have been left";
   }
   Network smooth = two_kinds(kSomeSilent);
@@ -244,8 +245,8 @@ TEST(Silent, UpperBoundsAndLawsStayOnBoxesAsWellAndWitnessesAreAmongOtherNeighbo
       const CertifiedBound &bound = found.bounds[i], &same = plain.bounds[i];
       // Branch and bound ends where it is close to a witness, and these are others.
       EXPECT_LE(std::abs(bound.upper.value() - same.upper.value()), (on_box ? 0.05 : 0) * same.upper.value());
-      std::vector<std::string> there = bound.lower.other_networks;
-      there.push_back(files::networks_of(bound.function).front());
+      std::vector<files::FunctionId> there = bound.lower.other_networks;
+      there.push_back(bound.function.input_part());
       EXPECT_FALSE(bound.lower.witness && files::is_silent_among(net, bound.function, there))
           << bound.function;
       EXPECT_TRUE(bound.lower.witness || !bound.neighbours.empty()) << bound.function;
@@ -290,8 +291,8 @@ TEST(Silent, TheCheckerRefusesWhatIsTrueOfTheNetworkThatIsNeverSilentOnly) {
   const Network plain = two_kinds({});
   const lipschitz::Certification found = with_values(plain, 2);
   std::vector<std::string> witnessed = {"small"};
-  for (const std::string& other : tests::bound_of(found, "set:small:small").lower.other_networks)
-    witnessed.push_back(files::kind_of(other));
+  for (const files::FunctionId& other : tests::bound_of(found, "set:small:small").lower.other_networks)
+    witnessed.push_back(other.kind());
   std::sort(witnessed.begin(), witnessed.end());
   const Network silent = two_kinds({{"small"}, witnessed});
   files::Json certificate = lipschitz::certificate(plain, found);

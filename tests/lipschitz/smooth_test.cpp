@@ -36,7 +36,7 @@ Certification certified_by(const Network& network, UpperMethod method = UpperMet
   return certify(network, options);
 }
 
-double upper_of(const Certification& found, const std::string& function) {
+double upper_of(const Certification& found, const files::FunctionId& function) {
   for (const lipschitz::CertifiedBound& bound : found.bounds)
     if (bound.function == function && bound.block == "all") return bound.upper.value();
   ADD_FAILURE() << "no bound of " << function;

@@ -22,7 +22,8 @@ using namespace tests;
 
 std::string foreign(const std::string& name) { return source_path("tests/nn/files/" + name); }
 
-testing::AssertionResult is_refused(const std::string& bytes, const std::vector<std::string>& pieces) {
+testing::AssertionResult foreign_is_refused(const std::string& bytes,
+                                            const std::vector<std::string>& pieces) {
   return refuses([&] { parse_weights(bytes, "net"); }, pieces);
 }
 
@@ -142,29 +143,29 @@ TEST(Nnet, DamagedLinesAreRefusedByNumber) {
   const auto with = [&](const std::string& from, const std::string& to) {
     return std::string(text).replace(text.find(from), from.size(), to);
   };
-  EXPECT_TRUE(is_refused(with("2,2,1,\n0", "2,3,1,\n0"), {"line 11", "expected 2 numbers"}));
-  EXPECT_TRUE(is_refused(with("2.0,4.0,8.0", "0.0,4.0,8.0"), {"line 8", "a range is 0"}));
-  EXPECT_TRUE(is_refused(with("0.5,2.0", "0.5,nan"), {"line 10", "finite number"}));
-  EXPECT_TRUE(is_refused(with("2,2,1,\n0", "2,2,2,\n0"), {"line 3", "contradict"}));
-  EXPECT_TRUE(is_refused(with("2,2,1,2", "99999999,2,1,2"), {"line 2", "expected a count"}));
-  EXPECT_TRUE(is_refused(text.substr(0, text.size() - 5), {"ends early"}));
+  EXPECT_TRUE(foreign_is_refused(with("2,2,1,\n0", "2,3,1,\n0"), {"line 11", "expected 2 numbers"}));
+  EXPECT_TRUE(foreign_is_refused(with("2.0,4.0,8.0", "0.0,4.0,8.0"), {"line 8", "a range is 0"}));
+  EXPECT_TRUE(foreign_is_refused(with("0.5,2.0", "0.5,nan"), {"line 10", "finite number"}));
+  EXPECT_TRUE(foreign_is_refused(with("2,2,1,\n0", "2,2,2,\n0"), {"line 3", "contradict"}));
+  EXPECT_TRUE(foreign_is_refused(with("2,2,1,2", "99999999,2,1,2"), {"line 2", "expected a count"}));
+  EXPECT_TRUE(foreign_is_refused(text.substr(0, text.size() - 5), {"ends early"}));
 }
 
 TEST(MatFile, OtherVersionsAreRefusedWithTheCallThatMendsThem) {
   const std::string good = read_file(foreign("scipy_weights.mat"));
   std::string newer = good;
   newer[125] = '\3';
-  EXPECT_TRUE(is_refused(newer, {"another version than 5 and 7.3", "-v7"}));
+  EXPECT_TRUE(foreign_is_refused(newer, {"another version than 5 and 7.3", "-v7"}));
   std::string big_endian = good;
   big_endian.replace(126, 2, "MI");
-  EXPECT_TRUE(is_refused(big_endian, {"not little-endian"}));
+  EXPECT_TRUE(foreign_is_refused(big_endian, {"not little-endian"}));
 }
 
 TEST(Hdf5, OtherFilesThanMatlabsAreRefusedWithAFormatThatIsRead) {
   const std::string hdf5 = std::string("\x89HDF\r\n\x1a\n", 8) + std::string(100, '\0');
-  EXPECT_TRUE(is_refused(hdf5, {"HDF5", "ONNX", "numpy.savez"}));
-  EXPECT_TRUE(is_refused(std::string(1024, '#') + hdf5, {"HDF5", "numpy.savez"}));
-  EXPECT_TRUE(is_refused(std::string(700, '#') + hdf5, {"is neither"}));  // no offset of HDF5
+  EXPECT_TRUE(foreign_is_refused(hdf5, {"HDF5", "ONNX", "numpy.savez"}));
+  EXPECT_TRUE(foreign_is_refused(std::string(1024, '#') + hdf5, {"HDF5", "numpy.savez"}));
+  EXPECT_TRUE(foreign_is_refused(std::string(700, '#') + hdf5, {"is neither"}));  // no offset of HDF5
 }
 
 TEST(MatFile, ABombOfZerosIsRefused) {
@@ -183,8 +184,8 @@ TEST(MatFile, ABombOfZerosIsRefused) {
   }
   packed.resize(stream.total_out);
   deflateEnd(&stream);
-  EXPECT_TRUE(is_refused(header + little_endian(15, 4) + little_endian(packed.size(), 4) + packed,
-                         {"more than 128 MiB", "-v6"}));
+  EXPECT_TRUE(foreign_is_refused(header + little_endian(15, 4) + little_endian(packed.size(), 4) + packed,
+                                 {"more than 128 MiB", "-v6"}));
 }
 
 TEST(ForeignFiles, EveryTruncationAndManyFlippedBitsAreRefusedOrGiveASoundNetwork) {

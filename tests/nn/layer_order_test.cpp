@@ -37,9 +37,9 @@ OrderSource source(const Listed& layers, Listing listing = Listing::kRegistratio
   return decide_layer_order(layers, listing, stated, "net.pth").source;
 }
 
-testing::AssertionResult is_refused(const Listed& layers, const std::vector<std::string>& pieces,
-                                    Listing listing = Listing::kRegistration,
-                                    const std::vector<std::string>& stated = {}) {
+testing::AssertionResult order_is_refused(const Listed& layers, const std::vector<std::string>& pieces,
+                                          Listing listing = Listing::kRegistration,
+                                          const std::vector<std::string>& stated = {}) {
   return refuses([&] { decided(layers, listing, stated); }, pieces);
 }
 
@@ -66,15 +66,15 @@ TEST(LayerOrder, NumbersInNamesThatAgreeWithTheRegistrationDecide) {
 }
 
 TEST(LayerOrder, AnotherOrderOfRegistrationThanThatOfTheNamesIsRefusedWithBoth) {
-  EXPECT_TRUE(is_refused(listed(kSquare, {0, 2, 1, 3}),
-                         {"net.pth", "more than one fits", "fc1,fc3,fc2,fc4 (as registered)",
-                          "fc1,fc2,fc3,fc4 (by name)", "--order", "network.toml"}));
+  EXPECT_TRUE(order_is_refused(listed(kSquare, {0, 2, 1, 3}),
+                               {"net.pth", "more than one fits", "fc1,fc3,fc2,fc4 (as registered)",
+                                "fc1,fc2,fc3,fc4 (by name)", "--order", "network.toml"}));
 }
 
 TEST(LayerOrder, SquareLayersWithUnrelatedNamesAreRefused) {
   const Listed layers = {{"alpha", 3, 3}, {"beta", 3, 3}, {"gamma", 3, 3}};
-  EXPECT_TRUE(is_refused(layers, {"alpha,beta,gamma (as registered and by name)", "alpha,gamma,beta"}));
-  EXPECT_TRUE(is_refused(layers, {"alpha,beta,gamma (by name)"}, Listing::kUnordered));
+  EXPECT_TRUE(order_is_refused(layers, {"alpha,beta,gamma (as registered and by name)", "alpha,gamma,beta"}));
+  EXPECT_TRUE(order_is_refused(layers, {"alpha,beta,gamma (by name)"}, Listing::kUnordered));
 }
 
 TEST(LayerOrder, TheOnlyOrderThatFitsTheShapesIsTakenWhateverTheNames) {
@@ -86,8 +86,8 @@ TEST(LayerOrder, TheOnlyOrderThatFitsTheShapesIsTakenWhateverTheNames) {
 TEST(LayerOrder, NumbersDecideBetweenTheOrdersThatTheShapesLeave) {
   EXPECT_EQ(decided({{"stem", 2, 4}, {"body1", 4, 4}, {"body2", 4, 4}, {"head", 4, 1}}),
             "stem,body1,body2,head");
-  EXPECT_TRUE(
-      is_refused({{"stem", 2, 4}, {"body2", 4, 4}, {"body1", 4, 4}, {"head", 4, 1}}, {"more than one"}));
+  EXPECT_TRUE(order_is_refused({{"stem", 2, 4}, {"body2", 4, 4}, {"body1", 4, 4}, {"head", 4, 1}},
+                               {"more than one"}));
 }
 
 TEST(LayerOrder, WithoutARegistrationTheNumbersDecide) {
@@ -99,7 +99,7 @@ TEST(LayerOrder, AStatedOrderIsTakenAndMustNameEveryLayerOnceAndFit) {
   EXPECT_EQ(source(kSquare, Listing::kRegistration, {"fc1", "fc3", "fc2", "fc4"}), OrderSource::kUser);
   const auto stated_is_refused = [](const std::vector<std::string>& stated,
                                     const std::vector<std::string>& pieces) {
-    return is_refused(kSquare, pieces, Listing::kRegistration, stated);
+    return order_is_refused(kSquare, pieces, Listing::kRegistration, stated);
   };
   EXPECT_TRUE(stated_is_refused({"fc1", "fc2", "fc3"}, {"\"fc4\"", "left out"}));
   EXPECT_TRUE(stated_is_refused({"fc1", "fc2", "fc2", "fc4"}, {"\"fc2\"", "named twice"}));
@@ -110,8 +110,8 @@ TEST(LayerOrder, AStatedOrderIsTakenAndMustNameEveryLayerOnceAndFit) {
 
 TEST(LayerOrder, AFileThatStatesItsOrderTakesNoOther) {
   EXPECT_EQ(decided(kSquare, Listing::kEvaluation, {"fc1", "fc2", "fc3", "fc4"}), "fc1,fc2,fc3,fc4");
-  EXPECT_TRUE(is_refused(kSquare, {"itself states another order"}, Listing::kEvaluation,
-                         {"fc1", "fc3", "fc2", "fc4"}));
+  EXPECT_TRUE(order_is_refused(kSquare, {"itself states another order"}, Listing::kEvaluation,
+                               {"fc1", "fc3", "fc2", "fc4"}));
 }
 
 TEST(LayerOrder, ManyLayersAreDecidedOrRefusedWithoutEnumeratingTheirOrders) {
@@ -119,10 +119,10 @@ TEST(LayerOrder, ManyLayersAreDecidedOrRefusedWithoutEnumeratingTheirOrders) {
   for (int k = 0; k < 1000; ++k) layers.push_back({"fc" + std::to_string(k), 8, 8});
   EXPECT_EQ(source(layers), OrderSource::kNames);
   std::swap(layers[0], layers[1]);
-  EXPECT_TRUE(is_refused(layers, {"more than one fits"}));
+  EXPECT_TRUE(order_is_refused(layers, {"more than one fits"}));
   layers.resize(64);  // 64! orders
   for (LayerShape& layer : layers) layer.name = "a" + layer.name + "x" + std::to_string(layer.name.size());
-  EXPECT_TRUE(is_refused(layers, {"more than one fits"}));
+  EXPECT_TRUE(order_is_refused(layers, {"more than one fits"}));
 }
 
 TEST(LayerOrder, AStateDictThatCouldBeSeveralNetworksIsRefusedUnlessTheOrderIsGiven) {

@@ -36,7 +36,8 @@ std::string npz(const std::string& inputs, const std::string& outputs) {
 
 /// Of a network of two inputs and one output.
 Samples parsed(const std::string& bytes) { return parse_samples(bytes, "samples", 2, 1); }
-testing::AssertionResult is_refused(const std::string& bytes, const std::vector<std::string>& pieces) {
+testing::AssertionResult samples_are_refused(const std::string& bytes,
+                                             const std::vector<std::string>& pieces) {
   return refuses([&] { parsed(bytes); }, pieces);
 }
 
@@ -58,47 +59,51 @@ TEST(Samples, EveryFormatGivesTheSame) {
 }
 
 TEST(Samples, ABadCsvIsRefusedWithItsLineAndColumn) {
-  EXPECT_TRUE(is_refused("", {"samples", "holds no sample"}));
-  EXPECT_TRUE(is_refused("x0,x1,y\n", {"holds no sample"}));
-  EXPECT_TRUE(is_refused("1,2,3\n4,5\n", {"line 2", "2 columns", "2 inputs and 1 outputs", "makes 3"}));
-  EXPECT_TRUE(is_refused("1,2,3,4\n", {"line 1", "4 columns"}));
-  EXPECT_TRUE(is_refused("1,2,3\n4,nan,6\n", {"line 2", "input 1", "nan", "not finite"}));
-  EXPECT_TRUE(is_refused("1,2,-inf\n", {"line 1", "output 0", "-inf"}));
-  EXPECT_TRUE(is_refused("1,2,1e999\n", {"line 1", "output 0"}));
-  EXPECT_TRUE(is_refused("1,2,3\n4,x,6\n", {"line 2", "input 1", "\"x\"", "is not a number"}));
-  EXPECT_TRUE(is_refused("1,,3\n", {"line 1", "input 1", "is not a number"}));
-  EXPECT_TRUE(is_refused(std::string("1,2,3\n\0,5,6\n", 12), {"line 2", "is not a number"}));
+  EXPECT_TRUE(samples_are_refused("", {"samples", "holds no sample"}));
+  EXPECT_TRUE(samples_are_refused("x0,x1,y\n", {"holds no sample"}));
+  EXPECT_TRUE(
+      samples_are_refused("1,2,3\n4,5\n", {"line 2", "2 columns", "2 inputs and 1 outputs", "makes 3"}));
+  EXPECT_TRUE(samples_are_refused("1,2,3,4\n", {"line 1", "4 columns"}));
+  EXPECT_TRUE(samples_are_refused("1,2,3\n4,nan,6\n", {"line 2", "input 1", "nan", "not finite"}));
+  EXPECT_TRUE(samples_are_refused("1,2,-inf\n", {"line 1", "output 0", "-inf"}));
+  EXPECT_TRUE(samples_are_refused("1,2,1e999\n", {"line 1", "output 0"}));
+  EXPECT_TRUE(samples_are_refused("1,2,3\n4,x,6\n", {"line 2", "input 1", "\"x\"", "is not a number"}));
+  EXPECT_TRUE(samples_are_refused("1,,3\n", {"line 1", "input 1", "is not a number"}));
+  EXPECT_TRUE(samples_are_refused(std::string("1,2,3\n\0,5,6\n", 12), {"line 2", "is not a number"}));
 }
 
 TEST(Samples, ABadJsonIsRefusedWithItsSample) {
-  EXPECT_TRUE(is_refused(R"({"inputs": [[1, 2]], "outputs": []})", {"outputs", "0 samples", "there are 1"}));
   EXPECT_TRUE(
-      is_refused(R"({"inputs": [[1, 2], [3]], "outputs": [[1], [2]]})", {"sample 1", "inputs", "1 numbers"}));
-  EXPECT_TRUE(
-      is_refused(R"({"inputs": [[1, "a"]], "outputs": [[1]]})", {"sample 0", "inputs[1]", "not a number"}));
-  EXPECT_TRUE(is_refused(R"({"inputs": [[1, 2]]})", {"outputs", "is not a list"}));
-  EXPECT_TRUE(is_refused(R"({"inputs": [], "outputs": []})", {"holds no sample"}));
-  EXPECT_TRUE(is_refused(R"({"inputs": [[1, 2]], "outputs": [[1]], "output": 1})",
-                         {"\"output\"", "not a known key"}));
-  EXPECT_TRUE(
-      is_refused(R"({"schema": "swarmcert/box/1", "inputs": [[1, 2]], "outputs": [[1]]})", {"schema"}));
-  EXPECT_TRUE(is_refused("{\"inputs\": [[1, 2]", {"line"}));
+      samples_are_refused(R"({"inputs": [[1, 2]], "outputs": []})", {"outputs", "0 samples", "there are 1"}));
+  EXPECT_TRUE(samples_are_refused(R"({"inputs": [[1, 2], [3]], "outputs": [[1], [2]]})",
+                                  {"sample 1", "inputs", "1 numbers"}));
+  EXPECT_TRUE(samples_are_refused(R"({"inputs": [[1, "a"]], "outputs": [[1]]})",
+                                  {"sample 0", "inputs[1]", "not a number"}));
+  EXPECT_TRUE(samples_are_refused(R"({"inputs": [[1, 2]]})", {"outputs", "is not a list"}));
+  EXPECT_TRUE(samples_are_refused(R"({"inputs": [], "outputs": []})", {"holds no sample"}));
+  EXPECT_TRUE(samples_are_refused(R"({"inputs": [[1, 2]], "outputs": [[1]], "output": 1})",
+                                  {"\"output\"", "not a known key"}));
+  EXPECT_TRUE(samples_are_refused(R"({"schema": "swarmcert/box/1", "inputs": [[1, 2]], "outputs": [[1]]})",
+                                  {"schema"}));
+  EXPECT_TRUE(samples_are_refused("{\"inputs\": [[1, 2]", {"line"}));
 }
 
 TEST(Samples, ABadNpzIsRefusedWithItsArray) {
   const std::string two = npy<double>("(1, 2)", {1, 2}), one = npy<double>("(1, 1)", {3});
   EXPECT_NO_THROW(parsed(npz(two, one)));
+  EXPECT_TRUE(samples_are_refused(npz(npy<double>("(1, 3)", {1, 2, 3}), one),
+                                  {"inputs.npy", "[1, 3]", "[samples, 2]"}));
+  EXPECT_TRUE(samples_are_refused(npz(npy<double>("(2,)", {1, 2}), one), {"inputs.npy", "[samples, 2]"}));
   EXPECT_TRUE(
-      is_refused(npz(npy<double>("(1, 3)", {1, 2, 3}), one), {"inputs.npy", "[1, 3]", "[samples, 2]"}));
-  EXPECT_TRUE(is_refused(npz(npy<double>("(2,)", {1, 2}), one), {"inputs.npy", "[samples, 2]"}));
-  EXPECT_TRUE(is_refused(npz(two, npy<double>("(2, 1)", {3, 4})), {"outputs", "2 samples", "there are 1"}));
-  EXPECT_TRUE(is_refused(npz(npy<double>("(0, 2)", {}), npy<double>("(0, 1)", {})), {"holds no sample"}));
+      samples_are_refused(npz(two, npy<double>("(2, 1)", {3, 4})), {"outputs", "2 samples", "there are 1"}));
+  EXPECT_TRUE(
+      samples_are_refused(npz(npy<double>("(0, 2)", {}), npy<double>("(0, 1)", {})), {"holds no sample"}));
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(is_refused(npz(npy<double>("(1, 2)", {1, nan}), one), {"inputs.npy[0,1]", "nan"}));
-  EXPECT_TRUE(
-      is_refused(tests::zip({{"x.npy", two}, {"y.npy", one}}), {"\"inputs\"", "no such array", "\"x.npy\""}));
-  EXPECT_TRUE(is_refused(tests::zip({{"inputs.npy", two, 8, 200}, {"outputs.npy", one}}),
-                         {"inputs.npy", "compressed", "numpy.savez"}));
+  EXPECT_TRUE(samples_are_refused(npz(npy<double>("(1, 2)", {1, nan}), one), {"inputs.npy[0,1]", "nan"}));
+  EXPECT_TRUE(samples_are_refused(tests::zip({{"x.npy", two}, {"y.npy", one}}),
+                                  {"\"inputs\"", "no such array", "\"x.npy\""}));
+  EXPECT_TRUE(samples_are_refused(tests::zip({{"inputs.npy", two, 8, 200}, {"outputs.npy", one}}),
+                                  {"inputs.npy", "compressed", "numpy.savez"}));
 }
 
 TEST(Npy, ReadsTheVersionsThatNumpyWrites) {

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "nn/training/deep_set_loss.h"
+#include "nn/training/layout.h"
+#include "nn/training/spectral_normalization.h"
 #include "nn/training/symmetry.h"
 #include "nn/training/trainer.h"
 
@@ -116,10 +119,10 @@ TEST(DeepSetLoss, GradientIsTheDerivativeInEveryParameter) {
         for (int j = 0; j < layer.inputs; ++j) {
           const std::size_t at = static_cast<std::size_t>(i) * layer.inputs + j;
           ASSERT_NEAR(static_cast<double>(w(i, j)), derivative(layer.weights[at]), tolerance)
-              << layout.parts()[p].name << " layer " << k << " weight " << i << ", " << j;
+              << layout.parts()[p].id << " layer " << k << " weight " << i << ", " << j;
         }
         ASSERT_NEAR(static_cast<double>(b(i)), derivative(layer.biases[i]), tolerance)
-            << layout.parts()[p].name << " layer " << k << " bias " << i;
+            << layout.parts()[p].id << " layer " << k << " bias " << i;
       }
     }
   }
@@ -240,7 +243,7 @@ TEST(SpectralNormalization, ClipKeepsEveryLayerBelowGamma) {
   for (int p = 0; p < 5; ++p) {
     for (int k = 0; k < layout.parts()[p].layers(); ++k) {
       const double norm = norm_of(layout, trainer.theta(), p, k);
-      EXPECT_LE(norm, 0.8 * 1.01) << layout.parts()[p].name << " layer " << k;
+      EXPECT_LE(norm, 0.8 * 1.01) << layout.parts()[p].id << " layer " << k;
       at_limit += norm > 0.8 * 0.99;
     }
   }
@@ -257,7 +260,7 @@ TEST(SpectralNormalization, TightenedLayersKeepTheirShareOfGamma) {
   const double limits[] = {0.8, 0.8, 0.4, 0.8, 0.2};
   for (int p = 0; p < 5; ++p) {
     for (int k = 0; k < layout.parts()[p].layers(); ++k)
-      EXPECT_LE(norm_of(layout, trainer.theta(), p, k), limits[p] * 1.01) << layout.parts()[p].name;
+      EXPECT_LE(norm_of(layout, trainer.theta(), p, k), limits[p] * 1.01) << layout.parts()[p].id;
   }
   EXPECT_GT(norm_of(layout, trainer.theta(), 0, 0), 0.41) << "a part that was not tightened";
 }
@@ -272,7 +275,7 @@ TEST(SpectralNormalization, EqualMakesTheProductOfTheNormsGamma) {
     const int layers = layout.parts()[p].layers();
     for (int k = 0; k < layers; ++k) {
       EXPECT_NEAR(norm_of(layout, trainer.theta(), p, k), std::pow(2.0, 1.0 / layers), 0.01)
-          << layout.parts()[p].name << " layer " << k;
+          << layout.parts()[p].id << " layer " << k;
     }
   }
 }

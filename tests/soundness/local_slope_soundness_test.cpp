@@ -41,8 +41,8 @@ void add(Point& sum, const Point& term) {
 /// Evaluates one bound's function at pairs of points.
 class PairsInTheBox {
  public:
-  PairsInTheBox(const Network& network, const std::map<std::string, Box>& domain, const CertifiedBound& bound)
-      : domain_(domain), bound_(bound), names_(files::networks_of(bound.function)) {
+  PairsInTheBox(const Network& network, const lipschitz::Domain& domain, const CertifiedBound& bound)
+      : domain_(domain), bound_(bound), names_(bound.function.parts()) {
     for (const auto& [name, weights] : files::parts(network)) parts_.emplace(name, *weights);
     block_ = files::block_coordinates(network, bound.function, bound.block);
   }
@@ -98,22 +98,23 @@ class PairsInTheBox {
       for (double& value : sum) value = 20 * random.symmetric();
       return sum;
     }
-    const auto add_one = [&](const std::string& part) {
+    const auto add_one = [&](const files::FunctionId& part) {
       add(sum, parts_.at(part)(inside(domain_.at(part), random)));
     };
-    if (names_[0] != files::kGroundPhi && parts_.count(files::kGroundPhi) == 1) add_one(files::kGroundPhi);
+    if (!names_[0].is_ground_phi() && parts_.count(files::FunctionId::ground_phi()) == 1)
+      add_one(files::FunctionId::ground_phi());
     for (const auto& [kind, count] : bound_.neighbours) {
-      const int others = count - ("phi:" + kind == names_[0] ? 1 : 0);
+      const int others = count - (files::FunctionId::phi(kind) == names_[0] ? 1 : 0);
       for (int j = 0; j < others; ++j)
         if (random.uniform() < 0.7) add_one("phi:" + kind);
     }
     return sum;
   }
 
-  const std::map<std::string, Box>& domain_;
+  const lipschitz::Domain& domain_;
   const CertifiedBound& bound_;
-  std::vector<std::string> names_;
-  std::map<std::string, Evaluator<double>> parts_;
+  std::vector<files::FunctionId> names_;
+  std::map<files::FunctionId, Evaluator<double>> parts_;
   std::vector<int> block_;
 };
 
@@ -143,10 +144,10 @@ std::vector<Network> examples() {
   return result;
 }
 
-std::map<std::string, Box> boxes_of(const Network& network) {
-  std::map<std::string, Box> domain;
+lipschitz::Domain boxes_of(const Network& network) {
+  lipschitz::Domain domain;
   for (const auto& [name, weights] : files::parts(network)) {
-    if (name.rfind("rho:", 0) == 0) continue;
+    if (name.is_rho()) continue;
     const int inputs = weights->inputs(), positions = inputs == 4 ? 1 : 3;
     Box box;
     for (int k = 0; k < inputs; ++k) {
@@ -178,7 +179,7 @@ void no_slope_in_the_box_exceeds_its_bound(long pairs, int nodes) {
   double closest = 0;
   for (std::size_t n = 0; n < networks.size(); ++n) {
     for (const CertifiedBound& bound : found[n].bounds) {
-      if (bound.function.rfind("rho:", 0) == 0) continue;
+      if (bound.function.is_rho()) continue;
       local += bound.method == lipschitz::UpperMethod::kBranch ? 1 : 0;
       counted += bound.neighbours.empty() ? 0 : 1;
       const PairsInTheBox slopes(networks[n], found[n].domain, bound);

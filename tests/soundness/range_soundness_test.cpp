@@ -25,8 +25,8 @@ using lipschitz::Box;
 const Box kBox{{-1, -1, -1, -2, -2, -2}, {1, 1, 1, 2, 2, 2}};
 const Box kGroundBox{{-1, -2, -2, -2}, {1, 2, 2, 2}};
 
-std::map<std::string, Box> domain_of(const Network& network) {
-  std::map<std::string, Box> domain;
+lipschitz::Domain domain_of(const Network& network) {
+  lipschitz::Domain domain;
   for (const auto& [kind, phi] : network.phi) domain["phi:" + kind] = kind == "ground" ? kGroundBox : kBox;
   if (network.plain) domain["network"] = kBox;
   return domain;
@@ -40,10 +40,11 @@ struct Proved {
 Proved prove(const Network& network, int neighbours, int nodes) {
   lipschitz::CertifyOptions certify;
   certify.lower.rounds = 0;
-  std::map<std::string, double> bounds, rho;
+  std::map<files::FunctionId, double> bounds;
+  std::map<std::string, double> rho;
   for (const lipschitz::CertifiedBound& bound : lipschitz::certify(network, certify).bounds) {
     bounds[bound.function] = bound.upper.value();
-    if (bound.function.rfind("rho:", 0) == 0) rho[bound.function.substr(4)] = bound.upper.value();
+    if (bound.function.is_rho()) rho[bound.function.kind()] = bound.upper.value();
   }
   lipschitz::RangeOptions range;
   range.neighbours = neighbours;
@@ -69,9 +70,9 @@ std::vector<Scalar> point(const Box& box, Random& random) {
 }
 
 /// Random neighbours against ranges and errors: f in double, and in float32 by the code that flies.
-void try_points(const Network& network, const Proved& proved, const std::string& function, int neighbours,
-                int samples) {
-  const std::vector<std::string> names = files::networks_of(function);
+void try_points(const Network& network, const Proved& proved, const files::FunctionId& function,
+                int neighbours, int samples) {
+  const std::vector<files::FunctionId> names = function.parts();
   const auto parts = files::parts(network);
   const files::Evaluator<double> phi(*parts.at(names[0])), rho(*parts.at(names[1]));
   const files::Evaluator<float> phi32(*parts.at(names[0])), rho32(*parts.at(names[1]));
@@ -128,7 +129,7 @@ void try_points(const Network& network, const Proved& proved, const std::string&
   std::printf(
       "%s, up to %d neighbours: sampled %.4g .. %.4g, attained %.4g .. %.4g, proved %.4g .. %.4g; jump %.3g "
       "of %.3g; float32 off by %.3g of %.3g\n",
-      function.c_str(), neighbours, least, greatest, range->least.value, range->greatest.value, range->lower,
+      function.name().c_str(), neighbours, least, greatest, range->least.value, range->greatest.value, range->lower,
       range->upper, jump, range->jump, largest_error, error->evaluation.value());
 }
 
@@ -240,8 +241,8 @@ TEST(RangeSoundness, AnAffineNetworkHasItsExactRange) {
 }
 
 /// A climb goes much further than samples: from the worst of many points, steps that shrink where they fail.
-double furthest_off(const Network& network, const std::string& function, Random& random) {
-  const std::vector<std::string> names = files::networks_of(function);
+double furthest_off(const Network& network, const files::FunctionId& function, Random& random) {
+  const std::vector<files::FunctionId> names = function.parts();
   const auto parts = files::parts(network);
   const files::Evaluator<double> phi(*parts.at(names[0])), rho(*parts.at(names[1]));
   const files::Evaluator<float> phi32(*parts.at(names[0])), rho32(*parts.at(names[1]));
@@ -289,7 +290,7 @@ TEST(RangeSoundness, AFloat32ErrorWhoseSearchIsStoppedIsLargerAndFinite) {
   std::mt19937 generator(8);
   const Network network = tests::deep_set(tests::random_network({6, 8, 5, 4}, generator),
                                           tests::random_network({4, 6, 1}, generator));
-  const std::map<std::string, double> bounds = {{"set:default:default", 1}};
+  const std::map<files::FunctionId, double> bounds = {{"set:default:default", 1}};
   lipschitz::Float32Options options;
   const auto evaluation = [&] {
     return lipschitz::float32_errors(network, domain_of(network), bounds, options).at(0).evaluation.value();

@@ -28,9 +28,9 @@ using tests::kRounding;
 /// One set function, or a network alone, ready to be evaluated at many points.
 class Function {
  public:
-  Function(const Network& network, const std::string& function) {
+  Function(const Network& network, const files::FunctionId& function) {
     const auto parts = files::parts(network);
-    const std::vector<std::string> names = files::networks_of(function);
+    const std::vector<files::FunctionId> names = function.parts();
     moved_.emplace(*parts.at(names[0]));
     inputs_ = parts.at(names[0])->inputs();
     if (names.size() == 2) rho_.emplace(*parts.at(names[1]));

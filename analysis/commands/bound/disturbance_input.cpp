@@ -164,9 +164,9 @@ Constants largest(const Bounds& bounds, const Function& function, const Upper& u
                   const std::string& path) {
   Constants result;
   for (const auto& bound : bounds) {
-    const std::string of = function(bound);
-    if (!files::is_whole(of)) continue;
-    const bool is_ground = files::is_set(of) && files::networks_of(of).front() == files::kGroundPhi;
+    const std::optional<files::FunctionId> of = function(bound);
+    if (!of || !of->is_whole()) continue;
+    const bool is_ground = of->is_set() && of->input_part().is_ground_phi();
     double& constant = is_ground ? result.own : result.neighbour;
     constant = std::max(constant, newtons(unit(bound), upper(bound), path));
   }
@@ -206,11 +206,12 @@ Constants certified_constants(const DisturbanceArguments& arguments, std::vector
   }
   return largest(
       certificate["bounds"],
-      [](const Json& b) {
+      [](const Json& b) -> std::optional<files::FunctionId> {
         // Only what bounds one neighbour's whole input, anywhere, in the Euclidean norm; the checker knows the rest.
         const bool is_plain = b.value("block", "all") == "all" && b.value("domain", "global") == "global" &&
                               (!b.contains("scale") || b["scale"].empty());
-        return is_plain ? b.value("function", "") : std::string();
+        if (!is_plain) return std::nullopt;
+        return files::FunctionId::parse(b.value("function", ""));
       },
       [](const Json& b) { return b["upper"].get<double>(); },
       [&](const Json& b) { return files::unit(network, b["function"].get<std::string>()); },
@@ -226,7 +227,7 @@ Constants product_constants(const DisturbanceArguments& arguments, std::vector<s
   options.lower.rounds = 0;
   const lipschitz::Certification found = certify(network, options);
   return largest(
-      found.bounds, [](const lipschitz::CertifiedBound& b) { return b.function; },
+      found.bounds, [](const lipschitz::CertifiedBound& b) { return std::optional(b.function); },
       [](const lipschitz::CertifiedBound& b) { return b.upper.value(); },
       [&](const lipschitz::CertifiedBound& b) { return files::unit(network, b.function); },
       arguments.network.file.empty() ? arguments.network.phi + ", " + arguments.network.rho

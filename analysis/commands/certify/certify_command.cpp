@@ -73,7 +73,7 @@ Verdict judge(const Certification& found, double max_lipschitz) {
     if (layer.respects_gamma) verdicts.push_back(*layer.respects_gamma);
   }
   for (const CertifiedBound& bound : found.bounds) {
-    if (max_lipschitz <= 0 || !files::is_whole(bound.function)) continue;
+    if (max_lipschitz <= 0 || !bound.function.is_whole()) continue;
     if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) continue;
     const double lower = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
     verdicts.push_back(bound.upper.value() <= max_lipschitz ? Verdict::kProved
@@ -129,9 +129,9 @@ void parse_blocks(CertifyOptions& options) {
 }
 
 /// Holds NET against what was recorded from it. @throws InputError where it differs.
-std::map<std::string, files::SampleAgreement> compare_samples(const files::Network& network,
-                                                              const CertifyOptions& options) {
-  std::map<std::string, files::SampleAgreement> result;
+std::map<files::FunctionId, files::SampleAgreement> compare_samples(const files::Network& network,
+                                                                    const CertifyOptions& options) {
+  std::map<files::FunctionId, files::SampleAgreement> result;
   for (const std::string& argument : options.samples) {
     for (const auto& [part, samples] : files::read_samples(argument, network)) {
       if (!result.emplace(part, files::hold_against(network, part, samples, options.sample_tolerance)).second)
@@ -182,14 +182,15 @@ void add_slope_estimates(const files::Network& network, const lipschitz::Certify
 /// Range and float32 error over the box of --domain, or over what the clamp lets through.
 void add_ranges(const files::Network& network, const CertifyOptions& options, Progress& progress,
                 CertifyOutput& output) {
-  const std::map<std::string, lipschitz::Box> domain =
+  const lipschitz::Domain domain =
       options.domain.empty() ? lipschitz::clamp_domain(network) : options.certify.domain;
   if (domain.empty()) throw UsageError("--range needs a box: give --domain, or a clamp in network.toml");
-  std::map<std::string, double> bounds, rho_bounds;
+  std::map<files::FunctionId, double> bounds;
+  std::map<std::string, double> rho_bounds;
   for (const CertifiedBound& bound : output.found.bounds) {
     if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) continue;
     bounds[bound.function] = bound.upper.value();
-    if (files::is_rho(bound.function)) rho_bounds[files::kind_of(bound.function)] = bound.upper.value();
+    if (bound.function.is_rho()) rho_bounds[bound.function.kind()] = bound.upper.value();
   }
   lipschitz::RangeOptions range;
   range.neighbours = std::max(1, options.certify.neighbours);
@@ -200,7 +201,7 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Pr
   output.ranges_cut_short = stop.now();
   if (output.ranges_cut_short) range.nodes = 1;  // wider, and proved all the same
   output.ranges = lipschitz::ranges(network, domain, rho_bounds, range);
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const files::Parts parts = files::parts(network);
   const bool is_float32 = std::all_of(parts.begin(), parts.end(), [](const auto& part) {
     return part.second->precision == files::Precision::kFloat32 && part.second->is_relu();
   });
@@ -346,7 +347,7 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   const files::Network network = read_network(options);
-  const std::map<std::string, files::SampleAgreement> samples = compare_samples(network, options);
+  const std::map<files::FunctionId, files::SampleAgreement> samples = compare_samples(network, options);
   if (!options.domain.empty()) options.certify.domain = lipschitz::read_domain(options.domain, network);
   if (!options.map.empty()) {
     if (options.domain.empty()) throw UsageError("--map needs the box of --domain");

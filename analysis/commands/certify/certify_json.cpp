@@ -21,7 +21,7 @@ using lipschitz::Verdict;
 Json attained_json(const Attained& attained) {
   Json points = Json::array();
   for (std::size_t j = 0; j < attained.points.size(); ++j)
-    points.push_back({{"network", attained.networks[j]}, {"x", attained.points[j]}});
+    points.push_back({{"network", attained.networks[j].name()}, {"x", attained.points[j]}});
   return {{"value", attained.value}, {"points", std::move(points)}};
 }
 
@@ -31,7 +31,7 @@ Json range_json(const files::Network& network, const CertifyOutput& output,
                 const lipschitz::CertifiedRange& range) {
   const auto* const stated = in_certificate(output, range.function, range.neighbours_at_most);
   const auto index = static_cast<std::size_t>(range.output);
-  return {{"function", range.function},
+  return {{"function", range.function.name()},
           {"output", range.output},
           {"domain", "box"},
           {"neighbours", range.neighbours_at_most},
@@ -81,7 +81,7 @@ Json witness_json(const lipschitz::FoundSlope& found) {
   if (!found.witness) return nullptr;
   Json others = Json::array();
   for (std::size_t j = 0; j < found.witness->others.size(); ++j) {
-    others.push_back({{"network", found.other_networks[j]}, {"x", found.witness->others[j]}});
+    others.push_back({{"network", found.other_networks[j].name()}, {"x", found.witness->others[j]}});
   }
   return {{"x", found.witness->x}, {"y", found.witness->y}, {"others", std::move(others)}};
 }
@@ -89,9 +89,9 @@ Json witness_json(const lipschitz::FoundSlope& found) {
 /// The operations of all parts, one after the other.
 Json chains_json(const files::Network& network) {
   Json list = Json::array();
-  for (const auto& [name, weights] : files::parts(network)) {
-    for (Json& step : files::chain_json(files::chain(network, name))) {
-      step["network"] = name;
+  for (const auto& [part, weights] : files::parts(network)) {
+    for (Json& step : files::chain_json(files::chain(network, part))) {
+      step["network"] = part.name();
       list.push_back(std::move(step));
     }
   }
@@ -101,13 +101,13 @@ Json chains_json(const files::Network& network) {
 /// What is known of where each part's chain comes from.
 Json chain_sources_json(const files::Network& network) {
   Json sources = Json::object();
-  for (const auto& [name, weights] : files::parts(network)) {
+  for (const auto& [part, weights] : files::parts(network)) {
     const bool is_stated = weights->order_source == files::OrderSource::kFile;
     const char* const otherwise = weights->activation_is_given ? "user" : "assumed";
-    sources[name] = {{"order", files::name(weights->order_source)},
-                     {"activation", is_stated ? "file" : otherwise},
-                     {"notes", weights->notes},
-                     {"rounding_of_slope", files::rounding_of_slope(*weights)}};
+    sources[part.name()] = {{"order", files::name(weights->order_source)},
+                            {"activation", is_stated ? "file" : otherwise},
+                            {"notes", weights->notes},
+                            {"rounding_of_slope", files::rounding_of_slope(*weights)}};
   }
   return sources;
 }
@@ -115,7 +115,7 @@ Json chain_sources_json(const files::Network& network) {
 Json samples_result(const Certification& found) {
   Json list = Json::array();
   for (const auto& [part, agreement] : found.samples) {
-    list.push_back({{"network", part},
+    list.push_back({{"network", part.name()},
                     {"file", agreement.path},
                     {"sha256", agreement.sha256},
                     {"count", agreement.count},
@@ -145,7 +145,7 @@ Json map_json(const files::Network& network, const lipschitz::SlopeMapOptions& o
                      {"lower", cell.lower.witness ? Json(cell.lower.witness->slope.value()) : Json()},
                      {"lower_witness", witness_json(cell.lower)}});
   }
-  return {{"function", map.function},
+  return {{"function", map.function.name()},
           {"coordinates", names},
           {"shape", options.cells},
           {"others", std::move(others)},
@@ -159,7 +159,7 @@ Json layer_json(const CertifiedLayer& layer) {
   Json respects;
   if (layer.respects_gamma == Verdict::kProved) respects = true;
   if (layer.respects_gamma == Verdict::kRefuted) respects = false;
-  return {{"network", layer.network},
+  return {{"network", layer.network.name()},
           {"name", layer.name},
           {"spectral_norm", {layer.norm.norm.lower.value(), layer.norm.norm.upper.value()}},
           {"respects_gamma", respects}};
@@ -190,7 +190,7 @@ Json bound_json(const files::Network& network, const CertifyOutput& output, std:
 Json float32_error_json(const files::Network& network, const CertifyOutput& output,
                         const lipschitz::Float32Error& error) {
   const auto* const stated = in_certificate(output, error.function, error.neighbours_at_most);
-  return {{"function", error.function},
+  return {{"function", error.function.name()},
           {"neighbours", error.neighbours_at_most},
           {"unit", output_unit(network)},
           {"bound", error.total.value()},

@@ -41,15 +41,15 @@ std::optional<lipschitz::Estimate> slope_estimate_of(const CertifyOutput& output
   return bound < output.slope_estimates.size() ? output.slope_estimates[bound] : std::nullopt;
 }
 
-const lipschitz::CertifiedValues* in_certificate(const CertifyOutput& output, const std::string& function,
-                                                 int neighbours) {
+const lipschitz::CertifiedValues* in_certificate(const CertifyOutput& output,
+                                                 const files::FunctionId& function, int neighbours) {
   for (const lipschitz::CertifiedValues& values : output.found.values)
     if (values.function == function && values.neighbours == neighbours) return &values;
   return nullptr;
 }
 
 std::string label(const CertifiedBound& bound) {
-  return bound.function + (bound.block == "all" ? "" : " " + bound.block) +
+  return bound.function.name() + (bound.block == "all" ? "" : " " + bound.block) +
          (bound.scale.empty() ? "" : " scaled") +
          (bound.neighbours.empty() ? "" : ", at most " + group_label(bound.neighbours));
 }
@@ -103,7 +103,7 @@ std::string sizes(const files::Weights& weights) {
 
 void print_chains(const files::Network& network, const Certification& found) {
   fmt::print("Functions that are certified\n");
-  for (const auto& [name, weights] : files::parts(network)) {
+  for (const auto& [part, weights] : files::parts(network)) {
     std::string remark;
     switch (weights->order_source) {
       case files::OrderSource::kFile:
@@ -119,13 +119,13 @@ void print_chains(const files::Network& network, const Certification& found) {
         remark = "order as given";
         break;
     }
-    const auto samples = found.samples.find(name);
+    const auto samples = found.samples.find(part);
     const bool is_unstated = weights->order_source != files::OrderSource::kFile &&
                              weights->layers.size() > 1 && samples == found.samples.end();
     if (is_unstated)
       remark += weights->activation_is_given ? "; activation as given, --samples compares"
                                              : "; ReLU is assumed, --samples compares";
-    fmt::print("  {}  {}  ({})\n", name, files::chain_words(files::chain(network, name)), remark);
+    fmt::print("  {}  {}  ({})\n", part.name(), files::chain_words(files::chain(network, part)), remark);
     for (const std::string& note : weights->notes) fmt::print("    {}\n", note);
     const double rounding = files::rounding_of_slope(*weights);
     if (rounding > 0)
@@ -143,10 +143,11 @@ void print_chains(const files::Network& network, const Certification& found) {
 
 void print_layers(const files::Network& network, const Certification& found) {
   fmt::print("Spectral norms, enclosed from both sides in exact arithmetic\n");
-  for (const auto& [name, weights] : files::parts(network)) {
-    fmt::print("  {}  {}  ({}, {})\n", name, weights->path, sizes(*weights), files::name(weights->precision));
+  for (const auto& [part, weights] : files::parts(network)) {
+    fmt::print("  {}  {}  ({}, {})\n", part.name(), weights->path, sizes(*weights),
+               files::name(weights->precision));
     for (const CertifiedLayer& layer : found.layers) {
-      if (layer.network != name) continue;
+      if (layer.network != part) continue;
       const double lower = layer.norm.norm.lower.value();
       const double upper = layer.norm.norm.upper.value();
       std::string remark;
@@ -276,7 +277,7 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
   for (const lipschitz::CertifiedRange& range : output.ranges) {
     const std::string many =
         range.neighbours_at_most > 0 ? " up to " + counted(range.neighbours_at_most, "neighbour") : "";
-    fmt::print("  {}{}: {:.6g} ({:.6g}) .. ({:.6g}) {:.6g}", range.function, many, range.lower,
+    fmt::print("  {}{}: {:.6g} ({:.6g}) .. ({:.6g}) {:.6g}", range.function.name(), many, range.lower,
                range.least.value, range.greatest.value, range.upper);
     // Without silent compositions the jump hardly depends on the number of neighbours: it is printed once.
     const bool has_jump =
@@ -297,8 +298,8 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
   for (const lipschitz::Float32Error& error : output.float32_errors) {
     const std::string many =
         error.neighbours_at_most > 0 ? " up to " + counted(error.neighbours_at_most, "neighbour") : "";
-    fmt::print("  {}{}: {:.4g} (arithmetic {:.4g}, conversion of the inputs {:.4g})", error.function, many,
-               error.total.value(), error.evaluation.value(), error.inputs.value());
+    fmt::print("  {}{}: {:.4g} (arithmetic {:.4g}, conversion of the inputs {:.4g})", error.function.name(),
+               many, error.total.value(), error.evaluation.value(), error.inputs.value());
     const auto* const stated = in_certificate(output, error.function, error.neighbours_at_most);
     fmt::print("{}\n",
                stated != nullptr && stated->float32_error

@@ -59,8 +59,8 @@ double slope_found(const lipschitz::CertifiedBound& bound);
 std::optional<lipschitz::Estimate> slope_estimate_of(const CertifyOutput& output, std::size_t bound);
 
 /// What the certificate states of the function's values; null where it leaves them out.
-const lipschitz::CertifiedValues* in_certificate(const CertifyOutput& output, const std::string& function,
-                                                 int neighbours);
+const lipschitz::CertifiedValues* in_certificate(const CertifyOutput& output,
+                                                 const files::FunctionId& function, int neighbours);
 
 /// "set:small:large", "set:small:large position scaled", "set:small:large, at most 2 small".
 std::string label(const lipschitz::CertifiedBound& bound);

@@ -70,9 +70,9 @@ void add_layers(Report& report, const CertifyOutput& output) {
   for (const CertifiedLayer& layer : output.found.layers) {
     const double lower = layer.norm.norm.lower.value(), upper = layer.norm.norm.upper.value();
     const auto [at_least, at_most] = outwards(lower, upper);
-    rows.push_back({layer.network, layer.name, at_least, at_most,
+    rows.push_back({layer.network.name(), layer.name, at_least, at_most,
                     layer.respects_gamma ? name(*layer.respects_gamma) : "not stated"});
-    bars.push_back({layer.network + " " + layer.name, upper, lower, upper});
+    bars.push_back({layer.network.name() + " " + layer.name, upper, lower, upper});
   }
   report.bars(
       "layers", bars, "spectral norm [output per input of the layer]",
@@ -116,7 +116,7 @@ void add_map(Report& report, const files::Network& network, const CertifyOutput&
                           coordinate_name(network, static_cast<int>(k)), steepest->box.lower[k],
                           steepest->box.upper[k]);
   }
-  report.heading("Where " + map.function + " is steep");
+  report.heading("Where " + map.function.name() + " is steep");
   report.paragraph(fmt::format(
       "Local slope over {} and {}; {}. {} of {} cells have a bound of their own, proved by {}; the "
       "others keep the bound of the whole box. The steepest proved cell lies at {} = {:.4g}, {} = {:.4g}: "
@@ -133,10 +133,10 @@ void add_map(Report& report, const files::Network& network, const CertifyOutput&
                std::max(steepest->upper.value(), 1e-300), figure, column);
   };
   report.figure(file + "_upper", data, script(file + "_upper", 3, "slope at most"),
-                "Proved: in no cell is " + map.function + " steeper than this.");
+                "Proved: in no cell is " + map.function.name() + " steeper than this.");
   report.figure(
       file + "_lower", data, script(file + "_lower", 4, "slope at least"),
-      "Witnessed: between two points of the cell the slope of " + map.function +
+      "Witnessed: between two points of the cell the slope of " + map.function.name() +
           " is this large. Colours as above; where both maps are bright the network is steep, where "
           "only the upper one is, the bound is loose or no steep points were found.");
 }
@@ -159,7 +159,7 @@ std::string write_certify_report(const files::Network& network, const CertifyOut
   report.heading("Inputs");
   std::vector<std::vector<std::string>> rows;
   for (const auto& [part, weights] : files::parts(network))
-    rows.push_back({part, weights->path, weights->sha256});
+    rows.push_back({part.name(), weights->path, weights->sha256});
   report.table({"network", "file", "sha256"}, rows);
   return report.write(folder, overwrite);
 }

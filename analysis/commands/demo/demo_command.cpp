@@ -57,7 +57,7 @@ Certified certify_network(const files::Network& network, const std::string& file
   const lipschitz::Certification found = certify(network, options);
   files::write_file(certificate_path, files::to_text(certificate(network, found)), common.force);
   for (const lipschitz::CertifiedBound& bound : found.bounds) {
-    say(fmt::format("   {:<18} proved <= {:<12.8g} witnessed >= {:<12.8g} {}", bound.function,
+    say(fmt::format("   {:<18} proved <= {:<12.8g} witnessed >= {:<12.8g} {}", bound.function.name(),
                     bound.upper.value(), bound.lower.witness ? bound.lower.witness->slope.value() : 0.0,
                     files::unit(network, bound.function)));
   }

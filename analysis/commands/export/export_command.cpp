@@ -38,15 +38,16 @@ std::string certificate_of(const files::Network& network, const std::string& pat
   if (hash != files::content_sha256(certificate))
     refuse("content_sha256", hash, "is not this document's: it was changed");
   const files::Json& weights = certificate["network"]["weights"];
-  for (const auto& [part, one] : files::parts(network)) {
+  for (const auto& [id, one] : files::parts(network)) {
+    const std::string& part = id.name();
     if (!weights.contains(part)) refuse("network.weights", part, "is not in the certificate");
     if (weights[part].value("sha256", "") != one->sha256)
       refuse("network.weights." + part + ".sha256", weights[part].value("sha256", ""),
              "is not the hash of " + one->path);
-    const files::Json chain = files::chain_json(files::chain(network, part));
+    const files::Json chain = files::chain_json(files::chain(network, id));
     if (weights[part].value("chain", files::Json()) != chain)
       refuse("network.weights." + part + ".chain", "",
-             "is not the chain that is exported: " + files::chain_words(files::chain(network, part)));
+             "is not the chain that is exported: " + files::chain_words(files::chain(network, id)));
   }
   const bool rests_on_description = network.invariants || !network.silent.empty();
   if (rests_on_description && certificate["network"].value("description_sha256", "") != network.sha256)

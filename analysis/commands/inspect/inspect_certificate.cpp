@@ -44,7 +44,8 @@ files::Json inspect_network_certificate(const std::string& path, const files::Js
   for (const files::Json& law : certificate.value("laws", files::Json::array())) {
     files::Json line = law;
     if (line.is_object()) line.erase("upper_hex");
-    if (print) print_bound_row(files::rho_name(cell(law, "rho")) + " " + cell(law, "neighbours"), law);
+    if (print)
+      print_bound_row(files::FunctionId::rho(cell(law, "rho")).name() + " " + cell(law, "neighbours"), law);
     bounds.push_back(std::move(line));
   }
   return {{"file", path}, {"kind", "certificate"}, {"bounds", std::move(bounds)}};

@@ -119,10 +119,10 @@ files::Json inspect_network(const std::string& path, files::NetworkArguments arg
   const files::Network network = files::load_any_network(arguments);
   if (print) print_description(network);
   files::Json parts = files::Json::object();
-  for (const auto& [name, weights] : files::parts(network)) {
-    parts[name] = describe(*weights);
+  for (const auto& [part, weights] : files::parts(network)) {
+    parts[part.name()] = describe(*weights);
     if (!print) continue;
-    fmt::print("{}: {} {}, sha256 {}\n", weights->path, name, files::name(weights->precision),
+    fmt::print("{}: {} {}, sha256 {}\n", weights->path, part.name(), files::name(weights->precision),
                weights->sha256);
     for (std::size_t k = 0; k < weights->layers.size(); ++k) {
       const files::Layer& layer = weights->layers[k];

@@ -17,7 +17,7 @@ files::Network load_flown_net(const files::NetworkArguments& arguments, const st
   for (const auto& [part, weights] : files::parts(network)) {
     if (weights->precision == files::Precision::kFloat32) continue;
     if (as != "float32") {
-      throw files::InputError({weights->path, "", part, "float64",
+      throw files::InputError({weights->path, "", part.name(), "float64",
                                "flight code is float32: rounding changes the function",
                                "say --as float32, here and to certify"});
     }

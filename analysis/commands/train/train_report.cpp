@@ -9,7 +9,7 @@
 #include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
 #include "nn/weights/compositions.h"
-#include "nn/weights/function_names.h"
+#include "nn/weights/function_id.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -82,7 +82,7 @@ void add_map(Report& report, const LearningData& data, const learning::Run& run,
     for (int j = 0; j < kSteps; ++j) {
       const float x = -0.5f + static_cast<float>(i) / (kSteps - 1);
       const float z = -0.3f + 1.2f * static_cast<float>(j) / (kSteps - 1);
-      const int ground = data.layout.find(files::kGroundPhi);
+      const int ground = data.layout.find(files::FunctionId::ground_phi());
       if (ground >= 0) grid.add_input(ground, learning::seen_of_own({-0.6f, 0, 0, 0}, data.invariants));
       grid.add_input(phi, learning::seen_of_neighbour({x, 0, z, 0, 0, 0}, data.invariants));
       grid.add_sample(rho, std::vector<float>(static_cast<std::size_t>(grid.outputs), 0.0f));
@@ -110,8 +110,8 @@ void add_map(Report& report, const LearningData& data, const learning::Run& run,
                     ".dat' using 3 nooutput\nm = (abs(STATS_min) > abs(STATS_max)) ? abs(STATS_min) : "
                     "abs(STATS_max)\nset cbrange [-m:m]\nset size ratio 1.2\nplot '" +
                     name + ".dat' using 1:2:3 with image notitle\n",
-                data.layout.parts()[rho].name + " with one neighbour of " + data.layout.parts()[phi].name +
-                    " at rest, 0.6 m above the ground.");
+                data.layout.parts()[rho].id.name() + " with one neighbour of " +
+                    data.layout.parts()[phi].id.name() + " at rest, 0.6 m above the ground.");
 }
 
 }  // namespace
@@ -142,14 +142,13 @@ std::string write_train_report(const LearningData& data, const learning::Run& ru
   if (data.target == learning::Target::kTorque) in_plane = {1};
   const std::vector<training::Part>& parts = data.layout.parts();
   for (std::size_t phi = 0; phi < parts.size(); ++phi) {
-    if (!files::is_phi(parts[phi].name) || parts[phi].name == files::kGroundPhi) continue;
+    if (!parts[phi].id.is_phi() || parts[phi].id.is_ground_phi()) continue;
     for (std::size_t rho = 0; rho < parts.size(); ++rho) {
-      if (!files::is_rho(parts[rho].name)) continue;
-      const std::string own = files::kind_of(parts[rho].name);
+      if (!parts[rho].id.is_rho()) continue;
+      const std::string own = parts[rho].id.kind();
       const auto scale = support.scales.find(own);
       if (scale != support.scales.end() && scale->second == 0) continue;
-      if (support.silent.count(files::composition_name({files::kind_of(parts[phi].name)}, own)) == 1)
-        continue;
+      if (support.silent.count(files::composition_name({parts[phi].id.kind()}, own)) == 1) continue;
       for (const int c : in_plane)
         add_map(report, data, run, static_cast<int>(phi), static_cast<int>(rho), c);
     }

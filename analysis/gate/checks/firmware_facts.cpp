@@ -48,12 +48,13 @@ std::string why_of_another(Evidence& evidence, const Json& facts, const std::str
       !facts["network"]["weights"].is_object())
     refuse(file, "network.weights", "is missing");
   const Json& weights = facts["network"]["weights"];
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const files::Parts parts = files::parts(network);
   if (facts["network"].value("sha256", Json()) != Json(network.sha256)) return "another network.toml";
   if (weights.size() != parts.size()) return "other networks";
-  for (const auto& [name, part] : parts) {
+  for (const auto& [part, stored] : parts) {
+    const std::string& name = part.name();
     if (!weights.contains(name) || !weights[name].is_object() ||
-        weights[name].value("sha256", Json()) != Json(part->sha256))
+        weights[name].value("sha256", Json()) != Json(stored->sha256))
       return "other weights of " + name;
   }
   return "";

@@ -33,7 +33,7 @@ Run read_float32_error(const files::TomlTable& table, Policy& policy) {
       const double total = scale == 1 ? error.total.value() : round_up(error.total.value() * scale);
       if (total <= worst) continue;
       worst = total;
-      check.witness = fmt::format("{}, up to {} neighbours", error.function, error.neighbours_at_most);
+      check.witness = fmt::format("{}, up to {} neighbours", error.function.name(), error.neighbours_at_most);
     }
     if (errors.empty()) {
       check.reason = "the network has no function that flies";

@@ -9,14 +9,14 @@
 #include "lipschitz/base/box.h"
 #include "nn/base/json.h"
 #include "nn/base/toml.h"
-#include "nn/weights/function_names.h"
+#include "nn/weights/function_id.h"
 
 namespace swarmcert::gate {
 namespace {
 
 struct WantedBound {
-  std::string name;      ///< of the row
-  std::string function;  ///< empty: the plain network and every set function
+  std::string name;                           ///< of the row
+  std::optional<files::FunctionId> function;  ///< nothing: the plain network and every set function
   std::string block;
   Limit limit;
 };
@@ -26,14 +26,15 @@ void require_certified_box(Evidence& evidence) {
   if (evidence.release().certificate.empty()) throw Unfounded("bounds on a box need a certificate");
   const files::Json& certified = evidence.certificate()["box"];
   for (const auto& [part, box] : evidence.domain()) {
-    if (!certified.is_object() || !certified.contains(part))
-      throw Unfounded("the certificate has no box for " + part);
-    const std::vector<double> lower = files::parse_hex_floats(certified[part]["lower"]);
-    const std::vector<double> upper = files::parse_hex_floats(certified[part]["upper"]);
+    if (!certified.is_object() || !certified.contains(part.name()))
+      throw Unfounded("the certificate has no box for " + part.name());
+    const std::vector<double> lower = files::parse_hex_floats(certified[part.name()]["lower"]);
+    const std::vector<double> upper = files::parse_hex_floats(certified[part.name()]["upper"]);
     bool is_inside = lower.size() == box.lower.size();
     for (std::size_t k = 0; is_inside && k < lower.size(); ++k)
       is_inside = lower[k] <= box.lower[k] && box.upper[k] <= upper[k];
-    if (!is_inside) throw Unfounded("the certificate's box does not contain the release's, for " + part);
+    if (!is_inside)
+      throw Unfounded("the certificate's box does not contain the release's, for " + part.name());
   }
 }
 
@@ -42,8 +43,7 @@ void judge_bounds(Evidence& evidence, const WantedBound& wanted, bool on_box, Ch
   double upper = -1, lower = -1;
   for (const LipschitzBound& bound : evidence.bounds()) {
     if (bound.block != wanted.block || (bound.domain != "global" && !on_box)) continue;
-    if (wanted.function.empty() ? !files::is_whole(bound.function) : bound.function != wanted.function)
-      continue;
+    if (wanted.function ? bound.function != *wanted.function : !bound.function.is_whole()) continue;
     const double scale = wanted.limit.unit_N > 0 ? force_scale(evidence, wanted.limit) : 1;
     if (bound.lower) lower = std::max(lower, round_down(*bound.lower * scale));
     const double scaled = scale == 1 ? bound.upper : round_up(bound.upper * scale);
@@ -53,14 +53,14 @@ void judge_bounds(Evidence& evidence, const WantedBound& wanted, bool on_box, Ch
             : bound.unit;
     if (scaled <= upper) continue;
     upper = scaled;
-    check.witness =
-        bound.lower ? fmt::format("{}: a slope of {:.6g} is attained", bound.function, *bound.lower * scale)
-                    : bound.function;
+    check.witness = bound.lower ? fmt::format("{}: a slope of {:.6g} is attained", bound.function.name(),
+                                              *bound.lower * scale)
+                                : bound.function.name();
   }
   if (upper < 0) {
     check.reason = fmt::format(
         "no {}bound of {} for the block {} is proved: certify with --blocks={}", on_box ? "" : "global ",
-        wanted.function.empty() ? "the whole network" : wanted.function, wanted.block, wanted.block);
+        wanted.function ? wanted.function->name() : "the whole network", wanted.block, wanted.block);
   } else {
     judge(check, wanted.limit, upper, lower);
   }
@@ -78,7 +78,7 @@ Run read_lipschitz(const files::TomlTable& table, Policy& policy) {
   if (!policy.release.has_network()) require_file(table, "", "network");
   std::vector<WantedBound> all;
   const auto add = [&all](const char* name, const char* block, const std::optional<Limit>& limit) {
-    if (limit) all.push_back({name, "", block, *limit});
+    if (limit) all.push_back({name, std::nullopt, block, *limit});
   };
   add("lipschitz", "all", force_limit(table, "max_joint"));
   add("lipschitz.position", "position", force_limit(table, "max_position", "_m"));
@@ -87,8 +87,13 @@ Run read_lipschitz(const files::TomlTable& table, Policy& policy) {
     if (wanted.block != "all") policy.blocks.push_back(wanted.block);
   if (table.has("functions")) {
     const files::TomlTable functions = table.table("functions");
-    for (const std::string& function : functions.keys())
-      all.push_back({"lipschitz." + function, function, "all", *limit(functions, function, "")});
+    for (const std::string& name : functions.keys()) {
+      const std::optional<files::FunctionId> function = files::FunctionId::parse(name);
+      if (!function)
+        functions.refuse(
+            name, "", "is no function: \"network\", \"phi:<kind>\", \"rho:<kind>\" or \"set:<phi>:<rho>\"");
+      all.push_back({"lipschitz." + name, function, "all", *limit(functions, name, "")});
+    }
   }
   if (all.empty()) refuse_without_limit(table, "max_joint_gf = 500");
   const bool on_box = table.has("domain") && table.choice("domain", {"global", "box"}) == 1;

@@ -7,7 +7,7 @@
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/checks/force_unit.h"
 #include "nn/base/toml.h"
-#include "nn/weights/function_names.h"
+#include "nn/weights/function_id.h"
 
 namespace swarmcert::gate {
 namespace {
@@ -16,9 +16,9 @@ using lipschitz::Attained;
 using lipschitz::CertifiedRange;
 
 std::string range_words(const CertifiedRange& range, const Attained& attained) {
-  std::string text = fmt::format("{} attains {:.6g}", range.function, attained.value);
+  std::string text = fmt::format("{} attains {:.6g}", range.function.name(), attained.value);
   for (std::size_t j = 0; j < attained.points.size(); ++j) {
-    text += fmt::format("{} {} (", j == 0 ? " at" : ",", attained.networks[j]);
+    text += fmt::format("{} {} (", j == 0 ? " at" : ",", attained.networks[j].name());
     for (std::size_t k = 0; k < attained.points[j].size(); ++k)
       text += fmt::format("{}{:.4g}", k == 0 ? "" : ", ", attained.points[j][k]);
     text += ")";
@@ -95,7 +95,7 @@ Run read_range(const files::TomlTable& table, Policy& policy) {
     options.jobs = evidence.settings().jobs;
     std::map<std::string, double> rho;
     for (const auto& [function, bound] : evidence.global_bounds())
-      if (files::is_rho(function)) rho[files::kind_of(function)] = bound;
+      if (function.is_rho()) rho[function.kind()] = bound;
     const auto ranges = lipschitz::ranges(evidence.flown(), evidence.domain(), rho, options);
     for (const WantedRange& wanted : all) judge_range(evidence, wanted, ranges, checks);
   };

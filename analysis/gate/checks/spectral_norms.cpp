@@ -44,9 +44,9 @@ void judge_norms(Evidence& evidence, const std::optional<Limit>& own, int line, 
       if (verdicts[k] == lipschitz::Verdict::kProved || check.verdict == Verdict::kFail) continue;
       const bool is_refuted = verdicts[k] == lipschitz::Verdict::kRefuted;
       check.verdict = is_refuted ? Verdict::kFail : Verdict::kInconclusive;
-      check.reason = fmt::format("{} {} {} gamma {}", part, weights->layers[k].name,
+      check.reason = fmt::format("{} {} {} gamma {}", part.name(), weights->layers[k].name,
                                  is_refuted ? "breaks" : "is too near to", gamma->value);
-      check.witness = fmt::format("{} {}: {:.15g} .. {:.15g}", part, weights->layers[k].name,
+      check.witness = fmt::format("{} {}: {:.15g} .. {:.15g}", part.name(), weights->layers[k].name,
                                   norms[k].lower.value(), norms[k].upper.value());
     }
   }

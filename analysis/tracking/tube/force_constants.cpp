@@ -16,24 +16,25 @@ namespace {
 
 constexpr double kNoConstant = std::numeric_limits<double>::infinity();
 
-double product_bound(const files::Network& network, const std::string& function) {
+double product_bound(const files::Network& network, const files::FunctionId& function) {
   std::vector<lipschitz::UpperBound> norms;
   const auto parts = files::parts(network);
-  for (const std::string& name : files::networks_of(function)) {
-    for (const files::Layer& layer : parts.at(name)->layers)
+  for (const files::FunctionId& part : function.parts()) {
+    for (const files::Layer& layer : parts.at(part)->layers)
       norms.push_back(lipschitz::spectral_norm(layer).norm.upper);
   }
   return lipschitz::product_up(norms).value();
 }
 
-bool has_block(const files::Network& network, const std::string& function, const std::string& block) {
+bool has_block(const files::Network& network, const files::FunctionId& function, const std::string& block) {
   const std::vector<std::string> blocks = files::blocks(network, function);
   return std::find(blocks.begin(), blocks.end(), block) != blocks.end();
 }
 
 /// LipSDP, at most `otherwise`; infinite for a block that the function has not.
-double sdp_constant(const files::Network& network, const std::string& function, const std::string& block,
-                    double otherwise, std::vector<double>* t, const std::atomic<bool>* cancelled) {
+double sdp_constant(const files::Network& network, const files::FunctionId& function,
+                    const std::string& block, double otherwise, std::vector<double>* t,
+                    const std::atomic<bool>* cancelled) {
   if (block != "all" && !has_block(network, function, block)) return kNoConstant;
   const lipschitz::SdpBound found =
       lipschitz::sdp_bound(check::stages(network, function, block), {lipschitz::Stop(cancelled), {}});
@@ -48,7 +49,7 @@ GlobalConstants global_constants(const files::Network& network, const LearnedFor
                                  const std::atomic<bool>* cancelled) {
   GlobalConstants result;
   const double unit = learned.newton_per_unit();
-  const std::string& function = learned.neighbour_function();
+  const files::FunctionId& function = learned.neighbour_function();
   const double product = product_bound(network, function);
   result.product.together = up(unit * product);
   result.product.position = result.product.velocity = kNoConstant;
@@ -57,11 +58,11 @@ GlobalConstants global_constants(const files::Network& network, const LearnedFor
       up(unit * sdp_constant(network, function, "position", product, &result.position_t, cancelled));
   result.sdp.velocity =
       up(unit * sdp_constant(network, function, "velocity", product, &result.velocity_t, cancelled));
-  if (learned.ground_function().empty()) return result;
-  const double own = product_bound(network, learned.ground_function());
+  if (!learned.ground_function()) return result;
+  const double own = product_bound(network, *learned.ground_function());
   result.product.own = up(unit * own);
   result.sdp.own =
-      up(unit * sdp_constant(network, learned.ground_function(), "all", own, nullptr, cancelled));
+      up(unit * sdp_constant(network, *learned.ground_function(), "all", own, nullptr, cancelled));
   return result;
 }
 

@@ -89,7 +89,7 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
     if (name != files::kGroundKind) kinds.push_back(name);
   const std::string phi = network.phi.count(kind) == 1 ? kind : kinds.front();
   const std::string rho = network.rho.count(kind) == 1 ? kind : network.rho.begin()->first;
-  neighbour_function_ = files::set_name(phi, rho);
+  neighbour_function_ = files::FunctionId::set(phi, rho);
   newton_per_unit_ = network.output_unit == "N" ? 1 : stability::kGramForce_N;
   const int inputs = network.phi.at(phi).inputs();
   for (int i = 0; i < inputs; ++i) {
@@ -108,7 +108,7 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
   std::vector<ReachNetwork> parts(static_cast<std::size_t>(neighbours), one);
   const auto ground = network.phi.find(files::kGroundKind);
   if (ground != network.phi.end()) {
-    ground_function_ = files::set_name(files::kGroundKind, rho);
+    ground_function_ = files::FunctionId::set(files::kGroundKind, rho);
     parts.push_back(lipschitz::reach_network(ground->second));
     parts.back().front().weights *= -1;  // it sees -z and -v
   }
@@ -123,7 +123,8 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
   }
   add_up(layers_.back(), network.phi.at(phi).outputs());
   for (ReachLayer& layer : lipschitz::reach_network(network.rho.at(rho))) layers_.push_back(std::move(layer));
-  const std::vector<std::string> parts_in_sum(static_cast<std::size_t>(neighbours), files::phi_name(phi));
+  const std::vector<files::FunctionId> parts_in_sum(static_cast<std::size_t>(neighbours),
+                                                    files::FunctionId::phi(phi));
   if (files::is_silent_among(network, neighbour_function_, parts_in_sum)) {
     layers_.back().weights.setZero();
     layers_.back().bias.setZero();

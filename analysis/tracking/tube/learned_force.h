@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,8 +46,8 @@ class LearnedForce {
   int states() const { return static_cast<int>(layers_.front().weights.cols()); }
   double newton_per_unit() const { return newton_per_unit_; }
   /// The set functions of a neighbour and, if there is one, of the ground.
-  const std::string& neighbour_function() const { return neighbour_function_; }
-  const std::string& ground_function() const { return ground_function_; }
+  const files::FunctionId& neighbour_function() const { return neighbour_function_; }
+  const std::optional<files::FunctionId>& ground_function() const { return ground_function_; }
   /// Which component of (dp, dv) each input of phi is.
   const std::vector<int>& input_components() const { return components_; }
 
@@ -56,7 +57,8 @@ class LearnedForce {
   lipschitz::ReachNetwork layers_;
   lipschitz::Box clamp_;  ///< of the whole state, infinite where nothing is clamped
   std::vector<int> components_;
-  std::string neighbour_function_, ground_function_;
+  files::FunctionId neighbour_function_;
+  std::optional<files::FunctionId> ground_function_;
   double newton_per_unit_ = 1;
 };
 
