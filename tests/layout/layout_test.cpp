@@ -255,6 +255,14 @@ TEST(Layout, InstalledHeadersAreForUsersAndIncludeOnlySuch) {
   }
 }
 
+TEST(Layout, EveryInstalledHeaderIsIncludedByATest) {
+  std::set<std::string> included;
+  for (const std::string& source : files_in({"tests"}, {".h", ".cpp"}))
+    for (const std::string& path : includes(source)) included.insert(path);
+  for (const std::string& header : installed_headers())
+    EXPECT_EQ(included.count(header), 1U) << header << ": users have it, and no test uses it directly";
+}
+
 /// The sources of each library, by path from the source tree.
 std::map<std::string, std::vector<std::string>> library_sources() {
   std::map<std::string, std::vector<std::string>> found;

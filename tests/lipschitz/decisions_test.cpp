@@ -6,6 +6,8 @@
 #include <set>
 
 #include "lipschitz/branch/local_bound.h"
+#include "lipschitz/checker/box_states.h"
+#include "lipschitz/checker/tree_proof.h"
 #include "lipschitz/checker/tree_words.h"
 #include "lipschitz/networks.h"
 

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "lipschitz/branch/local_bound.h"
+#include "lipschitz/checker/tree_proof.h"
 #include "lipschitz/networks.h"
 
 namespace swarmcert::lipschitz {

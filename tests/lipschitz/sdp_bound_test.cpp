@@ -6,6 +6,7 @@
 
 #include "data.h"
 #include "lipschitz/networks.h"
+#include "lipschitz/solver/interior_point.h"
 #include "lipschitz/upper/spectral_norm.h"
 
 namespace swarmcert {

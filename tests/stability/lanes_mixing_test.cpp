@@ -7,6 +7,7 @@
 #include <random>
 
 #include "controller/rotors_on_circle.h"
+#include "stability/bodies/lanes.h"
 
 namespace swarmcert::stability {
 namespace {

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "stability/effects/signal_path.h"
 #include "stability/vehicle.h"
 
 namespace swarmcert::stability {
@@ -30,6 +31,20 @@ std::vector<double> stepped(Swarm& swarm, double h, const std::vector<VehicleInp
     }
   }
   return result;
+}
+
+TEST(Swarm, ItsSignalPathHasTheLagsAndDelaysOfTheModelsEffects) {
+  Model model = tests::small_vehicle();
+  model.effects = {an_effect("motor_lag", {{"tau_s", 0.04}, {"gain", 0.5}}),
+                   an_effect("delay", {{"delay_s", 0.02}}), an_effect("sensor_delay", {{"delay_s", 0.01}})};
+  const Swarm swarm(model, 2);
+  const SignalPath& path = swarm.path(1);
+  EXPECT_EQ(path.motor_lag_s, 0.04);
+  EXPECT_EQ(path.motor_lag_gain, 0.5);
+  EXPECT_EQ(path.delay_s, 0.02);
+  EXPECT_EQ(path.delay_gain, 1);
+  EXPECT_EQ(path.sensor_delay_s, 0.01);
+  EXPECT_EQ(path.sensor_delay_gain, 1);
 }
 
 TEST(Swarm, ARungeKuttaStepIsThatOfItsDerivativeToTheBit) {
