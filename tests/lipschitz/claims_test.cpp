@@ -24,7 +24,7 @@ const CertifiedBound& bound_of(const Certification& found, const files::Function
                                const std::string& block) {
   for (const CertifiedBound& bound : found.bounds)
     if (bound.function == function && bound.block == block && bound.scale.empty()) return bound;
-  throw std::logic_error("no bound for " + function + " " + block);
+  throw std::logic_error("no bound for " + function.name() + " " + block);
 }
 
 double law_of(const Certification& found, LawKind law, const Neighbours& neighbours,

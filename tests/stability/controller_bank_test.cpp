@@ -15,7 +15,7 @@ namespace {
 constexpr double kPeriod_s = 0.001;
 constexpr int kVehicles = 5;  ///< enough to fly in lanes together
 
-Gains gains() {
+Gains bank_gains() {
   return parse_gains(
       "schema = \"swarmcert/gains/1\"\n[position]\nKp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, 10]\n"
       "[attitude]\nlaw = \"lee\"\n",
@@ -56,9 +56,9 @@ void tell(const Told& told, int vehicle, std::uint32_t now_ms, ControllerBank& b
 
 TEST(ControllerBank, AVehicleAmongOthersIsGivenTheCommandsThatItHasAlone) {
   const Swarm swarm(tests::small_vehicle(), kVehicles), one(tests::small_vehicle(), 1);
-  const auto together = make_float_bank(swarm, gains(), kPeriod_s);
+  const auto together = make_float_bank(swarm, bank_gains(), kPeriod_s);
   std::vector<std::unique_ptr<ControllerBank>> alone;
-  for (int i = 0; i < kVehicles; ++i) alone.push_back(make_float_bank(one, gains(), kPeriod_s));
+  for (int i = 0; i < kVehicles; ++i) alone.push_back(make_float_bank(one, bank_gains(), kPeriod_s));
   Rows rows(lines_for(kVehicles) * kVehicleStateSize), own(kVehicleStateSize);
   std::vector<ControlRecord> records(kVehicles), record(1);
   files::Random random(1);
@@ -86,8 +86,8 @@ TEST(ControllerBank, AVehicleAmongOthersIsGivenTheCommandsThatItHasAlone) {
 
 TEST(ControllerBank, FloatAnswersAsDoubleUpToRounding) {
   const Swarm one(tests::small_vehicle(), 1);
-  const auto in_float = make_float_bank(one, gains(), kPeriod_s);
-  const auto in_double = make_double_bank(one, gains(), kPeriod_s);
+  const auto in_float = make_float_bank(one, bank_gains(), kPeriod_s);
+  const auto in_double = make_double_bank(one, bank_gains(), kPeriod_s);
   Rows rows(kVehicleStateSize);
   std::vector<ControlRecord> a(1), b(1);
   files::Random random(2);
