@@ -41,8 +41,9 @@ int main() {
 
   // %%
   for (const lipschitz::CertifiedLayer& layer : found.layers) {
-    fmt::print("{:<10} {}  {:.6f} .. {:.6f}  {}\n", layer.network, layer.name, layer.norm.norm.lower.value(),
-               layer.norm.norm.upper.value(), lipschitz::name(*layer.respects_gamma));
+    fmt::print("{:<10} {}  {:.6f} .. {:.6f}  {}\n", layer.network.name(), layer.name,
+               layer.norm.norm.lower.value(), layer.norm.norm.upper.value(),
+               lipschitz::name(*layer.respects_gamma));
   }
 
   // %% [markdown]
@@ -52,10 +53,10 @@ int main() {
   std::string data;
   for (const lipschitz::CertifiedBound& bound : found.bounds) {
     const double witnessed = bound.lower.witness->slope.value();
-    fmt::print("{:<16} {:8.2f} <= L <= {:8.2f}   (product of norms: {:.1f})\n", bound.function, witnessed,
-               bound.upper.value(), bound.product.value());
-    data += fmt::format("\"{}\" {:.3f} {:.4g} {:.4g}\n", bound.function, witnessed, bound.upper.value(),
-                        bound.product.value());
+    fmt::print("{:<16} {:8.2f} <= L <= {:8.2f}   (product of norms: {:.1f})\n", bound.function.name(),
+               witnessed, bound.upper.value(), bound.product.value());
+    data += fmt::format("\"{}\" {:.3f} {:.4g} {:.4g}\n", bound.function.name(), witnessed,
+                        bound.upper.value(), bound.product.value());
   }
   notebook::plot("bounds", data,
                  "set style data histogram\nset style fill solid 0.8\nset logscale y\nset key top left\n"

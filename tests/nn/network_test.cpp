@@ -133,11 +133,11 @@ TEST(NetworkToml, SilentCompositionsAreFoundByTheNeighboursAndFromOneNeighbourMo
   EXPECT_EQ(silent_up_to(network, "set:small:small", 5), 2);
   EXPECT_EQ(silent_up_to(network, "set:large:small", 5), 1);
   EXPECT_EQ(silent_up_to(network, "set:small:large", 5), 0);
-  using Parts = std::set<std::vector<std::string>>;
+  using Beside = std::set<std::vector<FunctionId>>;
   EXPECT_EQ(beside_silent(network, "set:small:small"),
-            (Parts{{"phi:small", "phi:small"}, {"phi:large"}, {"phi:large", "phi:small", "phi:small"}}));
+            (Beside{{"phi:small", "phi:small"}, {"phi:large"}, {"phi:large", "phi:small", "phi:small"}}));
   EXPECT_EQ(beside_silent(network, "set:large:small"),
-            (Parts{{"phi:large"}, {"phi:large", "phi:large", "phi:small"}}));
+            (Beside{{"phi:large"}, {"phi:large", "phi:large", "phi:small"}}));
   EXPECT_TRUE(beside_silent(network, "set:ground:small").empty());
   EXPECT_TRUE(beside_silent(network, "set:small:large").empty());
 }
