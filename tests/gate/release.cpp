@@ -96,7 +96,8 @@ void ReleaseFolder::write_facts(int flash_bytes) const {
   arguments.file = folder_ / "network/network.toml";
   const files::Network network = files::load_network(arguments);
   files::Json weights = files::Json::object();
-  for (const auto& [part, stored] : files::parts(network)) weights[part.name()] = {{"sha256", stored->sha256}};
+  for (const auto& [part, stored] : files::parts(network))
+    weights[part.name()] = {{"sha256", stored->sha256}};
   const auto us = [](double least, double most) {
     files::Json cost = {{"instructions", 1000}};
     cost["modelled_us"] = {least, most};

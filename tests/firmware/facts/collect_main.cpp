@@ -93,7 +93,8 @@ int run(char** arguments, int count) {
   for (int i = 7; i < count; ++i) graph.add(swarmcert::files::read_file(arguments[i]));
 
   Json weights = Json::object();
-  for (const auto& [part, one] : swarmcert::files::parts(network)) weights[part.name()] = {{"sha256", one->sha256}};
+  for (const auto& [part, one] : swarmcert::files::parts(network))
+    weights[part.name()] = {{"sha256", one->sha256}};
   Json facts = {
       {"schema", "swarmcert/firmware-facts/1"},
       {"tool", "swarmcert " SWARMCERT_VERSION},
