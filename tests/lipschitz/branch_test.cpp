@@ -1,11 +1,12 @@
 /// Bounds that hold on a box: above every slope there, near the true constant, and proved by what the checker accepts.
+#include "lipschitz/branch/branch.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
 #include "data.h"
-#include "lipschitz/branch/branch.h"
 #include "lipschitz/branch/local_bound.h"
 #include "lipschitz/branch/local_chain.h"
 #include "lipschitz/networks.h"

@@ -129,8 +129,8 @@ void try_points(const Network& network, const Proved& proved, const files::Funct
   std::printf(
       "%s, up to %d neighbours: sampled %.4g .. %.4g, attained %.4g .. %.4g, proved %.4g .. %.4g; jump %.3g "
       "of %.3g; float32 off by %.3g of %.3g\n",
-      function.name().c_str(), neighbours, least, greatest, range->least.value, range->greatest.value, range->lower,
-      range->upper, jump, range->jump, largest_error, error->evaluation.value());
+      function.name().c_str(), neighbours, least, greatest, range->least.value, range->greatest.value,
+      range->lower, range->upper, jump, range->jump, largest_error, error->evaluation.value());
 }
 
 TEST(RangeSoundness, RandomSetsStayWithinTheirRange) {
