@@ -126,10 +126,10 @@ std::vector<GoldenVector> golden_vectors(const files::Network& network, int coun
   std::vector<GoldenVector> result;
   int own_kind = 0;
   for (const auto& [rho_kind, weights] : network.rho) {
-    const auto add = [&](int neighbours, const std::vector<int>& kinds) {
+    const auto add = [&, &own = rho_kind](int neighbours, const std::vector<int>& kinds) {
       result.push_back(random_vector(network, neighbours, kinds, random));
       result.back().own_kind = own_kind;
-      evaluator.run(rho_kind, result.back());
+      evaluator.run(own, result.back());
     };
     for (int g = 0; g < count; ++g) add(g % (most_neighbours + 1), {});
     for (const std::vector<int>& kinds : silent_kinds(network, rho_kind)) {
