@@ -185,6 +185,16 @@ TEST(GateChecks, ErrorsOfTheEstimatesCountAmongWhatMovesTheVehicle) {
                       {"policy.toml", "velocity_error_m_s", "-1", "must not be negative"}));
 }
 
+TEST(GateChecks, ALimitOfAFunctionThatNoNetworkCanHaveIsRefused) {
+  const ReleaseFolder release;
+  for (const std::string name : {"phi_small", "psi:small", "set:small"}) {
+    const std::string table = "lipschitz\nfunctions = { \"" + name + "\" = 30 }";
+    EXPECT_TRUE(refuses([&] { release.judge(release.policy_of({table})); },
+                        {"policy.toml", name, "is no function", "phi:<kind>"}))
+        << name;
+  }
+}
+
 TEST(GateChecks, AnUnstablePlantInTheBoxNeverPasses) {
   const ReleaseFolder release;
   const gate::GateResult result =
