@@ -34,9 +34,9 @@ void require_what_is_bounded(const Network& network, const files::Parts& parts,
     throw std::invalid_argument(std::string(options.domain.empty() ? "--method branch" : "bounds on a box") +
                                 ": for networks of relative states only, and these are rotation invariants");
   if (options.method != UpperMethod::kBranch) return;
-  for (const auto& [name, weights] : parts) {
+  for (const auto& [part, weights] : parts) {
     if (weights->is_relu()) continue;
-    throw std::invalid_argument("--method branch: for ReLU networks only; " + name.name() + " has " +
+    throw std::invalid_argument("--method branch: for ReLU networks only; " + part.name() + " has " +
                                 weights->activation_names() + " between its layers");
   }
 }

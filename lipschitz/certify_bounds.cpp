@@ -22,7 +22,7 @@ constexpr double kShareBeforeBranch = 0.3, kShareOfBoxes = 0.6;
 
 std::string called(const CertifiedBound& bound) {
   return bound.function.name() + " " + bound.block +
-         (bound.neighbours.empty() ? "" : " with so many neighbours");
+         (bound.neighbours.empty() ? "" : " with a limited number of neighbours");
 }
 
 bool has_program(UpperMethod method, const CertifiedBound& bound) {

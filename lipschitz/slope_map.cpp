@@ -22,7 +22,7 @@ constexpr int kRegions = 15;
 
 bool has_map(const CertifiedBound& bound) {
   if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) return false;
-  return bound.function == "network" ||
+  return bound.function.is_plain() ||
          (bound.function.is_set() && !bound.function.input_part().is_ground_phi());
 }
 

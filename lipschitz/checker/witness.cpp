@@ -290,10 +290,10 @@ SlopeFunction slope_function(const files::Network& network, const files::Functio
   SlopeFunction f{term(names[0]), {}, names.size() == 2 ? parts.at(names[1]) : nullptr};
   const files::FunctionId ground = files::FunctionId::ground_phi();
   std::size_t grounds = names[0] == ground ? 1 : 0;
-  for (const files::FunctionId& name : others) {
-    if (!name.is_phi()) refuse(name.name() + " is no neighbour");
-    grounds += name == ground ? 1 : 0;
-    f.others.push_back(term(name));
+  for (const files::FunctionId& part : others) {
+    if (!part.is_phi()) refuse(part.name() + " is no neighbour");
+    grounds += part == ground ? 1 : 0;
+    f.others.push_back(term(part));
   }
   if (names.size() == 2 && grounds != parts.count(ground)) {
     refuse("the ground network enters the sum exactly once");

@@ -251,9 +251,9 @@ std::vector<double> input_errors(const Box& box, double step) {
 std::vector<Float32Error> float32_errors(const Network& network, const Domain& domain,
                                          const std::map<files::FunctionId, double>& lipschitz,
                                          const Float32Options& options) {
-  for (const auto& [name, weights] : files::parts(network)) {
+  for (const auto& [part, weights] : files::parts(network)) {
     if (weights->precision != files::Precision::kFloat32)
-      throw std::invalid_argument("float32_errors: " + name.name() + " is not stored in float32");
+      throw std::invalid_argument("float32_errors: " + part.name() + " is not stored in float32");
   }
   const Domain inner = clamped(network, domain);
   std::map<files::FunctionId, double> moved;  // |q(x) - x| per part

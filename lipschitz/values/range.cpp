@@ -211,7 +211,7 @@ std::vector<files::FunctionId> value_functions(const Network& network) {
   std::vector<files::FunctionId> functions;
   for (const files::FunctionId& function : files::functions(network)) {
     const bool is_set = function.is_set();
-    if (function == "network" || (is_set && !function.parts()[0].is_ground_phi()))
+    if (function.is_plain() || (is_set && !function.input_part().is_ground_phi()))
       functions.push_back(function);
   }
   return functions;

@@ -194,7 +194,7 @@ Samples samples_of(const Network& network, const std::string& part, const std::s
   const auto found = named ? all.find(*named) : all.end();
   if (found == all.end()) {
     std::string list;
-    for (const auto& [name, weights] : all) list += (list.empty() ? "" : ", ") + name.name();
+    for (const auto& [known, weights] : all) list += (list.empty() ? "" : ", ") + known.name();
     throw InputError({path, "", in_quotes(part), "", "is no part of this network", "its parts are: " + list});
   }
   Samples samples;

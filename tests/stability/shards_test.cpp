@@ -71,7 +71,7 @@ TEST(Shards, AStoppedShardIsTakenUpWhereItStopped) {
   EXPECT_EQ(sweep_json(read_shards(stopped.path())).dump(), sweep_json(read_shards(whole.path())).dump());
 }
 
-TEST(Shards, AMissingShardIsNamed) {
+TEST(Shards, TheFirstCellOfAMissingShardIsNamed) {
   const tests::TempFolder inputs, folder;
   const Grid grid = small_grid(inputs);
   for (const int index : {0, 2}) run_shard(grid, folder.path(), shard(index, 3));
@@ -79,7 +79,7 @@ TEST(Shards, AMissingShardIsNamed) {
     read_shards(folder.path());
     FAIL() << "a shard is missing";
   } catch (const files::InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("1"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("the first is cell 1"), std::string::npos) << error.what();
   }
 }
 
