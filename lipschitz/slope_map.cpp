@@ -20,10 +20,10 @@ constexpr double kTolerance = 0.01;
 /// Linear regions that a round of the search for steep points enters.
 constexpr int kRegions = 15;
 
-bool has_map(const CertifiedBound& bound) {
+bool has_map(const files::Network& network, const CertifiedBound& bound) {
   if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) return false;
-  return bound.function.is_plain() ||
-         (bound.function.is_set() && !bound.function.input_part().is_ground_phi());
+  const std::vector<files::FunctionId> mapped = value_functions(network);
+  return std::find(mapped.begin(), mapped.end(), bound.function) != mapped.end();
 }
 
 int moving_inputs(const files::Network& network) {
@@ -164,7 +164,7 @@ std::vector<SlopeMap> slope_maps(const files::Network& network, const Certificat
   std::vector<SlopeMap> maps;
   std::vector<Cells> functions;
   for (const CertifiedBound& bound : found.bounds) {
-    if (!has_map(bound)) continue;
+    if (!has_map(network, bound)) continue;
     functions.emplace_back(network, found, bound, options);
     maps.push_back({bound.function, {}});
     const Box& box = options.domain.at(bound.function.input_part());
