@@ -1,40 +1,17 @@
 #include "notebooks_cpp/document.h"
 
-#include <cmark.h>
 #include <openssl/evp.h>
 
-#include <cstdlib>
-#include <memory>
 #include <sstream>
 
 namespace swarmcert::notebook {
 namespace {
-
-constexpr const char* kStyle =
-    ":root{color-scheme:light dark}body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:2rem auto;"
-    "padding:0 1rem}pre{overflow-x:auto;padding:.75rem;border-radius:4px;background:#8882;font-size:.85rem}"
-    "pre.output{background:none;border-left:3px solid #888;border-radius:0}img{max-width:100%;height:auto;"
-    "background:#fff}table{border-collapse:collapse}td,th{padding:.25rem .75rem;border-bottom:1px solid "
-    "#888}";
 
 std::string base64(const std::string& bytes) {
   std::string text(4 * ((bytes.size() + 2) / 3), '\0');
   EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
                   reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<int>(bytes.size()));
   return text;
-}
-
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text)
-    result += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '>' ? "&gt;" : std::string(1, c);
-  return result;
-}
-
-std::string html_of_markdown(const std::string& text) {
-  const std::unique_ptr<char, void (*)(void*)> html(
-      cmark_markdown_to_html(text.data(), text.size(), CMARK_OPT_DEFAULT), std::free);
-  return html.get();
 }
 
 /// As notebooks keep text: a list of lines with their ends.
@@ -86,30 +63,6 @@ files::Json to_ipynb(const std::vector<RunCell>& cells) {
             {"language_info", {{"file_extension", ".cpp"}, {"mimetype", "text/x-c++src"}, {"name", "c++"}}}}},
           {"nbformat", 4},
           {"nbformat_minor", 5}};
-}
-
-std::string to_html(const std::string& title, const std::vector<RunCell>& cells) {
-  std::string html = "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>" +
-                     escaped(title) +
-                     "</title>\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-                     "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src "
-                     "'unsafe-inline'; img-src data:\">\n<style>" +
-                     kStyle + "</style></head><body>\n";
-  for (const RunCell& cell : cells) {
-    if (!cell.is_code) {
-      html += html_of_markdown(cell.text);
-      continue;
-    }
-    html += "<pre><code>" + escaped(cell.text) + "</code></pre>\n";
-    for (const Output& output : cell.outputs) {
-      if (output.svg.empty())
-        html += "<pre class=\"output\">" + escaped(output.text) + "</pre>\n";
-      else
-        html += "<p><img alt=\"" + escaped(output.text) + "\" src=\"data:image/svg+xml;base64," +
-                base64(output.svg) + "\"></p>\n";
-    }
-  }
-  return html + "</body></html>\n";
 }
 
 std::string first_difference(const files::Json& committed, const files::Json& fresh) {

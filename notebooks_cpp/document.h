@@ -1,4 +1,4 @@
-/// @file A guide that ran: cells with what they printed and drew, as .ipynb and as HTML.
+/// @file A guide that ran: cells with what they printed and drew, as .ipynb.
 #pragma once
 
 #include <string>
@@ -23,9 +23,6 @@ struct RunCell : Cell {
 
 /// Notebook format 4.5. A plot is one display_data with SVG, PNG and text; its data stand in its metadata.
 files::Json to_ipynb(const std::vector<RunCell>& cells);
-
-/// One self-contained page that loads nothing.
-std::string to_html(const std::string& title, const std::vector<RunCell>& cells);
 
 /// Where two notebooks differ, images aside: the first cell with both texts; empty if nowhere. Both must have the images.
 std::string first_difference(const files::Json& committed, const files::Json& fresh);

@@ -3,8 +3,8 @@
 ///   notebook_renderer mark SOURCE OUTPUT
 ///     writes the source that is compiled: it says on standard output where each cell begins.
 ///   notebook_renderer render SOURCE PROGRAM PROJECT FOLDER [COMMITTED]
-///     runs PROGRAM in FOLDER/NAME, with the project's folders beside it; writes FOLDER/NAME.ipynb and NAME.html, and
-///     fails where COMMITTED differs in anything but the images' bytes.
+///     runs PROGRAM in FOLDER/NAME, with the project's folders beside it; writes FOLDER/NAME.ipynb, and fails
+///     where COMMITTED differs in anything but the images' bytes.
 #include <sys/wait.h>
 
 #include <array>
@@ -114,10 +114,8 @@ int render(const fs::path& source, const fs::path& program, const fs::path& proj
   prepare(scratch, project);
   const std::vector<Cell> cells = parse_cells(files::read_file(source.string()), source.string());
   const std::string output = output_of("SWARMCERT_NOTEBOOK=1 " + quoted(fs::absolute(program)), scratch);
-  const std::vector<RunCell> run = run_cells(cells, output, scratch);
-  const files::Json notebook = to_ipynb(run);
+  const files::Json notebook = to_ipynb(run_cells(cells, output, scratch));
   files::write_file((folder / (name + ".ipynb")).string(), notebook.dump(1) + "\n", true);
-  files::write_file((folder / (name + ".html")).string(), to_html(name, run), true);
   if (committed == nullptr) return 0;
   const std::string difference =
       first_difference(files::parse_json(files::read_file(committed), committed), notebook);
