@@ -158,6 +158,26 @@ struct PathEstimate {
   VectorXd centre, slope;
 };
 
+/// What Newton's matrix at a point sees of the path: for any mu, v - u / mu is Newton's step to it and u / mu^2 its
+/// derivative.
+struct PathView {
+  VectorXd u, v;
+  double mu;        ///< where on the path
+  double distance;  ///< from there, in the norm of Newton's matrix
+
+  bool good() const { return mu > 0 && std::isfinite(distance); }
+  PathEstimate estimate(const VectorXd& y) const { return {mu, y + v - u / mu, u / (mu * mu)}; }
+};
+
+/// @param mu where on the path to look; without it, where the path is nearest.
+PathView view_of_path(const NewtonMatrix& newton, const ChainPoint& from, std::optional<double> mu) {
+  PathView view = {newton.solve(VectorXd::Unit(from.y.size(), 0)), newton.solve(from.gradient), 0, 0};
+  view.mu = mu.value_or(view.u(0) / view.v(0));
+  view.distance = std::sqrt(
+      std::max(0.0, from.gradient.dot(view.v) - 2 * view.v(0) / view.mu + view.u(0) / (view.mu * view.mu)));
+  return view;
+}
+
 /// Where the path is at mu, by Hermite's interpolation at the last `points` estimates (Newton's divided differences,
 /// each place taken twice).
 VectorXd extrapolated(const std::vector<PathEstimate>& path, std::size_t points, double mu) {
@@ -224,7 +244,6 @@ InteriorPointResult minimise_chain(const ChainSlack& chain, const InteriorPointO
   if (!at) return result;
   result.points.push_back(at->y);
   result.gaps.push_back(kInfinity);
-  const VectorXd cost = VectorXd::Unit(at->y.size(), 0);
   const double first_mu = kFirstGap * at->y(0) / size;
   double reach = kFirstReach;
   double last_distance = kInfinity;
@@ -237,11 +256,9 @@ InteriorPointResult minimise_chain(const ChainSlack& chain, const InteriorPointO
     const NewtonMatrix newton(std::move(matrix));
     result.stop = LipSdpStop::kNumericalLimit;
     if (!newton.good()) break;
-    // For any mu, v - u / mu is Newton's step to the path and u / mu^2 the path's derivative.
-    const VectorXd u = newton.solve(cost), v = newton.solve(at->gradient);
-    const double mu = is_on_path ? u(0) / v(0) : first_mu;  // the nearest point of the path
-    const double distance = std::sqrt(std::max(0.0, at->gradient.dot(v) - 2 * v(0) / mu + u(0) / (mu * mu)));
-    if (!(mu > 0) || !std::isfinite(distance)) break;
+    const PathView view = view_of_path(newton, *at, is_on_path ? std::nullopt : std::optional(first_mu));
+    if (!view.good()) break;
+    const double mu = view.mu, distance = view.distance;
     const double gap = size * mu / at->y(0);
     if (distance < 1) result.best_dual = std::max(result.best_dual, at->y(0) - size * mu * (1 + distance));
     if (gap < options.relative_gap && distance < 1) {
@@ -252,7 +269,7 @@ InteriorPointResult minimise_chain(const ChainSlack& chain, const InteriorPointO
     const double before = at->y(0);
     std::optional<ChainPoint> next;
     if (distance < kOnPath) {
-      path.push_back({mu, at->y + v - u / mu, u / (mu * mu)});
+      path.push_back(view.estimate(at->y));
       if (path.size() > kMostPoints) path.erase(path.begin());
       next = follow(chain, newton, path, reach, options.stop);
       if (!next && is_lost) break;
