@@ -8,8 +8,8 @@
 #include <cstdlib>
 #include <regex>
 
+#include "analysis/cli/bash_completion.h"
 #include "analysis/cli/command_line.h"
-#include "analysis/cli/command_pages.h"
 #include "analysis/commands/commands.h"
 #include "nn/base/suggest.h"
 
@@ -108,14 +108,9 @@ int run_command(int argc, const char* const* argv) {
       "Exit codes: 0 done or holds; 1 a limit is violated, or something is refuted or rejected; 2 usage; 3 "
       "bad input;\n"
       "4 inconclusive; 70 a fault of this tool.  'swarmcert COMMAND --help' shows options and an example.");
-  const auto print_and_end = [&app](const std::string& name, std::string (*page)(const CLI::App&),
-                                    const std::string& description) {
-    app.add_flag_callback(
-        name, [&app, page] { throw CLI::CallForVersion(page(app), 0); }, description);
-  };
-  print_and_end("--man-page", man_page, "Print the manual page");
-  print_and_end("--bash-completion", bash_completion,
-                "Print the completion for bash: source <(swarmcert --bash-completion)");
+  app.add_flag_callback(
+      "--bash-completion", [&app] { throw CLI::CallForVersion(bash_completion(app), 0); },
+      "Print the completion for bash: source <(swarmcert --bash-completion)");
   CommonOptions common;
   std::function<int(const CommonOptions&)> action;
   for (const Command& command : commands()) {

@@ -85,7 +85,7 @@ else()
   endforeach()
 endif()
 
-foreach(file bin/swarmcert share/man/man1/swarmcert.1.gz share/bash-completion/completions/swarmcert
+foreach(file bin/swarmcert share/bash-completion/completions/swarmcert
              share/doc/swarmcert/copyright share/doc/swarmcert/SECURITY.md share/swarmcert/networks/demo/network.toml
              share/swarmcert/gains/crazyflie-small.toml share/swarmcert/models/crazyflie-small.toml
              share/swarmcert/analysis/flights/flights.toml share/swarmcert/sweep.sbatch
@@ -103,10 +103,15 @@ run(${root}/usr/bin/swarmcert --version)
 if(NOT output STREQUAL "swarmcert ${VERSION}\n")
   message(FATAL_ERROR "the packaged tool calls itself ${output}")
 endif()
-run(gzip -dc ${root}/usr/share/man/man1/swarmcert.1.gz)
-if(NOT output MATCHES "\"swarmcert ${VERSION}\"")
-  message(FATAL_ERROR "the manual page is of another version")
-endif()
+find_program(help2man help2man)
+foreach(page swarmcert swarmcert-certify)
+  if(help2man)
+    run(gzip -dc ${root}/usr/share/man/man1/${page}.1.gz)
+    if(NOT output MATCHES " ${VERSION}\"")
+      message(FATAL_ERROR "${page}.1 is of another version")
+    endif()
+  endif()
+endforeach()
 # Bundled files are found beside the tool: the demo names where it read them.
 run(${root}/usr/bin/swarmcert demo -q -o ${SCRATCH}/demo)
 if(NOT output MATCHES "${root}/usr/share/swarmcert/networks/demo/network.toml")

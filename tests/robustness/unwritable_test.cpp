@@ -39,7 +39,7 @@ TEST_F(Unwritable, FullStandardOutputIsAnError) {
   expect_refusal(kCertify + "> /dev/full", "No space left on device");
   expect_refusal(kCertify + "--json - > /dev/full",
                  "standard output: cannot be written (No space left on device)");
-  expect_refusal("swarmcert --man-page > /dev/full", "No space left on device");
+  expect_refusal("swarmcert --bash-completion > /dev/full", "No space left on device");
   EXPECT_EQ(run(kCertify + "--json /dev/full").exit_code, 3);
   EXPECT_EQ(run(kCertify + "--json /dev/null").exit_code, 0) << "devices need no --force";
 }
