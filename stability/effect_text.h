@@ -1,4 +1,4 @@
-/// @file An effect as it stands in a model file.
+/// @file Effects in the format of model files.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace swarmcert::stability {
 
-/// [[effect]] with everything that belongs to it; read_model() reads it back.
+/// Returns the [[effect]] table with all its parts; read_model() reads it back.
 std::string to_toml(const EffectSpec& effect);
 
 }  // namespace swarmcert::stability

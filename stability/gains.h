@@ -1,4 +1,4 @@
-/// @file gains.toml: the position gains that fly, the loop that runs them, and the lags behind it.
+/// @file gains.toml: position gains as flown, the rates of the loop, and its lags.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ using PidGains = controller::PidGains<double>;
 using CompositeGains = controller::CompositeGains<double>;
 using controller::AttitudeLaw;
 
-/// Gains of the attitude law about the body's axes: torque = -(KR e_R + Kw e_w + KI int e_R). The robust law has this
+/// Gains of the attitude law about the body axes: torque = -(KR e_R + Kw e_w + KI int e_R). The robust law has this
 /// form with Kw = K, KR = K Lambda.
 struct AttitudeGains {
   PerAxis KR_Nm;
@@ -26,40 +26,40 @@ struct AttitudeGains {
   PerAxis KI_Nm_per_s;
 };
 
-/// Everything gains.toml says. Exactly one of `pid` and `composite` is present.
+/// The contents of gains.toml. Exactly one of `pid` and `composite` is present.
 struct Gains {
-  std::string path;    ///< of the file, for messages and hashes
+  std::string path;    ///< path of the file, for messages and hashes
   std::string sha256;  ///< of its text
   std::optional<PidGains> pid;
   std::optional<CompositeGains> composite;
-  /// Largest |int e dt| that the integrator keeps, in m s; infinite where the file has no limit.
+  /// Largest |int e dt| that the integrator keeps, in m s; infinite if the file sets no limit.
   PerAxis integrator_limit_m_s = {std::numeric_limits<double>::infinity(),
                                   std::numeric_limits<double>::infinity(),
                                   std::numeric_limits<double>::infinity()};
   double rate_hz = 0;            ///< of the position loop; 0: the law is analysed in continuous time only
   double integrator_step_s = 0;  ///< added per cycle: I += step * e; 1/rate_hz unless the file says otherwise
   AttitudeLaw attitude_law = AttitudeLaw::kLee;
-  std::optional<AttitudeGains> attitude;  ///< for the margins of the cascade; what is simulated has its own
+  std::optional<AttitudeGains> attitude;  ///< for the margins of the cascade; simulation has its own
   double motor_lag_s = 0;                 ///< time constant of thrust, all axes
   double attitude_lag_s = 0;              ///< time constant of the thrust's direction: x and y only
   double body_rate_lag_s = 0;             ///< time constant of the measured body rates, in the cascade
   double delay_s = 0;                     ///< from state to force
-  double network_rate_hz = 0;             ///< of the learned force's staircase; 0: continuous
-  double network_latency_s = 0;           ///< age of what the network sees when its output is applied
+  double network_rate_hz = 0;             ///< of the learned force, held between updates; 0: continuous
+  double network_latency_s = 0;           ///< age of the network's inputs when its output is applied
 };
 
 /// Reads gains.toml (schema swarmcert/gains/1).
 ///   [position] Kp, Kd, Ki: three numbers, or one for all axes; or Lambda, K: 3x3, three (diagonal), or one number.
 ///              integrator_limit (m s), rate_hz, integrator_step_s: optional.
-///   [attitude] law = "lee" | "robust"; KR, Kw, KI: three numbers about the body's axes, or one for all; KI may be left
+///   [attitude] law = "lee" | "robust"; KR, Kw, KI: three numbers about the body axes, or one for all; KI may be left
 ///              out. [lag] motor_s, attitude_s, body_rate_s, delay_s;  [network] rate_hz, latency_s: optional.
-/// Whether Lambda and K fit the theorem is not asked here.
+/// Does not check whether Lambda and K satisfy the theorem's hypotheses.
 /// @throws files::InputError with line, key, value and hint: unknown keys, both forms or neither, negative or
-///   non-finite numbers, times above one second, rates outside 1 Hz .. 100 kHz, gains that no vehicle follows (Kp
-///   above 1e7 1/s^2, ...), an integrator step without a rate.
+///     non-finite numbers, times above one second, rates outside 1 Hz .. 100 kHz, gains too large for any vehicle (Kp
+///     above 1e7 1/s^2, ...), an integrator step without a rate.
 Gains load_gains(const std::string& path);
 
-/// As load_gains(), from memory; `path` is used in messages only.
+/// Like load_gains(), but parses `text`; `path` is used in messages only.
 Gains parse_gains(const std::string& text, const std::string& path);
 
 }  // namespace swarmcert::stability

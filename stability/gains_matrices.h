@@ -1,4 +1,4 @@
-/// @file Gains as matrices of Eigen, for decompositions.
+/// @file Conversion of gains to Eigen matrices, for decompositions.
 #pragma once
 
 #include <Eigen/Core>

@@ -15,37 +15,38 @@
 namespace swarmcert::stability {
 
 using controller::kGravity_m_s2;
-/// One gram-force: the unit of the thrust map and of the published networks.
+/// One gram-force, the unit of the thrust map and of the published networks.
 inline constexpr double kGramForce_N = controller::kNewtonPerGramForce;
 /// The battery voltage to which the thrust map and the effect `battery` refer.
 inline constexpr double kFullBattery_V = controller::kReferenceVoltage_V;
-/// Voltages of one lithium-polymer cell: empty under load, and full of the high-voltage kind with a reading's error.
+/// Voltages of one lithium-polymer cell: from empty under load to a full high-voltage cell plus measurement error.
 inline constexpr Interval kOneCell_V = {2.5, 4.5};
 
-/// Force of one rotor, by the map that flies. Outside the calibrated range the polynomial may fall with p.
+/// Force of one rotor, by the thrust map used in flight. Outside the calibrated range the polynomial may decrease with
+/// p.
 struct ThrustMap : controller::ThrustMap<double> {
-  /// Never negative. @param pwm p = PWM / 65536, in [0, 1]
+  /// Returns the force, never negative. @param pwm p = PWM / 65536, in [0, 1]
   double force_N(double pwm, double battery_V) const { return force_of_pwm(*this, pwm, battery_V); }
-  /// The p in [0, 1] that gives `force_N`; 0 or 1 where none gives so little or so much.
+  /// Returns the p in [0, 1] that gives `force_N`; 0 or 1 if the force is outside the range.
   double pwm(double force_N, double battery_V) const { return pwm_of_force(*this, force_N, battery_V); }
-  /// Largest force of one rotor, in newton.
+  /// Returns the largest force of one rotor, in newton.
   double largest_N(double battery_V) const { return force_N(1, battery_V); }
 };
 
-/// One rotor, which pushes along the body's z axis. Body axes: x forward, y left, z up.
+/// One rotor, which pushes along the body z axis. Body axes: x forward, y left, z up.
 struct RotorPlace {
   double x_m = 0, y_m = 0, z_m = 0;
-  bool counterclockwise = true;  ///< seen from above; its reaction turns the body the other way
+  bool counterclockwise = true;  ///< seen from above; its reaction torque turns the body the other way
 
-  /// Yaw torque per newton of thrust, with sign, of a rotor with the ratio `torque_per_thrust_m`.
+  /// Signed yaw torque per newton of thrust, for a rotor with the ratio `torque_per_thrust_m`.
   double yaw_m(double torque_per_thrust_m) const {
     return counterclockwise ? -torque_per_thrust_m : torque_per_thrust_m;
   }
 };
 inline constexpr std::size_t kFewestRotors = 3, kMostRotors = 8;
 
-/// What the logs' sensors do to the truth. Defaults: the published flights (BMI088 accelerometer behind a two-pole
-/// low-pass of 30 Hz, logged at about 100 Hz; positions from motion capture).
+/// Sensor model of the logs. Defaults: the published flights (BMI088 accelerometer behind a two-pole low-pass of 30 Hz,
+/// logged at about 100 Hz; positions from motion capture).
 struct SensorModel {
   double accelerometer_cutoff_hz = 30;
   double accelerometer_noise_m_s2 = 0.12;  ///< standard deviation per logged sample, after the filter
@@ -60,27 +61,27 @@ struct EffectExpression {
   std::map<std::string, std::string> formulas;  ///< "force_z_N" -> "a * T * exp(-z / b)"
   std::vector<std::string> linear;              ///< parameters in which the formulas are linear, e.g. {"a"}
   std::map<std::string, Interval> bounds;       ///< of any parameter
-  std::map<std::string, std::vector<double>> grid;  ///< values that identification tries, of the others
+  std::map<std::string, std::vector<double>> grid;  ///< values that identification tries for the others
   bool per_neighbour = false;                       ///< evaluated for each neighbour and summed
 };
 
-/// Where an effect's numbers come from. Written by identification, kept by everyone.
+/// Where an effect's numbers come from. Written by identification and preserved when models are rewritten.
 struct FitProvenance {
-  std::vector<std::string> flights;                          ///< that the fit used
-  std::map<std::string, Interval> interval;                  ///< by parameter, 90 %
+  std::vector<std::string> flights;                          ///< used by the fit
+  std::map<std::string, Interval> interval;                  ///< 90 % intervals, by parameter
   double select_rmse_before_N = 0, select_rmse_after_N = 0;  ///< on flights not used by the fit
-  int test_looks = 0;  ///< how often the test flights had been scored when this was written
+  int test_looks = 0;  ///< how often the test flights had been scored at that time
   std::string note;
 
   bool is_empty() const { return flights.empty() && interval.empty() && note.empty() && test_looks == 0; }
 };
 
-/// One [[effect]] of a model file. Parameters that are not named have the effect's defaults.
+/// One [[effect]] of a model file. Parameters that are not named take the effect's defaults.
 struct EffectSpec {
   std::string name;
-  std::string vehicle;  ///< "cf50": acts on this one only; empty: on every vehicle of the kind
+  std::string vehicle;  ///< "cf50": acts on this vehicle only; empty: on every vehicle of the kind
   std::map<std::string, double> parameters;
-  std::string network;          ///< of `deep_set`: path as stated, relative to the model's folder
+  std::string network;          ///< of `deep_set`: path as written, relative to the model's folder
   EffectExpression expression;  ///< of user-defined effects
   FitProvenance fit;
 
@@ -90,14 +91,14 @@ struct EffectSpec {
   }
 };
 
-/// One row of the ladder of errors that led to a model: what was tried on top of the rows before it.
+/// One row of the ladder of errors that led to a model: an effect tried on top of the rows before it.
 struct LadderRow {
   std::string effect;  ///< "nominal" for the first
   bool accepted = true;
   double fit_rmse_N = 0, select_rmse_N = 0, test_rmse_N = 0, noise_floor_N = 0;
-  int test_looks = 0;  ///< how often test flights had been scored when this was written
-  std::string note;    ///< why it was refused, or kept all the same
-  /// Of every effect after this row, so that it can be gone back to: "motor_lag.tau_s",
+  int test_looks = 0;  ///< how often the test flights had been scored at that time
+  std::string note;    ///< why it was rejected, or kept nevertheless
+  /// Parameter values of every effect after this row, so that the row can be restored: "motor_lag.tau_s",
   /// "constant_force@cf50.force_x_N".
   std::map<std::string, double> values;
 };
@@ -105,54 +106,55 @@ struct LadderRow {
 /// One kind of vehicle. Invariant after read_model(): all numbers finite, mass, inertia and arm positive, 3 to 8
 /// rotors, every effect known and within its parameters' bounds.
 struct Model {
-  std::string path;    ///< as the user gave it; empty if made in memory
+  std::string path;    ///< as given by the user; empty if made in memory
   std::string sha256;  ///< of the file
-  std::string kind;    ///< "small", "large", ...: which phi and rho of a network belong to it
+  std::string kind;    ///< "small", "large", ...: selects phi and rho of a network
   double mass_kg = 0;
   std::array<double, 3> inertia_kg_m2 = {0, 0, 0};  ///< diagonal, body axes x forward, y left, z up
   double arm_m = 0;                                 ///< from the centre to the rotors; their mean distance
   double torque_per_thrust_m = 0;                   ///< yaw torque of a rotor per newton of its thrust
-  Interval battery_range_V = kOneCell_V;            ///< voltages at which the vehicle can be
+  Interval battery_range_V = kOneCell_V;            ///< possible battery voltages of the vehicle
   ThrustMap thrust{};
-  /// Force of one rotor at command u in [0, 1], whatever the voltage: a + b u + c u^2, in newton. Where a file states
-  /// it, `thrust` is the same polynomial in gram-force.
+  /// Force of one rotor at command u in [0, 1], independent of the voltage: a + b u + c u^2, in newton. If a file
+  /// states it, `thrust` is the same polynomial in gram-force.
   std::optional<std::array<double, 3>> thrust_curve_N;
-  /// In the order of the motors in logs. Empty: four rotors in X at `arm_m`, in the order of a Crazyflie's motors.
+  /// In the order of the motors in logs. Empty: four rotors in X at `arm_m`, in the motor order of a Crazyflie.
   std::vector<RotorPlace> rotors;
   SensorModel sensor;
   std::vector<EffectSpec> effects;
-  std::vector<LadderRow> ladder;  ///< empty where effects were not fitted step by step
+  std::vector<LadderRow> ladder;  ///< empty if the effects were not fitted step by step
 
   double weight_N() const { return mass_kg * kGravity_m_s2; }
   std::size_t num_rotors() const { return rotors.empty() ? 4 : rotors.size(); }
-  /// Of all rotors together.
+  /// Thrust of all rotors together.
   double largest_thrust_N(double battery_V) const {
     return static_cast<double>(num_rotors()) * thrust.largest_N(battery_V);
   }
 };
 
-/// Where the rotors are: Model::rotors or, where that is empty, four in X: front right, back right, back left, front
-/// left.
+/// Returns the positions of the rotors: Model::rotors or, if that is empty, four in X: front right, back right, back
+/// left, front left.
 std::vector<RotorPlace> rotor_places(const Model& model);
 
-/// Sets `thrust_curve_N` and the `thrust` that is the same.
+/// Sets `thrust_curve_N` and the equivalent `thrust`.
 void set_thrust_curve(const std::array<double, 3>& curve_N, Model& model);
 
-/// @throws files::InputError where the rotors are not four in X, which `what` needs.
+/// @throws files::InputError unless the vehicle has four rotors in X, which `what` requires.
 void refuse_other_rotors(const Model& model, const std::string& what);
 
 /// Reads a model file.
-/// @throws files::InputError with line, key, value and hint; unknown keys, effects and parameters get a did-you-mean.
+/// @throws files::InputError with line, key, value and hint; for unknown keys, effects and parameters the hint suggests
+///     similar names.
 Model read_model(const std::string& path);
 
-/// Why the vehicle cannot be at `battery_V`, with range and probable unit; empty if it can.
+/// Returns why the vehicle cannot be at `battery_V`, with the range and the probable unit; empty if it can.
 std::string battery_problem(const Model& model, double battery_V);
 
-/// As read_model(), from memory; `path` gives the folder for networks, and the name in messages.
+/// Like read_model(), but parses `text`; `path` gives the folder for networks, and the name in messages.
 Model parse_model(const std::string& text, const std::string& path);
 
-/// The file that reads back as `model`: numbers in the shortest form that gives the same double.
-/// @param comments lines to put at the head, without '#'.
+/// Returns a file that reads back as `model`, with numbers in the shortest form that gives the same double.
+/// @param comments lines for the head of the file, without '#'.
 std::string to_toml(const Model& model, const std::vector<std::string>& comments = {});
 
 }  // namespace swarmcert::stability

@@ -1,4 +1,4 @@
-/// @file Numbers of [vehicle] that no multirotor has: they were written in another unit.
+/// @file Detects numbers of [vehicle] that were written in the wrong unit.
 #pragma once
 
 #include "nn/base/toml.h"
@@ -6,10 +6,10 @@
 
 namespace swarmcert::stability {
 
-/// Compares thrust with weight and the inertia's radius of gyration with the arm. Where they do not fit, the field
-/// whose usual other unit (gram, millimetre, g cm^2, percent or counts of PWM) makes them fit is refused.
-/// @param vehicle the table that `model` was read from.
-/// @throws files::InputError naming field, value and the unit that was probably meant.
+/// Compares the thrust with the weight and the radius of gyration with the arm. If they are implausible, the field that
+/// becomes plausible in another common unit (gram, millimetre, g cm^2, percent or PWM counts) is rejected.
+/// @param vehicle the table from which `model` was read.
+/// @throws files::InputError naming the field, its value and the unit that was probably meant.
 void check_vehicle_units(const files::TomlTable& vehicle, const Model& model);
 
 }  // namespace swarmcert::stability

@@ -5,9 +5,10 @@ namespace swarmcert::stability {
 
 enum class KernelWidth { kNarrow, kAvx2, kAvx512 };
 
-/// The widest that this processor has, avx2 with fused operations; narrower where the environment variable
-/// SWARMCERT_KERNELS says `narrow` or `avx2`, to see what other processors compute.
-/// @throws files::InputError if the variable says anything else but `avx512`.
+/// Returns the widest SIMD width that this processor supports (avx2 requires fused multiply-add). The environment
+/// variable SWARMCERT_KERNELS may select a narrower one, `narrow` or `avx2`, to reproduce the results of other
+/// processors.
+/// @throws files::InputError if the variable is set to anything other than `narrow`, `avx2` or `avx512`.
 KernelWidth widest_kernels();
 
 }  // namespace swarmcert::stability

@@ -1,9 +1,9 @@
 /// @file Eight floats in one SIMD value, with which the flight code runs for eight vehicles at once.
 ///
-/// A Lanes is a Scalar of the control laws (controller/scalar.h) that stands for the same variable of eight vehicles.
-/// Each operation does in every lane what it does to a float alone, so the lanes hold the bits that fly. Only
-/// comparisons that steer the code join the lanes: where they disagree, the result is invalid and `split` holds the
-/// lanes of one side; the caller then computes the two sides separately.
+/// Lanes is a Scalar type for the control laws (controller/scalar.h) that holds the same variable of eight vehicles.
+/// Each operation does in every lane exactly what it does to a single float, so every lane has the bits that the flight
+/// code computes. Only comparisons that decide a branch couple the lanes: if the lanes disagree, the result is invalid
+/// and `split` holds the lanes that took one side; the caller then computes the two sides separately.
 #pragma once
 
 #include <cmath>
@@ -30,29 +30,30 @@ struct ThrustMap;
 namespace swarmcert::stability {
 
 class Lanes {
-  // Code without 256-bit registers need not align its stack for them.
+  // Aligned to 16 bytes, so that code without 256-bit registers need not align its stack to 32.
   using Vector = float __attribute__((vector_size(32), aligned(16)));
   using Mask = std::int32_t __attribute__((vector_size(32), aligned(16)));
 
  public:
   static constexpr int kCount = 8;
   static constexpr unsigned kAll = (1U << kCount) - 1;
-  /// The lanes, as bits, in which the first comparison with different outcomes was true; 0 while there was none. Never
-  /// reset here. (A type of which the flight code has no variables: a compiler then knows that comparing changes none.)
+  /// Bit mask of the lanes in which the first comparison with differing outcomes was true; 0 if there was none yet.
+  /// Never reset here. (Its type occurs nowhere in the flight code, so the compiler knows that comparisons modify no
+  /// flight variable.)
   static inline thread_local std::uint64_t split = 0;
 
-  /// The outcome of a comparison in each lane. The code takes one path when it turns into a bool; conditions that
-  /// && and || join do so together, which changes no outcome, since comparing has no effect of its own.
+  /// The outcome of a comparison in each lane. Converting it to bool decides the branch for all lanes. && and ||
+  /// combine conditions without short-circuiting; comparisons have no side effects, so the outcome is the same.
   struct Choice {
     Mask m;
 
     SWARMCERT_LANE explicit Choice(const Mask& mask) : m(mask) {}
-    SWARMCERT_LANE Choice(const Choice& other) : m(other.m) {}  // not trivial, as that of Lanes
+    SWARMCERT_LANE Choice(const Choice& other) : m(other.m) {}  // not trivial, as in Lanes
     SWARMCERT_LANE Choice& operator=(const Choice& other) {
       m = other.m;
       return *this;
     }
-    /// The lanes, as bits, in which it is true.
+    /// Returns the bit mask of the lanes in which the condition is true.
     SWARMCERT_LANE unsigned lanes() const {
 #if defined(SWARMCERT_LANES_AVX2)
       return static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(reinterpret_cast<__m256i>(m))));
@@ -77,8 +78,8 @@ class Lanes {
   SWARMCERT_LANE explicit Lanes(float x) : v_{x, x, x, x, x, x, x, x} {}
   SWARMCERT_LANE explicit Lanes(double x) : Lanes(static_cast<float>(x)) {}
   SWARMCERT_LANE explicit Lanes(int x) : Lanes(static_cast<float>(x)) {}
-  // Not trivial, so that every compiler passes it in memory: functions for processors with and without 256-bit
-  // registers may call each other.
+  // Not trivial, so that every compiler passes Lanes in memory: functions compiled with and without 256-bit registers
+  // may then call each other.
   SWARMCERT_LANE Lanes(const Lanes& other) : v_(other.v_) {}
   SWARMCERT_LANE Lanes& operator=(const Lanes& other) {
     v_ = other.v_;
@@ -88,10 +89,10 @@ class Lanes {
   SWARMCERT_LANE float operator[](int lane) const { return v_[lane]; }
   SWARMCERT_LANE void set(int lane, float x) { v_[lane] = x; }
 
-  /// Which lanes a part of the vehicles takes, and what fills the others: copies of its first.
+  /// Selects a subset of the lanes; the other lanes are filled with copies of its first.
   struct Part {
     std::int32_t from[kCount] = {};
-    std::int32_t taken[kCount] = {};  ///< -1 where it takes the lane, else 0
+    std::int32_t taken[kCount] = {};  ///< -1 for lanes of the subset, else 0
 
     explicit Part(unsigned lanes) {
       int first = 0;
@@ -132,7 +133,7 @@ class Lanes {
   SWARMCERT_LANE friend Choice operator>=(const Lanes& a, const Lanes& b) { return Choice(a.v_ >= b.v_); }
   SWARMCERT_LANE friend Choice operator==(const Lanes& a, const Lanes& b) { return Choice(a.v_ == b.v_); }
 
-  // As in controller/scalar.h and battery.h, lane by lane.
+  // The functions of controller/scalar.h and battery.h, lane by lane.
   SWARMCERT_LANE friend Lanes square_root(const Lanes& x) {
 #if defined(SWARMCERT_LANES_AVX2)
     return Lanes(Raw{_mm256_sqrt_ps(_mm256_max_ps(Vector{}, x.v_))});
@@ -143,7 +144,7 @@ class Lanes {
     return Lanes(Raw{root});
 #endif
   }
-  // The larger of two; the second where they are equal or not numbers.
+  // The larger of the two operands; the second if they are equal or one is NaN, as the AVX instruction does.
   SWARMCERT_LANE friend Lanes absolute(const Lanes& x) {
 #if defined(SWARMCERT_LANES_AVX2)
     return Lanes(Raw{_mm256_max_ps(-x.v_, x.v_)});
@@ -163,10 +164,10 @@ class Lanes {
     return Lanes(Raw{x.v_ < lower.v_ ? lower.v_ : from_below.v});
   }
   SWARMCERT_LANE friend Choice is_finite(const Lanes& x) {
-    return Choice(x.v_ - x.v_ == Vector{});  // infinite and NaN give NaN
+    return Choice(x.v_ - x.v_ == Vector{});  // infinity and NaN give NaN
   }
-  // The PWM that the flight code computes is not used in lanes, and computing it could split them; logs compute it from
-  // the forces (ControllerBank::report()).
+  // The flight code's PWM is not used in lanes, and computing it could split them; logs compute it from the forces
+  // (ControllerBank::report()).
   struct Nothing {};
   SWARMCERT_LANE friend Nothing pwm_register(const Lanes&) { return {}; }
   SWARMCERT_LANE friend Lanes pwm_of_force(const controller::ThrustMap<Lanes>&, const Lanes&, const Lanes&) {
@@ -174,7 +175,8 @@ class Lanes {
   }
 
  private:
-  // Vectors as such are passed differently for different processors: inside a struct, by reference, they are not.
+  // The calling convention of a bare vector depends on the target processor; that of a struct passed by reference does
+  // not.
   struct Raw {
     Vector v;
   };
@@ -185,7 +187,7 @@ class Lanes {
   Vector v_;
 };
 
-/// The same variable of eight vehicles in double: what is measured is computed in it, and then rounded.
+/// The same variable of eight vehicles in double precision: measurements are computed in double and then rounded.
 class DoubleLanes {
   using Half = double __attribute__((vector_size(32), aligned(16)));
 
@@ -194,7 +196,7 @@ class DoubleLanes {
   SWARMCERT_LANE explicit DoubleLanes(int x) : low_(Half{} + x), high_(Half{} + x) {}
   SWARMCERT_LANE explicit DoubleLanes(const double* at) {
 #if defined(SWARMCERT_LANES_AVX2)
-    low_ = _mm256_loadu_pd(at);  // a copy of bytes would be two moves, and wait for each other
+    low_ = _mm256_loadu_pd(at);  // a bytewise copy would become two dependent moves
     high_ = _mm256_loadu_pd(at + 4);
 #else
     std::memcpy(&low_, at, sizeof low_);
@@ -235,7 +237,7 @@ class DoubleLanes {
     return result;
   }
 
-  /// The reverse, which is exact.
+  /// Widens float lanes to double, which is exact.
   SWARMCERT_LANE static void widen(const Lanes& x, double* to) {
 #if defined(SWARMCERT_LANES_AVX2)
     _mm256_storeu_pd(to, _mm256_cvtps_pd(_mm256_castps256_ps128(x.v_)));
@@ -251,7 +253,7 @@ class DoubleLanes {
   Half low_, high_;
 };
 
-/// False where this processor cannot execute them.
+/// Returns false if this processor cannot execute the lane instructions.
 inline bool lanes_are_fast() {
 #if defined(SWARMCERT_LANES_AVX2)
   return widest_kernels() >= KernelWidth::kAvx2;

@@ -5,14 +5,15 @@
 
 namespace swarmcert::stability {
 
-/// Places in a vehicle's state. Position and velocity in the world (z up); the quaternion takes body to world, in the
-/// order x, y, z, w of logs and of Eigen::Quaterniond::coeffs(); angular velocity in the body; rotors: force behind the
-/// motor lag, front right, back right, back left, front left (unused without lag).
+/// Indices into a vehicle's state. Position and velocity are in the world frame (z up). The quaternion maps body to
+/// world and is stored as x, y, z, w, as in logs and in Eigen::Quaterniond::coeffs(). The angular velocity is in the
+/// body frame. Rotors: forces behind the motor lag, in the order front right, back right, back left, front left (unused
+/// without lag).
 enum StateIndex : int { kPosition = 0, kVelocity = 3, kQuaternion = 6, kOmega = 10, kRotors = 13 };
 inline constexpr int kVehicleStateSize = 17;
 inline constexpr int kNumRotors = 4;
 
-/// The rotation of a quaternion of any length but 0: R(q) / |q|^2, row after row.
+/// Computes the rotation matrix of a quaternion of any nonzero length: R(q) / |q|^2, in row-major order.
 template <typename Number>
 inline void rotation_of(const Number& x, const Number& y, const Number& z, const Number& w, Number (&R)[9]) {
   const Number one(1), s = Number(2) / (w * w + x * x + y * y + z * z);

@@ -1,4 +1,4 @@
-/// @file The largest slopes of the wake of one vehicle, enclosed. Not for users: see truth_bounds.h.
+/// @file Enclosures of the largest slopes of one vehicle's wake. Not for users: see truth_bounds.h.
 #pragma once
 
 #include "nn/base/interval.h"
@@ -14,7 +14,8 @@ struct WakeField {
   bool fades = false;
 };
 
-/// Suprema over all r and the gaps given, each enclosed: lo is reached at a point, hi never exceeded.
+/// Suprema over all r and the given range of gaps, each enclosed: `lower` is attained at a point, `upper` never
+/// exceeded.
 struct FieldSlopes {
   Interval value;   ///< g
   Interval total;   ///< |gradient|
@@ -22,8 +23,8 @@ struct FieldSlopes {
   Interval along;   ///< |dg/dz|
 };
 
-/// By subdivision of the strip of r / spread and z, in intervals, to a relative gap of about 1e-3. Infinite slopes
-/// where the field has a jump (no fading) inside the gaps.
+/// Computes the suprema by interval subdivision of the strip of r / spread and z, to a relative gap of about 1e-3.
+/// Slopes are infinite if the field has a jump (no fading) within the range of gaps.
 FieldSlopes field_slopes(const WakeField& field, double least_gap_m, double largest_gap_m);
 
 }  // namespace swarmcert::stability

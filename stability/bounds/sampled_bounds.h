@@ -1,5 +1,5 @@
-/// @file Bounds on the tracking error of a sampled loop, from its own kernel: what disturbance_bounds.h does for a
-/// continuous one.
+/// @file Bounds on the tracking error of a sampled loop, from its own kernel; the counterpart of
+/// disturbance_bounds.h for sampled loops.
 #pragma once
 
 #include "stability/bounds/disturbance_bounds.h"
@@ -7,15 +7,15 @@
 
 namespace swarmcert::stability {
 
-/// B1..B5 of the sampled loop, at and between its samples; kCommand is an error added to the command once per period.
-/// The kernel is a polynomial on each period, so passes are felt as its maxima say, and B5 is split_bound() of it, on
-/// five phases of the period, of which the worst counts.
+/// Returns B1..B5 of the sampled loop, at and between its samples; kCommand is an error added to the command once per
+/// period. The kernel is a polynomial on each period. The effect of earlier passes is bounded by the maxima of these
+/// polynomials, and B5 is the worst split_bound() over five phases of the period.
 /// @param gains sampled_norms(loop, channel, Instants::kAll).
 DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, const GainNorms& gains,
                                      const Disturbance& disturbance);
 
-/// What a clamp of the integrator's state does. The demand is the exact gain to that state; the bounds that hold with
-/// an acting clamp are those of the loop without integral, to which the integral is an error of its command.
+/// Returns the effect of a clamp on the integrator's state. The demand is the exact gain to that state. The bounds that
+/// hold while the clamp acts are those of the loop without integral, with the integral as an error of its command.
 /// @param limit_m_s on the state I that firmware keeps (it adds integrator_step_s e per period).
 ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturbance& disturbance,
                          const OtherErrors& other, double limit_m_s);

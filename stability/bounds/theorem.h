@@ -18,25 +18,25 @@ namespace swarmcert::stability {
 
 struct Theorem {
   bool applies = false;
-  /// One sentence for each hypothesis that fails: what, by how much.
+  /// One sentence for each hypothesis that fails, with the numbers.
   std::vector<std::string> why_not;
-  /// The gains in (Lambda, K) form, where they have one with symmetric positive definite matrices.
+  /// The gains in (Lambda, K) form, if they have one with symmetric positive definite matrices.
   std::optional<CompositeGains> composite;
-  double min_Lambda = 0;  ///< lambda_min(Lambda), 1/s; where `composite`
+  double min_Lambda = 0;  ///< lambda_min(Lambda), 1/s; valid if `composite` is set
   double min_K = 0;       ///< lambda_min(K), kg/s
-  /// Ball per unit of d_m, m per N/s, from `composite`: true of the loop only where `applies`.
+  /// Returns the ball per unit of d_m, m per N/s, from `composite`; a bound for the loop only if `applies`.
   double ball_per_rate() const { return 1 / (min_Lambda * min_Lambda * min_K); }
 };
 
 /// Checks every hypothesis on `gains` for a vehicle of `mass_kg`.
-/// @param integrator_needs_m_s largest |int e| that the loop asks of its integrator, per axis, where it is known:
-///   a limit above it does not act and is no objection.
+/// @param integrator_needs_m_s largest |int e| demanded of the integrator, per axis, if known; a clamp above it never
+///     acts and does not violate the hypotheses.
 Theorem check_theorem(const Gains& gains, double mass_kg, const std::optional<PerAxis>& integrator_needs_m_s);
 
-/// PID gains of one axis of `gains`, with the integrator as written; nothing where Lambda or K couples axes.
+/// Returns the PID gains of one axis of `gains`, with the integrator as written; nothing if Lambda or K couples axes.
 std::optional<controller::AxisPid<double>> axis_gains(const Gains& gains, double mass_kg, int axis);
 
-/// The closed-form transient, valid for all t >= 0:
+/// The closed-form transient bound, valid for all t >= 0:
 ///   |e(t)| <= (1 + lt) e^(-lt) |e(0)| + t e^(-lt) |e'(0)| + m h(t) |s'(0)| + d_m int_0^t h.
 /// s'(0) = e''(0) + 2 Lambda e'(0) + Lambda^2 e(0), and e''(0) contains the initial learning error over the mass.
 struct Transient {
@@ -47,7 +47,7 @@ struct Transient {
   double rate_N_s = 0;                                ///< d_m
 
   double at(double t_s) const;
-  /// Exponential rate of approach, 1/s: min(k/m, l), up to a polynomial factor.
+  /// Returns the exponential rate of convergence, 1/s: min(k/m, l), up to a polynomial factor.
   double decay_1_s() const;
 };
 

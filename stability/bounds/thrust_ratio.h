@@ -1,4 +1,4 @@
-/// @file What it costs that the thrust ratio is known only within an interval.
+/// @file Bounds when the thrust ratio is known only within an interval.
 #pragma once
 
 #include "stability/bounds/disturbance_bounds.h"
@@ -7,38 +7,41 @@
 
 namespace swarmcert::stability {
 
-/// The force that acts is (1 + d) times the one of the model, with a constant |d| <= R < 1 that nobody knows:
+/// The actual force is (1 + d) times that of the model, with an unknown constant |d| <= R < 1:
 ///   m e'' = (1 + d) u + d w0 + f,
-/// u the feedback's part of the force that acts, w0 the force commanded at hover (the weight on z), f all others.
+/// where u is the feedback's part of the modelled force, w0 the force commanded at hover (the weight on z), and f all
+/// other forces.
 ///
-/// The class of f. (1 + d) u is the loop with gains scaled by 1 + d, so the gains of a class are the largest over that
-/// interval (uncertain_norms.h). Several passes count as so many single ones, amplitude and rate together as the lesser
-/// of both.
+/// Effect on the class of f: (1 + d) u is the loop with gains scaled by 1 + d, so the gains of a class are the largest
+/// over that interval (uncertain_norms.h). Several passes are treated as independent single passes; for amplitude and
+/// rate together the smaller of the two bounds is used.
 ///
-/// The rest. d w0 is a constant force. d u counts as a force on the loop of the model: with U = sup |u| there and E the
-/// gain from a force to u, |d u| <= R U / (1 - R E) (small gain), and infinite where R E >= 1.
+/// Effect on everything else: d w0 is a constant force. d u is treated as a force on the loop of the model: with U =
+/// sup |u| in that loop and E the gain from a force to u, |d u| <= R U / (1 - R E) (small gain), infinite if R E >= 1.
 ///
-/// What a network feeds forward passes the ratio too; d f_hat belongs to f.
+/// The feedforward of a network is also scaled by the ratio; d f_hat belongs to f.
 struct ThrustRatioGains {
   GainNorms of_class;      ///< largest over the interval, of the channel by which f enters
   double force_per_N = 0;  ///< R / (1 - R E)
-  double amplitude = 0;    ///< m/N, of a force on the loop of the model
-  double edge = 0;         ///< m/N, of a constant force
+  double amplitude = 0;    ///< m/N, for a force on the loop of the model
+  double edge = 0;         ///< m/N, for a constant force
 };
 ThrustRatioGains thrust_ratio_gains(const AxisLoop& loop, Channel channel, double ratio_error);
 ThrustRatioGains thrust_ratio_gains(const SampledLoop& loop, Channel channel, double ratio_error);
 
-/// Bounds of the class alone with these gains.
+/// Returns the bounds for the class alone with these gains.
 DisturbanceBounds disturbance_bounds(const ThrustRatioGains& gains, const Disturbance& disturbance);
 
-/// What the ratio adds to the bound of any class, m.
-/// @param errors with thrust_ratio_error and hover_N. @param errors_N effort_N() of them, hover's share included.
+/// Returns what the ratio adds to the bound of any class, m.
+/// @param errors with thrust_ratio_error and hover_N.
+/// @param errors_N effort_N() of `errors`, including the share of hover_N.
 double thrust_ratio_part(const ThrustRatioGains& gains, const OtherErrors& errors, double errors_N);
 
-/// What a clamp of the integrator does then. The demand grows by what d w0 and d u ask of the integrator; the bounds
-/// with an acting clamp are those of the loop without integral, over the interval of the ratio, which the integral's
-/// command passes too.
-/// @param exact what clamp_bounds() says of the loop of the model. @param of_class the gains of the whole loop.
+/// Returns the effect of the integrator's clamp under an uncertain ratio. The demand grows by the demands of d w0 and d
+/// u. The bounds while the clamp acts are those of the loop without integral over the interval of the ratio, which also
+/// scales the integral's command.
+/// @param exact clamp_bounds() of the loop of the model.
+/// @param of_class the gains of the whole loop.
 ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const ClampBounds& exact,
                          const ThrustRatioGains& of_class, const Disturbance& known,
                          const OtherErrors& errors, double limit_m_s);
@@ -46,7 +49,7 @@ ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const ClampBo
                          const ThrustRatioGains& of_class, const Disturbance& known,
                          const OtherErrors& errors, double limit_m_s);
 
-/// `errors` with the constant force d w0 among them.
+/// Returns `errors` including the constant force d w0.
 OtherErrors with_hover_share(OtherErrors errors);
 
 }  // namespace swarmcert::stability

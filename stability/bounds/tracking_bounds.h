@@ -1,4 +1,4 @@
-/// @file Everything that can be said about the tracking error of given gains on a given vehicle.
+/// @file All bounds on the tracking error of given gains on a given vehicle.
 #pragma once
 
 #include <optional>
@@ -15,17 +15,18 @@ namespace swarmcert::stability {
 
 enum class Loop { kContinuous, kSampled };
 
-/// The vehicle as far as bounds need it.
+/// The parameters of the vehicle that the bounds use.
 struct Plant {
   double mass_kg = 0;
-  double thrust_scale = 1;      ///< force that acts per force commanded
-  double largest_thrust_N = 0;  ///< of all rotors; 0: not known
+  double thrust_scale = 1;      ///< actual force per commanded force
+  double largest_thrust_N = 0;  ///< of all rotors; 0: unknown
 };
 
-/// The loop of one axis: lags of thrust, and of its direction for x and y. Nothing where Lambda or K couples axes.
+/// Returns the loop of one axis, with the lags of the thrust and, for x and y, of its direction. Returns nothing if
+/// Lambda or K couples axes.
 std::optional<AxisLoop> axis_loop(const Gains& gains, const Plant& plant, int axis);
 
-/// The same as firmware runs it; nothing without rate_hz.
+/// Returns the same loop as the firmware runs it; nothing without rate_hz.
 std::optional<SampledLoop> sampled_axis_loop(const Gains& gains, const Plant& plant, int axis);
 
 /// Norms at t = 0.
@@ -35,32 +36,32 @@ struct InitialError {
   double learning_error_N = 0;  ///< |force error|, bias included
 };
 
-/// What is known, and from where; per axis.
+/// What is known of the disturbances, per axis, and its source.
 struct DisturbanceSource {
   Disturbance axis[3];
   double rate_norm_N_s = std::numeric_limits<double>::infinity();  ///< d_m: sup |eps'| as a vector
   double bias_N[3] = {0, 0, 0};
-  /// Whether amplitude and impulse were measured with the bias in them; else it comes on top of every class.
+  /// Whether amplitude and impulse were measured with the bias included; otherwise the bias adds to every class.
   bool classes_contain_bias = false;
   EstimateError velocity_error[3];  ///< estimated - true velocity
   EstimateError position_error[3];  ///< estimated - true position
   ReferenceMotion reference[3];
   bool has_moving_reference() const;
-  /// |d|: every rotor gives (1 + d) times the thrust of the model, with one constant d; see thrust_ratio.h.
+  /// |d|: every rotor gives (1 + d) times the thrust of the model, with the same constant d; see thrust_ratio.h.
   double thrust_ratio_error = 0;
-  bool declares_velocity_error = false;  ///< velocity_error was stated, not measured
+  bool declares_velocity_error = false;  ///< velocity_error was declared, not measured
   bool has_estimate_errors() const;
-  /// Whether the amplitude is at least the bias on every axis, as one is that was measured with the bias in it.
+  /// Whether the amplitude is at least the bias on every axis, as it is if measured with the bias included.
   bool amplitudes_reach_bias() const;
-  /// All that acts on an axis beside its class.
+  /// Returns all errors on an axis in addition to its class.
   OtherErrors other(int of_axis, const InitialError& initial, const Plant& plant) const;
-  /// "declared", "declared truth", "measured" or "rate of f_hat": the last bounds the learned force alone, not its
-  /// error, and so gives no ball.
+  /// "declared", "declared truth", "measured" or "rate of f_hat". The last bounds only the learned force, not its
+  /// error, and therefore gives no ball.
   std::string kind = "none";
   std::string note;                              ///< on the numbers, for the list of assumptions
-  std::vector<std::string> further_assumptions;  ///< on which the numbers rest
+  std::vector<std::string> further_assumptions;  ///< that the numbers rely on
   bool bounds_learning_error() const { return kind != "none" && kind != "rate of f_hat"; }
-  double f_hat_rate_N_s = 0;  ///< sup |f_hat'|, for the staircase; where known
+  double f_hat_rate_N_s = 0;  ///< sup |f_hat'|, for the staircase; valid if f_hat_rate_known
   bool f_hat_rate_known = false;
 };
 
@@ -72,7 +73,7 @@ struct ExactGains {
   GainNorms all_times;  ///< sampled: also between them
 };
 
-/// Gains from errors of the estimates: norms per m/s for the velocity, per m for the position.
+/// Gains from errors of the estimates: norms per m/s for a velocity error, per m for a position error.
 struct EstimateGains {
   int axis = 0;
   Estimate estimate = Estimate::kVelocity;
@@ -81,26 +82,28 @@ struct EstimateGains {
   GainNorms all_times;  ///< sampled: also between them
 };
 
-/// Every bound holds for all that the source declares together, from rest but for the initial error.
+/// Bounds of one axis. Each holds for all declared disturbances together, starting from rest except for the initial
+/// error.
 struct AxisBounds {
   int axis = 0;
   Channel channel = Channel::kForce;
   Loop loop = Loop::kContinuous;
-  DisturbanceBounds bounds;  ///< of the linear loop, `parts` included: hold where clamp.never_acts
-  ErrorParts parts;          ///< what acts beside the class, of the linear loop
+  DisturbanceBounds bounds;  ///< of the linear loop, including `parts`: hold if clamp.never_acts
+  ErrorParts parts;          ///< in addition to the class, of the linear loop
   ClampBounds clamp;
-  /// Smallest bound that holds: of `bounds` where the clamp never acts, else of those that hold with it.
+  /// Returns the smallest valid bound: of `bounds` if the clamp never acts, else of those that hold with a clamp.
   double least() const {
     const double clamped = clamp.by_amplitude < clamp.by_impulse ? clamp.by_amplitude : clamp.by_impulse;
     return clamp.never_acts && bounds.least() < clamped ? bounds.least() : clamped;
   }
-  double staircase_m = 0;  ///< to be added for a learned force that is a staircase or late
-  double float32_m = 0;    ///< to be added for what float32 costs, where it is known
+  double staircase_m = 0;  ///< to be added for a learned force that is a staircase or delayed
+  double float32_m = 0;    ///< to be added for float32 arithmetic, if known
   double total_m() const { return least() + staircase_m + float32_m; }
 };
 
-/// Bounds of one axis without staircase and float32.
-/// @param gains of the loop and channel, over all times. @param known, other as the source gives them.
+/// Returns the bounds of one axis without staircase and float32.
+/// @param gains of the loop and channel, over all times.
+/// @param known, other as given by the source.
 AxisBounds axis_bounds(const AxisLoop& loop, Channel channel, const GainNorms& gains,
                        const Disturbance& known, const OtherErrors& other, bool classes_contain_bias,
                        double limit_m_s);
@@ -115,10 +118,10 @@ struct AxisFacts {
   double effort_gain = 0;
   double lag_limit_s = 0;
   double delay_limit_s = 0;
-  double effective_Ki = 0;  ///< sampled loop, else as written
+  double effective_Ki = 0;  ///< of the sampled loop, else as written
   double written_Ki = 0;
   double spectral_radius = 0;    ///< 0: no sampled loop
-  double clamp_authority_N = 0;  ///< constant force that the integrator can cancel; infinite without limit
+  double clamp_authority_N = 0;  ///< constant force that the integrator can cancel; infinite without a limit
   double clamp_residual_m = 0;   ///< of bias_N
   NoiseDeviation noise;          ///< for 1 mm and 0.05 m/s, sampled loop
 };
@@ -131,14 +134,15 @@ struct Assumption {
 
 struct TrackingReport {
   Theorem theorem;
-  std::optional<double> ball_m;  ///< where the theorem applies and d_m bounds the learning error
+  std::optional<double> ball_m;  ///< if the theorem applies and d_m bounds the learning error
   std::optional<Transient> transient;
   std::vector<ExactGains> exact;
   std::vector<EstimateGains> of_estimates;
   std::vector<AxisBounds> bounds;
   std::vector<AxisFacts> facts;
   std::optional<VectorGain> vector;
-  /// No saturation: thrust that is left on the z axis, up to the largest or down to none, N; nothing where not known.
+  /// Margin to saturation: the smaller of the thrust left on the z axis up to the maximum and down to zero, N; nothing
+  /// if unknown.
   std::optional<double> thrust_margin_N;
   std::vector<Assumption> assumptions;
 };

@@ -1,4 +1,4 @@
-/// @file Gains and model together: what the bounds on the tracking error start from.
+/// @file Gains and model together: the inputs of the bounds on the tracking error.
 #pragma once
 
 #include <string>
@@ -14,13 +14,13 @@ struct TrackingSetup {
   Gains gains;
   Model model;
   Plant plant;
-  std::vector<std::string> notes;  ///< what of the model entered the loop
+  std::vector<std::string> notes;  ///< which parts of the model entered the loop
 };
 
-/// Reads both files. The model's effects motor_lag, delay and thrust_ratio enter the loop where gains.toml states no
-/// lag or delay of its own.
-/// @param battery_V for the largest thrust.
-/// @throws files::InputError as load_gains() and read_model().
+/// Reads both files. The model's effects motor_lag, delay and thrust_ratio enter the loop if gains.toml states no lag
+/// or delay of its own.
+/// @param battery_V voltage for the largest thrust.
+/// @throws files::InputError like load_gains() and read_model().
 TrackingSetup load_tracking_setup(const std::string& gains, const std::string& model,
                                   double battery_V = kFullBattery_V);
 

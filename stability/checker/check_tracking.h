@@ -1,5 +1,4 @@
-/// @file The checker of certificates of tracking gains. It depends on GMP and the JSON reader, on nothing that
-/// searches.
+/// @file Checker of certificates of tracking gains. Depends on GMP and the JSON reader, but on no search code.
 #pragma once
 
 #include <string>
@@ -12,7 +11,7 @@ namespace swarmcert::check {
 
 inline constexpr const char* kTrackingSchema = "swarmcert/tracking-certificate/1";
 
-/// What such a certificate states; the checkers insist on it.
+/// The statement that a certificate must contain verbatim.
 inline constexpr const char* kTrackingStatement =
     "For each loop listed, with its numbers taken exactly as they stand: along one axis m e'' = u + f, "
     "e, e', the integral of e and the lags start at zero, and u is -m (Kp (e + p) + Kd (e' + v) + Ki int "
@@ -33,13 +32,13 @@ inline constexpr const char* kTrackingStatement =
 
 struct TrackingVerdict {
   bool accepted = false;
-  std::string reason;  ///< why not, naming the field; or what was verified
+  std::string reason;  ///< why it was rejected, naming the field; or what was verified
   int loops = 0;
   int gains = 0;
 };
 
-/// Verifies every gain of `certificate`; a malformed one is answered with a reason, not with an exception.
-/// @param gains_sha256, model_sha256 of the files that it must be of; empty: not compared.
+/// Verifies every gain of `certificate`. A malformed certificate is rejected with a reason, not with an exception.
+/// @param gains_sha256, model_sha256 hashes of the files that it must refer to; empty: not compared.
 TrackingVerdict check_tracking(const files::Json& certificate, const std::string& gains_sha256,
                                const std::string& model_sha256);
 

@@ -1,4 +1,4 @@
-/// @file Fixed-point numbers, fractions and the elimination that the checks of tracking gains share. Not for users.
+/// @file Fixed-point numbers, fractions and Gaussian elimination for the checks of tracking gains. Not for users.
 #pragma once
 
 #include <gmpxx.h>
@@ -26,7 +26,7 @@ inline void demand(bool condition, const char* reason) {
   if (!condition) throw std::runtime_error(reason);
 }
 
-/// Numbers of a loop outside of this are refused: underflow and overflow are out of reach then.
+/// Loops with numbers outside this range are rejected, which excludes underflow and overflow.
 inline bool is_usual(double x) { return x >= 0x1p-40 && x <= 0x1p40; }
 
 /// @throws std::runtime_error naming the numbers that are out of range.
@@ -49,19 +49,19 @@ inline Rational as_fraction(const Integer& fixed) {
   return Rational(fixed) * two_to(-static_cast<long>(kBits));
 }
 
-/// At least the product of two nonnegative fixed-point numbers.
+/// Upper bound on the product of two nonnegative fixed-point numbers.
 inline Integer times_up(const Integer& a, const Integer& b) { return ((a * b) >> kBits) + 1; }
 
 inline Integer root_up(const Integer& x) { return sqrt(x) + 1; }
-/// At least the root of x >= 0, as a fixed-point number.
+/// Upper bound on the square root of x >= 0, as a fixed-point number.
 inline Integer fixed_root_up(const Rational& x) { return root_up(ceil_fixed(x) << kBits); }
 
-/// Elimination of a symmetric matrix without exchange of rows, with `right` beside it.
-/// @returns right' m^-1 right; nothing unless every pivot is positive, that is, m positive definite.
+/// Eliminates a symmetric matrix without pivoting, with `right` as right-hand side.
+/// @returns right' m^-1 right; nothing unless every pivot is positive, that is, m is positive definite.
 std::optional<Rational> inverse_form(Square m, Row right);
 
-/// The form stated by a witness as fractions.
-/// @throws std::runtime_error unless it is symmetric, of n rows, with entries that are integers over 2^kFormBits.
+/// Returns the quadratic form stated by a witness, as fractions.
+/// @throws std::runtime_error unless it is symmetric, has n rows, and its entries are integers over 2^kFormBits.
 Square exact_form(const std::vector<std::vector<double>>& stated, std::size_t n);
 
 }  // namespace swarmcert::check

@@ -10,7 +10,7 @@
 
 namespace swarmcert::check {
 
-/// A number between two fixed-point numbers.
+/// An interval with fixed-point endpoints.
 struct FixedRange {
   Integer lower, upper;
 
@@ -30,22 +30,22 @@ struct FixedRange {
 using FixedRangeRow = std::vector<FixedRange>;
 using FixedRanges = std::vector<FixedRangeRow>;
 
-/// Which state stands where, before the control of a period: e, e', lags' outputs, the integral, past commands (newest
-/// first). After it the new command stands before the past ones.
+/// Layout of the state before the control of a period: e, e', lag outputs, the integral, past commands (newest first).
+/// After the control, the new command precedes the past ones.
 struct SampledLayout {
   std::size_t plant = 0, command = 0, past = 0, newest = 0;
-  Rational shift_s;  ///< part of a period for which the older command still acts
+  Rational shift_s;  ///< part of a period during which the older command still acts
 
   explicit SampledLayout(const SampledWitness& loop);
   std::size_t size() const { return command + past; }
 };
 
-/// State before -> after control, [size + 1 x size].
+/// Returns the map from the state before to the state after the control, [size + 1 x size].
 Square control_of(const SampledWitness& loop, const SampledLayout& at);
-/// State after control -> before that of the next period, [size x size + 1].
-/// @throws std::runtime_error where a lag is too short against the period.
+/// Returns the map from the state after the control to the state before the next period's control, [size x size + 1].
+/// @throws std::runtime_error if a lag is too short compared with the period.
 FixedRanges hold_of(const SampledWitness& loop, const SampledLayout& at);
-/// hold * control
+/// Returns hold * control.
 FixedRanges period_ranges(const FixedRanges& hold, const Square& control);
 
 /// The map M, and the norm |r| = sqrt(r P r') of rows over its states.
@@ -53,14 +53,14 @@ struct PeriodMap {
   std::size_t n = 0;
   FixedRanges M;
   std::vector<Integer> middle;  ///< of M, row by row
-  Integer spread;               ///< M is within this of `middle`
+  Integer spread;               ///< every entry of M is within this of `middle`
   Square P;
   std::vector<Integer> scaled_P;    ///< over 2^kFormBits
   Integer from_largest;             ///< |r| <= this times the largest |r_i|
   std::vector<Integer> coordinate;  ///< |r_i| <= this times |r|
   Rational gap;                     ///< 1 - contraction
 
-  /// @throws std::runtime_error unless P shows that |r M| <= contraction |r| for every M in the ranges.
+  /// @throws std::runtime_error unless P proves that |r M| <= contraction |r| for every M in the ranges.
   PeriodMap(const SampledWitness& loop, FixedRanges map);
 
  private:

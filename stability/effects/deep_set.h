@@ -1,4 +1,4 @@
-/// @file A learned deep set as an effect: c f_hat(own, neighbours), a vertical force, a force or a torque.
+/// @file A learned deep set as an effect: c f_hat(own, neighbours); f_hat is a vertical force, a force or a torque.
 #pragma once
 
 #include "stability/effects/effect.h"
@@ -9,7 +9,8 @@ class DeepSetForce;
 
 class DeepSetEffect : public Effect {
  public:
-  /// @throws files::InputError if `spec` names no network, or one that is no deep set with a rho of context.kind.
+  /// @throws files::InputError if `spec` names no network, or a network that is not a deep set with a rho for
+  ///     context.kind.
   DeepSetEffect(const EffectSpec& spec, const EffectContext& context);
   ~DeepSetEffect() override;
   static EffectInfo describe();

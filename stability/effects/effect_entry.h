@@ -1,4 +1,4 @@
-/// @file What the registry knows of an effect, and the effects whose classes only their own files see.
+/// @file Registry entries, and the built-in effects whose classes are local to their source files.
 #pragma once
 
 #include <memory>
@@ -13,7 +13,8 @@ struct EffectEntry {
   EffectMaker make;
 };
 
-/// Of a class with a default constructor, or with describe() and a constructor from the model file's entry.
+/// Returns the entry of a class with a default constructor, or with describe() and a constructor from the model file's
+/// entry.
 template <typename T>
 EffectEntry effect_entry() {
   if constexpr (std::is_default_constructible_v<T>) {
@@ -25,7 +26,7 @@ EffectEntry effect_entry() {
   }
 }
 
-/// Each in the file of its name.
+/// Each is defined in the source file of the same name.
 namespace effects {
 EffectEntry accelerometer_scale();
 EffectEntry battery();

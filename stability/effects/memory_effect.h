@@ -1,22 +1,22 @@
-/// @file What effects with a memory share.
+/// @file Base class and delay line of effects with a memory.
 #pragma once
 
 #include "stability/effects/effect.h"
 
 namespace swarmcert::stability {
 
-/// An effect whose columns need the past: stream() gives them.
+/// An effect whose columns depend on the past; stream() computes them.
 class MemoryEffect : public Effect {
  public:
   using Effect::Effect;
-  /// @throws std::logic_error always: there is no column of one instant.
+  /// @throws std::logic_error always, as no column exists for a single instant.
   void columns(const Instant& now, const double* shape, Wrench* columns) const final;
   std::unique_ptr<ColumnStream> stream(const double* shape) const override = 0;
   void add_to(SignalPath& path, const double* coefficients, const double* shape) const override = 0;
 };
 
-/// The past of a signal of at most kSize numbers, for reading it a fixed time ago. Between samples it is taken as
-/// linear, before the first one as constant. Holds the last 64 samples: at most 0.64 s at 100 Hz.
+/// The recent history of a signal of kSize numbers, read at a fixed delay. Linear interpolation between samples,
+/// constant before the first. Holds the last 64 samples: at most 0.64 s at 100 Hz.
 template <int kSize>
 class DelayLine {
  public:
@@ -28,7 +28,7 @@ class DelayLine {
     times_s_[at] = time_s;
     values_[at] = value;
   }
-  /// Precondition: something was pushed since restart().
+  /// Precondition: push() was called since restart().
   Value at(double time_s) const {
     const int oldest = count_ > kCapacity ? count_ - kCapacity : 0;
     int k = count_ - 1;

@@ -1,4 +1,4 @@
-/// @file Every effect by name.
+/// @file Registry of all effects by name.
 #pragma once
 
 #include <functional>
@@ -10,27 +10,27 @@
 
 namespace swarmcert::stability {
 
-/// Names of the effects that this library knows, in the order of the documentation.
+/// Returns the names of the effects that this library knows, in the order of the documentation.
 std::vector<std::string> effect_names();
 
 /// Makes an effect for one vehicle's model.
 using EffectMaker = std::function<std::unique_ptr<Effect>(const EffectSpec&, const EffectContext&)>;
 
-/// Adds an effect of your own: model files may name it, the simulator flies it, and identification tries it as it
-/// tries the others. Call it before models are read, from one thread.
-/// @throws std::invalid_argument if the name is empty or taken, or if it has no coefficient or too many.
+/// Registers a user-defined effect: model files may name it, the simulator applies it, and identification tries it like
+/// the built-in ones. Call this before models are read, from one thread.
+/// @throws std::invalid_argument if the name is empty or taken, or if the effect has no coefficient or too many.
 void register_effect(EffectInfo info, EffectMaker make);
 
-/// What is known of an effect of the registry.
-/// @throws std::invalid_argument if there is none of that name.
+/// Returns the description of a registered effect.
+/// @throws std::invalid_argument if no effect has that name.
 const EffectInfo& effect_info(const std::string& name);
 
-/// The effect that `spec` names or, where it has formulas, defines.
+/// Makes the effect that `spec` names or, if it has formulas, defines.
 /// @throws files::InputError if a network or a formula cannot be read; std::invalid_argument for an unknown name.
 std::unique_ptr<Effect> make_effect(const EffectSpec& spec, const EffectContext& context);
 
-/// Coefficients and theta of `spec`: its parameters where it names them, else the effect's defaults; in the order of
-/// the effect's info.
+/// Coefficients and theta of `spec` in the order of the effect's info: the parameters that `spec` names, and the
+/// effect's defaults for the others.
 struct EffectValues {
   std::vector<double> linear, shape;
 };

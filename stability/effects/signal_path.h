@@ -3,8 +3,8 @@
 
 namespace swarmcert::stability {
 
-/// Each stage takes the signal u of the stage before it and gives u + gain (stage(u) - u), so that gain 1 is the
-/// stage itself and the difference from u is `gain` times the effect's column.
+/// Each stage takes the signal u of the previous stage and outputs u + gain (stage(u) - u): gain 1 is the stage itself,
+/// and the difference from u is `gain` times the effect's column.
 /// Order: command -> delay -> motor lag -> rotors; true specific force -> sensor delay -> accelerometer filter.
 struct SignalPath {
   double delay_s = 0, delay_gain = 0;

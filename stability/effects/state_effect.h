@@ -1,4 +1,4 @@
-/// @file Effects with states of their own, which simulation integrates together with the vehicle's.
+/// @file Effects with their own states, which the simulation integrates together with the vehicle's state.
 #pragma once
 
 #include "stability/effects/effect.h"
@@ -15,8 +15,8 @@ class StateEffect : public Effect {
 
   virtual int num_states() const = 0;
 
-  /// What acts on the vehicle, and d states / dt. The effect may depend on the vehicle's acceleration, which depends on
-  /// the effect: implementations solve for both.
+  /// Computes the wrench on the vehicle, and d states / dt. The effect may depend on the vehicle's acceleration, which
+  /// in turn depends on the effect: implementations solve for both.
   /// @param others_W_N sum of all other forces on the vehicle: rotors, gravity and other effects.
   /// @param states     [num_states()].
   /// @param rates      [num_states()], overwritten.

@@ -1,4 +1,4 @@
-/// @file Judges one run of an IssCheck: integrates the loop and holds the error against ball and transient.
+/// @file Judges one run of an IssCheck: integrates the loop and compares the error with ball and transient bound.
 #pragma once
 
 #include <array>
@@ -11,13 +11,13 @@
 
 namespace swarmcert::stability {
 
-inline constexpr int kIssSamples = 250;  ///< of the error, per run
+inline constexpr int kIssSamples = 250;  ///< error samples per run
 
-/// The transient bound at the sample times, for one unit of each of the numbers that it is linear in.
+/// The transient bound at the sample times, tabulated for one unit of each quantity in which it is linear.
 class TransientTable {
  public:
   TransientTable(const Theorem& theorem, double mass_kg, double duration_s);
-  /// Bound on |p~| at sample k, for |p~|, |p~'|, |s'| at t = 0, and d_m.
+  /// Returns the bound on |p~| at sample k, given |p~|, |p~'|, |s'| at t = 0, and d_m.
   double at(int k, const std::array<double, 4>& sizes) const;
 
  private:
@@ -25,13 +25,13 @@ class TransientTable {
   std::vector<double> values_[kParts];
 };
 
-/// Safe to use from several threads.
+/// Thread-safe.
 class IssJudge {
  public:
-  /// @param check its d_m, ball and duration are those of the campaign; must outlive this.
+  /// @param check provides d_m, ball and duration of the campaign; must outlive this.
   IssJudge(const Gains& gains, const Model& model, const IssCheck& check, const Theorem& theorem);
 
-  /// Fills in the run's ratios, as far as the run keeps the hypotheses and its integration succeeds.
+  /// Fills in the run's ratios up to the time at which a hypothesis or the integration fails.
   void judge(IssRun* run) const;
 
   const PositionLoop& loop() const { return loop_; }
@@ -40,9 +40,9 @@ class IssJudge {
 
  private:
   void integrate(IssRun* run) const;
-  /// What the transient bound starts from: |p~|, |p~'|, |s'| at t = 0, and d_m; s'(0) contains the learning error.
+  /// The arguments of the transient bound: |p~|, |p~'|, |s'| at t = 0, and d_m; s'(0) contains the learning error.
   std::array<double, 4> start_sizes(const IssRun& run, const PositionLoop::State& state) const;
-  /// Takes one sample of |p~| into account; false where the run has left all bounds and need not go on.
+  /// Accounts for one sample of |p~|; returns false if the run exceeds all bounds so far that it need not continue.
   bool weigh(double error_m, int k, bool from_rest, const std::array<double, 4>& sizes, IssRun* run) const;
 
   PositionLoop loop_;

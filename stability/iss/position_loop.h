@@ -9,7 +9,7 @@
 
 namespace swarmcert::stability {
 
-/// States: p~, v, integral, force behind the motor lag, force behind the attitude lag; world, three each.
+/// States: p~, v, integral, force behind the motor lag, force behind the attitude lag; in the world frame, three each.
 class PositionLoop {
  public:
   static constexpr int kSize = 15;
@@ -17,18 +17,19 @@ class PositionLoop {
 
   PositionLoop(const Gains& gains, const Model& model);
 
-  /// dx/dt of the state x under the learning error `eps` (f_a_hat - f_a, in newton).
+  /// Computes dx/dt at the state x under the learning error `eps` (f_a_hat - f_a, in newton).
   void derivative(const double* x, const Eigen::Vector3d& eps_W_N, double* dx) const;
 
-  /// The hypothesis of the tracking theorem that does not hold in the state x, in words; null where all hold: the
-  /// commanded force is at most what the rotors give, not near zero, points above the horizon (an attitude law turns
-  /// the vehicle towards it), and no integral has reached its clamp.
+  /// Returns the hypothesis of the tracking theorem that fails in the state x, in words; null if all hold. They are:
+  /// the commanded force is at most what the rotors give, is not near zero and points above the horizon (an attitude
+  /// law turns the vehicle towards it), and no integral has reached its clamp.
   const char* left_hypothesis(const double* x) const;
 
-  /// At rest with these errors: integral 0, forces those that hold the weight.
+  /// Returns the initial state with these errors: integral 0, forces that balance the weight.
   State start(const Eigen::Vector3d& position_m, const Eigen::Vector3d& velocity_m_s) const;
 
-  /// The loop's matrix about rest, without clamp and limit: d state = A state + B eps; eps enters v as -eps / m.
+  /// Returns the loop's matrix about rest, without clamp and limit: d state = A state + B eps; eps enters v as -eps /
+  /// m.
   Eigen::Matrix<double, kSize, kSize> matrix() const;
 
   double mass_kg() const { return mass_kg_; }

@@ -1,7 +1,8 @@
 /// @file Flight logs of simulated vehicles, in the binary format of the published ones ("old" uSD format).
 ///
-/// byte 0: number of variables, 35; then `name(type),` for each; then the bitwise NOT of CRC-32 over all before.
-/// Blocks: u8 n; n records, packed little-endian, 102 bytes each; the bitwise NOT of CRC-32 over both.
+/// Header: byte 0 is the number of variables, 35; then `name(type),` for each; then the bitwise NOT of the CRC-32 of
+/// everything before. Blocks: u8 n; n records, packed little-endian, 102 bytes each; the bitwise NOT of the CRC-32 of
+/// both.
 #pragma once
 
 #include <array>
@@ -16,7 +17,7 @@
 
 namespace swarmcert::stability {
 
-/// One record, in the units of the file.
+/// One record, in the units of the log file.
 struct LogRecord {
   std::uint32_t tick_us = 0;  ///< since logging was switched on
   std::array<std::int16_t, 9> position_mm_velocity_mm_s_acceleration_mm_s2 = {};  ///< world; specific force
@@ -32,14 +33,14 @@ struct LogRecord {
   float prediction_gf = 0;
 };
 
-/// The whole file.
+/// Returns the contents of the log file.
 std::string to_usd_log(const std::vector<LogRecord>& records);
 
-/// Listens to a sampled loop and keeps what each vehicle's log would hold.
+/// Observes a sampled loop and records the log of each vehicle.
 class FlightRecorder {
  public:
-  /// @param seed of noise and clocks. Each vehicle's clock starts up to 30 ms after the simulation, ticks in
-  ///             microseconds, and jitters by 0.1 ms.
+  /// @param seed for noise and clocks. Each vehicle's clock starts up to 30 ms after the simulation, ticks in
+  ///     microseconds, and jitters by 0.1 ms.
   FlightRecorder(SampledFlight& loop, std::uint64_t seed);
 
   /// Call after every step of the loop.
@@ -48,7 +49,7 @@ class FlightRecorder {
   const std::vector<LogRecord>& records(int vehicle) const {
     return vehicles_[static_cast<std::size_t>(vehicle)].records;
   }
-  /// records(), which then are none.
+  /// Moves records(vehicle) out, leaving it empty.
   std::vector<LogRecord> take(int vehicle) {
     return std::move(vehicles_[static_cast<std::size_t>(vehicle)].records);
   }

@@ -33,7 +33,7 @@ struct Slot {
   Answer<Scalar> answer;
 };
 
-// Operations on every number of a slot.
+// Operations applied to every number of a slot.
 struct Fill {
   const Lanes::Part& part;
   SWARMCERT_LANE void operator()(Lanes& to, const Lanes& from) const { to = from.filled(part); }
@@ -43,9 +43,9 @@ struct Take {
   SWARMCERT_LANE void operator()(Lanes& to, const Lanes& from) const { to.take(from, part); }
 };
 
-// The fields of the structs in a slot. Each binding names all fields of its type: if the flight code gets a field that
-// is not listed here, this file does not compile, so the field cannot be lost when lanes are computed separately.
-// Stamps and flags are the same in all lanes that fly together; Group::Flags keeps them for each vehicle.
+// The fields of the structs in a slot. Each binding names all fields of its type: if a field is added to the flight
+// code but not listed here, this file does not compile, so the field cannot be lost when lanes are computed separately.
+// Stamps and flags are the same in all lanes computed together; Group::Flags keeps them for each vehicle.
 inline auto fields(controller::Vector3<Lanes>& v) {
   auto& [x, y, z] = v;
   return std::tie(x, y, z);
@@ -87,13 +87,13 @@ inline auto fields(Answer<Lanes>& answer) {
   auto& [wanted, forces] = answer;
   return std::tie(wanted, forces);
 }
-/// What flight_step() reads: the answer is not among it.
+/// The inputs of flight_step(), without the answer.
 inline auto fields(Slot<Lanes>& slot) {
   auto& [memory, measured, reference, prediction, torque_prediction, answer] = slot;
   return std::tie(memory, measured, reference, prediction, torque_prediction);
 }
 
-/// copy(to, from) for every Lanes in `to`.
+/// Calls copy(to, from) for every Lanes in `to`.
 template <typename T, typename Copy>
 void each(T& to, T& from, const Copy& copy) {
   if constexpr (std::is_same_v<T, Lanes>) {
@@ -116,14 +116,14 @@ inline void set(controller::Vector3<Lanes>& to, int lane, const Eigen::Vector3d&
   to.z.set(lane, static_cast<float>(from.z()));
 }
 
-/// In the vehicle's lane; for the first vehicle also in those that repeat it.
+/// Sets the vehicle's lane and, for the first vehicle, also the unused lanes, which repeat it.
 inline void set(controller::Vector3<Lanes>& to, int lane, std::size_t vehicles, const Eigen::Vector3d& from) {
   set(to, lane, from);
   if (lane != 0) return;
   for (int spare = static_cast<int>(vehicles); spare < Lanes::kCount; ++spare) set(to, spare, from);
 }
 
-/// One vehicle's number out of a result, alone or in a lane.
+/// Returns one vehicle's number from a result for a single vehicle or for lanes.
 inline double at(float x, int) { return static_cast<double>(x); }
 inline double at(double x, int) { return x; }
 inline double at(const Lanes& x, int lane) { return static_cast<double>(x[lane]); }

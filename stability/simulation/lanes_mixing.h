@@ -6,15 +6,15 @@
 
 namespace swarmcert::stability {
 
-/// controller::mix(), the same bits. The flight code calls this one for Lanes: it is no template, and stands where
-/// Lanes do.
+/// Equivalent to controller::mix(), with bitwise identical results. The flight code selects this overload for Lanes
+/// because it is not a template and is found by argument-dependent lookup.
 SWARMCERT_LANE inline controller::Mixed<Lanes> mix(const controller::Allocation<Lanes>& allocation,
                                                    const controller::ForceLimits<Lanes>& limits,
                                                    const controller::Wrench<Lanes>& wanted) {
   const Lanes zero(0), one(1);
   controller::Mixed<Lanes> result;
   if (allocation.rank == 4) {
-    // As there where thrust is feasible and all shares are 1. A wrench that is not finite fails a comparison.
+    // As in controller::mix() when the thrust is feasible and all shares are 1. A non-finite wrench fails a comparison.
     Lanes::Choice within = is_finite(limits.lower_N) && is_finite(limits.upper_N);
     for (int i = 0; i < allocation.count; ++i) {
       const Lanes(&per)[4] = allocation.inverse[i];

@@ -1,7 +1,8 @@
 /// @file Vector and matrix arithmetic for SUNDIALS by Eigen. Not for users.
 ///
-/// Distributions ship the serial vectors and dense matrices of SUNDIALS without optimisation: with a few dozen states
-/// they took four fifths of an integration. The data stay those of SUNDIALS, only the functions that touch them differ.
+/// Distributions ship the serial vectors and dense matrices of SUNDIALS compiled without optimisation: with a few dozen
+/// states they took four fifths of the integration time. The data stay in SUNDIALS objects; only the functions that
+/// operate on them are replaced.
 #pragma once
 
 #include <sundials/sundials_linearsolver.h>
@@ -10,15 +11,15 @@
 
 namespace swarmcert::stability {
 
-/// Makes `vector` and all its clones compute with Eigen. @param vector serial.
+/// Makes `vector` and all its clones compute with Eigen. @param vector a serial vector.
 void compute_with_eigen(N_Vector vector);
 
-/// The same for a matrix and its clones. @param matrix dense.
+/// Makes `matrix` and all its clones compute with Eigen. @param matrix a dense matrix.
 void compute_with_eigen(SUNMatrix matrix);
 
-/// Direct solver for dense matrices: LU with partial pivoting; up to 48 unknowns the inverse is kept, which Newton's
-/// method, correct to its own tolerance whatever the solver's rounding, takes as well and applies faster.
-/// @return nullptr if memory is short.
+/// Returns a direct solver for dense matrices by LU with partial pivoting. Up to 48 unknowns it keeps the inverse,
+/// which is faster to apply; its round-off error does not matter, since Newton's method iterates to its own tolerance.
+/// @return nullptr if out of memory.
 SUNLinearSolver eigen_solver(SUNContext context);
 
 }  // namespace swarmcert::stability

@@ -11,24 +11,24 @@
 namespace swarmcert::stability {
 
 struct RadioOptions {
-  double latency_s = 0;  ///< from measuring a position to its arrival
-  double loss = 0;       ///< share of positions that never arrive, each on its own
+  double latency_s = 0;  ///< from measurement of a position to its arrival
+  double loss = 0;       ///< fraction of positions that are lost, independently
 };
 
-/// Broadcast positions as the flight code keeps them (controller/neighbours.h): velocities are filtered differences,
-/// neighbours that are stale or leave the box of positions fade out. In double.
+/// Broadcast positions as processed by the flight code (controller/neighbours.h), in double precision: velocities are
+/// filtered differences, and neighbours that are stale or leave the valid box of positions fade out.
 class Radio {
  public:
-  /// @param period_s between broadcasts.
+  /// @param period_s time between broadcasts.
   Radio(int vehicles, double period_s, const RadioOptions& options);
 
-  /// One broadcast of every vehicle, and the arrival of what was sent `latency_s` ago.
+  /// Sends one broadcast from every vehicle, and delivers the one sent `latency_s` ago.
   void broadcast(const std::vector<Eigen::Vector3d>& positions_W_m, std::uint32_t now_ms,
                  files::Random& random);
 
   /// Replaces the neighbours in `now` by what vehicle `own` knows about them.
-  /// @param now all other vehicles in their order.
-  /// @param neighbours, weights overwritten; weights in [0, 1] as controller::weight() has them.
+  /// @param now must contain all other vehicles in their order.
+  /// @param neighbours, weights overwritten; weights in [0, 1], from controller::weight().
   void look(int own, std::uint32_t now_ms, Instant* now, std::vector<Neighbour>& neighbours,
             std::vector<double>& weights) const;
 
@@ -39,7 +39,7 @@ class Radio {
   };
 
   const RadioOptions options_;
-  std::size_t late_;  ///< broadcasts on their way at once
+  std::size_t late_;  ///< number of broadcasts in transit
   std::vector<Sent> on_their_way_;
   std::size_t next_ = 0;
   std::vector<controller::NeighbourTrack<double>> tracks_;

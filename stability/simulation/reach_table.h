@@ -1,4 +1,4 @@
-/// @file Lateral reach of a neighbour's effects by relative height.
+/// @file Lateral reach of a neighbour's effects, tabulated over the relative height.
 #pragma once
 
 #include <algorithm>
@@ -9,14 +9,14 @@
 
 namespace swarmcert::stability {
 
-/// An upper bound on the largest reach_m() of some effects, which is monotone in height, from its values at heights in
-/// steps of 1 cm.
+/// Upper bound on the largest reach_m() of several effects. Since reach_m() is monotone in height, the bound follows
+/// from its values at heights in steps of 1 cm.
 class ReachTable {
  public:
   ReachTable() = default;
   explicit ReachTable(const std::vector<const AppliedEffect*>& effects);
 
-  /// For neighbours that are from `lowest_m` to `highest_m` higher; infinite beyond 10 m.
+  /// Returns the bound for neighbours that are between `lowest_m` and `highest_m` higher; infinite beyond 10 m.
   double over(double lowest_m, double highest_m) const { return std::max(at(lowest_m), at(highest_m)); }
 
  private:

@@ -11,7 +11,7 @@
 
 namespace swarmcert::stability {
 
-/// Size of p - p_d over a flight, per world axis and as a vector; from the first moment off the ground on.
+/// Magnitude of p - p_d over a flight, per world axis and as a vector, from take-off on.
 struct TrackingError {
   std::array<double, 4> max_m = {};  ///< |x|, |y|, |z|, Euclidean norm
   std::array<double, 4> rms_m = {};
@@ -27,10 +27,10 @@ struct SimulatedVehicle {
 
 struct Simulation {
   std::vector<SimulatedVehicle> vehicles;
-  std::vector<std::vector<LogRecord>> logs;  ///< by vehicle; empty unless wanted
+  std::vector<std::vector<LogRecord>> logs;  ///< by vehicle; empty unless requested
   std::vector<std::vector<std::array<float, 7>>>
       errors;             ///< by vehicle, every position period: t, p - p_d, p_d
-  bool diverged = false;  ///< a state became infinite, or farther than 100 m: the flight ends there
+  bool diverged = false;  ///< a state became infinite or exceeded 100 m; ends the flight
   double end_s = 0;
 };
 
@@ -41,7 +41,7 @@ struct SimulationOptions {
   std::function<void(double time_s, double duration_s)> progress;
 };
 
-/// Flies `task` with the vehicles of `swarm`. @throws as SampledFlight.
+/// Flies `task` with the vehicles of `swarm`. @throws the same exceptions as SampledFlight.
 Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const SimulationOptions& options,
                     const files::Network* network = nullptr);
 

@@ -18,7 +18,7 @@ struct GridAxis {
   std::vector<double> values;
 };
 
-/// A requirement on a computed quantity; a cell that breaks it is infeasible.
+/// A requirement on a computed quantity; a cell that violates it is infeasible.
 struct GridLimit {
   std::string quantity;
   double least, most;
@@ -33,20 +33,20 @@ struct Grid {
   std::vector<std::string> compute;
   std::vector<GridLimit> limits;
   std::vector<std::string> pareto;  ///< quantities of the Pareto front
-  Disturbance disturbance;          ///< of one neighbour
+  Disturbance disturbance;          ///< due to one neighbour
   std::vector<std::string> inputs;  ///< files that were read
 
   long cells() const;
-  /// Values of the axes at a cell, in the order of `axes`; the last axis moves fastest.
+  /// Returns the values of the axes at a cell, in the order of `axes`; the last axis varies fastest.
   std::vector<double> at(long cell) const;
 };
 
-/// Parameters that an axis may have:
+/// Returns the parameters that an axis may vary:
 ///   Kp Kd Ki (1/s^2, 1/s, 1/s^3), Lambda K (1/s, kg/s), mass_kg, thrust_scale, battery_V, motor_s, attitude_s,
-///   delay_s, rate_hz, integrator_step_s, neighbours (the disturbance times their number), vehicles (neighbours + 1).
+///   delay_s, rate_hz, integrator_step_s, neighbours (multiplies the disturbance), vehicles (neighbours + 1).
 std::vector<std::string> grid_parameters();
 
-/// Quantities that can be computed; `better` is -1 where less is better, +1 where more is.
+/// A quantity that can be computed; `better` is -1 if smaller is better, +1 if larger is better.
 struct Quantity {
   std::string name;
   std::string unit;
@@ -64,17 +64,17 @@ const std::vector<Quantity>& grid_quantities();
 /// @throws files::InputError with line, key, value and hint; more than ten million cells are refused.
 Grid load_grid(const std::string& path);
 
-/// What one cell gives.
+/// The results of one cell.
 struct Cell {
   long index = 0;
-  std::vector<double> values;  ///< of grid.compute, in that order; NaN where there is none
-  std::string infeasible;      ///< why; empty where it is not
+  std::vector<double> values;  ///< of grid.compute, in that order; NaN if undefined
+  std::string infeasible;      ///< why the cell is infeasible; empty if feasible
 };
 
-/// Depends on nothing but the grid and the index.
+/// Computes one cell. The result depends on nothing but the grid and the index.
 Cell compute_cell(const Grid& grid, long index);
 
-/// Indices, ascending, of the feasible cells that no other feasible cell beats in every quantity of grid.pareto.
+/// Returns the indices, ascending, of the feasible cells that are not dominated in the quantities of grid.pareto.
 std::vector<long> pareto_front(const Grid& grid, const std::vector<Cell>& cells);
 
 }  // namespace swarmcert::stability

@@ -13,7 +13,7 @@
 namespace swarmcert::stability {
 
 struct SweepOptions {
-  files::Shard shard;   ///< of the grid's cells
+  files::Shard shard;   ///< which of the grid's cells to compute
   bool resume = false;  ///< keep the cells that the shard's file already has
   bool overwrite = false;
   int jobs = 0;
@@ -22,16 +22,16 @@ struct SweepOptions {
 };
 
 struct SweepOutcome {
-  std::string file;  ///< of the shard
-  long done = 0;     ///< cells in it
+  std::string file;  ///< written by the shard
+  long done = 0;     ///< cells in the file
   long total = 0;    ///< cells that belong to it
   bool complete() const { return done == total; }
 };
 
-/// Computes the cells of one shard and writes FOLDER/shard-I-of-N.json; every few seconds, and when cancelled, what is
-/// done so far (atomically). The file's bytes depend on the grid and the shard only.
-/// @throws files::InputError if the file exists and neither resume nor overwrite is set, or belongs to another grid; or
-///   if the folder holds other things and nothing of a sweep, and overwrite is not set.
+/// Computes the cells of one shard and writes FOLDER/shard-I-of-N.json. Every few seconds, and when cancelled, it
+/// writes the cells computed so far (atomically). The file's bytes depend on the grid and the shard only.
+/// @throws files::InputError if the file exists and neither resume nor overwrite is set, if it belongs to another grid,
+///     or if the folder holds other files but nothing of a sweep and overwrite is not set.
 SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepOptions& options);
 
 /// A whole sweep, read back from its shards.
@@ -46,11 +46,11 @@ struct MergedSweep {
 };
 
 /// Reads every shard in `folder`.
-/// @throws files::InputError if shards are missing, incomplete, of different grids, or overlap: the message names them
-///   and the cells that are missing.
+/// @throws files::InputError if shards are missing, incomplete, overlapping or from different grids; the message names
+///     them and the missing cells.
 MergedSweep read_shards(const std::string& folder);
 
-/// The sweep as JSON (schema swarmcert/sweep-points/1): the same bytes however the grid was cut.
+/// Returns the sweep as JSON (schema swarmcert/sweep-points/1): the same bytes for any number of shards.
 files::Json sweep_json(const MergedSweep& sweep);
 
 }  // namespace swarmcert::stability

@@ -1,4 +1,4 @@
-/// @file The best PID gains of one axis under constraints.
+/// @file Optimises the PID gains of one axis under constraints.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace swarmcert::stability {
 
 struct TuneConstraints {
   double most_noise_m_s2 = 0;    ///< of the command, for 1 mm and 0.05 m/s of sensor noise
-  double least_lag_limit_s = 0;  ///< further first-order lag that the loop must bear
+  double least_lag_limit_s = 0;  ///< additional first-order lag that the loop must tolerate
   double most_rate =
       0;  ///< m per N/s; 0: no such constraint. As the rate gain is at least 1/(m Ki), it keeps Ki up
   double most_effort = 0;  ///< N/N; 0: no such constraint
@@ -25,10 +25,10 @@ enum class TuneObjective { kAmplitude, kImpulse, kEdge, kRate };
 struct TuneOptions {
   TuneObjective objective = TuneObjective::kImpulse;
   TuneConstraints constraints;
-  /// The attitude loop that flies, with the motors' lag and the thrust's ratio; its position gains are not read. Gains
-  /// that nearness_to_limit_cycle() calls close or unstable are then not feasible.
+  /// The attitude loop as flown, with the motor lag and the thrust ratio; its position gains are ignored. Gains that
+  /// nearness_to_limit_cycle() classifies as close or unstable are then infeasible.
   std::optional<Cascade> attitude = {};
-  double range = 8;  ///< gains between the given ones divided and multiplied by this
+  double range = 8;  ///< searched range: the given gains divided and multiplied by this
   int global_evaluations = 4000;
   int local_evaluations = 600;
   std::uint64_t seed = 1;
@@ -42,32 +42,32 @@ struct TunedPoint {
   double noise_m_s2 = 0, lag_limit_s = 0, effort = 0;
   std::optional<CascadeMargins> margins;  ///< with TuneOptions::attitude
   bool feasible = false;
-  double excess = 0;  ///< of the constraint that is violated most, relative; at most 0 where feasible
+  double excess = 0;  ///< relative violation of the worst constraint; at most 0 if feasible
 };
 
 struct TuneResult {
   TunedPoint shipped;
-  TunedPoint best;                          ///< where none is feasible: the one that violates least
+  TunedPoint best;                          ///< the least infeasible point if none is feasible
   GainNorms shipped_sampled, best_sampled;  ///< force channel of the sampled loop, at its samples
-  std::vector<std::string> violated;        ///< by `best`, where it is not feasible
-  /// Why no gains of the range satisfy the constraints, where that is proved; else empty.
+  std::vector<std::string> violated;        ///< constraints violated by `best`, if it is infeasible
+  /// Why no gains in the range satisfy the constraints, if that is proved; else empty.
   std::string infeasible;
-  /// Constraints within 0.1 % of their limit at the best gains, and gains at the end of their range.
+  /// Constraints within 0.1 % of their limit at the best gains, and gains at the ends of their range.
   std::vector<std::string> active_constraints;
-  std::string stopped;  ///< why the search ended; it finds good gains, it does not prove them best
+  std::string stopped;  ///< why the search ended; it does not prove that the gains found are optimal
 };
 
-/// Everything that constraints and objectives look at, for one set of gains as firmware writes them.
+/// Evaluates all constraints and objectives for one set of gains, given as in the firmware.
 TunedPoint evaluate_gains(const SampledLoop& loop, TuneObjective objective);
 
-/// The margins of these gains around the attitude loop. @param loop gains divided by `attitude.ratio` are those of
-/// firmware.
+/// Returns the margins of these gains around the attitude loop.
+/// @param loop its gains divided by `attitude.ratio` are the firmware gains.
 CascadeMargins margins_of(const SampledLoop& loop, const Cascade& attitude);
 
-/// Improves Kp, Kd, Ki of `loop`, and Kp and Kd alone where its Ki is 0, which it then stays: a global search without
-/// derivatives (GN_ISRES, seeded) over the logarithms of the gains, then COBYLA from its best point and from the given
-/// gains. The objective is that of the continuous loop with the effective Ki, as its kinks (sign changes of the kernel)
-/// leave it no derivative. The result is never worse than the given gains where those are feasible.
+/// Improves Kp, Kd and Ki of `loop` (only Kp and Kd if its Ki is 0, which then stays 0): a derivative-free global
+/// search (GN_ISRES, seeded) over the logarithms of the gains, then COBYLA from its best point and from the given
+/// gains. The objective is that of the continuous loop with the effective Ki; it has no derivative because of its kinks
+/// (sign changes of the kernel). The result is never worse than the given gains if those are feasible.
 TuneResult tune(const SampledLoop& loop, const TuneOptions& options);
 
 /// "amplitude", "impulse", "edge", "rate".

@@ -5,8 +5,8 @@
 
 namespace swarmcert::stability {
 
-/// s(x) = 35 x^4 - 84 x^5 + 70 x^6 - 20 x^7 and its derivatives: from 0 to 1 with velocity, acceleration and jerk zero
-/// at both ends; peak speed 2.1875 at the middle. x is held to [0, 1].
+/// s(x) = 35 x^4 - 84 x^5 + 70 x^6 - 20 x^7 and its derivatives: from 0 to 1 with zero velocity, acceleration and jerk
+/// at both ends; peak speed 2.1875 in the middle. x is clamped to [0, 1].
 struct RestToRest {
   double s, ds, dds;
 

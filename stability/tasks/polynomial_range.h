@@ -7,9 +7,9 @@
 
 namespace swarmcert::stability {
 
-/// RestToRest and its third derivative 840 u (1 - 5 u), u = x - x^2, over all x of an interval held to [0, 1]: values
-/// at the ends and wherever the next derivative vanishes, in intervals; 1e-13 more for the rounding of RestToRest
-/// itself.
+/// RestToRest and its third derivative 840 u (1 - 5 u), u = x - x^2, over all x of an interval clamped to [0, 1].
+/// Evaluates, in interval arithmetic, the ends and the points where the next derivative vanishes; widened by 1e-13 for
+/// the round-off error of RestToRest itself.
 struct RestToRestRange {
   Interval s, ds, dds, ddds;
 

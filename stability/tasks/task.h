@@ -1,4 +1,4 @@
-/// @file A flight task: where each vehicle should be at each time.
+/// @file A flight task: the reference trajectory of each vehicle.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,43 +12,43 @@
 
 namespace swarmcert::stability {
 
-/// What a controller is asked to follow at one instant, in the world.
+/// The reference for a controller at one instant, in the world frame.
 struct Setpoint {
   Eigen::Vector3d p_W_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d v_W_m_s = Eigen::Vector3d::Zero();
   Eigen::Vector3d a_W_m_s2 = Eigen::Vector3d::Zero();
 };
 
-/// Everything that a set point takes on over a stretch of time, axis by axis.
+/// Enclosure of a setpoint over a time interval, axis by axis.
 struct SetpointRange {
   Interval p_W_m[3], v_W_m_s[3], a_W_m_s2[3], jerk_W_m_s3[3];
 };
 
-/// Trajectories of a number of vehicles. Positions are continuous; velocities jump at most at knots().
+/// Trajectories of a number of vehicles. Positions are continuous; velocities jump only at knots().
 class Task {
  public:
   virtual ~Task() = default;
   virtual Setpoint at(int vehicle, double time_s) const = 0;
   virtual double duration_s() const = 0;
-  /// Times at which some vehicle's acceleration or its derivative jumps: integrators should stop there.
+  /// Times at which some vehicle's acceleration or its derivative jumps; integrators should stop there.
   virtual std::vector<double> knots_s() const { return {}; }
-  /// Encloses at(), and the derivative of its acceleration, over [from_s, to_s], where the acceleration is continuous
-  /// there; nothing from tasks that have no enclosure.
+  /// Returns an enclosure of at(), and of the derivative of its acceleration, over [from_s, to_s]. The acceleration
+  /// must be continuous there. Returns nothing if the task has no enclosure.
   virtual std::optional<SetpointRange> over(int vehicle, double from_s, double to_s) const;
-  /// Vehicles stand on the ground at the start, below their first set point.
+  /// Whether vehicles start on the ground, below their first setpoint.
   virtual bool starts_on_ground() const { return false; }
 };
 
 struct TaskOptions {
   int vehicles = 1;
-  double duration_s = 0;  ///< 0: the task's own
+  double duration_s = 0;  ///< 0: the task's default
   std::uint64_t seed = 0;
 };
 
-/// A task that lasts as long as it was asked to.
+/// A task with a selectable duration.
 class TimedTask : public Task {
  public:
-  /// @param own_s where nothing was asked for.
+  /// @param own_s default duration.
   TimedTask(const TaskOptions& options, double own_s)
       : vehicles_(options.vehicles), duration_s_(options.duration_s > 0 ? options.duration_s : own_s) {}
   double duration_s() const override { return duration_s_; }
@@ -61,7 +61,7 @@ class TimedTask : public Task {
 /// Names of the tasks, in the order of the documentation.
 std::vector<std::string> task_names();
 
-/// One line about a task.
+/// Returns a one-line description of a task.
 /// @throws std::invalid_argument for an unknown name.
 std::string task_summary(const std::string& name);
 

@@ -1,4 +1,4 @@
-/// @file What the registry knows of a task. The classes are seen by their own files only.
+/// @file Registry entries of tasks, whose classes are local to their source files.
 #pragma once
 
 #include <functional>
@@ -19,7 +19,7 @@ TaskEntry task_entry() {
   return {T::kName, T::kSummary, [](const TaskOptions& options) { return std::make_unique<T>(options); }};
 }
 
-/// Each in the file of its name.
+/// Each is defined in the source file of the same name.
 namespace tasks {
 TaskEntry circle();
 TaskEntry hover();

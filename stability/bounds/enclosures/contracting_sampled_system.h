@@ -1,4 +1,4 @@
-/// @file The sampled loop in intervals, in coordinates in which it verifiably contracts. Not for users.
+/// @file The sampled loop in intervals, in coordinates in which it is verified to contract. Not for users.
 #pragma once
 
 #include <optional>
@@ -8,32 +8,33 @@
 
 namespace swarmcert::stability {
 
-/// Enclosures of the matrices of SampledModel. The integral is left out where Ki is 0, as nothing reads it. A delay
-/// within 1e-9 periods of a whole number of them counts as that number.
+/// Enclosures of the matrices of SampledModel. The integral is omitted if Ki is 0, as nothing reads it. A delay within
+/// 1e-9 periods of a whole number of periods is treated as that number.
 class IntervalSampledModel {
  public:
   explicit IntervalSampledModel(const SampledLoop& loop);
 
-  std::size_t size() const { return command_ + past_; }  ///< e, e', lags' outputs, I, past commands
+  std::size_t size() const { return command_ + past_; }  ///< e, e', lag outputs, I, past commands
   std::size_t lags() const { return plant_ - 2; }
   std::size_t past() const { return past_; }
   std::size_t command_index() const { return command_; }      ///< of the new command after control
   const IntervalMatrix& control() const { return control_; }  ///< [size + 1 x size]
   const IntervalMatrix& hold() const { return hold_; }        ///< [size x size + 1]
-  /// Row over the state after control that gives e at `phase_s` into the period.
+  /// Returns the row over the state after the control that gives e at `phase_s` into the period.
   IntervalVector error_at(double phase_s) const;
 
  private:
-  /// Plant's state at `phase` as rows over the state after control, [plant x size + 1].
+  /// Returns the plant's state at `phase` as rows over the state after the control, [plant x size + 1].
   IntervalMatrix plant_at(Interval phase_s) const;
 
   std::size_t plant_ = 0, command_ = 0, past_ = 0, newest_ = 0;
-  Interval shift_s_;  ///< part of a period for which the older command still acts
+  Interval shift_s_;  ///< part of a period during which the older command still acts
   IntervalMatrix generator_, control_, hold_;
 };
 
-/// Rows over the states of a period go to the period before by row -> row A, A = R M R^-1, after row = (old row) R^-1;
-/// |A|_2 <= gamma < 1 is verified (interval Cholesky of gamma^2 I - A'A), R'R from a Stein equation.
+/// Rows over the states of a period map to the period before by row -> row A, A = R M R^-1, after the change of
+/// coordinates row = (old row) R^-1. |A|_2 <= gamma < 1 is verified (interval Cholesky of gamma^2 I - A'A); R'R solves
+/// a Stein equation.
 struct ContractingSampledSystem {
   IntervalMatrix A;
   Eigen::MatrixXd R;
@@ -41,7 +42,7 @@ struct ContractingSampledSystem {
   double gamma = 1;
 };
 
-/// Nothing where stability could not be verified.
+/// Returns nothing if stability could not be verified.
 std::optional<ContractingSampledSystem> contracting(const IntervalSampledModel& model);
 
 }  // namespace swarmcert::stability

@@ -1,4 +1,4 @@
-/// @file A linear system in coordinates in which it verifiably contracts. Not for users.
+/// @file A linear system in coordinates in which it is verified to contract. Not for users.
 #pragma once
 
 #include <array>
@@ -14,18 +14,19 @@ struct ContractingSystem {
   IntervalMatrix A;
   IntervalVector b;
   double alpha = 0;
-  /// Rows that give Y (int y, vanishing at infinity), y, y', y''.
+  /// Rows that give Y (the antiderivative of y that vanishes at infinity), y, y', y''.
   std::array<IntervalVector, 4> rows;
 };
 
-/// Coordinates R x of the companion form, R'R the solution of a Lyapunov equation; the symmetric part of the system's
-/// matrix there is verified to lie below -alpha I (interval Cholesky), so |exp(A t)|_2 <= e^(-alpha t).
-/// Nothing where stability could not be verified, for every transfer function with such coefficients.
+/// Changes the companion form to coordinates R x, with R'R the solution of a Lyapunov equation. The symmetric part of
+/// the system matrix in these coordinates is verified to lie below -alpha I (interval Cholesky), so |exp(A t)|_2 <=
+/// e^(-alpha t). Valid for every transfer function with coefficients in the given intervals. Returns nothing if
+/// stability could not be verified.
 /// @param numerator   in ascending powers, of lower degree than the denominator.
-/// @param denominator in ascending powers; its last does not contain zero.
+/// @param denominator in ascending powers; the leading coefficient does not contain zero.
 std::optional<ContractingSystem> contracting(const IntervalVector& numerator,
                                              const IntervalVector& denominator);
-/// The same of a transfer function without a delay.
+/// The same for a transfer function without a delay.
 std::optional<ContractingSystem> contracting(const TransferFunction& h);
 
 }  // namespace swarmcert::stability

@@ -1,4 +1,4 @@
-/// @file Enclosures of exp, log and pow by interval arithmetic alone: nothing rests on how well libm rounds.
+/// @file Enclosures of exp, log and pow by interval arithmetic, independent of the accuracy of libm.
 #pragma once
 
 #include <stdexcept>
@@ -8,8 +8,8 @@
 
 namespace swarmcert::stability {
 
-/// e^x of one double. With y = x/2^k, |y| <= 1/4: the Taylor polynomial of degree 13, whose remainder is below
-/// 1.3 |y|^14/14!, squared k times. Beyond +-700, where doubles end, [0, 1e-300] or [1e300, oo].
+/// Encloses e^x of one double. With y = x/2^k, |y| <= 1/4: the Taylor polynomial of degree 13, whose remainder is below
+/// 1.3 |y|^14/14!, squared k times. Beyond +-700, near the limits of doubles, [0, 1e-300] or [1e300, oo].
 inline Interval exp_of(double x) {
   if (!(x > -700)) return {0, 1e-300};
   if (!(x < 700)) return {1e300, kInfinity};
@@ -26,7 +26,7 @@ inline Interval exp_of(double x) {
 
 inline Interval exp(Interval x) { return {std::max(0.0, exp_of(x.lower).lower), exp_of(x.upper).upper}; }
 
-/// ln x of one positive double: what libm says, widened until exp() proves it.
+/// Encloses ln x of one positive double: the result of libm, widened until exp() proves the enclosure.
 inline Interval log_of(double x) {
   const double guess = std::log(x);
   double slack = 1e-15 * std::max(1.0, std::abs(guess));
@@ -37,7 +37,7 @@ inline Interval log_of(double x) {
   throw std::domain_error("log of " + std::to_string(x) + " could not be enclosed");
 }
 
-/// x^n for x > 0.
+/// Encloses x^n for x > 0.
 inline Interval pow(Interval x, double n) {
   if (n == 0) return Interval(1);
   return exp(Interval(n) * Interval(log_of(x.lower).lower, log_of(x.upper).upper));

@@ -37,14 +37,14 @@ IntervalMatrix operator*(const IntervalMatrix& a, const IntervalMatrix& b);
 IntervalVector operator*(const IntervalVector& row, const IntervalMatrix& m);
 Interval dot(const IntervalVector& a, const std::vector<double>& b);
 
-/// Upper bound of the Euclidean norm.
+/// Returns an upper bound on the Euclidean norm.
 double norm_above(const IntervalVector& v);
 
-/// Enclosure of the inverse of a matrix: Gauss and Jordan in intervals on (approximate inverse times m), which is
-/// nearly the identity. Nothing where a pivot may vanish.
+/// Encloses the inverse of a matrix by interval Gauss-Jordan elimination of (approximate inverse times m), which is
+/// nearly the identity. Returns nothing if a pivot may vanish.
 std::optional<IntervalMatrix> inverse(const Eigen::MatrixXd& m);
 
-/// Whether every symmetric matrix in `m` is positive definite: Cholesky with positive pivots.
+/// Returns true if every symmetric matrix in `m` is proved positive definite: interval Cholesky with positive pivots.
 bool is_positive_definite(IntervalMatrix m);
 
 }  // namespace swarmcert::stability

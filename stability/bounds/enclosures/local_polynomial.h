@@ -1,5 +1,4 @@
-/// @file Functions that are polynomials on short stretches, up to a bounded error: what they integrate to. Not for
-/// users.
+/// @file Integrals and suprema of functions that are piecewise polynomials up to a bounded error. Not for users.
 #pragma once
 
 #include <algorithm>
@@ -11,16 +10,16 @@
 namespace swarmcert::stability {
 
 inline constexpr int kLocalTerms = 18;
-/// How often a stretch is halved at most.
+/// Maximum number of times a segment is halved.
 inline constexpr int kLocalDepth = 30;
 
 /// Taylor coefficients of one output along a trajectory from a point, with a remainder and an error ball.
 struct LocalPolynomial {
   std::array<Interval, kLocalTerms> c;
   double remainder = 0;  ///< times s^kLocalTerms
-  double error = 0;      ///< of the point, seen in this output
+  double error = 0;      ///< of the point, as seen in this output
 
-  /// What the polynomial may miss anywhere up to `s`.
+  /// Returns the error of the polynomial, as an interval that holds anywhere up to `s`.
   Interval slack(double s) const {
     const double r = up(nth_power(Interval(s), kLocalTerms).upper * remainder);
     const double total = up(r + error);
@@ -33,7 +32,7 @@ struct LocalPolynomial {
   }
   Interval at(double s) const { return polynomial(s) + slack(s); }
 
-  /// Range on [a, b]: the value in the middle and the slope over the stretch (mean value form).
+  /// Returns the range on [a, b]: the value at the midpoint plus the slope over the segment (mean value form).
   Interval range(double a, double b) const {
     const double middle = a + (b - a) / 2;
     const Interval s(a, b);
@@ -45,8 +44,9 @@ struct LocalPolynomial {
   }
 };
 
-/// int |f| in the order of time. Where f keeps its sign the integral is the difference of an antiderivative F between
-/// the ends of the whole run, so that enclosures of F are paid for once per change of sign and not per stretch.
+/// Integrates |f| in chronological order. While f keeps its sign, the integral is the difference of an antiderivative F
+/// between the ends of the whole run, so the enclosure widths of F are incurred once per sign change and not once per
+/// segment.
 class AbsoluteIntegral {
  public:
   void add(const LocalPolynomial& f, const LocalPolynomial& F, double a, double b, int depth) {
@@ -62,7 +62,7 @@ class AbsoluteIntegral {
       return;
     }
     const double most = up(up(b - a) * range.mag());
-    // No stretch is short enough to tell the sign of what is smaller than its own error.
+    // No subdivision can determine the sign of a value smaller than its own error.
     if (depth == 0 || most < 1e-19 || 8 * f.slack(b).upper > range.mag()) {
       close();
       total_ += Interval(0, most);
@@ -91,7 +91,7 @@ class AbsoluteIntegral {
   int sign_ = 0;
 };
 
-/// Raises best.lower and best.upper to enclose the supremum of |f| over all stretches seen so far.
+/// Updates `lower` and best to enclose the supremum of |f| over all segments seen so far.
 inline void raise_supremum(const LocalPolynomial& f, const LocalPolynomial& slope, double a, double b,
                            int depth, double& lower, Interval& best) {
   lower = std::max({lower, abs(f.at(a)).lower, abs(f.at(b)).lower});

@@ -1,11 +1,11 @@
-/// @file Axes that Lambda or K couples, each around the attitude loop that flies, as one linear loop.
+/// @file Axes coupled by Lambda or K, each with its attitude loop, as one linear loop.
 ///
 /// Axis i is a channel: the loop of attitude_cascade.h with its own attitude law, lags and ratio, whose position loop
-/// asks for the acceleration
+/// commands the acceleration
 ///   u_i = -sum_j (Kp_ij e_j + Kd_ij e_j' + Ki_ij int e_j).
-/// With the state x of all channels and one command per channel, behind its motors, the loop is
+/// With the state x of all channels and one command per channel, before its motors, the loop is
 ///   x' = A x + B c,   c = -C x,
-/// with eigenvalues of A - B C. Its margins are those of the loop cut at all commands or at one of them.
+/// with the eigenvalues of A - B C. Its margins are those of the loop opened at all commands or at one of them.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,31 +22,32 @@ struct PidMatrices {
   Eigen::MatrixXd Kd;  ///< 2 Lambda + K / m, 1/s
   Eigen::MatrixXd Ki;  ///< K Lambda^2 / m, 1/s^3
 };
-/// Of all three axes.
+/// Returns the matrices of all three axes.
 PidMatrices pid_matrices(const CompositeGains& gains, double mass_kg);
 
 struct CoupledCascade {
-  PidMatrices position;           ///< n x n for n channels, before the ratio of a channel; Ki as it acts
-  std::vector<Cascade> channels;  ///< their Kp, Kd, Ki are not read
+  PidMatrices position;           ///< n x n for n channels, before a channel's ratio; Ki effective
+  std::vector<Cascade> channels;  ///< their Kp, Kd, Ki are ignored
 };
 
 bool is_stable(const CoupledCascade& loop);
 
-/// How far a coupled loop is from oscillating. Damping and frequency are those of the whole loop in each.
+/// Stability margins of a coupled loop. Damping and frequency in each are those of the whole loop.
 struct CoupledMargins {
-  /// The gain of every channel changes by one factor; one delay is between the state and all motors. Where nothing is
-  /// coupled these are the smallest of the channels' own margins.
+  /// All channels' gains change by a common factor; a common delay precedes all motors. For uncoupled channels these
+  /// are the smallest of the channels' own margins.
   CascadeMargins together;
-  /// Per channel: its gain alone changes, its motors alone are delayed. Where nothing is coupled these are
+  /// Per channel: only its gain changes, only its motors are delayed. For uncoupled channels these are
   /// cascade_margins().
   std::vector<CascadeMargins> alone;
 };
 
-/// All zero where the loop is not stable. To rounding, not rigorous: see set_gain_margins() for gains; for delays every
-/// frequency at which the loop's gain crosses 1 is bracketed on a grid of steps of 2 %, and finer about resonances.
+/// Returns the margins; all zero if the loop is unstable. Accurate up to round-off, not rigorous: for gains see
+/// set_gain_margins(); for delays, every frequency at which the loop gain crosses 1 is bracketed on a grid with steps
+/// of 2 %, finer near resonances.
 CoupledMargins coupled_margins(const CoupledCascade& loop);
 
-/// By the smallest of all its gain margins, see nearness_to_limit_cycle(const CascadeMargins&).
+/// Classifies by the smallest of all gain margins, see nearness_to_limit_cycle(const CascadeMargins&).
 Nearness nearness_to_limit_cycle(const CoupledMargins& margins);
 
 }  // namespace swarmcert::stability

@@ -1,7 +1,7 @@
-/// @file Impulse responses of linear loops and their exact norms: what a bounded disturbance can do at worst.
+/// @file Impulse responses of linear loops and their exact norms, the worst-case gains of bounded disturbances.
 ///
-/// For e = h * w (convolution, from rest), |e(t)| <= |h|_1 sup|w|, and the sign pattern w(t - u) = sign h(u) attains
-/// it; |e(t)| <= sup|h| int|w|. So these norms are not estimates of a gain, they are the gain (Hoelder).
+/// For e = h * w (convolution, from rest), |e(t)| <= |h|_1 sup|w|, which the sign pattern w(t - u) = sign h(u) attains;
+/// |e(t)| <= sup|h| int|w|. These norms are therefore the exact gains, not estimates (Hoelder).
 #pragma once
 
 #include <complex>
@@ -19,9 +19,9 @@ struct TransferFunction {
   double delay_s = 0;
 };
 
-/// Norms of y(t) = L^-1[Y], t > 0. Computed between the zeros of y, y' and y'', which are found by bracketing and
-/// refined to rounding; no grid sum. Relative error about 1e-12 without a delay, 1e-11 with one; not rigorous (for
-/// enclosures see verified_norms.h). All infinite where the loop is not stable.
+/// Norms of y(t) = L^-1[Y], t > 0. Computed between the zeros of y, y' and y'', which are bracketed and refined to
+/// round-off; no sums over a grid. Relative error about 1e-12 without a delay, 1e-11 with one; not rigorous (for
+/// enclosures see verified_norms.h). All infinite if the loop is unstable.
 struct ResponseNorms {
   double integral = 0;            ///< int y
   double integral_abs = 0;        ///< |y|_1
@@ -37,19 +37,20 @@ struct ResponseNorms {
 
 ResponseNorms response_norms(const TransferFunction& y);
 
-/// y(0), y(step), ..., `count` values, by the exact recursion of the state (without a delay) or by Taylor pieces.
+/// Returns `count` values y(0), y(step), ..., by the exact recursion of the state (without a delay) or by Taylor
+/// segments.
 std::vector<double> sampled_response(const TransferFunction& y, double step_s, int count);
 
-/// Poles: zeros of the denominator, where there is no delay.
+/// Returns the poles, the zeros of the denominator, for a system without a delay.
 std::vector<std::complex<double>> poles(const Polynomial& denominator);
 
-/// Whether all zeros of denominator + feedback exp(-delay s) have negative real parts. With a delay: the loop without
-/// delay is stable and the delay is below delay_margin().
+/// Whether all zeros of denominator + feedback exp(-delay s) have negative real parts. With a delay: whether the loop
+/// without delay is stable and the delay is below delay_margin().
 bool is_stable(const TransferFunction& y);
 
-/// Largest delay T for which denominator + feedback exp(-s t) keeps all zeros on the left for every t in [0, T):
-/// over the frequencies w with |denominator(jw)| = |feedback(jw)|, the least arg(...)/w. Infinite where there is no
-/// such frequency. 0 if the loop is unstable without a delay.
+/// Returns the largest T such that denominator + feedback exp(-s t) has all zeros in the open left half-plane for every
+/// delay t in [0, T): the least arg(...)/w over the frequencies w with |denominator(jw)| = |feedback(jw)|. Infinite if
+/// there is no such frequency. 0 if the loop is unstable without a delay.
 double delay_margin(const Polynomial& denominator, const Polynomial& feedback);
 
 }  // namespace swarmcert::stability

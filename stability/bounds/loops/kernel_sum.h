@@ -10,35 +10,35 @@
 
 namespace swarmcert::stability {
 
-/// Adds up |kernel|, |its integral| and their extrema backwards in time from the moment looked at.
+/// Accumulates |kernel|, |its integral| and their extrema, backwards in time from the time of the output.
 class KernelSum {
  public:
-  /// @param at_once where the integral starts, for the rate gain to the output plus at_once times the disturbance; the
-  ///   other gains are those to the output alone.
+  /// @param at_once initial value of the integral. The rate gain is then that to the output plus at_once times the
+  ///     disturbance; the other gains are those to the output alone.
   explicit KernelSum(double at_once = 0) : at_once_(at_once), integral_(at_once) {}
 
-  /// A stretch of `length` on which the kernel is slope u + start, u growing backwards in time.
+  /// Adds a segment of `length` on which the kernel is slope u + start, u growing backwards in time.
   void add_linear(double start, double slope, double length);
-  /// The integral alone jumps.
+  /// Adds a jump of the integral alone.
   void add_jump(double jump) { integral_ += jump; }
-  /// That stretch, then again and again `ratio` times smaller; the integral goes to its limit in proportion.
+  /// Adds the segment and infinitely many repetitions, each scaled by `ratio`; the integral converges in proportion.
   void add_series(double start, double slope, double length, double ratio) {
     add_series(0, start, slope, length, ratio);
   }
-  /// The same with a jump before each of them, smaller by the same ratio.
+  /// The same with a jump before each repetition, scaled by the same ratio.
   void add_series(double jump, double start, double slope, double length, double ratio);
 
   const GainNorms& norms() const { return norms_; }
 
  private:
-  /// No change of sign of the kernel inside, so its integral is monotonic and has at most one zero.
+  /// Adds a segment on which the kernel keeps its sign, so that its integral is monotonic and has at most one zero.
   void add_signed(double start, double slope, double length);
 
   GainNorms norms_;
   double at_once_, integral_;
 };
 
-/// How a kernel of a sampled loop changes.
+/// Variation of the kernel of a sampled loop.
 class KernelVariation {
  public:
   void add_linear(double start, double slope, double length) {
@@ -52,21 +52,21 @@ class KernelVariation {
     const double before = total_;
     const double jump = std::abs(start - end_);
     add_linear(start, slope, length);
-    // Each period moves by its slope, then jumps to the next one's start.
+    // Each period contributes its slope and the jump to the start of the next one.
     const double one = total_ - before - jump + std::abs(start * ratio - end_);
     total_ = before + jump + one / (1 - ratio);
     end_ = 0;
   }
-  /// Total variation, jumps included, the first from zero and the return to zero, too.
+  /// Returns the total variation, including jumps, the initial jump from zero and the return to zero.
   double total() const { return total_ + std::abs(end_); }
-  /// sup |kernel(v + period) - kernel(v)|, where all stretches last a period.
+  /// Returns sup |kernel(v + period) - kernel(v)|, if every segment lasts one period.
   double most_per_period() const { return most_; }
 
  private:
   double total_ = 0, most_ = 0, start_ = 0, end_ = 0;
 };
 
-/// @param after the output as a row over the state after control. Sum: KernelSum or KernelVariation.
+/// @param after the output as a row over the state after the control. Sum: KernelSum or KernelVariation.
 template <class Sum>
 void add_force_kernel(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after, Sum& sum) {
   adjoint.force_kernel(
@@ -76,11 +76,11 @@ void add_force_kernel(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& a
       });
 }
 
-/// Gains from an error of the command, added once per period, in units of acceleration.
-/// @param with_own whether the error of the output's own period counts.
+/// Returns the gains from an error of the command, added once per period, in units of acceleration.
+/// @param with_own whether the error in the output's own period is included.
 GainNorms command_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after, bool with_own = true);
-/// The same for what adds `input` [size + 1] to the state after control, once per period.
-/// @param at_once as in KernelSum: `rate` is that to the output plus at_once times the latest input.
+/// The same for an input that adds `input` [size + 1] to the state after the control, once per period.
+/// @param at_once as in KernelSum: `rate` is the gain to the output plus at_once times the latest input.
 GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after,
                       const Eigen::VectorXd& input, bool with_own = true, double at_once = 0);
 

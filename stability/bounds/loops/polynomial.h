@@ -40,14 +40,14 @@ inline Polynomial derivative_of(const Polynomial& p) {
   return result;
 }
 
-/// (i + k)! / i!: what k derivatives make of the coefficient of s^(i + k). Exact below 2^53.
+/// Returns (i + k)! / i!, the factor of the coefficient of s^(i + k) after k derivatives. Exact below 2^53.
 inline double rising_factorial(std::size_t i, std::size_t k) {
   double result = 1;
   for (std::size_t j = 1; j <= k; ++j) result *= static_cast<double>(i + j);
   return result;
 }
 
-/// By Horner's rule.
+/// Evaluates p at s by Horner's rule.
 inline double value(const Polynomial& p, double s) {
   double result = 0;
   for (std::size_t i = p.size(); i-- > 0;) result = result * s + p[i];

@@ -1,5 +1,4 @@
-/// @file Kernel of a sampled loop by backward (adjoint)
-/// recursion, period by period. Not for users.
+/// @file Kernel of a sampled loop by backward (adjoint) recursion, period by period. Not for users.
 #pragma once
 
 #include <cmath>
@@ -9,37 +8,39 @@
 
 namespace swarmcert::stability {
 
-/// `map` without the integral, which nothing reads where Ki is 0; its eigenvalue 1 would mislead.
+/// Returns `map` without the integral if Ki is 0: nothing reads the integral then, and its eigenvalue 1 would be
+/// misleading.
 Eigen::MatrixXd without_unread(const Eigen::MatrixXd& map, const SampledModel& model, double Ki);
 Eigen::MatrixXd without_row(const Eigen::MatrixXd& m, Eigen::Index row);
-/// Largest modulus of an eigenvalue.
+/// Returns the largest modulus of an eigenvalue.
 double largest_modulus(const Eigen::MatrixXd& map);
 
-/// Outputs are e at a phase into a period, or I after the control of a period; kernels are per unit of acceleration.
+/// Outputs are e at a phase within a period, or I after the control of a period; kernels are per unit of acceleration.
 class SampledAdjoint {
  public:
   enum class Output { kError, kIntegral };
 
   explicit SampledAdjoint(const SampledLoop& loop, Output output = Output::kError);
 
-  /// Whether the loop is stable and an oscillation that is left fades within kMostPeriods. Where not, there are no
-  /// kernels, and gains count as infinite.
+  /// Whether the loop is stable and its slowest oscillation decays within kMostPeriods. If not, there are no kernels,
+  /// and all gains are infinite.
   bool is_stable() const { return is_stable_; }
   double period_s() const { return period_s_; }
   const SampledModel& model() const { return model_; }
   static constexpr double kMostPeriods = 3e6;
 
-  /// Calls visit(start, slope, length): the kernel from a force to the output is start + slope u, u growing backwards
-  /// in time, on stretches that follow one another; the first is the part of the period before the moment looked at.
-  /// Ends where the kernel has fallen to e^-42, or where one real mode is all that is left: then every further period
-  /// has `ratio` times the kernel of the one before, and finish(start, slope, length, ratio) is called with the next
-  /// one.
+  /// Calls visit(start, slope, length) for consecutive segments, on which the kernel from a force to the output is
+  /// start + slope u, with u growing backwards in time. The first segment is the part of the period before the output's
+  /// time. Ends where the kernel has fallen to e^-42, or where only one real mode is left: the kernel of every further
+  /// period is then `ratio` times that of the one before, and finish(start, slope, length, ratio) is called with the
+  /// next one.
   template <class Visit, class Finish>
   void force_kernel(double phase_s, const Visit& visit, const Finish& finish) const {
     if (output_ == Output::kError) visit(0.0, 1.0, phase_s);
     force_kernel(output_after_control(phase_s), visit, finish);
   }
-  /// The same for any output, a row over the state after control that no force of its own period moves.
+  /// The same for any output, given as a row over the state after the control; a force in its own period must not
+  /// affect it.
   template <class Visit, class Finish>
   void force_kernel(const Eigen::RowVectorXd& after, const Visit& visit, const Finish& finish) const {
     const std::vector<double> rest = walk(
@@ -47,8 +48,8 @@ class SampledAdjoint {
     if (ratio_ > 0) finish(rest[1], rest[0], period_s_, ratio_);
   }
 
-  /// Calls visit(kernel): the response to an error of 1 m/s^2 in the command of this period, of the one before, ...
-  /// and finish(kernel, ratio) as above.
+  /// Calls visit(kernel) with the response to an error of 1 m/s^2 in the command of this period, of the one before,
+  /// ..., and finish(kernel, ratio) as above.
   template <class Visit, class Finish>
   void command_kernel(double phase_s, const Visit& visit, const Finish& finish) const {
     command_kernel(output_after_control(phase_s), visit, finish);
@@ -57,7 +58,7 @@ class SampledAdjoint {
   void command_kernel(const Eigen::RowVectorXd& after, const Visit& visit, const Finish& finish) const {
     input_kernel(after, Eigen::VectorXd::Unit(model_.size() + 1, model_.command_index()), visit, finish);
   }
-  /// The same for what adds `input` [size + 1] to the state after control of every period.
+  /// The same for an input that adds `input` [size + 1] to the state after the control of every period.
   template <class Visit, class Finish>
   void input_kernel(const Eigen::RowVectorXd& after, const Eigen::VectorXd& input, const Visit& visit,
                     const Finish& finish) const {
@@ -73,11 +74,12 @@ class SampledAdjoint {
     if (ratio_ > 0) finish(kernel_of(rest), ratio_);
   }
 
-  /// The output as a row over the state after control.
+  /// Returns the output as a row over the state after the control.
   Eigen::RowVectorXd output_after_control(double phase_s) const;
 
  private:
-  /// row <- row * map, on plain arrays: this loop runs up to a million times. Returns the row after the last visited.
+  /// row <- row * map, on plain arrays, as this loop runs up to a million times. Returns the row after the last one
+  /// visited.
   template <class Visit>
   std::vector<double> walk(const Eigen::RowVectorXd& first, const Visit& visit) const {
     std::vector<double> now(first.data(), first.data() + first.size());
@@ -102,7 +104,7 @@ class SampledAdjoint {
   Eigen::MatrixXd map_;
   bool is_stable_ = false;
   long periods_ = 0;
-  double ratio_ = 0;  ///< of the lone real mode after periods_; 0: nothing is left then
+  double ratio_ = 0;  ///< of the only real mode left after periods_; 0: no mode is left
 };
 
 }  // namespace swarmcert::stability

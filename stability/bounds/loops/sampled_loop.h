@@ -6,42 +6,41 @@
 namespace swarmcert::stability {
 
 /// Every period: measure e and e'; I += integrator_step_s e; command -m (Kp e + Kd e' + Ki I), held until the next
-/// one, delayed by plant.delay_s (any number, not only whole periods) and passed through plant.lags_s.
+/// command, delayed by plant.delay_s (not necessarily whole periods) and passed through plant.lags_s.
 struct SampledLoop {
-  AxisLoop plant;  ///< Ki as written in the firmware, not as it acts
+  AxisLoop plant;  ///< Ki as written in the firmware, not the effective one
   double period_s = 0;
   double integrator_step_s = 0;
 };
 
-/// Ki integrator_step_s / period_s: the continuous gain that the sampled integrator amounts to.
+/// Returns Ki integrator_step_s / period_s, the equivalent continuous gain of the sampled integrator.
 double effective_Ki(const SampledLoop& loop);
 
-/// Which tracking errors count.
+/// The times at which tracking errors count.
 enum class Instants {
-  kSampling,  ///< those that the loop measures
-  kAll,  ///< also those between; on the shipped gains the impulse gain is up to 4e-4 larger, amplitude, edge 1e-4
+  kSampling,  ///< the times at which the loop measures
+  kAll,  ///< also between them; for the shipped gains impulse is up to 4e-4 larger, amplitude and edge 1e-4
 };
 
-/// Exact norms of the sampled loop.
-/// Channel kForce: a disturbance in continuous time. Channel kCommand: an error that the loop adds to its command once
-/// per period: rate means |eps_k - eps_(k-1)| <= period, impulse means period sum|eps_k| <= 1.
-/// By the adjoint: the kernel is a polynomial on each period before the time looked at, its sign changes are roots of
-/// that polynomial. With kAll the worst phase is searched on nine phases and refined. Relative error about 1e-10.
-/// All infinite where the spectral radius is not below 1.
+/// Returns the exact norms of the sampled loop. Channel kForce: a disturbance in continuous time. Channel kCommand: an
+/// error that the loop adds to its command once per period; `rate` then means |eps_k - eps_(k-1)| <= period, `impulse`
+/// period sum|eps_k| <= 1. Computed by the adjoint: the kernel is a polynomial on each period before the output's time,
+/// and its sign changes are roots of that polynomial. With kAll the worst phase is searched on nine phases and refined.
+/// Relative error about 1e-10. All infinite if the spectral radius is not below 1.
 GainNorms sampled_norms(const SampledLoop& loop, Channel channel, Instants instants);
 
 /// The same for an error of an estimate, which the loop reads once per period, per m/s or per m.
 GainNorms sampled_norms(const SampledLoop& loop, Estimate estimate, Instants instants);
 
-/// |u|_oo per |f|_oo for the feedback part u of the commanded force, N/N (force channel).
+/// Returns |u|_oo per |f|_oo for the feedback part u of the commanded force, N/N (force channel).
 double effort_gain(const SampledLoop& loop);
 
-/// Largest modulus of an eigenvalue of the map from one sample to the next.
+/// Returns the largest modulus of an eigenvalue of the map from one sample to the next.
 double spectral_radius(const SampledLoop& loop);
 
-/// Standard deviation of e at the sampling times, m, under white measurement noise of standard deviations
-/// `position_m` and `velocity_m_s` per sample (discrete Lyapunov equation); `command_m_s2` is that of the commanded
-/// acceleration. Infinite where the loop is unstable.
+/// Standard deviation of e at the sampling times, m, under white measurement noise of standard deviations `position_m`
+/// and `velocity_m_s` per sample (discrete Lyapunov equation); `command_m_s2` is that of the commanded acceleration.
+/// Infinite if the loop is unstable.
 struct NoiseDeviation {
   double error_m = 0;
   double command_m_s2 = 0;

@@ -1,4 +1,4 @@
-/// @file The norms of a smooth function that arrives in polynomial pieces.
+/// @file Norms of a smooth function given as a sequence of polynomial pieces.
 #pragma once
 
 #include <algorithm>
@@ -7,29 +7,29 @@
 
 namespace swarmcert::stability {
 
-/// Takes a function piece by piece, in order, and keeps what ResponseNorms needs. Each piece must be short against the
-/// function's fastest mode: a piece may have one zero of y'', and up to two of y' and of y.
+/// Processes a function piece by piece, in order, and accumulates ResponseNorms. Each piece must be short compared with
+/// the function's fastest mode: a piece may have one zero of y'', and up to two zeros of y' and of y.
 class ZeroScan {
  public:
   /// @param initial_integral Y(0), where Y' = y.
   ZeroScan(double initial_integral, double y0, double slope0);
 
-  /// A piece in which y = p(u), 0 <= u <= length.
-  /// @param integral_at_start Y there.
+  /// Adds a piece in which y = p(u), 0 <= u <= length.
+  /// @param integral_at_start Y at its start.
   void add(const Polynomial& piece, double length, double integral_at_start);
 
-  /// Whether one of y and its first three derivatives (the four values at either end of a stretch) changes its
-  /// sign; a stretch without needs no piece.
+  /// Whether y or one of its first three derivatives (the four values at either end of a segment) changes its sign. A
+  /// segment without a sign change needs no piece.
   static bool has_event(const double* at_start, const double* at_end);
 
   /// @param final_integral Y(oo); y and its derivatives vanish there.
   ResponseNorms finish(double final_integral) const;
 
-  /// How many zeros of y, y' and y'' there were, the least of the three.
+  /// Returns the smallest of the numbers of zeros found of y, y' and y''.
   long least_events() const { return std::min({integrals_, values_, slopes_}); }
 
-  /// As finish(), where from now on the response is one decaying oscillation: areas between zeros shrink by `ratio`
-  /// from one to the next, and so sum to a geometric series.
+  /// Like finish(), if the rest of the response is a single decaying oscillation: the areas between zeros then shrink
+  /// by `ratio` from one to the next and sum to a geometric series.
   ResponseNorms finish_oscillation(double final_integral, double ratio) const;
 
  private:

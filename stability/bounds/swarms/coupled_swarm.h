@@ -1,5 +1,4 @@
-/// @file swarm.toml: vehicles of one kind whose forces depend on each other's motion, and whether their errors stay
-/// bounded.
+/// @file swarm.toml: vehicles of one kind with coupled forces, and a test whether their errors stay bounded.
 #pragma once
 
 #include <optional>
@@ -18,27 +17,27 @@ struct CoupledSwarm {
 };
 
 /// Reads swarm.toml (schema swarmcert/swarm/1): vehicles = N, [[coupling]] on, by, position_N_m, velocity_N_s_m,
-/// speed_m_s, acceleration_m_s2, cross_rate_N_s, direction = "apart" | "together" where the force's sign is known.
+/// speed_m_s, acceleration_m_s2, cross_rate_N_s, direction = "apart" | "together" if the force's sign is known.
 /// @throws files::InputError with line, key, value and hint.
 CoupledSwarm read_coupled_swarm(const std::string& path);
 
-/// A class without any force.
+/// Returns a class that contains no force.
 Disturbance no_force();
 
 struct CoupledVerdict {
   SmallGain small_gain;
-  OwnMotion of_estimates;  ///< of every vehicle, by errors of its estimates
-  OwnMotion of_force;      ///< likewise, by its force error beside the couplings
-  /// Small gain is sufficient, not necessary: where it fails, an unstable instance of the class decides the matter.
+  OwnMotion of_estimates;  ///< of every vehicle, due to errors of its estimates
+  OwnMotion of_force;      ///< likewise, due to its force error beside the couplings
+  /// Small gain is sufficient, not necessary: if it fails, an unstable instance of the class disproves stability.
   std::optional<UnstableSwarm> unstable;
   bool is_refuted() const { return unstable && unstable->is_declared; }
 };
 
-/// Small gain of the z loops (continuous, command channel, the integrator as it acts when sampled) of vehicles that all
-/// have these gains. The couplings hold for how vehicles really move; what a network makes of wrong estimates of its
-/// inputs is not in them, and belongs into cross_rate_N_s.
-/// @param others velocity_error, position_error and bias_N of every vehicle's z axis; nothing else of it is read.
-/// @param force class of every vehicle's force error along z beside the bias and the couplings.
+/// Applies the small-gain test to the z loops (continuous, command channel, effective integral gain if sampled) of
+/// vehicles that all have these gains. The couplings describe how forces depend on the true motion of the vehicles. The
+/// effect of wrong estimates on a network's inputs is not included, and must be added to cross_rate_N_s.
+/// @param others velocity_error, position_error and bias_N of every vehicle's z axis; the other members are ignored.
+/// @param force class of every vehicle's force error along z in addition to the bias and the couplings.
 /// @throws std::invalid_argument if Lambda or K couples the z axis to others.
 CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant,
                       const OtherErrors& others = {}, const Disturbance& force = no_force());

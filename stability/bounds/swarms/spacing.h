@@ -1,4 +1,4 @@
-/// @file Keep-out shape below other vehicles from a downwash field and bounds on the tracking error.
+/// @file Keep-out region below other vehicles, from a downwash field and bounds on the tracking error.
 #pragma once
 
 #include <vector>
@@ -7,8 +7,8 @@
 
 namespace swarmcert::stability {
 
-/// |f_z| of one vehicle above at height gap dz and horizontal distance r: amplitude (0.3/dz)^decay
-/// exp(-r^2/(2 s^2)), s = spread + slope dz; below `nearest_m` it counts as there.
+/// |f_z| due to one vehicle above at height gap dz and horizontal distance r: amplitude (0.3/dz)^decay exp(-r^2/(2
+/// s^2)), s = spread + slope dz; a gap below `nearest_m` is replaced by it.
 struct DownwashField {
   double amplitude_N = 0;
   double decay = 0;
@@ -19,7 +19,7 @@ struct DownwashField {
   double spread_at_m(double height_gap_m) const;
 };
 
-/// What else matters of the lower vehicle.
+/// Further parameters of the lower vehicle.
 struct SpacingVehicle {
   double effort_gain = 0;  ///< N/N
   double largest_thrust_N = 0;
@@ -29,7 +29,7 @@ struct SpacingVehicle {
 
 struct SpacingQuestion {
   double max_error_m = 0;
-  int neighbours = 1;  ///< above at once; their forces add at most linearly
+  int neighbours = 1;  ///< number above at once; their forces add at most linearly
   double guard = 1;    ///< factor on every predicted force, from comparison with flights
   double from_m = 0.15, to_m = 0.8;
   int steps = 27;
@@ -40,25 +40,26 @@ struct SpacingRow {
   double height_gap_m = 0;  ///< of the references
   double peak_force_N = 0;
   double stay_error_m = 0;       ///< bound for any motion below, however slow
-  bool may_stay = false;         ///< stay_error_m <= max_error_m and thrust suffices
-  double keep_out_radius_m = 0;  ///< horizontal distance beyond which any motion is fine; 0 where may_stay
-  /// Least relative horizontal speed of one straight pass at constant gap through the keep-out radius; infinite where
-  /// no speed suffices, 0 where may_stay.
+  bool may_stay = false;         ///< stay_error_m <= max_error_m and the thrust suffices
+  double keep_out_radius_m = 0;  ///< horizontal distance beyond which any motion is allowed; 0 if may_stay
+  /// Smallest relative horizontal speed of a straight pass at constant gap through the keep-out radius; infinite if no
+  /// speed suffices, 0 if may_stay.
   double least_speed_m_s = 0;
-  double thrust_margin_N = 0;  ///< under the peak force; negative: the thrust does not suffice at any speed
+  double thrust_margin_N = 0;  ///< at the peak force; negative: the thrust does not suffice at any speed
 };
 
 struct Spacing {
   std::vector<SpacingRow> shape;
-  double least_gap_to_stay_m = 0;  ///< of the rows; infinite where none
+  double least_gap_to_stay_m = 0;  ///< among the rows; infinite if none allows it
   double least_gap_to_cross_m = 0;
 };
 
-/// The lower vehicle, without feed-forward. Its own error may bring it nearer, so forces are taken at the gap less
-/// max_error_m. Staying: amplitude bound. Passing at speed v: J = peak s sqrt(2 pi)/v and the smaller of the impulse
-/// and the pulse bound. Bounds hold in the class of the field and the loop; `guard` carries what flights say about it.
-/// Where the integrator's clamp may act, the bounds that hold with it are used.
-/// @param loop of the z axis, with Ki as it acts. @param gains of its force channel, over all times.
+/// Computes the spacing for the lower vehicle, without feedforward. Its own error may bring it closer, so forces are
+/// evaluated at the gap less max_error_m. Staying: amplitude bound. Passing at speed v: J = peak s sqrt(2 pi)/v and the
+/// smaller of the impulse and the pulse bound. The bounds hold for forces within the field; `guard` accounts for its
+/// deviation from flights. If the integrator's clamp may act, the bounds that hold with a clamp are used.
+/// @param loop of the z axis, with the effective Ki.
+/// @param gains of its force channel, over all times.
 Spacing spacing(const AxisLoop& loop, const GainNorms& gains, const SpacingVehicle& vehicle,
                 const DownwashField& field, const SpacingQuestion& question);
 

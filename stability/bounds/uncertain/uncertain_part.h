@@ -1,4 +1,4 @@
-/// @file A part of a box of uncertain plants, and what bounds the gains over it. Not for users.
+/// @file Bounds on the gains over a subbox of uncertain plants. Not for users.
 #pragma once
 
 #include <algorithm>
@@ -15,11 +15,11 @@ constexpr std::array<double GainNorms::*, 4> kUncertainGains = {&GainNorms::rate
                                                                 &GainNorms::edge, &GainNorms::impulse};
 using FourGains = std::array<double, 4>;  ///< rate, amplitude, edge, impulse
 
-/// Thrust per mass relative to what the controller was told, lag, delay.
+/// Thrust-to-mass ratio relative to the one the controller assumes, lag, delay.
 using PlantPoint = std::array<double, 3>;
 
-/// On which edge of mass and thrust: there a gain per force is that per 1 kg over the mass, or times ratio over the
-/// force that the ratio is of.
+/// The edge of the mass-thrust range. On kLeastMass a gain per force is that for 1 kg divided by the mass; on
+/// kLeastThrust it is that for 1 kg times the ratio, divided by the force that the ratio refers to.
 enum class PlantEdge { kLeastMass, kLeastThrust };
 
 struct PlantBox {
@@ -32,27 +32,27 @@ struct PlantBox {
   double lag_change() const { return width(1) / 2; }
   double delay_change() const { return width(2) / 2; }
   double largest_ratio() const { return to[0] / centre()[0]; }
-  /// Bound of |Delta_L|_1, see uncertain_continuous.cpp.
+  /// Bound on |Delta_L|_1, see uncertain_continuous.cpp.
   double lag_ratio() const {
     const double change = lag_change();
     return change == 0 ? 0 : from[1] > 0 ? 2 * change / from[1] : kInfinity;
   }
 };
 
-/// Over a box: every gain per 1 kg (times the ratio on the edge of least thrust) is at most `first_order`, and at most
-/// (its largest at the corners + sum of absolute + between_samples)/(1 - sum of relative); `absolute` times the ratio
-/// on that edge, too.
+/// Bounds over a box: every gain per 1 kg (times the ratio on the edge of least thrust) is at most `first_order`, and
+/// at most (its largest at the corners + sum of absolute + between_samples)/(1 - sum of relative). On the edge of least
+/// thrust, `absolute` is multiplied by the ratio as well.
 struct PlantBends {
   FourGains first_order = {kInfinity, kInfinity, kInfinity, kInfinity};
   std::array<PlantPoint, 4> absolute{}, relative{};  ///< by gain, then dimension
-  FourGains between_samples{};                       ///< what errors may exceed those at the samples by
-  PlantPoint share{};  ///< what each dimension adds to the loop gain around the centre
+  FourGains between_samples{};                       ///< excess of the errors between samples
+  PlantPoint share{};  ///< contribution of each dimension to the loop gain around the centre
 };
 
-/// x times a gain that may be infinite: nothing where x is nothing.
+/// x times a gain that may be infinite; 0 if x is 0.
 inline double times(double x, double gain) { return x == 0 ? 0 : x * gain; }
 
-/// For 1 kg, the gains as they act there.
+/// Returns the loop for 1 kg, with the effective gains at p.
 inline AxisLoop plant_at(AxisLoop loop, const PlantPoint& p) {
   loop.mass_kg = 1;
   loop.Kp *= p[0];
@@ -63,7 +63,7 @@ inline AxisLoop plant_at(AxisLoop loop, const PlantPoint& p) {
   return loop;
 }
 
-/// @param fixed the loop without what varies.
+/// @param fixed the loop without the varying parameters.
 PlantBends bends_over(const AxisLoop& fixed, Channel channel, const PlantBox& box);
 PlantBends bends_over(const SampledLoop& fixed, Channel channel, const PlantBox& box);
 
