@@ -13,7 +13,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// For integrators that normalise.
+/// For integrators that normalise the quaternions themselves.
 struct NoPull {};
 
 #define SWARMCERT_KERNEL_FILE "stability/bodies/rigid_bodies_kernel.inc"
@@ -27,7 +27,7 @@ struct Kernel {
   decltype(&narrow::normalise) normalise;
 };
 
-/// The widest that this processor has and `size` vehicles fill.
+/// Selects the widest kernel that this processor supports and `size` vehicles fill.
 Kernel choose([[maybe_unused]] int size) {
 #define SWARMCERT_KERNEL(width)                                     \
   {                                                                 \

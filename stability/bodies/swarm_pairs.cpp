@@ -15,7 +15,7 @@ void LaneSums::clear(int count) {
 void LaneSums::add(int to, int from) {
   std::vector<Part>& parts = parts_[static_cast<std::size_t>(to / kRowLength)];
   const int line = from / kRowLength, lane = to % kRowLength;
-  // A part that has something for this lane comes before.
+  // If the last part already has a term for this lane, a new part is needed.
   if (parts.empty() || parts.back().line != line || parts.back().mask[lane] != 0) {
     parts.emplace_back();
     parts.back().line = line;

@@ -8,9 +8,9 @@
 namespace swarmcert::stability {
 namespace {
 
-/// argmin over u of sum_i weight_i |u_i - h_i| + sum_i |u_(i+1) - u_i|, u = 0 before and after: exact. The derivative
-/// of the optimal cost up to i is a nondecreasing staircase, kept as its jumps; a term of the total variation clips it
-/// to [-1, 1] (Johnson, J. Comput. Graph. Stat. 22, 2013).
+/// Computes argmin over u of sum_i weight_i |u_i - h_i| + sum_i |u_(i+1) - u_i|, u = 0 before and after, exactly. The
+/// derivative of the optimal cost up to i is a nondecreasing staircase, stored as its jumps; each total-variation term
+/// clips it to [-1, 1] (Johnson, J. Comput. Graph. Stat. 22, 2013).
 class TotalVariation {
  public:
   TotalVariation(const std::vector<double>& h, const std::vector<double>& weight) : h_(h), weight_(weight) {}
@@ -29,7 +29,7 @@ class TotalVariation {
       high[i] = clip_high();
     }
     std::vector<double> u(h_.size());
-    double next = 0;  // after the last
+    double next = 0;  // after the last value
     for (std::size_t i = h_.size(); i-- > 0;) {
       next = std::min(std::max(next, low[i]), high[i]);
       u[i] = next;
@@ -38,7 +38,7 @@ class TotalVariation {
   }
 
  private:
-  /// Raises the derivative to at least -1: removes steps from below; the place where it passes -1.
+  /// Clips the derivative to at least -1 by removing steps from below; returns the position where it crosses -1.
   double clip_low() {
     double at = steps_.empty() ? 0 : steps_.begin()->first;
     while (lowest_ < -1 && !steps_.empty()) {
@@ -76,12 +76,12 @@ class TotalVariation {
 
   const std::vector<double>& h_;
   const std::vector<double>& weight_;
-  std::multimap<double, double> steps_;  ///< where the derivative jumps, and by how much
+  std::multimap<double, double> steps_;  ///< jumps of the derivative by position
   double lowest_ = -1;
   double highest_ = 1;
 };
 
-/// Nodes that u may bend at: all at first, then so many that about twenty thousand remain.
+/// Nodes at which u may bend: all of the first ones, then a subset such that about twenty thousand remain.
 std::vector<std::size_t> bends(std::size_t count) {
   constexpr std::size_t kDense = 12'000;
   constexpr std::size_t kSparse = 8'000;
@@ -118,12 +118,12 @@ double split_bound(const StepResponse& h, double amplitude, double rate) {
     for (std::size_t i = nodes[k] + 1; i <= nodes[k + 1]; ++i) {
       const double share = span > 0 ? (time[i] - time[nodes[k]]) / span : 1;
       const double here = std::abs(h.value[i] - (u[k] + share * (u[k + 1] - u[k])));
-      // |h - u| lies below the chord of its end values, which is convex, plus what h bends away from its own chord.
+      // |h - u| is at most the chord of its end values, as it is convex, plus the deviation of h from its own chord.
       rest += (before + here) / 2 * h.length[i - 1] + h.bend[i - 1];
       before = here;
     }
   }
-  // After the last node u is zero, or it is h, which then only falls.
+  // After the last node u is either zero, or equal to h, which then only decreases.
   double end = amplitude * std::abs(u.back()) + rate * h.after;
   if (h.falls_after) {
     end = std::min(end, amplitude * (std::abs(u.back() - h.value.back()) + std::abs(h.value.back())));

@@ -10,9 +10,9 @@
 namespace swarmcert::stability {
 namespace {
 
-/// The response after `after_s` has passed, as a response of its own: same poles, new initial values.
+/// Returns the response from `after_s` on as a separate response: same poles, new initial values.
 TransferFunction later(const TransferFunction& y, double after_s) {
-  // y, y', ..., y^(n-1) at after_s: from the responses of s^k Y without their jumps, whose samples obey the same
+  // y, y', ..., y^(n-1) at after_s are obtained from the responses of s^k Y without their jumps, which obey the same
   // equation; one sample each.
   const Polynomial total = sum(y.denominator, y.feedback);
   const std::size_t n = total.size() - 1;
@@ -21,7 +21,7 @@ TransferFunction later(const TransferFunction& y, double after_s) {
   std::vector<double> state;
   for (std::size_t k = 0; k < n; ++k) {
     state.push_back(sampled_response({numerator, total, {}, 0}, after_s, 2)[1]);
-    // s Y - y(0+): shift, then take the leading term out.
+    // s Y - y(0+): shift the coefficients, then subtract the leading term.
     const double y0 = numerator[n - 1] / total[n];
     Polynomial shifted(n, 0.0);
     for (std::size_t i = 0; i < n; ++i) shifted[i] = (i > 0 ? numerator[i - 1] : 0) - y0 * total[i];
@@ -41,7 +41,7 @@ class FadingResponse {
     const ResponseNorms norms = response_norms(y);
     peak_ = norms.max_abs();
     if (y.delay_s == 0) return;
-    // With a delay: samples, and what can happen between two of them.
+    // With a delay: samples, plus the largest change between two of them.
     constexpr int kCount = 200'001;
     double slowest = kInfinity;
     for (const std::complex<double>& pole : poles(sum(y.denominator, y.feedback))) {
@@ -57,7 +57,8 @@ class FadingResponse {
   double operator()(double after_s) const {
     if (after_s <= 0) return peak_;
     if (y_.delay_s == 0) return response_norms(later(y_, after_s)).max_abs();
-    // After the samples' end the response is below what the last of them shows: at least their slack is counted.
+    // Beyond the last sample the response is below the bound at that sample, which includes at least the slack
+    // between_.
     const auto i = std::min(static_cast<std::size_t>(after_s / step_s_), later_.size() - 1);
     return std::min(peak_, later_[i] + between_);
   }
@@ -101,11 +102,12 @@ double amplitude_and_rate_bound(const AxisLoop& loop, Channel channel, double am
   for (const std::complex<double>& pole : poles(sum(h.denominator, h.feedback))) {
     slowest = std::min(slowest, -pole.real());
   }
-  const double horizon_s = 25 / slowest;  // e^-25 of the rate bound is left out of the split, and added below
+  const double horizon_s = 25 / slowest;  // the split omits e^-25 of the rate bound, which is added below
   const double step_s = horizon_s / (nodes - 1);
   const auto cells = static_cast<std::size_t>(nodes) - 1;
-  // h bends away from its chord by at most step^2/8 sup |h''|, over all cells step^2/12 |h''|_1 to leading order,
-  // doubled for the variation of h'' inside a cell; shared out evenly, as only the sum counts. After the horizon u = 0.
+  // The deviation of h from its chord is at most step^2/8 sup |h''| on a cell, or step^2/12 |h''|_1 over all cells to
+  // leading order; doubled to allow for the variation of h'' within a cell. It is distributed evenly, as only the sum
+  // matters. Beyond the horizon u = 0.
   const double between = step_s * step_s / 6 * response_norms(h).curvature_integral;
   const StepResponse step = {sampled_response(h, step_s, nodes), std::vector<double>(cells, step_s),
                              std::vector<double>(cells, between / static_cast<double>(cells)),
@@ -119,7 +121,7 @@ double felt_passes(const Disturbance& disturbance, const std::function<double(do
     const double after_s = std::max(0.0, k * disturbance.pass_period_s - disturbance.pass_length_s);
     const double gain = gain_after(after_s);
     const int left = disturbance.passes - k;
-    if (gain * left < 1e-9 * total) return total + gain * left;  // gains fall: no later one is larger
+    if (gain * left < 1e-9 * total) return total + gain * left;  // gains decrease: no later one is larger
     total += gain;
   }
   return total;
@@ -137,7 +139,7 @@ DisturbanceBounds bounds_by_class(const GainNorms& gains, const Disturbance& dis
   if (std::isfinite(bounds.by_impulse) && disturbance.passes > 1)
     bounds.by_impulse = disturbance.impulse_N_s * felt.impulses();
   if (disturbance.variation_per_pass) {
-    // The force also rises once from zero; without an integrator every edge is felt for ever.
+    // The force also rises once from zero; without an integrator the effect of every edge is permanent.
     bounds.by_edges = kInfinity;
     if (std::isfinite(disturbance.variation_N) && has_integrator)
       bounds.by_edges =

@@ -14,21 +14,22 @@
 namespace swarmcert::stability {
 namespace {
 
-/// What is absent costs nothing, also where the gain is infinite.
+/// Returns |size| gain(); 0 if size is 0, even if the gain is infinite.
 template <class Gain>
 double part(double size, const Gain& gain) {
   return size == 0 ? 0 : std::abs(size) * gain();
 }
 
-/// The largest response of `output`, a row over the state after control, to e = 1 or e' = 1 before the control at t =
-/// 0.
+/// The largest response of `output`, a row over the state after the control, to e = 1 or e' = 1 before the control at t
+/// = 0.
 struct InitialResponse {
   double to_position = 0, to_velocity = 0;
 };
 
 InitialResponse initial_response(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output) {
   InitialResponse most;
-  // The kernel of a force, start + slope u, is the response to a jump of the speed and to one of the position.
+  // The kernel of a force, start + slope u, gives the responses to a jump of the velocity (start) and of the position
+  // (slope).
   const auto take = [&most](double start, double slope) {
     most.to_position = std::max(most.to_position, std::abs(slope));
     most.to_velocity = std::max(most.to_velocity, std::abs(start));
@@ -39,7 +40,7 @@ InitialResponse initial_response(const SampledAdjoint& adjoint, const Eigen::Row
   return most;
 }
 
-/// The error n of the velocity as one of the command, -m Kd n.
+/// Converts an error n of the velocity to an error of the command, -m Kd n.
 Disturbance as_command(const EstimateError& n, double scale_N) {
   Disturbance error;
   error.rate_N_s = scale_N * n.rate;
@@ -54,7 +55,7 @@ Disturbance as_command(const EstimateError& n, double scale_N) {
   return error;
 }
 
-/// @param norms gains from the error of an estimate. @param by_command bounds from a class of errors of the command.
+/// @param norms gains from the error of an estimate. @param by_command bounds for a class of errors of the command.
 template <class Norms, class ByCommand>
 double velocity_part(const AxisLoop& plant, const EstimateError& n, const Norms& norms,
                      const ByCommand& by_command) {
@@ -65,7 +66,7 @@ double velocity_part(const AxisLoop& plant, const EstimateError& n, const Norms&
   if (!has_more || plant.Kd == 0) return by_amplitude;
   const DisturbanceBounds bounds = by_command(as_command(n, plant.mass_kg * plant.Kd));
   const double constant_m = part(n.constant, [&] { return gains.edge; });
-  // Edges per window count the first rise by the amplitude, which contains the constant part.
+  // The edge bound for windows includes the first rise by the amplitude, which contains the constant part.
   const double at_first_m = n.window_s > 0 ? 0 : constant_m;
   return std::min({by_amplitude, bounds.by_impulse, bounds.by_edges + at_first_m,
                    std::min(bounds.by_rate, bounds.by_both) + constant_m});
@@ -89,8 +90,8 @@ double position_part(const AnyLoop& loop, const EstimateError& n, const Norms& n
   return least;
 }
 
-/// The least of what the classes of an error of an estimate demand; windows count by their amplitude.
-/// @param amplitude, edge, impulse gains, evaluated where needed.
+/// Returns the smallest demand that the classes of an estimate's error give; for windows only the amplitude counts.
+/// @param amplitude, edge, impulse gains, evaluated on demand.
 template <class Amplitude, class Edge, class Impulse>
 double least_demand(const EstimateError& n, const Amplitude& amplitude, const Edge& edge,
                     const Impulse& impulse) {
@@ -102,8 +103,8 @@ double least_demand(const EstimateError& n, const Amplitude& amplitude, const Ed
   return least;
 }
 
-/// What the reference demands of the integrator: its jumps as starts away from it, its jerk as a force of age times
-/// jerk.
+/// Returns the demand of the reference on the integrator: its jumps act like initial errors, its jerk like a force of
+/// age times jerk.
 /// @param position, speed, force demands per m, per m/s and per m/s^2.
 template <class AnyLoop, class Position, class Speed, class Force>
 double reference_demand(const AnyLoop& loop, const ReferenceMotion& reference, const Position& position,
@@ -125,7 +126,7 @@ double OtherErrors::step_N() const { return std::max(std::abs(bias_N), start_N);
 ErrorParts error_parts(const AxisLoop& loop, double step_gain, const OtherErrors& errors) {
   ErrorParts parts;
   parts.bias_m = part(errors.step_N(), [&] { return step_gain; });
-  // A jump of the speed is an impulse of force.
+  // A jump of the velocity is an impulse of force.
   parts.initial_m = part(errors.position_m, [&] { return initial_position_gain(loop); }) +
                     part(errors.velocity_m_s,
                          [&] { return loop.mass_kg * continuous_norms(loop, Channel::kForce).impulse; });
@@ -166,7 +167,7 @@ ErrorParts error_parts(const SampledLoop& loop, double step_gain, const OtherErr
 }
 
 double drift_gain(const AxisLoop& loop) {
-  // (s^2 L + s Kd exp(-Ts)) / D of n'; with a delay as in initial_position_gain().
+  // (s^2 L + s Kd exp(-Ts)) / D acting on n'; with a delay as in initial_position_gain().
   const double together = response_norms(initial_position_transfer(loop)).integral_abs;
   if (loop.delay_s == 0 || !std::isfinite(together)) return together;
   const ResponseNorms command = response_norms(impulse_transfer(loop, Channel::kCommand));
@@ -184,15 +185,15 @@ double drift_gain(const SampledLoop& loop) {
   const double step_s = loop.period_s / kPhases;
   double most = 0;
   for (int i = 0; i <= kPhases; ++i) most = std::max(most, rate_at(i * step_s));
-  // Between two phases e leaves its chord as in initial_position_gain(); n is that of the last sample throughout.
+  // Between two phases e deviates from its chord as in initial_position_gain(); n stays that of the last sample.
   const Eigen::Index command = adjoint.model().command_index();
   const Eigen::RowVectorXd commanded = Eigen::RowVectorXd::Unit(adjoint.model().size() + 1, command);
   return most + step_s * step_s / 8 * input_gains(adjoint, commanded, input).rate;
 }
 
 double initial_position_gain(const AxisLoop& loop) {
-  // e = (s^2 L + s Kd exp(-Ts)) / D. With a delay the second term comes later by T, in which it moves by at most T
-  // times its steepest slope.
+  // e = (s^2 L + s Kd exp(-Ts)) / D. With a delay the second term comes later by T, during which it changes by at most
+  // T times its steepest slope.
   const double together = response_norms(initial_position_transfer(loop)).max_abs();
   if (loop.delay_s == 0 || !std::isfinite(together)) return std::max(1.0, together);
   const ResponseNorms command = response_norms(impulse_transfer(loop, Channel::kCommand));
@@ -208,8 +209,8 @@ double initial_position_gain(const SampledLoop& loop) {
   for (int i = 0; i < kPhases; ++i) {
     most = std::max(most, initial_response(adjoint, adjoint.output_after_control(i * step_s)).to_position);
   }
-  // Between two phases e leaves its chord by at most an eighth of the step's square times |e''|, and |e''| is at most
-  // the largest command: the lags average it.
+  // Between two phases e deviates from its chord by at most an eighth of the squared step times |e''|, and |e''| is at
+  // most the largest command, since the lags average the commands.
   const Eigen::Index command = adjoint.model().command_index();
   const Eigen::RowVectorXd commanded = Eigen::RowVectorXd::Unit(adjoint.model().size() + 1, command);
   return most + step_s * step_s / 8 * initial_response(adjoint, commanded).to_position;
@@ -244,7 +245,7 @@ double integral_demand_m_s(const AxisLoop& loop, Channel channel, const OtherErr
 
 namespace {
 
-/// The largest value that all of them can give an output, a row over the state after control.
+/// Returns the largest value of an output, a row over the state after the control, due to all errors together.
 double largest_output(const SampledLoop& loop, const SampledAdjoint& adjoint,
                       const Eigen::RowVectorXd& output, Channel channel, const OtherErrors& errors) {
   const auto step = [&] {
@@ -260,7 +261,7 @@ double largest_output(const SampledLoop& loop, const SampledAdjoint& adjoint,
   };
   const auto speed = [&] { return initial_response(adjoint, output).to_velocity; };
   const auto position = [&] { return initial_response(adjoint, output).to_position; };
-  // A jump of the speed between two samples has moved the set point by at most a period of it when the law sees it.
+  // A jump of the velocity between two samples has moved the setpoint by at most a period of it when the law sees it.
   const auto speed_step = [&] { return speed() + loop.period_s * position(); };
   const auto force = [&] {
     KernelSum sum;
@@ -307,16 +308,17 @@ double effort_N(const SampledLoop& loop, const OtherErrors& errors) {
 
 double effort_N(const AxisLoop& loop, const OtherErrors& errors) {
   const double effort = effort_gain(loop);
-  // An error of an estimate is commanded at once, and the loop answers it as it answers a force.
+  // An error of an estimate enters the command immediately, and the loop responds to it as to a force.
   const auto velocity_error = [&] { return loop.Kd * (1 + effort); };
   const auto position_error = [&] {
-    // Of the integral's share, -Ki s^2 L / D exp(-Ts): m h' of the force channel, differentiated.
+    // For the integral's share, -Ki s^2 L / D exp(-Ts): m h' of the force channel, differentiated.
     const ResponseNorms force = response_norms(impulse_transfer(loop, Channel::kForce));
     return loop.Kp * (1 + effort) + (loop.Ki > 0 ? loop.Ki * loop.mass_kg * force.variation : 0);
   };
   const auto speed = [&] { return loop.mass_kg * effort_impulse_gain(loop); };
   const auto position = [&] {
-    // m (Kp e + Kd e' + Ki int e), each at its largest; e' is the response to an error of the estimated position.
+    // m (Kp e + Kd e' + Ki int e), with each term at its maximum; e' is the response to an error of the estimated
+    // position.
     double most =
         loop.Kp * initial_position_gain(loop) + loop.Kd * continuous_norms(loop, Estimate::kPosition).impulse;
     if (loop.Ki > 0) {

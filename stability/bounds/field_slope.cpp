@@ -16,7 +16,7 @@ constexpr int kMostBoxes = 6000;
 
 enum Slope { kTotal, kAcross, kAlong };
 
-/// 1/x of an interval of positive numbers that may be unbounded.
+/// Returns 1/x of an interval of positive numbers, which may be unbounded.
 Interval inverse(Interval x) { return {std::isinf(x.upper) ? 0 : down(1 / x.upper), up(1 / x.lower)}; }
 
 Interval square(Interval x) { return abs(x) * abs(x); }
@@ -35,7 +35,8 @@ class Slopes {
   }
 
   Interval operator()(Interval q, Interval z) const {
-    // Beyond kFarSpreads, q^k exp(-q^2/2) with k <= 2 falls, so its values lie between 0 and that at the near end.
+    // Beyond kFarSpreads, q^k exp(-q^2/2) with k <= 2 decreases, so its values lie between 0 and the value at the near
+    // end.
     const bool is_far = std::isinf(q.upper);
     const Interval nearest(q.lower);
     const Interval exponent = square(is_far ? nearest : q) / Interval(2);
@@ -76,7 +77,7 @@ class Slopes {
 
  private:
   Interval power(double z) const { return pow(Interval(kWakeReference_m) / Interval(z), field_.decay); }
-  /// x^2 (3 - 2x), which rises on [0, 1].
+  /// x^2 (3 - 2x), which increases on [0, 1].
   static Interval smooth_step(Interval x) {
     const auto at = [](double t) {
       return Interval(t) * Interval(t) * (Interval(3) - Interval(2) * Interval(t));
@@ -133,7 +134,7 @@ FieldSlopes field_slopes(const WakeField& field, double least_gap_m, double larg
   FieldSlopes result;
   if (largest_gap_m <= kWakeTouching_m) return result;
   const double from_m = std::max(least_gap_m, kWakeTouching_m);
-  // Straight below, the field rises up to kWakeNearest_m and falls beyond.
+  // Directly below, the field increases up to kWakeNearest_m and decreases beyond.
   const double strongest_m = std::max(from_m, kWakeNearest_m);
   result.value = pow(Interval(kWakeReference_m) / Interval(strongest_m), field.decay);
   if (largest_gap_m < kWakeNearest_m && field.fades) {

@@ -12,13 +12,13 @@ namespace {
 
 constexpr int kPhases = 5;
 
-/// The kernel of one output at one phase, in cells that follow one another backwards in time; per unit of force.
+/// The kernel of one output at one phase, in consecutive cells backwards in time; per unit of force.
 struct Kernel {
   std::vector<double> length;
   std::vector<double> peak;       ///< largest |kernel| on a cell
-  std::vector<double> step;       ///< its integral up to a cell's start, and to the end of the last
+  std::vector<double> step;       ///< its integral up to a cell's start, and to the end of the last cell
   std::vector<double> step_peak;  ///< largest |integral| on a cell
-  std::vector<double> bend;       ///< of the integral away from its chord, over a cell
+  std::vector<double> bend;       ///< deviation of the integral from its chord, integrated over a cell
   double area = 0;                ///< int |kernel|
   double ratio = 0;            ///< of every cell after the last to the one before; 0: nothing is left there
   double step_area_after = 0;  ///< int |integral| after the last cell
@@ -40,7 +40,7 @@ struct Kernel {
     bend.push_back(std::abs(slope) * cell * cell * cell / 12);
   }
 
-  /// A last cell, of which every later one is `ratio` times the one before; the integral falls in proportion.
+  /// Adds a last cell, of which every later one is `ratio` times the one before; the integral decreases in proportion.
   void add_series(double start, double slope, double cell, double shrinks) {
     ratio = shrinks;
     const double before = area;
@@ -64,7 +64,7 @@ Kernel kernel_of(const SampledAdjoint& adjoint, Channel channel, double phase_s,
           kernel.add_series(start / mass_kg, slope / mass_kg, length, ratio);
         });
   } else {
-    // An error of one period is a force held for the period: int |eps| dt counts it as it counts a force.
+    // An error of one period is a force held for that period, with the same int |eps| dt.
     const double period_s = adjoint.period_s();
     const double scale = 1 / (mass_kg * period_s);
     adjoint.command_kernel(
@@ -74,7 +74,7 @@ Kernel kernel_of(const SampledAdjoint& adjoint, Channel channel, double phase_s,
   return kernel;
 }
 
-/// Largest of `values` (one per cell) at `after_s` or earlier in time; falls with after_s.
+/// Largest of `values` (one per cell) at `after_s` or earlier in time; decreases with after_s.
 class FadingKernel {
  public:
   FadingKernel(const Kernel& kernel, std::vector<double> values)
@@ -95,7 +95,7 @@ class FadingKernel {
   double ratio_, period_s_;
 };
 
-/// The worst of `bound` over the phases at which the error may be looked at.
+/// Returns the worst of `bound` over the phases at which the error may be evaluated.
 template <class Bound>
 double worst_phase(const SampledLoop& loop, const Bound& bound) {
   double worst = 0;
@@ -125,7 +125,7 @@ DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, c
   const double E = disturbance.amplitude_N, d = disturbance.rate_N_s;
   if (std::isfinite(bounds.by_rate) && std::isfinite(bounds.by_amplitude) && E > 0 && d > 0) {
     const double both = worst_phase(loop, [&](double phase_s) {
-      // In the command, rate acts once per period on the sum up to there; the trapezoids count as much.
+      // For the command, the rate acts once per period on the sum up to that time; the trapezoids have the same sum.
       const Kernel kernel = kernel_of(adjoint, channel, phase_s, mass_kg);
       return split_bound({kernel.step, kernel.length, kernel.bend,
                           kernel.step_area_after + 1e-12 * gains.rate, kernel.step_area_after > 0},

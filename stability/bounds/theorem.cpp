@@ -9,7 +9,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// How far gains, printed with few digits, may be from a (Lambda, K) form: relative, in Ki.
+/// Tolerance for gains, printed with few digits, to be accepted as a (Lambda, K) form: relative, in Ki.
 constexpr double kFormTolerance = 1e-9;
 constexpr char kAxes[] = "xyz";
 
@@ -19,7 +19,7 @@ std::string number(double value) {
   return text;
 }
 
-/// Smallest eigenvalue, where `m` is symmetric; else objects.
+/// Returns the smallest eigenvalue if `m` is symmetric and positive definite; else adds an objection.
 std::optional<double> positive_definite(const Matrix3& m, const char* name,
                                         std::vector<std::string>& why_not) {
   const Eigen::Matrix3d matrix = to_eigen(m);
@@ -37,7 +37,8 @@ std::optional<double> positive_definite(const Matrix3& m, const char* name,
   return std::nullopt;
 }
 
-/// Diagonal (Lambda, K) of PID gains whose Ki acts as `share` of what is written; else objects.
+/// Returns the diagonal (Lambda, K) of PID gains whose effective Ki is `share` of the written one; else adds an
+/// objection.
 std::optional<CompositeGains> composite_of(const PidGains& pid, double share, double mass_kg,
                                            std::vector<std::string>& why_not) {
   CompositeGains result{};
@@ -140,7 +141,7 @@ double kernel(double l, double a, double t) {
     return (std::exp(-a * t) - std::exp(-l * t) + difference * t * std::exp(-l * t)) /
            (difference * difference);
   }
-  // t^2 e^(-lt) (e^(-x) - 1 + x)/x^2 by its series, which does not cancel.
+  // t^2 e^(-lt) (e^(-x) - 1 + x)/x^2 by its series, which avoids cancellation.
   double term = 0.5;
   double total = term;
   for (int n = 3; n < 25; ++n) {
@@ -158,7 +159,7 @@ double kernel_integral(double l, double a, double t) {
            (1 - decayed_l) / (l * difference * difference) +
            (1 - decayed_l * (1 + l * t)) / (l * l * difference);
   }
-  // Nearly equal rates: the closed form cancels; Simpson's rule on a smooth kernel does not.
+  // For nearly equal rates the closed form cancels; Simpson's rule on the smooth kernel does not.
   constexpr int kCells = 6000;
   const double horizon = std::min(t, 60 / std::min(l, a));
   const double step = horizon / kCells;

@@ -15,7 +15,7 @@ GainNorms largest(const UncertainNorms& norms) {
   return {norms.rate.upper, norms.amplitude.upper, norms.edge.upper, norms.impulse.upper};
 }
 
-/// The interval of the ratio; mass, lags and delay as they are.
+/// The interval of the ratio, with mass, lags and delay as given.
 UncertainPlant ratio_only(const AxisLoop& loop, double ratio_error) {
   return {{loop.mass_kg, loop.mass_kg},
           {down(1 - ratio_error), up(1 + ratio_error)},
@@ -35,7 +35,7 @@ ThrustRatioGains gains_of(const AnyLoop& loop, const AxisLoop& plant, Channel ch
   return gains;
 }
 
-/// sup |int e dt| per newton of force.
+/// Returns sup |int e dt| per newton of force.
 double integral_gain(const AxisLoop& loop) { return continuous_norms(loop, Channel::kForce).rate; }
 double integral_gain(const SampledLoop& loop) {
   const SampledAdjoint adjoint(loop, SampledAdjoint::Output::kIntegral);
@@ -109,7 +109,7 @@ DisturbanceBounds disturbance_bounds(const ThrustRatioGains& gains, const Distur
   DisturbanceBounds bounds;
   bounds.by_rate = times_known(gains.of_class.rate, disturbance.rate_N_s);
   bounds.by_amplitude = times_known(gains.of_class.amplitude, disturbance.amplitude_N);
-  // Windows that follow one another for ever bring edges without end.
+  // An endless sequence of windows has unlimited total variation.
   if (!disturbance.variation_per_pass)
     bounds.by_edges = times_known(gains.of_class.edge, disturbance.variation_N);
   bounds.by_impulse = times_known(gains.of_class.impulse * disturbance.passes, disturbance.impulse_N_s);

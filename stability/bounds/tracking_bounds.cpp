@@ -100,7 +100,7 @@ double integrator_limit(const Gains& gains, int axis) {
   return gains.integrator_limit_m_s[static_cast<std::size_t>(axis)];
 }
 
-/// @param of_class what disturbance_bounds() says of the class alone.
+/// @param of_class disturbance_bounds() of the class alone.
 template <class AnyLoop>
 AxisBounds bounds_of(const AnyLoop& loop, DisturbanceBounds of_class, Channel channel, const GainNorms& gains,
                      const Disturbance& known, const OtherErrors& other, bool classes_contain_bias,
@@ -118,12 +118,12 @@ AxisBounds bounds_of(const AnyLoop& loop, DisturbanceBounds of_class, Channel ch
   row.bounds.add(row.parts.total_m());
   OtherErrors beside_amplitude = other;
   if (classes_contain_bias) {
-    // A rate says nothing about the force at the start; an amplitude or an impulse that was measured contains it.
+    // A rate says nothing about the force at the start; a measured amplitude or impulse contains it.
     ErrorParts parts = row.parts;
     parts.bias_m = 0;
     row.bounds.by_amplitude = of_class.by_amplitude + parts.total_m();
     row.bounds.by_impulse = of_class.by_impulse + parts.total_m();
-    // Edges per pass count the first rise by the amplitude.
+    // The edge bound per pass includes the first rise by the amplitude.
     if (known.variation_per_pass) row.bounds.by_edges = of_class.by_edges + parts.total_m();
     beside_amplitude.bias_N = beside_amplitude.start_N = 0;
   }
@@ -132,7 +132,7 @@ AxisBounds bounds_of(const AnyLoop& loop, DisturbanceBounds of_class, Channel ch
   return row;
 }
 
-/// Gains of an axis, copied where its loop is that of the axis before.
+/// Computes the gains of an axis, or copies them if its loop equals that of the previous axis.
 void add_gains(const AxisLoop& loop, const std::optional<SampledLoop>& sampled, int axis, bool is_as_before,
                TrackingReport& report) {
   const auto copy = [axis](auto& rows) {
@@ -167,7 +167,7 @@ void add_gains(const AxisLoop& loop, const std::optional<SampledLoop>& sampled, 
   }
 }
 
-/// What the disturbance can ask of the integrator of the loop that flies.
+/// Returns the demand of the disturbance on the integrator of the loop as flown.
 double integrator_need(const Gains& gains, const Plant& plant, const AxisLoop& loop,
                        const std::optional<SampledLoop>& sampled, int axis, const DisturbanceSource& source,
                        const InitialError& initial) {
@@ -180,7 +180,7 @@ double integrator_need(const Gains& gains, const Plant& plant, const AxisLoop& l
   return clamp.demand_m_s;
 }
 
-/// Bounds of an axis, one row per row of gains, copied where all is as on the axis before.
+/// Computes the bounds of an axis, one row per row of gains, or copies them if nothing differs from the previous axis.
 void add_bounds(const Gains& gains, const Plant& plant, const AxisLoop& loop,
                 const std::optional<SampledLoop>& sampled, int axis, bool is_as_before,
                 const DisturbanceSource& source, const InitialError& initial, TrackingReport& report) {
@@ -211,19 +211,19 @@ void add_bounds(const Gains& gains, const Plant& plant, const AxisLoop& loop,
   }
 }
 
-/// Neither more thrust than the rotors give nor less than nothing, about hover.
+/// Sets the margin, about hover, to the maximum thrust and to zero thrust.
 void add_thrust_margin(const Plant& plant, const AxisLoop& loop, const DisturbanceSource& source,
                        const InitialError& initial, TrackingReport& report) {
   const double amplitude_N = source.axis[2].amplitude_N;
   if (!(plant.largest_thrust_N > 0) || !std::isfinite(amplitude_N)) return;
-  if (source.has_moving_reference()) return;  // what is fed forward takes thrust too, and is not bounded
+  if (source.has_moving_reference()) return;  // the feedforward also uses thrust, and is not bounded
   OtherErrors other = source.other(2, initial, plant);
   if (source.classes_contain_bias) other.bias_N = other.start_N = 0;
   const double weight_N = plant.mass_kg * kGravity_m_s2;
   const double effort = report.facts.back().effort_gain;
   const double ratio = other.thrust_ratio_error;
   double needed_N = effort * amplitude_N + effort_N(loop, with_hover_share(other));
-  // d u is one more force on the loop of the model; see thrust_ratio.h.
+  // d u is an additional force on the loop of the model; see thrust_ratio.h.
   if (ratio > 0) needed_N = ratio * effort < 1 ? needed_N / (1 - ratio * effort) : kInfinity;
   if (!std::isfinite(needed_N)) return;
   report.thrust_margin_N =
@@ -231,7 +231,7 @@ void add_thrust_margin(const Plant& plant, const AxisLoop& loop, const Disturban
       needed_N;
 }
 
-/// Largest sum of the absolute values of a row, an upper bound of the 2-norm of a symmetric matrix.
+/// Largest row sum of absolute values, an upper bound on the 2-norm of a symmetric matrix.
 double row_sum_norm(const Matrix3& m) {
   const auto sum = [](const controller::Vector3<double>& row) {
     return std::abs(row.x) + std::abs(row.y) + std::abs(row.z);
@@ -247,7 +247,7 @@ Transient transient_of(const Theorem& theorem, const Plant& plant, const Disturb
   transient.mass_kg = plant.mass_kg;
   transient.error_m = initial.position_m;
   transient.speed_m_s = initial.velocity_m_s;
-  // With the integral at zero, m e'' = -(m 2 Lambda + K) e' - (m Lambda^2 + 2 K Lambda) e - K Lambda^2 0 - eps(0), so
+  // With zero integral, m e'' = -(m 2 Lambda + K) e' - (m Lambda^2 + 2 K Lambda) e - K Lambda^2 0 - eps(0), so
   // m s' = -K (e' + 2 Lambda e) - eps(0).
   const double bias_N = std::hypot(source.bias_N[0], source.bias_N[1], source.bias_N[2]);
   transient.s_dot_m_s2 =
@@ -260,7 +260,7 @@ Transient transient_of(const Theorem& theorem, const Plant& plant, const Disturb
   return transient;
 }
 
-/// Hypotheses beyond the gains, then vector gain, transient and ball.
+/// Checks the hypotheses that do not concern the gains; then adds vector gain, transient and ball.
 void add_theorem(const Plant& plant, const DisturbanceSource& source, const InitialError& initial,
                  TrackingReport& report) {
   Theorem& theorem = report.theorem;

@@ -11,16 +11,16 @@
 namespace swarmcert::stability {
 namespace {
 
-/// Product of nonnegative numbers, rounded up, in which a factor of 0 wins over one that is not known.
+/// Product of nonnegative numbers, rounded up; 0 if one factor is 0, even if the other is infinite.
 double times_up(double a, double b) { return a == 0 || b == 0 ? 0 : up(a * b); }
 double plus(double a, double b) { return up(a + b); }
 
-/// 1/x from above.
+/// Returns 1/x, rounded up.
 double one_over(double x) { return x > 0 ? up(1 / x) : kInfinity; }
 
 void set_all(double* three, double value) { std::fill(three, three + 3, value); }
 
-/// Values of a spec by name.
+/// Parameters of a spec by name.
 class Values {
  public:
   Values(const EffectSpec& spec, const EffectInfo& info) : info_(info), values_(effect_values(info, spec)) {}
@@ -39,12 +39,12 @@ class Values {
   EffectValues values_;
 };
 
-/// N^(1/p) from above: how much stronger N equal forces composed with the norm p are than one.
+/// Upper bound on N^(1/p), the ratio of N equal forces composed with the p-norm to one of them.
 double composed(int neighbours, double p) {
   return neighbours <= 1 ? 1 : pow(Interval(neighbours), 1 / p).upper * (1 + 1e-15 * neighbours);
 }
 
-/// A field of position: its amplitude along z, its rate by slope and relative speed.
+/// Bounds a field of the position: the amplitude along z, and the rate from slope and relative speed.
 void field_bounds(const WakeField& field, double strength_N, double composition, const MotionSet& motion,
                   EffectBounds& result) {
   const FieldSlopes slopes = field_slopes(field, motion.least_gap_m, motion.largest_gap_m);
@@ -54,7 +54,8 @@ void field_bounds(const WakeField& field, double strength_N, double composition,
   result.slope_along_N_m = times_up(strength_N, slopes.along.upper);
   double rate = times_up(factor, times_up(slopes.total.upper, motion.relative_speed_m_s));
   if (field.convection_s_m > 0) {
-    // The wake's centre moves with the neighbour: r - k dz v_j changes by k |dz'| |v_j| + k dz |v_j'| more.
+    // The wake's centre moves with the neighbour: the rate of r - k dz v_j has the additional terms k |dz'| |v_j| + k
+    // dz |v_j'|.
     const double drift = plus(times_up(motion.relative_speed_m_s, motion.speed_m_s),
                               times_up(motion.largest_gap_m, motion.acceleration_m_s2));
     rate = plus(rate, times_up(times_up(factor, slopes.across.upper), times_up(field.convection_s_m, drift)));
@@ -72,7 +73,7 @@ void field_bounds(const WakeField& field, double strength_N, double composition,
   }
 }
 
-/// How neighbours move that are seen where they were at their velocity `delay_s` ago: dp - d v_j has the rate dv - d
+/// Motion of neighbours that are seen `delay_s` ago, extrapolated with their velocity: dp - d v_j has the rate dv - d
 /// v_j'.
 MotionSet seen_late(MotionSet motion, double delay_s) {
   const double moved_m = times_up(delay_s, motion.speed_m_s);
@@ -85,7 +86,7 @@ MotionSet seen_late(MotionSet motion, double delay_s) {
 void bound_wake(const std::string& name, const Values& value, const MotionSet& motion, EffectBounds& result) {
   WakeField field;
   if (name == "wake_delay") {
-    // Of rotors of equal area: the mass enters as for downwash with the exponent 1/2.
+    // For rotors of equal area: the mass enters as in downwash with the exponent 1/2.
     field.decay = value("decay_exponent");
     field.spread_m = value("spread_m");
     field.spread_slope = value("spread_slope");
@@ -133,7 +134,7 @@ void bound_drag(const std::string& name, const Values& value, const Model& model
     rate = times_up(k, plus(times_up(1.4142135623730952, times_up(m.thrust_rate_N_s, m.speed_m_s)),
                             times_up(m.largest_thrust_N, m.acceleration_m_s2)));
   } else {
-    // inflow: (T (b'v) b)', each of b'v, b and T by its own rate
+    // inflow: (T (b'v) b)', with the rates of b'v, b and T bounded separately
     const double k = value("loss_s_m");
     amplitude = times_up(k, times_up(m.largest_thrust_N, m.speed_m_s));
     rate = times_up(k, plus(times_up(2 * m.thrust_rate_N_s, m.speed_m_s),
@@ -148,8 +149,8 @@ void bound_drag(const std::string& name, const Values& value, const Model& model
   }
 }
 
-/// Rotors push: |sum (rotor_k - 1) f_k| <= max |rotor_k - 1| sum f_k. How fast thrust moves from rotor to rotor nobody
-/// declares.
+/// Rotors only push: |sum (rotor_k - 1) f_k| <= max |rotor_k - 1| sum f_k. The rate at which thrust moves between
+/// rotors is not declared, so it has no bound.
 void bound_rotors(const Values& value, const MotionSet& m, EffectBounds& result) {
   double most = 0;
   for (const char* const rotor : {"rotor_1", "rotor_2", "rotor_3", "rotor_4"})
@@ -160,8 +161,8 @@ void bound_rotors(const Values& value, const MotionSet& m, EffectBounds& result)
 }
 
 void bound_surface(const std::string& name, const Values& value, const MotionSet& m, EffectBounds& result) {
-  // f = a g T b3 with g = exp(-distance/b): |f'| <= a g (|(T b3)'| + T |v_z|/b). The clamps at the surfaces only
-  // reduce.
+  // f = a g T b3 with g = exp(-distance/b): |f'| <= a g (|(T b3)'| + T |v_z|/b). The clamps at the surfaces can only
+  // reduce this.
   const double decay_m = value("decay_m");
   const double nearest_m = name == "ground"
                                ? down(std::max(m.least_height_m, 0.0) - value("height_reference_m"))
@@ -175,7 +176,7 @@ void bound_surface(const std::string& name, const Values& value, const MotionSet
   if (std::isinf(result.rate_N_s[2])) result.unbounded = "needs --own-speed and --thrust-rate";
 }
 
-/// f = T R w with w fixed in the body: how fast the body yaws nobody declares.
+/// f = T R w with w fixed in the body: the yaw rate is not declared, so the rate has no bound.
 void bound_tilt(const Values& value, const MotionSet& m, EffectBounds& result) {
   const double x = value("tilt_x_rad"), y = value("tilt_y_rad");
   const double tilt = up(std::sqrt(plus(up(x * x), up(y * y))));
@@ -184,7 +185,7 @@ void bound_tilt(const Values& value, const MotionSet& m, EffectBounds& result) {
   if (tilt > 0) result.unbounded = "turns with the body, whose yaw rate is not bounded";
 }
 
-/// The pull is a convex function's gradient with the slope k at most, and grows with the distance.
+/// The pull is the gradient of a convex function, with slope at most k, and grows with the distance.
 void bound_tether(const Values& value, const MotionSet& m, EffectBounds& result) {
   const double k = value("stiffness_N_m");
   set_all(result.amplitude_N, k == 0 ? 0 : kInfinity);
@@ -192,13 +193,14 @@ void bound_tether(const Values& value, const MotionSet& m, EffectBounds& result)
   if (k > 0) result.unbounded = "the pull grows with the distance from the anchor, which nothing here limits";
 }
 
-/// f = g T b3 with a factor g of the motion: |(T b3)'| bounds |T'| and T |b3'|, and every effect its own |g'|.
+/// f = g T b3 with a factor g that depends on the motion: |(T b3)'| bounds |T'| and T |b3'|; |g'| is bounded per
+/// effect.
 void bound_thrust_factor(const std::string& name, const Values& value, const Model& model, const MotionSet& m,
                          EffectBounds& result) {
   constexpr double kRootOfTwoOverE = 0.8577638849607070;  // largest |2 u exp(-u^2)|, rounded up
   constexpr double kOneOverRootOfE = 0.6065306597126335;  // largest |u exp(-u^2 / 2)|, rounded up
   const double T = m.largest_thrust_N, rate = m.thrust_rate_N_s;
-  // T (b3'v)' and T |v - b3 (b3'v)|' alike
+  // Bounds both T (b3'v)' and T |v - b3 (b3'v)|'.
   const double turning = plus(times_up(T, m.acceleration_m_s2), times_up(rate, m.speed_m_s));
   double amplitude = 0, change = 0;
   if (name == "voltage_sag") {
@@ -227,7 +229,7 @@ void bound_thrust_factor(const std::string& name, const Values& value, const Mod
   if (std::isinf(change)) result.unbounded = "needs --own-speed, --own-accel and --thrust-rate";
 }
 
-/// Functions of the place: their slope times the speed, and a thrust's own rate.
+/// Bounds functions of the position: their slope times the speed, plus the rate of the thrust.
 void bound_place(const std::string& name, const Values& value, const MotionSet& m, EffectBounds& result) {
   if (name == "wall") {
     // f = p g T n with n fixed and g = exp(-d/b)
@@ -238,7 +240,7 @@ void bound_place(const std::string& name, const Values& value, const MotionSet& 
       result.rate_N_s[i] = times_up(push, plus(m.thrust_rate_N_s, along));
     }
   } else {
-    // The logistic function has the slope 1 / (4 d), exp(-u^2 / 2) the slope exp(-1/2).
+    // The logistic function has a slope of at most 1 / (4 d), exp(-u^2 / 2) one of at most exp(-1/2).
     constexpr double kOneOverRootOfE = 0.6065306597126335;
     const char* const forces[] = {"shear_x_N", "shear_y_N", "thermal_N"};
     for (int i = 0; i < 3; ++i) {
@@ -253,7 +255,7 @@ void bound_place(const std::string& name, const Values& value, const MotionSet& 
     result.unbounded = name == "wall" ? "needs --own-speed and --thrust-rate" : "needs --own-speed";
 }
 
-/// Bounded, but for the step itself.
+/// Bounds the force except for the step itself.
 void bound_step(const Values& value, EffectBounds& result) {
   const double before = value("mass_before_kg"), after = value("mass_after_kg");
   if (before == after) {

@@ -1,4 +1,4 @@
-/// @file An accelerometer that reads too much or too little.
+/// @file Scale error of the accelerometer.
 #include "stability/effects/effect_entry.h"
 #include "stability/effects/memory_effect.h"
 
@@ -12,8 +12,8 @@ class AccelerometerScaleStream : public ColumnStream {
   }
 };
 
-/// The log's specific force is `scale` times the true one. As a force, to first order in what is no thrust: (scale - 1)
-/// T b3. In simulation it acts on the log alone.
+/// The log's specific force is `scale` times the true one. Expressed as a force, to first order in the non-thrust
+/// forces: (scale - 1) T b3. In simulation it affects only the log.
 class AccelerometerScale : public MemoryEffect {
  public:
   AccelerometerScale()
@@ -31,7 +31,7 @@ class AccelerometerScale : public MemoryEffect {
     return std::make_unique<AccelerometerScaleStream>();
   }
   void add_to(SignalPath&, const double*, const double*) const override {
-    // Nothing between command and force: FlightRecorder scales what it logs.
+    // Does not affect the path from command to force: FlightRecorder scales what it logs.
   }
 };
 

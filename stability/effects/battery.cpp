@@ -1,4 +1,4 @@
-/// @file Thrust that the map misses as the battery drains: f = k (V - 4.2 V) T b3.
+/// @file Thrust error of the map as the battery drains: f = k (V - 4.2 V) T b3.
 #include <cmath>
 
 #include "stability/effects/effect.h"

@@ -1,4 +1,4 @@
-/// @file Ceiling effect: f = a T exp(-(h - z) / b) b3, or with a tail that falls like a power.
+/// @file Ceiling effect: f = a T exp(-(h - z) / b) b3, or with a power-law tail.
 #include <algorithm>
 #include <cmath>
 
@@ -34,7 +34,8 @@ class Ceiling : public Effect {
     return now.p_W_m.z() > shape[kCeilingHeight] - 2 * shape[kCeilingDecay];
   }
   std::vector<std::vector<double>> grid(const FlightRange& range) const override {
-    // Flights cannot tell the ceiling's height from the amplitude: the height is taken just above the highest point.
+    // Flights cannot distinguish the ceiling's height from the amplitude, so the height is set just above the highest
+    // point.
     std::vector<std::vector<double>> thetas;
     for (const double tail : info().shape[kCeilingTail].grid) {
       for (const double decay_m : info().shape[kCeilingDecay].grid)

@@ -1,12 +1,12 @@
-/// @file A centre of mass beside the centre of the rotors.
+/// @file Offset of the centre of mass from the centre of the rotors.
 #include "stability/effects/effect.h"
 #include "stability/effects/effect_entry.h"
 
 namespace swarmcert::stability {
 namespace {
 
-/// tau = -c x T e3 = T (-c_y, c_x, 0) in the body, c the place of the centre of mass from the centre of the rotors. A
-/// height of the centre of mass adds nothing to the torque of forces along e3.
+/// tau = -c x T e3 = T (-c_y, c_x, 0) in the body frame, c the position of the centre of mass relative to the centre of
+/// the rotors. The vertical component of c does not affect the torque of forces along e3.
 class ComOffset : public Effect {
  public:
   ComOffset()

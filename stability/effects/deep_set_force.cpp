@@ -16,7 +16,7 @@ const std::vector<std::string> kInputs = {"dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_
   throw files::InputError({network.path, "", field, value, what, hint});
 }
 
-/// Which component of (dp, dv) each input of phi is.
+/// Returns the component of (dp, dv) that each input of phi is.
 std::vector<int> read_order(const files::Network& network, int inputs) {
   std::vector<int> order;
   for (int i = 0; i < inputs; ++i) {
@@ -44,7 +44,7 @@ DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
     refuse(network_, "", "", "is one plain network, and a force among vehicles needs a deep set",
            "name a network.toml with phi and rho");
   }
-  // Evaluators own arrays that the views below point to: no reallocation after this.
+  // The views below point into arrays owned by the evaluators, so the vector must not reallocate after this.
   evaluators_.reserve(network_.phi.size() + 1);
   std::vector<std::string> names;
   for (const auto& [name, weights] : network_.phi) {

@@ -35,7 +35,7 @@ class Delay : public MemoryEffect {
              "delay",
              "vertical commands with content at 2 .. 8 Hz, where a lag attenuates and a delay does not",
              {{"gain", "1 is the delay itself; a fit far from 1 is no delay", 1, 0, 1.3}},
-             // Less than a record is a matter of when the log reads the command.
+             // A delay of less than one record cannot be separated from the time at which the log reads the command.
              {{"delay_s", "d", 0.01, 0, 0.5, {0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06}}},
              true}) {}
   std::unique_ptr<ColumnStream> stream(const double* shape) const override {

@@ -19,7 +19,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// Pairs side by side, as columns() meets them, in blocks of kRowLength.
+/// Pairs side by side in blocks of kRowLength, in the order of columns().
 struct PairRows {
   const double *dx_m, *dy_m, *dz_m;  ///< the neighbour's position minus the vehicle's, in W
   const double *vx_m_s, *vy_m_s;     ///< the neighbour's velocity
@@ -39,7 +39,7 @@ struct WakeKernel {
   decltype(&narrow::logarithm_of_one) logarithm_of_one;
 };
 
-/// The narrowest that takes `count` at once, or the widest of this processor.
+/// Selects the narrowest kernel that takes `count` at once, or else the widest of this processor.
 const WakeKernel& kernel_for([[maybe_unused]] int count) {
 #if defined(SWARMCERT_WIDE_KERNELS)
   static constexpr WakeKernel kAvx2 = {avx2::kBlock, avx2::strengths, avx2::swarm_forces, avx2::compose_row,
@@ -47,7 +47,7 @@ const WakeKernel& kernel_for([[maybe_unused]] int count) {
   static constexpr WakeKernel kAvx512 = {avx512::kBlock, avx512::strengths, avx512::swarm_forces,
                                          avx512::compose_row, avx512::logarithm_of_one};
   if (count > avx2::kBlock && widest_kernels() == KernelWidth::kAvx512) return kAvx512;
-  // Also for fewer: the narrow one has no fused operations of its own.
+  // Also for smaller counts: the narrow kernel has no native fused operations.
   if (widest_kernels() >= KernelWidth::kAvx2) return kAvx2;
 #endif
   static constexpr WakeKernel kNarrow = {narrow::kBlock, narrow::strengths, narrow::swarm_forces,
@@ -85,7 +85,7 @@ void Downwash::columns_along(const Instant* instants, int count, const double* s
   drifted_columns(instants, count, shape, {}, columns);
 }
 
-// The same arithmetic as for a whole swarm, for the pairs of several instants at a time.
+// Uses the same arithmetic as for a whole swarm, for the pairs of several instants at a time.
 void Downwash::drifted_columns(const Instant* instants, int count, const double* shape,
                                const WakeDrift& drift, Wrench* columns) const {
   constexpr int kMost = 4 * kRowLength;
@@ -109,7 +109,7 @@ void Downwash::drifted_columns(const Instant* instants, int count, const double*
       for (int j = 0; j < now.num_neighbours; ++j) {
         const Neighbour& neighbour = now.neighbours[j];
         const Eigen::Vector3d dp_W_m = drift.dp_W_m(neighbour);
-        if (dp_W_m.z() <= kWakeTouching_m) continue;  // does nothing, as in the kernel
+        if (dp_W_m.z() <= kWakeTouching_m) continue;  // no effect, as in the kernel
         if (pairs == kMost) add_up();
         if (neighbour.mass_kg != last_mass_kg) {
           last_mass_kg = neighbour.mass_kg;
@@ -126,7 +126,7 @@ void Downwash::drifted_columns(const Instant* instants, int count, const double*
     kernel.compose_row(sums, round_up(some, kernel.block), 1 / shape[kNorm], composed);
     for (int i = 0; i < some; ++i) {
       columns[first + i] = {};
-      if (sums[i] != 0) columns[first + i].force_W_N.z() = -composed[i];  // also where it is no number
+      if (sums[i] != 0) columns[first + i].force_W_N.z() = -composed[i];  // also if NaN
     }
   }
 }
@@ -158,8 +158,8 @@ bool Downwash::in_support(const Instant& now, const double* shape) const {
 }
 
 std::vector<std::vector<double>> Downwash::grid(const FlightRange&) const {
-  // Spreads that go together, from narrow and opening to wide and parallel; the product of all grids would be
-  // thousands of columns. What is left out here is for refinement to find.
+  // Combinations of spreads, from narrow and opening to wide and parallel; the product of all grids would have
+  // thousands of columns. Refinement covers the remaining combinations.
   const double spreads[][2] = {
       {0.0259477, 0.08181592}, {0.035, 0.1}, {0.04, 0.055}, {0.052, 0.028}, {0.06, 0.06}};
   std::vector<std::vector<double>> thetas;
@@ -179,7 +179,7 @@ std::vector<double> Downwash::bends_m() const { return {kWakeTouching_m, kWakeNe
 double Downwash::reach_m(double dz_m, const double* shape) const {
   if (dz_m <= kWakeTouching_m) return 0;
   if (shape[kTail] > 0) return std::numeric_limits<double>::infinity();
-  // The wake lags by k dz |v|; 20 m/s is faster than anything this project flies.
+  // The wake lags by k dz |v|; 20 m/s exceeds all flight speeds considered in this project.
   const double lag_m = shape[kConvection] * dz_m * 20;
   return kWakeReachInSpreads * (shape[kSpread0] + shape[kSpreadSlope] * std::max(dz_m, kWakeNearest_m)) +
          lag_m;

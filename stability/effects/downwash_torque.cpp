@@ -1,9 +1,11 @@
-/// @file Torque of the downwash of the vehicles above, which is not the same at each rotor.
+/// @file Torque due to the downwash of the vehicles above, which differs between the rotors.
 ///
-/// The wake of downwash.h, taken at each of the four rotors r_k (body, X arrangement) instead of the centre:
+/// The wake of downwash.h is evaluated at each of the four rotors r_k (body frame, X arrangement) instead of the
+/// centre:
 ///   tau_B = sum_k r_k x R' (0, 0, f_k),   f_k = -(A / 4) (sum_j g_j(p_j - p - R r_k)^p)^(1/p).
-/// With an arm a that is short against the wake, a level vehicle has tau = a^2 / 2 (d f_z / dy, -d f_z / dx, 0): the
-/// slope of downwash's vertical force over its own position. That force is downwash's; models that want both name both.
+/// If the arm a is short compared with the wake, a level vehicle has tau = a^2 / 2 (d f_z / dy, -d f_z / dx, 0): the
+/// slope of the vertical downwash force over the vehicle's own position. The force itself belongs to the effect
+/// `downwash`; a model that wants both must name both.
 #include <Eigen/Geometry>
 #include <vector>
 
@@ -14,7 +16,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// Place of the arm in theta; what comes before is Downwash's.
+/// Index of the arm in theta; the indices before it are those of Downwash.
 constexpr int kArm = 7;
 
 class DownwashTorque : public Effect {
@@ -56,7 +58,7 @@ class DownwashTorque : public Effect {
 
  private:
   Downwash downwash_;
-  mutable std::vector<Neighbour> at_rotor_;  ///< scratch: the neighbours as one rotor meets them
+  mutable std::vector<Neighbour> at_rotor_;  ///< scratch: the neighbours relative to one rotor
 };
 
 }  // namespace

@@ -5,7 +5,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// The columns of an effect without memory.
+/// The columns of an effect without a memory.
 class InstantStream : public ColumnStream {
  public:
   InstantStream(const Effect& effect, std::vector<double> shape)

@@ -25,7 +25,8 @@ const std::vector<std::string> kVariables = {
     "climb", "vbx", "vby", "dx", "dy", "dz", "dvx",  "dvy",     "dvz",     "mj"};
 constexpr std::size_t kFirstOfNeighbour = 25;  // "dx"
 
-/// Where `formula` is "rest + name" with nothing that binds weaker than a sum, how long the rest is; else 0.
+/// If `formula` has the form "rest + name", with the sum as its outermost operation, returns the length of the rest;
+/// else 0.
 std::size_t length_before(const std::string& name, const std::string& formula) {
   const std::size_t plus = formula.rfind('+');
   if (plus == std::string::npos || plus == 0) return 0;
@@ -42,8 +43,9 @@ std::size_t length_before(const std::string& name, const std::string& formula) {
   return depth == 0 ? plus : 0;
 }
 
-/// Shape parameters without a grid vary as well: by a factor of two to both sides where they are one or two, in small
-/// steps from where they are where they are more. Those at zero have no scale, those with equal bounds are held.
+/// Shape parameters without a grid vary as well: by a factor of two to both sides if there are at most two of them, in
+/// small steps around their values if there are more. Parameters at zero have no scale and stay fixed, as do those with
+/// equal bounds.
 void add_grids(std::vector<Parameter>& shape) {
   const auto varies = [](const Parameter& p) { return p.grid.empty() && p.value != 0 && p.lower < p.upper; };
   const bool few = std::count_if(shape.begin(), shape.end(), varies) <= 2;
@@ -96,14 +98,14 @@ EffectInfo describe(const EffectSpec& spec) {
 struct ExpressionEffect::Formulas {
   std::string path, name;
   bool per_neighbour = false;
-  bool turns = false;  ///< some formula takes the heading or the tilt, which are slow to compute
+  bool turns = false;  ///< some formula uses the heading or the tilt, which are slow to compute
   std::vector<double> variables = std::vector<double>(kVariables.size());
   std::vector<double> linear, shape;
   struct Formula {
     std::size_t target;
     mu::Parser parser;
-    /// A coefficient that is added to what `parser` gives, which does not contain it and is linear in the others: with
-    /// nothing but this one, the formula need not be evaluated.
+    /// A coefficient that is added to the result of `parser`. The parser's formula does not contain it and is linear in
+    /// the others, so if all others are zero the formula need not be evaluated.
     const double* constant = nullptr;
   };
   std::vector<Formula> formulas;
@@ -119,7 +121,7 @@ struct ExpressionEffect::Formulas {
     std::vector<std::string> known = kVariables;
     if (!per_neighbour) known.resize(kFirstOfNeighbour);
     try {
-      for (std::size_t i = 0; i < known.size(); ++i) {  // each that is defined takes time
+      for (std::size_t i = 0; i < known.size(); ++i) {  // each defined variable costs time
         if (text.find(known[i]) != std::string::npos) formula.parser.DefineVar(known[i], &variables[i]);
       }
       for (std::size_t k = 0; k < info.linear.size(); ++k) {
@@ -195,7 +197,8 @@ struct ExpressionEffect::Formulas {
     to[6] = neighbour.mass_kg;
   }
 
-  /// Adds what the formulas give now to `sum`. @param only the one coefficient that is not zero, where there is one
+  /// Adds the current values of the formulas to `sum`.
+  /// @param only the only nonzero coefficient, if there is exactly one.
   void add_value(const Instant& now, const double* only, Wrench* sum) {
     for (Formula& formula : formulas) {
       const double* const constant = formula.constant;
@@ -227,7 +230,7 @@ struct ExpressionEffect::Formulas {
     return sum;
   }
 
-  /// Linearity at random instants: f(0) = 0 and f(c) = sum_k c_k f(e_k).
+  /// Tests linearity at random instants: f(0) = 0 and f(c) = sum_k c_k f(e_k).
   void check_linear(const EffectInfo& info) {
     std::mt19937_64 random(1);
     const auto uniform = [&random](double lower, double upper) {

@@ -1,4 +1,4 @@
-/// @file An inertial unit that is tilted against the rotors: the log's attitude is that of the unit.
+/// @file An inertial unit that is tilted relative to the rotors: the log's attitude is that of the unit.
 #include "stability/effects/effect.h"
 #include "stability/effects/effect_entry.h"
 
@@ -6,7 +6,7 @@ namespace swarmcert::stability {
 namespace {
 
 /// f = T R (t x e3), t = (tilt_x, tilt_y, 0): the rotors push along R (e3 + t x e3), to first order in t. In simulation
-/// the attitude is that of the unit, so that it is the rotors that are tilted.
+/// the attitude is that of the inertial unit, so it is the rotors that are tilted.
 class ImuTilt : public Effect {
  public:
   ImuTilt()

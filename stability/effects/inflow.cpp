@@ -1,4 +1,4 @@
-/// @file Thrust lost to the flow that a climb sends through the rotors: f = -k T (b3' v) b3.
+/// @file Thrust lost to the axial inflow of the rotors in climb: f = -k T (b3' v) b3.
 #include <cmath>
 
 #include "stability/effects/effect.h"

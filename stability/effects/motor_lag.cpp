@@ -1,4 +1,4 @@
-/// @file Rotors follow their command like a first-order lag: tau x' = u - x, f = c (x - T) b3 and torque likewise.
+/// @file Rotors follow their command with a first-order lag: tau x' = u - x, f = c (x - T) b3 and torque likewise.
 #include <cmath>
 
 #include "stability/effects/effect_entry.h"
@@ -41,7 +41,7 @@ class MotorLagStream : public ColumnStream {
  private:
   const double tau_s_;
   bool has_past_ = false;
-  double time_s_ = 0, step_s_ = 0, decay_ = 1, in_steps_ = 0;  ///< the last: tau
+  double time_s_ = 0, step_s_ = 0, decay_ = 1, in_steps_ = 0;  ///< the last: tau in steps
   Vector4 input_, lagged_;
 };
 

@@ -10,15 +10,15 @@ enum PendulumShape { kLength, kDamping };
 
 const Eigen::Vector3d kFall_m_s2(0, 0, -kGravity_m_s2);
 
-/// Place and velocity of the load relative to the vehicle.
+/// Position and velocity of the load relative to the vehicle.
 struct Swing {
   Eigen::Vector3d r_m, dr_m_s;
 };
 
 Swing hanging_still(const double* shape) { return {{0, 0, -shape[kLength]}, Eigen::Vector3d::Zero()}; }
 
-/// What the string must take of the load's acceleration relative to the vehicle, along its direction, for its length
-/// to stay: `free_m_s2` is that acceleration without a string. Errors of the length die away at kKeep_1_s.
+/// Returns the part of the load's relative acceleration that the string must cancel, along its direction, to keep its
+/// length; `free_m_s2` is the acceleration without a string. Length errors decay at the rate kKeep_1_s.
 double taken_m_s2(const Swing& swing, const double* shape, const Eigen::Vector3d& free_m_s2) {
   constexpr double kKeep_1_s = 20;
   const double off_m2 = 0.5 * (swing.r_m.squaredNorm() - shape[kLength] * shape[kLength]);
@@ -27,7 +27,7 @@ double taken_m_s2(const Swing& swing, const double* shape, const Eigen::Vector3d
   return (swing.r_m.dot(free_m_s2) + kept) / swing.r_m.norm();
 }
 
-/// d swing / dt.
+/// Returns d swing / dt.
 Swing swing_rate(const Swing& swing, const double* shape, const Eigen::Vector3d& free_m_s2) {
   return {swing.dr_m_s, free_m_s2 - taken_m_s2(swing, shape, free_m_s2) * swing.r_m.normalized()};
 }
@@ -36,7 +36,7 @@ Swing moved(const Swing& from, double step_s, const Swing& rate) {
   return {from.r_m + step_s * rate.r_m, from.dr_m_s + step_s * rate.dr_m_s};
 }
 
-/// A Runge-Kutta step under a constant acceleration of the vehicle.
+/// Takes a Runge-Kutta step with constant acceleration of the vehicle.
 Swing after(const Swing& from, double step_s, const double* shape, const Eigen::Vector3d& acceleration_m_s2) {
   const auto rate = [&](const Swing& at) {
     return swing_rate(at, shape, kFall_m_s2 - acceleration_m_s2 - shape[kDamping] * at.dr_m_s);
@@ -74,7 +74,7 @@ class PendulumStream : public ColumnStream {
  private:
   static constexpr double kSmoothing_s = 0.04, kLongestStep_s = 0.02;
 
-  /// Over a velocity that is linear between the records.
+  /// Advances the swing, with a velocity that is linear between the records.
   void follow(const Eigen::Vector3d& acceleration_m_s2, double h_s) {
     const int steps = std::max(1, static_cast<int>(std::ceil(h_s / kLongestStep_s)));
     for (int k = 0; k < steps; ++k) swing_ = after(swing_, h_s / steps, shape_, acceleration_m_s2);
@@ -86,7 +86,7 @@ class PendulumStream : public ColumnStream {
   bool has_past_ = false;
   double time_s_ = 0;
   Eigen::Vector3d velocity_m_s_ = Eigen::Vector3d::Zero();
-  Eigen::Vector3d behind_m_s_ = Eigen::Vector3d::Zero();  ///< how far the smoothed velocity is behind
+  Eigen::Vector3d behind_m_s_ = Eigen::Vector3d::Zero();  ///< lag of the smoothed velocity
   Swing swing_;
 };
 
@@ -127,8 +127,8 @@ Wrench Pendulum::act(const Instant& now, const Eigen::Vector3d& others_W_N, cons
   Swing swing = hanging_still(shape);
   swing.r_m += Eigen::Vector3d(states[0], states[1], states[2]);
   swing.dr_m_s = {states[3], states[4], states[5]};
-  // Vehicle and load pull at each other through friction and string: accelerations as if there were no string, then
-  // the tension that keeps its length.
+  // Vehicle and load pull at each other through friction and string: first the accelerations without a string, then the
+  // tension that keeps its length.
   const Eigen::Vector3d friction_N = load_kg * shape[kDamping] * swing.dr_m_s;
   const Eigen::Vector3d free_m_s2 =
       kFall_m_s2 - shape[kDamping] * swing.dr_m_s - (others_W_N + friction_N) / now.mass_kg;

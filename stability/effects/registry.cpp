@@ -14,7 +14,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// A new effect is one line here. A deque keeps references when users add theirs.
+/// Each effect is one line. A deque keeps references valid when users add effects.
 std::deque<EffectEntry>& entries() {
   static std::deque<EffectEntry> all = {effects::motor_lag(),
                                         effects::delay(),

@@ -1,4 +1,4 @@
-/// @file Rotors that give another thrust than the model's map says: a weak, worn or cut propeller, a tired motor.
+/// @file Rotors whose thrust differs from the model's map: a weak, worn or cut propeller, a tired motor.
 #include <cmath>
 
 #include "stability/effects/effect.h"
@@ -11,8 +11,8 @@ constexpr int kNumFactors = 4;
 /// Signs of a rotor's thrust in the torques about body x, y and z.
 constexpr double kTorqueSigns[kNumFactors][3] = {{-1, -1, -1}, {-1, 1, 1}, {1, 1, -1}, {1, -1, 1}};
 
-/// f = sum_k (rotor_k - 1) f_k b3 with the torques of these forces, where f_k is what the model knows of rotor k: front
-/// right, back right, back left, front left. The coefficient `model` takes the model's own thrust out, so that the
+/// f = sum_k (rotor_k - 1) f_k b3 with the torques of these forces, where f_k is the modelled thrust of rotor k: front
+/// right, back right, back left, front left. The coefficient `model` subtracts the model's own thrust, so that the
 /// others are factors.
 class RotorThrust : public Effect {
  public:

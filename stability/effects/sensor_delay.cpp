@@ -1,4 +1,4 @@
-/// @file Delayed accelerometer: the log shows c ((T b3)(t - d) - T b3) as a force.
+/// @file Delayed accelerometer: appears in the log as the force c ((T b3)(t - d) - T b3).
 #include "stability/effects/effect_entry.h"
 #include "stability/effects/memory_effect.h"
 #include "stability/effects/signal_path.h"

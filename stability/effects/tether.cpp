@@ -1,4 +1,4 @@
-/// @file A line to an anchor that pulls once it is taut.
+/// @file A line to an anchor, which pulls when taut.
 #include <algorithm>
 
 #include "stability/effects/effect.h"

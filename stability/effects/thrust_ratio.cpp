@@ -1,4 +1,4 @@
-/// @file Thrust scale, mass or payload: f = e T b3. Only the ratio of thrust to mass enters a flight's kinematics.
+/// @file Thrust scale, mass or payload: f = e T b3. A flight's kinematics depend only on the ratio of thrust to mass.
 #include "stability/effects/effect.h"
 #include "stability/effects/effect_entry.h"
 

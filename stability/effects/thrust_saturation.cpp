@@ -1,4 +1,4 @@
-/// @file Thrust that is missing above a knee, because propellers saturate: f = -c max(0, T - k W) b3.
+/// @file Thrust deficit above a knee, because propellers saturate: f = -c max(0, T - k W) b3.
 #include <algorithm>
 
 #include "stability/effects/effect.h"

@@ -1,4 +1,4 @@
-/// @file A constant torque: centre of gravity beside the thrust axis, unequal rotors.
+/// @file A constant torque: centre of gravity off the thrust axis, unequal rotors.
 #include "stability/effects/effect.h"
 #include "stability/effects/effect_entry.h"
 

@@ -1,4 +1,4 @@
-/// @file Lift on a vehicle that flies over others, caused by the inflow of their rotors.
+/// @file Lift on a vehicle that flies above others, caused by the inflow of their rotors.
 #include <algorithm>
 #include <cmath>
 
@@ -11,7 +11,7 @@ namespace {
 
 enum UpperLiftShape { kSpread, kExponent };
 
-/// Lift per newton of amplitude from one neighbour; 0 for those that are not below.
+/// Lift per newton of amplitude from one neighbour; 0 unless it is below.
 double lift(const Neighbour& neighbour, const double* shape) {
   const double below_m = -neighbour.dp_W_m.z();
   const double r2 = neighbour.dp_W_m.head<2>().squaredNorm();

@@ -1,4 +1,4 @@
-/// @file Thrust that is missing because the supply gives way under load: f = -s T ((T / W)^(3/2) - 1) b3.
+/// @file Thrust deficit because the supply voltage sags under load: f = -s T ((T / W)^(3/2) - 1) b3.
 #include <algorithm>
 #include <cmath>
 

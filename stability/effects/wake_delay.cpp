@@ -1,4 +1,4 @@
-/// @file Downwash that takes time to arrive, and drifts with the wind meanwhile.
+/// @file Downwash that arrives with a delay, and meanwhile drifts with the wind.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,7 +21,7 @@ enum DelayedShape {
 
 constexpr int kMostAtOnce = 64;
 
-/// As Downwash wants it: without convection and tail, for vehicles of equal rotor area.
+/// The shape parameters for Downwash: without convection and tail, for vehicles of equal rotor area.
 std::array<double, 7> downwash_shape(const double* shape) {
   return {shape[kDelayedDecay],
           shape[kDelayedSpread0],
@@ -34,8 +34,8 @@ std::array<double, 7> downwash_shape(const double* shape) {
 
 WakeDrift drift_of(const double* shape) { return {shape[kDelay], {shape[kWindX], shape[kWindY], 0}}; }
 
-/// `now` among its nearest neighbours where their wakes, which arrive now, have drifted to; `past` is scratch of
-/// kMostAtOnce.
+/// Returns `now` with its nearest neighbours at the positions to which the wakes that arrive now have drifted; `past`
+/// is scratch for kMostAtOnce neighbours.
 Instant with_past_neighbours(const Instant& now, const double* shape, Neighbour* past) {
   const WakeDrift drift = drift_of(shape);
   Instant then = now;
@@ -48,7 +48,7 @@ Instant with_past_neighbours(const Instant& now, const double* shape, Neighbour*
   return then;
 }
 
-/// The wake of downwash.h with a WakeDrift, in a horizontal wind. With a delay of 0 it is the downwash without
+/// The wake of downwash.h with a WakeDrift, in a horizontal wind. With zero delay it is the downwash without
 /// convection.
 class WakeDelay : public Effect {
  public:
@@ -86,8 +86,8 @@ class WakeDelay : public Effect {
     for (const double delay_s : info().shape[kDelay].grid) {
       for (const auto& spread : spreads) thetas.push_back({delay_s, decay, spread[0], spread[1], norm, 0, 0});
     }
-    // A wide wake, carried 0.16, 0.32 and 0.48 m to all sides: refinement moves it from there. Further out there are
-    // more sides, so that one of them is always within the width of the wake.
+    // A wide wake, displaced by 0.16, 0.32 and 0.48 m in several directions as starting points for refinement. At
+    // larger distances there are more directions, so that one of them is always within the width of the wake.
     constexpr double kDelay_s = 0.2, kTurn = 6.283185307179586;
     const struct {
       double wind_m_s;

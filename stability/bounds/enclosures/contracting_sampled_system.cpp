@@ -10,8 +10,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// exp(G t) of an interval matrix: Taylor sum of G t / 2^k, whose rows sum to at most 1/4, squared k times. What the
-/// sum misses is below 0.25^18/18! (1 + 1/64) < 3e-27 in the row-sum norm, so in every entry.
+/// Returns exp(G t) of an interval matrix: the Taylor sum of G t / 2^k, whose row sums are at most 1/4, squared k
+/// times. The truncation error is below 0.25^18/18! (1 + 1/64) < 3e-27 in the row-sum norm, and hence in every entry.
 IntervalMatrix exponential(const IntervalMatrix& generator, Interval t) {
   const std::size_t n = generator.size();
   IntervalMatrix scaled(n);
@@ -118,7 +118,7 @@ IntervalMatrix IntervalSampledModel::plant_at(Interval phase_s) const {
     }
     result = next;
   };
-  // Which comes first may be known only up to rounding: then the second stretch lasts from 0 to a rounding error.
+  // The order of the two may be uncertain due to round-off: the second segment then lasts from 0 to a rounding error.
   const Interval first_s(std::min(phase_s.lower, shift_s_.lower), std::min(phase_s.upper, shift_s_.upper));
   if (past_ > newest_) advance(first_s, newest_ + 1);
   const Interval rest_s = past_ > newest_ ? phase_s - first_s : phase_s;
@@ -140,7 +140,7 @@ std::optional<ContractingSampledSystem> contracting(const IntervalSampledModel& 
   const double radius = Eigen::EigenSolver<MatrixXd>(approximate, false).eigenvalues().cwiseAbs().maxCoeff();
   if (!(radius < 1)) return std::nullopt;
   const double gamma = 1 - 0.8 * (1 - radius);
-  // States in units in which they are alike: w^k for the k-th derivative of e, w^2 = Kp.
+  // Scales the states to comparable units: w^k for the k-th derivative of e, w^2 = Kp.
   const auto command = static_cast<Index>(model.command_index());
   const double w = std::sqrt(std::max(1e-6, (std::abs(model.control()(model.command_index(), 0).lower))));
   Eigen::VectorXd unit = Eigen::VectorXd::Constant(n, 1 / (w * w));

@@ -11,7 +11,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// P with (A + alpha)'P + P(A + alpha) = -I, in floating point: a proposal, which is checked.
+/// Solves (A + alpha)'P + P(A + alpha) = -I in floating point; the result is a proposal that is verified later.
 MatrixXd lyapunov(const MatrixXd& shifted) {
   const Index size = shifted.rows();
   MatrixXd kronecker = MatrixXd::Zero(size * size, size * size);
@@ -33,7 +33,7 @@ MatrixXd lyapunov(const MatrixXd& shifted) {
   return P;
 }
 
-/// The largest of a few rates with (A + A')/2 + rate <= 0, proved; 0 where none is.
+/// Returns the largest of a few rates for which (A + A')/2 + rate <= 0 is proved; 0 if none is.
 double proved_rate(const IntervalMatrix& A, std::size_t n, double alpha) {
   for (const double share : {0.95, 0.5, 0.1}) {
     IntervalMatrix test(n);
@@ -48,8 +48,8 @@ double proved_rate(const IntervalMatrix& A, std::size_t n, double alpha) {
   return 0;
 }
 
-/// The companion matrix in time units of 2^-exponent s, a power of two so that scaling is exact:
-/// x_k = y^(k) / 2^(k exponent).
+/// The companion matrix in time units of 2^-exponent s, a power of two, so that the scaling is exact: x_k = y^(k) /
+/// 2^(k exponent).
 struct Companion {
   int exponent = 0;
   std::vector<Interval> a;  ///< the denominator, monic and scaled
@@ -73,7 +73,7 @@ struct Companion {
     }
   }
 
-  /// y^(k)(0+) / 2^(k exponent) from the numerator, as in the exact series division.
+  /// Returns y^(k)(0+) / 2^(k exponent) from the numerator, by exact series division.
   IntervalVector initial(const IntervalVector& numerator, const Interval& leading) const {
     const std::size_t n = a.size() - 1;
     IntervalVector y(n);
@@ -89,7 +89,7 @@ struct Companion {
   }
 };
 
-/// Rows that read off int y, y, y' and y'' from R x, in the companion's unit of time.
+/// Computes the rows that give int y, y, y' and y'' from R x, in the companion's unit of time.
 void read_off(const Companion& companion, const IntervalMatrix& R_inverse, ContractingSystem& system) {
   const std::size_t n = companion.a.size() - 1;
   IntervalVector antiderivative(n);  // -(a_1 x_0 + ... + a_n x_(n-1))/a_0
@@ -103,7 +103,7 @@ void read_off(const Companion& companion, const IntervalMatrix& R_inverse, Contr
   }
 }
 
-/// Back to seconds: y^(k) = scale^k x_k, int dt = (1/scale) int; powers of two are exact.
+/// Converts back to seconds: y^(k) = scale^k x_k, int dt = (1/scale) int; powers of two are exact.
 void scale_time(double scale, ContractingSystem& system) {
   const double factors[] = {1 / scale, 1, scale, scale * scale};
   for (std::size_t r = 0; r < 4; ++r) {

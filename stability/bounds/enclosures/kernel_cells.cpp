@@ -18,13 +18,13 @@ double length_above(const std::vector<double>& w) {
   return sqrt(total).upper;
 }
 
-/// exp(A step), up to `remainder` in the 2-norm.
+/// exp(A step) up to `remainder` in the 2-norm.
 struct Step {
   IntervalMatrix matrix;
   double remainder = 0;
 };
 
-/// @param size at least |A| step, at most 1.
+/// @param size upper bound on |A| step, at most 1.
 Step exponential(const IntervalMatrix& A, double step_s, double size) {
   const std::size_t n = A.size();
   IntervalMatrix power(n);
@@ -39,13 +39,13 @@ Step exponential(const IntervalMatrix& A, double step_s, double size) {
       }
     }
   }
-  // size^18/18! (1 + size/19 + ...) with size <= 1, and 18! > 6.4e15. The series is below 1.06: 1.1 covers what is
-  // rounded.
+  // Remainder: size^18/18! (1 + size/19 + ...) with size <= 1, and 18! > 6.4e15. The series is below 1.06; the factor
+  // 1.1 also covers round-off.
   step.remainder = 1.1 * nth_power(Interval(size * 1.000001), kTaylorTerms).upper / 6.4e15;
   return step;
 }
 
-/// The state lies within `error` of w, in the 2-norm.
+/// The true state is within `error` of w in the 2-norm.
 struct EnclosedState {
   std::vector<double> w;
   double error = 0;
@@ -59,7 +59,7 @@ struct EnclosedState {
 
   double largest_norm() const { return up(length_above(w) + error); }
 
-  /// row x state. @param row_norm at least |row|.
+  /// Encloses row x state. @param row_norm upper bound on |row|.
   Interval value(const std::vector<Interval>& row, double row_norm) const {
     const double missed = up(row_norm * error);
     return dot(row, w) + Interval(-missed, missed);
@@ -118,7 +118,7 @@ std::optional<KernelCells> kernel_cells(const IntervalVector& numerator, const I
   if (!system) return std::nullopt;
   const double norm_A = frobenius_above(system->A);
   const int parts = static_cast<int>(std::ceil(cell_s / std::min(kLargestStep_s, 0.5 / norm_A)));
-  const double step_s = cell_s / parts;  // parts step_s is cell_s up to rounding: covered below
+  const double step_s = cell_s / parts;  // parts step_s equals cell_s up to round-off, which is covered below
   const Step step = exponential(system->A, step_s, up(norm_A * step_s));
   const double bend_norm = norm_above(system->rows[3]);
 
@@ -132,7 +132,7 @@ std::optional<KernelCells> kernel_cells(const IntervalVector& numerator, const I
     double largest = 0;
     Interval net;
     for (int p = 0; p < parts; ++p) {
-      // The state's norm falls, so what it is at the step's start bounds y'' in all of the step.
+      // The norm of the state decreases, so its value at the start of the step bounds y'' over the whole step.
       const double bend = up(up(bend_norm * state.largest_norm()) * up(step_s * step_s));
       state.advance(step);
       const Interval now = state.value(system->rows[1], row_norm);
@@ -147,7 +147,7 @@ std::optional<KernelCells> kernel_cells(const IntervalVector& numerator, const I
     cells.largest.push_back(largest);
     cells.peak = std::max(cells.peak, largest);
   }
-  // Cell borders k cell_s and sums of step_s differ by a few units in the last place of the time; |y| is at most
+  // The cell boundaries k cell_s and sums of step_s differ by a few units in the last place of the time; |y| is at most
   // `peak`.
   for (std::size_t k = 0; k < cells.integral.size(); ++k) {
     const double shift_s = 1e-15 * (parts + 4) * static_cast<double>(k + 2) * cell_s;
@@ -166,7 +166,7 @@ std::vector<double> convolved(const KernelCells& kernel, const std::vector<doubl
   const std::size_t count = sizes.size();
   std::vector<double> larger(count);
   for (std::size_t k = 0; k < count; ++k) larger[k] = k == 0 ? sizes[0] : std::max(sizes[k], sizes[k - 1]);
-  // Sums of nonnegative numbers: their rounding is at most count units, relatively.
+  // Sums of nonnegative numbers have a relative round-off error of at most `count` units.
   const double rounding = 1 + 4e-16 * static_cast<double>(count + 4);
   std::vector<double> result(count);
   for (std::size_t n = 0; n < count; ++n) {
@@ -185,7 +185,8 @@ Interval answer(const KernelCells& kernel, std::size_t m, Interval w) {
 }
 
 Interval answer_to_past(const KernelCells& kernel, const std::vector<Interval>& w, std::size_t n) {
-  // The terms of answer(), summed to nearest: each is off by a few units, their sum by n units of the sum of sizes.
+  // Sums the terms of answer() with rounding to nearest: each has an error of a few units, their sum one of n units of
+  // the sum of magnitudes.
   double centre = 0;
   double spread = 0;
   double size = 0;

@@ -6,11 +6,11 @@
 namespace swarmcert::stability {
 namespace {
 
-/// Distance of lags in the grid, relative to the middle of the interval: interpolation misses responses by about its
-/// square.
+/// Distance of the lags in the grid, relative to the middle of the interval; the interpolation error of responses is
+/// about its square.
 constexpr double kDistance = 0.025;
 
-/// a + tau b
+/// Returns a + tau b.
 IntervalVector at(const IntervalVector& a, const IntervalVector& b, double tau) {
   IntervalVector result = a;
   result.resize(std::max(a.size(), b.size()));
@@ -20,7 +20,7 @@ IntervalVector at(const IntervalVector& a, const IntervalVector& b, double tau) 
 
 double middle(Interval x) { return x.lower + (x.upper - x.lower) / 2; }
 
-/// kernel * y where |kernel| has these integrals over cells and |y| is at most sizes.
+/// Bounds kernel * y, given the integrals of |kernel| over cells and |y| <= sizes.
 std::vector<double> answered(const std::vector<double>& integral, const std::vector<double>& sizes) {
   KernelCells kernel;
   kernel.integral = integral;
@@ -33,7 +33,7 @@ LagRangeCells::LagRangeCells(const IntervalVector& fixed, const IntervalVector& 
                              double cell_s, int count)
     : cell_s_(cell_s), count_(count) {
   const double width_s = per_lag.empty() ? 0 : lag_s.upper - lag_s.lower;
-  // An even number: the middle of the interval is a lag of the grid.
+  // An even number, so that the middle of the interval is a lag of the grid.
   const int steps = 2 * static_cast<int>(std::ceil(width_s / (2 * kDistance * middle(lag_s))));
   for (int j = 0; j <= steps; ++j) {
     Node node;
@@ -55,16 +55,16 @@ LagRangeCells::LagRangeCells(const IntervalVector& fixed, const IntervalVector& 
   }
 }
 
-/// sup |y_tau| over each cell for tau from node j to the next. @param by_lag of n'/D_j; null: 0.
+/// Bounds sup |y_tau| over each cell for tau from node j to the next. @param by_lag cells of n'/D_j; null: 0.
 std::optional<std::vector<double>> LagRangeCells::largest_onwards(std::size_t j, const KernelCells& at_node,
                                                                   const KernelCells* by_lag) const {
   const std::vector<double>& rest = nodes_[j].rest->integral;
-  // (1 + theta) |y_tau| <= |y_j| + theta (..): the most over theta in [0, theta] divides by 1 at least.
+  // (1 + theta) |y_tau| <= |y_j| + theta (..): for the maximum over theta the divisor is at least 1.
   const Interval theta = Interval(step_s(j)) / nodes_[j].lag_s;
   const double again = (theta * rest[0]).upper;
   const Interval left = Interval(1) - Interval(again);
   if (!left.is_positive()) return std::nullopt;
-  std::vector<double> result, larger;  // of |y_tau| in a cell; the same or in the one before
+  std::vector<double> result, larger;  // of |y_tau| in a cell; the maximum of this cell and the one before
   for (std::size_t n = 0; n < rest.size(); ++n) {
     double past = 0;
     for (std::size_t m = 1; m <= n; ++m) past += rest[m] * larger[n - m];
@@ -79,7 +79,7 @@ std::optional<std::vector<double>> LagRangeCells::largest_onwards(std::size_t j,
   return result;
 }
 
-/// What linear interpolation from node j to the next misses y_tau by, over each cell.
+/// Bounds the error of linear interpolation of y_tau from node j to the next, over each cell.
 std::optional<std::vector<double>> LagRangeCells::missed_onwards(std::size_t j, const KernelCells& at_node,
                                                                  const KernelCells* by_lag) const {
   const std::optional<std::vector<double>> largest = largest_onwards(j, at_node, by_lag);
@@ -90,7 +90,7 @@ std::optional<std::vector<double>> LagRangeCells::missed_onwards(std::size_t j, 
     if (!largest_by_lag) return std::nullopt;
   }
   const std::vector<double>& rest = nodes_[j].rest_onwards;
-  // |tau d y_tau/d tau|
+  // Bound on |tau d y_tau/d tau|.
   std::vector<double> change = answered(rest, *largest);
   for (std::size_t n = 0; n < change.size(); ++n) {
     change[n] = up(change[n] + (*largest)[n]);
@@ -131,7 +131,7 @@ KernelCells LagRangeCells::united(const std::vector<KernelCells>& at_nodes,
   KernelCells result = at_nodes.front();
   const std::size_t count = result.net.size();
   const std::size_t last = at_nodes.size() - 1;
-  // Lags as x in [-1, 1]; at the ends exactly, and so between them.
+  // The lags mapped to x in [-1, 1]; exact at the ends, and hence within the range between them.
   const Interval low(nodes_.front().lag_s), width = Interval(nodes_.back().lag_s) - low;
   std::vector<Interval> places;
   for (const Node& node : nodes_)
@@ -143,7 +143,7 @@ KernelCells LagRangeCells::united(const std::vector<KernelCells>& at_nodes,
   result.modes.assign(2, std::vector<double>(count));
   result.peak = 0;
   for (std::size_t n = 0; n < count; ++n) {
-    // x and 2 x^2 - 1. Any sizes will do: these leave little.
+    // Coefficients of x and 2 x^2 - 1. Any values are valid; these leave a small remainder.
     const double from = middle(at_nodes.front().net[n]), to = middle(at_nodes.back().net[n]);
     const double line = (to - from) / 2;
     const double parabola = ((from + to) / 2 - middle(at_nodes[last / 2].net[n])) / 2;
@@ -160,7 +160,7 @@ KernelCells LagRangeCells::united(const std::vector<KernelCells>& at_nodes,
       result.largest[n] = std::max(result.largest[n], at_nodes[j].largest[n]);
     }
     const double integral = up(up(cell_s_ * (1 + 1e-12)) * most);
-    // Between lags of the grid 2 x^2 is off its own interpolation by at most distance^2/2.
+    // Between the lags of the grid, 2 x^2 differs from its linear interpolation by at most distance^2/2.
     const double bent = (Interval(std::abs(parabola)) * distance * distance / Interval(2)).upper;
     result.net[n] += Interval(-integral, integral) + Interval(-bent, bent);
     result.integral[n] = up(result.integral[n] + integral);

@@ -11,13 +11,13 @@
 namespace swarmcert::stability {
 namespace {
 
-/// One less than a LocalPolynomial has: there is an antiderivative.
+/// One less than the terms of a LocalPolynomial, which leaves room for the antiderivative.
 constexpr std::size_t kPieceTerms = kLocalTerms - 1;
-/// Longest stretch in units of 1/rate.
+/// Longest segment in units of 1/rate.
 constexpr double kLongest = 0.4;
-/// Where all of x has been below this for a delay, it is cut.
+/// The trajectory is truncated once all of x has been below this value for one delay.
 constexpr double kCut = 1e-11;
-/// Sums and products of a few dozen positive doubles, computed to nearest, are below their exact value by less.
+/// Factor that turns sums and products of a few dozen positive doubles, rounded to nearest, into upper bounds.
 constexpr double kAbove = 1 + 1e-13;
 
 using Piece = std::array<double, kPieceTerms>;
@@ -26,7 +26,8 @@ class DelayedSteps {
  public:
   DelayedSteps(const TransferFunction& y, long most_pieces)
       : y_(y), order_(y.denominator.size() - 1), most_pieces_(most_pieces) {
-    // Cauchy's bound on the poles without the delay; a power of two, whose powers are exact.
+    // Cauchy's bound on the poles of the loop without the delay, rounded to a power of two so that its powers are
+    // exact.
     double rate = 0;
     for (std::size_t k = 0; k < order_; ++k) {
       const double a = y.denominator[k] + (k < y.feedback.size() ? y.feedback[k] : 0);
@@ -48,12 +49,12 @@ class DelayedSteps {
   double unit_1_s() const { return unit_; }
 
   struct Column {
-    std::vector<double> integral, most;  ///< of |x_i|, above
-    double residual = 0;                 ///< total variation, above
+    std::vector<double> integral, most;  ///< upper bounds for |x_i|
+    double residual = 0;                 ///< total variation, upper bound
   };
 
-  /// The column of X that starts at x_l = 1. Calls visit(piece) with the pieces of z.
-  /// @returns nothing where it does not decay in time.
+  /// Computes the column of X that starts at x_l = 1. Calls visit(piece) with the pieces of z.
+  /// @returns nothing if it does not decay within the maximum number of pieces.
   template <class Visit>
   std::optional<Column> column(std::size_t l, Visit&& visit) const {
     Column result{std::vector<double>(order_), std::vector<double>(order_), 0};
@@ -83,7 +84,7 @@ class DelayedSteps {
       if (!(largest < 1e12)) return std::nullopt;
       quiet = largest < kCut ? quiet + 1 : 0;
       if (quiet <= per_delay_) continue;
-      // The cut: all of x jumps to zero, and for a delay more nothing answers what was.
+      // The truncation: all of x jumps to zero, and for one more delay the feedback of the past is missing.
       double fed_back = 0;
       double power = 1;
       for (const double b : y_.feedback) fed_back += std::abs(b) * power, power *= unit_;
@@ -98,7 +99,7 @@ class DelayedSteps {
     return std::nullopt;
   }
 
-  /// sum_k factors[k] z^(k + shift), in intervals.
+  /// Returns sum_k factors[k] z^(k + shift), in intervals.
   LocalPolynomial combined(const Polynomial& factors, const Piece& z, std::size_t shift) const {
     LocalPolynomial result;
     for (std::size_t k = 0; k < factors.size(); ++k) {
@@ -111,7 +112,7 @@ class DelayedSteps {
   }
 
  private:
-  /// The Taylor polynomial from about `at`, driven by the piece one delay before.
+  /// Returns the Taylor polynomial from approximately `at`, driven by the piece one delay earlier.
   Piece next(const std::vector<Interval>& at, const Piece& driving) const {
     Piece z{};
     for (std::size_t k = 0; k < order_; ++k)
@@ -127,7 +128,7 @@ class DelayedSteps {
     return z;
   }
 
-  /// sup |z^(k)| on the stretch, nearly.
+  /// Approximates sup |z^(k)| on the segment.
   double most_of(const Piece& z, std::size_t k) const {
     double total = 0;
     for (std::size_t i = kPieceTerms - k; i-- > 0;)
@@ -143,7 +144,7 @@ class DelayedSteps {
     return total;
   }
 
-  /// sup of what z misses of z^(n) = -(sum a_k z^(k) + sum b_k driving^(k))/a_n, nearly.
+  /// Approximates the supremum of the defect of z in z^(n) = -(sum a_k z^(k) + sum b_k driving^(k))/a_n.
   double missed(const Piece& z, const Piece& driving) const {
     double total = 0;
     for (std::size_t i = kPieceTerms; i-- > 0;) {
@@ -167,7 +168,7 @@ class DelayedSteps {
   std::array<std::array<double, kPieceTerms>, kPieceTerms> rising_{};
 };
 
-/// The norms of the approximation of y, piece by piece.
+/// Accumulates the norms of the approximation of y, piece by piece.
 class PieceNorms {
  public:
   PieceNorms(const DelayedSteps& steps, const TransferFunction& y, Interval unit, bool integrates)
@@ -226,12 +227,12 @@ std::optional<VerifiedNorms> norms_by_steps(const TransferFunction& y, bool inte
   if (n + 4 > kPieceTerms || y.feedback.size() > n || y.numerator.size() + (integrates ? 1 : 0) > n) {
     return std::nullopt;
   }
-  double slowest = kInfinity;  // without the delay, which is near enough to foresee how many pieces it takes
+  double slowest = kInfinity;  // without the delay; accurate enough to predict the number of pieces
   for (const std::complex<double>& pole : poles(sum(y.denominator, y.feedback))) {
     slowest = std::min(slowest, -pole.real());
   }
   if (!(-std::log(kCut) / slowest / steps.length_s() < static_cast<double>(most_pieces))) return std::nullopt;
-  // y = numerator z, where z starts at z^(n-1) = 1/a_n, is so many times the last column.
+  // y = numerator z, where z starts at z^(n-1) = 1/a_n, is the last column times this unit.
   const Interval unit = Interval(1) / (Interval(y.denominator[n]) *
                                        nth_power(Interval(steps.unit_1_s()), static_cast<int>(n) - 1));
   PieceNorms pieces(steps, y, unit, integrates);
@@ -249,11 +250,11 @@ std::optional<VerifiedNorms> norms_by_steps(const TransferFunction& y, bool inte
       most[i] = std::max(most[i], found->most[i]);
     }
   }
-  // What numerator z^(shift) may be off by.
+  // Bounds the error of numerator z^(shift).
   const auto error = [&](const std::vector<double>& size, std::size_t shift) {
     double total = 0;
     double power =
-        std::ldexp(1.0, std::ilogb(steps.unit_1_s()) * static_cast<int>(shift));  // of a power of two
+        std::ldexp(1.0, std::ilogb(steps.unit_1_s()) * static_cast<int>(shift));  // exact for a power of two
     for (std::size_t k = 0; k < y.numerator.size(); ++k, power *= steps.unit_1_s()) {
       total += std::abs(y.numerator[k]) * power * size[k + shift];
     }

@@ -32,7 +32,7 @@ class Enclosure {
       row_norm_[r] = norm_above(taylor_[r][0]);
       remainder_norm_[r] = norm_above(taylor_[r][kLocalTerms]);
     }
-    // exp(A length) as intervals, by its Taylor sum; the remainder in norm.
+    // exp(A length) in intervals, by its Taylor sum; the remainder is bounded in norm.
     IntervalMatrix power(MatrixXd::Identity(static_cast<Index>(n), static_cast<Index>(n)));
     IntervalMatrix total = power;
     for (int k = 1; k < kLocalTerms; ++k) {
@@ -48,11 +48,11 @@ class Enclosure {
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = 0; j < n; ++j) step_[i * n + j] = total(i, j);
     }
-    step_remainder_ = 2 * std::pow(0.2500001, kLocalTerms) / 6.4e15;  // 0.25^18/18! and what follows it
+    step_remainder_ = 2 * std::pow(0.2500001, kLocalTerms) / 6.4e15;  // 0.25^18/18! plus the following terms
   }
 
-  /// @param y which row is h': 2 with an integral, whose system's response is h; 1 without.
-  /// @param settled what h tends to.
+  /// @param y index of the row of h': 2 with an integral, where the system's response is h; 1 without.
+  /// @param settled limit of h.
   VerifiedNorms run(std::size_t y, Interval settled) {
     const std::size_t n = system_.A.size();
     std::vector<double> w(n);
@@ -116,7 +116,7 @@ class Enclosure {
       const double half = up(std::max(total.upper - next[i], next[i] - total.lower));
       missed += Interval(half) * half;
     }
-    // The flow contracts, so the old error does not grow.
+    // The flow contracts, so the previous error does not grow.
     error = up(up(error + sqrt(missed).upper) + step_remainder_ * length(w));
     w = std::move(next);
   }
@@ -132,7 +132,7 @@ class Enclosure {
 
 IntervalVector intervals(const Polynomial& p) { return IntervalVector(p.begin(), p.end()); }
 
-/// denominator + feedback times the first `order` + 1 terms of e^(-Ts).
+/// Returns denominator + feedback times the first `order` + 1 terms of e^(-Ts).
 IntervalVector with_expanded_delay(const TransferFunction& y, std::size_t order) {
   IntervalVector result = intervals(y.denominator);
   Interval term = 1;
@@ -143,7 +143,7 @@ IntervalVector with_expanded_delay(const TransferFunction& y, std::size_t order)
   return result;
 }
 
-/// Upper bound of |feedback/denominator (e^(-Ts) - its expansion)|_1; see verified_norms().
+/// Returns an upper bound on |feedback/denominator (e^(-Ts) - its expansion)|_1; see verified_norms().
 double rest_of_delay(const TransferFunction& y, std::size_t order, const IntervalVector& denominator) {
   IntervalVector numerator = intervals(y.feedback);
   numerator.insert(numerator.begin(), order, Interval(0));
@@ -158,7 +158,7 @@ double rest_of_delay(const TransferFunction& y, std::size_t order, const Interva
   return (weight * (jump + Enclosure(*system).run(2, Interval(0)).amplitude)).upper;
 }
 
-/// The norms of the loop whose characteristic polynomial is `denominator`.
+/// Returns the norms of the loop whose characteristic polynomial is `denominator`.
 std::optional<VerifiedNorms> norms_over(const TransferFunction& y, const IntervalVector& denominator,
                                         bool integrates) {
   const std::optional<ContractingSystem> system = contracting(intervals(y.numerator), denominator);
@@ -175,10 +175,10 @@ VerifiedNorms times(VerifiedNorms norms, Interval factor) {
   return norms;
 }
 
-/// @param integrates y is the response to a step, else that to an impulse.
+/// @param integrates true: y is the response to a step; false: that to an impulse.
 std::optional<VerifiedNorms> norms_of(const TransferFunction& y, bool integrates) {
   if (y.delay_s == 0) return norms_over(y, intervals(sum(y.denominator, y.feedback)), integrates);
-  // A delay that is short against the slowest mode takes many steps, but may be sharp by its expansion.
+  // A delay that is short compared with the slowest mode takes many steps, but its expansion may be accurate.
   constexpr long kFewPieces = 30'000;
   constexpr long kMostPieces = 400'000;
   constexpr double kSharp = 1e-3;

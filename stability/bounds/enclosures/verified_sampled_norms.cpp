@@ -13,13 +13,13 @@ namespace {
 
 using Eigen::Index;
 
-/// Sums and products of a few positive doubles, computed to nearest, are below their exact value by less than this.
+/// Factor that turns sums and products of a few positive doubles, rounded to nearest, into upper bounds.
 constexpr double kOver = 1 + 1e-14;
 constexpr int kVerifiedPhases = 4;
 constexpr long kMostPeriods = 1'500'000;
 
-/// A linear function of the row: `mid` in doubles, and how far the exact value may be from its double sum, per length
-/// of the computed row and per error of the row.
+/// A linear function of the row: `mid` in doubles, and bounds on the deviation of the exact value from the sum in
+/// doubles, per length of the computed row and per error of the row.
 struct Linear {
   std::vector<double> mid;
   double per_length = 0, per_error = 0;
@@ -33,7 +33,7 @@ struct Linear {
       radius = up(radius + r);
     }
     per_error = norm_above(c) * kOver;
-    // gamma_n of a dot product, and as much again for the few operations on its result.
+    // gamma_n of a dot product, plus the same amount for the few operations on its result.
     per_length = (radius + 2.3e-16 * (static_cast<double>(c.size()) + 8) * per_error) * kOver;
   }
   double operator()(const std::vector<double>& row) const {
@@ -43,7 +43,7 @@ struct Linear {
   }
 };
 
-/// One period of the kernel k, its integral S and the integral of that, Q; each may be off by its error anywhere.
+/// One period of the kernel k, its integral S and the integral of S, Q; each with a bound on its error.
 struct Cell {
   double k0, k1;  ///< k = k0 + k1 u
   double S0, Q0;
@@ -62,17 +62,18 @@ struct Cell {
   }
 };
 
-/// Total variation of a continuous function that is monotonic on runs, and its extremum, from its values at their ends.
+/// Accumulates the total variation and the extremum of a continuous, piecewise monotonic function from its values at
+/// the ends of the pieces.
 class Runs {
  public:
-  /// A stretch of the run of this sign begins where the function has the value `at()`.
+  /// Starts a segment with this sign, at which the function has the value `at()`.
   template <class Value>
   void add(int sign, const Value& at) {
     if (sign == sign_) return;
     turn(at());
     sign_ = sign;
   }
-  /// A stretch on which the function varies by at most `most`.
+  /// Adds a segment on which the function varies by at most `most`.
   void add_unsure(Interval at, double most) {
     turn(at);
     total_ += Interval(0, most);
@@ -96,18 +97,18 @@ class Runs {
   int sign_ = 0;
 };
 
-/// What is looked at: a row over the states before control, and what acts on it within its own period.
+/// An output: a row over the states before the control, and the direct contributions within its own period.
 struct Output {
   IntervalVector row;
-  double phase_s = 0;  ///< forces of its own period: the kernel is u up to here
-  Interval own;        ///< commands: response to that of its own period
-  Interval settled;    ///< what a constant disturbance does to it in the end
+  double phase_s = 0;  ///< forces in its own period: the kernel is u up to this time
+  Interval own;        ///< commands: response to the command of its own period
+  Interval settled;    ///< response to a constant disturbance in the long run
 };
 
 class SampledEnclosure {
  public:
-  /// @param input what is added to the state after control once per period; empty: a force.
-  /// @param integrates whether the output follows a constant input no more in the end.
+  /// @param input added to the state after the control once per period; empty: a force.
+  /// @param integrates whether the output's response to a constant input vanishes in the long run.
   SampledEnclosure(const SampledLoop& loop, const IntervalVector& input, bool integrates,
                    const IntervalSampledModel& model, ContractingSampledSystem system)
       : h_(loop.period_s), is_force_(input.empty()), integrates_(integrates), system_(std::move(system)) {
@@ -135,7 +136,7 @@ class SampledEnclosure {
         k1[i] = system_.R(static_cast<Index>(i), 0);
       }
     } else {
-      // An error of one period, as a force held for it.
+      // An error of one period is equivalent to a force held for one period.
       for (std::size_t k = 0; k < n; ++k) {
         Interval held;
         for (std::size_t j = 0; j < input.size(); ++j) held += model.hold()(k, j) * input[j];
@@ -193,7 +194,7 @@ class SampledEnclosure {
     }
     set(cell, row, length, error, settled, settled_error);
     of_S.finish(cell.S(0));
-    // What is left: |row| falls by gamma per period.
+    // The tail: |row| decreases by gamma per period.
     const double size = (length + error) * kOver;
     const double k_most = (k0_.per_error + k1_.per_error * h_) * size * kOver;
     const double periods = up(1 / gap_.lower);
@@ -223,8 +224,8 @@ class SampledEnclosure {
     return std::sqrt(total) * kOver;
   }
 
-  /// x with x = c + A x, row x the sum over all periods: the residual of a computed x bounds its error, as
-  /// |(I - A)^-1| <= 1/(1 - gamma).
+  /// Encloses x with x = c + A x, so that row x is the sum over all periods: the residual of a computed x bounds its
+  /// error, as |(I - A)^-1| <= 1/(1 - gamma).
   IntervalVector summed(const IntervalVector& c) const {
     const std::size_t n = c.size();
     std::vector<double> x(n);
@@ -336,7 +337,7 @@ class SampledEnclosure {
   bool integrates_;
   ContractingSampledSystem system_;
   Interval gap_;
-  std::vector<double> A_;  ///< by columns
+  std::vector<double> A_;  ///< column by column
   double step_error_ = 0;
   Linear k0_, k1_, rest_, second_rest_;
 };
@@ -350,7 +351,7 @@ Interval dot(const IntervalVector& row, const IntervalVector& column) {
   return total;
 }
 
-/// @param input as in SampledEnclosure. @param at_rest what a constant input does to e in the end.
+/// @param input as in SampledEnclosure. @param at_rest response of e to a constant input in the long run.
 std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, const IntervalSampledModel& model,
                                                    const IntervalVector& input, bool integrates,
                                                    Interval at_rest) {
@@ -358,7 +359,7 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
   if (!system) return std::nullopt;
   const bool is_force = input.empty();
   const SampledEnclosure enclosure(loop, input, integrates, model, *std::move(system));
-  // Of a row over the state after control.
+  // Returns the norms of an output, given as a row over the state after the control.
   const auto output = [&](const IntervalVector& after, double phase_s, Interval settled) {
     return enclosure.run({(after * model.control()) * enclosure.system().R_inverse, phase_s,
                           is_force ? Interval(0) : dot(after, input), settled});
@@ -373,7 +374,8 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
       all = {std::max(all.lower, (here.*gain).lower), std::max(all.upper, (here.*gain).upper)};
     }
   }
-  // The largest gains to a command or a lag's output; with a force, `rate` to its sum with the force at that time.
+  // The largest gains to a command or a lag output; for a force, `rate` is the gain to its sum with the force at that
+  // time.
   VerifiedNorms bend{Interval(0), Interval(0), Interval(0), Interval(0)};
   for (std::size_t i = 0; i <= model.lags(); ++i) {
     IntervalVector after(model.size() + 1);
@@ -384,10 +386,10 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
   }
   if (is_force) {
     bend.amplitude = bend.amplitude + Interval(1);
-    // The force changes by less than this from the sample at which a command was made until it acts.
+    // From the sample at which a command is computed until it acts, the force changes by less than this.
     bend.rate = bend.rate + Interval(static_cast<double>(model.past() + 2)) * Interval(loop.period_s);
   }
-  bend.edge = bend.amplitude;  // an input of variation 1 from rest stays below 1
+  bend.edge = bend.amplitude;  // an input of total variation 1 from rest stays below 1
   const double step_s = up(loop.period_s / kVerifiedPhases * (1 + 1e-15));
   for (const auto gain : kSampledGains) {
     Interval& all = result.all_times.*gain;
@@ -397,7 +399,7 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
   return result;
 }
 
-/// Every finite gain over `divisor`.
+/// Divides every finite gain by `divisor`.
 VerifiedSampledNorms over(VerifiedSampledNorms result, Interval divisor) {
   for (VerifiedNorms* const norms : {&result.at_samples, &result.all_times}) {
     for (const auto gain : kSampledGains) {
@@ -428,7 +430,7 @@ std::optional<VerifiedSampledNorms> verified_sampled_norms(const SampledLoop& lo
   IntervalVector input(model.size() + 1);
   for (std::size_t i = 0; i < input.size(); ++i)
     input[i] = model.control()(i, measured) - Interval(i == measured ? 1.0 : 0.0);
-  // A wrong position is followed: e goes to its negative.
+  // The vehicle follows a wrong position: e tends to its negative.
   if (estimate == Estimate::kPosition) return enclosed_norms(loop, model, input, false, Interval(-1));
   const bool integrates = loop.plant.Ki > 0;
   const Interval at_rest =

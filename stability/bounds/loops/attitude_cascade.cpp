@@ -10,15 +10,15 @@
 namespace swarmcert::stability {
 namespace {
 
-/// The loop cut at the motors: open(s) + feedback(s) is its characteristic polynomial, and a delay of the motors
-/// multiplies `feedback` alone.
+/// The loop opened at the motors: open(s) + feedback(s) is its characteristic polynomial, and a delay of the motors
+/// multiplies `feedback` only.
 struct CutLoop {
   Polynomial lag;  ///< L N, N = rate_lag s + 1 of the measured body rate; L without attitude
-  Polynomial law;  ///< ratio (Kw s^2 + (KR s + KI) N)/J without a factor s where KI = 0; 1 without attitude
+  Polynomial law;  ///< ratio (Kw s^2 + (KR s + KI) N)/J without a factor s if KI = 0; 1 without attitude
   Polynomial stiffness;  ///< ratio (KR s + KI) N/J without that factor; 1 without attitude
-  int inner = 0;         ///< powers of s that the open attitude loop has beside L
+  int inner = 0;         ///< powers of s in the open attitude loop besides L
   int outer = 2;         ///< those of the open position loop
-  Polynomial pid;        ///< ratio (Kd s^2 + Kp s + Ki) without a factor s where Ki = 0
+  Polynomial pid;        ///< ratio (Kd s^2 + Kp s + Ki) without a factor s if Ki = 0
 
   explicit CutLoop(const Cascade& loop) : lag{1, loop.lag_s}, law{1}, stiffness{1} {
     if (!(loop.lag_s > 0)) lag = {1};
@@ -44,7 +44,7 @@ struct CutLoop {
     const Polynomial position = product(stiffness, pid);
     return inner == 0 ? position : sum(times_s_to(outer, law), position);
   }
-  /// What stands between the tilt that acts and the one asked for.
+  /// The denominator of the transfer function from the commanded to the actual tilt.
   Polynomial attitude_denominator() const { return inner == 0 ? lag : sum(times_s_to(inner, lag), law); }
 };
 
@@ -73,7 +73,7 @@ bool is_stable(const Cascade& loop) { return is_stable(cascade_transfer(loop, Ca
 
 namespace {
 
-/// The factor at which stability ends, between one that keeps it and one that does not.
+/// Returns the factor at which stability ends, between a stable and an unstable one.
 double boundary(const std::function<bool(double)>& holds, double stable, double unstable) {
   for (int i = 0; i < 60; ++i) {
     const double middle = std::sqrt(stable * unstable);

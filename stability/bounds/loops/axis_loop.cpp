@@ -21,7 +21,8 @@ Polynomial times_s(Polynomial p) {
   return p;
 }
 
-/// D(s) without the factor s that it has for Ki = 0; `numerator` must then carry one factor s less as well.
+/// Returns numerator over D(s), without the factor s of D(s) if Ki = 0; `numerator` must then have one factor s less as
+/// well.
 TransferFunction over_characteristic(const AxisLoop& loop, Polynomial numerator) {
   const bool integrates = loop.Ki > 0;
   Polynomial open = lag_polynomial(loop);
@@ -34,14 +35,14 @@ Polynomial channel_numerator(const AxisLoop& loop, Channel channel) {
   return scaled(channel == Channel::kForce ? lag_polynomial(loop) : Polynomial{1}, 1 / loop.mass_kg);
 }
 
-/// -u after an impulse of force, without the delay's shift.
+/// Returns -u after an impulse of force, without the delay's shift.
 TransferFunction effort_transfer(const AxisLoop& loop) {
   const Polynomial feedback =
       loop.Ki > 0 ? Polynomial{loop.Ki, loop.Kp, loop.Kd} : Polynomial{loop.Kp, loop.Kd};
   return over_characteristic(loop, product(feedback, lag_polynomial(loop)));
 }
 
-/// (p - p[0]) / s
+/// Returns (p - p[0]) / s.
 Polynomial without_constant(Polynomial p) {
   p.erase(p.begin());
   return p;
@@ -108,8 +109,8 @@ LagFloor lag_floor(const AxisLoop& loop) {
     floor = {lagged.integral_abs, lagged.slope_max_abs};
   }
   if (loop.delay_s > 0) {
-    // L - e^(-Ts) = (L - 1) + (1 - e^(-Ts)), and (1 - e^(-Ts))/s is the mean over a window times T: a bound by the
-    // triangle inequality, no longer exact.
+    // L - e^(-Ts) = (L - 1) + (1 - e^(-Ts)), and (1 - e^(-Ts))/s is T times the mean over a window; the triangle
+    // inequality gives a bound, which is no longer exact.
     const ResponseNorms command = response_norms(impulse_transfer(loop, Channel::kCommand));
     floor.rate += loop.delay_s * command.integral_abs;
     floor.impulse += command.max - command.min;

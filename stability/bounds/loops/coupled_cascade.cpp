@@ -17,7 +17,7 @@ using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// int e enters as V' int e where Ki = U V', so that an integral which acts nowhere leaves no pole at 0.
+/// int e enters as V' int e, where Ki = U V', so that an integral without effect leaves no pole at 0.
 struct Integrals {
   MatrixXd to_command;   ///< U, [n x rank]
   MatrixXd from_errors;  ///< V', [rank x n]
@@ -33,8 +33,8 @@ struct Integrals {
   }
 };
 
-/// Divides coordinates by powers of two until rows and columns are of one size (Parlett and Reinsch 1969): the same
-/// loop exactly, with eigenvalues that rounding moves less.
+/// Scales the coordinates by powers of two until rows and columns are of similar size (Parlett and Reinsch 1969):
+/// exactly the same loop, but its eigenvalues are less sensitive to round-off.
 VectorXd balance(MatrixXd& A) {
   const Index n = A.rows();
   VectorXd scale = VectorXd::Ones(n);
@@ -65,8 +65,8 @@ bool is_left(const std::vector<Complex>& poles) {
   return std::all_of(poles.begin(), poles.end(), [](const Complex& pole) { return pole.real() < 0; });
 }
 
-/// x' = A x + B c, c = -C x. Of a channel: e, e', then with an attitude law the tilt times g, its derivative and, where
-/// they are there, the measured derivative and the law's integral; last what acts behind the motors' lag.
+/// x' = A x + B c, c = -C x. States of a channel: e, e'; with an attitude law the tilt times g, its derivative and, if
+/// present, the measured derivative and the law's integral; last the output of the motors' lag.
 class StateSpace {
  public:
   explicit StateSpace(const CoupledCascade& loop)
@@ -94,14 +94,14 @@ class StateSpace {
     return count + 2 + (channel.body_rate_lag_s > 0 ? 1 : 0) + (channel.attitude->KI_J_s3 > 0 ? 1 : 0);
   }
 
-  /// @param next the first state that is free. @returns the one after the channel's.
+  /// @param next index of the first free state. @returns the index after the channel's states.
   Index add_channel(const PidMatrices& position, const Cascade& channel, Index i, Index next) {
     Eigen::RowVectorXd wanted = Eigen::RowVectorXd::Zero(A.cols());  // -u_i times the ratio
     wanted.head(channels_) = position.Kp.row(i);
     wanted.segment(channels_, channels_) = position.Kd.row(i);
     wanted.segment(2 * channels_, integrals_.to_command.cols()) = integrals_.to_command.row(i);
     wanted *= channel.ratio;
-    Index driven = channels_ + i;  // state whose derivative is what the motors give
+    Index driven = channels_ + i;  // state whose derivative is the output of the motors
     if (!channel.attitude) {
       C.row(i) = wanted;
     } else {
@@ -147,10 +147,10 @@ CoupledCascade with_factor(CoupledCascade loop, double factor, std::size_t first
   return loop;
 }
 
-/// The loop cut at some commands: from them to what the law answers, C (s I - A)^-1 B.
+/// The loop opened at some commands: the transfer function from them to the law's response, C (s I - A)^-1 B.
 class CutAt {
  public:
-  /// @param first, count the commands that are cut; the others stay closed.
+  /// @param first, count range of the opened commands; the others stay closed.
   CutAt(const StateSpace& whole, Index first, Index count) {
     const Index channels = whole.B.cols();
     A_ = whole.A;
@@ -162,7 +162,7 @@ class CutAt {
     poles_ = eigenvalues(A_);
   }
 
-  /// Eigenvalues at s = j w, by size.
+  /// Returns the eigenvalues at s = j w, sorted by magnitude.
   std::vector<Complex> at(double w_rad_s) const {
     MatrixXcd resolvent = -A_.cast<Complex>();
     resolvent.diagonal().array() += Complex(0, w_rad_s);
@@ -174,8 +174,8 @@ class CutAt {
     return result;
   }
 
-  /// Frequencies between which no eigenvalue's size is expected to cross 1 twice: far below the slowest and beyond the
-  /// fastest pole in small steps, and across each resonance of what stays closed.
+  /// Returns frequencies between which no eigenvalue's magnitude is expected to cross 1 twice: small steps from far
+  /// below the slowest to beyond the fastest pole, refined across each resonance of the closed part.
   std::vector<double> grid(const std::vector<Complex>& closed_poles) const {
     constexpr double kBeyond = 1e3, kStep = 1.02;
     double slowest = kInfinity, fastest = 0;
@@ -200,8 +200,8 @@ class CutAt {
   std::vector<Complex> poles_;
 };
 
-/// The least delay of the commands that are cut with which some pole lies on the imaginary axis: there an eigenvalue l
-/// of the open loop has l exp(-j w T) = -1, so |l| = 1 and T = arg(-l)/w.
+/// Returns the smallest delay of the opened commands for which some pole lies on the imaginary axis: there an
+/// eigenvalue l of the open loop has l exp(-j w T) = -1, so |l| = 1 and T = arg(-l)/w.
 double delay_margin(const CutAt& loop, const std::vector<Complex>& closed_poles) {
   double least_s = kInfinity;
   double from = 0;

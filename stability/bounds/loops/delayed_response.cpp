@@ -1,6 +1,6 @@
 // Impulse responses with a delay T, by the method of steps. With z = L^-1[1/(denominator + feedback e^(-Ts))],
 //   a_n z^(n) = -sum_{k<n} a_k z^(k) - sum_j b_j z^(j)(t - T),   z^(n-1)(0+) = 1/a_n,   z = 0 for t < 0,
-// and y = sum_k c_k z^(k). feedback has degree below n, so nothing but continuous pieces is ever fed back.
+// and y = sum_k c_k z^(k). The degree of `feedback` is below n, so only continuous functions are fed back.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,15 +12,15 @@ namespace swarmcert::stability {
 namespace {
 
 constexpr int kTerms = 14;
-/// Longest stretch in units of 1/rate: 0.4^14/14! is below rounding, and so a stretch has few zeros.
+/// Longest segment in units of 1/rate: 0.4^14/14! is below round-off, and a segment this short has few zeros.
 constexpr double kStretch = 0.4;
-/// The response has ended where a whole second of slow time stays below this part of its peak.
+/// The response has ended when it stays below this fraction of its peak for a whole period of the slowest mode.
 constexpr double kNegligible = 1e-17;
-/// A slow mode counts as alone where nothing else exceeds this part of the peak. Rounding stays below.
+/// A slow mode is considered alone when nothing else exceeds this fraction of the peak. Round-off errors are smaller.
 constexpr double kHidden = 1e-11;
 constexpr long kMostPieces = 20'000'000;
 
-/// Bounds the moduli of the poles of the loop without its delay (Cauchy's bound on scaled coefficients).
+/// Returns a bound on the moduli of the poles of the loop without its delay (Cauchy's bound on scaled coefficients).
 double rate_of(const TransferFunction& y) {
   const Polynomial total = sum(y.denominator, y.feedback);
   double rate = 0;
@@ -31,16 +31,16 @@ double rate_of(const TransferFunction& y) {
   return rate;
 }
 
-/// A real mode c e^(st) of y, slower than all others; c = 0: none.
+/// A real mode c e^(st) of y that is slower than all others; c = 0: there is none.
 struct SlowMode {
   double s = 0, c = 0;
-  double others_1_s = 0;  ///< least modulus of the other poles, of the loop without its delay
+  double others_1_s = 0;  ///< smallest modulus of the other poles, of the loop without its delay
 
   double at(double t_s) const { return c == 0 ? 0 : c * std::exp(s * t_s); }
 };
 
-/// By Newton's method on D(s) = denominator + feedback e^(-Ts) from the slowest pole without delay; c is the residue
-/// numerator/D' there.
+/// Finds the slow mode by Newton's method on D(s) = denominator + feedback e^(-Ts), starting from the slowest pole
+/// without delay; c is the residue numerator/D' there.
 SlowMode slow_mode(const TransferFunction& y) {
   SlowMode mode;
   std::vector<std::complex<double>> all = poles(sum(y.denominator, y.feedback));
@@ -66,7 +66,7 @@ SlowMode slow_mode(const TransferFunction& y) {
   return mode;
 }
 
-/// The first `count` derivatives of p at u, by Horner's rule for all at once.
+/// Computes the first `count` derivatives of p at u, all at once by Horner's rule.
 void derivatives_at(const Polynomial& p, double u, std::size_t count, double* out) {
   std::fill(out, out + count, 0.0);
   for (std::size_t i = p.size(); i-- > 0;) {
@@ -94,9 +94,9 @@ class Steps {
 
   double length() const { return length_; }
 
-  /// The next piece of y; valid until the next call. No heap: this runs a million times.
+  /// Returns the next piece of y, valid until the next call. Does not allocate, since it runs a million times.
   const Polynomial& next() {
-    // The oldest piece of z is what drives this one, and is then overwritten by it.
+    // The oldest piece of z drives the new one, which then overwrites it.
     Polynomial& z = past_[newest_];
     newest_ = (newest_ + 1) % past_.size();
     combine(y_.feedback, z, driven_);
@@ -119,10 +119,10 @@ class Steps {
   }
 
  private:
-  /// (i + k)! / i!, by i.
+  /// Returns (i + k)! / i!, indexed by i.
   const double* rising_of(std::size_t k) const { return rising_.data() + k * terms_; }
 
-  /// sum_k factors[k] p^(k)
+  /// to = sum_k factors[k] p^(k)
   void combine(const Polynomial& factors, const Polynomial& p, Polynomial& to) const {
     std::fill(to.begin(), to.end(), 0.0);
     for (std::size_t k = 0; k < factors.size(); ++k) {
@@ -136,7 +136,7 @@ class Steps {
   int per_delay_ = 1;
   double length_ = 0;
   std::vector<double> state_, rising_;
-  std::vector<Polynomial> past_;  ///< ring: the pieces of z of one delay, zero before the start
+  std::vector<Polynomial> past_;  ///< ring buffer: the pieces of z over one delay, zero before the start
   std::size_t newest_ = 0;
   Polynomial driven_, result_;
 };
@@ -151,13 +151,13 @@ ResponseNorms delayed_norms(const TransferFunction& y) {
   const Polynomial* piece = &steps.next();
   four_derivatives(*piece, 0, at_start);
   ZeroScan scan(0, at_start[0], at_start[1]);
-  // The slowest time that the loop can have decides how long it must stay small.
+  // The slowest time constant of the loop determines how long the response must stay small.
   const Polynomial total = sum(y.denominator, y.feedback);
   double slowest = std::numeric_limits<double>::infinity();
   for (const std::complex<double>& pole : poles(total)) slowest = std::min(slowest, std::abs(pole));
   const double patience_s = 2 * 3.15 / slowest + y.delay_s;
-  // A slow real mode that is all that is left needs no more pieces: its integral is closed. Others may hide where they
-  // cross zero, not for this long.
+  // Once only a slow real mode is left, no more pieces are needed: its integral is known in closed form. Other modes
+  // may be hidden near their zero crossings, but not for this long.
   const SlowMode slow = slow_mode(y);
   const double alone_s = y.delay_s + 2 / slow.others_1_s;
   double alone_since_s = 0;

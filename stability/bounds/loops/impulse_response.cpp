@@ -21,7 +21,7 @@ std::complex<double> value_at(const Polynomial& p, std::complex<double> s) {
   return result;
 }
 
-/// |p(jw)|^2 as a polynomial in w^2.
+/// Returns |p(jw)|^2 as a polynomial in w^2.
 Polynomial squared_modulus(const Polynomial& p) {
   Polynomial real;  // in w^2
   Polynomial imaginary;
@@ -38,9 +38,9 @@ Polynomial squared_modulus(const Polynomial& p) {
   return result;
 }
 
-/// Whether all zeros have negative real parts: the first column of Routh's array has one sign.
+/// Whether all zeros have negative real parts: the first column of the Routh array has constant sign.
 bool all_left(const Polynomial& denominator) {
-  std::vector<double> upper;  // descending powers, every second
+  std::vector<double> upper;  // descending powers, every second one
   std::vector<double> lower;
   for (std::size_t i = denominator.size(); i-- > 0;) {
     ((denominator.size() - 1 - i) % 2 == 0 ? upper : lower).push_back(denominator[i]);
@@ -68,7 +68,7 @@ double delay_margin(const Polynomial& denominator, const Polynomial& feedback) {
     if (!(root.real() > 0) || std::abs(root.imag()) > 1e-7 * std::abs(root)) continue;
     const double w = std::sqrt(root.real());
     const std::complex<double> s(0, w);
-    // denominator = -feedback e^(-jwT): the angle by which feedback must turn.
+    // denominator = -feedback e^(-jwT): the angle by which feedback must be rotated.
     double angle = std::arg(-value_at(feedback, s) / value_at(denominator, s));
     if (angle <= 0) angle += 2 * std::acos(-1.0);
     margin_s = std::min(margin_s, angle / w);

@@ -36,7 +36,7 @@ void KernelSum::add_signed(double start, double slope, double length) {
   if (before * after < 0) {
     double from = 0;
     double to = length;
-    for (int i = 0; i < 60; ++i) {  // the quadratic formula cancels where slope is tiny
+    for (int i = 0; i < 60; ++i) {  // the quadratic formula cancels if the slope is tiny
       const double middle = (from + to) / 2;
       const double here = before + (start + slope * middle / 2) * middle;
       (here * before > 0 ? from : to) = middle;
@@ -72,7 +72,7 @@ GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& a
     gains.rate += std::abs(step + at_once) * period_s;
   };
   adjoint.input_kernel(after, input, add, [&](double kernel, double ratio) {
-    // What is left falls in proportion, and so does the way of the step to its limit.
+    // The rest decreases in proportion, and so does the distance of the step response from its limit.
     const double rate = gains.rate;
     const double amplitude = gains.amplitude;
     const double from = step;

@@ -1,5 +1,5 @@
-// Impulse responses without a delay: the state is (y, y', ..., y^(n-1)), so zeros of y and of its derivatives are
-// zeros of its coordinates, and the antiderivative that vanishes at infinity is a fixed combination of them.
+// Impulse responses without a delay: the state is (y, y', ..., y^(n-1)), so the zeros of y and of its derivatives are
+// zeros of its coordinates, and the antiderivative that vanishes at infinity is a fixed linear combination of them.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -15,13 +15,13 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// exp(-kGone): modes that have decayed this far are not looked at any more.
+/// Modes that have decayed to exp(-kGone) are ignored from then on.
 constexpr double kGone = 60;
-/// Longest stretch, in radians of the fastest mode that is left.
+/// Longest segment, in radians of the fastest remaining mode.
 constexpr double kResponseStretch = 0.25;
 constexpr int kResponseTaylorTerms = 20;
 
-/// In time units of 1/rate, rate being the largest modulus of a pole, so that all entries are of moderate size.
+/// Uses time units of 1/rate, with rate the largest modulus of a pole, so that all entries are of moderate size.
 class Chain {
  public:
   explicit Chain(const TransferFunction& y) {
@@ -57,7 +57,7 @@ class Chain {
   const VectorXd& initial() const { return initial_; }
   const std::vector<std::complex<double>>& sorted_poles() const { return poles_; }
 
-  /// int y over scaled time, the antiderivative that vanishes at infinity.
+  /// Returns int y over scaled time, the antiderivative that vanishes at infinity.
   double integral(const VectorXd& x) const {
     const Eigen::Index n = a_.size();
     double total = x[n - 1];
@@ -65,7 +65,7 @@ class Chain {
     return -total / a_[0];
   }
 
-  /// Taylor polynomial of y from state x; terms beyond the state follow from the differential equation.
+  /// Returns the Taylor polynomial of y from state x; terms beyond the state follow from the differential equation.
   Polynomial taylor(const VectorXd& x, int terms) const {
     const auto n = static_cast<std::size_t>(a_.size());
     Polynomial derivatives(static_cast<std::size_t>(terms));
@@ -96,7 +96,7 @@ class Chain {
     }
   }
 
-  /// exp(companion * duration) by Taylor series, duration at most about one.
+  /// Returns exp(companion * duration) by Taylor series, for a duration of at most about one.
   MatrixXd propagator(double duration) const {
     const Eigen::Index n = a_.size();
     MatrixXd companion = MatrixXd::Zero(n, n);
@@ -121,7 +121,7 @@ class Chain {
   VectorXd initial_;
 };
 
-/// Walks through the response in stretches that double in length as fast modes decay, halving where something happens.
+/// Traverses the response in segments whose length doubles as fast modes decay, halving them where sign changes occur.
 class Scan {
  public:
   explicit Scan(const Chain& chain)
@@ -160,8 +160,8 @@ class Scan {
     return four[1];
   }
 
-  /// Whether one real pole is all that is left: the response and its derivatives have no zeros any more, and sampling
-  /// on would only find those of rounding.
+  /// Whether only one real pole is left: the response and its derivatives then have no more zeros, and further sampling
+  /// would only find zeros due to round-off.
   bool is_lone_decay(double t) const {
     int left = 0;
     for (const std::complex<double>& pole : chain_.sorted_poles()) {
@@ -170,7 +170,7 @@ class Scan {
     return left == 1;
   }
 
-  /// Where one pair of complex poles is all that is left: what it keeps over half a cycle; else 0.
+  /// If only one pair of complex poles is left, returns the decay factor over half a cycle; else 0.
   double lone_oscillation(double t) const {
     const std::complex<double>* left = nullptr;
     for (const std::complex<double>& pole : chain_.sorted_poles()) {
@@ -182,7 +182,7 @@ class Scan {
     return std::exp(left->real() / left->imag() * std::acos(-1.0));
   }
 
-  /// Modulus of the fastest mode that is still there, in units of the fastest of all.
+  /// Returns the modulus of the fastest remaining mode, relative to the fastest of all.
   double active_rate(double t) const {
     double result = 0;
     for (const std::complex<double>& pole : chain_.sorted_poles()) {
@@ -214,7 +214,7 @@ std::vector<std::complex<double>> poles(const Polynomial& denominator) {
   const auto n = static_cast<Eigen::Index>(denominator.size()) - 1;
   std::vector<std::complex<double>> result;
   if (n < 1) return result;
-  // A time scale that makes the outer coefficients equal keeps the companion matrix balanced.
+  // A time scale that makes the first and last coefficients equal keeps the companion matrix balanced.
   const double scale = denominator[0] == 0 ? 1
                                            : std::pow(std::abs(denominator[0] / denominator.back()),
                                                       1 / static_cast<double>(n));
@@ -232,7 +232,7 @@ std::vector<std::complex<double>> poles(const Polynomial& denominator) {
 ResponseNorms rational_norms(const TransferFunction& y) {
   const Chain chain(y);
   ResponseNorms norms = Scan(chain).run();
-  const double rate = chain.rate();  // int dt shrinks by the rate, a derivative grows by it
+  const double rate = chain.rate();  // int dt is divided by the rate, a derivative is multiplied by it
   norms.integral /= rate;
   norms.integral_abs /= rate;
   norms.step_max_abs /= rate;

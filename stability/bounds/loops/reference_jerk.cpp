@@ -11,9 +11,9 @@
 namespace swarmcert::stability {
 namespace {
 
-/// int |C - H| to an output, a row over the state after control, `phase_s` after that control.
-/// @param moves_at_once whether a force acts on the output from that control to the moment looked at, as on e.
-/// @param with_own whether the command of the output's own period counts.
+/// Returns int |C - H| for an output, a row over the state after the control, `phase_s` after that control.
+/// @param moves_at_once whether a force acts on the output between that control and the output's time, as it does on e.
+/// @param with_own whether the command of the output's own period is included.
 double gain_to(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output, double phase_s,
                bool moves_at_once, bool with_own) {
   std::vector<double> commands;  // the newest first; one more than there are periods of the force's kernel

@@ -40,7 +40,7 @@ SampledAdjoint::SampledAdjoint(const SampledLoop& loop, Output output)
   for (Index i = 0; i < modes.size(); ++i) {
     if (i != slowest) next = std::max(next, std::abs(modes[i]));
   }
-  // Repeated modes, as those of a delay, take some periods more to fade.
+  // Repeated modes, such as those of a delay, take some more periods to decay.
   constexpr double kMore = 60;
   const double until_gone = 42 / -std::log(std::max(modulus, 1e-6)) + kMore;
   const double until_alone = next < modulus ? 42 / std::log(modulus / next) + kMore : 1e300;

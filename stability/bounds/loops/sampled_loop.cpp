@@ -20,7 +20,7 @@ using Eigen::RowVectorXd;
 constexpr std::array<double GainNorms::*, 4> kAllGains = {&GainNorms::rate, &GainNorms::amplitude,
                                                           &GainNorms::edge, &GainNorms::impulse};
 
-/// Gains to e at one phase of the period; per unit of acceleration or of the estimate's error.
+/// Gains to e at one phase of the period, per unit of acceleration or of the estimate's error.
 class PhaseGains {
  public:
   PhaseGains(const SampledLoop& loop, Channel channel) : adjoint_(loop) {
@@ -48,7 +48,7 @@ class PhaseGains {
   Eigen::VectorXd input_;  ///< added to the state after control, once per period; empty: a force
 };
 
-/// The largest value of one gain over the phases, from its values on a grid: golden section around the best.
+/// Returns the largest value of one gain over the phases: golden section around the best value on a grid.
 double refine(const PhaseGains& gains, double GainNorms::*which, const std::vector<GainNorms>& grid,
               double step_s) {
   std::size_t best = 0;
@@ -119,7 +119,7 @@ NoiseDeviation noise_deviation(const SampledLoop& loop, double position_m, doubl
   const double Ki = loop.plant.Ki;
   const MatrixXd map = without_unread(model.hold() * model.control(), model, Ki);
   if (!(largest_modulus(map) < 1)) return {kInfinity, kInfinity};
-  // Noise enters where the control reads e and e': the columns of control() less what is the state itself.
+  // Noise enters where the control reads e and e': the columns of control() minus the identity part of the state.
   MatrixXd read = model.control().leftCols(2);
   read(0, 0) -= 1;
   read(1, 1) -= 1;

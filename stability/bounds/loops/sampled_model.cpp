@@ -38,7 +38,7 @@ SampledModel::SampledModel(const SampledLoop& loop) : loop_(loop) {
 
   generator_ = MatrixXd::Zero(plant_ + 1, plant_ + 1);
   generator_(0, 1) = 1;
-  generator_(1, 2) = 1;  // the last lag's output, or the command itself where there is no lag
+  generator_(1, 2) = 1;  // the last lag's output, or the command itself without a lag
   for (Index i = 0; i < lags; ++i) {
     const double tau = lags_s[static_cast<std::size_t>(i)];
     generator_(2 + i, 2 + i) = -1 / tau;

@@ -16,8 +16,8 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-/// Cell lengths in radians of the fastest mode that is left: of the partition whose sums are reported (they differ by
-/// about kFine^2/8 of the gain), and of the one on which the worst direction is searched.
+/// Cell lengths in radians of the fastest remaining mode: kFine for the reported sums (they differ by about kFine^2/8
+/// of the gain), kCoarse for the search of the worst direction.
 constexpr double kFine = 0.0012;
 constexpr double kCoarse = 0.02;
 constexpr double kNegligibleExponent = 45;
@@ -76,7 +76,8 @@ Partition partition(const Matrix3d& Lambda, const Matrix3d& K, double mass_kg, d
     x = next;
     t_s += length_s;
   }
-  // |exp(-slowest t)| times a polynomial, e^-45 of the peak: far below rounding; the antiderivative bounds it in size.
+  // |exp(-slowest t)| times a polynomial, e^-45 of the peak: far below round-off. The antiderivative bounds its
+  // magnitude.
   result.tail = 10 * (antiderivative * x).norm();
   return result;
 }
@@ -115,9 +116,9 @@ void derivatives(const Partition& p, const Vector3d& eta, Vector3d& gradient, Ma
   }
 }
 
-/// Local maximum of J on the sphere near `eta`: in the tangent plane, Newton steps along directions that bend down and
-/// steps of the gradient along those that do not (yet); far away, the direction of the gradient, which never decreases
-/// the convex J.
+/// Local maximum of J on the sphere near `eta`: Newton steps in the tangent plane along directions of negative
+/// curvature, gradient steps along the others; far away, the direction of the gradient, which never decreases the
+/// convex J.
 Vector3d ascend(const Partition& p, Vector3d eta, int most_steps) {
   for (int i = 0; i < most_steps; ++i) {
     Vector3d gradient;
@@ -147,7 +148,8 @@ Vector3d ascend(const Partition& p, Vector3d eta, int most_steps) {
 
 /// Upper bound on J over all directions by the concavity of the square root; see the header.
 double concave_bound(const Partition& p, const Vector3d& eta) {
-  // With any w > 0 the bound holds; integrals from above by the trapezoid of exact node values with remainders.
+  // The bound holds for any w > 0; the integrals are bounded above by the trapezoidal rule on exact node values plus
+  // remainders.
   Matrix3d Q = Matrix3d::Zero();
   double total_w = 0;
   double floor = 0;
@@ -155,7 +157,7 @@ double concave_bound(const Partition& p, const Vector3d& eta) {
   floor *= 1e-9;  // keeps 1/w finite where H'eta vanishes
   for (std::size_t i = 0; i < p.length_s.size(); ++i) {
     const double w = std::max(((p.at_node[i] * eta).norm() + (p.at_node[i + 1] * eta).norm()) / 2, floor);
-    // |H'eta| on the cell lies below the chord plus the bend: integrate |H'eta|^2 exactly on the chord.
+    // |H'eta| on the cell is at most the chord plus its deviation: integrate |H'eta|^2 exactly on the chord.
     const Matrix3d& a = p.at_node[i];
     const Matrix3d& b = p.at_node[i + 1];
     Q += (a.transpose() * a + b.transpose() * b + (a + b).transpose() * (a + b)) * (p.length_s[i] / (6 * w));
@@ -177,7 +179,7 @@ struct Triangle {
   bool operator<(const Triangle& other) const { return bound < other.bound; }
 };
 
-/// Largest value on the unit sphere of the linear function through the corners: at least J on their cone.
+/// Largest value on the unit sphere of the linear function through the corners, which bounds J on their cone.
 Triangle make_triangle(const Corner& a, const Corner& b, const Corner& c) {
   Matrix3d corners;
   corners << a.eta.transpose(), b.eta.transpose(), c.eta.transpose();
@@ -185,7 +187,7 @@ Triangle make_triangle(const Corner& a, const Corner& b, const Corner& c) {
   return {{a, b, c}, gradient.norm()};
 }
 
-/// Covers half of the sphere (J is even) until the bound is within `gap` of `lower` or the budget is spent.
+/// Covers half of the sphere (J is even) until the bound is within `gap` of `lower` or the budget is exhausted.
 double sphere_bound(const Partition& p, double lower, double gap) {
   const auto corner = [&p](const Vector3d& direction) {
     const Vector3d eta = direction.normalized();
@@ -224,7 +226,7 @@ VectorGain vector_peak_gain(const Matrix3& Lambda, const Matrix3& K, double mass
   const Partition p = partition(L, gain, mass_kg, kFine);
   const Partition coarse = partition(L, gain, mass_kg, kCoarse);
 
-  // Starts: axes, diagonals between them, and the matrices' own directions.
+  // Starting points: axes, diagonals between them, and the eigenvectors of the matrices.
   std::vector<Vector3d> starts;
   for (int x = -1; x <= 1; ++x) {
     for (int y = -1; y <= 1; ++y) {

@@ -14,7 +14,7 @@ double integral_to(const Polynomial& p, double u) {
 
 bool changes_sign(double a, double b) { return (a < 0 && b > 0) || (a > 0 && b < 0); }
 
-/// The zero of p in (from, to), where p changes sign: bisection until the bracket has no double inside.
+/// Finds the zero of p in (from, to), where p changes sign: bisection until no double is left inside the bracket.
 double zero(const Polynomial& p, double from, double to) {
   const bool rises = value(p, from) < 0;
   for (int i = 0; i < 200; ++i) {
@@ -25,7 +25,7 @@ double zero(const Polynomial& p, double from, double to) {
   return from + (to - from) / 2;
 }
 
-/// Zeros of p in (0, length) with a change of sign, given those of its derivative.
+/// Returns the zeros of p in (0, length) at which the sign changes, given those of its derivative.
 std::vector<double> zeros(const Polynomial& p, double length, const std::vector<double>& extrema) {
   std::vector<double> result;
   double from = 0;

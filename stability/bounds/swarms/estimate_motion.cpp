@@ -8,18 +8,18 @@
 namespace swarmcert::stability {
 namespace {
 
-/// What is absent costs nothing, also where the gain is infinite; what is not known cannot be bounded.
+/// Returns size times gain; 0 if the size is 0, even if the gain is infinite, and infinite if the size is unknown.
 double known_times(double size, double gain) {
   return size == 0 ? 0 : std::isinf(size) ? kInfinity : size * gain;
 }
 
-/// Gains from an error of an estimate to e' and e'', of its amplitude and of its rate.
+/// Gains from an error of an estimate to e' and e'', for its amplitude and for its rate.
 struct MotionGains {
   double speed_by_amplitude = 0, speed_by_rate = 0;
   double acceleration_by_amplitude = 0, acceleration_by_rate = 0;
 };
 
-/// @param slope_at_once of the kernel's slope at t = 0, where the law acts without a lag.
+/// @param slope_at_once value of the kernel's slope at t = 0, if the law acts without a lag.
 MotionGains motion_gains(const ResponseNorms& kernel, double slope_at_once) {
   MotionGains gains;
   gains.speed_by_amplitude = kernel.variation;
@@ -64,7 +64,7 @@ OwnMotion estimate_motion(const AxisLoop& loop, const OtherErrors& errors) {
 
 OwnMotion force_motion(const AxisLoop& loop, const Disturbance& force, double bias_N) {
   OwnMotion motion;
-  EstimateError class_of;  // of a signal, whatever its unit
+  EstimateError class_of;  // of a signal, in any unit
   class_of.amplitude = std::min(force.amplitude_N, force.variation_per_pass ? kInfinity : force.variation_N);
   class_of.rate = force.rate_N_s;
   if (!class_of.is_zero()) {

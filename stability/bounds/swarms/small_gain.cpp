@@ -17,7 +17,7 @@ MatrixXd coupling_matrix(const std::vector<LoopGains>& loops, const std::vector<
   const auto n = static_cast<Index>(loops.size());
   MatrixXd Gamma = MatrixXd::Zero(n, n);
   for (const Coupling& c : couplings) {
-    // |v_rel| <= V + g1 (D_on + D_by): both vehicles' own loops turn rates into motion.
+    // |v_rel| <= V + g1 (D_on + D_by): the loops of both vehicles turn rates into motion.
     const auto gain = [&c](const LoopGains& loop) {
       return c.position_N_m * loop.velocity + c.velocity_N_s_m * loop.acceleration;
     };
@@ -27,11 +27,11 @@ MatrixXd coupling_matrix(const std::vector<LoopGains>& loops, const std::vector<
   return Gamma;
 }
 
-/// Collatz and Wielandt: for a nonnegative matrix and any positive x, max_i (Gx)_i/x_i bounds the spectral radius from
-/// above and, min_i, from below.
+/// Collatz-Wielandt bounds: for a nonnegative matrix and any positive x, max_i (Gx)_i/x_i is an upper bound on the
+/// spectral radius and min_i a lower bound.
 void enclose(const MatrixXd& Gamma, double& lower, double& upper) {
   const Index n = Gamma.rows();
-  // I + G has the same vector and converges where G alone would cycle; a little of everything keeps x positive.
+  // I + G has the same eigenvector and converges where iterating G alone would cycle; a floor keeps x positive.
   VectorXd x = VectorXd::Ones(n);
   for (int i = 0; i < 2000; ++i) {
     x = (x + Gamma * x).eval();
@@ -43,7 +43,7 @@ void enclose(const MatrixXd& Gamma, double& lower, double& upper) {
   lower = std::max(0.0, ratio.minCoeff() * (1 - 1e-14 * static_cast<double>(n)));
 }
 
-/// What the references' motion and the vehicles' own make of the couplings, per vehicle, N/s.
+/// Rates due to the motion of the references and the vehicles' own motion, through the couplings, per vehicle, N/s.
 VectorXd rates_from_outside(std::size_t vehicles, const std::vector<Coupling>& couplings,
                             const std::vector<OwnMotion>& own) {
   VectorXd b = VectorXd::Zero(static_cast<Index>(vehicles));
@@ -56,7 +56,7 @@ VectorXd rates_from_outside(std::size_t vehicles, const std::vector<Coupling>& c
       speed_m_s += motion.speed_m_s;
       acceleration_m_s2 += motion.acceleration_m_s2;
     }
-    // A coupling that is absent feels no motion, not even an unbounded one.
+    // A coupling of zero contributes nothing, even if the motion is unbounded.
     if (c.position_N_m > 0) b[c.on] += c.position_N_m * speed_m_s;
     if (c.velocity_N_s_m > 0) b[c.on] += c.velocity_N_s_m * acceleration_m_s2;
     b[c.on] += c.cross_rate_N_s;

@@ -9,7 +9,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// The lower vehicle's errors under the field.
+/// Tracking errors of the lower vehicle under the field.
 class LowerVehicle {
  public:
   LowerVehicle(const AxisLoop& loop, const GainNorms& gains, const SpacingVehicle& vehicle,
@@ -18,14 +18,14 @@ class LowerVehicle {
     if (std::isfinite(gains.amplitude)) pulse_ = std::min(pulse_gain(loop, Channel::kForce), 2 * gains.edge);
   }
 
-  /// For any motion below the field, however slow.
+  /// Error bound for any motion below the field, however slow.
   double stay_error_m(double force_N) const {
     const ClampBounds clamp = clamp_of(amplitude(force_N));
     return std::min(clamp.never_acts ? gains_.amplitude * force_N : kInfinity,
                     std::isinf(vehicle_.integrator_limit_m_s) ? kInfinity : clamp.by_amplitude);
   }
 
-  /// Largest force, held for ever, under which the bounds give at most max_error: the clamp acts for larger ones.
+  /// Largest permanent force under which the bounds give at most max_error; for larger forces the clamp acts.
   double tolerated_N() const {
     const auto is_fine = [&](double force_N) {
       const ClampBounds clamp = clamp_of(amplitude(force_N));
@@ -42,7 +42,8 @@ class LowerVehicle {
     return low;
   }
 
-  /// The slowest pass whose error is bounded by max_error: bisect, all bounds fall with speed. Infinite: none.
+  /// The slowest pass whose error is bounded by max_error, by bisection, since all bounds decrease with speed.
+  /// Infinite: none.
   double least_speed_m_s(double peak_N, double spread_m) const {
     const double impulse_at_1_m_s = peak_N * spread_m * std::sqrt(2 * std::acos(-1.0));
     const auto is_fine = [&](double speed_m_s) {
@@ -102,7 +103,8 @@ Spacing spacing(const AxisLoop& loop, const GainNorms& gains, const SpacingVehic
     SpacingRow row;
     const double share = question.steps > 1 ? static_cast<double>(i) / (question.steps - 1) : 0;
     row.height_gap_m = question.from_m + share * (question.to_m - question.from_m);
-    // Strongest anywhere within the error that is allowed: the force falls with the gap, the spread grows with it.
+    // Maximum of the field anywhere within the allowed error: the force decreases with the gap, the spread grows with
+    // it.
     const double nearest_gap_m = row.height_gap_m - question.max_error_m;
     const double factor = question.guard * question.neighbours;
     row.peak_force_N = factor * field.peak_N(std::max(nearest_gap_m, 0.0));
@@ -115,7 +117,7 @@ Spacing spacing(const AxisLoop& loop, const GainNorms& gains, const SpacingVehic
     if (row.may_stay) {
       result.least_gap_to_stay_m = std::min(result.least_gap_to_stay_m, row.height_gap_m);
     } else {
-      // Beyond the radius at which the field has fallen to what the bounds tolerate for ever.
+      // The radius at which the field has decreased to the force that the bounds tolerate permanently.
       const double tolerated_N = lower.tolerated_N();
       row.keep_out_radius_m =
           tolerated_N > 0 ? spread_m * std::sqrt(2 * std::max(0.0, std::log(row.peak_force_N / tolerated_N)))

@@ -14,7 +14,7 @@ using Eigen::VectorXd;
 constexpr std::size_t kMostCombined = 8;
 constexpr double kGrown = 1000;
 
-/// Per vehicle: int e, e, e', outputs of the lags (accelerations, the last acts).
+/// States per vehicle: int e, e, e', lag outputs (accelerations; the last one acts).
 MatrixXd swarm_matrix(const AxisLoop& loop, int vehicles, const std::vector<Coupling>& couplings,
                       const std::vector<int>& sign) {
   std::vector<double> lags_s;
@@ -24,7 +24,7 @@ MatrixXd swarm_matrix(const AxisLoop& loop, int vehicles, const std::vector<Coup
   const auto lags = static_cast<Index>(lags_s.size());
   const Index n = 3 + lags;
   MatrixXd A = MatrixXd::Zero(n * vehicles, n * vehicles);
-  // Where a commanded acceleration enters: the first lag, or e' itself.
+  // Index at which a commanded acceleration enters: the first lag, or e' itself.
   const Index command = lags > 0 ? n - 1 : 2;
   const double gain = lags > 0 ? 1 / lags_s.back() : 1;
   for (Index i = 0; i < vehicles; ++i) {
@@ -53,7 +53,7 @@ MatrixXd swarm_matrix(const AxisLoop& loop, int vehicles, const std::vector<Coup
   return A;
 }
 
-/// Largest |e| of any vehicle over that of one vehicle displaced at the start.
+/// Returns the largest |e| of any vehicle relative to the initial displacement of one vehicle.
 double replayed_growth(const MatrixXd& A, int vehicles, double seconds) {
   const double step_s = 0.1 / Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues().cwiseAbs().maxCoeff();
   const auto steps = static_cast<long>(std::min(seconds / step_s, 2e6));
@@ -95,7 +95,7 @@ std::optional<UnstableSwarm> find_unstable_swarm(const AxisLoop& loop, int vehic
     const double growth = Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues().real().maxCoeff();
     if (growth > worst.growth_1_s) worst.growth_1_s = growth, worst.sign = sign;
   }
-  // Slower growth is not told from rounding, nor worth the name.
+  // Slower growth cannot be distinguished from round-off and is not relevant in practice.
   if (!(worst.growth_1_s > 1e-3)) return std::nullopt;
   worst.is_declared =
       std::all_of(couplings.begin(), couplings.end(), [](const Coupling& c) { return c.direction != 0; });

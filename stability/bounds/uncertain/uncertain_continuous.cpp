@@ -1,34 +1,35 @@
-// How the gains of a continuous loop bend over a box of ratio r, lag tau and delay T.
+// Curvature of the gains of a continuous loop over a box of ratio r, lag tau and delay T.
 //
-// Small gain around the centre. Accelerations throughout: a is what the actuators give, f the force over the true mass,
-// e'' = a + f. With r now relative to the centre's, lag and delay (tau, T) and (tau0, T0) of the centre:
-//   a = r (1 + Delta_L)(1 + Delta_D) a0,  a0 what the centre's actuators would give for the same commands,
+// Small gain around the centre. All signals are accelerations: a is the output of the actuators, f the force divided by
+// the true mass, e'' = a + f. Let r be relative to the centre's ratio, (tau, T) lag and delay, and (tau0, T0) those of
+// the centre:
+//   a = r (1 + Delta_L)(1 + Delta_D) a0,  with a0 the output of the centre's actuators for the same commands,
 //   Delta_L = (tau0 - tau) s/(tau s + 1),  Delta_D = e^(-(T - T0)s) - 1.
-// Both are a derivative of something small: a - r a0 = r dw/dt with
-// |w|_oo <= W |a0|_oo, W = |tau - tau0| + |T - T0|. Besides, |Delta_L|_1 <= 2 |tau - tau0|/tau.
-// So the true loop is the centre's under the further force d = (r - 1) a0 + r dw/dt. All commutes: with M the
-// complementary response of the centre (from a force to -a0) and lambda the norm of d against its force, every gain is
-// at most the centre's over 1 - lambda, times |1 + Delta_L|_1 where the disturbance passes the actuators; so is M's and
-// that of its derivative, with r (1 + Delta_L) in front.
+// Both are derivatives of something small: a - r a0 = r dw/dt with
+// |w|_oo <= W |a0|_oo, W = |tau - tau0| + |T - T0|. Furthermore, |Delta_L|_1 <= 2 |tau - tau0|/tau.
+// Hence the true loop is the centre's loop with the additional force d = (r - 1) a0 + r dw/dt. All operators commute.
+// Let M be the complementary response of the centre (from a force to -a0) and lambda the norm of the map from the
+// centre's force to d. Then every gain is at most the centre's gain divided by 1 - lambda, times |1 + Delta_L|_1 if the
+// disturbance passes the actuators. The same holds for M and for its derivative, with r (1 + Delta_L) in front.
 //
 // Second derivatives. D = L s^3 + r F e^(-Ts), F = Kd s^2 + Kp s + Ki, M = r F e^(-Ts)/D, S = 1 - M, x = 1/(tau s + 1)
-// the motors' part of L, y = L/D (force) or 1/D (command, whose own delay norms do not see):
+// the motors' part of L, y = L/D (force) or 1/D (command, whose own delay does not affect norms):
 //   y_rr = 2/r^2 M^2 y,  (r y)_rr = -2/r^2 M S (r y),
 //   force:   y_tau = M (s x) y,   y_tautau = -2 (s x)^2 M S y;
 //   command: y_tau = -(s x) S y,  y_tautau = 2 (s x)^2 S^2 y,
 //   y_T = s M y,  y_TT = -s^2 M (1 - 2 M) y,
-// where |s x|_1 = 2/tau, |x|_1 = 1, and derivatives may be taken of y instead: |s y| is a gain again.
+// where |s x|_1 = 2/tau, |x|_1 = 1, and derivatives may be applied to y instead: |s y| is again a gain.
 #include "stability/bounds/uncertain/uncertain_part.h"
 
 namespace swarmcert::stability {
 namespace {
 
-/// What interpolation between both ends of a stretch misses, by a bound of the second derivative or of the first.
+/// Returns the interpolation error between two points, from a bound on the second derivative or on the first.
 double missed_between(double width, double second, double first) {
   return std::min(times(width * width / 8, second), times(width / 2, first));
 }
 
-/// M but for its delay, which norms do not see.
+/// Returns M without its delay, which does not affect norms.
 TransferFunction complementary_of(const AxisLoop& loop) {
   TransferFunction complementary = step_transfer(loop, Channel::kCommand);
   complementary.numerator = {loop.Ki, loop.Kp, loop.Kd};
@@ -39,7 +40,7 @@ TransferFunction complementary_of(const AxisLoop& loop) {
   return complementary;
 }
 
-/// Sets the bend of gain `k` over coordinate `j`: the relative one, or the absolute one where that is smaller.
+/// Sets the bend of gain `k` over coordinate `j`: the relative one, or the absolute one if that is smaller.
 void keep_smaller(PlantBends& bends, std::size_t k, std::size_t j, double relative, double absolute,
                   double at_centre) {
   const bool is_absolute = absolute < relative * at_centre;
@@ -66,7 +67,7 @@ PlantBends bends_over(const AxisLoop& fixed, Channel channel, const PlantBox& bo
       r * box.delay_change() * variation};
   const double lambda = bends.share[0] + bends.share[1] + bends.share[2];
   if (!(lambda < 1)) return bends;
-  // Of s y. The error after an impulse begins at rest, with a slope only.
+  // Gains of s y. The error after an impulse starts at zero with a nonzero slope.
   const ResponseNorms impulse = response_norms(impulse_transfer(loop, channel));
   const FourGains slope = {norms.amplitude, impulse.variation, norms.impulse, impulse.slope_max_abs};
   FourGains slope_over{};
@@ -100,7 +101,7 @@ PlantBends bends_over(const AxisLoop& fixed, Channel channel, const PlantBox& bo
     const double delay_absolute = missed_between(box.width(2), sM * (1 + 2 * M) * sy, M * sy);
     keep_smaller(bends, k, 2, delay_relative, delay_absolute, at_centre);
   }
-  // On the edge of least thrust absolute bends are those of r y.
+  // On the edge of least thrust, absolute bends refer to r y.
   if (box.edge == PlantEdge::kLeastThrust) {
     for (PlantPoint& absolute : bends.absolute) {
       for (double& bend : absolute) bend *= box.to[0];

@@ -11,10 +11,10 @@ namespace {
 struct BoundedPart {
   PlantBox box;
   FourGains upper{};                  ///< per unit of force
-  std::array<PlantPoint, 4> share{};  ///< what each dimension adds to the bound of each gain
+  std::array<PlantPoint, 4> share{};  ///< contribution of each dimension to the bound of each gain
 };
 
-/// Gains for 1 kg at a point, and how they bend over a box.
+/// Gains for 1 kg at a point, and bounds on their curvature over a box.
 struct UncertainFamily {
   std::function<GainNorms(const PlantPoint&)> at;
   std::function<PlantBends(const PlantBox&)> bends;
@@ -56,7 +56,7 @@ class Subdivision {
       PlantBox high = part.box;
       const double middle = part.box.centre()[i];
       if (!(low.from[i] < middle && middle < low.to[i]))
-        return finish(End::kBudget);  // as fine as doubles are
+        return finish(End::kBudget);  // at the resolution of doubles
       low.to[i] = high.from[i] = middle;
       part = bounded(low);
       parts_.push_back(bounded(high));
@@ -75,13 +75,13 @@ class Subdivision {
     return p;
   }
 
-  /// What gains per 1 kg are multiplied by.
+  /// Returns the factor that converts gains per 1 kg to gains per unit of force.
   double weight(PlantEdge edge, double ratio) const {
     return edge == PlantEdge::kLeastMass ? 1 / plant_.mass_kg.lower
                                          : ratio / (plant_.thrust_scale.lower * told_mass_kg_);
   }
 
-  /// The gains at a point, per unit of force; raises `lower`.
+  /// Returns the gains at a point, per unit of force; raises `lower`.
   FourGains evaluate(PlantEdge edge, const PlantPoint& p) {
     const auto [known, is_new] = norms_.try_emplace(p);
     if (is_new) {
@@ -116,7 +116,7 @@ class Subdivision {
     }
     ++result_.evaluations;
     const PlantBends bends = family_.bends(box);
-    // On the edge of least thrust bends are those of the gain times the ratio.
+    // On the edge of least thrust, bends refer to the gain times the ratio.
     const double unit = weight(box.edge, 1);
     for (std::size_t k = 0; k < 4; ++k) {
       double absolute = bends.between_samples[k] * weight(box.edge, box.to[0]);
@@ -126,7 +126,7 @@ class Subdivision {
         relative += bends.relative[k][i];
         part.share[k][i] = bends.absolute[k][i] * unit + times(bends.relative[k][i], most[k]);
       }
-      // Bends are bounds only where small gain has any; what is not a number bounds nothing.
+      // Bends are valid only where the small-gain bound exists; a NaN proves nothing.
       const double first_order = bends.first_order[k] * weight(box.edge, box.to[0]);
       const bool is_bent = std::isfinite(first_order) && relative < 1 && !std::isnan(absolute);
       part.upper[k] = is_bent ? std::min(first_order, (most[k] + absolute) / (1 - relative)) : kInfinity;
@@ -135,14 +135,14 @@ class Subdivision {
     return part;
   }
 
-  /// The part and gain that are farthest from what was reached; sets `upper`.
+  /// Finds the part and gain with the largest gap to the value attained; sets `upper`.
   Farthest find_farthest() {
     Farthest farthest;
     for (std::size_t k = 0; k < 4; ++k) gains_[k]->upper = gains_[k]->lower;
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       for (std::size_t k = 0; k < 4; ++k) {
         gains_[k]->upper = std::max(gains_[k]->upper, parts_[i].upper[k]);
-        if (std::isinf(gains_[k]->lower)) continue;  // nothing to prove: it is infinite
+        if (std::isinf(gains_[k]->lower)) continue;  // nothing to prove: the gain is infinite
         const double ratio = parts_[i].upper[k] / gains_[k]->lower;
         if (ratio > farthest.ratio) farthest = {i, k, ratio};
       }

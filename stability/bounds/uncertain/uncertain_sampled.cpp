@@ -1,26 +1,28 @@
-// How the gains of a sampled loop bend over a box of ratio r, lag tau and delay T.
+// Curvature of the gains of a sampled loop over a box of ratio r, lag tau and delay T.
 //
-// Operators on signals over time; what samples does not commute with what shifts. A = x A' e^(-Ts) the actuators,
-// x = 1/(tau s + 1), u the command, a = r A u, e'' = a + f. E: force to e; M: force to a; N = 1 + M: force to e''.
+// Operators act on signals over time; sampling does not commute with shifts. A = x A' e^(-Ts) the actuators, x = 1/(tau
+// s + 1), u the command, a = r A u, e'' = a + f. E: force to e; M: force to a; N = 1 + M: force to e''.
 //
-// Small gain around the centre, as in uncertain_continuous.cpp, a0 what the centre's actuators would give: the true
-// loop is the centre's under the further force d = eps a0 + r dw/dt, eps = r - 1, |w| <= W |a0|. With G the amplitude
-// gain (to e or a0) and V the gain from w (the total variation of the kernel), |a0| <= N_a/(1 - lambda),
-// lambda = eps G_a + r W V_a, and |e| <= N_e + (eps G_e + r W V_e) |a0|, N of the class; V over the box alike.
-// For ramps a0 is unbounded; but n = a0 + f/r is not: d = eps n - (eps/r) f + r dw_n/dt - (a disturbance below
-// W |f'|), so |n| <= (N_n/r + G_a W)/(1 - lambda), N_n the gain from f' to a0 + f, and
-// |e| <= N_e/r + (eps G_e + r W V_e) |n| + G_e W. From commands: a0 answers the command's error over r; or, for short
-// errors, the part of a0 that answers them is changed as above, the error itself passes the lag and the delay only:
-// what that changes is below W sup |kernel(v + h) - kernel(v)|/h at samples.
+// Small gain around the centre, as in uncertain_continuous.cpp, with a0 the output of the centre's actuators: the true
+// loop is the centre's loop with the additional force d = eps a0 + r dw/dt, eps = r - 1, |w| <= W |a0|. With G the
+// amplitude gain (to e or a0) and V the gain from w (the total variation of the kernel), |a0| <= N_a/(1 - lambda),
+// lambda = eps G_a + r W V_a, and |e| <= N_e + (eps G_e + r W V_e) |a0|, N the gains from the class; V over the box
+// likewise.
+// For ramps a0 is unbounded, but n = a0 + f/r is not: d = eps n - (eps/r) f + r dw_n/dt - (a disturbance below W |f'|),
+// so |n| <= (N_n/r + G_a W)/(1 - lambda), N_n the gain from f' to a0 + f, and |e| <= N_e/r + (eps G_e + r W V_e) |n| +
+// G_e W. For commands, a0 is the response to the command's error divided by r. For short errors, only the part of a0
+// that responds to them changes as above, and the error itself passes the lag and the delay only: this change is below
+// W sup |kernel(v + h) - kernel(v)|/h at samples.
 //
 // Second derivatives, from E_r = E M/r, M_r = N M/r, E_tau = -E (s x) M, M_tau = -N (s x) M, (s x)_tau = -(s x)^2, and
-// the same with s for s x in T (x and s commute with A, not with E and M):
+// the same with s in place of s x for T (x and s commute with A, but not with E and M):
 //   force:   E_rr = 2/r^2 E M M,    (r E)_rr = 2/r E N M,    E_tautau = 2 E (s x) N (s x) M,  E_TT = E s (1 + 2 M) s M;
 //   command: E A: the last M is M A in r, 2/r^2 E M (M A), (r E A)_rr = 2/r E M (N A), and N A in tau and T.
-// M f, N A c: the accelerations that answer the class; (s x) of them is x times their slope, |x|_1 = 1, |s x|_1 =
-// 2/tau; E s is V_e, N (s x) <= 2/tau + V_a. Of ramps only N f = n is bounded: E M M f = E M n - E n + E f, E N M f = E
-// M n. A short command error c: E s s A c is (E s A' c - E s A c)/tau, each below sup |kernel(v + h) - kernel(v)|/h.
-// Between samples |e| exceeds the larger of its neighbours by at most h^2/8 sup|a + f|.
+// M f and N A c are the accelerations in response to the class; (s x) of them is x times their slope, with |x|_1 = 1,
+// |s x|_1 = 2/tau; E s is V_e, N (s x) <= 2/tau + V_a. For ramps only N f = n is bounded: E M M f = E M n - E n + E f,
+// E N M f = E M n. For a short command error c: E s s A c is (E s A' c - E s A c)/tau, each below
+// sup |kernel(v + h) - kernel(v)|/h. Between samples |e| exceeds the larger of its neighbours by at most h^2/8 sup|a +
+// f|.
 #include <optional>
 #include <utility>
 #include <vector>
@@ -36,8 +38,8 @@ struct OutputGains {
   GainNorms force, command;
   double variation = 0;  ///< from w, where the force is dw/dt
   double change_of_pulse =
-      0;             ///< from a command of one period and area 1 that comes a second later, to first order
-  GainNorms answer;  ///< from commands, their own passing through not counted
+      0;             ///< first-order effect of delaying a command pulse of one period and area 1, per second
+  GainNorms answer;  ///< from commands, excluding their direct feedthrough
 };
 
 OutputGains output_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after, bool with_force,
@@ -73,17 +75,17 @@ GainNorms larger_of(GainNorms a, const GainNorms& b) {
 
 double toward(double near, double far, double share) { return near + share * std::max(0.0, far - near); }
 
-/// What the actuators give.
+/// The output of the actuators.
 struct Actuators {
   OutputGains a;                          ///< a0 at all times
   GainNorms slope;                        ///< of a0, from the channel's classes
   double slope_by_amplitude = kInfinity;  ///< of a0, per force
 };
 
-/// a0 at all times: on a period it is a convex combination of its value at the sample, of which at least 1 - share,
-/// with the other lags' outputs and the commands. Its slope is (input - a0)/tau; the difference moves from its value at
-/// the sample toward the slope of the input, a difference of the lag before or of commands; after a fresh command it is
-/// a convex combination of its differences from that.
+/// Bounds a0 at all times: within a period it is a convex combination of its value at the sample, with weight at least
+/// 1 - share, the other lags' outputs and the commands. Its slope is (input - a0)/tau; the difference moves from its
+/// value at the sample towards the slope of the input, a difference of the previous lag or of commands. After a new
+/// command it is a convex combination of its differences from that command.
 Actuators actuator_gains(const SampledLoop& loop, const SampledAdjoint& adjoint, Channel channel) {
   using Row = Eigen::RowVectorXd;
   const SampledModel& model = adjoint.model();
@@ -116,7 +118,7 @@ Actuators actuator_gains(const SampledLoop& loop, const SampledAdjoint& adjoint,
   near.change_of_pulse = commanded.change_of_pulse;
   result.a = near;
 
-  // From the first lag, which commands drive, to the last: of its input less its output.
+  // From the first lag, which the commands drive, to the last: gains to the lag's input minus its output.
   const auto gains_of = [&](const Row& after) {
     const OutputGains gains = output_gains(adjoint, after, false, channel);
     return std::pair(channel == Channel::kForce ? gains.force : gains.command, gains.force.amplitude);
@@ -145,7 +147,7 @@ Actuators actuator_gains(const SampledLoop& loop, const SampledAdjoint& adjoint,
   return result;
 }
 
-/// Bounds over a box around a centre, per 1 kg: what the small gain leaves of the centre's values.
+/// Bounds over a box around a centre, per 1 kg, from the small-gain argument and the centre's values.
 struct OverBox {
   double ge = 0, ga = 0;            ///< amplitude gains to e and a
   double ve = 0, va = 0;            ///< the same from w
@@ -157,11 +159,11 @@ struct OverBox {
   double of_ramp = 0;               ///< N f for ramps, or N A c
 };
 
-/// What the centre gives at all times, and what the small gain over the box makes of it.
+/// The centre's gains at all times, and the constants of the small-gain argument over the box.
 struct BoxTerms {
   Actuators actuators;
   OutputGains e;
-  double bend = 0;           ///< h^2/8: of the second derivative between samples
+  double bend = 0;           ///< h^2/8: factor of the second derivative between samples
   double n_rate = 0;         ///< N f for ramps
   double further = 0;        ///< of e, per sup of a0
   double lambda = 0;         ///< of a0, per sup of a0
@@ -169,12 +171,12 @@ struct BoxTerms {
   double inverse_ratio = 0;  ///< largest, times the centre's
   double lag_and_delay_s = 0;
   double delay_s = 0;                 ///< largest change
-  double slope_left = 0, of_sup = 0;  ///< slopes of a0: the delay acts through them
+  double slope_left = 0, of_sup = 0;  ///< slopes of a0, through which the delay acts
   bool has_slope = false;
 };
 
-/// e between samples as well: a force of variation 1 from rest stays below 1, and f moves less than |f'| (T0 + 2 h)
-/// until it acts.
+/// Includes e between samples: a force of total variation 1 from rest stays below 1, and f changes by less than |f'|
+/// (T0 + 2 h) until it acts.
 void add_bend(bool is_force, const SampledLoop& loop, BoxTerms& terms) {
   const double h = loop.period_s;
   const OutputGains& a = terms.actuators.a;
@@ -189,7 +191,7 @@ void add_bend(bool is_force, const SampledLoop& loop, BoxTerms& terms) {
   for (const auto gain : kUncertainGains) e.command.*gain += terms.bend * a.command.*gain;
 }
 
-/// Classes of the force. Sets what errors gain between samples, too.
+/// Handles classes of the force. Also sets the excess of errors between samples.
 void add_force_gains(const BoxTerms& t, OverBox& over, PlantBends& bends) {
   const OutputGains& a = t.actuators.a;
   for (std::size_t k = 1; k < 4; ++k) {
@@ -214,7 +216,7 @@ void add_force_gains(const BoxTerms& t, OverBox& over, PlantBends& bends) {
   bends.between_samples[0] = t.bend * over.of_ramp;
 }
 
-/// Classes of the command.
+/// Handles classes of the command.
 void add_command_gains(const BoxTerms& t, OverBox& over, PlantBends& bends) {
   const OutputGains& a = t.actuators.a;
   for (std::size_t k = 0; k < 4; ++k) {
@@ -236,7 +238,8 @@ void add_command_gains(const BoxTerms& t, OverBox& over, PlantBends& bends) {
   over.of_ramp = over.total[0];
 }
 
-/// Nothing where small gain gives none. Sets the shares of `bends`, and what errors gain between samples.
+/// Returns nothing if the small-gain argument gives no bound. Sets the shares of `bends`, and the excess of errors
+/// between samples.
 std::optional<OverBox> over_box(const SampledLoop& loop, Channel channel, const PlantBox& box,
                                 PlantBends& bends) {
   bends.share = {box.ratio_change(), loop.plant.Kd * box.lag_change(), loop.plant.Kd * box.delay_change()};
@@ -254,7 +257,7 @@ std::optional<OverBox> over_box(const SampledLoop& loop, Channel channel, const 
   const double eps = box.ratio_change();
   const double G_a = a.force.amplitude;
   const double G_e = e.force.amplitude;
-  // What the further force does to a0 and to e, per sup of a0.
+  // Effect of the additional force on a0 and e, per sup of a0.
   const auto of_lag = [&](double G, double V) {
     return r * std::min(times(box.lag_change(), V), times(box.lag_ratio(), G));
   };
@@ -301,7 +304,7 @@ PlantBends bends_over(const SampledLoop& fixed, Channel channel, const PlantBox&
   const bool at_least_mass = box.edge == PlantEdge::kLeastMass;
   const double sx = box.from[1] > 0 ? 2 / box.from[1] : kInfinity;
   const double e_sx = std::min(ve, sx * ge);
-  // On the edge of least thrust bends are those of the gain times the ratio.
+  // On the edge of least thrust, bends refer to the gain times the ratio.
   const double by = at_least_mass ? 1 : box.to[0];
   for (std::size_t k = 0; k < 4; ++k) {
     const double z = answer[k];
