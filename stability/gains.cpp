@@ -14,8 +14,8 @@ using files::TomlTable;
 
 constexpr char kSchema[] = "swarmcert/gains/1";
 
-/// Bounds of numbers that a loop of a multirotor can have, far beyond any that flies. A position loop whose poles lie
-/// at 1000 1/s has Kp = 3e6, Kd = 3e3 and Ki = 1e9; rates beyond 100 kHz and below 1 Hz are periods or other units.
+/// Limits for the numbers of a multirotor's loop, far beyond those in use. A position loop with poles at 1000 1/s has
+/// Kp = 3e6, Kd = 3e3 and Ki = 1e9; rates beyond 100 kHz or below 1 Hz are periods or in other units.
 constexpr double kLargestAttitudeGain = 1e4;
 constexpr double kLargestKp_1_s2 = 1e7, kLargestKd_1_s = 1e5, kLargestKi_1_s3 = 1e10;
 constexpr double kLargestLambda_1_s = 1e3, kLargestK_kg_s = 1e5;
@@ -46,7 +46,7 @@ double positive(const TomlTable& table, const std::string& key) {
   return value;
 }
 
-/// Refuses a size that no loop has: overflow, or a number in another unit.
+/// Rejects implausible magnitudes: overflow, or a number in another unit.
 void check_size(const TomlTable& table, const std::string& key, double value, double largest,
                 const std::string& unit) {
   if (std::abs(value) > largest) {
@@ -56,7 +56,7 @@ void check_size(const TomlTable& table, const std::string& key, double value, do
   }
 }
 
-/// A rate of a loop, in hertz.
+/// Reads the rate of a loop, in hertz.
 double loop_rate_hz(const TomlTable& table) {
   const double value = positive(table, "rate_hz");
   if (value > kLargestRate_hz) {
@@ -72,7 +72,7 @@ double loop_rate_hz(const TomlTable& table) {
   return value;
 }
 
-/// A time of the loop. None that flies is longer than a second: longer ones were written in milliseconds.
+/// Checks a time constant of the loop. None in use is longer than a second; longer ones were written in milliseconds.
 double seconds(const TomlTable& table, const std::string& key, double value) {
   constexpr double kLongest_s = 1;
   if (value > kLongest_s) {
@@ -82,7 +82,7 @@ double seconds(const TomlTable& table, const std::string& key, double value) {
   return value;
 }
 
-/// Three numbers, or one that stands for all axes; none negative.
+/// Reads three numbers, or one for all axes; none negative.
 PerAxis per_axis(const TomlTable& table, const std::string& key, bool may_be_zero, double largest,
                  const std::string& unit) {
   PerAxis result{};
@@ -105,7 +105,7 @@ PerAxis per_axis(const TomlTable& table, const std::string& key, bool may_be_zer
   return result;
 }
 
-/// A matrix of three rows, three numbers for the diagonal, or one number for a multiple of the identity.
+/// Reads a matrix: three rows, three numbers for the diagonal, or one number for a multiple of the identity.
 Matrix3 read_matrix(const TomlTable& table, const std::string& key) {
   Matrix3 result{};
   if (!table.is_list(key)) {

@@ -26,7 +26,7 @@ double positive(const TomlTable& table, const std::string& key) {
   return value;
 }
 
-/// A rate of a sensor. None of a multirotor is above 100 kHz.
+/// Reads the rate of a sensor. No sensor of a multirotor exceeds 100 kHz.
 double rate_hz(const TomlTable& table, const std::string& key) {
   constexpr double kHighest_hz = 1e5;
   const double value = positive(table, key);
@@ -52,7 +52,7 @@ Interval interval(const TomlTable& table, const std::string& key) {
   return {numbers[0], numbers[1]};
 }
 
-/// The range of the battery that the file states, else that of one cell.
+/// Returns the battery range in the file, or else that of one cell.
 Interval battery_range(const TomlTable& vehicle) {
   constexpr double kHighest_V = 1000;
   if (!vehicle.has("battery_range_V")) return kOneCell_V;
@@ -75,7 +75,7 @@ RotorPlace read_rotor(const TomlTable& table) {
   return {position[0], position[1], position[2], table.choice("spin", {"ccw", "cw"}) == 0};
 }
 
-/// rotors and, from them, arm_m; without rotors, arm_m of four in X.
+/// Reads rotors and computes arm_m from them; without rotors, reads arm_m of four in X.
 void read_rotors(const TomlTable& vehicle, Model* model) {
   if (!vehicle.has("rotors")) {
     model->arm_m = positive(vehicle, "arm_m");
@@ -90,7 +90,7 @@ void read_rotors(const TomlTable& vehicle, Model* model) {
     vehicle.refuse("rotors", fmt::format("{} rotors", count),
                    fmt::format("must be {} to {} rotors", kFewestRotors, kMostRotors));
   }
-  // Rotors on one line through the centre of mass cannot hold an attitude.
+  // Rotors on one line through the centre of mass cannot control the attitude.
   double xx = 0, xy = 0, yy = 0;
   for (const RotorPlace& rotor : model->rotors) {
     model->arm_m += std::hypot(rotor.x_m, rotor.y_m) / static_cast<double>(count);
@@ -102,7 +102,7 @@ void read_rotors(const TomlTable& vehicle, Model* model) {
     vehicle.refuse("rotors", "", "lie on one line: roll and pitch cannot both be controlled");
 }
 
-/// The polynomial of the load cell or, for other vehicles, the curve in newton.
+/// Reads the load cell's polynomial or, for other vehicles, the thrust curve in newton.
 void read_thrust(const TomlTable& vehicle, Model* model) {
   if (!vehicle.has("thrust_curve")) {
     const TomlTable thrust = vehicle.table("thrust");
@@ -196,7 +196,7 @@ FitProvenance read_fit(const TomlTable& table) {
   return fit;
 }
 
-/// Names and bounds of the parameters that `spec` states.
+/// Checks names and bounds of the parameters that `spec` states.
 void check_parameters(const TomlTable& effect, const EffectSpec& spec, const EffectInfo& info) {
   if (!effect.has("parameters")) return;
   const TomlTable table = effect.table("parameters");

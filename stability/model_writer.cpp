@@ -6,14 +6,15 @@
 namespace swarmcert::stability {
 namespace {
 
-/// Shortest text that reads back as the same double, always with a point or an exponent, as TOML wants floats.
+/// Returns the shortest text that reads back as the same double, with a point or an exponent, as TOML requires for
+/// floats.
 std::string number(double value) {
   std::string text = fmt::format("{}", value);
   if (text.find_first_of(".en") == std::string::npos) text += ".0";
   return text;
 }
 
-/// A TOML basic string.
+/// Returns a TOML basic string.
 std::string quoted(const std::string& text) {
   std::string result = "\"";
   for (const char c : text) {
@@ -29,7 +30,7 @@ std::string quoted(const std::string& text) {
   return result + '"';
 }
 
-/// A key: bare where TOML allows it.
+/// Returns a key, without quotes where TOML allows it.
 std::string key(const std::string& name) {
   const bool bare = !name.empty() && name.find_first_not_of(
                                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"

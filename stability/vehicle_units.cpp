@@ -8,7 +8,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// Largest distance from the centre to a rotor that is taken as metres.
+/// Largest distance from the centre to a rotor that is plausible in metres.
 constexpr double kLongestArm_m = 5;
 /// Largest ratio of thrust to weight; racing multirotors reach about 15.
 constexpr double kLargestThrustToWeight = 30;
@@ -17,14 +17,14 @@ double largest_J(const Model& model) {
   return *std::max_element(model.inertia_kg_m2.begin(), model.inertia_kg_m2.end());
 }
 
-/// Radius of gyration over the arm: 0.6 for the Crazyflie 2.1, never far from 1 where rotors and body are one craft.
+/// Radius of gyration over the arm: 0.6 for the Crazyflie 2.1, never far from 1 if rotors and body are one craft.
 double gyration_to_arm(const Model& model, double mass_kg) {
   return std::sqrt(largest_J(model) / mass_kg) / model.arm_m;
 }
 
 bool fits_arm(double gyration_to_arm) { return gyration_to_arm > 0.05 && gyration_to_arm < 10; }
 
-/// Where the rotors do not lift the vehicle: the mass if it is one in gram, else the thrust map.
+/// If the rotors cannot lift the vehicle, rejects the mass if it is plausible in gram, else the thrust map.
 void check_lift(const files::TomlTable& vehicle, const Model& model) {
   const double lift_N = model.largest_thrust_N(kFullBattery_V);
   const std::string rotors = fmt::format("{} rotors", model.num_rotors());
@@ -78,7 +78,8 @@ void check_inertia(const files::TomlTable& vehicle, const Model& model) {
     vehicle.refuse("inertia_kg_m2", fmt::format("{:g}", value), problem,
                    "inertia is in kg m^2 and arm_m, from the centre to a rotor, in m: 1 g cm^2 is 1e-7");
   };
-  // A rigid body's largest is at most the sum of the others; measured ones may miss that by their errors.
+  // The largest moment of a rigid body is at most the sum of the other two; measured ones may exceed it by their
+  // errors.
   if (J[2] > 2 * (J[0] + J[1])) refuse(J[2], "is more than twice the other two together");
   if (fits_arm(gyration_to_arm(model, model.mass_kg))) return;
   refuse(J[2], fmt::format("means that the mass lies {:.3g} m from the axis, and the rotors are at {:g} m",

@@ -80,7 +80,7 @@ SampledWitness parse_sampled(const Json& entry) {
   return loop;
 }
 
-/// What the bounds depend on: all of the entry but its axis and its claims.
+/// Returns the text of an entry that determines its bounds: everything except axis and claims.
 std::string witness_text(Json entry) {
   entry.erase("axis");
   entry.erase("gains");
@@ -103,7 +103,7 @@ bool check_gain(const Json& gains, const std::string& name, const std::optional<
   return true;
 }
 
-/// @returns how many numbers are claimed.
+/// @returns the number of claimed numbers.
 int check_gains(const Json& gains, const GainBounds& proved) {
   files::require_keys(
       gains, {"rate", "rate_hex", "amplitude", "amplitude_hex", "edge", "edge_hex", "impulse", "impulse_hex"},
@@ -119,7 +119,7 @@ int check_gains(const Json& gains, const GainBounds& proved) {
 void check_loops(const Json& loops, TrackingVerdict& verdict) {
   demand_field(loops.is_array() && loops.size() <= 12, "loops are more than 12");
   std::set<std::string> seen;
-  std::map<std::string, GainBounds> known;  // axes that are the same are computed once
+  std::map<std::string, GainBounds> known;  // identical axes are computed once
   for (const Json& entry : loops) {
     const LoopWitness loop = parse_loop(entry);
     demand_field(seen.insert(entry["axis"].get<std::string>() + " " + loop.input).second,

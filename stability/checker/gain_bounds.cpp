@@ -43,14 +43,14 @@ void check_ranges(const LoopWitness& loop) {
   demand(is_usual(loop.decay), "decay is out of range");
 }
 
-/// y = numerator/denominator, and everything that follows from them and from P exactly.
+/// y = numerator/denominator, and the exact quantities that follow from it and P.
 struct System {
   Square A, P;
   Row initial;
-  Row rest_initial;  ///< of what the expansion of the delay leaves, behind its derivatives; empty without a delay
-  Rational rest_jump;       ///< its jump at 0
+  Row rest_initial;    ///< of the delay expansion's remainder, before its derivatives; empty without a delay
+  Rational rest_jump;  ///< its jump at 0
   Rational rest_weight;     ///< T^(k+1)/(k+1)!
-  Rational settled;         ///< what the integral of y tends to, in units of time
+  Rational settled;         ///< limit of the integral of y, in units of time
   std::array<Row, 5> rows;  ///< integral of y less `settled`, y, y', y'', y'''
 };
 
@@ -71,7 +71,7 @@ Row numerator_of(const LoopWitness& loop, const Row& lag) {
   return result;
 }
 
-/// The state at 0+, by division of the series in 1/s.
+/// Returns the state at 0+, by series division in 1/s.
 /// @param a `denominator` divided by its last coefficient, in units of time of 2^-time_exponent s.
 Row initial_state(const Row& numerator, const Row& denominator, const Row& a, long time_exponent) {
   const std::size_t n = a.size() - 1;
@@ -120,7 +120,7 @@ System system_of(const LoopWitness& loop) {
   system.P = exact_form(loop.P, n);
   system.initial = initial_state(numerator, denominator, a, loop.time_exponent);
   if (loop.delay_s > 0) {
-    Row rest(n + 1);  // s^(k+1) feedback, less its multiple of the denominator
+    Row rest(n + 1);  // s^(k+1) feedback, less a multiple of the denominator
     for (std::size_t k = 0; k < feedback.size(); ++k)
       rest[k + static_cast<std::size_t>(loop.delay_order) + 1] = feedback[k];
     system.rest_jump = rest[n] / denominator[n];
@@ -176,7 +176,7 @@ class Trajectory {
       }
     }
     factorial *= kTerms + 1;
-    // The terms left out are at most 2^-25/25! (1 + 1/2 + ...); rounding takes less than a unit per entry.
+    // The omitted terms are at most 2^-25/25! (1 + 1/2 + ...); the round-off error is below one unit per entry.
     missed_ = ceil_fixed(two_to(-kTerms) / Rational(factorial)) + static_cast<long>(n_);
     for (const Row& row : total) {
       for (const Rational& x : row) step_.push_back(floor_fixed(x));
@@ -204,9 +204,9 @@ class Trajectory {
   }
 
   std::vector<Integer> state;
-  Integer error;    ///< at least |true state - state|_P
+  Integer error;    ///< upper bound on |true state - state|_P
   Integer largest;  ///< max |state_i|
-  Integer size;     ///< at least |true state|_P
+  Integer size;     ///< upper bound on |true state|_P
 
  private:
   void measure() {
@@ -223,20 +223,20 @@ class Trajectory {
 
   std::size_t n_;
   std::vector<Integer> step_, P_;
-  Integer missed_;        ///< at least |exp(A cell) - step|_oo
+  Integer missed_;        ///< upper bound on |exp(A cell) - step|_oo
   Integer from_largest_;  ///< |u|_P <= this times |u|_oo
 };
 
 /// A linear form of the state.
 struct Form {
   std::vector<Integer> row;
-  Integer norm;  ///< at least sqrt(r P^-1 r')
+  Integer norm;  ///< upper bound on sqrt(r P^-1 r')
 
   Form(const Row& exact, const Square& P) {
     for (const Rational& x : exact) row.push_back(floor_fixed(x));
     norm = fixed_root_up(*inverse_form(P, exact));
   }
-  /// At least |offset + r x|, for the true state x.
+  /// Returns an upper bound on |offset + r x|, for the true state x.
   Integer above(const Trajectory& at, const Integer& offset) const {
     Integer sum = offset << kBits;
     for (std::size_t i = 0; i < row.size(); ++i) sum += row[i] * at.state[i];
@@ -245,7 +245,7 @@ struct Form {
   }
 };
 
-/// Integral and supremum of |offset + r x|, cell by cell.
+/// Accumulates the integral and supremum of |offset + r x|, cell by cell.
 class Norms {
  public:
   Norms(const System& system, std::size_t row, const Rational& offset, int step_exponent)
@@ -271,7 +271,7 @@ class Norms {
     const Integer tail = abs(offset_) + 1 + times_up(value_.norm, end.size);
     return Rational(std::max(supremum_, tail)) * two_to(-static_cast<long>(kBits));
   }
-  /// For offset 0.
+  /// For an offset of 0.
   Rational integral(const Trajectory& end, double decay) const {
     const Rational cell = two_to(-static_cast<long>(cell_));
     const Rational cells = cell / 2 * ends_ + cell * cell * cell / 12 * curvatures_;
@@ -286,7 +286,7 @@ class Norms {
   Integer before_, curvature_, ends_, curvatures_, supremum_;
 };
 
-/// At least the part of a response that the expansion of the delay may miss.
+/// Returns an upper bound on the relative error that the expansion of the delay may cause in a response.
 Rational missed_by_expansion(const System& system, const LoopWitness& loop) {
   if (loop.delay_s == 0) return 0;
   Trajectory at(system, system.rest_initial, loop.step_exponent);

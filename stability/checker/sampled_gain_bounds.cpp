@@ -23,7 +23,7 @@ void check_witness(const SampledWitness& loop) {
   demand(loop.contraction >= 0x1p-10 && loop.contraction <= 1 - 0x1p-40, "contraction is out of range");
 }
 
-/// A row that goes back period by period.
+/// A row that is propagated backwards, period by period.
 class Backwards {
  public:
   Backwards(const PeriodMap& map, const Row& row) : map_(map), next_(map.n) {
@@ -45,9 +45,9 @@ class Backwards {
   }
 
   std::vector<Integer> state;
-  Integer error;    ///< at least |true row - state|
+  Integer error;    ///< upper bound on |true row - state|
   Integer largest;  ///< max |state_i|
-  Integer size;     ///< at least |true row|
+  Integer size;     ///< upper bound on |true row|
 
  private:
   void measure() {
@@ -66,11 +66,11 @@ class Backwards {
   std::vector<Integer> next_;
 };
 
-/// A column that rows are multiplied with.
+/// A column with which rows are multiplied.
 struct Column {
   std::vector<Integer> at;
   Integer norm;  ///< |r at| <= norm |r|
-  Integer off;   ///< the true column differs from `at` by at most this in that sense
+  Integer off;   ///< the true column differs from `at` by at most this, in the same sense
   Integer most;  ///< norm + off
 
   Column() = default;
@@ -90,7 +90,7 @@ struct Column {
     }
     *this = Column(map, std::move(middle), std::move(unknown));
   }
-  /// At least |offset - r c| for the true row r and column c.
+  /// Returns an upper bound on |offset - r c| for the true row r and column c.
   Integer above(const Backwards& row, const Integer& offset) const {
     Integer sum = offset << kBits;
     for (std::size_t i = 0; i < at.size(); ++i) sum -= at[i] * row.state[i];
@@ -98,8 +98,8 @@ struct Column {
   }
 };
 
-/// x = (I - M)^-1 b: r x is the sum of r b over this period and all before. What the residual of a computed x leaves is
-/// summed up by the contraction.
+/// Computes x = (I - M)^-1 b: r x is the sum of r b over this period and all before. The residual of the computed x,
+/// summed by the contraction, bounds its error.
 Column summed(const PeriodMap& map, const FixedRangeRow& b) {
   const std::size_t n = map.n;
   Square left(n, Row(n + 1));
@@ -130,10 +130,10 @@ Column summed(const PeriodMap& map, const FixedRangeRow& b) {
   return {map, std::move(x), ceil_fixed(as_fraction(wrong) / map.gap)};
 }
 
-/// Gains of one output to one input, in fixed point until `bounds`.
+/// Gains of one output from one input, in fixed point until `bounds`.
 class Sums {
  public:
-  /// @param own what the input of the output's own period adds; @param limit what a constant input leaves.
+  /// @param own contribution of the input in the output's own period; @param limit response to a constant input.
   Sums(const PeriodMap& map, const Rational& period_s, const FixedRangeRow& effect, const Rational& own,
        const Rational& limit)
       : period_(period_s),
@@ -168,7 +168,7 @@ class Sums {
   Integer own_, effects_, lefts_, highest_, highest_effect_;
 };
 
-/// The same for a force, which acts at all times: k(u) = r_2 + r_1 u on each period.
+/// The same for a force, which acts continuously: k(u) = r_2 + r_1 u on each period.
 class ForceSums {
  public:
   ForceSums(const PeriodMap& map, const Rational& period_s, const Rational& limit)
@@ -181,7 +181,7 @@ class ForceSums {
         rest_(summed(map, column(map, period_s * period_s / 2, period_s))) {}
 
   void begin(const Backwards& row) { left_ = rest_.above(row, limit_fixed_); }
-  /// Of the period before the row; add() then has the row one period before.
+  /// Handles the period before the row; add() then takes the row one period earlier.
   void prepare(const Backwards& row) {
     const Integer late = late_.above(row, 0), early = early_.above(row, 0);
     ends_ += late + early;
@@ -213,7 +213,7 @@ class ForceSums {
   }
 
  private:
-  /// What a position and a speed at the end of a period come to.
+  /// Returns the response to a position and a velocity at the end of a period.
   static FixedRangeRow column(const PeriodMap& map, const Rational& position, const Rational& speed) {
     FixedRangeRow result(map.n);
     result[0] = FixedRange(position), result[1] = FixedRange(speed);
@@ -229,7 +229,8 @@ class ForceSums {
 constexpr std::size_t kForce = 0, kInputs = 4;  // force, command, velocity, position
 using AllGains = std::array<GainBounds, kInputs>;
 
-/// Of one output, a row over the state before a control; `own`: what the inputs of that control add to it.
+/// Returns the gains of one output, a row over the state before a control; `own`: direct contribution of that control's
+/// inputs.
 AllGains gains_of(const SampledWitness& loop, const PeriodMap& map, const Row& output,
                   const std::array<FixedRangeRow, kInputs>& effects, const Row& own, const Row& limits) {
   const Rational period = loop.period_s;
@@ -250,7 +251,7 @@ AllGains gains_of(const SampledWitness& loop, const PeriodMap& map, const Row& o
   return gains;
 }
 
-/// Adds what lies between the sampling times. In units of the acceleration that the input is.
+/// Adds the excess between the sampling times, in units of the input's acceleration.
 void include_times_between(const SampledWitness& loop, const AllGains& command, AllGains& error) {
   const Rational period = loop.period_s, bend = period * period / 8;
   Rational age = Rational(loop.delay_s) + period;
@@ -260,10 +261,10 @@ void include_times_between(const SampledWitness& loop, const AllGains& command, 
     const Rational amplitude = command[i].amplitude + (is_force ? 1 : 0);
     if (error[i].rate) *error[i].rate += bend * (*command[i].rate + (is_force ? age : Rational(0)));
     error[i].amplitude += bend * amplitude;
-    error[i].edge += bend * amplitude;  // an input of variation 1 from zero stays below 1
+    error[i].edge += bend * amplitude;  // an input of total variation 1 from zero stays below 1
     error[i].impulse += bend * command[i].impulse;
   }
-  // An impulse since the last sampling time has changed the speed by its size, and no command yet.
+  // An impulse since the last sampling time has changed the velocity by its size, but no command yet.
   error[kForce].impulse = std::max(error[kForce].impulse, period);
 }
 
@@ -296,7 +297,7 @@ SampledGainBounds sampled_upper_gains(const SampledWitness& loop) {
   const Square control = control_of(loop, at);
   const PeriodMap map(loop, period_ranges(hold, control));
 
-  // What each input adds to the state after control.
+  // Contributions of each input to the state after the control.
   std::array<Row, kInputs> inputs;
   inputs.fill(Row(at.size() + 1));
   inputs[1][at.command] = 1;
@@ -320,9 +321,9 @@ SampledGainBounds sampled_upper_gains(const SampledWitness& loop) {
     limits[0] = limits[1] = 1 / Rational(loop.Kp);
     limits[2] = -Rational(loop.Kd) / Rational(loop.Kp);
   }
-  limits[3] = -1;  // a wrong position is followed
+  limits[3] = -1;  // the vehicle follows a wrong position
   AllGains gains = gains_of(loop, map, error, effects, nothing, limits);
-  // In the end every command, with the force, comes to nothing.
+  // In the long run, every command plus the force tends to zero.
   include_times_between(loop, gains_of(loop, map, control[at.command], effects, own, nothing), gains);
   return {per_newton(gains[0], loop.mass_kg), per_newton(gains[1], loop.mass_kg), gains[2], gains[3]};
 }

@@ -9,7 +9,7 @@ namespace {
 constexpr int kMostPast = 8;
 constexpr int kMostHalvings = 12;
 constexpr int kTaylorTerms = 24;
-constexpr long kMarginExponent = -60;  ///< of the contraction, for what M is not known exactly
+constexpr long kMarginExponent = -60;  ///< of the contraction, as M is not known exactly
 
 FixedRanges zeros(std::size_t rows, std::size_t columns) { return FixedRanges(rows, FixedRangeRow(columns)); }
 
@@ -24,7 +24,7 @@ FixedRanges product(const FixedRanges& a, const FixedRanges& b) {
   return result;
 }
 
-/// exp(generator t): the Taylor sum of the 2^k-th part, whose rows sum to at most 1/2, squared k times.
+/// Returns exp(generator t): the Taylor sum of the 2^k-th part, whose row sums are at most 1/2, squared k times.
 FixedRanges exponential(const Square& generator, const Rational& t) {
   const std::size_t n = generator.size();
   Rational largest;
@@ -49,7 +49,7 @@ FixedRanges exponential(const Square& generator, const Rational& t) {
     term = product(term, scaled);
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = 0; j < n; ++j) {
-        FixedRange quotient;  // by the factorial, so that no division adds up
+        FixedRange quotient;  // by the factorial, so that division errors do not accumulate
         mpz_fdiv_q(quotient.lower.get_mpz_t(), term[i][j].lower.get_mpz_t(), factorial.get_mpz_t());
         mpz_cdiv_q(quotient.upper.get_mpz_t(), term[i][j].upper.get_mpz_t(), factorial.get_mpz_t());
         total[i][j].add(quotient);

@@ -24,20 +24,20 @@ Eigen::Vector3d random_direction(files::Random& random) {
   return {r * std::cos(angle), r * std::sin(angle), z};
 }
 
-/// Adds a piece to a disturbance.
+/// Adds a segment to a disturbance.
 void append(RateDisturbance* disturbance, double until_s, const Eigen::Vector3d& rate) {
   disturbance->until_s.push_back(until_s);
   disturbance->rate_W_N_s.push_back(rate);
 }
 
-/// Directions in which the loop may be weakest: the axes, then at random.
+/// Candidate directions for the worst case: the axes, then random ones.
 Eigen::Vector3d direction(int index, files::Random& random) {
   return index < 3 ? Eigen::Vector3d(Eigen::Vector3d::Unit(index)) : random_direction(random);
 }
 
-/// The input that drives the linear loop farthest along `eta` at the end: rate(T - t) = -g(t) / |g(t)| with the kernel
-/// g(t) from rate to eta' p~. By duality z' = A' z, z(0) = eta in p~, and g is the integral of B' z, as the rate is
-/// integrated once before it acts.
+/// Returns the input that drives the linear loop farthest along `eta` at the end: rate(T - t) = -g(t) / |g(t)| with the
+/// kernel g(t) from rate to eta' p~. By duality z' = A' z, z(0) = eta in p~, and g is the integral of B' z, since the
+/// rate is integrated once before it acts.
 RateDisturbance worst_linear(const IssJudge& judge, const Eigen::Vector3d& eta) {
   const auto a = judge.loop().matrix();
   PositionLoop::State z = PositionLoop::State::Zero();
@@ -66,7 +66,7 @@ RateDisturbance worst_linear(const IssJudge& judge, const Eigen::Vector3d& eta) 
   return disturbance;
 }
 
-/// Switches at random times between +u and -u, or among random vectors of at most d_m.
+/// Switches at random times between +u and -u, or between random vectors of magnitude at most d_m.
 RateDisturbance random_pieces(const IssJudge& judge, bool bang_bang, files::Random& random) {
   RateDisturbance disturbance;
   const Eigen::Vector3d axis = random_direction(random);
@@ -116,7 +116,7 @@ IssRun make_run(const IssJudge& judge, int index, std::uint64_t seed) {
   return run;
 }
 
-/// NLopt from a start of its own: lengths and directions of a few pieces, to drive |p~| as far as it goes.
+/// Maximises |p~| by NLopt from its own starting point, over the durations and directions of a few segments.
 IssRun optimise(const IssJudge& judge, int evaluations, std::uint64_t seed) {
   constexpr int kFew = 5;
   files::Random random(seed);
@@ -168,18 +168,18 @@ IssRun optimise(const IssJudge& judge, int evaluations, std::uint64_t seed) {
   try {
     search.optimize(x, value);
   } catch (const nlopt::roundoff_limited&) {
-    // It cannot refine further; the best run so far stands.
+    // No further refinement is possible; the best run so far stands.
   }
   return best;
 }
 
-/// Rate in 1/s at which the linear loop's slowest part that can be seen decays; not positive: it does not.
+/// Returns the decay rate in 1/s of the slowest mode of the linear loop; not positive if it does not decay.
 double slowest_decay(const PositionLoop& loop) {
   const Eigen::Matrix<double, PositionLoop::kSize, PositionLoop::kSize> a = loop.matrix();
   return -a.eigenvalues().real().maxCoeff();
 }
 
-/// What one would take for the ball without asking whether the theorem applies.
+/// Returns what one would use as the ball without checking whether the theorem applies.
 double naive_ball(const Gains& gains, double mass_kg) {
   if (gains.composite) {
     const auto least = [](const Matrix3& m) { return to_eigen(m).eigenvalues().real().minCoeff(); };
@@ -244,7 +244,7 @@ IssCheck check_iss(const Gains& gains, const Model& model, const IssOptions& opt
   check.ball_m = std::min(check.rate_N_s * ball_m_per_N_s, std::numeric_limits<double>::max());
 
   const IssJudge judge(gains, model, check, theorem);
-  // A fifth of the runs goes to optimisers, each with so many evaluations.
+  // A fifth of the runs is used by optimisers, with kEvaluations runs each.
   constexpr int kEvaluations = 40;
   const int searches = options.runs / (5 * kEvaluations);
   const int plain = std::max(options.runs - searches * kEvaluations, 1);

@@ -8,7 +8,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// Stays where it is.
+/// A task that stays at one point.
 class Stay : public Task {
  public:
   explicit Stay(double duration_s) : duration_s_(duration_s) {}
@@ -23,7 +23,7 @@ class Stay : public Task {
   double duration_s_;
 };
 
-/// The hypothesis that the flight has left, and when; nothing where it keeps them.
+/// Records the first violated hypothesis and its time; nothing if all hold.
 void note_hypotheses(const ContinuousFlight& flight, FullLoopRun* flown) {
   for (const FlightEvent& event : flight.events()) {
     if (!flown->left.empty()) return;
@@ -37,7 +37,7 @@ void note_hypotheses(const ContinuousFlight& flight, FullLoopRun* flown) {
   flown->left_at_s = flight.time_s();
 }
 
-/// Takes the error at this time into account, where the flight has kept the hypotheses until now.
+/// Accounts for the error at this time, if the flight has satisfied the hypotheses so far.
 void weigh(const ContinuousFlight& flight, const Task& task, double ball_m, FullLoopRun* flown) {
   const double* const x = flight.state(0);
   const double error_m = (Eigen::Vector3d(x[0], x[1], x[2]) - task.at(0, 0).p_W_m).norm();
@@ -78,7 +78,7 @@ void fly(Swarm& swarm, const Gains& gains, const Task& task, const RateDisturban
 
 std::vector<FullLoopRun> fly_full_loop(const Gains& gains, const Model& model, const IssCheck& check) {
   constexpr int kAxes = 3;
-  Model bare = model;  // what effects do is part of the disturbance; only the rotors' lag belongs to the loop
+  Model bare = model;  // effects are part of the disturbance; only the rotors' lag belongs to the loop
   bare.effects.erase(std::remove_if(bare.effects.begin(), bare.effects.end(),
                                     [](const EffectSpec& effect) { return effect.name != "motor_lag"; }),
                      bare.effects.end());

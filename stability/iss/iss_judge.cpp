@@ -9,8 +9,8 @@
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kTolerance = 1e-6;  ///< of a violation; the integrator's is a thousandth of it
-/// Transient bounds smaller than this share of the ball are not compared: the integrator's absolute tolerance is.
+constexpr double kTolerance = 1e-6;  ///< for violations; the integrator's tolerance is a thousandth of it
+/// Transient bounds below this fraction of the ball are not compared, because of the integrator's absolute tolerance.
 constexpr double kLeastShare = 1e-3;
 
 }  // namespace
@@ -42,28 +42,29 @@ void IssJudge::judge(IssRun* run) const {
   try {
     integrate(run);
   } catch (const IntegrationError& error) {
-    // A run that has left the hypotheses need not be integrable.
+    // A run that has violated the hypotheses need not be integrable.
     if (run->left.empty()) run->failure = error.what();
   }
 }
 
 void IssJudge::integrate(IssRun* run) const {
   const RateDisturbance& disturbance = run->disturbance;
-  // The learning error within the present piece: eps + (t - from) rate. Runge-Kutta starts anew at every switch at
-  // no cost, which multistep methods do not.
+  // The learning error within the current segment: eps + (t - from) rate. A Runge-Kutta method restarts at every switch
+  // without cost, unlike multistep methods.
   Eigen::Vector3d eps = disturbance.bias_W_N, rate = Eigen::Vector3d::Zero();
   double from_s = 0;
   OdeIntegrator integrator(
       OdeMethod::kRungeKutta,
       [&](double t, const double* x, double* dx) {
-        // Every evaluation counts, so that nothing is missed between samples; the last step may be a trial.
+        // Checked at every evaluation, so that nothing is missed between samples, although the last step may be a trial
+        // step.
         if (run->left.empty()) {
           if (const char* const left = loop_.left_hypothesis(x)) {
             run->left = left;
             run->left_at_s = t;
           }
         }
-        if (!run->left.empty()) {  // the run is over: rest, so that the integrator gets to its end at once
+        if (!run->left.empty()) {  // the run is over: freeze the state, so that it ends at once
           std::fill(dx, dx + PositionLoop::kSize, 0.0);
           return;
         }
@@ -95,7 +96,7 @@ void IssJudge::integrate(IssRun* run) const {
     }
     const double limit_s = piece < disturbance.until_s.size() ? disturbance.until_s[piece] : 1e300;
     integrator.advance(target_s, std::max(limit_s, target_s));
-    // Judged up to the last sample before: what made the run leave came in between.
+    // Judged only up to the previous sample, since the violation occurred after it.
     if (!run->left.empty()) return;
     const Eigen::Map<const Eigen::Vector3d> error(integrator.state());
     if (!weigh(error.norm(), k, from_rest, sizes, run)) return;
@@ -116,7 +117,7 @@ std::array<double, 4> IssJudge::start_sizes(const IssRun& run, const PositionLoo
 bool IssJudge::weigh(double error_m, int k, bool from_rest, const std::array<double, 4>& sizes,
                      IssRun* run) const {
   const double ball_m = check_.ball_m;
-  if (!(error_m <= 1e6 * ball_m)) error_m = 1e6 * ball_m;  // diverged, or not a number
+  if (!(error_m <= 1e6 * ball_m)) error_m = 1e6 * ball_m;  // diverged, or NaN
   if (error_m > run->largest_m) {
     run->largest_m = error_m;
     run->at_s = check_.duration_s * k / kIssSamples;

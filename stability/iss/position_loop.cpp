@@ -31,7 +31,7 @@ PositionLoop::PositionLoop(const Gains& gains, const Model& model)
     position_ = mass_kg_ * to_eigen(gains.pid->Kp_1_s2).asDiagonal().toDenseMatrix();
     velocity_ = mass_kg_ * to_eigen(gains.pid->Kd_1_s).asDiagonal().toDenseMatrix();
     integral_ = mass_kg_ * to_eigen(gains.pid->Ki_1_s3).asDiagonal().toDenseMatrix();
-    // A loop that adds another step than its period has, in effect, another Ki.
+    // If the integrator step differs from the period, the effective Ki differs from the written one.
     if (gains.rate_hz > 0 && gains.integrator_step_s > 0)
       integral_ *= gains.integrator_step_s * gains.rate_hz;
   }
@@ -53,7 +53,7 @@ Eigen::Vector3d PositionLoop::commanded_N(const double* x) const {
 }
 
 const char* PositionLoop::left_hypothesis(const double* x) const {
-  /// Below this share of the weight the direction of the commanded force says nothing.
+  /// Below this fraction of the weight, the direction of the commanded force is meaningless.
   constexpr double kLeastShare = 0.01;
   for (int i = 0; i < 3; ++i) {
     if (!(std::abs(x[kI + i]) < limit_m_s_[static_cast<std::size_t>(i)]))
@@ -98,7 +98,7 @@ Eigen::Matrix<double, PositionLoop::kSize, PositionLoop::kSize> PositionLoop::ma
   const Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
   a.block<3, 3>(kP, kV) = one;
   a.block<3, 3>(kI, kP) = one;
-  // Where a lag is absent its states are kept, decaying, and nobody reads them.
+  // States of absent lags are kept, decaying, but unused.
   constexpr double kUnread_1_s = 1e3;
   Eigen::Matrix<double, 3, kSize> force = Eigen::Matrix<double, 3, kSize>::Zero();
   force.block<3, 3>(0, kP) = -position_;

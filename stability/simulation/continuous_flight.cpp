@@ -11,8 +11,7 @@
 namespace swarmcert::stability {
 namespace {
 
-// The vector of numbers: the plant of all vehicles, then for each vehicle three integrals of position and three of
-// rate.
+// The state vector: the plant of all vehicles, then for each vehicle three position integrals and three rate integrals.
 constexpr int kControllerSize = 6;
 constexpr int kEventsPerVehicle = 5;  ///< thrust, three integrals, ground
 constexpr double kPull_1_s = 2;       ///< keeps | |q|^2 - 1 | below 3e-8 at a tolerance of 1e-6
@@ -26,7 +25,7 @@ struct ContinuousFlight::Vehicle {
   std::shared_ptr<const Pilot<double>> pilot;
   controller::FlightMemory<double> memory;
   std::array<double, 3> limit_m_s;
-  std::array<int, 3> held = {0, 0, 0};  ///< sign of the clamp at which an integral stands, 0 where it moves
+  std::array<int, 3> held = {0, 0, 0};  ///< sign of the clamp at which an integral is held, 0 if it is free
 };
 
 ContinuousFlight::ContinuousFlight(Swarm& swarm, const Gains& gains, const Task& task,
@@ -98,7 +97,7 @@ ContinuousFlight::ContinuousFlight(Swarm& swarm, const Gains& gains, const Task&
     integrator_->watch(n * kEventsPerVehicle,
                        [this](double t, const double* y, double* g) { watch(t, expand(y), g); });
   }
-  y_ = start;  // what never moves stays
+  y_ = start;  // components that never move keep these values
   this->start(0, start.data());
   at_ = start;
 }
@@ -109,7 +108,7 @@ double ContinuousFlight::time_s() const { return integrator_->time(); }
 
 const double* ContinuousFlight::state(int vehicle) const { return at_.data() + vehicle * kVehicleStateSize; }
 
-/// All numbers, of those that the solver has.
+/// Expands the solver's states to the whole state vector.
 const double* ContinuousFlight::expand(const double* solved) {
   for (std::size_t k = 0; k < moving_.size(); ++k) y_[moving_[k]] = solved[k];
   return y_.data();
@@ -123,7 +122,7 @@ void ContinuousFlight::start(double t, const double* y) {
 
 long ContinuousFlight::evaluations() const { return integrator_->evaluations(); }
 
-/// What the flight code reads at (t, y).
+/// The inputs of the flight code at (t, y).
 struct ContinuousFlight::Inputs {
   controller::Measured<double> measured;
   controller::FlightReference<double> reference;
@@ -187,8 +186,8 @@ void ContinuousFlight::derivative(double t, const double* y, double* dy) {
   swarm_.derivative(t, y, inputs_.data(), dy, kPull_1_s);
 }
 
-/// Zero where a smooth piece ends: thrust at its limit; an integral at its clamp, or the error that lets it go; the
-/// ground, or the thrust that lifts off it.
+/// Event functions, zero where a smooth segment ends: thrust reaching its limit; an integral reaching its clamp, or the
+/// error that releases it; the vehicle reaching the ground, or the thrust that lifts it off.
 void ContinuousFlight::watch(double t, const double* y, double* g) {
   for (int i = 0; i < swarm_.size(); ++i) {
     const double* const x = y + i * kVehicleStateSize;
@@ -226,7 +225,7 @@ void ContinuousFlight::meet(int event, double t, double* y) {
     events_.push_back(
         {was_held ? FlightEvent::What::kIntegralRelease : FlightEvent::What::kIntegralClamp, i, t});
     vehicle.held[axis] = was_held ? 0 : integral > 0 ? 1 : -1;
-    // On its clamp exactly; when let go, so far inside that the same crossing is not met twice.
+    // Exactly on its clamp; when released, slightly inside, so that the same crossing is not detected twice.
     const double limit = vehicle.limit_m_s[axis];
     integral = std::clamp(integral, -limit, limit) * (was_held ? 1 - 1e-12 : 1);
     return;
@@ -243,7 +242,7 @@ void ContinuousFlight::meet(int event, double t, double* y) {
 }
 
 void ContinuousFlight::fly_to(double end_s, double limit_s) {
-  // Chattering at a limit would never end; a thousand events in one piece are a fault of the model or the gains.
+  // Chattering at a limit would never end; a thousand events in one segment indicate a faulty model or faulty gains.
   constexpr int kMostEvents = 1000;
   int count = 0;
   while (integrator_->time() < end_s) {

@@ -22,8 +22,8 @@ using flight_slots::set;
 using flight_slots::Slot;
 using flight_slots::Take;
 
-/// What step() leaves for report(). PWM is not computed in flight_step(), whose result for it nobody reads, but here,
-/// by the same function of the same numbers.
+/// Fills in what step() leaves to report(). PWM is not computed in flight_step(), where nobody reads it, but here, by
+/// the same function of the same numbers.
 template <typename Scalar>
 void read_rest(const controller::ThrustMap<double>& map, const Slot<Scalar>& slot, int lane,
                ControlRecord* record) {
@@ -45,7 +45,7 @@ void read_rest(const controller::ThrustMap<double>& map, const Slot<Scalar>& slo
   }
 }
 
-/// @param x the vehicle's numbers in the rows of the swarm's state.
+/// @param x the vehicle's entries in the rows of the swarm's state.
 template <typename Scalar>
 void see_attitude(const double* x, Slot<Scalar>* slot) {
   const auto at = [x](int component) { return x[component * kRowLength]; };
@@ -56,7 +56,7 @@ void see_attitude(const double* x, Slot<Scalar>* slot) {
                              narrow<Scalar>({at(kOmega), at(kOmega + 1), at(kOmega + 2)})};
 }
 
-/// The lanes of up to eight vehicles of one kind. Lanes beyond the vehicles repeat the first one.
+/// The lanes of up to eight vehicles of one kind. Unused lanes repeat the first vehicle.
 struct Group {
   explicit Group(std::vector<int> of)
       : vehicles(std::move(of)), filled((1U << vehicles.size()) - 1), is_line(vehicles[0] % kRowLength == 0) {
@@ -66,8 +66,8 @@ struct Group {
   }
 
   std::vector<int> vehicles;
-  Lanes::Part filled;  ///< the lanes of vehicles
-  bool is_line;        ///< lanes are those of a line in the rows of the swarm's state
+  Lanes::Part filled;  ///< the lanes occupied by vehicles
+  bool is_line;        ///< the lanes coincide with one line in the rows of the swarm's state
   Slot<Lanes> slot;
   /// Rows of `news`.
   enum News : int {
@@ -78,13 +78,13 @@ struct Group {
     kWantedAcceleration = 12,
     kNumNews = 15
   };
-  Rows news{kNumNews};  ///< what see() and follow() were told
+  Rows news{kNumNews};  ///< inputs of see() and follow()
   bool has_news = false;
   void put(int row, int lane, const Eigen::Vector3d& v) {
     for (int axis = 0; axis < 3; ++axis) news.data()[(row + axis) * kRowLength + lane] = v[axis];
     has_news = true;
   }
-  /// What lanes do not hold side by side.
+  /// Per-vehicle data that are not kept in lanes.
   struct Flags {
     std::uint32_t position_stamp_ms = 0;
     bool has_reference = false, thrust_saturated = false;
@@ -94,8 +94,8 @@ struct Group {
     }
   };
   Flags flags[Lanes::kCount];
-  std::vector<unsigned> parts = {Lanes::kAll};  ///< lanes, as bits, that take one path through the code
-  int wait = 0;  ///< periods until all try together: lanes that disagreed tend to do so again
+  std::vector<unsigned> parts = {Lanes::kAll};  ///< lanes, as bit masks, that take one path through the code
+  int wait = 0;  ///< periods until all lanes run together again: lanes that disagreed tend to do so again
 
   std::size_t vehicle_of(int lane) const {
     const auto k = static_cast<std::size_t>(lane);
@@ -110,7 +110,7 @@ int first_of(unsigned lanes) {
   return lane;
 }
 
-/// The lanes whose flags are those of the first.
+/// Returns the lanes whose flags equal those of the first.
 unsigned alike(const Group& group, unsigned lanes) {
   const Group::Flags& first = group.flags_of(first_of(lanes));
   unsigned result = 0;
@@ -120,7 +120,7 @@ unsigned alike(const Group& group, unsigned lanes) {
   return result;
 }
 
-/// What all lanes see of this period.
+/// Updates the inputs of all lanes for this period.
 SWARMCERT_FOR_LANES void look(Group& group, const double* rows, double battery_V, std::uint32_t now_ms) {
   Slot<Lanes>& slot = group.slot;
   slot.measured.attitude_stamp_ms = now_ms;
@@ -160,21 +160,21 @@ SWARMCERT_FOR_LANES void look(Group& group, const double* rows, double battery_V
   slot.reference.acceleration_W_m_s2 = told(Group::kWantedAcceleration);
 }
 
-/// What the lanes of one path have in common.
+/// Results that all lanes of one path share.
 struct Outcome {
   bool motors_off = false;
   std::uint8_t faults = 0;
 };
 
-/// One control period of lanes that agree on `flags`.
-/// @param keeps whether `slot` must be as it was where lanes disagree. Where they agreed a period ago, and neither
-///              measurements nor references are new, there is little to keep.
-/// @returns the lanes of one side where they disagree; else 0.
+/// Runs one control period of lanes that agree on `flags`.
+/// @param keeps whether `slot` must be restored if the lanes disagree. If they agreed in the previous period, and
+///     neither measurements nor references are new, only little needs to be saved.
+/// @returns the lanes of one side if they disagree; else 0.
 template <typename Settings>
 SWARMCERT_FOR_LANES [[gnu::noinline]] unsigned fly(const Settings& settings, Slot<Lanes>& slot,
                                                    Group::Flags& flags, std::uint32_t now_ms,
                                                    bool position_is_due, bool keeps, Outcome* outcome) {
-  if (settings.allocation.count != kNumRotors) __builtin_unreachable();  // so that loops over rotors unroll
+  if (settings.allocation.count != kNumRotors) __builtin_unreachable();  // lets loops over rotors unroll
   FlightMemory<Lanes>& memory = slot.memory;
   FlightMemory<Lanes> before;
   if (keeps) before = memory;
@@ -202,8 +202,8 @@ SWARMCERT_FOR_LANES [[gnu::noinline]] unsigned fly(const Settings& settings, Slo
   return 0;
 }
 
-/// One control period of a part of a group. Where its lanes disagree nothing is changed, and those of one side are
-/// returned; else 0.
+/// Runs one control period of a subset of a group. If its lanes disagree, nothing is changed and the lanes of one side
+/// are returned; else 0.
 template <typename Settings>
 SWARMCERT_FOR_LANES unsigned step_lanes(const Settings& settings, Group& group, unsigned lanes,
                                         std::uint32_t now_ms, bool position_is_due, bool may_differ,
@@ -372,7 +372,7 @@ class Bank : public ControllerBank {
     record->faults = push.faults;
   }
 
-  /// As few runs through the code as there are paths that vehicles take.
+  /// Runs the code once for each path that the vehicles take.
   void step(Group& group, const double* rows, double battery_V, std::uint32_t now_ms, bool position_is_due,
             std::vector<ControlRecord>& records) {
     constexpr int kWait = 10;
@@ -385,7 +385,7 @@ class Bank : public ControllerBank {
     const Pilot<Lanes>& pilot =
         lane_pilots_[static_cast<std::size_t>(swarm_.kind_of(group.vehicles.front()))];
     pilot.with_settings([&](const auto& settings) {
-      // Flags part where paths do, and at new measurements.
+      // Flags may differ where paths differ, and at new measurements.
       const bool may_differ = position_is_due || group.parts.size() > 1 || tries_together;
       for (std::size_t k = 0; k < group.parts.size();) {
         const unsigned lanes = group.parts[k];
@@ -408,7 +408,7 @@ class Bank : public ControllerBank {
   std::vector<Pilot<Lanes>> lane_pilots_;  ///< by kind
   std::vector<Slot<Scalar>> slots_;        ///< by vehicle
   std::vector<std::unique_ptr<Group>> groups_;
-  std::vector<Group*> group_of_;  ///< by vehicle; nullptr: alone
+  std::vector<Group*> group_of_;  ///< by vehicle; nullptr: computed alone
   std::vector<int> lane_of_;
 };
 

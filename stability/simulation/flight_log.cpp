@@ -22,7 +22,7 @@ constexpr char kHeader[] =
 constexpr unsigned kVariables = 35;
 constexpr std::size_t kRecordsPerBlock = 2;
 
-/// Writes an integer's bytes, lowest first; returns what comes behind.
+/// Writes an integer in little-endian order; returns the position after it.
 template <typename Integer>
 char* put(char* to, Integer value) {
   for (std::size_t i = 0; i < sizeof value; ++i) {
@@ -44,7 +44,7 @@ char* put(char* to, const std::array<T, kSize>& values) {
   return to;
 }
 
-/// NOT crc32 of everything from `begin` on.
+/// Writes NOT crc32 of everything from `begin` on.
 char* put_check(char* to, const char* begin) {
   return put(to, static_cast<std::uint32_t>(
                      ~crc32(0, reinterpret_cast<const Bytef*>(begin), static_cast<uInt>(to - begin))));
@@ -67,7 +67,7 @@ char* put(char* to, const LogRecord& record) {
   return put(to, record.prediction_gf);
 }
 
-/// `q` turned by a small random rotation vector.
+/// Returns `q` rotated by a small random rotation vector.
 Eigen::Quaterniond disturbed(files::Random& random, double angle_rad, const Eigen::Quaterniond& q) {
   const double x = 0.5 * angle_rad * random.bell(), y = 0.5 * angle_rad * random.bell(),
                z = 0.5 * angle_rad * random.bell();
@@ -78,7 +78,7 @@ Eigen::Quaterniond disturbed(files::Random& random, double angle_rad, const Eige
   return Eigen::Quaterniond(r.coeffs() / length);
 }
 
-/// Product of the model's accelerometer_scale effects.
+/// Returns the product of the model's accelerometer_scale effects.
 double accelerometer_scale(const Model& model) {
   double scale = 1;
   for (const EffectSpec& spec : model.effects) {

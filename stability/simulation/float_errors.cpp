@@ -12,7 +12,7 @@ namespace {
 
 controller::Vector3<double> vector_of(const PerAxis& v) { return {v[0], v[1], v[2]}; }
 
-/// Cycle of a loop whose rate is not given: that of the fastest position loop of the published firmware.
+/// Period of a loop without a stated rate: that of the fastest position loop of the published firmware.
 constexpr double kUnstatedPeriod_s = 0.002;
 
 }  // namespace

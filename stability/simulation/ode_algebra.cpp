@@ -68,7 +68,7 @@ int set_up_solver(SUNLinearSolver solver, SUNMatrix A) {
   own.lu.compute(map(A));
   own.is_inverted = own.lu.rows() <= kMostInverted;
   if (own.is_inverted) own.inverse.noalias() = own.lu.inverse();
-  // As from a vanishing pivot, of which CVODE makes a smaller step.
+  // Reported like a vanishing pivot, to which CVODE responds with a smaller step.
   const double least = own.lu.matrixLU().diagonal().cwiseAbs().minCoeff();
   return least > 0 ? SUNLS_SUCCESS : SUNLS_LUFACT_FAIL;
 }

@@ -27,7 +27,7 @@ T* made(T* pointer, const char* what) {
   return pointer;
 }
 
-/// Errors arrive as statuses; SUNDIALS need not print them as well.
+/// Errors are reported by status codes; suppresses SUNDIALS's own messages.
 void say_nothing(int, const char*, const char*, char*, void*) {}
 
 }  // namespace
@@ -140,7 +140,7 @@ void OdeIntegrator::start(double t, const double* y) {
 
 std::vector<int> OdeIntegrator::advance(double target, double limit) {
   Solver& solver = *solver_;
-  // SUNDIALS refuses to start over less than a rounding error: there is nothing to integrate.
+  // SUNDIALS refuses to start over less than a rounding error; there is then nothing to integrate.
   if (target - solver.t <= 1e-13 * (1 + std::abs(target))) return {};
   int status;
   if (solver.method == OdeMethod::kRungeKutta) {

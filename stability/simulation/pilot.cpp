@@ -5,7 +5,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// The moment of inertia for which the public attitude gains were tuned.
+/// The moments of inertia for which the public attitude gains were tuned.
 constexpr double kPublishedInertia_kg_m2[3] = {16.571710e-6, 16.655602e-6, 29.261652e-6};
 
 template <typename Scalar>
@@ -23,13 +23,13 @@ controller::Matrix3<Scalar> matrix(const Matrix3& m) {
   return {vector<Scalar>(m.x), vector<Scalar>(m.y), vector<Scalar>(m.z)};
 }
 
-/// The least force of a rotor at a full battery: at the map's lowest point, or at p = 0 where that lies below 0.
+/// Returns the smallest force of a rotor at full battery: at the map's minimum, or at p = 0 if the minimum is at p < 0.
 double least_force_N(const ThrustMap& map) {
   const double lowest = map.c20 > 0 ? std::clamp(-(map.c10 + map.c11) / (2 * map.c20), 0.0, 1.0) : 0;
   return map.force_N(lowest, kFullBattery_V);
 }
 
-/// All but the position gains.
+/// Fills in all settings except the position gains.
 template <typename Scalar, typename Position>
 void fill(const Gains& gains, const Model& model, double attitude_step_s,
           controller::FlightSettings<Scalar, Position>* settings) {
@@ -93,7 +93,7 @@ controller::FlightCommand<Scalar> Pilot<Scalar>::step(
       settings_);
 }
 
-// Flattened, so that what is not returned is not computed.
+// Flattened, so that unused results are not computed.
 template <typename Scalar>
 [[gnu::flatten]] typename Pilot<Scalar>::Push Pilot<Scalar>::push(
     controller::FlightMemory<Scalar>& memory, const controller::Measured<Scalar>& measured,
@@ -104,7 +104,7 @@ template <typename Scalar>
     const controller::FlightCommand<Scalar> command =
         controller::flight_step(settings, memory, measured, reference, {Scalar(0), Scalar(0), prediction_N},
                                 now_ms, position_is_due, torque_prediction_Nm);
-    memory.mean_p = mean_p;  // on which no pilot's largest force depends
+    memory.mean_p = mean_p;  // irrelevant, since no pilot's largest force depends on it
     return {command.faults, command.motors_off, command.wanted, command.mixed.forces};
   };
   if (const auto* const pid = std::get_if<0>(&settings_)) return with(*pid);

@@ -7,7 +7,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// How many control periods make one period of a slower loop.
+/// Returns the number of control periods per period of a slower loop.
 int periods(double control_hz, double slow_hz, const char* what) {
   const double ratio = control_hz / slow_hz;
   const double whole = std::round(ratio);
@@ -118,7 +118,7 @@ Eigen::Vector3d SampledFlight::measured_position(int vehicle) {
   return p;
 }
 
-/// The staircase: predictions are made from what is known now, and applied network_late_ periods later.
+/// Computes predictions from the current measurements; they are applied network_late_ periods later (zero-order hold).
 void SampledFlight::predict() {
   const auto slots = static_cast<std::int64_t>(network_late_) + 1;
   const auto now_ms = static_cast<std::uint32_t>(std::llround(1e3 * time_s()));
@@ -150,7 +150,7 @@ void SampledFlight::predict() {
   }
 }
 
-/// New positions and set points for the position loop.
+/// Passes new positions and setpoints to the position loop.
 void SampledFlight::measure() {
   const auto now_ms = static_cast<std::uint32_t>(std::llround(1e3 * time_s()));
   for (int i = 0; i < swarm_.size(); ++i) {
@@ -183,7 +183,7 @@ void SampledFlight::control() {
     VehicleInput& input = inputs_[i];
     ControlRecord& record = records_[i];
     input.battery_V = battery;
-    // On the ground the motors are off until the task leaves it, and no integral grows.
+    // On the ground the motors are off until the task takes off, and no integral grows.
     if (input.resting) {
       controllers_->reset_integrals(static_cast<int>(i));
     }
@@ -208,8 +208,9 @@ void SampledFlight::advance(double from_s, double h_s) {
   for (int k = 0; k < options_.substeps; ++k) step_onto_bends(from_s + k * step_s, step_s);
 }
 
-/// One Runge-Kutta step, cut where vehicles meet bends: a step across one is accurate to the second order only.
-/// Vehicles that no other reaches keep the uncut step, and so the bits with which they fly alone.
+/// Takes one Runge-Kutta step, split where vehicles meet bends, since a step across a bend has only second-order
+/// accuracy. Vehicles that no other vehicle reaches keep the result of the full step, so that they are bitwise
+/// identical to flying alone.
 void SampledFlight::step_onto_bends(double from_s, double h_s) {
   constexpr int kMostCuts = 8;
   const double end_s = from_s + h_s;
@@ -229,7 +230,8 @@ void SampledFlight::step_onto_bends(double from_s, double h_s) {
   }
 }
 
-/// Puts the commands that delays let through into the inputs: those of `late` part of the period, or of the early one.
+/// Sets the inputs to the commands after their delay: those of the late part of the period if `late`, else of the early
+/// part.
 void SampledFlight::apply_delayed(bool late) {
   const auto slots = static_cast<std::int64_t>(delayed_.front().size() / kNumRotors);
   for (int i = 0; i < swarm_.size(); ++i) {
@@ -247,8 +249,9 @@ void SampledFlight::apply_delayed(bool late) {
   }
 }
 
-/// Moves the plant by one period. A command delay of k + r periods holds the command of k + 1 periods ago for the
-/// first r of it, that of k periods ago for the rest. Where kinds have different r, all switch at the largest.
+/// Moves the plant by one period. With a command delay of k + r periods, the command of k + 1 periods ago acts for the
+/// first fraction r of the period, that of k periods ago for the rest. If kinds have different r, all switch at the
+/// largest.
 void SampledFlight::move() {
   if (!has_delay_) {
     advance(time_s(), period_s_);
@@ -267,7 +270,7 @@ void SampledFlight::move() {
   advance(time_s() + switch_s_, period_s_ - switch_s_);
 }
 
-/// Inelastic ground: a vehicle that sinks to it stands level until thrust lifts it.
+/// Inelastic ground: a vehicle that descends to it stands level until thrust lifts it.
 void SampledFlight::touch_ground() {
   for (int i = 0; i < swarm_.size(); ++i) {
     if (input(i).resting) {

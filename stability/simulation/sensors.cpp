@@ -72,7 +72,7 @@ std::uint32_t compress_quaternion(const Eigen::Quaterniond& quaternion) {
 
 std::int16_t milli(double value) {
   const double scaled = std::trunc(value * 1000);
-  if (!(std::abs(scaled) < 0x1p62)) return 0;  // a NaN, or far beyond any log
+  if (!(std::abs(scaled) < 0x1p62)) return 0;  // NaN, or far beyond any log
   return static_cast<std::int16_t>(
       static_cast<std::uint16_t>(static_cast<std::uint64_t>(static_cast<std::int64_t>(scaled))));
 }

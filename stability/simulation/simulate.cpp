@@ -7,7 +7,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// Sums of squares and maxima of one vehicle's error.
+/// Accumulates squares and maxima of one vehicle's error.
 struct Sums {
   std::array<double, 4> max = {}, squares = {};
   std::int64_t count = 0;
@@ -41,7 +41,7 @@ Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const Si
   const auto vehicles = static_cast<std::size_t>(swarm.size());
   std::vector<Sums> sums(vehicles);
   std::vector<std::int64_t> saturated(vehicles);
-  std::vector<double> most_tilted(vehicles, 1.0);  ///< least cosine of the tilt
+  std::vector<double> most_tilted(vehicles, 1.0);  ///< smallest cosine of the tilt
   Simulation simulation;
   simulation.vehicles.resize(vehicles);
   simulation.errors.resize(vehicles);
@@ -66,7 +66,7 @@ Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const Si
         break;
       }
       sums[i].add(error);
-      // The third entry of the thrust axis, whose angle to the vertical is the tilt.
+      // The third component of the thrust axis, whose angle to the vertical is the tilt.
       const double* const q = x + kQuaternion;
       const double length2 = q[3] * q[3] + q[0] * q[0] + q[1] * q[1] + q[2] * q[2];
       most_tilted[i] = std::min(most_tilted[i], 1 - 2 * (q[0] * q[0] + q[1] * q[1]) / length2);

@@ -19,7 +19,8 @@ namespace {
 
 using Vector3Map = Eigen::Map<const Eigen::Vector3d>;
 
-/// Simulated vehicles are named as their logs: the first is cf1. A vehicle that does not fly is none of them.
+/// Returns the index of the vehicle that `spec` names. Simulated vehicles are named like their logs; the first is cf1.
+/// A vehicle that does not fly matches none.
 int only_vehicle(const EffectSpec& spec) {
   if (spec.vehicle.empty()) return kEveryVehicle;
   const bool is_number = spec.vehicle.size() > 2 && spec.vehicle.size() < 9 &&
@@ -178,7 +179,7 @@ Wrench Swarm::effects_on(int vehicle, double time_s, const double* state, const 
   return sum_of_effects(vehicle, input, state + size() * kVehicleStateSize);
 }
 
-/// At instant_.
+/// Returns the sum of the effects at instant_.
 Wrench Swarm::sum_of_effects(int vehicle, const VehicleInput& input, const double* effect_states) {
   Wrench sum;
   sum.force_W_N = input.disturbance_W_N;
@@ -239,7 +240,8 @@ void Swarm::hold(const VehicleInput* inputs) {
   if (!pairs_hold_ || !same_rest) pair_up(inputs);
 }
 
-/// Who is acted on, and by whom, until find_neighbours() looks again or a vehicle comes to rest or leaves the ground.
+/// Determines which vehicles have effects and which pairs interact, until find_neighbours() is called again or a
+/// vehicle lands or takes off.
 void Swarm::pair_up(const VehicleInput* inputs) {
   pairs_hold_ = true;
   for (const int i : acted_on_) {
@@ -249,7 +251,7 @@ void Swarm::pair_up(const VehicleInput* inputs) {
   for (PairBatch& batch : batches_) batch.pairs.clear();
   for (int i = 0; i < size(); ++i) {
     const Kind& own = kind(i);
-    // Where only neighbours matter and none is near, there is nothing to add.
+    // If only neighbours matter and none is near, there is nothing to add.
     const bool alone = listed_ && near_[static_cast<std::size_t>(i)].empty();
     const bool nothing = own.effects.empty() || (alone && own.wide.size() == own.effects.size());
     if (inputs[i].resting || (nothing && !has_effect_states(i))) continue;
@@ -279,7 +281,7 @@ void Swarm::pair_up(const VehicleInput* inputs) {
   }
 }
 
-/// Disturbances and effects, as outer forces of the bodies.
+/// Adds disturbances and effects to the external forces of the bodies.
 void Swarm::act(double time_s, const double* rows, const VehicleInput* inputs) {
   act_on_pairs(&rows, 1);
   const States states = {rows, true};
@@ -297,7 +299,7 @@ void Swarm::act(double time_s, const double* rows, const VehicleInput* inputs) {
   }
 }
 
-/// What pairs do in one or two states of the swarm, as outer forces of the bodies.
+/// Adds the effects between pairs, in one or two states of the swarm, to the external forces of the bodies.
 void Swarm::act_on_pairs(const double* const* rows, int num_rows) {
   double* const forces[] = {bodies_.row(RigidBodies::kForce + 2), bodies_.row(RigidBodies::kLaterForceZ)};
   const double* const disturbance = bodies_.row(RigidBodies::kDisturbanceZ);

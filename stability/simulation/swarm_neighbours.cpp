@@ -6,7 +6,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// Faster than any vehicle's velocity changes: for how long neighbours, once found, stay the only ones.
+/// Upper bound on the rate of change of a vehicle's velocity; determines how long a list of neighbours stays valid.
 constexpr double kFastestChange_m_s2 = 50;
 
 }  // namespace
@@ -62,7 +62,7 @@ void Swarm::find_meetings(const double* rows, double horizon_s) {
 }
 
 double Swarm::first_bend(const double* before, const double* after, double step_s) const {
-  // Nearer to an end of the step, what crossing costs is small.
+  // Crossings closer than this to an end of the step cause only a small error.
   constexpr double kAtEnd = 1e-3;
   double first = 1;
   for (const Meeting& meeting : meetings_) {
@@ -75,7 +75,7 @@ double Swarm::first_bend(const double* before, const double* after, double step_
     const double from = apart(before, kPosition + 2) - meeting.bend_m;
     const double to = apart(after, kPosition + 2) - meeting.bend_m;
     if ((from < 0) == (to < 0)) continue;
-    // Where the cubic through both heights and speeds is zero, by halving: a place to within 1e-12 of the step.
+    // Zero of the cubic through both heights and velocities, by bisection, to within 1e-12 of the step.
     const double v_from = step_s * apart(before, kVelocity + 2), v_to = step_s * apart(after, kVelocity + 2);
     double low = 0, high = 1;
     for (int k = 0; k < 40; ++k) {

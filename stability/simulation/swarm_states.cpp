@@ -4,7 +4,7 @@
 
 namespace swarmcert::stability {
 
-/// The states of effects lie behind those of the vehicles, vehicle after vehicle.
+/// Places the states of effects after those of the vehicles, vehicle by vehicle.
 void Swarm::place_effect_states() {
   std::size_t states = 0;
   for (int i = 0; i < size(); ++i) {
@@ -27,7 +27,7 @@ bool Swarm::has_effect_states(int vehicle) const {
   return first_use_[i] < first_use_[i + 1];
 }
 
-/// At instant_: `others` with the effects that have states, whose rates it leaves in rates_.
+/// At instant_: returns `others` plus the effects with states, and stores the states' rates in rates_.
 Wrench Swarm::act_with_states(int vehicle, const double* effect_states, const Wrench& others) {
   Wrench sum = others;
   const Eigen::Vector3d weight_W_N(0, 0, -instant_.mass_kg * kGravity_m_s2);
@@ -44,7 +44,7 @@ Wrench Swarm::act_with_states(int vehicle, const double* effect_states, const Wr
   return sum;
 }
 
-/// As RigidBodies::stage(), of the states of effects at rates_.
+/// Like RigidBodies::stage(), for the states of effects with rates rates_.
 void Swarm::stage_effect_states(int which, double step_s, double* start, double* rows, double* sum) const {
   for (std::size_t k = 0; k < rates_.size(); ++k) {
     const double rate = rates_[k];

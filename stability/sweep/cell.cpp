@@ -8,7 +8,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// The grid's gains and vehicle with the cell's values put in.
+/// The grid's gains and vehicle with a cell's values inserted.
 struct Variant {
   Gains gains;
   Plant plant;
@@ -42,12 +42,12 @@ Variant variant_of(const Grid& grid, const std::vector<double>& values) {
   }
   if (v.gains.rate_hz > 0 && !own_step) v.gains.integrator_step_s = 1 / v.gains.rate_hz;
   v.plant.largest_thrust_N = v.plant.thrust_scale * grid.model.largest_thrust_N(battery_V);
-  // Firmware commands forces with the mass it was told: another mass scales what its gains do.
+  // The firmware commands forces for the mass it was told, so another mass scales the effect of its gains.
   v.plant.thrust_scale *= grid.model.mass_kg / v.plant.mass_kg;
   return v;
 }
 
-/// Computes each quantity at most once, and only those that are asked for.
+/// Computes each requested quantity, at most once.
 class Quantities {
  public:
   Quantities(const Grid& grid, const Variant& variant, const AxisLoop& loop,
@@ -81,7 +81,7 @@ class Quantities {
  private:
   double scaled(double known) const { return std::isinf(known) ? known : variant_.neighbours * known; }
 
-  /// Of the loop that flies: its integrator acts with the effective gain.
+  /// Norms of the loop as flown, with the effective integral gain.
   const GainNorms& norms() {
     if (!norms_) norms_ = continuous_norms(acting_, Channel::kForce);
     return *norms_;
@@ -97,7 +97,7 @@ class Quantities {
     const ClampBounds clamp =
         clamp_bounds(acting_, Channel::kForce, all, {},
                      variant_.gains.integrator_limit_m_s[static_cast<std::size_t>(grid_.axis)], share);
-    // Where the integrator may reach its clamp the loop is not linear.
+    // If the integrator may reach its clamp, the loop is not linear.
     if (clamp.exists && !clamp.never_acts) return std::min(clamp.by_amplitude, clamp.by_impulse);
     const auto bound = [](double gain, double known) { return std::isinf(known) ? kInfinity : gain * known; };
     return std::min({bound(norms().rate, scaled(d.rate_N_s)), bound(norms().amplitude, scaled(d.amplitude_N)),
@@ -116,7 +116,7 @@ class Quantities {
   const Grid& grid_;
   const Variant& variant_;
   const AxisLoop& loop_;
-  AxisLoop acting_;  ///< with the integral gain that the sampled loop has in effect
+  AxisLoop acting_;  ///< with the effective integral gain of the sampled loop
   const std::optional<SampledLoop>& sampled_;
   std::optional<GainNorms> norms_;
   std::optional<double> effort_;
@@ -133,7 +133,7 @@ std::string limit_text(const GridLimit& limit, double value) {
   return text;
 }
 
-/// Empty where the rotors can lift the vehicle.
+/// Returns an empty text if the rotors can lift the vehicle.
 std::string lift_text(const Variant& variant) {
   const double weight_N = variant.plant.mass_kg * kGravity_m_s2;
   if (variant.plant.largest_thrust_N > weight_N) return "";
@@ -174,7 +174,7 @@ Cell compute_cell(const Grid& grid, long index) {
   cell.infeasible = lift_text(variant);
   Quantities quantities(grid, variant, *loop, sampled);
   for (std::size_t i = 0; i < grid.compute.size(); ++i) cell.values[i] = quantities(grid.compute[i]);
-  // Every bound is of a loop whose thrust is never at its limit.
+  // All bounds assume that thrust never reaches its limit.
   if (cell.infeasible.empty() && std::isfinite(grid.disturbance.amplitude_N)) {
     const double margin_N = quantities("thrust_margin_N");
     if (margin_N < 0) cell.infeasible = thrust_text(margin_N);
@@ -205,7 +205,7 @@ std::vector<long> pareto_front(const Grid& grid, const std::vector<Cell>& cells)
     for (const auto& [column, better] : objectives) result.push_back(-better * cell.values[column]);
     return result;
   };
-  // In lexicographic order of costs a cell can only be beaten by one before it.
+  // In lexicographic order of costs, a cell can only be dominated by an earlier one.
   std::vector<std::pair<std::vector<double>, long>> order;
   for (const Cell& cell : cells) {
     std::vector<double> cost = costs(cell);

@@ -133,7 +133,7 @@ const std::vector<Quantity>& grid_quantities() {
   return all;
 }
 
-/// Why no vehicle of the grid has `value` of the parameter `name`; empty if one can.
+/// Returns why no vehicle of the grid can have `value` of the parameter `name`; empty if one can.
 std::string parameter_problem(const Grid& grid, const std::string& name, double value) {
   constexpr double kLeast_hz = 1, kLargest_hz = 1e5;
   if (name == "battery_V") return battery_problem(grid.model, value);
@@ -148,7 +148,7 @@ std::string parameter_problem(const Grid& grid, const std::string& name, double 
 
 namespace {
 
-/// Axes that the gains have, and that make sense for them.
+/// Requires axes that the gains have, and that make sense for them.
 void require_fitting_axes(const TomlTable& axes, const Gains& gains) {
   const bool pid_axis = axes.has("Kp") || axes.has("Kd") || axes.has("Ki");
   const bool composite_axis = axes.has("Lambda") || axes.has("K");
@@ -179,7 +179,7 @@ void read_axes(const TomlTable& axes, Grid& grid) {
   require_fitting_axes(axes, grid.gains);
 }
 
-/// After grid.compute.
+/// Must be called after grid.compute is read.
 void read_pareto(const TomlTable& top, Grid& grid) {
   grid.pareto = read_quantities(top, "pareto");
   for (const std::string& name : grid.pareto) {

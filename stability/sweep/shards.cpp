@@ -20,10 +20,10 @@ namespace fs = std::filesystem;
 
 constexpr char kShardSchema[] = "swarmcert/sweep-shard/1";
 constexpr char kPointsSchema[] = "swarmcert/sweep-points/1";
-constexpr int kBlock = 512;  ///< cells between two looks at the clock and at Ctrl-C
+constexpr int kBlock = 512;  ///< cells between two checks of the clock and of Ctrl-C
 constexpr double kCheckpoint_s = 5;
 
-/// JSON has no infinity and no NaN; both occur (no bound, no sampled loop) and must survive.
+/// JSON has no infinity and no NaN; both occur (no bound, no sampled loop) and must be preserved.
 Json number_json(double value) {
   if (std::isfinite(value)) return value;
   return std::isnan(value) ? "nan" : value > 0 ? "inf" : "-inf";
@@ -81,7 +81,7 @@ bool same_grid(const Json& a, const Json& b) {
   return true;
 }
 
-/// Members that are missing or of another type end as InputError.
+/// Converts missing members and wrong types to InputError.
 template <class Read>
 auto reading(const std::string& file, const Read& read) {
   try {
@@ -92,8 +92,8 @@ auto reading(const std::string& file, const Read& read) {
   }
 }
 
-/// A folder that is not empty and has nothing of a sweep is someone else's. Shards may start at the same time, so files
-/// that are still being written count, too.
+/// Rejects a folder that contains files but nothing of a sweep. Shards may start simultaneously, so files that are
+/// still being written count as well.
 void refuse_foreign(const std::string& folder) {
   if (!fs::is_directory(folder) || fs::is_empty(folder)) return;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
@@ -107,7 +107,7 @@ void refuse_foreign(const std::string& folder) {
                     "name another folder, or --force writes beside what is there"});
 }
 
-/// In alphabetical order; at least one.
+/// Returns the shard files in alphabetical order; at least one.
 std::vector<std::string> shard_files(const std::string& folder) {
   std::vector<std::string> paths;
   if (fs::is_directory(folder)) {

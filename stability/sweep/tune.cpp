@@ -16,9 +16,9 @@
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kWorst = 1e6;  ///< stands for infinity, which optimisers cannot add up
+constexpr double kWorst = 1e6;  ///< replaces infinity, which optimisers cannot add
 
-/// Settings that the optimiser refuses are a fault of this program: no input reaches them.
+/// Settings that the optimiser rejects are a bug in this program; no input causes them.
 void require(nlopt_result result) {
   if (result < 0) throw std::logic_error(std::string("NLopt: ") + nlopt_result_to_string(result));
 }
@@ -39,7 +39,8 @@ double objective_of(const GainNorms& norms, TuneObjective objective) {
 
 constexpr std::size_t kNumConstraints = 5;
 
-/// How far gains are from clear of a limit cycle; a hundredth more than it takes, so that rounding does not decide.
+/// Returns the relative distance of the gains from being clear of a limit cycle. The 1 % margin avoids a decision by
+/// round-off.
 double limit_cycle_excess(const std::optional<CascadeMargins>& margins) {
   constexpr double kMore = 1.01;
   if (!margins) return -1;
@@ -47,7 +48,7 @@ double limit_cycle_excess(const std::optional<CascadeMargins>& margins) {
   return std::max(kMore * kLeastGainMargin / margins->gain - 1, kMore - margins->damping / kLeastDamping);
 }
 
-/// Relative excess over each limit: at most 0 where it holds.
+/// Relative violation of each constraint: at most 0 if satisfied.
 std::array<double, kNumConstraints> excesses(const TunedPoint& p, const TuneConstraints& c) {
   const auto above = [](double value, double most) {
     if (most <= 0) return -1.0;
@@ -85,7 +86,7 @@ class Search {
     return point;
   }
 
-  /// The point of the last evaluation: objective and constraints ask for the same one in turn.
+  /// Returns the point of the last evaluation, since objective and constraints request the same one in turn.
   const TunedPoint& cached(const double* x) {
     if (!std::equal(x, x + dimension(), last_.begin()) || !has_last_) {
       std::copy(x, x + dimension(), last_.begin());
@@ -164,7 +165,8 @@ const char* name(TuneObjective objective) {
 
 namespace {
 
-/// Whether some oscillation keeps more than half of itself for 10 cycles: no candidate, and its norms are many terms.
+/// Whether some oscillation keeps more than half of its amplitude over 10 cycles. Such a loop is no candidate, and its
+/// norms are expensive.
 bool rings(const AxisLoop& loop) {
   const TransferFunction y = impulse_transfer(loop, Channel::kForce);
   for (const std::complex<double>& pole : poles(sum(y.denominator, y.feedback))) {
@@ -222,7 +224,7 @@ TuneResult tune(const SampledLoop& loop, const TuneOptions& options) {
   }
   nlopt_srand(static_cast<unsigned long>(options.seed));
   const std::string global = search.run(NLOPT_GN_ISRES, given, low, high, options.global_evaluations);
-  // COBYLA walks into the constraints by itself: from the best point, or from the one that violates least.
+  // COBYLA handles constraints by itself: start from the best point, or else from the one that violates least.
   const std::string local =
       search.run(NLOPT_LN_COBYLA, search.best_x(), low, high, options.local_evaluations);
   search.run(NLOPT_LN_COBYLA, search.best_x(), low, high, options.local_evaluations);

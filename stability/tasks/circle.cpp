@@ -1,4 +1,4 @@
-/// @file Vehicles follow one another on a circle of radius 0.5 m, 0.6 m high, one turn in 6 s.
+/// @file Vehicles follow one another on a circle of radius 0.5 m at a height of 0.6 m, one turn in 6 s.
 #include <cmath>
 
 #include "stability/tasks/polynomial.h"
@@ -11,7 +11,7 @@ namespace {
 constexpr double kTurn_s = 6;
 constexpr double kRadius_m = 0.5;
 constexpr double kCircleHeight_m = 0.6;
-/// The speed rises from zero over this time; the angle follows the integral of a rest-to-rest ramp.
+/// The speed rises from zero over this time; the angle is the integral of a rest-to-rest ramp.
 constexpr double kRamp_s = 2;
 constexpr double kFullTurn = 6.28318530717958647692;
 

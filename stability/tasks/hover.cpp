@@ -1,4 +1,4 @@
-/// @file Vehicles hover side by side, 0.5 m apart, 0.6 m high.
+/// @file Vehicles hover side by side, 0.5 m apart, at a height of 0.6 m.
 #include "stability/tasks/task.h"
 #include "stability/tasks/task_entry.h"
 

@@ -1,4 +1,4 @@
-/// @file Random goals in a box, held apart by an artificial potential: the published data collection.
+/// @file Random goals in a box, kept apart by an artificial potential: the published data collection.
 #include <algorithm>
 #include <cmath>
 
@@ -9,18 +9,18 @@
 namespace swarmcert::stability {
 namespace {
 
-// The published collection: goals at random in a box, approached under artificial potentials. Acceleration and speed
-// are limited; a new goal comes when half the time of flight to the present one has passed.
+// The published data collection: random goals in a box, approached under artificial potentials with limited
+// acceleration and speed. A new goal is drawn when half the flight time to the current one has passed.
 constexpr double kStep_s = 0.01;
 constexpr double kLowest_m = 0.3;  ///< of the box; it is 0.6 m high
 constexpr double kHeight_m = 0.6;
-/// The box of one vehicle alone, as in the published flights of single vehicles: low, where the ground is felt.
+/// The box of a single vehicle, as in the published flights of single vehicles: low, within ground effect.
 constexpr double kLowestAlone_m = 0.08, kHeightAlone_m = 0.3;
 constexpr double kPull_1_s2 = 8, kDamping_1_s = 4;
-constexpr double kSafe_m = 0.45;     ///< vehicles nearer than this repel each other
+constexpr double kSafe_m = 0.45;     ///< vehicles closer than this repel each other
 constexpr double kRepulsion = 0.25;  ///< m^3/s^2
 constexpr double kMostAcceleration_m_s2 = 1, kMostSpeed_m_s = 0.25;
-/// Heights count as less than they are, so that vehicles may fly under each other, which is what the data are for.
+/// Height differences are weighted less, so that vehicles fly below each other, which is the purpose of the data.
 constexpr double kHeightWeight = 0.5;
 
 double limited(double value, double limit) { return std::clamp(value, -limit, limit); }
@@ -35,7 +35,7 @@ Eigen::Vector3d random_place(files::Random& random, double side_m, double lowest
   return {x_m, y_m, lowest_m + height_m * random.uniform()};
 }
 
-/// Repulsion of a vehicle at `p` from one at `q`.
+/// Returns the repulsion on a vehicle at `p` from one at `q`.
 Eigen::Vector3d repulsion(const Eigen::Vector3d& p, const Eigen::Vector3d& q) {
   Eigen::Vector3d apart = p - q;
   apart.z() /= kHeightWeight;
@@ -57,7 +57,7 @@ class RandomWalk : public Task {
     std::vector<Walker> walkers;
     for (int i = 0; i < options.vehicles; ++i) {
       random.emplace_back(files::Random(options.seed + static_cast<std::uint64_t>(i)).bits());
-      // They start apart, stacked over the box.
+      // Vehicles start apart, stacked above the box.
       const double share = (i + 0.5) / options.vehicles;
       Walker walker;
       walker.p = random_place(random.back(), side_m, lowest_m, height_m);

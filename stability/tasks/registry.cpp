@@ -5,7 +5,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// A new task is one line here.
+/// Each task is one line.
 const std::vector<TaskEntry>& task_entries() {
   static const std::vector<TaskEntry> all = {tasks::hover(), tasks::swap(), tasks::random_walk(),
                                              tasks::circle(), tasks::takeoff()};

@@ -10,7 +10,7 @@
 namespace swarmcert::stability {
 namespace {
 
-// Published experiment: 3 s per swap, one every 4.5 s; between swaps the vehicles wait.
+// Published experiment: a swap takes 3 s and starts every 4.5 s; in between the vehicles wait.
 constexpr double kPeriod_s = 4.5;
 constexpr double kSwap_s = 3;
 constexpr double kPi = 3.14159265358979323846;
@@ -19,7 +19,7 @@ struct Geometry {
   double lowest_m, step_m, radius_m;
 };
 
-/// As flown with two to five vehicles; more go on in the pattern of five.
+/// The geometry as flown with two to five vehicles; larger swarms continue the pattern of five.
 Geometry geometry(int vehicles) {
   if (vehicles <= 2) return {0.6, 0.3, 0.3};
   if (vehicles == 3) return {0.6, 0.25, 0.35};
@@ -56,7 +56,7 @@ class Swap : public TimedTask {
     return setpoint;
   }
   std::optional<SetpointRange> over(int vehicle, double from_s, double to_s) const override {
-    const Setpoint lowest = at(vehicle, 0);  // of the swap's first period, at rest
+    const Setpoint lowest = at(vehicle, 0);  // in the first period of the swap, at rest
     const double start_s = kPeriod_s - kSwap_s;
     std::optional<SetpointRange> result;
     for (int swap = static_cast<int>(std::floor(from_s / kPeriod_s)); swap * kPeriod_s <= to_s; ++swap) {
@@ -98,7 +98,7 @@ class Swap : public TimedTask {
   }
 
  private:
-  std::vector<Eigen::Vector3d> sides_m_;  ///< by vehicle: where it starts, its height included
+  std::vector<Eigen::Vector3d> sides_m_;  ///< by vehicle: starting point, including its height
 };
 
 }  // namespace

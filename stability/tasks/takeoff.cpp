@@ -8,7 +8,7 @@
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kGround_m = 0.05;  ///< where the marker frame of a Crazyflie that stands on the floor is
+constexpr double kGround_m = 0.05;  ///< height of the marker frame of a Crazyflie that stands on the floor
 constexpr double kTop_m = 0.5;
 constexpr double kWait_s = 1;
 constexpr double kMove_s = 2.5;
