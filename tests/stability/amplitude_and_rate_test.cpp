@@ -1,4 +1,4 @@
-// The bound for forces limited in amplitude and in rate, against the two limits alone and against forces of the class.
+// The bound for forces limited in amplitude and in rate, compared with each limit alone and with forces of the class.
 #include "stability/bounds/amplitude_and_rate.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 constexpr double kNodeStep_s = 0.002;
 constexpr int kNumNodes = 7501;  // 15 s
 
-/// y = 1.5 exp(-t) - 5 exp(-2 t) + 3.5 exp(-3 t): starts at zero, changes its sign once, then falls to zero.
+/// y = 1.5 exp(-t) - 5 exp(-2 t) + 3.5 exp(-3 t): starts at zero, changes its sign once, then decays to zero.
 StepResponse response() {
   StepResponse h;
   h.value = sampled_response({{1, -2}, {6, 11, 6, 1}}, kNodeStep_s, kNumNodes);
@@ -35,7 +35,7 @@ double variation(const StepResponse& h) {
   return sum + std::abs(h.value.back());
 }
 
-/// What the bends of all cells can add to any bound.
+/// Largest contribution of the bends of all cells to any bound.
 double bends(const StepResponse& h) { return std::accumulate(h.bend.begin(), h.bend.end(), 0.0); }
 
 double integral(const StepResponse& h) {
@@ -66,7 +66,7 @@ TEST(AmplitudeAndRate, NoForceOfTheClassExceedsTheBoundAndTheBestComeNear) {
   const double amplitude = 0.5, rate = 0.4, bound = split_bound(h, amplitude, rate);
   double largest = 0;
   for (int run = 0; run < 200; ++run) {
-    // Follows the sign of the remaining response with a random lead, as far as both limits let it.
+    // Follows the sign of the remaining response with a random lead, as far as both limits allow.
     const auto lead = static_cast<std::size_t>(1500 * random.uniform());
     double f = 0, output = 0;
     for (std::size_t i = 0; i + 1 < h.value.size(); ++i) {

@@ -42,8 +42,8 @@ TEST(AttitudeCascade, AStiffAttitudeLoopIsAsGoodAsNone) {
 }
 
 TEST(AttitudeCascade, ASteadyTorqueLeavesTheErrorOfItsTilt) {
-  // Without integrators a torque per inertia alpha tilts by alpha/(KR/J ratio), and that acceleration is held by
-  // ratio Kp e.
+  // Without integrators, a torque per inertia alpha causes a tilt of alpha/(KR/J ratio), and ratio Kp e balances the
+  // resulting acceleration.
   const Cascade loop{9, 7, 0, 1.5, AttitudeLoop{500, 60, 0}, 0.03};
   const double steady =
       std::abs(response_norms(cascade_transfer(loop, CascadeInput::kAngularAcceleration)).integral);

@@ -149,7 +149,7 @@ TEST(AxisLoop, AVeryShortDelayChangesNormsInProportion) {
   EXPECT_LT(std::abs(change[0]), 0.01 * without.amplitude);
 }
 
-/// A delay seen through a chain of n lags of T/n converges to it as 1/n: extrapolated from n = 16 and 32.
+/// A delay is approximated by a chain of n lags of T/n, with an error of order 1/n: extrapolated from n = 16 and 32.
 TEST(AxisLoop, ADelayIsTheLimitOfManyLags) {
   AxisLoop late = pid(10, 5, 10);
   late.delay_s = 0.05;
@@ -165,14 +165,14 @@ TEST(AxisLoop, ADelayIsTheLimitOfManyLags) {
 }
 
 TEST(AxisLoop, ADelayedLoopWithASlowIntegratorIsSummedToItsEnd) {
-  // The slow mode lasts 10 s to two days per e-fold: its integral is closed, and must be that of the pieces. A ramp's
-  // error is 1/(m Ki) where h does not change its sign, whatever lag and delay.
+  // The slow mode has time constants from 10 s to two days: its integral is added in closed form and must match the sum
+  // of the pieces. If h does not change its sign, the error under a ramp is 1/(m Ki) for any lag and delay.
   for (const double Ki : {2.0, 0.6, 0.01, 1e-4}) {
     const AxisLoop loop = {0.034, 20, 10, Ki, {0.0575, 0.1}, 0.004};
     const GainNorms norms = continuous_norms(loop, Channel::kForce);
     EXPECT_NEAR(norms.rate, 1 / (loop.mass_kg * Ki), 1e-9 / (loop.mass_kg * Ki)) << Ki;
     if (Ki < 0.1) continue;  // the grid would need hours of flight
-    // Against a plain sum over 500 s, of which e^-15 is left: independent of how the tail is closed.
+    // Compared with a plain sum over 500 s, where e^-15 is left: independent of the closed form of the tail.
     constexpr double kStep_s = 2e-3;
     double area = 0, peak = 0;
     for (const double y : sampled_response(impulse_transfer(loop, Channel::kForce), kStep_s, 250'000)) {
@@ -187,11 +187,11 @@ TEST(AxisLoop, ADelayedLoopWithASlowIntegratorIsSummedToItsEnd) {
 TEST(AxisLoop, WithoutIntegralARampHasNoBoundAndTheRestHas) {
   const GainNorms norms = continuous_norms(pid(10, 5, 0), Channel::kForce);
   EXPECT_TRUE(std::isinf(norms.rate));
-  // Second-order system with overshoot exp(-pi zeta / sqrt(1 - zeta^2)) of its step response 1/(m Kp).
+  // A second-order system whose step response 1/(m Kp) has an overshoot of exp(-pi zeta / sqrt(1 - zeta^2)).
   const double zeta = 5 / (2 * std::sqrt(10.0));
   const double overshoot = std::exp(-std::acos(-1.0) * zeta / std::sqrt(1 - zeta * zeta));
   expect_near(norms.edge, (1 + overshoot) / (kMass_kg * 10), 1e-12, "edge");
-  // Total variation of that step response: sum of the swings.
+  // Total variation of this step response: the sum of its swings.
   expect_near(norms.amplitude, (1 + overshoot) / (1 - overshoot) / (kMass_kg * 10), 1e-12, "amplitude");
 }
 
@@ -200,7 +200,7 @@ TEST(AxisLoop, AClampedIntegratorLeavesAResidual) {
   EXPECT_EQ(clamp_residual(pid(10, 5, 10), 0.0883, INFINITY), 0);
 }
 
-/// A sum over a fine grid, which knows nothing of zeros or ladders, agrees for random loops of any pole pattern.
+/// A sum over a fine grid, which does not locate zeros, agrees for random loops with any pole pattern.
 TEST(AxisLoop, NormsAgreeWithGridSumsOnRandomLoops) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(0, 1);

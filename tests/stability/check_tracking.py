@@ -1,19 +1,20 @@
 #!/usr/bin/env python3
-"""A second checker of certificates of tracking gains, in another language and written from the mathematics: integers
-and fractions, standard library only. It shares no line with the C++ checker and must accept and reject the same
+"""A second checker of certificates of tracking gains, written in another language from the mathematics, with integers
+and fractions and only the standard library. It shares no code with the C++ checker and must accept and reject the same
 certificates.
 
     check_tracking.py CERTIFICATE [--gains FILE] [--model FILE]
 
-Exit 0: accepted; 1: rejected, with the reason; 2: usage; 3: a file that cannot be read, or is not JSON of this kind.
+Exit status: 0 accepted; 1 rejected, with the reason; 2 usage error; 3 unreadable file, or not JSON of this kind.
 
-Along one axis y, the response of e to an impulse of the input, solves a linear equation with the numbers of the loop.
-With x the vector of y and its derivatives, in the certificate's unit of time, x' = A x. The certificate gives P with
-A'P + PA + 2 decay P < 0, so that sqrt(x'Px) falls at least like e^(-decay t). The step response, less its limit, is a
-linear form of x, too. Four numbers follow: the integrals and the largest values of both.
+Along one axis, let y be the response of e to an impulse of the input. It solves a linear differential equation with the
+numbers of the loop. With x the vector of y and its derivatives, in the certificate's unit of time, x' = A x. The
+certificate gives P with A'P + PA + 2 decay P < 0, so sqrt(x'Px) decays at least like e^(-decay t). The step response
+minus its limit is also a linear form of x. Four numbers follow: the integrals and the largest values of both.
 
-A sampled loop goes from period to period by a matrix M, in intervals of integers over 2^128; P with M P M' <
-contraction^2 P bounds the rows that give e some periods later. The same four numbers are sums over the periods.
+The state of a sampled loop maps from one period to the next by a matrix M, enclosed in intervals of integers over
+2^128; P with M P M' < contraction^2 P bounds the rows that give e some periods later. The same four numbers are sums
+over the periods.
 """
 import hashlib
 import json
@@ -41,7 +42,7 @@ STATEMENT = (
     "compares the hashes and derives the loops anew, up to a relative 1e-12 for rounding. What is listed under "
     "left_out, and every bound made from these gains, is not certified here.")
 
-BITS = 128  # of a fixed-point number after the point
+BITS = 128  # number of fractional bits of a fixed-point number
 DEEPEST = 64
 HEX_FLOAT = re.compile(r"(-?)0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]{0,40})(?:\.([0-9a-fA-F]{0,40}))?[pP]([+-]?[0-9]{1,5})")
 
@@ -95,7 +96,7 @@ def read_json(text):
 
 
 def encode(value):
-    """The bytes that content_sha256 hashes: independent of white space and of the order of members."""
+    """Returns the bytes that content_sha256 hashes: independent of white space and of the order of members."""
     if value is None:
         return b"n"
     if isinstance(value, bool):
@@ -120,7 +121,7 @@ def require_keys(value, keys, where):
 
 
 def exact(text):
-    """The number of a hex float that a double holds exactly."""
+    """Returns the number of a hex float that is exactly representable as a double."""
     match = HEX_FLOAT.fullmatch(text) if isinstance(text, str) else None
     require(match is not None, f"{str(text)[:60]!r} is not a hex float")
     sign, whole, fraction, exponent = match.groups()
@@ -159,7 +160,7 @@ def times(row, matrix):
 
 
 def inverse_form(matrix, vector):
-    """vector' matrix^-1 vector, for a symmetric matrix; None unless it is positive definite."""
+    """Returns vector' matrix^-1 vector, for a symmetric matrix; None unless it is positive definite."""
     m, v, total = [list(row) for row in matrix], list(vector), Fraction(0)
     for k in range(len(m)):
         if m[k][k] <= 0:
@@ -189,7 +190,7 @@ def root_above(x):
 
 
 class Derived:
-    """The loops of gains.toml and model.toml."""
+    """Returns the loops of gains.toml and model.toml."""
 
     def __init__(self, gains, model):
         self.mass = model["vehicle"]["mass_kg"]
@@ -303,7 +304,7 @@ class Loop:
             return start
 
         self.start = initial(top)
-        # e^(-Ts) less its expansion is (-s)^(order + 1) times a kernel of one sign whose integral is this weight.
+        # e^(-Ts) minus its expansion is (-s)^(order + 1) times a kernel of one sign whose integral is this weight.
         self.rest_weight = self.delay ** (self.delay_order + 1) / factorial(self.delay_order + 1)
         rest = [Fraction(0)] * (self.delay_order + 1) + back
         rest += [Fraction(0)] * (n + 1 - len(rest))
@@ -323,7 +324,7 @@ class Loop:
         require(inverse_form(falls, nothing) is not None, "P does not show that the loop decays at the rate stated")
 
     def transition(self):
-        """exp(A cell) in fixed point, and an upper bound of what is missing, in the maximum norm."""
+        """Returns exp(A cell) in fixed point, and an upper bound on its error in the maximum norm."""
         n, cell = len(self.A), two_to(-self.cell)
         require(max([1] + [sum(map(abs, row)) for row in self.A]) * cell <= Fraction(1, 2), "the cells are too long")
         power = [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]
@@ -334,7 +335,7 @@ class Loop:
         return [[fixed_below(x) for x in row] for row in total], fixed_above(two_to(-24) / factorial(25)) + n
 
     def gains(self):
-        """Upper bounds of rate (None where there is none), amplitude, edge, impulse."""
+        """Returns upper bounds on rate (None if there is none), amplitude, edge and impulse."""
         self.check_decay()
         missed = 0
         if self.delay:
@@ -410,7 +411,7 @@ def matrix_product(a, b):
 
 
 def matrix_exponential(generator, t):
-    """exp(generator t) for t >= 0: the Taylor sum of a part of it in fractions, squared in intervals."""
+    """Returns exp(generator t), t >= 0: the Taylor sum for t / 2^k in fractions, squared k times in intervals."""
     n, halvings = len(generator), 0
     largest = max(sum(map(abs, row)) for row in generator) * t
     while largest > Fraction(2) ** (halvings - 1):
@@ -444,8 +445,8 @@ def solve(matrix, right):
 
 
 class Sampled:
-    """One axis. States before a control: e, e', outputs of the lags, the integral, past commands; after it the new
-    command stands before the past ones."""
+    """One axis. States before a control: e, e', lag outputs, the integral, past commands; after the control, the new
+    command precedes the past ones."""
     INPUTS = ("force", "command", "velocity", "position")
 
     def __init__(self, entry):
@@ -481,7 +482,7 @@ class Sampled:
         return rows + [law] + [[Fraction(int(j == c + i)) for j in range(n)] for i in range(self.past)]
 
     def next_period(self):
-        """From the state after control, in intervals."""
+        """Returns the map from the state after a control to the state before the next control, in intervals."""
         n, plant, unit = self.n, self.plant, (1 << BITS, 1 << BITS)
         g = [[Fraction(0)] * (plant + 1) for _ in range(plant + 1)]
         g[0][1] = g[1][2] = Fraction(1)
@@ -522,7 +523,7 @@ class Sampled:
         return control, hold
 
     def column(self, intervals):
-        """The middle, its norm, and how far from it the true column may be."""
+        """Returns the midpoint, its norm, and a bound on its distance from the true column."""
         unknown = sum(product_above(high - low + 1, reach) for (low, high), reach in zip(intervals, self.reach))
         return self.finished([(low + high) >> 1 for low, high in intervals], unknown)
 
@@ -531,7 +532,7 @@ class Sampled:
         return middle, norm, unknown
 
     def summed(self, effect):
-        """(I - M)^-1 effect."""
+        """Returns (I - M)^-1 effect."""
         n = self.n
         left = [[int(i == j) - Fraction(self.middle[i][j], 2 ** BITS) for j in range(n)] for i in range(n)]
         x = [fixed_below(v) for v in solve(left, [Fraction(low + high >> 1, 2 ** BITS) for low, high in effect])]
@@ -543,7 +544,7 @@ class Sampled:
         return self.finished(x, fixed_above(Fraction(wrong, 2 ** BITS) / (1 - self.factor)))
 
     def run(self, output, effects, own, limits):
-        """Gains of one output to the four inputs, as dictionaries. `effects`: columns of the inputs but the force."""
+        """Returns the gains from the four inputs to one output. `effects`: columns of all inputs but the force."""
         T, n, fixed = self.period, self.n, 2 ** BITS
         bow = T * T / 8
         rest_of_row = [(0, 0)] * (n - 2)

@@ -11,7 +11,7 @@ using files::Json;
 
 constexpr char kNoHash[] = "";
 
-/// A certificate that states nothing of any loop, with a hash that is its own.
+/// A certificate without loops, with a valid content hash.
 Json empty_certificate() {
   return {{"schema", kTrackingSchema},
           {"tool", "test"},

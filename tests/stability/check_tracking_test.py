@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Runs both checkers of tracking gains over the same certificates: sound ones, mutations of every field under a forged
-content hash, and hostile files. They must agree on each, and accept no claim below what holds.
+"""Runs both checkers of tracking gains on the same certificates: valid ones, mutations of every field under a forged
+content hash, and hostile files. They must agree on each, and must not accept a claim below the true gain.
 
     check_tracking_test.py SWARMCERT SOURCE_DIR
 """
@@ -18,7 +18,7 @@ import check_tracking as second
 
 SWARMCERT, SOURCE = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
 MODEL = SOURCE / "stability/models/crazyflie-small.toml"
-LIMIT_S = 20  # of a hostile file on a loaded machine; it takes milliseconds
+LIMIT_S = 20  # for a hostile file on a loaded machine; it takes milliseconds
 
 
 def certificate(folder, position, lag="", model=MODEL):
@@ -58,7 +58,7 @@ def at(document, path):
 
 
 def mutations(value):
-    """Other values for one field: numbers up and down, other types, what is missing."""
+    """Other values for one field: larger and smaller numbers, other types, missing values."""
     if isinstance(value, str) and value[:3] in ("0x0", "0x1"):
         x = float.fromhex(value)
         yield from (y.hex() for y in (x * 1.25 or 0.5, x * 0.75, -x, math.nextafter(x, math.inf),
@@ -77,7 +77,7 @@ def mutations(value):
 
 
 def least_gains(loop):
-    """Gains of the loop from below, by stepping its differential equation: what no certificate may claim less than."""
+    """Lower bounds on the gains of the loop, by stepping its differential equation. No certificate may claim less."""
     c = {k: float.fromhex(loop[k]) for k in ("mass_kg", "Kp", "Kd", "Ki")}
     lags = [float.fromhex(x) for x in loop["lags_s"]]
     m, kp, kd, ki = c["mass_kg"], c["Kp"], c["Kd"], c["Ki"]
@@ -86,7 +86,7 @@ def least_gains(loop):
     past = []  # commands, one per step
 
     def command_at(x, ahead):
-        """The command of the state, or where there is a delay, of the steps before."""
+        """The command for this state or, with a delay, for an earlier step."""
         if late == 0:
             return command_of(x)
         k = len(past) - late - 1
@@ -108,7 +108,7 @@ def least_gains(loop):
         return [v, (chain + (loop["input"] == "force")) / m, e, *lagged, 1.0]
 
     x, peak, integral, variation, steepest = [0.0] * (4 + len(lags)), 0.0, 0.0, 0.0, 0.0
-    for _ in range(int(horizon / dt)):  # Runge and Kutta, of the response to a unit step
+    for _ in range(int(horizon / dt)):  # Runge-Kutta, for the response to a unit step
         past.append(command_of(x))
         k1 = slope(x, 0)
         k2 = slope([a + dt / 2 * b for a, b in zip(x, k1)], 0.5)
@@ -122,9 +122,9 @@ def least_gains(loop):
 
 
 def least_sampled_gains(loop, source):
-    """Of the sampled loop from below: sums over the sampling times of the response to a step of one input, which begins
-    at a sampling time. Held commands pass the lags by Runge and Kutta in short steps; a delay is a whole number of
-    them."""
+    """Lower bounds on the gains of the sampled loop: sums over the sampling times of the response to a step of one
+    input that begins at a sampling time. Held commands pass through the lags by Runge-Kutta in short steps; a delay is
+    a whole number of them."""
     m, kp, kd, ki, period, increment, delay = (float.fromhex(loop[k]) for k in (
         "mass_kg", "Kp", "Kd", "Ki", "period_s", "integrator_step_s", "delay_s"))
     lags = [float.fromhex(x) for x in loop["lags_s"]]
@@ -189,7 +189,7 @@ def agree_on_mutations(folder, document):
 
 @contextlib.contextmanager
 def gains_computed_once():
-    """The second checker finds the gains of a witness once: most mutations change a claim only."""
+    """Lets the second checker compute the gains of a witness only once, since most mutations change only a claim."""
     originals = {kind: kind.gains for kind in (second.Loop, second.Sampled)}
 
     def once(compute):
@@ -210,11 +210,11 @@ def gains_computed_once():
 
 
 def agree_on_sampled_mutations(folder, document):
-    """Every field of a sampled loop with a past command; of P, a form as of the other loops, the diagonal and a
-    corner."""
+    """Mutates every field of a sampled loop with a past command; of P, which has the same form as in the other loops,
+    only the diagonal and one other entry."""
     seen = accepted = 0
     loop = document["sampled_loops"][0]
-    witness = ("axis", "steps", "contraction", "P", "gains")  # they change nothing of what is true
+    witness = ("axis", "steps", "contraction", "P", "gains")  # these do not affect the truth of the claims
     truth = {source: least_sampled_gains(loop, source) for source in loop["gains"]}
     assert [exit_codes(folder, forged({**document, "loops": [], "sampled_loops": some}))
             for some in ([loop], [])] == [[0, 0], [1, 1]]
@@ -236,7 +236,7 @@ def agree_on_sampled_mutations(folder, document):
 
 
 def hold_from_below(loop, rate_slack, truth=None):
-    """No certified gain is below what stepping finds; the integral over sampling times is a sum, wrong by
+    """No certified gain is below the one found by stepping; the integral over sampling times is a sum with an error of
     `rate_slack`."""
     compared = 0
     for source, claims in loop["gains"].items():
@@ -249,7 +249,7 @@ def hold_from_below(loop, rate_slack, truth=None):
 
 
 def refuse_low_claims(folder, document):
-    """A gain 6 % lower is below the true one, as what is certified is at most 5 % above."""
+    """A gain 6 % lower is below the true one, since certified gains are at most 5 % above."""
     for k, loop in enumerate(document["loops"][:4]):
         for name in ("rate", "amplitude", "edge", "impulse"):
             if loop["gains"][name] is None:
@@ -273,7 +273,7 @@ def refuse_hostile_files(folder, document):
 
 
 def hold_for_random_loops(folder):
-    """Gains found by stepping never exceed certified ones, which are about as large."""
+    """Gains found by stepping never exceed the certified ones, which are only slightly larger."""
     generator, compared, delayed = random.Random(23), 0, 0
     for run in range(6):
         kp, kd = generator.uniform(6, 30), generator.uniform(5, 12)
@@ -299,7 +299,7 @@ def hold_for_random_loops(folder):
 
 
 def hold_for_random_sampled_loops(folder):
-    """The same for sampled loops: with and without integral, lags, delays of a part of a period and of several."""
+    """The same for sampled loops: with and without integral, lags, delays of a fraction of a period and of several."""
     generator, compared = random.Random(29), 0
     for run, delay_periods in enumerate((0, 0.5, 2, 1.25)):
         kp, kd, rate = generator.uniform(6, 20), generator.uniform(5, 8), (50, 100, 200, 100)[run]
@@ -315,7 +315,7 @@ def hold_for_random_sampled_loops(folder):
         compared += hold_from_below(loop, 2e-2)
         for source, claims in loop["gains"].items():
             least = least_sampled_gains(loop, source)
-            for name in ("amplitude", "edge", "impulse"):  # between the sampling times a force does a little more
+            for name in ("amplitude", "edge", "impulse"):  # a force causes slightly more between the samples
                 assert claims[name] <= 1.1 * least[name], (run, source, name, claims[name], least[name])
     assert compared > 50, compared
     print(f"{compared} gains of sampled random loops compared")
@@ -330,7 +330,7 @@ def main():
         own = ["--gains", str(folder / "gains.toml"), "--model", str(MODEL)]
         assert exit_codes(folder, forged(document), *own) == [0, 0]
         assert exit_codes(folder, forged(document), "--gains", str(MODEL)) == [1, 1]
-        for number in ("Kp", "mass_kg"):  # of a loop that is not the one of the files, though all is true of it
+        for number in ("Kp", "mass_kg"):  # all claims are true, but of another loop than that of the files
             other = copy.deepcopy(document)
             for loop in other["loops"]:
                 loop[number] = (float.fromhex(loop[number]) * (1 + 1e-9)).hex()
@@ -361,7 +361,7 @@ def main():
         assert certificate(folder, "Kp = 12\nKd = 7\nKi = 20", "[lag]\nmotor_s = 0.03\n") == document
         changed = copy.deepcopy(document)
         changed["tool"] = "another"
-        assert exit_codes(folder, json.dumps(changed)) == [1, 1]  # the hash of the content is of the other one
+        assert exit_codes(folder, json.dumps(changed)) == [1, 1]  # the content hash is that of the original
         sampled = certificate(folder, "Kp = 12\nKd = 7\nKi = 20\nrate_hz = 50",
                               "[lag]\nmotor_s = 0.03\ndelay_s = 0.005\n")
         assert exit_codes(folder, forged(sampled), *own) == [0, 0]

@@ -80,7 +80,7 @@ TEST(ContinuousFlight, IsTheLimitOfTheSampledLoop) {
 }
 
 TEST(ContinuousFlight, MeetsTheIntegralsClampAndStandsThere) {
-  // Reference: with |I| <= 0.1 m s a force of 0.0883 N leaves (0.0883 / m - Ki 0.1) / Kp.
+  // Reference: with |I| <= 0.1 m s a force of 0.0883 N leaves an error of (0.0883 / m - Ki 0.1) / Kp.
   Model heavy = model("crazyflie-small.toml");
   EffectSpec force;
   force.name = "constant_force";

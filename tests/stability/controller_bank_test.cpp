@@ -13,7 +13,7 @@ namespace swarmcert::stability {
 namespace {
 
 constexpr double kPeriod_s = 0.001;
-constexpr int kVehicles = 5;  ///< enough to fly in lanes together
+constexpr int kVehicles = 5;  ///< enough to share SIMD lanes
 
 Gains bank_gains() {
   return parse_gains(
@@ -26,7 +26,7 @@ Eigen::Vector3d random_vector(files::Random& random, double size) {
   return size * Eigen::Vector3d(random.symmetric(), random.symmetric(), random.symmetric());
 }
 
-/// What one vehicle is told in one period. Every tenth set point is far away, so that thrust reaches its limit.
+/// Inputs of one vehicle in one period. Every tenth setpoint is far away, so that thrust reaches its limit.
 struct Told {
   Eigen::Vector3d p_W_m, v_W_m_s, omega_B_rad_s;
   Eigen::Quaterniond attitude;
@@ -98,7 +98,7 @@ TEST(ControllerBank, FloatAnswersAsDoubleUpToRounding) {
     tell(told, 0, now_ms, *in_double, rows);
     in_float->step(rows.data(), 4.0, now_ms, true, a);
     in_double->step(rows.data(), 4.0, now_ms, true, b);
-    if (a[0].saturated || b[0].saturated) continue;  // which way a limit falls is not continuous
+    if (a[0].saturated || b[0].saturated) continue;  // the decision at a limit is discontinuous
     for (std::size_t r = 0; r < kNumRotors; ++r)
       ASSERT_NEAR(a[0].rotor_N[r], b[0].rotor_N[r], 1e-4) << now_ms;
   }

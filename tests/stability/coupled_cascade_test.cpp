@@ -12,7 +12,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The channels of x, y and z of a vehicle that flew: laws of their own about both tilts, and a thrust.
+/// Channels x, y and z of a vehicle that flew: separate attitude laws for both tilts, and the thrust.
 std::vector<Cascade> channels() {
   Cascade x, y, z;
   x.ratio = y.ratio = z.ratio = 1.3;
@@ -42,7 +42,7 @@ CoupledCascade coupled() {
   return loop;
 }
 
-/// The channel as a loop of its own.
+/// The channel as a separate loop.
 Cascade alone(const CoupledCascade& loop, Eigen::Index i) {
   Cascade result = loop.channels[static_cast<std::size_t>(i)];
   result.Kp = loop.position.Kp(i, i);
@@ -51,7 +51,7 @@ Cascade alone(const CoupledCascade& loop, Eigen::Index i) {
   return result;
 }
 
-/// Both are the same, or none destabilises either.
+/// Expects equal gains, or that neither loop can be destabilised.
 void expect_same_gain(double found, double expected, double tolerance) {
   if (std::isinf(expected)) {
     EXPECT_EQ(found, expected);
@@ -86,7 +86,7 @@ TEST(CoupledCascade, AxesThatAreNotCoupledKeepTheMarginsOfTheirOwnLoops) {
   EXPECT_NEAR(margins.together.damping, least.damping, 1e-9);
 }
 
-/// In axes turned by any angle the same vehicle flies, if both tilts are alike.
+/// With equal tilt loops, gains that are diagonal in axes rotated by any angle describe the same vehicle.
 TEST(CoupledCascade, GainsThatAreDiagonalInTurnedAxesHaveTheirMarginsTogether) {
   CoupledCascade straight;
   const Eigen::Vector2d Kp(9, 13), Kd(6, 5), Ki(2, 0);
@@ -105,7 +105,7 @@ TEST(CoupledCascade, GainsThatAreDiagonalInTurnedAxesHaveTheirMarginsTogether) {
     EXPECT_NEAR(margins.together.low_gain, expected.together.low_gain, 1e-8);
     EXPECT_NEAR(margins.together.delay_s, expected.together.delay_s, 1e-8 * expected.together.delay_s);
     EXPECT_NEAR(margins.together.damping, expected.together.damping, 1e-8);
-    // One tilt alone has its share of the other's axis.
+    // One tilt alone also affects the other's axis.
     EXPECT_GT(std::abs(margins.alone[0].low_gain - expected.alone[0].low_gain), 1e-5);
   }
 }
@@ -124,7 +124,7 @@ TEST(CoupledCascade, AtItsGainMarginsTheLoopStopsBeingStable) {
     ASSERT_TRUE(std::isfinite(found.gain));
     EXPECT_TRUE(holds(0.999 * found.gain, first, count));
     EXPECT_FALSE(holds(1.001 * found.gain, first, count));
-    if (found.low_gain == 0) return;  // without an integrator, it may vanish
+    if (found.low_gain == 0) return;  // without an integrator, it may be zero
     EXPECT_TRUE(holds(1.001 * found.low_gain, first, count));
     EXPECT_FALSE(holds(0.999 * found.low_gain, first, count));
   };
@@ -139,13 +139,13 @@ TEST(CoupledCascade, AtItsGainMarginsTheLoopStopsBeingStable) {
             nearness_to_limit_cycle(margins.together));
 }
 
-/// The coupled loop stepped through time by Euler's method, with commands that are delayed; written down from the
-/// equations of the headers.
+/// Steps the coupled loop through time by Euler's method, with delayed commands; implemented from the equations in the
+/// headers.
 class SteppedCascade {
  public:
   explicit SteppedCascade(const CoupledCascade& loop) : loop_(loop) {}
 
-  /// Largest |e| in the last tenth over that in the second tenth.
+  /// Returns the largest |e| in the last tenth relative to that in the second tenth.
   /// @param delay_s per channel.
   double growth(const Eigen::Vector3d& delay_s, double duration_s) {
     const auto steps = static_cast<long>(duration_s / kStep_s);

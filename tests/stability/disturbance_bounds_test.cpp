@@ -1,4 +1,4 @@
-// Expected bounds: gains by SciPy's DOP853 times the sizes of the force when two to five vehicles fly over one.
+// Expected bounds: gains by SciPy's DOP853 times the magnitudes of the force when two to five vehicles fly above one.
 #include "stability/bounds/disturbance_bounds.h"
 
 #include <gtest/gtest.h>
@@ -44,13 +44,13 @@ TEST(DisturbanceBounds, FlyUnderEventsOfTheReference) {
     EXPECT_NEAR(b.by_rate, B1[i], 0.05);
     EXPECT_NEAR(b.by_amplitude, B2[i], 1e-3);
     EXPECT_NEAR(b.by_edges, B3[i], 1e-3);
-    EXPECT_NEAR(b.by_impulse, B4[i], 0.012 * B4[i]);  // J is given with three digits, and rises in the source
+    EXPECT_NEAR(b.by_impulse, B4[i], 0.012 * B4[i]);  // J has three digits, rounded up in the source
     EXPECT_LE(b.by_both, std::min(b.by_rate, b.by_amplitude));
     EXPECT_EQ(b.which(), "impulse");
   }
 }
 
-/// What is left of an impulse of 1 N s after `after_s`, m: what a second pass so much later adds to the bound.
+/// Remainder of an impulse of 1 N s after `after_s`, m: the contribution to the bound of a second pass at that time.
 double left_of_an_impulse_m(const AxisLoop& loop, double after_s) {
   Disturbance passes = known(1, 1, 1, 1);
   passes.pass_period_s = after_s;
@@ -78,12 +78,13 @@ TEST(DisturbanceBounds, EarlierPassesAreStillFelt) {
   EXPECT_NEAR(all.by_impulse / one.by_impulse, 1.12, 0.01);
 }
 
-/// h >= 0 with one hump: the best split cuts the hump off where it is 2E/d wide (bang-bang with ramps of that length).
+/// h >= 0 with one hump: the best split cuts the hump off where its width is 2E/d (bang-bang with ramps of that
+/// length).
 TEST(DisturbanceBounds, AmplitudeAndRateTogetherHaveTheirClosedFormForOneHump) {
   const double a = 3, m = kMass_kg;
   const AxisLoop triple = pid_loop(3 * a * a, 3 * a, a * a * a);
   const double E = 1, d = 4;
-  // h = t^2 e^(-at)/(2m). Level c whose width is 2E/d by bisection.
+  // h = t^2 e^(-at)/(2m). Finds the level c with width 2E/d by bisection.
   const auto h = [&](double t) { return t * t * std::exp(-a * t) / (2 * m); };
   const double peak = h(2 / a);
   double low = 0, high = peak, from = 0, to = 0;
@@ -118,7 +119,7 @@ TEST(DisturbanceBounds, AmplitudeAndRateTogetherTendToEachAlone) {
 }
 
 /// Ten thousand random forces of each class, each convolved with the kernel: none exceeds the bound of its class, and
-/// the worst input of each class comes near it.
+/// the worst input of each class comes close to it.
 TEST(DisturbanceBounds, NoneOfTenThousandRandomInputsOfEachClassExceedsItsBound) {
   const AxisLoop loop = pid_loop(10, 5, 10, kLag_s);
   const GainNorms gains = continuous_norms(loop, Channel::kForce);
@@ -166,13 +167,13 @@ TEST(DisturbanceBounds, NoneOfTenThousandRandomInputsOfEachClassExceedsItsBound)
     ASSERT_LE(reached, gains.edge * variation + 1e-9);
     ASSERT_LE(reached, gains.impulse * impulse + 1e-9);
     nearest = std::max(nearest, reached / (gains.amplitude * amplitude));
-    // A staircase of slope-limited steps stays within one step of a force of that rate.
+    // A staircase of rate-limited steps differs by at most one step from a force of that rate.
     const double slack = gains.amplitude * rate * kStep_s;
     ASSERT_LE(error(slow), gains.rate * rate + slack);
     ASSERT_LE(error(slow), both + slack);
   }
   EXPECT_GT(nearest, 0.6);
-  // The worst force of size 1 N has the sign of h'(T - t).
+  // The worst force of amplitude 1 N has the sign of h'(T - t).
   std::vector<double> worst = sampled_response(impulse_transfer(loop, Channel::kForce), kStep_s, kCount);
   std::reverse(worst.begin(), worst.end());
   for (double& f : worst) f = f > 0 ? 1 : f < 0 ? -1 : 0;

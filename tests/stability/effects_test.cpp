@@ -139,7 +139,8 @@ TEST(Effects, GiveTheSameBitsForInstantsInARowAsForEachAlone) {
     if (effect_info(name).remembers) continue;
     SCOPED_TRACE(name);
     const std::unique_ptr<Effect> effect = make_effect(spec_of(name), kContext);
-    // More than registers hold, and more pairs than the downwash takes at once; with vehicles that are alone.
+    // More than fit in registers, and more pairs than the downwash processes at once; includes vehicles without
+    // neighbours.
     std::deque<RandomInstant> states;
     std::vector<Instant> instants;
     for (int i = 0; i < 77; ++i) instants.push_back(states.emplace_back(random, i % 7 == 6 ? 50 : i % 5).now);
@@ -164,7 +165,7 @@ TEST(Effects, GiveTheSameBitsForInstantsInARowAsForEachAlone) {
   }
 }
 
-/// Force in gram-force on a vehicle `dz_m` below another at horizontal distance `r_m`.
+/// Force in gram-force on a vehicle that is `dz_m` below another, at horizontal distance `r_m`.
 double downwash_gf(double r_m, double dz_m, double norm_exponent = 1.3, int copies = 1) {
   EffectSpec spec = spec_of("downwash");
   spec.parameters["norm_exponent"] = norm_exponent;
@@ -339,8 +340,8 @@ TEST(Downwash, HasTheSameBitsForOneVehicleAndForASwarm) {
   EXPECT_GT(composed, 300);
 }
 
-/// A level vehicle whose rotors give `f`, as the simulator's mixing has it (swarm.cpp): arms of 0.046 m, 0.006 m of
-/// torque per thrust.
+/// A level vehicle whose rotors give `f`, with the simulator's mixing (swarm.cpp): arms of 0.046 m, torque per thrust
+/// 0.006 m.
 Instant rotors_of(const Eigen::Vector4d& f_N) {
   const double offset_m = 0.046 * std::sqrt(0.5);
   Instant now;
@@ -363,7 +364,7 @@ TEST(RotorThrust, IsTheThrustAndTorqueOfTheRotorsWithTheirFactors) {
   EXPECT_LT(nominal.force_W_N.norm() + nominal.torque_B_Nm.norm(), 1e-15) << "factors of 1 change nothing";
 }
 
-/// The neighbours of a level vehicle that is moved by (x, y).
+/// Returns the downwash on a level vehicle that is displaced by (x, y).
 double downwash_N(const Instant& now, double x, double y) {
   std::vector<Neighbour> seen(now.neighbours, now.neighbours + now.num_neighbours);
   for (Neighbour& neighbour : seen) neighbour.dp_W_m -= Eigen::Vector3d(x, y, 0);
@@ -405,7 +406,7 @@ TEST(DownwashTorque, TiltsTowardsTheWakeAndTurnsWithTheSwarm) {
   const Eigen::Vector3d towards = effect.wrench(now).torque_B_Nm;
   EXPECT_GT(towards.y(), 1e-5) << "about +y: the thrust axis falls towards +x, where the wake pushes";
   EXPECT_NEAR(towards.x(), 0, 1e-15);
-  // A quarter turn of world and vehicle leaves what the body feels.
+  // A quarter turn of world and vehicle does not change the torque in the body frame.
   now.R_WB = Eigen::AngleAxisd(1.5707963267948966, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   above.dp_W_m = now.R_WB * above.dp_W_m;
   EXPECT_LT((effect.wrench(now).torque_B_Nm - towards).norm(), 1e-15);
@@ -577,7 +578,7 @@ class SidewaysPull : public Effect {
   }
 };
 
-// Last: the registry keeps it.
+// Must be the last test, since the effect stays in the registry.
 TEST(RegisteredEffect, IsNamedInModelFilesAndTakesPartLikeTheOthers) {
   const EffectMaker make = [](const EffectSpec&, const EffectContext&) {
     return std::make_unique<SidewaysPull>();

@@ -1,4 +1,4 @@
-/// @file What tests ask of an enclosure.
+/// @file Assertions on enclosures.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -7,8 +7,8 @@
 
 namespace swarmcert::tests {
 
-/// `interval` holds a number within `estimate_error` (relative) of `value`, has a width, and one below
-/// `relative_width`.
+/// Succeeds if `interval` contains a number within `estimate_error` (relative) of `value`, and its width is positive
+/// and below `relative_width`.
 inline testing::AssertionResult encloses(const Interval& interval, double value, double relative_width,
                                          double estimate_error = 0) {
   if (!(interval.lower <= value * (1 + estimate_error) && value * (1 - estimate_error) <= interval.upper)) {

@@ -1,4 +1,4 @@
-// Everything that a user can declare, acting together: no simulated error exceeds the bound that is printed.
+// All disturbances that a user can declare, acting together: no simulated error exceeds the reported bound.
 #include "stability/bounds/error_parts.h"
 
 #include <gtest/gtest.h>
@@ -23,11 +23,11 @@ using tests::kMass_kg;
 constexpr double kStep_s = 0.0025;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-/// The loops under test: with and without integrator, lags, a delay; continuous where `steps` is 0.
+/// The loops under test: with and without integrator, lags and delay; continuous if `steps` is 0.
 struct Case {
   const char* name;
   AxisLoop loop;
-  int steps;  ///< of kStep_s per period
+  int steps;  ///< number of kStep_s per period
   double integrator_share = 1;
 
   SampledLoop sampled() const {
@@ -50,7 +50,7 @@ std::vector<Case> cases() {
           {"sampled at 400 Hz", {kMass_kg, 20, 10, 12, {1 / 17.4, 0.03}, 0}, 1}};
 }
 
-/// e at the end of every step after what `start` does, and with what `each` sets before a step.
+/// Returns e at the end of every step, after `start` and under the forces that `force_of` returns.
 std::vector<double> response(SteppedLoop loop, int count, const std::function<void(SteppedLoop&)>& start,
                              const std::function<double(SteppedLoop&, int)>& force_of) {
   std::vector<double> e;
@@ -63,7 +63,7 @@ std::vector<double> response(SteppedLoop loop, int count, const std::function<vo
   return e;
 }
 
-/// What is declared of one axis, and inputs that are as large as that allows.
+/// Declarations for one axis, with inputs of the largest declared magnitude.
 struct Declared {
   Disturbance known;
   OtherErrors other;
@@ -79,7 +79,7 @@ AxisBounds bounds_of(const Case& c, const Declared& declared, double limit_m_s =
                      declared.known, declared.other, false, limit_m_s);
 }
 
-/// Signs of every part that add up at the end of the run: those of the responses to each of them, back in time.
+/// Signs with which all parts add up at the end of the run: those of the responses to each of them, backwards in time.
 struct Worst {
   std::vector<double> force, velocity, position;
   double bias = 0, initial_position = 0, initial_velocity = 0;
@@ -112,7 +112,7 @@ Worst worst_of(const Case& c, int count) {
 
 double sign(double x) { return x < 0 ? -1 : 1; }
 
-/// Largest |e| with every part as large as declared; a share `mistakes` of all signs is wrong.
+/// Returns the largest |e| with every part at its declared maximum; a fraction `mistakes` of all signs is wrong.
 double largest_error(const Case& c, const Declared& declared, const Worst& worst, double mistakes,
                      std::mt19937& random, double limit_m_s = kInfinite) {
   std::uniform_real_distribution<double> unit(0, 1);
@@ -146,7 +146,7 @@ double largest_error(const Case& c, const Declared& declared, const Worst& worst
     }
     if (std::isfinite(known.variation_N)) to_N = force_N = known.variation_N * sign(worst.bias);
     if (std::isfinite(known.impulse_N_s)) {
-      // Spread over a tenth of a second about the largest response.
+      // Spread over a tenth of a second around the largest response.
       const auto peak = std::max_element(worst.force.begin(), worst.force.end(),
                                          [](double a, double b) { return std::abs(a) < std::abs(b); });
       const int at = count - 1 - static_cast<int>(peak - worst.force.begin());
@@ -160,7 +160,7 @@ double largest_error(const Case& c, const Declared& declared, const Worst& worst
   return most;
 }
 
-/// One class of the force error at a time, with random sizes of all other parts.
+/// Draws declarations with one class of the force error at a time, and random magnitudes of all other parts.
 std::vector<Declared> random_declarations(std::mt19937& random, bool has_integrator) {
   std::uniform_real_distribution<double> unit(0, 1);
   std::vector<Declared> all(has_integrator ? 5 : 3);
@@ -180,11 +180,11 @@ std::vector<Declared> random_declarations(std::mt19937& random, bool has_integra
   return all;
 }
 
-/// How far stepping the loop may be off: a late command of a continuous loop is stepped as if it were linear on each
+/// Error bound of the stepped loop: a delayed command of a continuous loop is stepped as if it were linear on each
 /// step.
 double stepping_error(const Case& c) { return c.steps == 0 && c.loop.delay_s > 0 ? 2e-5 : 1e-7; }
 
-/// @param draws per loop and per end of a run.
+/// @param draws number per loop and per end of a run.
 void check_everything(int draws, const std::vector<double>& ends_s) {
   std::mt19937 random(3);
   int runs = 0;
@@ -216,7 +216,7 @@ TEST(ErrorParts, EverythingDeclaredTogetherStaysBelowTheBound_slow) {
   check_everything(40, {0.15, 0.3, 0.6, 1.2, 2.5, 6});
 }
 
-/// The vehicle that flies where every thrust is (1 + d) times that of the model, and what then acts on it.
+/// The actual vehicle if every thrust is (1 + d) times that of the model.
 Case with_ratio(Case c, double d) {
   for (double* const gain : {&c.loop.Kp, &c.loop.Kd, &c.loop.Ki}) *gain *= 1 + d;
   return c;
@@ -227,7 +227,7 @@ Declared with_hover_force(Declared declared, double d) {
   return declared;
 }
 
-/// The largest |e| over ratios within the error, over the bound that knows only the error.
+/// Checks the largest |e| over ratios within the error, relative to the bound that knows only the error.
 void check_ratios(double limit_m_s, double least_closest) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -277,7 +277,7 @@ TEST(ErrorParts, AnErrorOfTheThrustRatioCostsASagThatIsKnownWithoutIntegrator) {
   const double bound_m = bounds_of(c, declared).least();
   EXPECT_GE(bound_m, sag_m);
   EXPECT_LE(bound_m, 1.1 * sag_m);
-  // A feedback that an error of the ratio could turn round has no bound by small gain.
+  // If an error of the ratio could reverse the sign of the feedback, small gain gives no bound.
   declared.other.thrust_ratio_error = 0.89;
   EXPECT_TRUE(std::isinf(bounds_of(c, declared).parts.thrust_ratio_m));
 }
@@ -304,13 +304,13 @@ TEST(ErrorParts, EachPartAloneIsReached) {
         most = std::max(most, largest_error(c, declared, worst, 0, random));
       }
       EXPECT_LE(most, bound * (1 + stepping_error(c)));
-      // Speeds that begin between samples are worse, and slow loops take longer than the runs.
+      // Velocity jumps between samples are worse, and slow loops take longer than the runs.
       EXPECT_GT(most, 0.88 * bound);
     }
   }
 }
 
-/// e at the end of a run after an error of 1 of one estimate during one period, by the period in which it is made.
+/// Returns e at the end of a run after a unit error of one estimate during one period, indexed by that period.
 std::vector<double> estimate_kernel(const Case& c, Estimate estimate, int periods) {
   const int steps = std::max(c.steps, 1);
   std::vector<double> kernel;
@@ -325,9 +325,9 @@ std::vector<double> estimate_kernel(const Case& c, Estimate estimate, int period
   return kernel;
 }
 
-/// The worst error of an estimate within amplitude and rate, both finite: a backward dynamic program over multiples of
-/// what the rate allows in a period. Rounding the amplitude down to such a multiple is all that is lost, as a linear
-/// program of differences has a solution in whole numbers.
+/// Returns the worst error of an estimate within a finite amplitude and a finite rate: a backward dynamic program over
+/// multiples of the change that the rate allows per period. The only loss is rounding the amplitude down to such a
+/// multiple, since a linear program of differences has an integer solution.
 std::vector<double> worst_within(const EstimateError& known, const std::vector<double>& kernel,
                                  double period_s) {
   const double unit = known.rate * period_s;
@@ -358,7 +358,7 @@ std::vector<double> worst_within(const EstimateError& known, const std::vector<d
   return n;
 }
 
-/// The worst error of an estimate, one number per period, that its class allows for the error at the end of the run.
+/// Returns the worst error of an estimate in its class for the error at the end of the run, one number per period.
 std::vector<double> worst_error(const EstimateError& known, const std::vector<double>& kernel,
                                 double period_s) {
   if (std::isfinite(known.amplitude) && std::isfinite(known.rate))
@@ -390,7 +390,7 @@ TEST(ErrorParts, NoErrorOfAnEstimateInItsClassExceedsItsBoundAndTheWorstComesNea
   struct Class {
     const char* name;
     EstimateError velocity, position;
-    double near;  ///< of the bound
+    double near;  ///< fraction of the bound
   };
   const Class classes[] = {
       {"rate", {kInfinite, 0.3}, {}, 0.97},
@@ -404,7 +404,8 @@ TEST(ErrorParts, NoErrorOfAnEstimateInItsClassExceedsItsBoundAndTheWorstComesNea
       for (const Estimate estimate : {Estimate::kVelocity, Estimate::kPosition}) {
         const bool is_velocity = estimate == Estimate::kVelocity;
         const EstimateError& known = is_velocity ? of.velocity : of.position;
-        // Without an integrator a drift of the velocity alone has no bound, and that of a position never.
+        // Without an integrator a drift of the velocity estimate has no bound, and a drift of the position estimate
+        // never has one.
         if (known.is_zero() || (c.loop.Ki == 0 && std::isfinite(known.rate))) continue;
         SCOPED_TRACE(std::string(c.name) + ": " + of.name + (is_velocity ? " of v" : " of p"));
         Declared declared;
@@ -427,7 +428,7 @@ TEST(ErrorParts, NoErrorOfAnEstimateInItsClassExceedsItsBoundAndTheWorstComesNea
             most = std::max(most, std::abs(e));
           }
         }
-        // A continuous loop sees n as a staircase, up to a step ahead of its class.
+        // A continuous loop sees n as a staircase, which is up to one step ahead of its class.
         const double ahead = c.steps == 0 && std::isfinite(known.rate)
                                  ? known.rate * kStep_s * continuous_norms(c.loop, estimate).amplitude
                                  : 0;

@@ -1,4 +1,4 @@
-// Errors of the estimates in a swarm: what they move a vehicle by, and no simulated swarm leaves its bound.
+// Errors of the estimates in a swarm: their effect on one vehicle, and simulated swarms stay within their bounds.
 #include "stability/bounds/swarms/estimate_motion.h"
 
 #include <gtest/gtest.h>
@@ -16,8 +16,8 @@ namespace {
 
 constexpr double kMotionStep_s = 1e-3;
 
-/// Loops with at most one lag and no delay, integrated by the explicit midpoint rule on their equations as
-/// written down; no transfer function.
+/// Loops with at most one lag and no delay, integrated by the explicit midpoint rule on their differential equations,
+/// without transfer functions.
 class MovingVehicle {
  public:
   explicit MovingVehicle(const AxisLoop& loop) : loop_(loop) {}
@@ -59,7 +59,7 @@ struct MotionReached {
   double e = 0, speed = 0, acceleration = 0;
 };
 
-/// What one course of errors of the estimates makes a vehicle do.
+/// Returns the motion of a vehicle under given time histories of estimation errors.
 std::vector<MotionReached> motion_under(const AxisLoop& loop, const MotionCourse& velocity,
                                         const MotionCourse& position) {
   MovingVehicle vehicle(loop);
@@ -81,7 +81,7 @@ Gains gains_of_pair() {
   return parse_gains("schema = \"swarmcert/gains/1\"\n[position]\nKp = 10\nKd = 5\nKi = 10\n", "g.toml");
 }
 
-/// Two vehicles, each of which is pushed by the other's displacement.
+/// Two vehicles, each pushed by the other's displacement.
 CoupledSwarm pair_of(double slope_N_m) {
   CoupledSwarm swarm;
   swarm.vehicles = 2;
@@ -128,7 +128,7 @@ TEST(EstimateMotion, ASlowErrorMovesAVehicleByItsRate) {
   errors.velocity_error.rate = 0.02;
   const OwnMotion slow = estimate_motion(loop, errors);
   EXPECT_LT(slow.error_m, fast.error_m);
-  // Of the velocity error's rate: e' is Kd times the response to an acceleration that steps.
+  // By the velocity error's rate: e' is Kd times the response to a step of acceleration.
   EXPECT_NEAR(slow.speed_m_s,
               0.02 * loop.mass_kg * loop.Kd * continuous_norms(loop, Channel::kCommand).amplitude, 1e-12);
   EXPECT_LT(slow.acceleration_m_s2, fast.acceleration_m_s2);
@@ -157,7 +157,7 @@ TEST(EstimateMotion, NoSimulatedSwarmLeavesTheBoundThatContainsTheErrorsOfItsEst
   std::mt19937 random(7);
   double most_m = 0, most_rate_N_s = 0;
   for (int run = 0; run < 60; ++run) {
-    // Errors that switch around the period of the loop push the vehicles against each other.
+    // Errors that switch near the period of the loop drive the vehicles against each other.
     const double half_s = std::uniform_real_distribution<>(0.3, 2)(random);
     std::vector<MovingVehicle> vehicles(2, MovingVehicle(loop));
     const double sign = run % 2 == 0 ? 1 : -1;
@@ -207,7 +207,7 @@ TEST(ForceMotion, IsReachedByTheWorstForceOfItsSizeAndByNoneExceeded) {
       EXPECT_LE(most, 1.005 * limit) << loop.Ki;
       EXPECT_GT(most, 0.97 * limit) << loop.Ki;
     }
-    // A constant force moves a vehicle for good where nothing integrates.
+    // A constant force displaces a vehicle permanently if there is no integrator.
     const MotionCourse constant(kSteps, kSize_N);
     EXPECT_NEAR(std::abs(under(constant).back().e), force_motion(loop, no_force(), kSize_N).error_m,
                 1e-3 * kSize_N);

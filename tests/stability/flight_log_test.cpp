@@ -13,7 +13,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// What a compressed quaternion stands for, after the firmware's description.
+/// Expands a compressed quaternion according to the firmware's description.
 Eigen::Quaterniond expanded(std::uint32_t compressed) {
   Eigen::Quaterniond q;
   const int largest = static_cast<int>(compressed >> 30);
@@ -29,7 +29,7 @@ Eigen::Quaterniond expanded(std::uint32_t compressed) {
   return q;
 }
 
-/// Reads what to_usd_log() wrote, written from the format's description alone.
+/// Reads the output of to_usd_log(); implemented from the format's description alone.
 struct UsdReader {
   std::vector<std::string> names;
   std::vector<char> types;
@@ -123,14 +123,15 @@ TEST(FlightLog, RoundTripKeepsEveryFieldAndTheChecks) {
       ASSERT_GT(read[0], log.records[k - 1][0]) << "ticks ascend";
     }
   }
-  // Sampled every 10 ms, and the specific force at hover is gravity along +z: gravity is included in it.
+  // Sampled every 10 ms. At hover the specific force, which includes gravity, is g along +z.
   const double span_s = 1e-6 * (log.records.back()[0] - log.records[0][0]);
   EXPECT_NEAR(span_s / static_cast<double>(log.records.size() - 1), 0.01, 1e-5);
   EXPECT_NEAR(1e-3 * log.records[50][9], 9.81, 0.6);
 }
 
 TEST(FlightLog, ResidualForceOfALogIsTheEffectThatActed) {
-  // f_a = m a - R e_z T from the log alone, against the constant force of the truth (identification.md, section 2).
+  // f_a = m a - R e_z T from the log alone, compared with the constant force of the truth (identification.md, section
+  // 2).
   Model model = read_model(tests::source_path("stability/models/crazyflie-small.toml"));
   EffectSpec force;
   force.name = "constant_force";

@@ -118,7 +118,7 @@ TEST(ComOffset, LeversTheThrustAboutTheCentreOfMass) {
   Instant now = hovering();
   now.R_WB = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()).toRotationMatrix();
   const Wrench wrench = AppliedEffect(spec, {"small", {"small"}, ""}).wrench(now);
-  // The rotors' centre is at -c from the centre of mass, where they push along the body's z.
+  // The rotors' centre is at -c from the centre of mass; the rotors push along body z.
   const Eigen::Vector3d expected =
       Eigen::Vector3d(-0.002, 0.001, 0).cross(Eigen::Vector3d(0, 0, kFlowWeight_N));
   EXPECT_LT((wrench.torque_B_Nm - expected).norm(), 1e-15);
@@ -128,7 +128,7 @@ TEST(ComOffset, LeversTheThrustAboutTheCentreOfMass) {
 TEST(ImuTilt, TiltsTheThrustInTheBody) {
   Instant now = hovering();
   now.R_WB = Eigen::AngleAxisd(std::acos(0.0), Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  // Rotors that are turned about body x by t push along -y of the body, here along x of the world.
+  // Rotors tilted about body x by t push along body -y, here along world x.
   const Eigen::Vector3d of_x = flow_force("imu_tilt", {{"tilt_x_rad", 0.03}}, now);
   EXPECT_LT((of_x - Eigen::Vector3d(0.03 * kFlowWeight_N, 0, 0)).norm(), kFlowAccuracy_N);
   const Eigen::Vector3d of_y = flow_force("imu_tilt", {{"tilt_y_rad", 0.03}}, now);

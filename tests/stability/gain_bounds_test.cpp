@@ -11,7 +11,7 @@
 namespace swarmcert::check {
 namespace {
 
-/// Both poles at -2 and no integral: the response to an impulse of force is t e^(-2t)/m. In units of time of 1/2 s the
+/// Both poles at -2 and no integral: the response to an impulse of force is t e^(-2t)/m. In time units of 1/2 s the
 /// companion matrix is [0 1; -1 -2], and A'P + PA = -I.
 LoopWitness double_pole() {
   LoopWitness loop;
@@ -61,7 +61,7 @@ TEST(GainBounds, RefuseAWitnessThatShowsNothing) {
   refuses([](LoopWitness& loop) { loop.Kp = -4; });
   refuses([](LoopWitness& loop) { loop.mass_kg = std::nan(""); });
   refuses([](LoopWitness& loop) { loop.input = "torque"; });
-  refuses([](LoopWitness& loop) { loop.lags_s = {0.01}; });  // P is of another size
+  refuses([](LoopWitness& loop) { loop.lags_s = {0.01}; });  // P has the wrong size
 }
 
 /// Without lags and integral: (e, e') of the next period is M (e, e') with M = [1/2 1/4; -2 0], of spectral radius
@@ -101,7 +101,7 @@ TEST(SampledGainBounds, FollowTheMapWrittenDownByHand) {
 TEST(SampledGainBounds, LieJustAboveSumsOverThePeriods) {
   const SampledWitness loop = held_pole();
   const SampledGainBounds gains = sampled_upper_gains(loop);
-  // An error of one command of 1 N acts for a period: (e, e') = (1/8, 1/2)/mass after it.
+  // An error of 1 N in one command acts for one period: (e, e') = (1/8, 1/2)/mass after it.
   double e = 0.125 / 0.5, v = 0.5 / 0.5, sum = 0, step = 0, peak = 0, largest = 0;
   for (int k = 0; k < 200; ++k) {
     sum += std::abs(e), step += e;
@@ -111,7 +111,7 @@ TEST(SampledGainBounds, LieJustAboveSumsOverThePeriods) {
     e = next;
   }
   EXPECT_NEAR(step, 1 / (4 * 0.5), 1e-12) << "the error that a constant command of 1 N leaves";
-  // What may happen between the sampling times is at most period^2/8 = 1/32 of the largest acceleration.
+  // The excess between the sampling times is at most period^2/8 = 1/32 of the largest acceleration.
   const auto is_above = [](const mpq_class& bound, double at_samples) {
     EXPECT_GE(bound.get_d(), at_samples);
     EXPECT_LE(bound.get_d(), 1.7 * at_samples);
@@ -148,7 +148,7 @@ TEST(SampledGainBounds, RefuseAWitnessThatShowsNothing) {
   refuses([](SampledWitness& loop) { loop.period_s = 2; });  // unstable
   refuses([](SampledWitness& loop) { loop.delay_s = 5; });   // ten past commands
   refuses([](SampledWitness& loop) { loop.lags_s = {1e-6}; });
-  refuses([](SampledWitness& loop) { loop.Ki = 1; });  // P is of another size
+  refuses([](SampledWitness& loop) { loop.Ki = 1; });  // P has the wrong size
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The gains that bound reports, held against loops stepped through time.
+// The gains that `bound` reports, compared with loops stepped through time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// Gains from a kernel sampled at equal times.
+/// Gains from an equidistantly sampled kernel.
 GainNorms summed(const std::vector<double>& kernel, double step_s, bool integrates) {
   GainNorms gains;
   double S = 0;
@@ -27,10 +27,10 @@ GainNorms summed(const std::vector<double>& kernel, double step_s, bool integrat
   return gains;
 }
 
-/// One loop of those that the sweep goes over: lags, delays, weak and strong integrals, short integrator steps.
+/// One loop of the sweep: lags, delays, weak and strong integrals, short integrator steps.
 struct Drawn {
   SampledLoop loop;
-  double slowest_s = 0;  ///< for how long to step
+  double slowest_s = 0;  ///< duration of the stepping
 };
 
 class Draw {
@@ -65,7 +65,7 @@ class Draw {
   std::mt19937 random_;
 };
 
-/// Relative, of the larger of the two.
+/// Difference relative to the larger of the two.
 double apart(double a, double b) {
   if (std::isinf(a) && std::isinf(b)) return 0;
   return std::abs(a - b) / std::max(std::abs(a), std::abs(b));
@@ -89,7 +89,7 @@ void check_continuous(const Drawn& drawn) {
   std::vector<double> kernel;
   loop.place(0, 1 / plant.mass_kg);
   kernel.push_back(0);
-  // Until it has faded: it may take longer than the sampled loop, whose integral may be weaker.
+  // Until the kernel has decayed, which may take longer than for the sampled loop, whose integral may be weaker.
   double peak = 0, recent = 0;
   while (kernel.size() < most) {
     kernel.push_back(loop.step(0, 0));
@@ -107,10 +107,10 @@ void check_sampled(const Drawn& drawn) {
   const AxisLoop& plant = sampled.plant;
   const double h = sampled.period_s;
   const auto periods = static_cast<std::size_t>(drawn.slowest_s / h);
-  constexpr int kSteps = 4;   // a delay is a whole number of them
+  constexpr int kSteps = 4;   // the delay is a whole number of them
   constexpr int kPhases = 8;  // of the force's impulse within a period
   SteppedLoop loop(sampled, kSteps);
-  // Before the next sample the vehicle drifts: e = u/m, e' = 1/m, u the time from the impulse to the sample.
+  // Until the next sample the vehicle drifts: e = u/m, e' = 1/m, with u the time from the impulse to the sample.
   std::vector<std::vector<double>> errors;
   for (int i = 0; i <= kPhases; ++i) {
     loop.reset();
@@ -123,7 +123,7 @@ void check_sampled(const Drawn& drawn) {
     }
     errors.push_back(std::move(at));
   }
-  // By the time from the impulse to the sample; jumps where the impulse passes a sample.
+  // Ordered by the time from the impulse to the sample; jumps where the impulse passes a sample.
   GainNorms force;
   double S = 0;
   for (std::size_t k = 0; k < periods; ++k) {

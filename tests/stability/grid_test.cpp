@@ -22,7 +22,7 @@ TEST(Grid, EachCellHasItsOwnValuesAndTheLastAxisMovesFastest) {
 }
 
 TEST(Grid, TheFrontIsWhatNoFeasibleCellBeatsInEveryQuantity) {
-  // One quantity of which less is better, and one of which more is.
+  // One quantity for which less is better, and one for which more is better.
   std::string less, more;
   for (const Quantity& q : grid_quantities()) (q.better < 0 ? less : more) = q.name;
   ASSERT_FALSE(less.empty());

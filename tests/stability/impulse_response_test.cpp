@@ -1,4 +1,4 @@
-// Norms of responses with closed forms: two real poles, an oscillator (the sum of a geometric series of half waves), a
+// Norms of responses with closed forms: two real poles, an oscillator (the geometric series of its half waves), a
 // delayed integrator.
 #include "stability/bounds/loops/impulse_response.h"
 
@@ -25,7 +25,7 @@ TEST(Polynomials, ProductsSumsAndDerivativesAreThoseOfTheFunctions) {
 }
 
 TEST(ImpulseResponse, OfTwoRealPolesHasTheNormsOfItsClosedForm) {
-  // y = exp(-t) - exp(-2 t), which rises to 1/4 at t = ln 2 and falls.
+  // y = exp(-t) - exp(-2 t), which rises to 1/4 at t = ln 2 and then decreases.
   const ResponseNorms norms = response_norms({{1}, {2, 3, 1}});
   EXPECT_NEAR(norms.integral, 0.5, 1e-12);
   EXPECT_NEAR(norms.integral_abs, 0.5, 1e-12);

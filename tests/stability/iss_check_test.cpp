@@ -134,7 +134,7 @@ TEST(IssCheck, RunsThatLeaveAHypothesisAreLabelledAndRefuteNothing) {
 }
 
 TEST(IssCheck, AViolationWithEveryHypothesisKeptRefutes) {
-  // No loop of the theorem exceeds its ball, so the verdict is held against a campaign that says one does.
+  // No loop of the theorem exceeds its ball, so the verdict is tested on a campaign with an artificial violation.
   IssCheck check;
   check.theorem_applies = true;
   check.violations = 1;
@@ -149,8 +149,7 @@ TEST(IssCheck, AViolationWithEveryHypothesisKeptRefutes) {
   EXPECT_FALSE(check.why_inconclusive().empty()) << "a run that could not be integrated shows nothing";
 }
 
-/// Every shipped set of gains on both vehicles: an answer at any rate, and no refutation of gains that satisfy the
-/// theorem.
+/// All shipped gains on both vehicles: there is always a verdict, and gains that satisfy the theorem are not refuted.
 void check_shipped_gains(const std::vector<double>& rates_N_s, const std::vector<std::string>& models,
                          int runs) {
   const std::filesystem::path source = SWARMCERT_SOURCE_DIR;
@@ -193,7 +192,7 @@ TEST(IssCheck, ShippedGainsGetAnAnswerOnAGridOfRates_slow) {
 }
 
 TEST(IssCheck, EveryViolationShowsInARatioAboveOne) {
-  // Unequal gains leave the ball far away; the lag breaks the transient bound at its start.
+  // With unequal gains the errors stay far below the ball; the lag violates the transient bound at its start.
   const IssCheck check =
       check_iss(composite("[3.1, 2.5, 4.2]", "[0.12, 0.2, 0.09]", "[lag]\nmotor_s = 0.03\n"),
                 tests::small_vehicle(), with_runs(45));

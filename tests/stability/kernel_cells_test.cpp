@@ -1,4 +1,4 @@
-// Kernels cell by cell against the verified norms of the whole and against responses by exact recursion.
+// Kernels cell by cell, compared with the verified norms of the whole response and with responses by exact recursion.
 #include "stability/bounds/enclosures/kernel_cells.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// Loops of axis_loop_test.cpp: Z 10/5/10 and Z 10/5/2 behind a motor, A1 (triple pole).
+/// Loops of axis_loop_test.cpp: Z 10/5/10 and Z 10/5/2 behind a motor lag, A1 (triple pole).
 const AxisLoop kLoops[] = {
     {0.034, 10, 5, 10, {1 / 17.4}, 0}, {0.034, 10, 5, 2, {1 / 17.4}, 0}, {0.034, 48, 12, 64, {}, 0}};
 
@@ -24,7 +24,7 @@ TEST(KernelCells, SumUpToTheVerifiedNormsFromAbove) {
       const auto h1 = kernel_cells(impulse_transfer(loop, channel), 0.025, 2400);
       ASSERT_TRUE(norms && h && h1);
       const auto expect_above = [](double value, Interval exact) {
-        EXPECT_GE(value, exact.lower * (1 - 1e-4));  // 60 s of it
+        EXPECT_GE(value, exact.lower * (1 - 1e-4));  // the cells cover 60 s
         EXPECT_LE(value, exact.upper * (1 + 2e-4));
       };
       expect_above(h->total(), norms->rate);
@@ -75,7 +75,7 @@ TEST(KernelCells, NoErrorUnderRandomForcesOfTheSizesExceedsTheConvolution) {
     std::vector<double> sizes;
     for (int k = 0; k < cells; ++k) sizes.push_back(random.uniform() * (k / 10 % 2 == run % 2 ? 1 : 0.1));
     const std::vector<double> bound = convolved(*kernel, sizes);
-    // The worst force for the error at the end of cell n, and one of random signs.
+    // The worst force for the error at the end of cell n, and one with random signs.
     const int n = 20 + static_cast<int>(random.below(60));
     const int end = (n + 1) * parts - 1;
     for (const bool worst : {true, false}) {
@@ -93,8 +93,8 @@ TEST(KernelCells, NoErrorUnderRandomForcesOfTheSizesExceedsTheConvolution) {
   EXPECT_GT(nearest, 0.6) << "the worst force must come near";
 }
 
-/// How often responses to signals within intervals lie outside what the kernel answers, and the share of its width that
-/// they take at most.
+/// Number of responses to signals within intervals that lie outside the kernel's enclosure, and the largest fraction of
+/// its width that they use.
 struct Outside {
   int count = 0;
   double widest = 0;
@@ -113,7 +113,7 @@ Outside outside(const KernelCells& kernel, const std::vector<double>& y, double 
     }
     const auto n = static_cast<std::size_t>(20 + random.below(static_cast<std::uint64_t>(cells - 20)));
     const Interval answered = answer_to_past(kernel, w, n) + answer(kernel, 0, hull(w[n], w[n - 1]));
-    // Anywhere in cell n; the signals that bring the response furthest down and up.
+    // At any time in cell n; the signals that drive the response furthest down and up.
     const int end =
         static_cast<int>(n) * parts + 1 + static_cast<int>(random.below(static_cast<std::uint64_t>(parts)));
     double reached[2] = {0, 0};
@@ -140,7 +140,7 @@ TEST(KernelCells, NoResponseToSignalsWithinIntervalsLeavesWhatTheyAnswer) {
     const Outside found = outside(*kernel, values, 0.001, parts);
     EXPECT_EQ(found.count, 0);
     EXPECT_GT(found.widest, 0.4);
-    // The same look at kernels that are wrong: too small, moved by a cell, of the wrong sign.
+    // The same test for wrong kernels: too small, shifted by a cell, with the wrong sign.
     KernelCells small = *kernel;
     for (double& x : small.integral) x *= 0.3;
     KernelCells late = *kernel;

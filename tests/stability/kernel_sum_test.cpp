@@ -11,7 +11,7 @@ struct Stretch {
   double start, slope, length;
 };
 
-/// The norms of GainNorms by sums over small steps.
+/// Computes the norms of GainNorms by sums over small steps.
 GainNorms by_steps(const std::vector<Stretch>& stretches) {
   constexpr int kSteps = 4000;
   GainNorms norms;
@@ -60,7 +60,8 @@ TEST(KernelSum, ASeriesIsTheSameStretchAgainAndAgain) {
     series.add_series(0.5, 0.4, 0.2, ratio);
     double scale = 1;
     for (int k = 0; k < 500; ++k, scale *= ratio) stretches.add_linear(0.5 * scale, 0.4 * scale, 0.2);
-    // The area under the integral grows with each stretch: only the norms of the kernel itself sum to a series.
+    // The area under the integral grows with each segment: only the norms of the kernel itself form a convergent
+    // series.
     EXPECT_NEAR(series.norms().amplitude, stretches.norms().amplitude, 1e-12);
     EXPECT_NEAR(series.norms().edge, stretches.norms().edge, 1e-12);
     EXPECT_NEAR(series.norms().impulse, stretches.norms().impulse, 1e-12);
@@ -69,7 +70,7 @@ TEST(KernelSum, ASeriesIsTheSameStretchAgainAndAgain) {
 
 TEST(KernelVariation, CountsSlopesJumpsAndTheReturnToZero) {
   KernelVariation variation;
-  variation.add_linear(1, 2, 0.5);    // 0 -> 1, to 2
+  variation.add_linear(1, 2, 0.5);    // 0 -> 1, then to 2
   variation.add_linear(-1, 0, 0.25);  // -> -1
   EXPECT_DOUBLE_EQ(variation.total(), 1 + 1 + 3 + 1);
   EXPECT_DOUBLE_EQ(variation.most_per_period(), 3);

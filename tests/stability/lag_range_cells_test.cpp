@@ -1,4 +1,4 @@
-// Kernels of all lags of an interval against responses of single lags by exact recursion.
+// Kernels of all lags of an interval, compared with responses of single lags by exact recursion.
 #include "stability/bounds/enclosures/lag_range_cells.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ struct Family {
   }
 };
 
-/// s^4 tau + s^3 + 5 s^2 + 10 s + 10, and the same with another lag of 0.1 s: h' and g' of axis_loop.h for 1 kg.
+/// s^4 tau + s^3 + 5 s^2 + 10 s + 10, and the same with an additional lag of 0.1 s: h' and g' of axis_loop.h for 1 kg.
 const Polynomial kOne = {10, 10, 5, 1}, kTwo = {10, 10, 5, 1, 0.1};
 const Family kFamilies[] = {{{0, 1}, {}, kOne, {0, 0, 0, 0, 1}},
                             {{}, {0, 0, 1}, kOne, {0, 0, 0, 0, 1}},
@@ -71,7 +71,7 @@ TEST(LagRangeCells, AreLittleLargerThanThoseOfTheWorstLag) {
     const double worst = std::max(least->total(), most->total());
     EXPECT_GE(cells->total(), worst);
     EXPECT_LE(cells->total(), 1.05 * worst);
-    // What the modes leave of nets is small beside what the lag moves them by.
+    // The remainder of the nets after the modes is small compared with the change due to the lag.
     double left = 0, moved = 0;
     for (std::size_t k = 0; k < kCells; ++k) {
       left += cells->net[k].upper - cells->net[k].lower;

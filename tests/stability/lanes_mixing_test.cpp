@@ -49,7 +49,7 @@ TEST(LanesMixing, GivesEachVehicleTheBitsOfItsOwnMixing) {
       Lanes::split = 0;
       const controller::Mixed<Lanes> given =
           mixed(together, {Lanes(limits.lower_N), Lanes(limits.upper_N)}, all);
-      if (Lanes::split != 0) continue;  // worthless
+      if (Lanes::split != 0) continue;  // the result is invalid
       bool limited = false;
       for (int lane = 0; lane < Lanes::kCount; ++lane) {
         const controller::Mixed<float> own = controller::mix(alone, limits, wanted[lane]);

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Taylor coefficients of sin(a + s) and of its antiderivative -cos(a + s); what the next term may be.
+/// Taylor coefficients of sin(a + s) and of its antiderivative -cos(a + s), with a bound on the next term.
 LocalPolynomial wave(double phase) {
   LocalPolynomial p;
   double factorial = 1;
@@ -36,7 +36,7 @@ TEST(LocalPolynomial, RangeContainsTheFunctionBetweenTheEnds) {
   }
 }
 
-/// int_0^{4 pi} |sin| = 8, and of |sin| from a phase the same over whole turns.
+/// int_0^{4 pi} |sin| = 8, and the same over whole turns from any phase.
 TEST(LocalPolynomial, AbsoluteIntegralEnclosesThatOfAWaveOverItsZeros) {
   for (const double phase : {0.0, 0.3, 2.0}) {
     AbsoluteIntegral integral;

@@ -26,7 +26,7 @@ c20 = 0.0
 c11 = 0.0
 )";
 
-/// The refusal of `text`, or "" if it is read.
+/// Returns the error message for `text`, or "" if it is accepted.
 std::string refusal(const std::string& text) {
   try {
     parse_model(text, "m.toml");
@@ -48,7 +48,7 @@ TEST(Model, ReadsTheShippedCrazyflies) {
   EXPECT_EQ(small.kind, "small");
   EXPECT_TRUE(small.effects.empty());
   EXPECT_TRUE(large.effects.empty());
-  // Hover at a full battery: the mapped thrust of four rotors equals the weight at a plausible PWM.
+  // Hover at full battery: the mapped thrust of four rotors equals the weight at a plausible PWM.
   for (const Model& model : {small, large}) {
     const double pwm = model.thrust.pwm(model.weight_N() / 4, kFullBattery_V);
     EXPECT_GT(pwm, 0.4);
@@ -65,7 +65,7 @@ TEST(Model, PwmInvertsTheThrustMapWhereItReachesAndSaturatesElsewhere) {
       const double pwm = map.pwm(force_N, battery_V);
       ASSERT_GE(pwm, 0);
       ASSERT_LE(pwm, 1);
-      // Below the parabola's lowest point no PWM gives so little.
+      // Below the minimum of the parabola no PWM gives such a small force.
       const double vertex = -(map.c10 + map.c11 * battery_V / 4.2) / (2 * map.c20);
       if (pwm > std::max(vertex, 0.0) + 1e-9 && pwm < 1) {
         EXPECT_NEAR(map.force_N(pwm, battery_V), force_N, 1e-12);
@@ -81,7 +81,7 @@ TEST(Model, PwmInvertsTheThrustMapWhereItReachesAndSaturatesElsewhere) {
 
 TEST(Model, RotorForcesAreThoseOfTheFlightCodeAndNeverNegative) {
   ThrustMap map{};
-  map.c00 = -2, map.c10 = 10, map.c20 = 12, map.c11 = 1;  // below zero up to p = 0.16
+  map.c00 = -2, map.c10 = 10, map.c20 = 12, map.c11 = 1;  // negative up to p = 0.16
   EXPECT_EQ(map.force_N(0, kFullBattery_V), 0);
   int positive = 0;
   for (double battery_V = 3.3; battery_V < 4.21; battery_V += 0.1) {

@@ -10,7 +10,7 @@ namespace {
 
 constexpr OdeMethod kMethods[] = {OdeMethod::kBdf, OdeMethod::kAdams, OdeMethod::kRungeKutta};
 constexpr double kTolerance = 1e-9;
-constexpr double kGlobalError = 1e-5;  ///< local errors of kTolerance, added up over the whole integration
+constexpr double kGlobalError = 1e-5;  ///< accumulated local errors of kTolerance
 constexpr double kPi = 3.14159265358979324;
 
 /// x'' = -x from x = 1, x' = 0: x = cos t.
@@ -67,7 +67,7 @@ TEST(OdeIntegrator, NeverEvaluatesBeyondTheLimit) {
 
 TEST(OdeIntegrator, GivesUpAloudWhereNoStepMeetsTheTolerance) {
   for (const OdeMethod method : kMethods) {
-    // y' = y^2 from 1 grows beyond all bounds at t = 1.
+    // y' = y^2 from 1 diverges at t = 1.
     OdeIntegrator integrator(method, [](double, const double* y, double* dy) { dy[0] = y[0] * y[0]; },
                              kTolerance, {kTolerance});
     const double one = 1;

@@ -23,7 +23,7 @@ Model with_load(double load_kg, double length_m, double damping_1_s) {
   return model;
 }
 
-/// A level vehicle whose rotors carry itself and the load.
+/// A level vehicle whose rotors carry its own weight and that of the load.
 struct CarriedLoad {
   CarriedLoad(double length_m, double damping_1_s)
       : swarm(with_load(kLoad_kg, length_m, damping_1_s), 1),
@@ -57,8 +57,8 @@ TEST(Pendulum, HasSixStatesBehindThoseOfTheVehicles) {
 }
 
 TEST(Pendulum, SwingsFreelyAtTheFrequencyOfBothMasses) {
-  // A load of mass m_l below a free vehicle of mass m: omega^2 = (g / l) (1 + m_l / m), without damping; a half period
-  // turns the swing round, and the centre of both masses stays where it is.
+  // A load of mass m_l below a free vehicle of mass m: omega^2 = (g / l) (1 + m_l / m), without damping; half a period
+  // reverses the swing, and the common centre of mass does not move.
   constexpr double kSmall_m = 1e-3;
   for (const double length_m : {0.15, 0.4, 1.5}) {
     CarriedLoad carried(length_m, 0.01);
@@ -76,7 +76,7 @@ TEST(Pendulum, SwingsFreelyAtTheFrequencyOfBothMasses) {
 }
 
 TEST(Pendulum, LargeSwingsKeepEnergyMomentumAndTheLengthOfTheString) {
-  // Two bodies on a string under gravity and a thrust that carries both: only friction takes energy.
+  // Two bodies connected by a string, under gravity and a thrust that carries both: only friction dissipates energy.
   CarriedLoad carried(kString_m, 0.01);
   const double angle = 1;
   carried.swing_m() = kString_m * std::sin(angle);
@@ -113,7 +113,7 @@ TEST(Pendulum, ClimbsAsOneBodyOfBothMasses) {
 }
 
 TEST(Pendulum, HangsAsideUnderConstantAcceleration) {
-  // The string points along what the load feels, gravity and inertia, once the swing has died away.
+  // After the swing has decayed, the string points along the load's apparent gravity.
   CarriedLoad carried(kString_m, 6);
   carried.input.disturbance_W_N = {0.1, 0, 0};
   carried.move(20);
@@ -166,7 +166,7 @@ TEST(Pendulum, ForgetsTheSwingAtAGapOfTheLog) {
   EXPECT_EQ(column.force_W_N, Eigen::Vector3d(0, 0, -kGravity_m_s2));
 }
 
-/// The largest distance between a sampled and a continuous flight of the vehicle with the load.
+/// Returns the largest distance between a sampled and a continuous flight of the vehicle with the load.
 double gap_m(double rate_hz, double* swing_m) {
   const Gains gains = parse_gains(
       "schema = \"swarmcert/gains/1\"\n[position]\nKp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, 10]\n"

@@ -1,4 +1,4 @@
-// Random and adverse inputs of every disturbance class: none may exceed its bound.
+// Random and adversarial inputs of every disturbance class: none may exceed its bound.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ using tests::kMass_kg;
 constexpr double kInputStep_s = 0.0025;
 constexpr int kInputSteps = 2400;  // 6 s
 
-/// A force, linear on each step, with jumps between steps.
+/// A piecewise linear force with jumps between steps.
 struct Input {
   std::vector<double> from, to;
   Input() : from(kInputSteps), to(kInputSteps) {}
@@ -30,8 +30,8 @@ struct Input {
   }
 };
 
-/// Draws inputs of one class that are as large as the class allows. Every other one follows the sign of the kernel back
-/// from a random time, with mistakes, as the worst input does without them.
+/// Draws inputs of one class with the largest allowed magnitude. Every other one follows the sign of the kernel back
+/// from a random time, with random mistakes; without mistakes it would be the worst input.
 class Inputs {
  public:
   Inputs(unsigned seed, std::vector<double> kernel) : random_(seed), kernel_(std::move(kernel)) {}
@@ -47,7 +47,7 @@ class Inputs {
   }
   Input amplitude_and_rate(double E, double d) { return integrated(d, E, signs(kernel_)); }
 
-  /// Jumps and ramps that add up to the variation.
+  /// Jumps and ramps whose sum is the variation.
   Input edges(double variation) {
     Input f;
     const int jumps = 1 + static_cast<int>(4 * unit() * unit());
@@ -65,14 +65,14 @@ class Inputs {
     return f;
   }
 
-  /// `passes` of int |f| dt = J each, of a length of at most `length` steps, `period` steps apart.
+  /// `passes` passes with int |f| dt = J each, at most `length` steps long, `period` steps apart.
   Input impulses(double J, int passes, int period, int length) {
     Input f;
     const int first = static_cast<int>((kInputSteps - passes * period) * unit());
     for (int k = 0; k < passes; ++k) {
       const int start = first + k * period;
       const int used = 1 + static_cast<int>(length * unit() * unit());
-      const double tilt = unit() < 0.5 ? 1 : 2 * unit() - 1;  // a part of it pushes the other way
+      const double tilt = unit() < 0.5 ? 1 : 2 * unit() - 1;  // part of it may push in the opposite direction
       double total = 0;
       for (int i = 0; i < used && start + i < kInputSteps; ++i) {
         const double value = (i < used * std::abs(tilt) ? 1 : -1) * (0.2 + unit());
@@ -124,7 +124,7 @@ class Inputs {
     return sign;
   }
 
-  /// The force whose rate is d times the signs, held at +-E.
+  /// The force whose rate is d times the signs, clamped to +-E.
   static Input integrated(double d, double E, const std::vector<double>& sign) {
     Input f;
     double value = 0;
@@ -148,7 +148,7 @@ double largest_error(SteppedLoop& loop, const Input& f) {
   return most;
 }
 
-/// Largest error over its bound, by class.
+/// Returns the largest error relative to its bound, by class.
 std::map<std::string, double> largest_ratios(
     SteppedLoop loop, unsigned seed, int runs,
     const std::function<DisturbanceBounds(const Disturbance&)>& bounds) {
@@ -196,7 +196,7 @@ void check(int runs) {
   const SampledLoop short_step = {{kMass_kg, 10, 5, 10, {1 / 17.4}, 0}, 0.01, 0.002};
   const auto show = [](const char* name, const std::map<std::string, double>& ratios) {
     for (const auto& [kind, ratio] : ratios) {
-      // The bound holds for real numbers; the loop is stepped in doubles.
+      // The bound holds in real arithmetic; the loop is stepped in doubles.
       EXPECT_LE(ratio, 1 + 1e-7) << name << ": " << kind;
       EXPECT_GT(ratio, kind == "several passes" ? 0.3 : 0.55) << name << ": " << kind << " did not try hard";
       testing::Test::RecordProperty(std::string(name) + " " + kind, std::to_string(ratio));

@@ -1,4 +1,4 @@
-/// @file States of flight at random, for properties that hold at all of them.
+/// @file Random flight states, for properties that hold at all states.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -1,4 +1,4 @@
-// A set point that moves: no simulated error exceeds its part of the bound, and the worst ones come near it.
+// A moving setpoint: no simulated error exceeds its part of the bound, and the worst ones come close to it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ constexpr double kFine_s = 0.0025;
 
 struct FollowingLoop {
   AxisLoop loop;
-  int steps;  ///< of kFine_s per period; 0: continuous
+  int steps;  ///< number of kFine_s per period; 0: continuous
 
   SampledLoop sampled() const { return {loop, steps * kFine_s, steps * kFine_s}; }
   SteppedLoop stepped() const {
@@ -44,8 +44,8 @@ std::vector<FollowingLoop> following_loops() {
           {{kMass_kg, 20, 10, 12, {1 / 17.4, 0.03}, 0}, 1}};
 }
 
-/// e at the end of every step where the set point has this jerk on each step: what acts of its acceleration, as
-/// firmware feeds it forward, less the acceleration itself is a force on the mass.
+/// Returns e at the end of every step if the setpoint has this jerk on each step. The difference between the acting
+/// feedforward acceleration and the true one is a force on the mass.
 std::vector<double> errors_under(const FollowingLoop& c, const std::vector<double>& jerk_m_s3) {
   SteppedLoop loop = c.stepped();
   loop.reset();
@@ -55,7 +55,7 @@ std::vector<double> errors_under(const FollowingLoop& c, const std::vector<doubl
   for (std::size_t i = 0; i < jerk_m_s3.size(); ++i) {
     if (c.steps > 0 && i % static_cast<std::size_t>(c.steps) == 0) held = acceleration;
     const double next = acceleration + jerk_m_s3[i] * kFine_s;
-    // The mean of a step through every lag in turn; exact for a held command, to second order for a moving one.
+    // The mean of a step passed through all lags in turn; exact for a held command, second order for a moving one.
     commanded.insert(commanded.begin(), c.steps > 0 ? held : (acceleration + next) / 2);
     commanded.pop_back();
     double input = commanded.back();
@@ -139,7 +139,7 @@ TEST(ReferenceMotion, WhatItDemandsOfTheIntegratorIsNotExceeded) {
     const double demand_m_s = c.steps == 0 ? integral_demand_m_s(c.loop, Channel::kForce, other)
                                            : integral_demand_m_s(c.sampled(), Channel::kForce, other);
     double most_m_s = 0;
-    // The set point may jump between two samples as well.
+    // The setpoint may also jump between two samples.
     for (int after = 0; after < std::max(c.steps, 1); ++after) {
       SteppedLoop loop = c.stepped();
       loop.reset();

@@ -1,4 +1,4 @@
-/// Vehicles that are not four rotors in X.
+/// Vehicles other than four rotors in X.
 #include <gtest/gtest.h>
 
 #include "nn/base/input_error.h"
@@ -31,7 +31,7 @@ std::string with(std::string text, const std::string& from, const std::string& t
   return text.replace(text.find(from), from.size(), to);
 }
 
-/// The refusal of `text`, or "" if it is read.
+/// Returns the error message for `text`, or "" if it is accepted.
 std::string refusal_of(const std::string& text) {
   try {
     parse_model(text, "m.toml");
@@ -49,7 +49,7 @@ TEST(Rotors, PlacesSpinsAndThrustOfAHexacopterAreReadAndWrittenBack) {
   EXPECT_FALSE(model.rotors[0].counterclockwise);
   EXPECT_TRUE(model.rotors[1].counterclockwise);
   EXPECT_NEAR(model.arm_m, 0.27, 1e-3) << "mean distance of the rotors";
-  // 0.1 + 1.5 u + 7 u^2 newton, whatever the voltage.
+  // 0.1 + 1.5 u + 7 u^2 newton, independent of the voltage.
   EXPECT_NEAR(model.thrust.force_N(0.5, 12), 2.6, 1e-12);
   EXPECT_NEAR(model.thrust.force_N(0.5, 17), 2.6, 1e-12);
   EXPECT_NEAR(model.largest_thrust_N(14), 6 * 8.6, 1e-12);
@@ -67,7 +67,7 @@ TEST(Rotors, WithoutPlacesTheyAreFourInX) {
   model.arm_m = 0.1;
   const std::vector<RotorPlace> places = rotor_places(model);
   ASSERT_EQ(places.size(), 4u);
-  // Front right, turning counter-clockwise: its thrust rolls to the left, its reaction yaws to the right.
+  // Front right, counterclockwise: its thrust rolls the vehicle to the left, its reaction yaws it to the right.
   EXPECT_GT(places[0].x_m, 0);
   EXPECT_LT(places[0].y_m, 0);
   EXPECT_EQ(places[0].yaw_m(0.006), -0.006);

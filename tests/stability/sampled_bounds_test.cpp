@@ -13,7 +13,7 @@ namespace {
 
 using tests::kMass_kg;
 
-constexpr int kParts = 4;  ///< of a period, on each of which a force is constant
+constexpr int kParts = 4;  ///< parts of a period; a force is constant on each
 
 SampledLoop loop_of(double Kp, double Kd, double Ki, double rate_hz, double step_s = 0) {
   return {{kMass_kg, Kp, Kd, Ki, {}, 0}, 1 / rate_hz, step_s > 0 ? step_s : 1 / rate_hz};
@@ -23,7 +23,7 @@ struct Reached {
   double error_m = 0, integral_m_s = 0;
 };
 
-/// The loop of sampled_loop.h, without lag and delay, step by step; its integrator clamped.
+/// Steps the loop of sampled_loop.h, without lag and delay, with a clamped integrator.
 Reached fly(const SampledLoop& loop, const std::vector<double>& force_N, double limit_m_s = INFINITY) {
   const double h = loop.period_s / kParts, m = loop.plant.mass_kg;
   double p = 0, v = 0, integral = 0, command = 0;
@@ -54,7 +54,7 @@ DisturbanceBounds bounds_of(const SampledLoop& loop, const Disturbance& d) {
   return disturbance_bounds(loop, Channel::kForce, sampled_norms(loop, Channel::kForce, Instants::kAll), d);
 }
 
-/// Levels held for random times, between -1 and 1.
+/// Levels between -1 and 1, held for random times.
 std::vector<double> random_levels(std::mt19937& random, std::size_t count, bool bang) {
   std::uniform_real_distribution<double> unit(-1, 1);
   const auto hold = static_cast<std::size_t>(4 + random() % 1200);
@@ -82,20 +82,20 @@ TEST(SampledBounds, NoRandomForceOfBoundedAmplitudeAndRateExceedsTheirBoundAndAB
       double f = 0;
       std::vector<double> force;
       for (const double w : wanted) {
-        // Half a step of the staircase above or below the ramp through it: counted below.
+        // Half a step of the staircase above or below the ramp through it; included in the slack below.
         f += std::clamp(E * w - f, -step, step);
         force.push_back(f);
       }
       return force;
     };
     const double slack =
-        bounds.by_amplitude / E * step;  // a staircase of the ramp differs from it by a step at most
+        bounds.by_amplitude / E * step;  // a staircase differs from its ramp by at most a step
     for (int run = 0; run < 300; ++run) {
       const double reached = fly(loop, limited(random_levels(random, count, run % 2 == 0))).error_m;
       ASSERT_LE(reached, bounds.by_both + slack);
       nearest = std::max(nearest, reached);
     }
-    // Switches of the pure amplitude problem, found by looking at the response to a pulse.
+    // Switching times of the pure amplitude problem, from the response to a pulse.
     std::vector<double> kernel;
     {
       const double h = loop.period_s / kParts;
@@ -166,7 +166,7 @@ TEST(SampledBounds, PassesAreFeltAsOftenAsTheyComeAndNoTrainOfThemExceedsTheBoun
   EXPECT_GT(most, 0.6 * bound);
 }
 
-/// Many passes of a loop with a slow mode, long after all others are gone: near those of the continuous loop.
+/// Many passes of a loop with a slow mode, long after all others have decayed: close to those of the continuous loop.
 TEST(SampledBounds, PassesFadeWithTheSlowestMode) {
   const SampledLoop loop = loop_of(20, 10, 3, 1000);
   Disturbance train = of(INFINITY, 0.1, 0.02);
@@ -180,7 +180,7 @@ TEST(SampledBounds, PassesFadeWithTheSlowestMode) {
   EXPECT_NEAR(sampled.by_edges, continuous.by_edges, 0.02 * continuous.by_edges);
 }
 
-/// The clamp that firmware has: both bounds that hold with it, its demand, and whether it acts.
+/// The firmware's clamp: both bounds that hold with it, its demand, and whether it acts.
 TEST(SampledBounds, NoForceDrivesAClampedLoopBeyondItsBounds) {
   const double E = 0.1;
   for (const double limit_m_s : {0.01, 0.05, 0.4}) {
@@ -210,7 +210,7 @@ TEST(SampledBounds, AClampedBiasIsCounted) {
       clamp_bounds(loop, Channel::kForce, of(INFINITY, 0, INFINITY), {bias_N}, limit_m_s);
   EXPECT_FALSE(clamp.never_acts);
   const std::vector<double> force(6000 * kParts, bias_N);
-  // The integral settles where it cancels the bias, and overshoots on its way there.
+  // The integral settles where it cancels the bias, and overshoots on the way.
   EXPECT_GT(clamp.demand_m_s, 1.01 * bias_N / (kMass_kg * 10));
   EXPECT_NEAR(clamp.demand_m_s, fly(loop, force).integral_m_s, 1e-6);
   const double reached = fly(loop, force, limit_m_s).error_m;

@@ -55,7 +55,7 @@ TEST(SampledFlight, KeepsRotationsOrthogonalFor60s) {
   EXPECT_GT(turned, 0.05) << "the flight must turn the vehicles";
 }
 
-/// Largest distance between positions of two flights that differ by their substeps, 1 and 4.
+/// Returns the largest distance between the positions of two flights with 1 and 4 substeps.
 double substeps_matter_m(const Model& model, const Task& task, int vehicles, double end_s) {
   std::vector<double> paths[2];
   for (const int substeps : {1, 4}) {
@@ -78,7 +78,7 @@ double substeps_matter_m(const Model& model, const Task& task, int vehicles, dou
   return largest;
 }
 
-/// One vehicle sinks past another that hovers, through the heights where wakes bend; a third is far away.
+/// One vehicle descends past another that hovers, through the heights at which wakes bend; a third is far away.
 class SinksPast : public Task {
  public:
   Setpoint at(int vehicle, double time_s) const override {
@@ -113,7 +113,7 @@ TEST(SampledFlight, OneAndFourSubstepsAgree) {
   }
 }
 
-/// One vehicle of a task, flown as the only one.
+/// One vehicle of a task, flown alone.
 class OneOf : public Task {
  public:
   OneOf(const Task& task, int vehicle) : task_(task), vehicle_(vehicle) {}
@@ -142,8 +142,8 @@ TEST(SampledFlight, StepsThatAreCutForOthersLeaveTheBitsOfAVehicleThatNoneReache
 }
 
 TEST(SampledFlight, AVehicleFliesTheSameBitsAloneAndAmongOthers) {
-  // Several vehicles share wide registers, in the controllers (Lanes) and in the plant (RigidBodies); each kind of
-  // batch must give the bits of a single one. Gains this high drive the thrust of some vehicles to its limit.
+  // Several vehicles share SIMD registers, in the controllers (Lanes) and in the plant (RigidBodies); each batch must
+  // be bitwise identical to single vehicles. Gains this high drive the thrust of some vehicles to its limit.
   for (const int vehicles : {2, 3, 5, 8, 11}) {
     for (const char* const law : {"lee", "robust"}) {
       Model weak = with_effects({{"drag_linear", {{"drag_N_s_m", 0.013}}}, {"motor_lag", {}}});
@@ -227,7 +227,7 @@ TEST(SampledFlight, ADelayOfOneAndAHalfPeriodsHoldsCommandsThatLong) {
   for (int k = 0; k < 2000; ++k) {
     loop.step();
     commands.push_back(loop.record(0).rotor_N[0]);
-    // What acts at the end of period k is the command of one period ago.
+    // The command that acts at the end of period k is that of the previous period.
     if (k > 3) {
       EXPECT_EQ(loop.input(0).rotor_command_N[0], commands[static_cast<std::size_t>(k - 1)]);
     }
@@ -235,11 +235,12 @@ TEST(SampledFlight, ADelayOfOneAndAHalfPeriodsHoldsCommandsThatLong) {
 }
 
 TEST(SampledFlight, MotorLagAddsWhatItsColumnSays) {
-  // The defining property for effects that remember: applied thrust minus command = gain times the stream's column.
+  // The defining property of effects with a memory: applied thrust minus command = gain times the stream's column.
   Swarm swarm(with_effects({{"motor_lag", {{"gain", 0.8}, {"tau_s", 0.05}}}}), 1);
   const auto task = make_task("takeoff", {1, 12, 0});
   SampledFlight loop(swarm, parsed_gains(), *task, exact());
-  // The rotors see a staircase; the stream is exact for lines between samples, so it is given both ends of each step.
+  // The rotors see a staircase; the stream is exact for linear signals between samples, so it gets both ends of each
+  // step.
   const auto lag = make_effect(swarm.model(0).effects[0], {"small", {"small"}, ""});
   const double tau_s = 0.05;
   const auto stream = lag->stream(&tau_s);
@@ -265,8 +266,8 @@ TEST(SampledFlight, MotorLagAddsWhatItsColumnSays) {
 }
 
 TEST(SampledFlight, LinearConvolutionPredictsTheSwap) {
-  // A separate program: e = h' * f_a predicts the unsaturated swap to 0.5 %. 2 vehicles, Ki in effect 2, tau 1/17.4, no
-  // noise: simulation 0.0893 m, convolution 0.0896 m.
+  // An independent program: e = h' * f_a predicts the unsaturated swap to 0.5 %. 2 vehicles, effective Ki 2, tau
+  // 1/17.4, no noise: simulation 0.0893 m, convolution 0.0896 m.
   Swarm swarm(with_effects({{"downwash", {{"norm_exponent", 1.2}}}, {"motor_lag", {{"tau_s", 1 / 17.4}}}}),
               2);
   const auto task = make_task("swap", {2, 27, 0});
@@ -275,7 +276,7 @@ TEST(SampledFlight, LinearConvolutionPredictsTheSwap) {
       parsed_gains("Kp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, 10]\nintegrator_limit = [0.1, 0.1, "
                    "0.1]\nrate_hz = 100\nintegrator_step_s = 0.002\n"),
       *task, exact());
-  // m Delta e = s (tau s + 1) f, Delta = (tau s + 1) s^3 + Kd s^2 + Kp s + Ki: states of its controllable form.
+  // m Delta e = s (tau s + 1) f, Delta = (tau s + 1) s^3 + Kd s^2 + Kp s + Ki: the states of its controllable form.
   const double tau = 1 / 17.4, m = 0.034, Kp = 10, Kd = 5, Ki = 2;
   double z[4] = {0, 0, 0, 0};
   const auto derivative = [&](const double* x, double f, double* dx) {
@@ -331,8 +332,8 @@ TEST(SampledFlight, PredictedForceIsAStaircaseThatComesLate) {
 }
 
 TEST(SampledFlight, ANeighbourThatFallsSilentFadesOutWithin500ms) {
-  // A network whose answer depends on its neighbours only: with all positions lost the prediction is that of an
-  // empty set, with none lost it is another; lost from the start or late ones never give a third.
+  // A network whose output depends on the neighbours only. If all positions are lost, the prediction is that of an
+  // empty set; if none is lost, it is another; other losses and delays never give a third.
   const auto network = files::load_network({tests::source_path("nn/networks/demo/network.toml"), "", "", ""});
   const auto predictions = [&](const RadioOptions& radio, std::uint64_t seed) {
     Swarm swarm(with_effects({{"downwash", {}}}), 2);
@@ -363,10 +364,10 @@ TEST(SampledFlight, ANeighbourThatFallsSilentFadesOutWithin500ms) {
   EXPECT_LT(distance(all, half), 0.5 * largest(all)) << "half of the positions are enough";
   EXPECT_GT(distance(all, half), 0);
   EXPECT_LT(largest(predictions({0, 1}, 0)), 0.1 * largest(all)) << "a vehicle that knows of nobody";
-  // 0.45 s old positions still count, with the weight that is left; 0.5 s old ones do not.
+  // Positions 0.45 s old still count, with the remaining weight; positions 0.5 s old do not.
   EXPECT_GT(distance(predictions({0.45, 0}, 0), predictions({0, 1}, 0)), 1e-3);
   EXPECT_LT(distance(predictions({0.5, 0}, 0), predictions({0, 1}, 0)), 1e-3);
-  // No jump: between two of the network's periods (10 ms) a fade of 100 ms lets through a tenth and some motion.
+  // No jump: between two periods of the network (10 ms) a fade of 100 ms changes by a tenth, plus some motion.
   const std::vector<double> rare = predictions({0, 0.97}, 5);
   double jump = 0;
   for (std::size_t k = 1; k < rare.size(); ++k) jump = std::max(jump, std::abs(rare[k] - rare[k - 1]));

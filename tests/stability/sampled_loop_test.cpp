@@ -1,4 +1,5 @@
-// Expected norms: a separate program that sums the response by SciPy's matrix exponential, at the worst sampling phase.
+// Expected norms: an independent program that sums the response by SciPy's matrix exponential, at the worst sampling
+// phase.
 #include "stability/bounds/loops/sampled_loop.h"
 
 #include <gtest/gtest.h>
@@ -33,7 +34,7 @@ TEST(SampledLoop, NormsOfTheReferenceTable) {
       {48, 12, 64, &GainNorms::amplitude, .995112641, .995113432, .998348170, .995138042, 1.147289127},
       {10, 5, 10, &GainNorms::rate, 3.333246329, 3.330897826, 3.326691089, 3.312277050, 14.705882353},
       {10, 5, 10, &GainNorms::amplitude, 4.995020814, 4.993197363, 5.002062719, 4.978843651, 5.501886995},
-      // The last number is the sum up to 1000 s; up to 200 s it is 2.830861031.
+      // The last number is the sum up to 1000 s; the sum up to 200 s is 2.830861031.
       {20, 10, 3, &GainNorms::amplitude, 2.631073843, 2.630853459, 2.630350672, 2.629092073, 2.834290230},
   };
   for (const Row& row : rows) {
@@ -46,7 +47,7 @@ TEST(SampledLoop, NormsOfTheReferenceTable) {
     EXPECT_NEAR(gain(1000, 0, 0), row.at_1kHz, 1e-8);
     EXPECT_NEAR(gain(500, 0, 0), row.at_500Hz, 1e-8);
     EXPECT_NEAR(gain(500, 0, 0.004), row.at_500Hz_late, 1e-8);
-    EXPECT_NEAR(gain(100, 0, 0), row.at_100Hz, 1e-7);  // the reference's quadrature: 8e-8 off for Z
+    EXPECT_NEAR(gain(100, 0, 0), row.at_100Hz, 1e-7);  // the reference's quadrature errs by 8e-8 for Z
     EXPECT_NEAR(gain(100, 0.002, 0), row.at_100Hz_short_step, 1e-7);
   }
 }
@@ -57,7 +58,7 @@ TEST(SampledLoop, SpectralRadiiOfTheReference) {
   EXPECT_NEAR(spectral_radius(sampled(20, 10, 3, 500)), .9996739496, 1e-9);
 }
 
-/// Public firmware ran the loop at 100 Hz and stepped its integrator by 2 ms: the theorem's ball is five times larger.
+/// Public firmware runs the loop at 100 Hz with an integrator step of 2 ms: the theorem's ball is five times larger.
 TEST(SampledLoop, AShortIntegratorStepWeakensTheIntegralGain) {
   const SampledLoop fork = sampled(48, 12, 64, 100, 0.002);
   EXPECT_NEAR(effective_Ki(fork), 64.0 / 5, 1e-12);
@@ -74,7 +75,7 @@ TEST(SampledLoop, ErrorsBetweenSamplesAreHardlyLarger) {
   EXPECT_LT(all.amplitude, at_samples.amplitude * (1 + 1e-6));
 }
 
-/// What sampled_loop.h states of the shipped gains.
+/// The numbers for the shipped gains in sampled_loop.h.
 TEST(SampledLoop, ErrorsBetweenSamplesOfTheShippedGainsAreLargerByWhatTheHeaderStates) {
   const std::filesystem::path folder = std::filesystem::path(SWARMCERT_SOURCE_DIR) / "controller/gains";
   double rate = 0, amplitude = 0, edge = 0, impulse = 0;
@@ -109,7 +110,7 @@ TEST(SampledLoop, TendsToTheContinuousLoop) {
   const AxisLoop plant = {kMass_kg, 10, 5, 10, {1 / 17.4, 0.03}, 0.013};
   for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
     const GainNorms exact = continuous_norms(plant, channel);
-    // Holding a command for a period delays it by half of one: take that much off the delay.
+    // Holding a command for a period delays it by half a period, which is subtracted from the delay.
     AxisLoop early = plant;
     early.delay_s -= 0.00025;
     const GainNorms fast = sampled_norms({early, 0.0005, 0.0005}, channel, Instants::kSampling);
@@ -120,7 +121,7 @@ TEST(SampledLoop, TendsToTheContinuousLoop) {
   }
 }
 
-/// Largest |e| of the sampled loop, without lag or delay, under a force given per quarter of a period.
+/// Returns the largest |e| of the sampled loop, without lag or delay, under a force given per quarter of a period.
 double simulated_error(const SampledLoop& loop, const std::vector<double>& force_N) {
   const double h = loop.period_s / 4, m = loop.plant.mass_kg;
   double p = 0, v = 0, integral = 0, command = 0, worst = 0;
@@ -140,7 +141,7 @@ double simulated_error(const SampledLoop& loop, const std::vector<double>& force
 TEST(SampledLoop, NoRandomForceExceedsTheAmplitudeBoundAndBangBangNearsIt) {
   const SampledLoop loop = sampled(10, 5, 10, 100);
   const double bound = sampled_norms(loop, Channel::kForce, Instants::kAll).amplitude;
-  // Signs of the response to a pulse, backwards: the worst force.
+  // The signs of the response to a pulse, backwards: the worst force.
   const std::size_t count = 4 * 2000;
   std::vector<double> kernel;
   {
@@ -202,8 +203,8 @@ TEST(SampledLoop, WithoutIntegralTheRestIsFiniteAndNearTheContinuousLoop) {
   EXPECT_TRUE(std::isfinite(noise_deviation(sampled(10, 5, 0, 500), 1e-3, 0.05).command_m_s2));
 }
 
-/// One slow mode remains for hours: its geometric series is summed. The rate gain is at least the constant one, 1/(m
-/// Ki), and equal to it for a response of one sign.
+/// One slow mode remains for hours: its geometric series is summed. The rate gain is at least that of a ramp, 1/(m Ki),
+/// with equality for a response of one sign.
 TEST(SampledLoop, AVerySlowIntegratorCostsNoTimeAndHasItsClosedForm) {
   for (const double Ki : {1e-3, 1e-6}) {
     for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
@@ -216,7 +217,7 @@ TEST(SampledLoop, AVerySlowIntegratorCostsNoTimeAndHasItsClosedForm) {
   }
 }
 
-/// The same numbers with and without the shortcut: a plain sum over a million periods.
+/// The same results with and without the geometric series: a plain sum over a million periods.
 TEST(SampledLoop, TheSeriesOfTheLastModeEqualsThePlainSum) {
   const SampledLoop loop = sampled(9, 4, 0.3, 200, 0.002);
   const GainNorms norms = sampled_norms(loop, Channel::kCommand, Instants::kSampling);

@@ -1,4 +1,5 @@
-// Filters against what defines them: a Butterworth filter's gain at its cutoff, a delay's effect on a ramp.
+// Filters compared with their defining properties: a Butterworth filter's gain at its cutoff, a delay's effect on a
+// ramp.
 #include "stability/simulation/sensors.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +13,8 @@ namespace {
 
 constexpr double kRate_hz = 1000;
 
-/// The amplitude of the filtered sine of `frequency_hz`, once it has settled: from its mean square over whole periods.
+/// Returns the amplitude of the filtered sine of `frequency_hz` in steady state, from its mean square over whole
+/// periods.
 double gain_at(double frequency_hz, double cutoff_hz) {
   LowPass filter(cutoff_hz, kRate_hz);
   double squares = 0;
@@ -56,7 +58,7 @@ TEST(Sensors, MilliTruncatesTowardsZeroAndWrapsAsFirmwareDoes) {
   EXPECT_EQ(milli(32.768), -32768);
 }
 
-/// What vehicle 0 knows of vehicle 1, which moves at 0.5 m/s along x, after a second of broadcasts each 10 ms.
+/// What vehicle 0 knows of vehicle 1, which moves at 0.5 m/s along x, after a second of broadcasts every 10 ms.
 struct Known {
   double x_m = 0, velocity_m_s = 0, weight = 0;
 };

@@ -14,7 +14,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// Writes a grid of `steps` x 3 cells, and what it names, into `folder`.
+/// Writes a grid of `steps` x 3 cells, and the files that it names, into `folder`.
 Grid small_grid(const tests::TempFolder& folder, int steps = 4) {
   files::write_file(folder / "gains.toml",
                     "schema = \"swarmcert/gains/1\"\n[position]\nKp = 10\nKd = 5\nKi = 10\nrate_hz = 500\n",
@@ -50,7 +50,7 @@ TEST(Shards, TheSweepHasTheSameBytesHoweverTheGridWasCut) {
 
 TEST(Shards, AStoppedShardIsTakenUpWhereItStopped) {
   const tests::TempFolder inputs, whole, stopped;
-  const Grid grid = small_grid(inputs, 400);  // more cells than are computed between two looks at `cancelled`
+  const Grid grid = small_grid(inputs, 400);  // more cells than between two checks of `cancelled`
   run_shard(grid, whole.path(), shard(0, 1));
   std::atomic<bool> stop = false;
   SweepOptions options = shard(0, 1);

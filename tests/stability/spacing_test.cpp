@@ -1,4 +1,4 @@
-// The keep-out shape, row by row, against the bounds that it is made of.
+// The keep-out region, row by row, compared with the bounds from which it is computed.
 #include "stability/bounds/swarms/spacing.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-/// @file One axis of the loop, stepped through time: what bounds and gains are held against. Shares no code with them:
-/// Runge-Kutta on the equations as they are written down, no transfer function, no matrix exponential.
+/// @file One axis of the loop, stepped through time, as a reference for bounds and gains. Shares no code with them:
+/// Runge-Kutta on the differential equations, no transfer function, no matrix exponential.
 #pragma once
 
 #include <algorithm>
@@ -16,9 +16,9 @@ namespace swarmcert::stability {
 /// The force is linear on each step, with jumps between steps; so is the command of a continuous loop with a delay.
 class SteppedLoop {
  public:
-  /// Continuous: the control acts all the time. A delay must be a whole number of steps.
+  /// Continuous loop. A delay must be a whole number of steps.
   SteppedLoop(const AxisLoop& loop, double step_s) : loop_(loop), step_s_(step_s) { prepare(); }
-  /// Sampled: every `steps_per_period` steps.
+  /// Sampled loop: the control runs every `steps_per_period` steps.
   SteppedLoop(const SampledLoop& loop, int steps_per_period)
       : loop_(loop.plant),
         step_s_(loop.period_s / steps_per_period),
@@ -36,21 +36,21 @@ class SteppedLoop {
     command_ = 0;
     velocity_error_ = position_error_ = 0;
   }
-  /// What the law reads beside e' and e from the next step on: held over each step.
+  /// Sets the errors that the law adds to e' and e from the next step on, constant over each step.
   void err_estimates(double velocity_m_s, double position_m) {
     velocity_error_ = velocity_m_s;
     position_error_ = position_m;
   }
-  /// A clamp of the integrator's state; of a sampled loop.
+  /// Sets a clamp of the integrator's state; for a sampled loop.
   void clamp_integral(double limit_m_s) { limit_m_s_ = limit_m_s; }
   double integral_m_s() const { return x_[2]; }
-  /// Where it is; after an impulse of force the speed has changed.
+  /// Sets position and velocity. An impulse of force is a change of the velocity.
   void place(double e_m, double speed_m_s) {
     x_[0] = e_m;
     x_[1] = speed_m_s;
   }
 
-  /// One step; `command_error_N` is added to the command of the period that begins now. Returns e at its end.
+  /// Takes one step and returns e at its end; `command_error_N` is added to the command of the period that begins now.
   double step(double from_N, double to_N, double command_error_N = 0) {
     const double f0 = from_N / loop_.mass_kg;
     const double f1 = to_N / loop_.mass_kg;
@@ -64,7 +64,7 @@ class SteppedLoop {
       advance(f0, f1, delayed(0), delayed(0));
     } else if (past_.size() > 1) {
       push(feedback());
-      // The command begins with a jump: nothing of it acts before its time.
+      // The command begins with a jump: it has no effect before its time.
       const bool begins_next = count_ + 2 == static_cast<long>(past_.size());
       advance(f0, f1, delayed(0), begins_next ? delayed(0) : delayed(1));
     } else {
@@ -76,7 +76,7 @@ class SteppedLoop {
 
  private:
   static constexpr std::size_t kMost = 8;
-  using State = std::array<double, kMost>;  ///< e, e', int e, outputs of the lags from the last to the first
+  using State = std::array<double, kMost>;  ///< e, e', int e, lag outputs from the last to the first
 
   double& integral_() { return x_[2]; }
   double feedback() const {
@@ -84,7 +84,7 @@ class SteppedLoop {
   }
 
   void push(double command) { past_[static_cast<std::size_t>(count_) % past_.size()] = command; }
-  /// The command that acts now, or a step later.
+  /// Returns the command that acts now, or `later` steps later.
   double delayed(int later) const {
     const long k = count_ + later + 1;  // the slot after the newest is the oldest
     return past_[static_cast<std::size_t>(k) % past_.size()];
@@ -92,7 +92,7 @@ class SteppedLoop {
 
   bool closes_itself() const { return steps_per_period_ == 0 && past_.size() == 1; }
 
-  /// Inputs at one time.
+  /// Inputs at one instant.
   struct Inputs {
     double force = 0, command = 0, velocity_error = 0, position_error = 0;
   };
@@ -114,7 +114,7 @@ class SteppedLoop {
     return d;
   }
 
-  /// Force and command are linear on the step, errors of the estimates constant.
+  /// Force and command are linear on the step, errors of the estimates are constant.
   State runge_kutta(State x, const Inputs& from, const Inputs& to) const {
     constexpr int kParts = 16;
     const double dt = step_s_ / kParts;
@@ -140,7 +140,7 @@ class SteppedLoop {
     return x;
   }
 
-  /// A step is linear in the state and its six inputs: one column of each, integrated once.
+  /// A step is linear in the state and its six inputs: one column for each, integrated once.
   void prepare() {
     for (const double tau : loop_.lags_s) {
       if (tau > 0) lags_s_.push_back(tau);

@@ -17,7 +17,7 @@ EffectSpec an_effect(const std::string& name, const std::map<std::string, double
   return spec;
 }
 
-/// What Swarm::runge_kutta() says it is, stage after stage.
+/// The definition of Swarm::runge_kutta(), stage by stage.
 std::vector<double> stepped(Swarm& swarm, double h, const std::vector<VehicleInput>& inputs,
                             const std::vector<double>& start) {
   const std::size_t size = start.size();
@@ -48,8 +48,8 @@ TEST(Swarm, ItsSignalPathHasTheLagsAndDelaysOfTheModelsEffects) {
 }
 
 TEST(Swarm, ARungeKuttaStepIsThatOfItsDerivativeToTheBit) {
-  // Where only positions of pairs act, forces of two stages are computed together; with wakes that lag, or with other
-  // effects, they are not. Up to sixteen vehicles are picked from registers, more from memory.
+  // If only positions of pairs matter, the forces of two stages are computed together; with wakes that lag, or with
+  // other effects, they are not. Up to sixteen vehicles are selected from registers, more from memory.
   std::mt19937_64 random(5);
   const auto uniform = [&random](double from, double to) {
     return std::uniform_real_distribution<double>(from, to)(random);
@@ -122,7 +122,7 @@ TEST(Swarm, ListedNeighboursChangeNoBit) {
     Rows rows = swarm.make_rows();
     swarm.to_rows(state.data(), rows.data());
     swarm.find_neighbours(rows.data(), 0.01);
-    for (int i = 0; i < vehicles; ++i) {  // where they may be in 10 ms
+    for (int i = 0; i < vehicles; ++i) {  // positions possible within 10 ms
       for (int axis = 0; axis < 3; ++axis) {
         state[static_cast<std::size_t>(i * kVehicleStateSize + axis)] +=
             0.01 * state[static_cast<std::size_t>(i * kVehicleStateSize + kVelocity + axis)];

@@ -18,7 +18,7 @@ TEST(Tasks, VelocityAndAccelerationAreDerivativesOfThePosition) {
       for (double t = 0.0123; t < task->duration_s() - 0.1; t += 0.0371) {
         const Setpoint before = task->at(vehicle, t - h), now = task->at(vehicle, t),
                        after = task->at(vehicle, t + h);
-        // The walk's acceleration is piecewise constant: at most a step of 1 m/s^2 within 2 h.
+        // The walk's acceleration is piecewise constant: it changes by at most 1 m/s^2 within 2 h.
         ASSERT_LT(((after.p_W_m - before.p_W_m) / (2 * h) - now.v_W_m_s).norm(), 1e-4) << t;
         if (name != "random-walk") {
           ASSERT_LT(((after.v_W_m_s - before.v_W_m_s) / (2 * h) - now.a_W_m_s2).norm(), 1e-4) << t;

@@ -39,7 +39,7 @@ TEST(Theorem, BallsOfTheReference) {
               1e-14);
   EXPECT_NEAR(check_theorem(parsed("Lambda = [2, 2, 4]\nK = [0.2, 0.2, 0.05]"), .034, {}).ball_per_rate(), 5,
               1e-14);
-  // The same law written as PID gains.
+  // The same law as PID gains.
   const Theorem pid = check_theorem(parsed("Kp = 48\nKd = 12\nKi = 64"), .034, {});
   EXPECT_TRUE(pid.applies);
   EXPECT_NEAR(pid.ball_per_rate(), 0.45955882352941174, 1e-12);
@@ -112,7 +112,7 @@ TEST(Theorem, TransientIsSmoothWhereTheRatesMeet) {
 }
 
 TEST(SmallGain, NumbersOfTheReference) {
-  // Z 10/5/10 without lag: g1 = 4.9968507, the reference's limits and its nonlinear check.
+  // Z 10/5/10 without lag: g1 = 4.9968507, with the limits and the nonlinear simulation of the reference.
   const double g0 = 3.3355994424839928, g1 = 4.996850736188977;
   const double g2 = 1 / (2 * 0.04085056361483958);
   const std::vector<LoopGains> pair(2, {g0, g1, g2});
@@ -153,7 +153,8 @@ TEST(SmallGain, OneDirectionalDownwashClosesWhereBothDirectionsWouldNot) {
   EXPECT_LT(both.missing_factor_of[0], 1);
 }
 
-/// Largest |e| in the last of `seconds` of two vehicles whose learning errors are +-(Lp/8) sin(8 (relative position)).
+/// Returns the largest |e| in the last of `seconds` of two vehicles with learning errors +-(Lp/8) sin(8 (relative
+/// position)).
 double pair_error(double Lp, double Kp, double Kd, double Ki, double seconds) {
   constexpr double kStep_s = 1e-3;
   double e[2] = {1e-6, -1e-6}, v[2] = {}, integral[2] = {};
@@ -171,14 +172,14 @@ double pair_error(double Lp, double Kp, double Kd, double Ki, double seconds) {
   return largest;
 }
 
-/// The shipped swarms: one-way 0.145 N/m is proved, 0.25 N/m both ways is not, and simulation refutes it.
+/// The shipped swarms: one-way 0.145 N/m is proved; 0.25 N/m both ways is not, and simulation refutes it.
 TEST(SmallGain, WhatItDoesNotProveCanBeRefutedBySimulation) {
   EXPECT_GT(pair_error(0.25, 10, 5, 2, 60), 0.01);   // from a micrometre
-  EXPECT_LT(pair_error(0.145, 10, 5, 2, 60), 1e-5);  // inconclusive, and yet stable
+  EXPECT_LT(pair_error(0.145, 10, 5, 2, 60), 1e-5);  // not proved by small gain, but stable
 }
 
-/// Routh's criterion: the relative mode of two vehicles is unstable above m (Kp - Ki/Kd)/2 = 0.136 N/m, or
-/// m (Kd - Ki/Kp)/2 = 0.068 N s/m.
+/// Routh's criterion: the relative mode of two vehicles is unstable above m (Kp - Ki/Kd)/2 = 0.136 N/m or m (Kd -
+/// Ki/Kp)/2 = 0.068 N s/m.
 TEST(SmallGain, AnUnstableInstanceIsFoundExactlyAboveRouthsLimits) {
   const AxisLoop z = {0.034, 10, 5, 10, {}, 0};
   const auto pair = [](double Lp, double Lv) {
@@ -193,11 +194,12 @@ TEST(SmallGain, AnUnstableInstanceIsFoundExactlyAboveRouthsLimits) {
     EXPECT_FALSE(found->is_declared);
     EXPECT_GE(found->largest_error, 1000);
   }
-  // One-way forces close no loop through the other vehicle, but change the vehicle's own: Kp - Lp/m or Kp + Lp/m.
+  // One-way forces close no loop through the other vehicle, but change the vehicle's own stiffness to Kp - Lp/m or Kp +
+  // Lp/m.
   EXPECT_FALSE(find_unstable_swarm(z, 2, {{0, 1, 0.145, 0, 0.1, 0, 0}}));
   EXPECT_TRUE(find_unstable_swarm(z, 2, {{0, 1, 0.034 * 8 * 1.05, 0, 0.1, 0, 0}}));
   EXPECT_TRUE(find_unstable_swarm({0.034, 10, 5, 10, {1 / 17.4}, 0}, 2, pair(0.14, 0)));
-  // Forces that are known to pull together are stiffness.
+  // Forces that are known to pull the vehicles together act like additional stiffness.
   std::vector<Coupling> together = pair(0.25, 0);
   for (Coupling& c : together) c.direction = -1;
   EXPECT_FALSE(find_unstable_swarm(z, 2, together));

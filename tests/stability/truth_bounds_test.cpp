@@ -46,8 +46,8 @@ class Motions {
   std::uniform_real_distribution<double> unit_{0, 1};
 };
 
-/// Largest force and rate along z of random neighbours that move within `motion`, by differences of the simulator's
-/// own columns.
+/// Largest force and rate along z of random neighbours that move within `motion`, by finite differences of the
+/// simulator's columns.
 struct Seen {
   double amplitude_N = 0, rate_N_s = 0;
 };
@@ -108,7 +108,7 @@ TEST(TruthBounds, EncloseTheDownwashThatIsSimulatedForAnyGapSpeedAndNumberAndAre
         const EffectBounds bounds = truth_bounds(model, motion).at(0);
         const Seen seen = seen_of_wake(model.effects[0], motion, 1, 10000);
         EXPECT_LE(seen.amplitude_N, bounds.amplitude_N[2]);
-        EXPECT_LE(seen.rate_N_s, bounds.rate_N_s[2] * (1 + 1e-4));  // of a difference over a microsecond
+        EXPECT_LE(seen.rate_N_s, bounds.rate_N_s[2] * (1 + 1e-4));  // finite difference over a microsecond
         const bool drifts = std::string(text).find("convection") != std::string::npos;
         EXPECT_GT(seen.amplitude_N, (drifts ? 0.5 : 0.8) * bounds.amplitude_N[2]);
         EXPECT_GT(seen.rate_N_s, (drifts ? 0.4 : 0.8) * bounds.rate_N_s[2]);

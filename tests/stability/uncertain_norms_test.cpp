@@ -16,7 +16,7 @@ namespace {
 using tests::kMass_kg;
 using End = UncertainNorms::End;
 
-/// The flown gains, z and x.
+/// The gains as flown, z and x.
 const AxisLoop kLoop = {kMass_kg, 10, 5, 10, {}, 0};
 const AxisLoop kSideways = {kMass_kg, 20, 10, 3, {0.1}, 0};
 
@@ -34,7 +34,7 @@ AxisLoop at(AxisLoop loop, double mass_kg, double scale, double lag_s, double de
   return loop;
 }
 
-/// Random plants of a box, every third number at an end of its interval.
+/// Draws random plants of a box; every third number is at an end of its interval.
 class PlantsOf {
  public:
   explicit PlantsOf(const UncertainPlant& box) : box_(box) {}
@@ -67,7 +67,7 @@ void expect_gap(const UncertainNorms& norms, double gap) {
   }
 }
 
-/// What was reached is reached again at the plant that is named.
+/// Expects that each gain is attained again at the plant that is reported for it.
 template <class NormsOf>
 void expect_replay(const UncertainNorms& norms, const AxisLoop& told, const NormsOf& norms_of) {
   const auto replayed = [&](const UncertainGain& worst) {
@@ -137,7 +137,7 @@ TEST(UncertainNorms, NoSampledLoopOfABoxExceedsItsSupremumAndItIsNear) {
       PlantsOf plants(box.plant);
       for (int i = 0; i < 150 && !HasFailure(); ++i) {
         const SampledLoop loop = sampled(plants(box.told));
-        // Between samples, too; this takes thirty times as long.
+        // Also between samples, which takes thirty times as long.
         expect_below(sampled_norms(loop, channel, i % 50 == 0 ? Instants::kAll : Instants::kSampling), norms);
       }
       expect_replay(norms, box.told, [&](const AxisLoop& loop) {
@@ -154,7 +154,7 @@ TEST(UncertainNorms, SmallerIntervalsTendToTheCertainNorms) {
   for (const double share : {0.04, 0.004, 0.0004, 0.0}) {
     const auto about = [share](double x) { return Interval{x * (1 - share), x * (1 + share)}; };
     const UncertainPlant box = {about(kMass_kg), about(1), about(0.0575), about(0.006)};
-    // No refinement: what a single part gives.
+    // Without refinement: the bound of a single part.
     const double upper = uncertain_norms(kLoop, box, Channel::kForce, {0, 1}).amplitude.upper;
     const double sampled_upper =
         uncertain_norms(SampledLoop{kLoop, 0.01, 0.01}, box, Channel::kForce, {0, 1}).amplitude.upper;
@@ -202,7 +202,7 @@ TEST(UncertainNorms, BoundsHoldWhereverItEndsAndTheEndIsNamed) {
   EXPECT_GE(stopped.amplitude.upper, full.amplitude.lower);
 }
 
-/// A box around the flown loop that is wide in one dimension only.
+/// A box around the loop as flown that is wide in one dimension only.
 PlantBox wide_in(std::size_t dimension, PlantEdge edge) {
   constexpr double kCentre[] = {1, 0.05, 0.01};
   PlantBox box;
@@ -215,19 +215,18 @@ PlantBox wide_in(std::size_t dimension, PlantEdge edge) {
   return box;
 }
 
-/// By how much the middle of a function's values differs from the mean of its ends: in sum and at most.
+/// Difference between the midpoint of a function's values and the mean of its ends: sum and maximum.
 struct Bend {
   double sum = 0, most = 0;
 };
 
-/// kernel(p): samples of a response, of the plant at p.
+/// @param kernel returns samples of a response of the plant at p.
 template <class Kernel>
 Bend bend_of(const PlantBox& box, const Kernel& kernel) {
   const std::vector<double> from = kernel(box.from);
   const std::vector<double> middle = kernel(box.centre());
   const std::vector<double> to = kernel(box.to);
-  const bool is_weighted =
-      box.edge == PlantEdge::kLeastThrust;  // there it is ratio times response that bends
+  const bool is_weighted = box.edge == PlantEdge::kLeastThrust;  // the bend is that of ratio times response
   const auto weight = [&](const PlantPoint& p) { return is_weighted ? p[0] : 1.0; };
   Bend bend;
   for (std::size_t i = 0; i < middle.size(); ++i) {
@@ -277,7 +276,7 @@ TEST(UncertainNorms, KernelsOfSampledLoopsBendLessBetweenCornersThanBoundedAndNo
         return SampledLoop{plant_at(kLoop, p), kPeriod_s, kPeriod_s};
       };
       const PlantBends bends = bends_over(SampledLoop{kLoop, kPeriod_s, kPeriod_s}, Channel::kForce, box);
-      // The errors measured after an impulse of force, stepped through time: values of the kernel, one a period.
+      // Errors measured after an impulse of force, stepped through time: values of the kernel, one per period.
       const Bend bend = bend_of(box, [&](const PlantPoint& p) {
         constexpr int kSteps = 20;  // of 0.4 ms: the delays are whole numbers of them
         SteppedLoop stepped(loop_at(p), kSteps);

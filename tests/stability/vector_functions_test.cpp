@@ -1,4 +1,4 @@
-// Arithmetic of stability/effects/vector_functions.inc.
+// Tests of the arithmetic in stability/effects/vector_functions.inc.
 #include <gtest/gtest.h>
 
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
@@ -30,7 +30,7 @@ struct Widths {
   std::vector<decltype(&narrow::logarithms)> logarithms_of_one_plus = {narrow::logarithms_of_one_plus};
   std::vector<decltype(&narrow::exponentials)> exponentials = {narrow::exponentials};
 
-  /// Those that this processor has.
+  /// The widths that this processor supports.
   Widths() {
 #if defined(SWARMCERT_WIDE_KERNELS)
     if (widest_kernels() >= KernelWidth::kAvx2) {
@@ -47,7 +47,7 @@ struct Widths {
   }
 };
 
-/// Numbers of all sizes from e^-600 to e^600, most of them about 1, with the ends of the table's intervals.
+/// Numbers of all magnitudes from e^-600 to e^600, most of them near 1, including the ends of the table's intervals.
 Rows numbers() {
   std::mt19937_64 random(21);
   Rows result(lines_for(kCount));
@@ -62,7 +62,7 @@ Rows numbers() {
   return result;
 }
 
-/// The same at every width.
+/// Expects the same results at every width.
 template <typename Function, typename... Argument>
 std::vector<double> results(const std::vector<Function>& widths, const Rows& x, const Argument&... argument) {
   std::vector<double> first;
@@ -93,7 +93,7 @@ TEST(VectorFunctions, LogarithmIsAsExactAsItSaysAtEveryWidth) {
 TEST(VectorFunctions, LogarithmOfOnePlusASmallNumberKeepsItsDigits) {
   if (std::numeric_limits<long double>::digits < 64) GTEST_SKIP() << "long double is double here";
   Rows y = numbers();
-  for (int i = 0; i < kCount; i += 2) y.data()[i] *= 0.25;  // about where the formula changes
+  for (int i = 0; i < kCount; i += 2) y.data()[i] *= 0.25;  // near the point where the formula changes
   const std::vector<double> given = results(Widths().logarithms_of_one_plus, y);
   long double worst = 0;
   for (std::size_t i = 0; i < given.size(); ++i) {

@@ -31,7 +31,7 @@ TEST(VectorGain, EnclosesTheReference) {
 
 TEST(VectorGain, ARotatingDisturbanceBeatsEveryAxis) {
   const VectorGain gain = vector_peak_gain(diagonal(2, 2, 4), diagonal(.2, .2, .05), kMass_kg);
-  EXPECT_GT(gain.lower, 1.25 + 3e-4);  // both axes have 1.25
+  EXPECT_GT(gain.lower, 1.25 + 3e-4);  // the gain of each axis alone is 1.25
   const double z = gain.direction[2] * gain.direction[2];
   EXPECT_NEAR(z, 0.452, 2e-3);
 }
@@ -71,7 +71,7 @@ TEST(VectorGain, MatricesThatDoNotCommuteStayBelowTheTheorem) {
   EXPECT_TRUE(gain.is_exact()) << gain.lower << " .. " << gain.upper;
 }
 
-/// Largest |e| of the theorem's loop under a disturbance rate given per step (classical Runge-Kutta).
+/// Returns the largest |e| of the theorem's loop under a disturbance rate given per step (classical Runge-Kutta).
 double simulated(const Matrix3& Lambda, const Matrix3& K, const std::vector<std::array<double, 3>>& rate,
                  double step_s) {
   using State = std::array<double, 9>;
@@ -133,7 +133,7 @@ TEST(VectorGain, NoRandomDisturbanceExceedsItAndARampReachesTheIsotropicBall) {
   EXPECT_LE(reached, ball * (1 + 1e-9));
 }
 
-/// A non-symmetric Lambda can exceed d/(l^2 k); check_theorem() refuses it (theorem_test.cpp).
+/// A non-symmetric Lambda can exceed d/(l^2 k); check_theorem() rejects it (theorem_test.cpp).
 TEST(VectorGain, ANonSymmetricLambdaExceedsTheBallThatItsEigenvaluesSuggest) {
   const Matrix3 Lambda = {{2, 8, 0}, {0, 2, 0}, {0, 0, 2}};  // eigenvalues 2
   const std::vector<std::array<double, 3>> ramp(4000, {0, 1, 0});

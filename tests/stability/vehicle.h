@@ -1,4 +1,4 @@
-/// @file The vehicle of the tests.
+/// @file The vehicle used in the tests.
 #pragma once
 
 #include "data.h"

@@ -47,7 +47,7 @@ TEST(VerifiedNorms, TheEstimateLiesInsideForLoopsOfAnyPolePattern) {
     ASSERT_TRUE(norms.has_value());
     const GainNorms estimate = continuous_norms(loop, channel);
     SCOPED_TRACE(testing::Message() << loop.Kp << " " << loop.Kd << " " << loop.Ki);
-    // Slow or badly conditioned loops cost width.
+    // Slow or ill-conditioned loops have wider enclosures.
     EXPECT_TRUE(encloses(norms->rate, estimate.rate, 1e-4));
     EXPECT_TRUE(encloses(norms->amplitude, estimate.amplitude, 1e-4));
     EXPECT_TRUE(encloses(norms->edge, estimate.edge, 1e-7));
@@ -94,7 +94,7 @@ TEST(VerifiedNorms, GainsOfErrorsOfTheEstimatesAreEnclosed) {
 }
 
 TEST(VerifiedNorms, ADelayIsEnclosedNarrowlyUpToTheStabilityLimit) {
-  // No, one and two lags, no integral, and long delays: half and nine tenths of what destabilises.
+  // Zero, one and two lags, no integral, and long delays: half and nine tenths of the destabilising delay.
   std::vector<AxisLoop> loops = {
       {kMass_kg, 10, 5, 10, {0.0575}, 0.02},  {kMass_kg, 20, 10, 3, {0.0575, 0.1}, 0.01},
       {kMass_kg, 48, 12, 64, {0.0575}, 0.01}, {kMass_kg, 10, 5, 0, {0.0575}, 0.008},
@@ -126,7 +126,7 @@ TEST(VerifiedNorms, ADelayIsEnclosedNarrowlyUpToTheStabilityLimit) {
 }
 
 TEST(VerifiedNorms, AShortDelayOfASlowLoopIsExpanded) {
-  // Too many pieces for the method of steps.
+  // Too many segments for the method of steps.
   const AxisLoop loop = {kMass_kg, 10, 5, 2, {0.0575}, 2e-5};
   const auto norms = verified_norms(loop, Channel::kForce);
   ASSERT_TRUE(norms.has_value());

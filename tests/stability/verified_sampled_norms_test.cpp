@@ -13,13 +13,13 @@ namespace {
 
 using tests::kMass_kg;
 
-/// For values that are themselves computed.
+/// For values that are computed themselves.
 testing::AssertionResult encloses_estimate(const Interval& interval, double value, double relative_width,
                                            double estimate_error = 1e-10) {
   return tests::encloses(interval, value, relative_width, estimate_error);
 }
 
-/// @param channel or the estimate that errs.
+/// @param channel the channel, or the estimate that has the error.
 template <class Input>
 void expect_enclosures(const SampledLoop& loop, Input channel, double width, double width_between) {
   const auto norms = verified_sampled_norms(loop, channel);
@@ -41,8 +41,8 @@ void expect_enclosures(const SampledLoop& loop, Input channel, double width, dou
 }
 
 TEST(VerifiedSampledNorms, EncloseThePublishedTableToItsDigits) {
-  // Amplitude and rate gains at 100 Hz and 500 Hz of z 10/5/10 and of the triple pole, as printed; at 100 Hz the
-  // quadrature behind them is off by 8e-8.
+  // Amplitude and rate gains at 100 Hz and 500 Hz of z 10/5/10 and of the triple pole, as printed; at 100 Hz their
+  // quadrature has an error of 8e-8.
   struct Row {
     AxisLoop loop;
     double period_s, step_s, rate, amplitude;
