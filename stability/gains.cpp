@@ -42,7 +42,7 @@ double non_negative(const TomlTable& table, const std::string& key) {
 
 double positive(const TomlTable& table, const std::string& key) {
   const double value = table.number(key);
-  if (!(value > 0)) table.refuse(key, text_of(value), "must be positive", "leave the key out for none");
+  if (!(value > 0)) table.refuse(key, text_of(value), "must be positive", "omit the key if there is none");
   return value;
 }
 
@@ -51,8 +51,8 @@ void check_size(const TomlTable& table, const std::string& key, double value, do
                 const std::string& unit) {
   if (std::abs(value) > largest) {
     table.refuse(key, text_of(value),
-                 "is beyond " + text_of(largest) + " " + unit + ", which no vehicle follows",
-                 "it is in " + unit);
+                 "exceeds " + text_of(largest) + " " + unit + ", more than any vehicle can follow",
+                 "the value is in " + unit);
   }
 }
 
@@ -61,13 +61,13 @@ double loop_rate_hz(const TomlTable& table) {
   const double value = positive(table, "rate_hz");
   if (value > kLargestRate_hz) {
     table.refuse("rate_hz", text_of(value),
-                 "is beyond " + text_of(kLargestRate_hz) + " Hz, which no controller runs at",
-                 "it is in hertz");
+                 "exceeds " + text_of(kLargestRate_hz) + " Hz, faster than any controller",
+                 "the value is in hertz");
   }
   if (value < kLeastRate_hz) {
     table.refuse("rate_hz", text_of(value),
                  "is below " + text_of(kLeastRate_hz) + " Hz; a period was probably meant",
-                 "it is in hertz: a period of " + text_of(value) + " s is " + text_of(1 / value));
+                 "the value is in hertz: a period of " + text_of(value) + " s is " + text_of(1 / value));
   }
   return value;
 }
@@ -77,7 +77,7 @@ double seconds(const TomlTable& table, const std::string& key, double value) {
   constexpr double kLongest_s = 1;
   if (value > kLongest_s) {
     table.refuse(key, text_of(value), "is longer than " + text_of(kLongest_s) + " s",
-                 "it is in seconds: 20 ms are 0.02");
+                 "the value is in seconds: 20 ms are 0.02");
   }
   return value;
 }
@@ -98,7 +98,7 @@ PerAxis per_axis(const TomlTable& table, const std::string& key, bool may_be_zer
   }
   for (const double value : result) {
     if (value < 0)
-      table.refuse(key, text_of(value), "must not be negative", "the loop has its signs built in");
+      table.refuse(key, text_of(value), "must not be negative", "the control law already has the signs");
     if (value == 0 && !may_be_zero) table.refuse(key, text_of(value), "must be positive");
     check_size(table, key, value, largest, unit);
   }
@@ -147,7 +147,7 @@ void read_position(const TomlTable& position, Gains& gains) {
   const bool is_pid = position.has("Kp") || position.has("Kd") || position.has("Ki");
   const bool is_composite = position.has("Lambda") || position.has("K");
   if (is_pid && is_composite) {
-    position.refuse(position.has("Lambda") ? "Lambda" : "K", "", "stands beside Kp, Kd or Ki",
+    position.refuse(position.has("Lambda") ? "Lambda" : "K", "", "cannot be combined with Kp, Kd or Ki",
                     "give Kp, Kd, Ki or Lambda, K");
   }
   if (!is_pid && !is_composite) position.refuse("", "", "has no gains", "give Kp, Kd, Ki or Lambda, K");
@@ -169,7 +169,7 @@ void read_position(const TomlTable& position, Gains& gains) {
   if (position.has("integrator_step_s")) {
     if (gains.rate_hz == 0) {
       position.refuse("integrator_step_s", text_of(position.number("integrator_step_s")),
-                      "has a meaning only for a sampled loop", "add rate_hz");
+                      "applies only to a sampled loop", "add rate_hz");
     }
     gains.integrator_step_s = seconds(position, "integrator_step_s", positive(position, "integrator_step_s"));
   }
@@ -184,7 +184,7 @@ void read_attitude(const TomlTable& table, Gains& gains) {
   if (!has_gains) return;
   for (const char* const key : {"KR", "Kw"})
     if (!table.has(key))
-      table.refuse(key, "", "is missing beside the other gains of the attitude law", "add it");
+      table.refuse(key, "", "is missing, but other gains of the attitude law are given", "add it");
   gains.attitude = AttitudeGains{per_axis(table, "KR", false, kLargestAttitudeGain, "N m"),
                                  per_axis(table, "Kw", false, kLargestAttitudeGain, "N m s"),
                                  {0, 0, 0}};

@@ -32,7 +32,7 @@ double rate_hz(const TomlTable& table, const std::string& key) {
   const double value = positive(table, key);
   if (value > kHighest_hz) {
     table.refuse(key, fmt::format("{:g}", value), fmt::format("is above {:g} Hz", kHighest_hz),
-                 "it is in hertz: 100 Hz are 100, whatever the period in us");
+                 "the value is in hertz: write 100 for 100 Hz");
   }
   return value;
 }
@@ -61,8 +61,8 @@ Interval battery_range(const TomlTable& vehicle) {
     vehicle.refuse("battery_range_V", fmt::format("{:g}", range.lower), "must be positive");
   if (range.upper > kHighest_V) {
     vehicle.refuse("battery_range_V", fmt::format("{:g}", range.upper),
-                   fmt::format("is above {:g} V; millivolt were probably meant", kHighest_V),
-                   fmt::format("it is in V: {:g} mV are {:g}", range.upper, range.upper / 1000));
+                   fmt::format("is above {:g} V; millivolts were probably meant", kHighest_V),
+                   fmt::format("the value is in V: {:g} mV is {:g}", range.upper, range.upper / 1000));
   }
   return range;
 }
@@ -82,8 +82,8 @@ void read_rotors(const TomlTable& vehicle, Model* model) {
     return;
   }
   if (vehicle.has("arm_m"))
-    vehicle.refuse("arm_m", "", "stands beside rotors, which say where each rotor is",
-                   "leave one of the two out");
+    vehicle.refuse("arm_m", "", "cannot be combined with rotors, which already give the positions",
+                   "omit one of the two");
   for (const TomlTable& rotor : vehicle.tables("rotors")) model->rotors.push_back(read_rotor(rotor));
   const std::size_t count = model->rotors.size();
   if (count < kFewestRotors || count > kMostRotors) {
@@ -112,8 +112,8 @@ void read_thrust(const TomlTable& vehicle, Model* model) {
     return;
   }
   if (vehicle.has("thrust"))
-    vehicle.refuse("thrust", "", "stands beside thrust_curve, which says the same",
-                   "leave one of the two out");
+    vehicle.refuse("thrust", "", "cannot be combined with thrust_curve, which replaces it",
+                   "omit one of the two");
   const TomlTable curve = vehicle.table("thrust_curve");
   curve.allow_only({"force_N"});
   const std::vector<double> force_N = curve.numbers("force_N");
@@ -121,7 +121,7 @@ void read_thrust(const TomlTable& vehicle, Model* model) {
     curve.refuse("force_N", "",
                  "must be [a, b, c]: a rotor gives a + b u + c u^2 newton at command u in 0 .. 1");
   if (!(force_N[1] >= 0) || !(force_N[1] + 2 * force_N[2] >= 0) || !(force_N[1] + force_N[2] > 0))
-    curve.refuse("force_N", "", "does not grow with the command in 0 .. 1");
+    curve.refuse("force_N", "", "does not increase with the command in 0 .. 1");
   set_thrust_curve({force_N[0], force_N[1], force_N[2]}, *model);
 }
 
@@ -175,7 +175,7 @@ EffectExpression read_expression(const TomlTable& table) {
     }
   }
   if (expression.formulas.empty()) {
-    table.refuse("", "", "holds no formula", "add e.g. force_z_N = \"a * T\"");
+    table.refuse("", "", "contains no formula", "add e.g. force_z_N = \"a * T\"");
   }
   return expression;
 }
@@ -232,7 +232,7 @@ EffectSpec read_effect(const TomlTable& effect, const std::string& path) {
   if (effect.has("expression")) {
     if (is_known || spec.name.empty()) {
       effect.refuse("name", files::in_quotes(spec.name), "cannot name a user-defined effect",
-                    "choose a name of your own");
+                    "choose another name");
     }
     spec.expression = read_expression(effect.table("expression"));
     check_parameters(effect, spec, make_effect(spec, {"", {}, path})->info());
@@ -243,12 +243,12 @@ EffectSpec read_effect(const TomlTable& effect, const std::string& path) {
                   files::did_you_mean(spec.name, names) + ", or add [effect.expression]");
   }
   if (!spec.network.empty() && spec.name != "deep_set") {
-    effect.refuse("network", files::in_quotes(spec.network), "belongs to the effect deep_set only");
+    effect.refuse("network", files::in_quotes(spec.network), "is allowed only for the effect deep_set");
   }
   const EffectInfo& info = effect_info(spec.name);
   if (info.remembers && !spec.vehicle.empty()) {
-    effect.refuse("vehicle", files::in_quotes(spec.vehicle), "cannot have a lag or delay of its own",
-                  "give it a model of its own in flights.toml");
+    effect.refuse("vehicle", files::in_quotes(spec.vehicle), "cannot have its own lag or delay",
+                  "give it its own model in flights.toml");
   }
   check_parameters(effect, spec, info);
   return spec;
@@ -319,7 +319,7 @@ void refuse_other_rotors(const Model& model, const std::string& what) {
   if (model.rotors.empty()) return;
   throw files::InputError({model.path.empty() ? model.kind : model.path, "", "vehicle.rotors",
                            fmt::format("{} rotors", model.rotors.size()), what + " needs four rotors in X",
-                           "give arm_m in place of rotors if the vehicle is one"});
+                           "give arm_m instead of rotors if it has four rotors in X"});
 }
 
 std::string battery_problem(const Model& model, double battery_V) {
@@ -328,9 +328,9 @@ std::string battery_problem(const Model& model, double battery_V) {
   std::string problem =
       fmt::format("{:g} V lies outside the battery range of {}, {:g} .. {:g} V{}", battery_V,
                   model.path.empty() ? "the model" : model.path, lower_V, upper_V,
-                  model.battery_range_V == kOneCell_V ? " (one cell, unless battery_range_V says more)" : "");
+                  model.battery_range_V == kOneCell_V ? " (one cell, the default of battery_range_V)" : "");
   if (battery_V / 1000 >= lower_V && battery_V / 1000 <= upper_V)
-    problem += fmt::format("; it is in V: {:g} mV are {:g}", battery_V, battery_V / 1000);
+    problem += fmt::format("; the value is in V: {:g} mV is {:g}", battery_V, battery_V / 1000);
   return problem;
 }
 

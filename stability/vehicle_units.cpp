@@ -32,9 +32,9 @@ void check_lift(const files::TomlTable& vehicle, const Model& model) {
   const std::string mass = fmt::format("{:g}", mass_kg);
   if (lift_N > kLargestThrustToWeight * model.weight_N()) {
     vehicle.refuse("mass_kg", mass,
-                   fmt::format("weighs {:.3g} N, and {} give {:.3g} N, {:.3g} times as much",
+                   fmt::format("weighs {:.3g} N, but {} give {:.3g} N, {:.3g} times as much",
                                model.weight_N(), rotors, lift_N, lift_N / model.weight_N()),
-                   fmt::format("mass is in kg and {}: correct the one that is not",
+                   fmt::format("mass is in kg and {}: correct the wrong one",
                                model.thrust_curve_N ? "thrust_curve.force_N in newton"
                                                     : "the thrust polynomial in gram-force"));
   }
@@ -43,19 +43,19 @@ void check_lift(const files::TomlTable& vehicle, const Model& model) {
   if (lifts_gram && !fits_arm(gyration_to_arm(model, mass_kg)) &&
       fits_arm(gyration_to_arm(model, mass_kg / 1000))) {
     vehicle.refuse("mass_kg", mass,
-                   fmt::format("weighs {:.4g} N, and {} lift {:.3g} N; gram were probably meant",
+                   fmt::format("weighs {:.4g} N, but {} lift {:.3g} N; grams were probably meant",
                                model.weight_N(), rotors, lift_N),
-                   fmt::format("mass is in kg: {:g} g are {:g}", mass_kg, mass_kg / 1000));
+                   fmt::format("mass is in kg: {:g} g is {:g}", mass_kg, mass_kg / 1000));
   }
   if (model.thrust_curve_N) {
     vehicle.refuse("thrust_curve", "",
-                   fmt::format("{} give {:.4g} N at full command, and the vehicle weighs {:.4g} N", rotors,
+                   fmt::format("{} give {:.4g} N at full command, but the vehicle weighs {:.4g} N", rotors,
                                lift_N, model.weight_N()),
-                   "force_N is of one rotor, in newton, for a command of 0 .. 1");
+                   "force_N is the force of one rotor, in newton, for a command of 0 .. 1");
   }
   vehicle.refuse(
       "thrust", "",
-      fmt::format("{} give {:.4g} N at 4.2 V, and the vehicle weighs {:.4g} N", rotors, lift_N,
+      fmt::format("{} give {:.4g} N at 4.2 V, but the vehicle weighs {:.4g} N", rotors, lift_N,
                   model.weight_N()),
       "the polynomial is in gram-force (not newton) of p = PWM / 65536 (not percent or counts) and "
       "v = V / 4.2");
@@ -67,7 +67,7 @@ void check_arm(const files::TomlTable& vehicle, const Model& model) {
       model.rotors.empty() ? "arm_m" : "rotors", fmt::format("{:g}", model.arm_m),
       fmt::format("means that the rotors are at {:g} m from the centre; millimetres were probably meant",
                   model.arm_m),
-      fmt::format("it is in m, from the centre to a rotor: {:g} mm are {:g}", model.arm_m,
+      fmt::format("the value is in m, from the centre to a rotor: {:g} mm is {:g}", model.arm_m,
                   model.arm_m / 1000));
 }
 
@@ -80,9 +80,9 @@ void check_inertia(const files::TomlTable& vehicle, const Model& model) {
   };
   // The largest moment of a rigid body is at most the sum of the other two; measured ones may exceed it by their
   // errors.
-  if (J[2] > 2 * (J[0] + J[1])) refuse(J[2], "is more than twice the other two together");
+  if (J[2] > 2 * (J[0] + J[1])) refuse(J[2], "is more than twice the sum of the other two");
   if (fits_arm(gyration_to_arm(model, model.mass_kg))) return;
-  refuse(J[2], fmt::format("means that the mass lies {:.3g} m from the axis, and the rotors are at {:g} m",
+  refuse(J[2], fmt::format("means that the mass lies {:.3g} m from the axis, but the rotors are at {:g} m",
                            std::sqrt(J[2] / model.mass_kg), model.arm_m));
 }
 
@@ -90,10 +90,10 @@ void check_torque(const files::TomlTable& vehicle, const Model& model) {
   if (model.torque_per_thrust_m <= model.arm_m) return;
   vehicle.refuse(
       "torque_per_thrust_m", fmt::format("{:g}", model.torque_per_thrust_m),
-      fmt::format("is more than arm_m, {:g} m: rotors turn a vehicle about its thrust less than about "
-                  "the other axes",
+      fmt::format("is more than arm_m, {:g} m: the yaw torque of rotors is smaller than their roll and pitch "
+                  "torques",
                   model.arm_m),
-      "it is torque in N m per newton of thrust");
+      "this is the torque in N m per newton of thrust");
 }
 
 }  // namespace

@@ -55,7 +55,7 @@ std::optional<CompositeGains> composite_of(const PidGains& pid, double share, do
     has_form = false;
     std::string why = std::string("the gains of axis ") + kAxes[i] + " have no (Lambda, K) form: ";
     if (axis.status == controller::ConversionStatus::kOtherIntegralGain) {
-      why += "Ki = " + number(pid_axis.Ki_1_s3) + ", and Kp, Kd would need " + number(axis.needed_Ki_1_s3);
+      why += "Ki = " + number(pid_axis.Ki_1_s3) + ", but Kp, Kd would need " + number(axis.needed_Ki_1_s3);
     } else {
       why += controller::to_text(axis.status);
     }
@@ -78,8 +78,9 @@ Theorem check_theorem(const Gains& gains, double mass_kg,
     theorem.composite = gains.composite;
     if (!acts_as_written) {
       theorem.why_not.push_back("the integrator adds " + number(gains.integrator_step_s) +
-                                " s per cycle of " + number(1 / gains.rate_hz) + " s: Lambda^2 acts " +
-                                number(share) + " times as written, which is no (Lambda, K) form");
+                                " s per cycle of " + number(1 / gains.rate_hz) +
+                                " s: the effective Lambda^2 is " + number(share) +
+                                " times the written one, which has no (Lambda, K) form");
     }
   }
   if (theorem.composite) {
@@ -103,8 +104,7 @@ Theorem check_theorem(const Gains& gains, double mass_kg,
     if (integrator_needs_m_s && (*integrator_needs_m_s)[i] <= limit) continue;
     std::string why =
         std::string("the integrator of axis ") + kAxes[i] + " is clamped at " + number(limit) + " m s";
-    if (integrator_needs_m_s)
-      why += ", and the disturbance can ask for " + number((*integrator_needs_m_s)[i]);
+    if (integrator_needs_m_s) why += ", but the disturbance can demand " + number((*integrator_needs_m_s)[i]);
     theorem.why_not.push_back(why);
   }
   if (gains.network_rate_hz > 0) {

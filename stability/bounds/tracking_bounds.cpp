@@ -48,7 +48,7 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
     add("rate of f_hat", "proved", "bounds the learned force, not its error: gives no ball");
   } else if (source.kind == "declared truth") {
     add("the force is that of the declared truth", "assumed", source.note);
-    add("constants of the declared truth", "proved", "enclosed over the motions stated");
+    add("constants of the declared truth", "proved", "enclosed over the stated motions");
     if (source.f_hat_rate_known) add("rate of f_hat", "proved", "from the network's Lipschitz constant");
   } else if (source.kind != "none") {
     add("disturbance class", source.kind == "measured" ? "measured" : "assumed",
@@ -56,8 +56,8 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
   }
   for (const std::string& assumption : source.further_assumptions) add(assumption, "assumed", "");
   if (source.thrust_ratio_error > 0) {
-    add("mass as in the model; the thrust ratio within the error declared, and constant", "assumed",
-        "what a network feeds forward, times that error, belongs to the force error");
+    add("mass as in the model; thrust ratio constant, within the declared error", "assumed",
+        "the network's feedforward times that error belongs to the force error");
   } else {
     add("mass and thrust scale as in the model", "assumed", "--uncertain encloses intervals");
   }
@@ -67,26 +67,26 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
       : source.kind == "measured" ? "measured"
                                   : "proved",
       report.thrust_margin_N
-          ? "under all that is declared, about hover, by the effort gain of the continuous loop"
+          ? "under all declared disturbances, about hover, by the effort gain of the continuous loop"
           : "");
   if (source.has_moving_reference())
-    add("the set point moves as declared", "assumed",
-        "its acceleration is fed forward, and the force that acts is the force commanded");
+    add("the setpoint moves as declared", "assumed",
+        "its acceleration is fed forward, and the actual force is the commanded force");
   if (source.has_estimate_errors()) {
     const bool is_measured = source.kind == "measured" && !source.declares_velocity_error;
     add("errors of the estimated position and velocity", is_measured ? "measured" : "assumed",
         is_measured ? "of the velocity, over the same windows" : "as declared");
   } else {
     add("exact position and velocity", "assumed",
-        "--velocity-error and --position-error bound what errors of the estimates add");
+        "--velocity-error and --position-error bound the effect of estimation errors");
   }
   if (source.bounds_learning_error() && !source.f_hat_rate_known &&
       (gains.network_rate_hz > 0 || gains.network_latency_s > 0)) {
-    add("the learned force follows its inputs at once", "assumed",
-        "it is a staircase or late by [network]; --network NET --speed V bounds what that adds");
+    add("the learned force follows its inputs immediately", "assumed",
+        "[network] makes it a staircase or late; --network NET --speed V bounds the effect");
   }
   if (gains.rate_hz > 0) {
-    add("continuous position loop", "assumed", "rows named 'sampled' do not need it");
+    add("continuous position loop", "assumed", "not needed for rows named 'sampled'");
   }
   if (gains.motor_lag_s > 0 || gains.attitude_lag_s > 0 || gains.delay_s > 0) {
     add("first-order lags and a constant delay", "assumed", "as in [lag]");
@@ -269,12 +269,11 @@ void add_theorem(const Plant& plant, const DisturbanceSource& source, const Init
     theorem.why_not.push_back(std::move(why));
   };
   if (plant.thrust_scale != 1) {
-    object("the force that acts is not the force commanded: thrust scale " +
-           std::to_string(plant.thrust_scale));
+    object("the actual force is not the commanded force: thrust scale " + std::to_string(plant.thrust_scale));
   }
-  if (source.has_estimate_errors()) object("the estimated position or velocity errs, as declared");
-  if (source.thrust_ratio_error > 0) object("the thrust ratio errs, as declared");
-  if (source.has_moving_reference()) object("the set point moves as declared");
+  if (source.has_estimate_errors()) object("the estimated position or velocity has errors, as declared");
+  if (source.thrust_ratio_error > 0) object("the thrust ratio has an error, as declared");
+  if (source.has_moving_reference()) object("the setpoint moves, as declared");
   if (!theorem.composite) return;
   report.vector = vector_peak_gain(theorem.composite->Lambda_1_s, theorem.composite->K_kg_s, plant.mass_kg);
   report.transient = transient_of(theorem, plant, source, initial);

@@ -62,8 +62,7 @@ void field_bounds(const WakeField& field, double strength_N, double composition,
   }
   result.rate_N_s[2] = rate;
   if (std::isinf(slopes.total.upper)) {
-    result.unbounded =
-        "the field jumps where vehicles are 0.05 m apart in height: state --gap from above that";
+    result.unbounded = "the field jumps at a height difference of 0.05 m: choose a --gap above that";
   } else if (std::isinf(rate)) {
     result.unbounded = field.convection_s_m > 0
                            ? "the wake is carried along: needs --speed, --own-speed, --own-accel and --gap"
@@ -190,7 +189,7 @@ void bound_tether(const Values& value, const MotionSet& m, EffectBounds& result)
   const double k = value("stiffness_N_m");
   set_all(result.amplitude_N, k == 0 ? 0 : kInfinity);
   set_all(result.rate_N_s, times_up(k, m.speed_m_s));
-  if (k > 0) result.unbounded = "the pull grows with the distance from the anchor, which nothing here limits";
+  if (k > 0) result.unbounded = "the pull grows with the distance from the anchor, which is not bounded";
 }
 
 /// f = g T b3 with a factor g that depends on the motion: |(T b3)'| bounds |T'| and T |b3'|; |g'| is bounded per
@@ -265,7 +264,7 @@ void bound_step(const Values& value, EffectBounds& result) {
   result.amplitude_N[2] = up(std::max(std::abs(before), std::abs(after)) * kGravity_m_s2);
   result.rate_N_s[2] = kInfinity;
   result.unbounded =
-      "the load changes in no time: bound the motion before and after it with a constant_force each";
+      "the load changes instantaneously: bound the motion before and after it with one constant_force each";
 }
 
 }  // namespace
@@ -279,7 +278,7 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
     result.unbounded = why;
   };
   if (effect.is_expression()) {
-    nothing_known("a formula of the user has no enclosure here");
+    nothing_known("user-defined formulas have no enclosure");
     return result;
   }
   const std::string& name = effect.name;
@@ -290,12 +289,12 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
   } else if (name == "torque_bias" || name == "downwash_torque" || name == "com_offset") {
     result.note = "a torque: no force";
   } else if (name == "sensor_delay" || name == "accelerometer_scale") {
-    result.note = "of the accelerometer: no force";
+    result.note = "affects only the accelerometer: no force";
   } else if (name == "constant_force") {
     const char* const axes[] = {"force_x_N", "force_y_N", "force_z_N"};
     for (int i = 0; i < 3; ++i) result.bias_N[i] = std::abs(value(axes[i]));
   } else if ((name == "downwash" || name == "ceiling") && value("tail") != 0) {
-    nothing_known("a wake or ceiling with a tail has no enclosure here: only tail = 0");
+    nothing_known("wakes and ceilings have an enclosure only for tail = 0");
   } else if (name == "downwash" || name == "upper_lift" || name == "wake_delay") {
     bound_wake(name, value, motion, result);
   } else if (name == "drag_linear" || name == "drag_quadratic" || name == "drag_rotor" || name == "inflow") {
@@ -316,11 +315,11 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
   } else if (name == "payload_step") {
     bound_step(value, result);
   } else if (name == "pendulum") {
-    nothing_known("the swing of a load depends on all of the past: it has no enclosure here");
+    nothing_known("the swing of a load depends on the whole past and has no enclosure");
   } else if (name == "battery") {
-    nothing_known("scales the thrust with the voltage: enclose it with --uncertain battery=A:B");
+    nothing_known("scales the thrust with the voltage: use --uncertain battery=A:B");
   } else {
-    nothing_known("has no enclosure here; a network's rate comes from --network or --certificate");
+    nothing_known("has no enclosure; for the rate of a network use --network or --certificate");
   }
   return result;
 }

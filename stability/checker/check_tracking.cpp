@@ -98,8 +98,9 @@ bool check_gain(const Json& gains, const std::string& name, const std::optional<
   const double claimed = files::parse_hex_float(hex.get<std::string>());
   demand_field(decimal.is_number() && decimal.get<double>() == claimed,
                "gains." + name + ": decimal and hex notation differ");
-  demand_field(proved.has_value(), "gains." + name + " is claimed, but a constant input leaves an error");
-  demand_field(mpq_class(claimed) >= *proved, "gains." + name + " is below what the witness shows");
+  demand_field(proved.has_value(),
+               "gains." + name + " is claimed, but a constant input leaves a steady-state error");
+  demand_field(mpq_class(claimed) >= *proved, "gains." + name + " is below what the witness proves");
   return true;
 }
 
@@ -117,13 +118,13 @@ int check_gains(const Json& gains, const GainBounds& proved) {
 }
 
 void check_loops(const Json& loops, TrackingVerdict& verdict) {
-  demand_field(loops.is_array() && loops.size() <= 12, "loops are more than 12");
+  demand_field(loops.is_array() && loops.size() <= 12, "there are more than 12 loops");
   std::set<std::string> seen;
   std::map<std::string, GainBounds> known;  // identical axes are computed once
   for (const Json& entry : loops) {
     const LoopWitness loop = parse_loop(entry);
     demand_field(seen.insert(entry["axis"].get<std::string>() + " " + loop.input).second,
-                 "loops: one stands twice");
+                 "loops: one appears twice");
     const auto [place, is_new] = known.try_emplace(witness_text(entry));
     if (is_new) place->second = upper_gains(loop);
     verdict.gains += check_gains(entry["gains"], place->second);
@@ -132,12 +133,12 @@ void check_loops(const Json& loops, TrackingVerdict& verdict) {
 }
 
 void check_sampled_loops(const Json& loops, TrackingVerdict& verdict) {
-  demand_field(loops.is_array() && loops.size() <= 3, "sampled_loops are more than 3");
+  demand_field(loops.is_array() && loops.size() <= 3, "there are more than 3 sampled_loops");
   std::set<std::string> seen;
   std::map<std::string, SampledGainBounds> known;
   for (const Json& entry : loops) {
     const SampledWitness loop = parse_sampled(entry);
-    demand_field(seen.insert(entry["axis"].get<std::string>()).second, "sampled_loops: one stands twice");
+    demand_field(seen.insert(entry["axis"].get<std::string>()).second, "sampled_loops: one appears twice");
     const auto [place, is_new] = known.try_emplace(witness_text(entry));
     if (is_new) place->second = sampled_upper_gains(loop);
     const Json& gains = entry["gains"];
@@ -157,7 +158,7 @@ void check_left_out(const Json& left_out) {
     files::require_keys(entry, {"axis", "input", "loop", "why"}, "left_out");
     check_axis(entry);
     demand_field(entry["input"].is_string() && entry["loop"].is_string() && entry["why"].is_string(),
-                 "left_out: a word is not text");
+                 "left_out: an entry is not a string");
   }
 }
 
@@ -175,9 +176,9 @@ TrackingVerdict verified(const Json& certificate, const std::string& gains_sha25
   demand_field(certificate["gains_sha256"].is_string() && certificate["model_sha256"].is_string(),
                "gains_sha256 or model_sha256 is not text");
   demand_field(gains_sha256.empty() || certificate["gains_sha256"] == gains_sha256,
-               "gains_sha256 is of another file");
+               "gains_sha256 belongs to another file");
   demand_field(model_sha256.empty() || certificate["model_sha256"] == model_sha256,
-               "model_sha256 is of another file");
+               "model_sha256 belongs to another file");
   check_left_out(certificate["left_out"]);
   TrackingVerdict verdict;
   check_loops(certificate["loops"], verdict);

@@ -10,7 +10,7 @@ void check_numbers(const LoopNumbers& loop) {
       is_usual(loop.mass_kg) && is_usual(loop.Kp) && is_usual(loop.Kd) && (loop.Ki == 0 || is_usual(loop.Ki)),
       "mass_kg, Kp, Kd or Ki is out of range");
   demand(loop.lags_s.size() <= kMostLags && std::all_of(loop.lags_s.begin(), loop.lags_s.end(), is_usual),
-         "lags_s are more than four, or out of range");
+         "lags_s has more than four entries, or one is out of range");
   demand(loop.delay_s == 0 || is_usual(loop.delay_s), "delay_s is out of range");
 }
 
@@ -29,10 +29,10 @@ std::optional<Rational> inverse_form(Square m, Row right) {
 }
 
 Square exact_form(const std::vector<std::vector<double>>& stated, std::size_t n) {
-  demand(stated.size() == n, "P has another size than the loop");
+  demand(stated.size() == n, "the size of P does not match the loop");
   Square exact(n, Row(n));
   for (std::size_t i = 0; i < n; ++i) {
-    demand(stated[i].size() == n, "P has another size than the loop");
+    demand(stated[i].size() == n, "the size of P does not match the loop");
     for (std::size_t j = 0; j < n; ++j) {
       const double x = stated[i][j], scaled = std::ldexp(x, static_cast<int>(kFormBits));
       demand(std::abs(x) <= 0x1p64 && scaled == std::floor(scaled), "P has an entry out of range");

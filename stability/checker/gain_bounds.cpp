@@ -32,7 +32,7 @@ Row product(const Row& a, const Row& b) {
 void check_ranges(const LoopWitness& loop) {
   demand(loop.input == "force" || loop.input == "command" || loop.input == "velocity" ||
              loop.input == "position",
-         "input is none of force, command, velocity, position");
+         "input must be force, command, velocity or position");
   check_numbers(loop);
   demand(loop.delay_order >= 0 &&
              static_cast<std::size_t>(loop.delay_order) <= (loop.delay_s == 0 ? 0 : loop.lags_s.size()),
@@ -149,7 +149,7 @@ void check_decay(const System& system, double decay) {
       }
     }
   }
-  demand(inverse_form(falls, Row(n)).has_value(), "P does not show that the loop decays at the rate stated");
+  demand(inverse_form(falls, Row(n)).has_value(), "P does not prove that the loop decays at the stated rate");
 }
 
 /// The state at the ends of the cells, in fixed point.
@@ -310,7 +310,7 @@ GainBounds upper_gains(const LoopWitness& loop) {
   const System system = system_of(loop);
   check_decay(system, loop.decay);
   const Rational missed = missed_by_expansion(system, loop);
-  demand(missed < 1, "delay_order: the expansion misses too much of the delay");
+  demand(missed < 1, "delay_order: the expansion of the delay is too inaccurate");
   Trajectory at(system, system.initial, loop.step_exponent);
   Norms step(system, 0, system.settled, loop.step_exponent);
   Norms impulse(system, 1, 0, loop.step_exponent);

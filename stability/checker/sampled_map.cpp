@@ -35,7 +35,7 @@ FixedRanges exponential(const Square& generator, const Rational& t) {
   }
   int halvings = 0;
   while (largest * two_to(-halvings) > Rational(1, 2)) {
-    demand(++halvings <= kMostHalvings, "lags_s: one is too short against period_s");
+    demand(++halvings <= kMostHalvings, "lags_s: one is too short compared with period_s");
   }
   FixedRanges scaled = zeros(n, n), term = zeros(n, n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -178,7 +178,7 @@ void PeriodMap::check_contraction(const Rational& factor) const {
     }
   }
   demand(sgn(factor) > 0 && inverse_form(falls, Row(n)).has_value(),
-         "P does not show that the loop contracts as stated");
+         "P does not prove that the loop contracts as stated");
 }
 
 }  // namespace swarmcert::check

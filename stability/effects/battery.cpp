@@ -10,14 +10,15 @@ namespace {
 class Battery : public Effect {
  public:
   Battery()
-      : Effect({"battery",
-                "f = k (V - 4.2) T b3",
-                "first-order remainder of a thrust map that already has the voltage in it",
-                "battery",
-                "repeat the same accelerations over more than 0.3 V of discharge; fly a discharged battery "
-                "first once",
-                {{"sensitivity_1_V", "relative thrust per volt", 0, 0, 1}},
-                {}}) {}
+      : Effect(
+            {"battery",
+             "f = k (V - 4.2) T b3",
+             "first-order remainder of a thrust map that already includes the voltage",
+             "battery",
+             "repeat the same accelerations over more than 0.3 V of discharge; once, begin with a discharged "
+             "battery",
+             {{"sensitivity_1_V", "relative thrust per volt", 0, 0, 1}},
+             {}}) {}
   void columns(const Instant& now, const double*, Wrench* columns) const override {
     columns[0] = {(now.battery_V - kFullBattery_V) * now.thrust_N * now.b3_W(), Eigen::Vector3d::Zero()};
   }

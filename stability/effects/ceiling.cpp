@@ -13,17 +13,17 @@ enum CeilingShape { kCeilingDecay, kCeilingHeight, kCeilingTail };
 class Ceiling : public Effect {
  public:
   Ceiling()
-      : Effect(
-            {"ceiling",
-             "f = a T (1 + q x)^(-1/q) b3, x = (h - z) / b; exp(-x) for q = 0",
-             "rotors near a surface above them: Sanchez-Cuevas, Heredia and Ollero 2017: their rational form "
-             "falls like an inverse square, q = 0.5",
-             "ceiling",
-             "a fifth of the time within two rotor radii of the ceiling",
-             {{"amplitude", "relative thrust gained at the height h", 0, 0, 1}},
-             {{"decay_m", "b", 0.05, 0.005, 0.5, {0.03, 0.05, 0.08, 0.12, 0.2}},
-              {"height_m", "h: of the ceiling; with q = 0, a and h only count as a exp(-h / b)", 2.5, 0, 20},
-              {"tail", "q: 0 is exponential, 0.5 an inverse square", 0, 0, 1, {0, 0.5}}}}) {}
+      : Effect({"ceiling",
+                "f = a T (1 + q x)^(-1/q) b3, x = (h - z) / b; exp(-x) for q = 0",
+                "rotors below a surface: Sanchez-Cuevas, Heredia and Ollero 2017; their rational form "
+                "decays like an inverse square, q = 0.5",
+                "ceiling",
+                "a fifth of the time within two rotor radii of the ceiling",
+                {{"amplitude", "relative thrust gained at the height h", 0, 0, 1}},
+                {{"decay_m", "b", 0.05, 0.005, 0.5, {0.03, 0.05, 0.08, 0.12, 0.2}},
+                 {"height_m", "h: height of the ceiling; for q = 0, a and h enter only as a exp(-h / b)", 2.5,
+                  0, 20},
+                 {"tail", "q: 0 is exponential, 0.5 an inverse square", 0, 0, 1, {0, 0.5}}}}) {}
   void columns(const Instant& now, const double* shape, Wrench* columns) const override {
     const double gap_m = std::max(shape[kCeilingHeight] - now.p_W_m.z(), 0.0);
     const double x = gap_m / shape[kCeilingDecay], tail = shape[kCeilingTail];

@@ -11,7 +11,7 @@ class ConstantForce : public Effect {
       : Effect(
             {"constant_force",
              "f = (f_x, f_y, f_z) in the world",
-             "what wind times linear drag, a tilted thrust axis and a biased accelerometer have in common",
+             "common effect of wind times linear drag, a tilted thrust axis and a biased accelerometer",
              "wind / tilt / IMU bias",
              "yaw through more than 90 degrees (world against body), tilt changes (bias against thrust axis)",
              {{"force_x_N", "world x", 0, -0.3, 0.3},

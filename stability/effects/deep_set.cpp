@@ -12,7 +12,7 @@ namespace {
 
 files::Network load(const EffectSpec& spec, const EffectContext& context) {
   if (spec.network.empty()) {
-    throw files::InputError({"", "", "effect.network", "", "the effect deep_set names no network",
+    throw files::InputError({"", "", "effect.network", "", "the effect deep_set needs a network",
                              "add network = \"network.toml\""});
   }
   return files::load_evaluated_network(
@@ -24,7 +24,7 @@ files::Network load(const EffectSpec& spec, const EffectContext& context) {
 EffectInfo DeepSetEffect::describe() {
   return {"deep_set",
           "f = c f_hat(own state, neighbours), or a torque",
-          "the learned model of this project: a flexible candidate, to be tried after the physical ones",
+          "the learned model of this project: a flexible candidate to try after the physical ones",
           "deep_set",
           "the flights that the network was trained for",
           {{"gain", "1 is the network itself", 1, 0, 1.5}},

@@ -27,7 +27,7 @@ std::vector<int> read_order(const files::Network& network, int inputs) {
     const std::string& name = network.input_order[static_cast<std::size_t>(i)];
     const auto found = std::find(kInputs.begin(), kInputs.end(), name);
     if (found == kInputs.end()) {
-      refuse(network, "input.order", files::in_quotes(name), "is not an input that a simulation knows",
+      refuse(network, "input.order", files::in_quotes(name), "is not an input that simulation provides",
              "use dp_x_m .. dv_z_m_s");
     }
     order.push_back(static_cast<int>(found - kInputs.begin()));
@@ -41,8 +41,8 @@ DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
                            const std::vector<std::string>& kinds, DeepSetOutput output)
     : network_(std::move(network)) {
   if (network_.plain) {
-    refuse(network_, "", "", "is one plain network, and a force among vehicles needs a deep set",
-           "name a network.toml with phi and rho");
+    refuse(network_, "", "", "is a plain network, but a force between vehicles needs a deep set",
+           "use a network.toml with phi and rho");
   }
   // The views below point into arrays owned by the evaluators, so the vector must not reallocate after this.
   evaluators_.reserve(network_.phi.size() + 1);

@@ -31,10 +31,11 @@ class Delay : public MemoryEffect {
       : MemoryEffect(
             {"delay",
              "f = c (T(t - d) - T) b3; torque likewise",
-             "radio, computation and motor drivers; 10 .. 20 ms in published flights, beside the motor lag",
+             "radio, computation and motor drivers; 10 .. 20 ms in published flights, in addition to the "
+             "motor lag",
              "delay",
              "vertical commands with content at 2 .. 8 Hz, where a lag attenuates and a delay does not",
-             {{"gain", "1 is the delay itself; a fit far from 1 is no delay", 1, 0, 1.3}},
+             {{"gain", "1 is a pure delay; a fit far from 1 indicates another cause", 1, 0, 1.3}},
              // A delay of less than one record cannot be separated from the time at which the log reads the command.
              {{"delay_s", "d", 0.01, 0, 0.5, {0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06}}},
              true}) {}

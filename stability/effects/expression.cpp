@@ -275,8 +275,8 @@ struct ExpressionEffect::Formulas {
       std::copy(c.begin(), c.end(), linear.begin());
       const double gap = (value() - sum).norm();
       if (constant != 0 || gap > 1e-9 * (size + 1e-300)) {
-        refuse("linear", "", "the formulas are not linear in these parameters, without a constant part",
-               "list only coefficients that multiply; multiply the whole formula with one of them");
+        refuse("linear", "", "the formulas are not linear in these parameters, or have a constant part",
+               "list only multiplicative coefficients; multiply the whole formula by one of them");
       }
     }
   }
@@ -293,13 +293,13 @@ ExpressionEffect::ExpressionEffect(const EffectSpec& spec, const std::string& pa
       static_cast<int>(info().shape.size()) > kMostShape) {
     formulas_->refuse("linear", std::to_string(num_columns()) + " names",
                       "an effect has 1 to 8 coefficients and at most 8 other parameters",
-                      "list the parameters that multiply");
+                      "list the multiplicative parameters");
   }
   for (const std::vector<Parameter>* parameters : {&info().linear, &info().shape}) {
     for (const Parameter& parameter : *parameters) {
       if (std::find(kVariables.begin(), kVariables.end(), parameter.name) == kVariables.end()) continue;
       formulas_->refuse("parameters", files::in_quotes(parameter.name), "is the name of a variable",
-                        "name the parameter otherwise");
+                        "rename the parameter");
     }
   }
   for (const auto& [target, text] : spec.expression.formulas) {

@@ -54,7 +54,7 @@ class MotorLag : public MemoryEffect {
                       "motors 70 .. 90 ms",
                       "motor_lag",
                       "vertical commands with content at 2 .. 8 Hz",
-                      {{"gain", "1 is the lag itself; a fit far from 1 is no motor lag", 1, 0, 1.3}},
+                      {{"gain", "1 is a pure lag; a fit far from 1 indicates another cause", 1, 0, 1.3}},
                       {{"tau_s",
                         "time constant",
                         1 / 17.4,

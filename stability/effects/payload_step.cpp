@@ -11,7 +11,7 @@ class PayloadStep : public Effect {
       : Effect(
             {"payload_step",
              "f = -g m_before e_z until the time t_0 of the log, -g m_after e_z from then on",
-             "the weight of a load that is dropped or picked up; its inertia is left out, which is exact at "
+             "the weight of a load that is dropped or picked up; its inertia is neglected, which is exact at "
              "constant velocity",
              "payload_step",
              "half a minute with the load and half a minute without, the same motion in both",

@@ -22,22 +22,22 @@ class RotorThrust : public Effect {
     info.name = "rotor_thrust";
     info.equation = "f = sum (rotor_k - 1) f_k b3, tau = sum (rotor_k - 1) (r_k x f_k e3 + s_k kappa f_k e3)";
     info.source =
-        "the torques of a hovering vehicle cancel, so that a rotor that gives less is asked for more; 9 % "
-        "less "
+        "the torques of a hovering vehicle cancel, so a weaker rotor gets a larger command; 9 % less thrust "
         "for propellers 3 mm shorter (of 47 mm), 23 % for 7 mm";
     info.equivalence_class = "weak rotor / load near a rotor";
     info.excitation =
-        "half a minute of slow flight, and the same of the healthy vehicle; land, turn the load by 180 "
-        "degrees and fly again to tell a load from a weak rotor";
+        "half a minute of slow flight, and the same with the healthy vehicle; land, turn the load by 180 "
+        "degrees and fly again to distinguish a load from a weak rotor";
     const char* const kRotorPlaces[kNumFactors] = {"front right", "back right", "back left", "front left"};
     for (int k = 0; k < kNumFactors; ++k) {
       info.linear.push_back(
           {"rotor_" + std::to_string(k + 1),
-           std::string("thrust of the rotor ") + kRotorPlaces[k] + " over the map's; 1 is nominal", 1, 0, 2});
+           std::string("thrust of the rotor ") + kRotorPlaces[k] + " relative to the map; 1 is nominal", 1, 0,
+           2});
     }
     info.linear.push_back({"model", "the model's own thrust, which the factors replace", -1, -1, -1});
-    info.shape = {{"arm_m", "from the centre to a rotor, as the vehicle's", 0.046, 0.005, 2},
-                  {"torque_per_thrust_m", "as the vehicle's", 0.006, 0.0001, 1}};
+    info.shape = {{"arm_m", "from the centre to a rotor, as in the vehicle", 0.046, 0.005, 2},
+                  {"torque_per_thrust_m", "as in the vehicle", 0.006, 0.0001, 1}};
     return info;
   }
   void columns(const Instant& now, const double* shape, Wrench* columns) const override {

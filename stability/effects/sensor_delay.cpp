@@ -32,7 +32,7 @@ class SensorDelay : public MemoryEffect {
              "group delay of the accelerometer's filter: 7.5 ms for two poles at 30 Hz",
              "sensor_delay",
              "tilt of more than 5 degrees at more than 1 Hz: a motor lag does not delay the thrust axis",
-             {{"gain", "1 is the delay itself; a fit far from 1 is no delay", 1, 0, 1.3}},
+             {{"gain", "1 is a pure delay; a fit far from 1 indicates another cause", 1, 0, 1.3}},
              {{"delay_s", "d", 0.0075, 0, 0.5, {0.01, 0.015, 0.02, 0.03, 0.04}}},
              true}) {}
   std::unique_ptr<ColumnStream> stream(const double* shape) const override {

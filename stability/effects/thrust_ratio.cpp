@@ -10,9 +10,9 @@ class ThrustRatio : public Effect {
   ThrustRatio()
       : Effect({"thrust_ratio",
                 "f = e T b3, where 1 + e = (true thrust / mapped thrust) (stated mass / true mass)",
-                "m a = s T: kinematics show s / m only",
+                "m a = s T: kinematics reveal only s / m",
                 "mass / payload / thrust scale",
-                "thrust changes of more than 15 %; weigh the vehicle to tell mass from thrust",
+                "thrust changes of more than 15 %; weigh the vehicle to separate mass from thrust",
                 {{"ratio", "relative excess of thrust over mass", 0, -0.7, 0.7}},
                 {}}) {}
   void columns(const Instant& now, const double*, Wrench* columns) const override {

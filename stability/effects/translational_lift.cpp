@@ -18,8 +18,7 @@ class TranslationalLift : public Effect {
       : Effect({"translational_lift",
                 "f = a T (1 - exp(-(v_h / v_0)^2)) b3, v_h the speed across the thrust axis",
                 "rotors that move through fresh air need less power for the same thrust (Glauert's momentum "
-                "theory of "
-                "forward flight); the form has its limits, none at rest and a constant at speed",
+                "theory of forward flight); the form has its limits: zero at rest and a constant at speed",
                 "translational_lift",
                 "horizontal flight from rest to twice the speed v_0, at constant height",
                 {{"gain", "a: share of the thrust gained at speed", 0, 0, 0.5}},

@@ -14,13 +14,13 @@ class VoltageSag : public Effect {
       : Effect(
             {"voltage_sag",
              "f = -s T ((T / W)^(3/2) - 1) b3",
-             "the power of a rotor at rest in air grows with T^(3/2) (momentum theory), the supply's voltage "
-             "falls in proportion to the power drawn; W is the weight: hovering is part of the thrust map",
+             "the power of a rotor at rest in air grows with T^(3/2) (momentum theory), and the supply "
+             "voltage falls in proportion to the power; W is the weight: hovering is part of the thrust map",
              "voltage_sag",
              "thrust from half to one and a half times the weight, with the battery's voltage logged slowly "
              "or "
              "not at all",
-             {{"sag", "share of the thrust lost per multiple of the power of hovering", 0, 0, 0.5}},
+             {{"sag", "fraction of the thrust lost per multiple of the hovering power", 0, 0, 0.5}},
              {}}) {}
   void columns(const Instant& now, const double*, Wrench* columns) const override {
     const double load = std::max(now.thrust_N, 0.0) / (now.mass_kg * kGravity_m_s2);

@@ -64,7 +64,7 @@ class WakeDelay : public Effect {
                  {"spread_m", "as of downwash", 0.0259477, 0.005, 0.3, {0.0259477, 0.06}},
                  {"spread_slope", "as of downwash", 0.08181592, 0, 1, {0.028, 0.08181592}},
                  {"norm_exponent", "as of downwash", 1.3, 1, 10},
-                 {"wind_x_m_s", "w: wind that carries the wake along", 0, -5, 5, {0, 1.6}},
+                 {"wind_x_m_s", "w: wind that carries the wake", 0, -5, 5, {0, 1.6}},
                  {"wind_y_m_s", "", 0, -5, 5, {0, 1.6}}},
                 false,
                 true}) {}

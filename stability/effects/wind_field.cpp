@@ -25,9 +25,8 @@ class WindField : public Effect {
   WindField()
       : Effect({"wind_field",
                 "f_xy = F / (1 + exp(-(z - z_0) / d)), f_z = G exp(-((x - x_0)^2 + (y - y_0)^2) / (2 r^2))",
-                "a shear layer between still and moving air, and a thermal or the draught of a fan; forces, "
-                "since drag "
-                "times wind is all that flights show",
+                "a shear layer between still and moving air, and a thermal or the draught of a fan; given as "
+                "forces, since flights reveal only drag times wind",
                 "wind_field",
                 "the same heights and places at several speeds and headings",
                 {{"shear_x_N", "force above the layer, world x", 0, -0.3, 0.3},

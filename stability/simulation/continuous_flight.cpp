@@ -53,7 +53,7 @@ ContinuousFlight::ContinuousFlight(Swarm& swarm, const Gains& gains, const Task&
   for (int i = 0; i < n; ++i) {
     if (swarm.path(i).delay_s > 0) {
       throw std::invalid_argument(
-          "the continuous loop has no delays: use the sampled loop, or leave out the delay");
+          "the continuous loop does not support delays: use the sampled loop, or omit the delay");
     }
     Vehicle& vehicle = vehicles_.emplace_back();
     vehicle.pilot = pilots[static_cast<std::size_t>(swarm.kind_of(i))];

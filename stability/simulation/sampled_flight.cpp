@@ -13,7 +13,7 @@ int periods(double control_hz, double slow_hz, const char* what) {
   const double whole = std::round(ratio);
   if (whole < 1 || std::abs(ratio - whole) > 1e-6 * whole) {
     throw std::invalid_argument(std::string("the ") + what + " loop at " + std::to_string(slow_hz) +
-                                " Hz is no whole fraction of the attitude loop's " +
+                                " Hz does not divide the attitude loop's rate of " +
                                 std::to_string(control_hz) + " Hz");
   }
   return static_cast<int>(whole);

@@ -38,7 +38,7 @@ GridAxis read_axis(const TomlTable& axes, const std::string& name) {
   const bool is_log = table.has("scale") && table.choice("scale", {"linear", "log"}) == 1;
   for (const auto& [key, value] : {std::pair("from", from), std::pair("to", to)}) {
     if (value < 0) table.refuse(key, fmt::format("{:g}", value), "must not be negative");
-    if (is_log && value == 0) table.refuse(key, "0", "must be positive on a log scale", "or leave scale out");
+    if (is_log && value == 0) table.refuse(key, "0", "must be positive on a log scale", "or omit scale");
   }
   GridAxis axis = {name, {}};
   for (int i = 0; i < static_cast<int>(steps); ++i) {
@@ -49,13 +49,14 @@ GridAxis read_axis(const TomlTable& axes, const std::string& name) {
   if (steps > 1) axis.values.back() = to;  // exactly
   const bool is_time = name.size() > 2 && name.compare(name.size() - 2, 2, "_s") == 0;
   if (is_time && to > 1) {
-    table.refuse("to", fmt::format("{:g}", to), "is longer than 1 s", "it is in seconds: 20 ms are 0.02");
+    table.refuse("to", fmt::format("{:g}", to), "is longer than 1 s",
+                 "the value is in seconds: 20 ms are 0.02");
   }
   const bool is_count = name == "neighbours" || name == "vehicles";
   for (const double value : axis.values) {
     if (is_count && value != std::floor(value)) {
       table.refuse("steps", fmt::format("{:g}", steps), fmt::format("gives {:.3g} {}", value, name),
-                   "choose steps that meet whole numbers only");
+                   "choose steps that give whole numbers only");
     }
   }
   return axis;
@@ -121,15 +122,15 @@ const std::vector<Quantity>& grid_quantities() {
       {"edge", "m/N", -1, "worst error per variation of force, |h|_oo"},
       {"impulse", "m per N s", -1, "worst error per impulse, |h'|_oo"},
       {"error_m", "m", -1, "smallest of the rate, amplitude, edge and impulse bounds for [disturbance]"},
-      {"lag_limit_s", "s", 1, "further first-order lag that the loop bears"},
-      {"delay_limit_s", "s", 1, "delay that the loop bears"},
-      {"lag_floor", "m per N/s", -1, "error that lag leaves with perfect feed-forward"},
+      {"lag_limit_s", "s", 1, "additional first-order lag that the loop tolerates"},
+      {"delay_limit_s", "s", 1, "delay that the loop tolerates"},
+      {"lag_floor", "m per N/s", -1, "error that remains with perfect feedforward, due to the lag"},
       {"effort", "N/N", -1, "feedback force per amplitude of force"},
       {"noise_command_m_s2", "m/s^2", -1, "jitter of the command for 1 mm and 0.05 m/s of noise"},
       {"noise_error_m", "m", -1, "error from the same noise"},
       {"spectral_radius", "1", -1, "of the sampled loop"},
       {"integral_authority_N", "N", 1, "constant force that the clamped integrator can cancel"},
-      {"thrust_margin_N", "N", 1, "thrust left about hover for [disturbance]"}};
+      {"thrust_margin_N", "N", 1, "thrust margin about hover under [disturbance]"}};
   return all;
 }
 
@@ -138,11 +139,11 @@ std::string parameter_problem(const Grid& grid, const std::string& name, double 
   constexpr double kLeast_hz = 1, kLargest_hz = 1e5;
   if (name == "battery_V") return battery_problem(grid.model, value);
   if (name == "rate_hz" && (value < kLeast_hz || value > kLargest_hz))
-    return fmt::format("{:g} Hz is no rate of a loop; it is in hertz: 100 Hz are 100", value);
+    return fmt::format("{:g} Hz is not a plausible rate; the value is in hertz: write 100 for 100 Hz", value);
   const double lifted_kg = grid.model.largest_thrust_N(kFullBattery_V) / kGravity_m_s2;
   if (name == "mass_kg" && value > 100 * lifted_kg)
-    return fmt::format("{:g} kg, and the rotors lift {:.3g} kg; it is in kg: {:g} g are {:g}", value,
-                       lifted_kg, value, value / 1000);
+    return fmt::format("{:g} kg, but the rotors lift only {:.3g} kg; the value is in kg: {:g} g is {:g}",
+                       value, lifted_kg, value, value / 1000);
   return "";
 }
 
@@ -153,13 +154,13 @@ void require_fitting_axes(const TomlTable& axes, const Gains& gains) {
   const bool pid_axis = axes.has("Kp") || axes.has("Kd") || axes.has("Ki");
   const bool composite_axis = axes.has("Lambda") || axes.has("K");
   if (pid_axis && (composite_axis || !gains.pid)) {
-    axes.refuse("", "", "varies Kp, Kd or Ki, and the gains are Lambda, K", "vary Lambda and K");
+    axes.refuse("", "", "varies Kp, Kd or Ki, but the gains are Lambda, K", "vary Lambda and K");
   }
   if (composite_axis && !gains.composite) {
-    axes.refuse("", "", "varies Lambda or K, and the gains are Kp, Kd, Ki", "vary Kp, Kd and Ki");
+    axes.refuse("", "", "varies Lambda or K, but the gains are Kp, Kd, Ki", "vary Kp, Kd and Ki");
   }
   if (axes.has("integrator_step_s") && gains.rate_hz == 0 && !axes.has("rate_hz")) {
-    axes.refuse("integrator_step_s", "", "needs a sampled loop", "state rate_hz in the gains");
+    axes.refuse("integrator_step_s", "", "needs a sampled loop", "add rate_hz to the gains");
   }
 }
 
@@ -198,7 +199,7 @@ void read_limits(const TomlTable& limits, Grid& grid) {
     const double most = limit.has("most") ? limit.number("most") : INFINITY;
     if (least > most) {
       limit.refuse("least", fmt::format("{:g}", least), fmt::format("is more than most = {:g}", most),
-                   "no cell can meet both");
+                   "no cell can satisfy both");
     }
     grid.limits.push_back({name, least, most});
   }

@@ -88,7 +88,7 @@ auto reading(const std::string& file, const Read& read) {
     return read();
   } catch (const Json::exception& error) {
     throw InputError({file, "", "", "", std::string("is not a shard of a sweep (") + error.what() + ")",
-                      "compute it again with --force"});
+                      "recompute it with --force"});
   }
 }
 
@@ -103,8 +103,8 @@ void refuse_foreign(const std::string& folder) {
       return;
     }
   }
-  throw InputError({folder, "", "", "", "is not empty, and nothing in it is of a sweep",
-                    "name another folder, or --force writes beside what is there"});
+  throw InputError({folder, "", "", "", "is not empty, and contains nothing of a sweep",
+                    "choose another folder, or add files to this one with --force"});
 }
 
 /// Returns the shard files in alphabetical order; at least one.
@@ -120,7 +120,7 @@ std::vector<std::string> shard_files(const std::string& folder) {
   std::sort(paths.begin(), paths.end());
   if (paths.empty()) {
     throw InputError(
-        {folder, "", "", "", "has no shard of a sweep", "swarmcert sweep GRID.toml -o " + folder});
+        {folder, "", "", "", "contains no shard of a sweep", "swarmcert sweep GRID.toml -o " + folder});
   }
   return paths;
 }
@@ -141,7 +141,7 @@ SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepO
       reading(outcome.file, [&] {
         if (!same_grid(old, head)) {
           throw InputError({outcome.file, "", "grid_sha256", "", "belongs to another grid, gains or model",
-                            "--force computes it again"});
+                            "--force recomputes it"});
         }
         for (const Json& json : old.at("cells")) {
           Cell cell = cell_of(json);
@@ -198,8 +198,8 @@ MergedSweep read_shards(const std::string& folder) {
         Cell cell = cell_of(json);
         const long index = cell.index;
         if (!cells.emplace(index, std::move(cell)).second) {
-          throw InputError({path, "", "cells", std::to_string(index), "is a cell that another shard has too",
-                            "keep the shards of one cut only"});
+          throw InputError({path, "", "cells", std::to_string(index), "is also a cell of another shard",
+                            "keep only shards with the same number of shards"});
         }
       }
       return 0;
@@ -221,7 +221,7 @@ MergedSweep read_shards(const std::string& folder) {
   for (long i = 0; i < total; ++i) {
     if (cells.count(i) == 1) continue;
     throw InputError({folder, "", "cells", std::to_string(total - static_cast<long>(cells.size())),
-                      "of " + std::to_string(total) + " are missing, the first is cell " + std::to_string(i),
+                      "of " + std::to_string(total) + " are missing; the first is cell " + std::to_string(i),
                       "run its shard with --resume"});
   }
   for (auto& [index, cell] : cells) sweep.cells.push_back(std::move(cell));

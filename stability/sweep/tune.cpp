@@ -248,8 +248,10 @@ TuneResult tune(const SampledLoop& loop, const TuneOptions& options) {
   constexpr std::array<const char*, 3> kGainNames = {"Kp", "Kd", "Ki"};
   for (std::size_t i = 0; i < search.dimension(); ++i) {
     const double x = search.best_x()[i];
-    if (x < low[i] + 1e-3) result.active_constraints.push_back(std::string(kGainNames[i]) + " at its least");
-    if (x > high[i] - 1e-3) result.active_constraints.push_back(std::string(kGainNames[i]) + " at its most");
+    if (x < low[i] + 1e-3)
+      result.active_constraints.push_back(std::string(kGainNames[i]) + " at its minimum");
+    if (x > high[i] - 1e-3)
+      result.active_constraints.push_back(std::string(kGainNames[i]) + " at its maximum");
   }
   return result;
 }

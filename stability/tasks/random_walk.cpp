@@ -47,7 +47,7 @@ Eigen::Vector3d repulsion(const Eigen::Vector3d& p, const Eigen::Vector3d& q) {
 class RandomWalk : public Task {
  public:
   static constexpr char kName[] = "random-walk";
-  static constexpr char kSummary[] = "random goals in a box, held apart by artificial potentials";
+  static constexpr char kSummary[] = "random goals in a box, kept apart by artificial potentials";
   explicit RandomWalk(const TaskOptions& options)
       : duration_s_(options.duration_s > 0 ? options.duration_s : 60) {
     const double side_m = options.vehicles <= 2 ? 0.2 : 0.3;

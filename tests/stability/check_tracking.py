@@ -73,7 +73,7 @@ def read_json(text):
     def unique(pairs):
         members = dict(pairs)
         if len(members) != len(pairs):
-            raise Unreadable("a key stands twice")
+            raise Unreadable("a key appears twice")
         return members
 
     def integer(digits):
@@ -242,8 +242,8 @@ class Derived:
 
 
 def read_form(rows, n):
-    require(isinstance(rows, list) and len(rows) == n, "P has another size than the loop")
-    require(all(isinstance(row, list) and len(row) == n for row in rows), "P has another size than the loop")
+    require(isinstance(rows, list) and len(rows) == n, "the size of P does not match the loop")
+    require(all(isinstance(row, list) and len(row) == n for row in rows), "the size of P does not match the loop")
     form = [[exact(x) for x in row] for row in rows]
     for i in range(n):
         for j in range(n):
@@ -321,7 +321,7 @@ class Loop:
         require(inverse_form(P, nothing) is not None, "P is not positive definite")
         falls = [[-2 * self.decay * P[i][j] - sum(A[k][i] * P[k][j] + P[i][k] * A[k][j] for k in range(n))
                   for j in range(n)] for i in range(n)]
-        require(inverse_form(falls, nothing) is not None, "P does not show that the loop decays at the rate stated")
+        require(inverse_form(falls, nothing) is not None, "P does not prove that the loop decays at the stated rate")
 
     def transition(self):
         """Returns exp(A cell) in fixed point, and an upper bound on its error in the maximum norm."""
@@ -340,7 +340,7 @@ class Loop:
         missed = 0
         if self.delay:
             missed = self.rest_weight * (abs(self.rest_jump) + self.norms(self.rest_start)["amplitude"])
-            require(missed < 1, "the expansion misses too much of the delay")
+            require(missed < 1, "the expansion of the delay is too inaccurate")
         return {name: x and x / (1 - missed) for name, x in self.norms(self.start).items()}
 
     def norms(self, start):
@@ -416,7 +416,7 @@ def matrix_exponential(generator, t):
     largest = max(sum(map(abs, row)) for row in generator) * t
     while largest > Fraction(2) ** (halvings - 1):
         halvings += 1
-        require(halvings <= 12, "a lag is too short against the period")
+        require(halvings <= 12, "a lag is too short compared with the period")
     part = [[x * t / 2 ** halvings for x in row] for row in generator]
     power = [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]
     total = [list(row) for row in power]
@@ -517,7 +517,8 @@ class Sampled:
         half = [times(row, self.P) for row in m]
         falls = [[factor ** 2 * self.P[i][j] - sum(x * y for x, y in zip(half[i], m[j])) for j in range(n)]
                  for i in range(n)]
-        require(inverse_form(falls, [Fraction(0)] * n) is not None, "P does not show that the loop contracts as stated")
+        require(inverse_form(falls, [Fraction(0)] * n) is not None,
+                "P does not prove that the loop contracts as stated")
         unknown = product_above(self.widest, product_above(n * self.spread, max(self.reach)))
         require(unknown <= 1 << (BITS - 60), "P has an entry out of range")
         return control, hold
@@ -644,7 +645,7 @@ def check_sampled(loops, derived):
     seen, known = set(), {}
     for entry in loops:
         loop = Sampled(entry)
-        require(entry["axis"] not in seen, "a sampled loop stands twice")
+        require(entry["axis"] not in seen, "a sampled loop appears twice")
         seen.add(entry["axis"])
         require_keys(entry["gains"], " ".join(Sampled.INPUTS), "gains")
         for name in Sampled.INPUTS:
@@ -667,8 +668,8 @@ def check_gain(claims, name, proved):
     claimed = exact(text)
     require(isinstance(decimal, (int, float)) and not isinstance(decimal, bool) and Fraction(float(decimal)) == claimed,
             f"gains.{name}: decimal and hex notation differ")
-    require(proved is not None, f"gains.{name} is claimed, but a constant input leaves an error")
-    require(claimed >= proved, f"gains.{name} is below what the witness shows")
+    require(proved is not None, f"gains.{name} is claimed, but a constant input leaves a steady-state error")
+    require(claimed >= proved, f"gains.{name} is below what the witness proves")
 
 
 def check(c, hashes, derived):
@@ -679,7 +680,7 @@ def check(c, hashes, derived):
     for key in ("tool", "gains_sha256", "model_sha256"):
         require(isinstance(c[key], str), f"{key} is not text")
     for key, expected in hashes.items():
-        require(c[key] == expected, f"{key} is of another file")
+        require(c[key] == expected, f"{key} belongs to another file")
     require(isinstance(c["left_out"], list), "left_out is not an array")
     for entry in c["left_out"]:
         require_keys(entry, "axis input loop why", "left_out")
@@ -690,7 +691,7 @@ def check(c, hashes, derived):
     seen, known = set(), {}
     for entry in loops:
         loop = Loop(entry)
-        require((entry["axis"], loop.input) not in seen, "a loop stands twice")
+        require((entry["axis"], loop.input) not in seen, "a loop appears twice")
         seen.add((entry["axis"], loop.input))
         require_keys(entry["gains"], GAINS, "gains")
         if derived is not None:

@@ -157,7 +157,7 @@ TEST(Model, RefusesNumbersInOtherUnits) {
   EXPECT_EQ(inertia("[16e-6, 16e-6, 33e-6]"), "")
       << "a little more than a rigid body has is a measuring error";
   has(inertia("[16, 16e-6, 29e-6]"), "line 5: vehicle.inertia_kg_m2 = 16: is more than twice");
-  has(inertia("[160, 160, 290]"), "the mass lies 92.4 m from the axis, and the rotors are at 0.046 m");
+  has(inertia("[160, 160, 290]"), "the mass lies 92.4 m from the axis, but the rotors are at 0.046 m");
   has(inertia("[160, 160, 290]"), "1 g cm^2 is 1e-7");
   has(refusal(replaced(kVehicle, "arm_m = 0.046", "arm_m = 46")), "the rotors are at 46 m");
   has(refusal(replaced(kVehicle, "m = 0.006", "m = 6")),

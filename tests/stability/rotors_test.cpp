@@ -119,9 +119,9 @@ TEST(Rotors, RefusesWhatCannotFly) {
       "rotors = [ { position_m = [0.2, 0, 0], spin = \"cw\" }, { position_m = [0.1, 0, 0], spin = "
       "\"cw\" }, { position_m = [-0.2, 0, 0], spin = \"ccw\" } ]\n";
   says(with(kHexacopter, body, line), "lie on one line");
-  says(with(kHexacopter, "mass_kg = 2.2", "mass_kg = 2.2\narm_m = 0.27"), "stands beside rotors");
+  says(with(kHexacopter, "mass_kg = 2.2", "mass_kg = 2.2\narm_m = 0.27"), "cannot be combined with rotors");
   says(with(kHexacopter, "spin = \"cw\"", "spin = \"left\""), "spin");
-  says(with(kHexacopter, "force_N = [0.1, 1.5, 7.0]", "force_N = [0.1, 1.5, -7.0]"), "does not grow");
+  says(with(kHexacopter, "force_N = [0.1, 1.5, 7.0]", "force_N = [0.1, 1.5, -7.0]"), "does not increase");
   says(with(kHexacopter, "force_N = [0.1, 1.5, 7.0]", "force_N = [0.1, 1.5]"), "[a, b, c]");
   says(with(kHexacopter, "force_N = [0.1, 1.5, 7.0]", "force_N = [0.0, 0.1, 0.7]"), "6 rotors give 4.8 N");
   says(with(kHexacopter, "mass_kg = 2.2", "mass_kg = 2200"), "6 rotors");
