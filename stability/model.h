@@ -65,12 +65,12 @@ struct EffectExpression {
   bool per_neighbour = false;                       ///< evaluated for each neighbour and summed
 };
 
-/// Where an effect's numbers come from. Written by identification and preserved when models are rewritten.
+/// The origin of an effect's numbers. Written by identification and preserved when models are rewritten.
 struct FitProvenance {
   std::vector<std::string> flights;                          ///< used by the fit
   std::map<std::string, Interval> interval;                  ///< 90 % intervals, by parameter
   double select_rmse_before_N = 0, select_rmse_after_N = 0;  ///< on flights not used by the fit
-  int test_looks = 0;  ///< how often the test flights had been scored at that time
+  int test_looks = 0;  ///< number of times the test flights had been scored
   std::string note;
 
   bool is_empty() const { return flights.empty() && interval.empty() && note.empty() && test_looks == 0; }
@@ -96,7 +96,7 @@ struct LadderRow {
   std::string effect;  ///< "nominal" for the first
   bool accepted = true;
   double fit_rmse_N = 0, select_rmse_N = 0, test_rmse_N = 0, noise_floor_N = 0;
-  int test_looks = 0;  ///< how often the test flights had been scored at that time
+  int test_looks = 0;  ///< number of times the test flights had been scored
   std::string note;    ///< why it was rejected, or kept nevertheless
   /// Parameter values of every effect after this row, so that the row can be restored: "motor_lag.tau_s",
   /// "constant_force@cf50.force_x_N".

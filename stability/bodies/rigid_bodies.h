@@ -74,9 +74,9 @@ class RigidBodies {
   /// Returns the first line of a row; the lines of further vehicles follow every kNumRows * kRowLength numbers.
   double* row(int which) { return rows_.data() + which * kRowLength; }
 
-  /// Whether some kLagRate is nonzero. Without lag, the rotor states stay as they are.
+  /// Sets whether some kLagRate is nonzero. Without lag, the rotor states stay as they are.
   void set_lagging(bool lags) { lags_ = lags; }
-  /// Whether all vehicles move, so that the stages need not test kMoving. The unused lanes then fall freely.
+  /// Sets whether all vehicles move, in which case the stages need not test kMoving. The unused lanes then fall freely.
   void set_all_moving(bool move) { all_move_ = move; }
 
   /// Computes derivative = d state / dt.

@@ -13,7 +13,7 @@ struct StepResponse {
   std::vector<double> length;
   std::vector<double> bend;
   double after = 0;
-  bool falls_after = false;  ///< whether |h| then decreases to zero without a sign change
+  bool falls_after = false;  ///< true if |h| then decreases to zero without a sign change
 };
 
 /// Returns a bound on sup |y| over all f with |f| <= amplitude and |f'| <= rate, from rest. The supremum is a linear

@@ -12,7 +12,7 @@
 
 namespace swarmcert::stability {
 
-/// What is known of the force error f(t) of one axis. Infinite: unknown. f is zero before it starts.
+/// Known bounds on the force error f(t) of one axis. Infinite: unknown. f is zero before it starts.
 struct Disturbance {
   double rate_N_s = std::numeric_limits<double>::infinity();     ///< sup |f'|
   double amplitude_N = std::numeric_limits<double>::infinity();  ///< sup |f|
@@ -21,8 +21,8 @@ struct Disturbance {
   double impulse_N_s = std::numeric_limits<double>::infinity();  ///< int |f| dt, of one pass
   int passes = 1;                                                ///< number of such passes
   double pass_period_s = 0;  ///< least time from the start of one pass to the start of the next
-  double pass_length_s = 0;  ///< how long one pass lasts
-  /// Whether variation_N is also that of one pass, for a force that need not vanish between passes.
+  double pass_length_s = 0;  ///< duration of one pass
+  /// True if variation_N is also that of one pass, for a force that need not vanish between passes.
   bool variation_per_pass = false;
   bool operator==(const Disturbance& o) const {
     return rate_N_s == o.rate_N_s && amplitude_N == o.amplitude_N && variation_N == o.variation_N &&
@@ -71,10 +71,10 @@ double felt_passes(const Disturbance& disturbance, const std::function<double(do
 
 /// Effect of a clamp |int e| <= limit on the bounds of the linear loop.
 struct ClampBounds {
-  bool exists = false;  ///< whether there is a clamp, and an integrator that it could limit
+  bool exists = false;  ///< true if there is a clamp, and an integrator that it could limit
   /// Bound on the integrator of the linear loop, m s: the gain from f to int e, plus integral_demand_m_s().
   double demand_m_s = 0;
-  /// Whether the demand is within the limit; the clamp then never acts, and the bounds of the linear loop hold.
+  /// True if the demand is within the limit; the clamp then never acts, and the bounds of the linear loop hold.
   bool never_acts = true;
   /// Bounds that hold whether or not the clamp acts: the integral is a command of at most m Ki limit, which acts like f
   /// on the loop without integral. They are |h'_PD|_1 sup|f| + |c'_PD|_1 m Ki limit, c the command channel, and for

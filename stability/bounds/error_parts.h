@@ -8,7 +8,7 @@
 
 namespace swarmcert::stability {
 
-/// What is known of the error n(t) of an estimate, in m/s for a velocity and m for a position. Infinite: unknown. n is
+/// Known bounds on the error n(t) of an estimate, in m/s for a velocity and m for a position. Infinite: unknown. n is
 /// zero before t = 0 and, except for its constant part, rises from zero at the stated rate. A sampled loop sees n once
 /// per period: `impulse` is then the period times the sum of |n| over its samples.
 struct EstimateError {
@@ -30,7 +30,7 @@ struct EstimateError {
   }
 };
 
-/// How the setpoint p_d moves. The law feeds p_d'' forward; motion that the loop cannot follow at once is an error.
+/// Motion of the setpoint p_d. The law feeds p_d'' forward; motion that the loop cannot follow at once is an error.
 struct ReferenceMotion {
   double steps_m = 0;          ///< sum of the sizes of all jumps of p_d
   double speed_steps_m_s = 0;  ///< of all jumps of p_d', such as the start and the end of a ramp

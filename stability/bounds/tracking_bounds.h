@@ -36,12 +36,12 @@ struct InitialError {
   double learning_error_N = 0;  ///< |force error|, bias included
 };
 
-/// What is known of the disturbances, per axis, and its source.
+/// Known bounds on the disturbances, per axis, and their source.
 struct DisturbanceSource {
   Disturbance axis[3];
   double rate_norm_N_s = std::numeric_limits<double>::infinity();  ///< d_m: sup |eps'| as a vector
   double bias_N[3] = {0, 0, 0};
-  /// Whether amplitude and impulse were measured with the bias included; otherwise the bias adds to every class.
+  /// True if amplitude and impulse were measured with the bias included; otherwise the bias adds to every class.
   bool classes_contain_bias = false;
   EstimateError velocity_error[3];  ///< estimated - true velocity
   EstimateError position_error[3];  ///< estimated - true position
@@ -51,7 +51,7 @@ struct DisturbanceSource {
   double thrust_ratio_error = 0;
   bool declares_velocity_error = false;  ///< velocity_error was declared, not measured
   bool has_estimate_errors() const;
-  /// Whether the amplitude is at least the bias on every axis, as it is if measured with the bias included.
+  /// Returns true if the amplitude is at least the bias on every axis, as it is if measured with the bias included.
   bool amplitudes_reach_bias() const;
   /// Returns all errors on an axis in addition to its class.
   OtherErrors other(int of_axis, const InitialError& initial, const Plant& plant) const;

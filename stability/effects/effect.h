@@ -91,7 +91,7 @@ struct EffectInfo {
 inline constexpr int kMostColumns = 8;
 inline constexpr int kMostShape = 8;
 
-/// What an effect needs to know about its vehicle and the swarm.
+/// The vehicle and the swarm, as far as an effect depends on them.
 struct EffectContext {
   std::string kind;                ///< kind of the vehicle itself
   std::vector<std::string> kinds;  ///< Neighbour::kind is an index into this
@@ -141,8 +141,8 @@ class Effect {
   /// instant by instant.
   virtual void columns_along(const Instant* instants, int count, const double* shape, Wrench* columns) const;
 
-  /// Whether add_force_z() is implemented. The effect's only column must then be a vertical force that depends on
-  /// nothing but pairs of vehicles. This is the fast path for simulated swarms.
+  /// Returns true if add_force_z() is implemented. The effect's only column must then be a vertical force that depends
+  /// on nothing but pairs of vehicles. This is the fast path for simulated swarms.
   virtual bool takes_pairs() const { return false; }
 
   virtual bool pairs_need_velocity(const double* shape) const;

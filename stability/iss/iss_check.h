@@ -77,10 +77,10 @@ struct IssCheck {
   bool unstable = false;  ///< the linear loop has no decaying response
   bool cancelled = false;
 
-  /// Whether the ball is refuted: some run exceeds a bound of the theorem although every hypothesis holds, those on the
-  /// gains and, up to that time, those on the flight.
+  /// Returns true if the ball is refuted: some run exceeds a bound of the theorem although every hypothesis holds,
+  /// those on the gains and, up to that time, those on the flight.
   bool is_refuted() const { return theorem_applies && violations > 0; }
-  /// The reasons why the campaign is inconclusive although it does not refute the ball; empty: it found no violation.
+  /// Returns the reasons why a campaign that does not refute the ball is inconclusive; empty: it found no violation.
   std::vector<std::string> why_inconclusive() const;
 };
 

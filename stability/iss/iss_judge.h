@@ -42,7 +42,7 @@ class IssJudge {
   void integrate(IssRun* run) const;
   /// The arguments of the transient bound: |p~|, |p~'|, |s'| at t = 0, and d_m; s'(0) contains the learning error.
   std::array<double, 4> start_sizes(const IssRun& run, const PositionLoop::State& state) const;
-  /// Accounts for one sample of |p~|; returns false if the run exceeds all bounds so far that it need not continue.
+  /// Accounts for one sample of |p~|; returns false if the run has diverged (|p~| >= 1e6 balls) and need not continue.
   bool weigh(double error_m, int k, bool from_rest, const std::array<double, 4>& sizes, IssRun* run) const;
 
   PositionLoop loop_;

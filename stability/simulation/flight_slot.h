@@ -22,7 +22,7 @@ struct Answer {
   controller::RotorForces<Scalar> forces{};
 };
 
-/// What flight_step() reads and writes for one vehicle, or for the lanes of several.
+/// The data that flight_step() reads and writes for one vehicle, or for the lanes of several.
 template <typename Scalar>
 struct Slot {
   controller::FlightMemory<Scalar> memory;

@@ -165,8 +165,8 @@ const char* name(TuneObjective objective) {
 
 namespace {
 
-/// Whether some oscillation keeps more than half of its amplitude over 10 cycles. Such a loop is no candidate, and its
-/// norms are expensive.
+/// Returns true if some oscillation keeps more than half of its amplitude over 10 cycles. Such a loop is no candidate,
+/// and its norms are expensive.
 bool rings(const AxisLoop& loop) {
   const TransferFunction y = impulse_transfer(loop, Channel::kForce);
   for (const std::complex<double>& pole : poles(sum(y.denominator, y.feedback))) {

@@ -35,7 +35,7 @@ class Task {
   /// Returns an enclosure of at(), and of the derivative of its acceleration, over [from_s, to_s]. The acceleration
   /// must be continuous there. Returns nothing if the task has no enclosure.
   virtual std::optional<SetpointRange> over(int vehicle, double from_s, double to_s) const;
-  /// Whether vehicles start on the ground, below their first setpoint.
+  /// Returns true if vehicles start on the ground, below their first setpoint.
   virtual bool starts_on_ground() const { return false; }
 };
 

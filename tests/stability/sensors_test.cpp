@@ -58,7 +58,7 @@ TEST(Sensors, MilliTruncatesTowardsZeroAndWrapsAsFirmwareDoes) {
   EXPECT_EQ(milli(32.768), -32768);
 }
 
-/// What vehicle 0 knows of vehicle 1, which moves at 0.5 m/s along x, after a second of broadcasts every 10 ms.
+/// Vehicle 0's knowledge of vehicle 1, which moves at 0.5 m/s along x, after a second of broadcasts every 10 ms.
 struct Known {
   double x_m = 0, velocity_m_s = 0, weight = 0;
 };

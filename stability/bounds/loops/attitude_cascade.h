@@ -55,7 +55,7 @@ struct CascadeMargins {
   double gain = 0;      ///< factor by which `ratio` can grow; infinite if none destabilises the loop
   double low_gain = 0;  ///< factor to which `ratio` can shrink; 0: any
   double delay_s = 0;   ///< tolerated between the state and the motors, in addition to lag_s
-  /// Of the least damped pair of poles: -Re/|s|, and |s| in rad/s. 1 and 0 if no pole oscillates.
+  /// The damping ratio -Re/|s| and |s| in rad/s of the least damped pair of poles; 1 and 0 if no pole oscillates.
   double damping = 0, frequency_rad_s = 0;
 };
 CascadeMargins cascade_margins(const Cascade& loop);

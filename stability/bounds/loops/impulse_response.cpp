@@ -38,7 +38,7 @@ Polynomial squared_modulus(const Polynomial& p) {
   return result;
 }
 
-/// Whether all zeros have negative real parts: the first column of the Routh array has constant sign.
+/// Returns true if all zeros have negative real parts: the first column of the Routh array has constant sign.
 bool all_left(const Polynomial& denominator) {
   std::vector<double> upper;  // descending powers, every second one
   std::vector<double> lower;

@@ -44,8 +44,8 @@ std::vector<double> sampled_response(const TransferFunction& y, double step_s, i
 /// Returns the poles, the zeros of the denominator, for a system without a delay.
 std::vector<std::complex<double>> poles(const Polynomial& denominator);
 
-/// Whether all zeros of denominator + feedback exp(-delay s) have negative real parts. With a delay: whether the loop
-/// without delay is stable and the delay is below delay_margin().
+/// Returns true if all zeros of denominator + feedback exp(-delay s) have negative real parts. With a delay: if the
+/// loop without delay is stable and the delay is below delay_margin().
 bool is_stable(const TransferFunction& y);
 
 /// Returns the largest T such that denominator + feedback exp(-s t) has all zeros in the open left half-plane for every

@@ -160,8 +160,8 @@ class Scan {
     return four[1];
   }
 
-  /// Whether only one real pole is left: the response and its derivatives then have no more zeros, and further sampling
-  /// would only find zeros due to round-off.
+  /// Returns true if only one real pole is left: the response and its derivatives then have no more zeros, and further
+  /// sampling would only find zeros due to round-off.
   bool is_lone_decay(double t) const {
     int left = 0;
     for (const std::complex<double>& pole : chain_.sorted_poles()) {

@@ -22,8 +22,8 @@ class SampledAdjoint {
 
   explicit SampledAdjoint(const SampledLoop& loop, Output output = Output::kError);
 
-  /// Whether the loop is stable and its slowest oscillation decays within kMostPeriods. If not, there are no kernels,
-  /// and all gains are infinite.
+  /// Returns true if the loop is stable and its slowest oscillation decays within kMostPeriods. Otherwise there are no
+  /// kernels, and all gains are infinite.
   bool is_stable() const { return is_stable_; }
   double period_s() const { return period_s_; }
   const SampledModel& model() const { return model_; }

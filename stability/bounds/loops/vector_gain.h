@@ -14,7 +14,7 @@ struct VectorGain {
   double lower = 0;                   ///< error attained by replaying the worst input
   double upper = 0;                   ///< no admissible input exceeds it
   std::array<double, 3> direction{};  ///< eta of the worst input, a unit vector
-  /// Whether upper - lower < 1e-6, in which case the gain is called exact.
+  /// Returns true if upper - lower < 1e-6; the gain is then called exact.
   bool is_exact() const { return upper - lower < 1e-6; }
 };
 

@@ -18,8 +18,8 @@ class ZeroScan {
   /// @param integral_at_start Y at its start.
   void add(const Polynomial& piece, double length, double integral_at_start);
 
-  /// Whether y or one of its first three derivatives (the four values at either end of a segment) changes its sign. A
-  /// segment without a sign change needs no piece.
+  /// Returns true if y or one of its first three derivatives (the four values at either end of a segment) changes its
+  /// sign. A segment without a sign change needs no piece.
   static bool has_event(const double* at_start, const double* at_end);
 
   /// @param final_integral Y(oo); y and its derivatives vanish there.

@@ -11,7 +11,7 @@ namespace swarmcert::stability {
 
 /// Instances of the class |eps_on'| <= Lp |v_rel| + Lv |a_rel|: eps_on = sign (Lp (e_on - e_by) + Lv (e_on' - e_by')).
 struct UnstableSwarm {
-  /// Whether every coupling's direction was stated; this is then the swarm as declared, else one of its class.
+  /// True if every coupling's direction was stated; this is then the swarm as declared, else one of its class.
   bool is_declared = false;
   std::vector<int> sign;     ///< of each coupling: +1 pushes the vehicles apart
   double growth_1_s = 0;     ///< largest real part of an eigenvalue of the swarm under these forces

@@ -28,7 +28,7 @@ struct UncertainEffort {
 /// One gain: attains `lower` at some point of the box; never exceeds `upper` in the box.
 struct UncertainGain {
   double lower = 0, upper = 0;
-  double mass_kg = 0, thrust_scale = 0, lag_s = 0, delay_s = 0;  ///< where it attains `lower`
+  double mass_kg = 0, thrust_scale = 0, lag_s = 0, delay_s = 0;  ///< point that attains `lower`
 };
 
 struct UncertainNorms {

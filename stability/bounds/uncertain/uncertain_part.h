@@ -18,8 +18,8 @@ using FourGains = std::array<double, 4>;  ///< rate, amplitude, edge, impulse
 /// Thrust-to-mass ratio relative to the one the controller assumes, lag, delay.
 using PlantPoint = std::array<double, 3>;
 
-/// The edge of the mass-thrust range. On kLeastMass a gain per force is that for 1 kg divided by the mass; on
-/// kLeastThrust it is that for 1 kg times the ratio, divided by the force that the ratio refers to.
+/// The edge of the mass-thrust range on which a box lies. A gain per unit of force is the gain for 1 kg times 1 / mass
+/// on kLeastMass, or times ratio / (thrust scale * commanded mass) on kLeastThrust.
 enum class PlantEdge { kLeastMass, kLeastThrust };
 
 struct PlantBox {
