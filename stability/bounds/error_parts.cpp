@@ -20,8 +20,8 @@ double part(double size, const Gain& gain) {
   return size == 0 ? 0 : std::abs(size) * gain();
 }
 
-/// The largest response of `output`, a row over the state after the control, to e = 1 or e' = 1 before the control at t
-/// = 0.
+/// The largest response of `output`, a row over the state after the control, to e = 1 or e' = 1 before the control at
+/// t = 0.
 struct InitialResponse {
   double to_position = 0, to_velocity = 0;
 };

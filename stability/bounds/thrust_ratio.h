@@ -16,8 +16,9 @@ namespace swarmcert::stability {
 /// over that interval (uncertain_norms.h). Several passes are treated as independent single passes; for amplitude and
 /// rate together the smaller of the two bounds is used.
 ///
-/// Effect on everything else: d w0 is a constant force. d u is treated as a force on the loop of the model: with U =
-/// sup |u| in that loop and E the gain from a force to u, |d u| <= R U / (1 - R E) (small gain), infinite if R E >= 1.
+/// Effect on everything else: d w0 is a constant force. d u is treated as a force on the loop of the model: with
+/// U = sup |u| in that loop and E the gain from a force to u, |d u| <= R U / (1 - R E) (small gain), infinite if
+/// R E >= 1.
 ///
 /// The feedforward of a network is also scaled by the ratio; d f_hat belongs to f.
 struct ThrustRatioGains {

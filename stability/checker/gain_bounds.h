@@ -43,8 +43,8 @@ std::size_t order(const LoopWitness& loop);
 /// Let x = (y, y', ...) / powers of the time unit, y the response to an impulse; x' = A x, A the companion matrix,
 /// exact. P > 0 and A'P + PA + 2 decay P < 0 are verified by exact elimination. The state is propagated from cell to
 /// cell by the Taylor sum of exp(A cell) to order 24 in integers over 2^128; its errors never grow in the norm of P,
-/// and are summed. Within a cell |f| <= the line through |f| at both ends + cell^2/8 sup|f''|. After the last cell, |r
-/// x| <= sqrt(r P^-1 r') |x|_P, which decays.
+/// and are summed. Within a cell |f| <= the line through |f| at both ends + cell^2/8 sup|f''|. After the last cell,
+/// |r x| <= sqrt(r P^-1 r') |x|_P, which decays.
 ///
 /// A delay T is expanded: A is the companion matrix of D0 = open + feedback R, with R the Taylor polynomial of e^(-Ts)
 /// of degree k = delay_order. The remainder, (-s)^(k+1) times a kernel of one sign and of integral T^(k+1)/(k+1)!, maps

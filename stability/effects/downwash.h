@@ -6,8 +6,8 @@
 /// horizontal distance from the neighbour's wake: the wake of a moving vehicle lags behind it by k dz v_j. Below 0.12 m
 /// dz is replaced by 0.12 m, and u fades the force out from there to 0.05 m, where vehicles touch. The total is
 ///   f_z = -A (sum_j g_j^p)^(1/p).
-/// The defaults are a fit to two-vehicle flights of small Crazyflies with 0.15 <= dz <= 0.75 m, residual 1.1 gf rms. p
-/// = 1 is a plain sum, p = 2 adds momentum flux; flights of three vehicles gave 1.85, tracking errors of up to five
+/// The defaults are a fit to two-vehicle flights of small Crazyflies with 0.15 <= dz <= 0.75 m, residual 1.1 gf rms.
+/// p = 1 is a plain sum, p = 2 adds momentum flux; flights of three vehicles gave 1.85, tracking errors of up to five
 /// vehicles 1.2 .. 1.3.
 #pragma once
 

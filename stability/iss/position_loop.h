@@ -28,8 +28,8 @@ class PositionLoop {
   /// Returns the initial state with these errors: integral 0, forces that balance the weight.
   State start(const Eigen::Vector3d& position_m, const Eigen::Vector3d& velocity_m_s) const;
 
-  /// Returns the loop's matrix about rest, without clamp and limit: d state = A state + B eps; eps enters v as -eps /
-  /// m.
+  /// Returns the loop's matrix about rest, without clamp and limit: d state = A state + B eps; eps enters v as
+  /// -eps / m.
   Eigen::Matrix<double, kSize, kSize> matrix() const;
 
   double mass_kg() const { return mass_kg_; }

@@ -178,8 +178,8 @@ TEST(SmallGain, WhatItDoesNotProveCanBeRefutedBySimulation) {
   EXPECT_LT(pair_error(0.145, 10, 5, 2, 60), 1e-5);  // not proved by small gain, but stable
 }
 
-/// Routh's criterion: the relative mode of two vehicles is unstable above m (Kp - Ki/Kd)/2 = 0.136 N/m or m (Kd -
-/// Ki/Kp)/2 = 0.068 N s/m.
+/// Routh's criterion: the relative mode of two vehicles is unstable above m (Kp - Ki/Kd)/2 = 0.136 N/m or
+/// m (Kd - Ki/Kp)/2 = 0.068 N s/m.
 TEST(SmallGain, AnUnstableInstanceIsFoundExactlyAboveRouthsLimits) {
   const AxisLoop z = {0.034, 10, 5, 10, {}, 0};
   const auto pair = [](double Lp, double Lv) {
@@ -194,8 +194,8 @@ TEST(SmallGain, AnUnstableInstanceIsFoundExactlyAboveRouthsLimits) {
     EXPECT_FALSE(found->is_declared);
     EXPECT_GE(found->largest_error, 1000);
   }
-  // One-way forces close no loop through the other vehicle, but change the vehicle's own stiffness to Kp - Lp/m or Kp +
-  // Lp/m.
+  // One-way forces close no loop through the other vehicle, but change the vehicle's own stiffness to Kp - Lp/m or
+  // Kp + Lp/m.
   EXPECT_FALSE(find_unstable_swarm(z, 2, {{0, 1, 0.145, 0, 0.1, 0, 0}}));
   EXPECT_TRUE(find_unstable_swarm(z, 2, {{0, 1, 0.034 * 8 * 1.05, 0, 0.1, 0, 0}}));
   EXPECT_TRUE(find_unstable_swarm({0.034, 10, 5, 10, {1 / 17.4}, 0}, 2, pair(0.14, 0)));

@@ -48,8 +48,8 @@ double proved_rate(const IntervalMatrix& A, std::size_t n, double alpha) {
   return 0;
 }
 
-/// The companion matrix in time units of 2^-exponent s, a power of two, so that the scaling is exact: x_k = y^(k) /
-/// 2^(k exponent).
+/// The companion matrix in time units of 2^-exponent s, a power of two, so that the scaling is exact:
+/// x_k = y^(k) / 2^(k exponent).
 struct Companion {
   int exponent = 0;
   std::vector<Interval> a;  ///< the denominator, monic and scaled

@@ -19,9 +19,9 @@ struct ContractingSystem {
 };
 
 /// Changes the companion form to coordinates R x, with R'R the solution of a Lyapunov equation. The symmetric part of
-/// the system matrix in these coordinates is verified to lie below -alpha I (interval Cholesky), so |exp(A t)|_2 <=
-/// e^(-alpha t). Valid for every transfer function with coefficients in the given intervals. Returns nothing if
-/// stability could not be verified.
+/// the system matrix in these coordinates is verified to lie below -alpha I (interval Cholesky), so
+/// |exp(A t)|_2 <= e^(-alpha t). Valid for every transfer function with coefficients in the given intervals. Returns
+/// nothing if stability could not be verified.
 /// @param numerator   in ascending powers, of lower degree than the denominator.
 /// @param denominator in ascending powers; the leading coefficient does not contain zero.
 std::optional<ContractingSystem> contracting(const IntervalVector& numerator,

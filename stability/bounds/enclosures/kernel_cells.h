@@ -24,8 +24,8 @@ struct KernelCells {
 };
 
 /// Computes the bounds in steps of a millisecond or less, in coordinates in which the system contracts
-/// (contracting_system.h), so that errors of the computed state never grow. Within a step |y| <= max of both ends +
-/// step^2/8 sup|y''|.
+/// (contracting_system.h), so that errors of the computed state never grow. Within a step |y| <= max of both
+/// ends + step^2/8 sup|y''|.
 /// @param y without a delay, strictly proper.
 /// @returns nothing if stability could not be verified.
 std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s, int count);

@@ -16,8 +16,8 @@ struct VerifiedSampledNorms {
 /// stability could not be verified.
 ///
 /// The kernel is a row over the states, propagated from period to period by a matrix that contracts in the coordinates
-/// of contracting_sampled_system.h, so errors of the computed row never grow; the sums and the tail follow from (I -
-/// A)^-1, enclosed by its residual. The kernel is a polynomial on each period; runs of one sign are summed by the
+/// of contracting_sampled_system.h, so errors of the computed row never grow; the sums and the tail follow from
+/// (I - A)^-1, enclosed by its residual. The kernel is a polynomial on each period; runs of one sign are summed by the
 /// difference of an antiderivative between their ends. Between samples, with e_i the errors at quarters of a period,
 /// |e| <= max |e_i| + (period/4)^2/8 sup|e''|: since e'' is a convex combination of commands and lag outputs, plus the
 /// disturbance, its gain is that of the largest of them.

@@ -22,9 +22,9 @@ struct VectorGain {
 /// admissible, and its response is the sum of |C'eta|. Upper bound: the trapezoidal sum of |H'eta| plus its remainder,
 /// made uniform in eta by
 ///  - concavity: sqrt(x) <= (x/w + w)/2 with w = |H'eta*| gives J(eta) <= (int w + eta' (int H H'/w) eta)/2 for every
-///  eta, an eigenvalue problem; this closes the gap whenever Lambda and K commute;
+///    eta, an eigenvalue problem; this closes the gap whenever Lambda and K commute;
 ///  - covering the sphere by triangles, refined where the bound is largest: J is convex and homogeneous, so on the cone
-///  of a triangle it lies below the linear function through its corners.
+///    of a triangle it lies below the linear function through its corners.
 /// Valid up to the round-off error of evaluating the response (1e-12 relative).
 /// @param Lambda, K symmetric positive definite.
 VectorGain vector_peak_gain(const Matrix3& Lambda, const Matrix3& K, double mass_kg);

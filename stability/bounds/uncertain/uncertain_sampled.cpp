@@ -21,8 +21,8 @@
 // M f and N A c are the accelerations in response to the class; (s x) of them is x times their slope, with |x|_1 = 1,
 // |s x|_1 = 2/tau; E s is V_e, N (s x) <= 2/tau + V_a. For ramps only N f = n is bounded: E M M f = E M n - E n + E f,
 // E N M f = E M n. For a short command error c: E s s A c is (E s A' c - E s A c)/tau, each below
-// sup |kernel(v + h) - kernel(v)|/h. Between samples |e| exceeds the larger of its neighbours by at most h^2/8 sup|a +
-// f|.
+// sup |kernel(v + h) - kernel(v)|/h. Between samples |e| exceeds the larger of its neighbours by at most
+// h^2/8 sup|a + f|.
 #include <optional>
 #include <utility>
 #include <vector>
