@@ -16,8 +16,8 @@ namespace swarmcert::stability {
 struct Disturbance {
   double rate_N_s = std::numeric_limits<double>::infinity();     ///< sup |f'|
   double amplitude_N = std::numeric_limits<double>::infinity();  ///< sup |f|
-  double variation_N =
-      std::numeric_limits<double>::infinity();  ///< total variation of f, rise from zero included
+  /// Total variation of f, rise from zero included.
+  double variation_N = std::numeric_limits<double>::infinity();
   double impulse_N_s = std::numeric_limits<double>::infinity();  ///< int |f| dt, of one pass
   int passes = 1;                                                ///< number of such passes
   double pass_period_s = 0;  ///< least time from the start of one pass to the start of the next

@@ -18,8 +18,8 @@ struct EstimateError {
   double impulse = std::numeric_limits<double>::infinity();    ///< int |n| dt
   /// A part that acts from t = 0 on; included in amplitude and impulse, but not in rate and variation.
   double constant = 0;
-  double window_s =
-      0;  ///< variation and impulse are those of any window of this length; 0: of the whole flight
+  /// Variation and impulse are those of any window of this length; 0: of the whole flight.
+  double window_s = 0;
 
   bool is_zero() const;
   /// Returns the smallest bound on |n| that follows.
@@ -49,8 +49,8 @@ struct OtherErrors {
   EstimateError velocity_error{};  ///< estimated - true velocity
   EstimateError position_error{};  ///< estimated - true position
   ReferenceMotion reference{};
-  double thrust_ratio_error =
-      0;               ///< |d|: the actual force is (1 + d) times that of the model (thrust_ratio.h)
+  /// |d|: the actual force is (1 + d) times that of the model (thrust_ratio.h).
+  double thrust_ratio_error = 0;
   double hover_N = 0;  ///< the force commanded at hover along this axis, also scaled by d
 
   /// Returns the size of the force error's step at t = 0.

@@ -4,7 +4,7 @@
 ///   limsup |e| <= d_m / (lambda_min(Lambda)^2 lambda_min(K)).
 /// It is a limsup, not a limit. Proof: V = m |s'|^2 / 2 gives |s'(t)| <= e^(-at)|s'(0)| + d_m (1 - e^(-at)) / k with
 /// k = lambda_min(K), a = k/m; two convolutions with exp(-Lambda t), of norm e^(-lt) for symmetric Lambda, give the
-/// rest. Lambda and K need not commute. A non-symmetric Lambda breaks it.
+/// rest. Lambda and K need not commute. The bound can fail for a non-symmetric Lambda.
 #pragma once
 
 #include <optional>
@@ -38,7 +38,7 @@ std::optional<controller::AxisPid<double>> axis_gains(const Gains& gains, double
 
 /// The closed-form transient bound, valid for all t >= 0:
 ///   |e(t)| <= (1 + lt) e^(-lt) |e(0)| + t e^(-lt) |e'(0)| + m h(t) |s'(0)| + d_m int_0^t h.
-/// s'(0) = e''(0) + 2 Lambda e'(0) + Lambda^2 e(0), and e''(0) contains the initial learning error over the mass.
+/// s'(0) = e''(0) + 2 Lambda e'(0) + Lambda^2 e(0), and e''(0) contains the initial learning error divided by the mass.
 struct Transient {
   double l = 0;  ///< lambda_min(Lambda), 1/s
   double k = 0;  ///< lambda_min(K), kg/s

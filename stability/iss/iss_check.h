@@ -37,8 +37,8 @@ struct IssRun {
                   velocity_m_s = Eigen::Vector3d::Zero();  ///< errors at t = 0
   RateDisturbance disturbance;
   double ratio = 0;  ///< largest |p~| / ball; only for runs that start at rest without bias
-  double transient_ratio =
-      0;  ///< largest |p~(t)| / transient bound(t), where that is more than a thousandth of the ball
+  /// Largest |p~(t)| / transient bound(t), where that is more than a thousandth of the ball.
+  double transient_ratio = 0;
   double largest_m = 0, at_s = 0;
   bool is_violation = false;  ///< one of the ratios is above 1
   /// The hypothesis that the run violated, in words, and when. The run is not judged from then on. Empty: satisfied

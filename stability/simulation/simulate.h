@@ -28,8 +28,8 @@ struct SimulatedVehicle {
 struct Simulation {
   std::vector<SimulatedVehicle> vehicles;
   std::vector<std::vector<LogRecord>> logs;  ///< by vehicle; empty unless requested
-  std::vector<std::vector<std::array<float, 7>>>
-      errors;             ///< by vehicle, every position period: t, p - p_d, p_d
+  /// By vehicle, every position period: t, p - p_d, p_d.
+  std::vector<std::vector<std::array<float, 7>>> errors;
   bool diverged = false;  ///< a state became infinite or exceeded 100 m; ends the flight
   double end_s = 0;
 };

@@ -15,8 +15,8 @@ namespace swarmcert::stability {
 struct TuneConstraints {
   double most_noise_m_s2 = 0;    ///< of the command, for 1 mm and 0.05 m/s of sensor noise
   double least_lag_limit_s = 0;  ///< additional first-order lag that the loop must tolerate
-  double most_rate =
-      0;  ///< m per N/s; 0: no such constraint. As the rate gain is at least 1/(m Ki), it keeps Ki up
+  /// m per N/s; 0: no such constraint. It enforces a minimum Ki, as the rate gain is at least 1/(m Ki).
+  double most_rate = 0;
   double most_effort = 0;  ///< N/N; 0: no such constraint
 };
 

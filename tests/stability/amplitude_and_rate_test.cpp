@@ -21,8 +21,8 @@ StepResponse response() {
   StepResponse h;
   h.value = sampled_response({{1, -2}, {6, 11, 6, 1}}, kNodeStep_s, kNumNodes);
   h.length.assign(h.value.size() - 1, kNodeStep_s);
-  const double largest_bend =
-      1.5 + 5 * 4 + 3.5 * 9;  // |y''|; y less its chord integrates to at most step^3 / 12 of it
+  // |y''|; y less its chord integrates to at most step^3 / 12 of it.
+  const double largest_bend = 1.5 + 5 * 4 + 3.5 * 9;
   h.bend.assign(h.length.size(), largest_bend * kNodeStep_s * kNodeStep_s * kNodeStep_s / 12);
   h.after = std::abs(h.value.back());  // of exp(-t), which dominates there
   h.falls_after = true;

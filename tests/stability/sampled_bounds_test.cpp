@@ -88,8 +88,8 @@ TEST(SampledBounds, NoRandomForceOfBoundedAmplitudeAndRateExceedsTheirBoundAndAB
       }
       return force;
     };
-    const double slack =
-        bounds.by_amplitude / E * step;  // a staircase differs from its ramp by at most a step
+    // A staircase differs from its ramp by at most a step.
+    const double slack = bounds.by_amplitude / E * step;
     for (int run = 0; run < 300; ++run) {
       const double reached = fly(loop, limited(random_levels(random, count, run % 2 == 0))).error_m;
       ASSERT_LE(reached, bounds.by_both + slack);

@@ -253,8 +253,8 @@ std::optional<VerifiedNorms> norms_by_steps(const TransferFunction& y, bool inte
   // Bounds the error of numerator z^(shift).
   const auto error = [&](const std::vector<double>& size, std::size_t shift) {
     double total = 0;
-    double power =
-        std::ldexp(1.0, std::ilogb(steps.unit_1_s()) * static_cast<int>(shift));  // exact for a power of two
+    // Exact for a power of two.
+    double power = std::ldexp(1.0, std::ilogb(steps.unit_1_s()) * static_cast<int>(shift));
     for (std::size_t k = 0; k < y.numerator.size(); ++k, power *= steps.unit_1_s()) {
       total += std::abs(y.numerator[k]) * power * size[k + shift];
     }

@@ -37,8 +37,8 @@ namespace {
 struct OutputGains {
   GainNorms force, command;
   double variation = 0;  ///< from w, where the force is dw/dt
-  double change_of_pulse =
-      0;             ///< first-order effect of delaying a command pulse of one period and area 1, per second
+  /// First-order effect of delaying a command pulse of one period and area 1, per second.
+  double change_of_pulse = 0;
   GainNorms answer;  ///< from commands, excluding their direct feedthrough
 };
 
