@@ -1,4 +1,5 @@
-/// @file Certification of NET: every layer's spectral norm, every function's Lipschitz constant, from both sides.
+/// @file Certification of NET: upper and lower bounds on every layer's spectral norm and every function's Lipschitz
+/// constant.
 #pragma once
 
 #include <atomic>
@@ -23,13 +24,15 @@
 namespace swarmcert::lipschitz {
 
 enum class UpperMethod {
-  kAuto,     ///< the smallest of the next three; with a box, of activations besides ReLU, of the two after
-  kProduct,  ///< product of the layers' spectral norms
-  kEclipseFast,   ///< layer by layer in closed form; what the semidefinite program starts from
+  /// The smallest bound by kProduct, kEclipseFast and kSdp; on a box, for activations other than ReLU, also by
+  /// kLocalProduct and kLocalSdp.
+  kAuto,
+  kProduct,       ///< product of the layers' spectral norms
+  kEclipseFast,   ///< layer by layer in closed form; the starting point of the semidefinite program
   kSdp,           ///< LipSDP-Neuron
-  kLocalProduct,  ///< the product with the steepest slopes that the activations have on the box
-  kLocalSdp,      ///< LipSDP-Neuron with the slopes that they have on the box
-  kBranch,  ///< branch and bound on the claim's box, or, for all inputs, on a projective cover; kAuto for rho
+  kLocalProduct,  ///< kProduct with the largest slopes of the activations on the box
+  kLocalSdp,      ///< LipSDP-Neuron with the range of slopes of the activations on the box
+  kBranch,  ///< branch and bound on the claim's box, or on a projective cover of all inputs; for rho: as kAuto
 };
 
 struct CertifyOptions : ClaimOptions {
@@ -38,8 +41,8 @@ struct CertifyOptions : ClaimOptions {
   BranchOptions branch;                        ///< per claim; `known` and `cancelled` are taken from here
   LowerBoundOptions lower;                     ///< its `cancelled` is taken from here below
   int jobs = 0;  ///< threads; 0: all. Results do not depend on it, unless `seconds` is set.
-  /// Wall clock for all of it, shared out among its parts; 0: no limit. Exceeded by what has to be proved in any case:
-  /// the spectral norms and the layer-wise bounds before, one exact proof per bound after.
+  /// Wall-clock limit for the whole certification, divided among its tasks; 0: no limit. The work that is always done
+  /// may exceed it: the spectral norms and layer-wise bounds at the start, and one exact proof per bound at the end.
   double seconds = 0;
   const std::atomic<bool>* cancelled = nullptr;  ///< ends the searches; upper bounds found so far are kept
   std::function<void(int done, int total, const std::string& what)> progress;  ///< called from any thread
@@ -49,30 +52,30 @@ struct CertifiedLayer {
   files::FunctionId network;  ///< "network", "phi:<kind>" or "rho:<kind>"
   std::string name;           ///< the layer's name in its file
   SpectralNorm norm;
-  /// Whether the layer satisfies what was stated of gamma: proved, refuted, inconclusive; nothing where nothing was, or
-  /// the layer is none of the file.
+  /// Whether the layer satisfies the stated gamma: proved, refuted or inconclusive. Nothing if no gamma was stated or
+  /// the layer is not stored in the file.
   std::optional<Verdict> respects_gamma;
 };
 
 struct CertifiedBound : Claim {
-  bool has_witness = true;  ///< of relative states; otherwise there is no lower bound
-  bool is_relu = true;      ///< and by ReLU alone; otherwise there is no branch and bound
-  bool has_slopes = true;   ///< number by number; otherwise a layer is sorted, and the product is the bound
-  bool has_local_slopes = false;  ///< a box, and an activation besides ReLU: its slopes there may be smaller
-  bool is_monotone = true;        ///< otherwise the layer-wise bound is that of the product
+  bool has_witness = true;  ///< false for functions of invariants, which get no lower bound
+  bool is_relu = true;      ///< all activations are ReLU and `has_witness`; otherwise there is no branch and bound
+  bool has_slopes = true;   ///< all activations act entry by entry; false if a layer is sorted: only the product bound
+  bool has_local_slopes = false;  ///< there is a box and an activation other than ReLU, with possibly smaller slopes
+  bool is_monotone = true;        ///< false: the layer-wise bound is the product of norms
   UpperBound upper{0};
   UpperMethod method = UpperMethod::kProduct;
-  std::optional<UpperProof> proof;  ///< where method is kEclipseFast, kSdp or kLocalSdp
-  std::optional<LocalProof> local;  ///< where method is kBranch
-  int nodes = 0;                    ///< boxes that branch and bound looked at
+  std::optional<UpperProof> proof;  ///< set if method is kEclipseFast, kSdp or kLocalSdp
+  std::optional<LocalProof> local;  ///< set if method is kBranch
+  int nodes = 0;                    ///< boxes examined by branch and bound
   BranchStop branch_stop = BranchStop::kNothingRun;
-  Outlook outlook;        ///< where nodes > 0
+  Outlook outlook;        ///< set if nodes > 0
   UpperBound product{0};  ///< product of spectral norms, for comparison
-  SdpBound sdp;           ///< how the semidefinite program went; its proof is moved to `proof`
+  SdpBound sdp;           ///< outcome of the semidefinite program; its proof is moved to `proof`
   FoundSlope lower;       ///< proves the lower bound
 
-  /// Whether more time might have given a smaller upper or a larger lower bound: a search was stopped by a signal or by
-  /// the time. Both bounds are proved all the same.
+  /// Returns whether more time might have given a smaller upper bound or a larger lower bound, because a signal or the
+  /// time limit stopped a search. Both bounds are proved in either case.
   bool is_interrupted() const {
     const bool above = branch_stop == BranchStop::kNothingRun ? lipschitz::is_interrupted(sdp.stop)
                                                               : lipschitz::is_interrupted(branch_stop);
@@ -81,58 +84,65 @@ struct CertifiedBound : Claim {
 };
 
 struct CertifiedLaw : LawClaim {
-  std::string domain = "global";  ///< "box" where a bound that it rests on holds there only
+  std::string domain = "global";  ///< "box" if any bound it depends on holds on the box only
   UpperBound upper{0};
-  bool interrupted = false;  ///< one of the bounds that it rests on is
+  bool interrupted = false;  ///< the search for one of the bounds it depends on was interrupted
 };
 
 struct Certification {
   std::optional<files::GammaStatement> gamma;
-  bool as_float32 = false;  ///< the network was rounded to float32 before; for the certificate
+  bool as_float32 = false;  ///< the network was rounded to float32 beforehand; for the certificate
   Domain domain;
   std::map<files::FunctionId, files::SampleAgreement>
-      samples;  ///< by part: what it was held against; for the certificate
+      samples;  ///< by part: the samples it was compared with; for the certificate
   std::vector<CertifiedLayer> layers;
   std::vector<CertifiedBound> bounds;
   std::vector<CertifiedLaw> laws;
   std::vector<CertifiedValues> values;  ///< for the certificate; from certified_values()
 };
 
-/// How far from gamma a norm may lie, relatively, to count as equal to it: what float32 storage costs, and a little.
+/// Relative deviation from gamma up to which a norm counts as equal to it: the error of float32 storage with a small
+/// margin.
 inline constexpr double kEqualTolerance = 0x1p-20;
 
-/// Whether the norms of one network's layers satisfy what was stated of gamma, layer by layer. Scope layer: |W|_2 <=
-/// gamma. Scope network, mode clip: the product of the norms is at most gamma; one verdict for all layers. Scope
-/// network, mode equal: each is the equal share, gamma^(1/layers). Mode equal asks for the converse as well, both up to
-/// kEqualTolerance. Decided in exact arithmetic; inconclusive where an enclosure straddles its limit.
+/// Returns for each layer of one network whether the norms satisfy the stated gamma.
+/// Scope layer: |W|_2 <= gamma. Scope network, mode clip: the product of the norms is at most gamma; all layers get the
+/// same verdict. Scope network, mode equal: each norm equals gamma^(1/layers). Mode equal requires the lower bound on
+/// the norm as well as the upper one, both up to kEqualTolerance. Decided in exact arithmetic; inconclusive if the
+/// limit lies inside an enclosure.
 std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const std::vector<Enclosure>& norms);
 
-/// Certifies NET as a whole. Upper bounds hold in exact arithmetic for the weights as stored, over all inputs and so
-/// over every box; lower bounds are slopes between two float32 points, exact or, of smooth activations, rounded down
-/// (checker/witness.h). The clamp of NET, which never increases a distance, leaves the upper bounds valid. Functions
-/// with other activations than ReLU are bounded above by the same matrix inequality where the activation is monotone
-/// (checker/stages.h), else, up to the size that bent_bound.h states, by its extension; on a box also from the slopes
-/// that the activations have there. Set functions of rotation invariants get upper bounds only: those of rho(sum phi)
-/// times the Lipschitz constant of the map to invariants. Where NET is silent in some compositions, bounds hold while
-/// the neighbours stay the same, and lower ones are among neighbours where it is not. Branch and bound is for ReLU. It
-/// runs on what the clamp lets through of the box, or on a projective cover of all inputs where there is no box.
-/// @throws std::invalid_argument if gamma is not positive, if branch and bound is asked for and an activation is not
-///   ReLU, if there is a domain or branch and bound is asked for and NET has invariants, or as claims() and
+/// Certifies all functions of NET.
+///
+/// Upper bounds hold in exact arithmetic for the weights as stored, over all inputs and hence over every box. Lower
+/// bounds are slopes between two float32 points: exact, or rounded down for smooth activations (checker/witness.h). The
+/// input clamp of NET never increases a distance, so upper bounds remain valid with it.
+///
+/// Functions with activations other than ReLU are bounded above by the same matrix inequality if the activation is
+/// monotone (checker/stages.h), otherwise by its extension up to the size stated in bent_bound.h; on a box also by the
+/// slopes of the activations there. Set functions of rotation invariants get upper bounds only: the bound of
+/// rho(sum phi) times the Lipschitz constant of the map to invariants. If NET is silent in some compositions, bounds
+/// hold while the neighbours stay the same, and lower bounds use compositions in which it is not silent.
+///
+/// Branch and bound supports ReLU only. It runs on the image of the box under the clamp, or on a projective cover of
+/// all inputs if there is no box.
+/// @throws std::invalid_argument if gamma is not positive; if branch and bound is requested and an activation is not
+///   ReLU; if NET has invariants and there is a domain or branch and bound is requested; or as claims() and
 ///   law_claims().
 Certification certify(const files::Network& network, const CertifyOptions& options);
 
-/// What the law gives from verified bounds of its terms, rounded up.
-/// @param terms bound of one neighbour and number of such neighbours.
+/// Returns the bound that a law yields from verified bounds of its terms, rounded up.
+/// @param terms pairs of the bound for one neighbour and the number of such neighbours.
 UpperBound law_bound(LawKind law, const std::vector<std::pair<UpperBound, int>>& terms);
 
-/// What a claim and a law say, without proofs: the fields that JSON results and certificates share.
+/// Returns the statement of a claim or a law without its proof: the fields shared by JSON results and certificates.
 files::Json summary(const files::Network& network, const CertifiedBound& bound);
 files::Json summary(const files::Network& network, const CertifiedLaw& law);
 
-/// The certificate of what was found: everything that check::check() needs besides the weights.
+/// Returns the certificate of a certification: everything that check::check() needs besides the weights.
 files::Json certificate(const files::Network& network, const Certification& certification);
 
-/// Whether a search for any of the bounds was.
+/// Returns whether the search for any of the bounds was interrupted.
 bool is_interrupted(const Certification& certification);
 /// "finished" or "interrupted".
 const char* status(bool is_interrupted);
@@ -140,7 +150,7 @@ const char* status(bool is_interrupted);
 /// "auto", "product", "eclipse_fast", "sdp", "local_product", "local_sdp", "branch".
 const char* name(UpperMethod method);
 
-/// Whether bounds by this method hold on the box only, where there is one.
+/// Returns whether bounds by this method hold on the box only, if the claim has one.
 constexpr bool is_local(UpperMethod method) {
   return method == UpperMethod::kBranch || method == UpperMethod::kLocalProduct ||
          method == UpperMethod::kLocalSdp;

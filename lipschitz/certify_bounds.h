@@ -1,4 +1,4 @@
-/// @file The bounds of a certification: what is done for each claim, in which order, within which time.
+/// @file The bounds of a certification: which methods run for each claim, in which order and within which time.
 #pragma once
 
 #include "lipschitz/base/stop.h"
@@ -7,22 +7,25 @@
 
 namespace swarmcert::lipschitz {
 
-/// Pieces of work that find_bounds() gives to its progress.
+/// Returns the number of tasks that find_bounds() reports to its progress.
 int pieces_of_work(const CertifyOptions& options, int bounds);
 
-/// Proves upper bounds for `bounds`, whose `product` is set, and searches for lower ones: first what takes seconds at
-/// any size, eclipse_fast(); then the semidefinite programs, with the slopes on the box where other activations than
-/// ReLU have smaller ones there, and the searches for steep slopes; then, where it is wanted, branch and bound. Every
-/// bound is proved whenever `stop` ends the work; those that it cut short say so.
-/// @param layers of the whole network, with their norms.
+/// Proves upper bounds for `bounds`, whose `product` is set, and searches for lower bounds.
+///
+/// The order is: eclipse_fast(), which takes seconds at any size; then the semidefinite programs, with the slopes on
+/// the box if activations other than ReLU have smaller slopes there, and the searches for lower bounds; then branch and
+/// bound if requested. Every bound is proved no matter when `stop` ends the work; bounds whose search was cut short are
+/// marked as interrupted.
+/// @param layers all layers of the network, with their norms.
 void find_bounds(const files::Network& network, const CertifyOptions& options, const Stop& stop,
                  WorkProgress& progress, const std::vector<CertifiedLayer>& layers,
                  std::vector<CertifiedBound>& bounds);
 
-/// Replaces `bound` by a smaller one for inputs in `box`, by the product of norms and by the matrix inequality, where
-/// the slopes that the activations have there give one. Whether the inequality was proved, smaller or not.
-/// @param box of the moving input, as it leaves the clamp. @param method kProduct: by the product alone.
+/// Replaces `bound` by a smaller bound for inputs in `box` if the slopes of the activations there give one, by the
+/// product of norms or by the matrix inequality.
+/// @param box range of the moving input after the clamp. @param method kProduct: use the product only.
 /// @param options `known` is taken from the bound.
+/// @returns whether the matrix inequality was proved, whether or not its bound is smaller.
 bool bound_by_slopes_on_box(const files::Network& network, const Box& box,
                             const std::vector<CertifiedLayer>& layers, UpperMethod method, SdpOptions options,
                             CertifiedBound& bound);

@@ -8,13 +8,12 @@
 
 namespace swarmcert::lipschitz {
 
-/// {x : lower[k] <= x[k] <= upper[k]}, in the units of the network's inputs. Infinite bounds leave a side
-/// open.
+/// {x : lower[k] <= x[k] <= upper[k]}, in the units of the network's inputs. Bounds may be infinite.
 struct Box {
   std::vector<double> lower, upper;
 };
 
-/// By part of NET, a plain network or a phi: where its inputs lie.
+/// The input box of each part of NET: the plain network or each phi.
 using Domain = std::map<files::FunctionId, Box>;
 
 }  // namespace swarmcert::lipschitz

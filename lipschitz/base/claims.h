@@ -1,4 +1,4 @@
-/// @file What is certified about NET: one claim per function, block of inputs and norm; laws for several neighbours.
+/// @file Claims about NET: one per function, block of inputs and norm; laws for several neighbours.
 #pragma once
 
 #include <map>
@@ -11,35 +11,35 @@
 
 namespace swarmcert::lipschitz {
 
-/// Neighbours by kind.
+/// Number of neighbours of each kind.
 using Neighbours = std::map<std::string, int>;
 
-/// |f(x) - f(y)|_2 <= L |x - y| for all x and y of the domain that differ in `block` only; in a set function for one
-/// neighbour that moves.
+/// |f(x) - f(y)|_2 <= L |x - y| for all x and y of the domain that differ in `block` only; in a set function, x and y
+/// are two positions of one moving neighbour.
 struct Claim {
   files::FunctionId function;     ///< "network", "phi:<kind>", "rho:<kind>" or "set:<phi kind>:<rho kind>"
   std::string block = "all";      ///< see files::block_coordinates()
   std::vector<double> scale;      ///< empty: |x - y|_2; else |x - y|^2 = sum_k ((x_k - y_k) / scale_k)^2
   std::string domain = "global";  ///< or "box"
-  /// Of a set function on a box: there are at most as many neighbours, the moving one included, all in the box. Empty:
-  /// any number, anywhere.
+  /// For a set function on a box: the largest number of neighbours of each kind, including the moving one, all in the
+  /// box. Empty: any number, anywhere.
   Neighbours neighbours = {};
 };
 
-/// How a bound for one neighbour becomes one for several terms of the sum, moved one after the other (triangle
-/// inequality), with K_j the bound of neighbour j, and the ground as one more term where there is one:
+/// How bounds for single neighbours give a bound for several terms of the sum that move: one term after the other, by
+/// the triangle inequality. K_j is the bound of neighbour j; the ground, if present, counts as one more term.
 enum class LawKind {
   kAllStacked,  ///< |df| <= sqrt(sum_j K_j^2) sqrt(sum_j |dx_j|^2): all inputs as one vector
   kAllMax,      ///< |df| <= (sum_j K_j) max_j |dx_j|
-  kOwnState,  ///< |df| <= (sum_j K_j) |dx|: the vehicle's own state moves by dx, so every input moves by as much
+  kOwnState,  ///< |df| <= (sum_j K_j) |dx|: the vehicle's own state moves by dx, so every input moves by dx
 };
 /// "all_stacked", "all_max" or "own_state".
 const char* name(LawKind law);
 
-/// A law for one group of neighbours in front of one rho. Single coordinates have none: those of the ground are others
-/// than those of a neighbour.
+/// A law for one group of neighbours in front of one rho. There are no laws for single coordinates, because the ground
+/// and a neighbour have different coordinates.
 struct LawClaim {
-  std::string rho;  ///< kind
+  std::string rho;  ///< kind of the vehicle
   Neighbours neighbours;
   std::string block = "all";  ///< "all", "position" or "velocity"
   LawKind law = LawKind::kAllStacked;
@@ -47,24 +47,26 @@ struct LawClaim {
 
 /// Which claims to make.
 struct ClaimOptions {
-  /// Besides "all": names of blocks, each for the functions that have it; "every": all blocks of all functions.
+  /// Blocks besides "all", each for the functions that have it; "every": all blocks of all functions.
   std::vector<std::string> blocks;
-  std::vector<double> scale;  ///< not empty: claims in this norm as well, for functions with as many inputs
-  int neighbours = 0;         ///< laws for as many neighbours of each kind; 0: none
-  Neighbours mixture;         ///< laws for this group as well; empty: none
-  bool counted = false;       ///< claims for these numbers of neighbours as well, where there is a domain
-  /// By part ("network", "phi:<kind>"): claims of functions of these inputs hold for them. Empty: all of R^n.
+  std::vector<double> scale;  ///< if not empty: additional claims in this norm, for functions with as many inputs
+  int neighbours = 0;         ///< laws for this many neighbours of each kind; 0: none
+  Neighbours mixture;         ///< laws for this group in addition; empty: none
+  bool counted = false;       ///< additional claims for these numbers of neighbours, if there is a domain
+  /// By part ("network", "phi:<kind>"): the box on which claims about functions of this part's input hold. Empty: all
+  /// of R^n.
   Domain domain;
 };
 
-/// @throws std::invalid_argument if no function has a block of that name or as many inputs as `scale`, a scale is not
-///   positive, or `mixture` names a kind that NET has not.
+/// Returns the claims and the laws to be certified.
+/// @throws std::invalid_argument if no function has a block of that name or as many inputs as `scale` has entries, if
+///   a scale is not positive, or if `mixture` names a kind that NET does not have.
 std::vector<Claim> claims(const files::Network& network, const ClaimOptions& options);
 std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptions& options);
 
-/// Reads a box.toml: `schema = "swarmcert/box/1"`, `lower` and `upper`, one number per input of the plain network or
-/// of the neighbours' phi; a table `ground` with the same keys for the ground's inputs (-z and -v), which otherwise
-/// get the last four intervals.
+/// Reads a box.toml: `schema = "swarmcert/box/1"`, `lower` and `upper` with one number per input of the plain network
+/// or of the neighbours' phi. An optional table `ground` has the same keys for the ground's inputs (-z and -v); without
+/// it, the ground gets the last four intervals.
 /// @throws files::InputError with line, field, value and hint.
 Domain read_domain(const std::string& path, const files::Network& network);
 

@@ -1,4 +1,4 @@
-/// @file Exact numbers rounded to doubles that stay bounds.
+/// @file Directed rounding of exact numbers to doubles.
 #pragma once
 
 #include <optional>
@@ -7,17 +7,18 @@
 
 namespace swarmcert::lipschitz {
 
-/// The smallest double that is at least x; infinite beyond the doubles.
+/// Returns the smallest double that is at least x, or infinity on overflow.
 double rounded_up(const check::Dyadic& x);
-/// The largest double that is at most x; -infinity beyond the doubles.
+/// Returns the largest double that is at most x, or -infinity on overflow.
 double rounded_down(const check::Dyadic& x);
 
-/// The smallest double u >= 0 with u^2 >= square, in exact arithmetic; infinite beyond the doubles.
-/// @param square not negative
+/// Returns the smallest double u >= 0 with u^2 >= square in exact arithmetic, or infinity on overflow.
+/// @param square nonnegative
 double sqrt_up(const check::Dyadic& square);
 
-/// A float32 in [low, high], the nearest to x or one next to it; nothing if the interval holds no float32.
-/// @param x within the range of float32 once it is in [low, high]; low and high not NaN.
+/// Returns the float32 in [low, high] that is nearest to x, or one next to it; nothing if the interval contains no
+/// float32.
+/// @param x must be within the range of float32 after it is clamped to [low, high]; low and high are not NaN.
 std::optional<float> nearest_float(double x, double low, double high);
 
 }  // namespace swarmcert::lipschitz

@@ -1,4 +1,4 @@
-/// @file When work that could go on has to end, and how the time of a command is shared out.
+/// @file Cancellation and time limits, and how the time of a command is divided among tasks.
 #pragma once
 
 #include <algorithm>
@@ -11,16 +11,16 @@
 
 namespace swarmcert::lipschitz {
 
-/// A flag that a signal sets, a time, both or neither. Copies share the flag.
+/// A stop condition: a cancellation flag, a time limit, both or neither. Copies share the flag.
 class Stop {
  public:
   using Clock = std::chrono::steady_clock;
 
-  Stop() = default;  ///< never
-  /// @param flag stays the caller's; null: none.
-  /// @param seconds from now on; 0: no limit.
+  Stop() = default;  ///< Never stops.
+  /// @param flag not owned; null: none.
+  /// @param seconds limit from now on; 0: no limit.
   explicit Stop(const std::atomic<bool>* flag, double seconds = 0) : flag_(flag) {
-    // A limit beyond what the clock can count is none.
+    // Longer limits would overflow the clock and count as no limit.
     constexpr double kLongest_s = 1e8;
     if (seconds > 0 && seconds < kLongest_s)
       at_ =
@@ -32,16 +32,16 @@ class Stop {
   bool now() const { return is_cancelled() || is_out_of_time(); }
   bool has_limit() const { return at_.has_value(); }
 
-  /// Seconds until the limit, 0 once it has passed. Precondition: has_limit().
+  /// Returns the seconds until the limit, or 0 after it has passed. Precondition: has_limit().
   double seconds_left() const {
     return std::max(0.0, std::chrono::duration<double>(*at_ - Clock::now()).count());
   }
-  /// The same flag; the time, where there is a limit, after this share of what is left.
+  /// Returns a stop with the same flag that allows this share of the remaining time, if there is a limit.
   Stop after_share(double share) const {
     return has_limit() ? Stop(flag_, std::max(share * seconds_left(), kLeast_s)) : *this;
   }
 
-  /// What has no time left looks at the clock once and stops.
+  /// Shortest limit that after_share() sets: long enough to look at the clock once.
   static constexpr double kLeast_s = 1e-4;
 
  private:
@@ -49,15 +49,15 @@ class Stop {
   std::optional<Clock::time_point> at_;
 };
 
-/// Shares out the time until a stop among tasks that begin one after the other on several threads: each gets an equal
-/// part of what is left, so that what quick tasks do not need goes to those behind them.
+/// Divides the time until a stop among tasks that begin one after the other on several threads. Each task gets an equal
+/// part of the remaining time, so that later tasks benefit from time that earlier ones did not use.
 class TimeShares {
  public:
   /// @param jobs see files::thread_count().
   TimeShares(Stop whole, int tasks, int jobs)
       : whole_(whole), left_(tasks), threads_(files::thread_count(jobs)) {}
 
-  /// The stop of the task that begins now.
+  /// Returns the stop for the task that begins now.
   Stop next() {
     const std::lock_guard<std::mutex> lock(mutex_);
     const int tasks = std::max(left_--, 1);

@@ -1,4 +1,4 @@
-/// @file What is being worked on, on several threads, in words.
+/// @file Progress of tasks that run on several threads.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace swarmcert::lipschitz {
 
-/// Counts pieces of work and names the one that has been running for the longest.
+/// Counts finished tasks and reports the name of the task that has been running longest.
 class WorkProgress {
  public:
   using Show = std::function<void(int done, int total, const std::string& what)>;
@@ -17,7 +17,7 @@ class WorkProgress {
   /// @param show called from any thread, one at a time; empty: nothing is shown.
   WorkProgress(int total, Show show) : total_(total), show_(std::move(show)) {}
 
-  /// Runs `work`, which is called `what`.
+  /// Runs `work` under the name `what`.
   template <class Work>
   void run(const std::string& what, const Work& work) {
     change([&] { running_.push_back(what); });
