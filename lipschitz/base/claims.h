@@ -31,7 +31,7 @@ struct Claim {
 enum class LawKind {
   kAllStacked,  ///< |df| <= sqrt(sum_j K_j^2) sqrt(sum_j |dx_j|^2): all inputs as one vector
   kAllMax,      ///< |df| <= (sum_j K_j) max_j |dx_j|
-  kOwnState,  ///< |df| <= (sum_j K_j) |dx|: the vehicle's own state moves by dx, so every input moves by dx
+  kOwnState,    ///< |df| <= (sum_j K_j) |dx|: the vehicle's own state and hence every input moves by dx
 };
 /// "all_stacked", "all_max" or "own_state".
 const char* name(LawKind law);
@@ -49,7 +49,7 @@ struct LawClaim {
 struct ClaimOptions {
   /// Blocks besides "all", each for the functions that have it; "every": all blocks of all functions.
   std::vector<std::string> blocks;
-  std::vector<double> scale;  ///< if not empty: additional claims in this norm, for functions with as many inputs
+  std::vector<double> scale;  ///< if not empty: more claims in this norm, for functions with as many inputs
   int neighbours = 0;         ///< laws for this many neighbours of each kind; 0: none
   Neighbours mixture;         ///< laws for this group in addition; empty: none
   bool counted = false;       ///< additional claims for these numbers of neighbours, if there is a domain

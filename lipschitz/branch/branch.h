@@ -1,4 +1,4 @@
-/// @file Branch and bound for the Lipschitz constant on a box: halve the box where that decides neurons.
+/// @file Branch and bound for the Lipschitz constant on a box: halves boxes to decide the states of neurons.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,97 +11,96 @@
 
 namespace swarmcert::lipschitz {
 
-/// A bisection of the boxes with a proof per part, in preorder, box after box: a split is followed by its lower, then
-/// its upper half.
+/// A bisection of the boxes with one proof per part. The trees of the boxes follow each other in preorder: a split is
+/// followed by its lower half, then by its upper half.
 struct BranchTree {
   static constexpr int kLeaf = -1;
   struct Node {
     int split = kLeaf;    ///< coordinate that is halved, or kLeaf
-    int multipliers = 0;  ///< of a leaf: index into `multipliers`
-    int form = kNone;  ///< of set functions: index into `forms`, the form that holds from here down; or kNone
-    bool bounds_rho = false;  ///< rho's neurons are bounded here; always where there is a form
+    int multipliers = 0;  ///< for a leaf: index into `multipliers`
+    int form = kNone;  ///< for set functions: index into `forms` of the form valid in this subtree, or kNone
+    bool bounds_rho = false;  ///< rho's neurons are bounded at this node; always true if there is a form
     std::vector<check::Decision>
-        decided;  ///< neurons that better lower slopes decide here, in the order of TreeProof
+        decided;  ///< neurons decided here by better lower slopes, in the order of TreeProof
   };
   static constexpr int kNone = -1;
   std::vector<Node> nodes;
-  std::vector<std::vector<double>> multipliers;  ///< one per hidden neuron of the network, in its own units
-  std::vector<std::vector<check::Conflict>> conflicts;  ///< that go with each of them; or none at all
-  std::vector<check::Form> forms;                       ///< of rho
+  std::vector<std::vector<double>> multipliers;  ///< each: one per hidden neuron, in the network's units
+  std::vector<std::vector<check::Conflict>> conflicts;  ///< one list per entry of `multipliers`; or empty
+  std::vector<check::Form> forms;                       ///< quadratic forms that bound rho
   double rho = 0;                                       ///< claimed bound on the squared Lipschitz constant
 };
 
 struct BranchOptions {
-  int nodes = 20000;        ///< boxes to look at
-  double seconds = 0;       ///< wall clock; the search stops at the next node; 0: no limit
-  double known = 0;         ///< a Lipschitz constant that is attained: no need to go below
-  double tolerance = 1e-3;  ///< stop when the bound is within this of `known`, relatively
-  /// Conflict cuts: pairs of neurons that a box keeps from being in some states at once, at most so many per box. Fewer
-  /// boxes and a shorter proof for the same bound, but more time.
+  int nodes = 20000;        ///< number of boxes to examine
+  double seconds = 0;       ///< wall-clock limit; the search stops at the next node; 0: no limit
+  double known = 0;         ///< a lower bound on the Lipschitz constant: no need to go below
+  double tolerance = 1e-3;  ///< stop when the relative distance of the bound to `known` is at most this
+  /// Largest number of conflict cuts per box. A conflict cut is a pair of neurons that cannot be in given states at
+  /// once anywhere in the box. Cuts give fewer boxes and a shorter proof for the same bound, but take more time.
   int pairs = 0;
-  /// Better lower slopes for neurons that are nearly decided (Reach): fewer boxes, shorter proofs that are checked
-  /// sooner, in about the time that a search takes without; for a stated number of neighbours in less.
+  /// Uses better lower slopes for neurons that are nearly decided (Reach). This gives fewer boxes and shorter proofs
+  /// that are checked faster, in about the same search time; for a stated number of neighbours in less time.
   bool better_slopes = true;
-  /// Multipliers to start from, one per hidden neuron of the network, in its own units: those of a bound that holds
-  /// everywhere. Empty: none.
+  /// Initial multipliers, one per hidden neuron of the network, in its own units, taken from a global bound. Empty:
+  /// none.
   std::vector<double> start;
-  /// For one of many searches: it spends its time on boxes alone. The parts that dominate in the end are not solved
-  /// better, and there is no outlook.
+  /// Spends all time on boxes, for callers that run many searches: the parts that dominate at the end are not solved
+  /// more accurately, and no outlook is computed.
   bool boxes_only = false;
   const std::atomic<bool>* cancelled = nullptr;
-  /// After every so many nodes: share of the nodes or of the time that is used up, bound so far.
+  /// Called periodically with the used share of the nodes or of the time, and the bound so far.
   std::function<void(double share, double bound)> progress;
 };
 
 /// Why a search of boxes stopped.
 enum class BranchStop {
   kNothingRun,
-  kCloseEnough,  ///< the bound is within the tolerance of a slope that is attained
-  kNodes,        ///< all boxes that it was given
+  kCloseEnough,  ///< the bound is within the tolerance of the known lower bound
+  kNodes,        ///< the limit on the number of boxes was reached
   kTimeLimit,
   kCancelled,
-  /// The box that dominates has no side left to halve, or no multipliers were found for it. On a projective cover that
-  /// is where kinks which run side by side to infinity, as those behind one neuron of the first layer do, meet in one
-  /// point: boxes around it decide nothing between them, however small.
+  /// The dominating box has no side left to halve, or no multipliers were found for it. On a projective cover this
+  /// happens at points at infinity where parallel kinks meet, such as those behind one neuron of the first layer: no
+  /// box around such a point, however small, decides the neurons of these kinks.
   kNothingToHalve,
 };
 /// "close enough", "nodes used up", ...
 const char* name(BranchStop stop);
-/// Whether the search would have gone on.
+/// Returns whether the search was stopped from outside and would have continued.
 constexpr bool is_interrupted(BranchStop stop) {
   return stop == BranchStop::kCancelled || stop == BranchStop::kTimeLimit;
 }
 
-/// What a search that has stopped knows of the way that is left: estimates, no bounds.
+/// Estimates of how much further a stopped search could have come. No bounds.
 struct Outlook {
-  double bound_halfway = 0, bound = 0;  ///< Lipschitz constants proved after half of the boxes, and after all
-  int undecided = 0,
-      neurons = 0;  ///< in the part that dominates, whose neurons could still do as they like; of all
-  double slope_in_part = 0;  ///< the steepest slope at points of that part
+  double bound_halfway = 0, bound = 0;  ///< Lipschitz bounds proved after half and all of the boxes
+  int undecided = 0, neurons = 0;       ///< in the dominating part: number of undecided and of all neurons
+  double slope_in_part = 0;             ///< the largest slope at points of the dominating part
 };
 
 struct BranchResult {
   BranchTree tree;
   BranchStop stop = BranchStop::kNothingRun;
-  int nodes = 0;                 ///< boxes looked at
-  double undecided_per_box = 0;  ///< neurons that a box leaves undecided, on average
+  int nodes = 0;                 ///< boxes examined
+  double undecided_per_box = 0;  ///< average number of undecided neurons per box
   Outlook outlook;
-  /// Centres of boxes, by falling slope at the centre, at most kSteepCentres: where a search for lower bounds may
-  /// start.
+  /// The box centres with the largest slopes, steepest first, at most kSteepCentres: starting points for a lower-bound
+  /// search.
   std::vector<Eigen::VectorXd> steep_centres;
 };
 
 inline constexpr std::size_t kSteepCentres = 8;
 
-/// Best-first search over the union of the boxes. Each box bounds its neurons by linear relaxation (Reach), takes out
-/// those that it decides, and inherits the multipliers of an ancestor; the box that dominates gets multipliers of its
-/// own once enough of its neurons are decided, and is halved otherwise. The slope at each box's centre says how far the
-/// bound can fall at most. The result depends on the options only, not on the machine's load (seconds unset). It can be
-/// used whenever the search stops.
+/// Best-first search over the union of the boxes. For each box, the neurons are bounded by linear relaxation (Reach),
+/// decided neurons are eliminated, and the multipliers of an ancestor are inherited. The dominating box gets its own
+/// multipliers once enough of its neurons are decided; otherwise it is halved. The slope at the centre of each box
+/// limits how far the bound can fall. If `seconds` is not set, the result depends on the options only, not on the load
+/// of the machine. The result is usable whenever the search stops.
 BranchResult branch(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options);
 
-/// The same for a set function whose sum is bounded. Its boxes are bounded with phi alone, in front of a form of rho; a
-/// box that decides more of phi's and of rho's neurons gets a form of its own, and hands it down.
+/// The same for a set function whose sum is bounded. Boxes are bounded using phi alone, in front of a quadratic form
+/// that bounds rho. A box that decides more neurons of phi and rho gets its own form, which its subtree inherits.
 BranchResult branch(const SetChain& set, const std::vector<Box>& boxes, const BranchOptions& options);
 
 }  // namespace swarmcert::lipschitz

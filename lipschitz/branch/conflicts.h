@@ -1,4 +1,4 @@
-/// @file Pairs of activation states that a box excludes, as additional constraints of the program.
+/// @file Pairs of activation states that cannot occur together in a box, as additional constraints of the program.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,32 +9,33 @@
 
 namespace swarmcert::lipschitz {
 
-/// Nowhere in the box are s_1 y_1 > 0 and s_2 y_2 > 0 at once, s = 1 for `on` and -1 for off, since
-/// lambda s_1 y_1 + (1 - lambda) s_2 y_2 < 0. Neurons are counted over all outputs of hidden layers.
+/// A pair of states that cannot occur together: s_1 y_1 > 0 and s_2 y_2 > 0 hold nowhere in the box at once, with s = 1
+/// for on and s = -1 for off, because lambda s_1 y_1 + (1 - lambda) s_2 y_2 < 0. Neurons are numbered over all outputs
+/// of hidden layers.
 struct NeuronPair {
   Eigen::Index first = 0, second = 0;  ///< first < second
   bool first_on = true, second_on = true;
   double lambda = 0;
 };
 
-/// Linear forms above every neuron's y and -y over a box.
+/// Linear upper bounds on y and -y of every neuron over a box.
 class NeuronForms {
  public:
-  /// @param forms as Reach gives them.
+  /// @param forms as returned by Reach.
   NeuronForms(const std::vector<LinearForms>& forms, const Box& box);
 
-  /// Whether the forms show it, with a margin for another's rounding. Neurons whose forms Reach left out are in no
-  /// pair.
+  /// Returns whether the forms prove that the pair is excluded, with a margin for the round-off of a different
+  /// implementation. Neurons for which Reach returned no forms are in no pair.
   bool excludes(const NeuronPair& pair) const;
 
-  /// All pairs among `neurons`, ascending, with the lambda that shows them best.
+  /// Returns all excluded pairs among `neurons`, which are ascending, each with the lambda of largest margin.
   std::vector<NeuronPair> pairs(const std::vector<Eigen::Index>& neurons) const;
 
  private:
   double largest(const NeuronPair& pair) const;
 
-  Eigen::MatrixXd slopes_[2];   ///< [inputs x neurons] of y and of -y, times half the box's widths
-  Eigen::VectorXd centres_[2];  ///< values at the box's centre
+  Eigen::MatrixXd slopes_[2];   ///< [inputs x neurons] slopes of y and of -y, times half the box widths
+  Eigen::VectorXd centres_[2];  ///< values at the centre of the box
 };
 
 }  // namespace swarmcert::lipschitz

@@ -1,4 +1,4 @@
-/// @file The function of a local bound, in the form that all nodes of its search share.
+/// @file The function of a local bound, in the form shared by all nodes of its search.
 #pragma once
 
 #include <vector>
@@ -10,58 +10,62 @@
 
 namespace swarmcert::lipschitz {
 
-/// f = g(h_K-1), with the hidden layers h_k = relu(W_k h_k-1 + b_k), or without a ReLU where the layer has none, and
-/// |g(z) - g(z')|^2 <= (z - z')' G (z - z') for all z, z'. Of a plain network G = W_K' W_K; for phi in front of rho it
-/// carries a bound on rho (RhoBound).
+/// The function f = g(h_K-1) with hidden layers h_k = relu(W_k h_k-1 + b_k), or h_k = W_k h_k-1 + b_k for a layer
+/// without ReLU, and |g(z) - g(z')|^2 <= (z - z')' G (z - z') for all z, z'. For a plain network G = W_K' W_K; for phi
+/// in front of rho, G contains a bound on rho (RhoForm).
 ///
-/// Everything is scaled by powers of two per layer, which ReLU lets through, so that (rho, t) are of order one:
-/// h_k here is 2^-scale[k] times the network's.
+/// All layers are scaled by powers of two, which commute with ReLU, so that (rho, t) are of order one: the h_k of the
+/// chain is the network's h_k times 2^-exponents[k].
 struct LocalChain {
   ReachNetwork hidden;                     ///< W_1 .. W_K-1, the last one with ReLU
-  Eigen::MatrixXd gram;                    ///< G, rounded to nearest: a search proposes, the checker verifies
-  std::vector<Eigen::Index> without_relu;  ///< per hidden layer: the last so many outputs pass as they are
-  std::vector<int> block;                  ///< coordinates of x that move; the box bounds all
+  Eigen::MatrixXd gram;                    ///< G, rounded to nearest
+  std::vector<Eigen::Index> without_relu;  ///< per hidden layer: how many of its last outputs have no ReLU
+  std::vector<int> block;                  ///< coordinates of x that move; the box bounds all coordinates
   std::vector<double> weight;              ///< per moving coordinate: |dx|^2 = sum (dx_k / weight_k)^2
   std::vector<int>
-      exponents;  ///< per hidden layer: e_1 + ... + e_k of the scaling; the output's is `output_exponent`
+      exponents;  ///< per hidden layer: e_1 + ... + e_k of the scaling; `output_exponent` for the output
   int output_exponent = 0;
 
   Eigen::Index inputs() const { return hidden.front().weights.cols(); }
-  Eigen::Index neurons() const;  ///< outputs of hidden layers, those without ReLU included
-  /// rho of the network for rho here, and the other way round for multipliers of layer k.
+  Eigen::Index neurons() const;  ///< number of outputs of hidden layers, including those without ReLU
+  /// Conversions between rho and multipliers of layer `layer` in the units of the chain (scaled) and of the network.
   double unscaled_rho(double rho) const;
   double unscaled_multiplier(double t, std::size_t layer) const;
   double scaled_multiplier(double t, std::size_t layer) const;
-  /// The layer of the n-th neuron.
+  /// Returns the layer of a neuron.
   std::size_t layer_of(Eigen::Index neuron) const;
-  /// A pair and its multiplier for the network.
+  /// Returns a pair and its multiplier in the units of the network.
   check::Conflict unscaled(const NeuronPair& pair, double multiplier) const;
 
-  /// |df|^2 per |dx|^2 in the steepest direction at x [inputs], in the units of `rho` here: an estimate from below.
+  /// Returns the largest |df|^2 / |dx|^2 over all directions at x [inputs], in the units of this chain's rho: an
+  /// estimate of a lower bound.
   double squared_slope(const Eigen::VectorXd& x) const;
 };
 
+/// Builds the chain of a network.
 /// @param layers the network's layers in double, the last one without ReLU, the one before with ReLU.
-/// @param form   the Gram matrix of what follows the last layer, [outputs x outputs]; empty: the identity.
+/// @param form   the Gram matrix of the function behind the last layer, [outputs x outputs]; empty: the identity.
 LocalChain local_chain(const ReachNetwork& layers, const Eigen::MatrixXd& form, const std::vector<int>& block,
                        const std::vector<double>& weight);
 
-/// A set function's chain, taken apart at phi's last layer v = W h + b, which has no ReLU: phi's hidden layers, whose
-/// `gram` waits for a form Q with |drho|^2 <= dv' Q dv, and rho as a function of v. All in the units of the whole.
+/// The chain of a set function, split at the last layer of phi, v = W h + b, which has no ReLU: the hidden layers of
+/// phi, whose `gram` is set later from a form Q with |drho|^2 <= dv' Q dv, and rho as a function of v. All parts are in
+/// the units of the whole chain.
 struct SetChain {
   LocalChain whole, phi, rho;
   Eigen::MatrixXd last;  ///< W
 
-  /// G of phi for a form.
+  /// Returns G of phi for a form Q.
   Eigen::MatrixXd gram(const Eigen::MatrixXd& q) const { return last.transpose() * q * last; }
-  /// Exponent of the power of two that turns a form of the chain into the network's.
+  /// Returns the exponent of the power of two that converts a form of the chain into one of the network.
   int form_exponent() const;
 };
 
+/// Splits the chain of a set function.
 /// @param last index of phi's last layer among the hidden layers of `whole`.
 SetChain set_chain(const LocalChain& whole, std::size_t last);
 
-/// The chain as a function of (u, s): see check::homogeneous().
+/// Returns the chain as a function of (u, s); see check::homogeneous().
 LocalChain homogeneous(LocalChain chain);
 
 }  // namespace swarmcert::lipschitz

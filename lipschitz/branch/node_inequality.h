@@ -1,4 +1,4 @@
-/// @file LipSDP-Neuron on a box: the neurons that the box decides are no variables any more.
+/// @file LipSDP-Neuron on a box, with the decided neurons eliminated.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,18 +10,18 @@
 
 namespace swarmcert::lipschitz {
 
-/// What a box leaves of a neuron's slope.
+/// State of a neuron over a box.
 enum class NeuronState : char { kOff, kOn, kUndecided };
 
-/// S(rho, t) over the moving inputs and the undecided neurons. A neuron that is off has dz = 0, one that is on dz = dy:
-/// both are substituted, so that S is dense but small. Positive semidefinite, it proves |df|^2 <= rho |dx|^2 for all
-/// pairs of points of the box, since the segment between them stays inside.
+/// The matrix S(rho, t) over the moving inputs and the undecided neurons. A neuron that is off has dz = 0, a neuron
+/// that is on has dz = dy; both are substituted, so that S is dense but small. If S is positive semidefinite, then
+/// |df|^2 <= rho |dx|^2 for all pairs of points of the box, because the segment between them stays inside.
 class NodeInequality final : public RankTwoInequality {
  public:
-  /// @param gram G of what follows the hidden layers.
+  /// @param gram G of the function behind the hidden layers.
   NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states,
                  const Eigen::MatrixXd& gram);
-  /// With the chain's own.
+  /// Uses the Gram matrix of the chain.
   NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states)
       : NodeInequality(chain, states, chain.gram) {}
 
@@ -33,20 +33,20 @@ class NodeInequality final : public RankTwoInequality {
   Eigen::MatrixXd a_transposed_times(const Eigen::MatrixXd& x) const override;
   Eigen::MatrixXd times_patterned(const Eigen::MatrixXd& x, const Eigen::MatrixXd& d) const override;
 
-  /// Adds a pair of undecided neurons: with u = dz (on) or dy - dz (off), 2 u_1 u_2 = 0 gets a multiplier of either
-  /// sign.
+  /// Adds the constraint of a pair of undecided neurons: 2 u_1 u_2 = 0 with u = dz (on) or dy - dz (off). Its
+  /// multiplier may have either sign.
   void add(const NeuronPair& pair);
-  /// Columns of [A E], E the unit vectors of the neurons, that make up u_1 and u_2 of a pair.
+  /// Columns of [A E] that represent u_1 and u_2 of a pair; E are the unit vectors of the neurons.
   struct Factors {
     Eigen::Index first, second;
   };
   const std::vector<Factors>& pairs() const { return pairs_; }
 
-  /// The lower triangle of S(0, t) for the multipliers of the neurons, and of the pairs behind them.
+  /// Returns the lower triangle of S(0, t); t contains the multipliers of the neurons, then those of the pairs.
   Eigen::MatrixXd slack_without_rho(const Eigen::VectorXd& t) const;
   /// [neurons x size], row i is a_i'.
   const Eigen::MatrixXd& rows_of_a() const { return a_; }
-  /// The neurons of one layer: beside -1 at their own variables, their a_i are zero outside of variables
+  /// The neurons of one layer. Except for -1 at its own variable, each a_i is zero outside the variables
   /// [first_used, past_used).
   struct LayerBlock {
     Eigen::Index first_neuron, neurons, first_used, past_used;
@@ -56,9 +56,10 @@ class NodeInequality final : public RankTwoInequality {
   /// Indices of the undecided neurons among all, ascending: t has one entry for each.
   const std::vector<Eigen::Index>& undecided() const { return undecided_; }
 
-  /// The least rho with S(rho, t) >= 0, up to rounding; infinity if there is none. `t` as in slack_without_rho().
+  /// Returns the least rho with S(rho, t) >= 0, up to round-off, or infinity if there is none. `t` as in
+  /// slack_without_rho().
   double least_rho(const Eigen::VectorXd& t) const;
-  /// The least Q with |df|^2 <= dx' Q dx for these multipliers; empty if there is none.
+  /// Returns the least Q with |df|^2 <= dx' Q dx for these multipliers, or an empty matrix if there is none.
   Eigen::MatrixXd least_form(const Eigen::VectorXd& t) const;
 
  private:
@@ -67,7 +68,7 @@ class NodeInequality final : public RankTwoInequality {
   Eigen::MatrixXd a_;  ///< [neurons x size] rows a_i'
   std::vector<LayerBlock> blocks_;
   std::vector<Factors> pairs_;
-  Eigen::MatrixXd last_gram_;  ///< of df in the variables
+  Eigen::MatrixXd last_gram_;  ///< Gram matrix of df in the variables
 };
 
 }  // namespace swarmcert::lipschitz

@@ -9,8 +9,8 @@
 
 namespace swarmcert::lipschitz {
 
-/// Multipliers for a box that inherits none: those given, improved, or where they prove nothing or there are none,
-/// those of the whole program.
+/// Returns multipliers for a box that inherits none: the given ones, improved, or, if there are none or they prove
+/// nothing, the solution of the full semidefinite program.
 /// @param start one per hidden neuron of the network, in its own units; or empty.
 Eigen::VectorXd root_multipliers(const LocalChain& chain, const NodeInequality& inequality,
                                  const std::vector<double>& start);

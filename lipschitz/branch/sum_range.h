@@ -1,4 +1,4 @@
-/// @file Contribution of neighbours that do not move: the range of a term over its box, with its proof.
+/// @file Range of a neighbour's term over its box, with a proof: the contribution of neighbours that do not move.
 #pragma once
 
 #include <string>
@@ -10,17 +10,17 @@
 
 namespace swarmcert::lipschitz {
 
-/// least <= y <= most for the outputs y of a chain over a box, shown by check::check_range() with `tree`.
+/// least <= y <= most for the outputs y of a chain over a box, proved by check::check_range() with `tree`.
 struct RangeProof {
   std::string tree;
   std::vector<double> least, most;
 };
 
-/// The same layers for a search. What enters besides, [least, most], becomes a bias and its radius.
+/// Converts the layers for a search. The additional term in [least, most] becomes a bias and its radius.
 ReachNetwork reach_layers(const std::vector<check::HiddenLayer>& layers);
 
-/// The hull of the outputs over up to `nodes` parts of the box: always halves the part with the widest range, where its
-/// linear forms depend on it most.
+/// Returns the hull of the outputs over up to `nodes` parts of the box. Always halves the part with the widest range,
+/// along the coordinate on which its linear forms depend most.
 /// @param layers the last one without ReLU.
 RangeProof sum_range(const std::vector<check::HiddenLayer>& layers, const Box& box, int nodes);
 

@@ -1,23 +1,25 @@
-/// @file LipSDP-Neuron bounds of chains whose neurons have slopes in any [a, b]: of SiLU and GELU, and on boxes.
+/// @file LipSDP-Neuron bounds of chains whose neurons have slopes in any [a, b]: SiLU and GELU, and boxes.
 #pragma once
 
 #include "lipschitz/upper/sdp_bound.h"
 
 namespace swarmcert::lipschitz {
 
-/// Where the neurons of a layer have different slopes, the program is dense: then chains with more variables (inputs,
-/// after those of a wide first stage are reduced to its rows, and neurons) are left to the product of norms.
+/// The program is dense if the neurons of a layer have different slope ranges. Such chains with more variables than
+/// this (neurons plus inputs, after the inputs of a wide first stage are reduced to its rows) get the product of norms
+/// only.
 inline constexpr int kMostBentVariables = 1400;
 
-/// sdp_bound() of such a chain, whose optimum is at most the product of the norms and of each layer's steepest slope.
+/// sdp_bound() for such a chain. The optimum is at most the product of the norms times the steepest slope of each
+/// layer.
 ///
-/// Long chains whose layers each have slopes in one [1 - c, c] go to minimise_chain(). Others are solved in the
-/// variables w = (z - a y) / sqrt(b - a), where y enters a neuron and z leaves it: the constraint of a neuron is
-/// w (sqrt(b - a) y - w) >= 0, of rank two in a single w, which is the form of RankTwoInequality, for which minimise()
-/// is made. The matrix over (x, w) is dense, because y depends on all layers before. The root keeps multipliers of one
-/// size, however narrow a range is.
+/// Long chains in which all neurons of a layer have the same range [1 - c, c] are solved by minimise_chain(). Others
+/// are solved by minimise() in the variables w = (z - a y) / sqrt(b - a), where y is the input and z the output of a
+/// neuron. The constraint of a neuron is then w (sqrt(b - a) y - w) >= 0, which has rank two and involves a single w,
+/// as RankTwoInequality requires. The matrix over (x, w) is dense, because y depends on all previous layers. The square
+/// root keeps the multipliers of similar size even for narrow ranges.
 /// @param chain a < b in each range.
-/// @returns no proof where the slopes are others and the chain has more than kMostBentVariables.
+/// @returns no proof if the slope ranges have another form and the chain has more than kMostBentVariables variables.
 SdpBound bent_bound(const check::BentChain& chain, const SdpOptions& options = {});
 
 }  // namespace swarmcert::lipschitz

@@ -17,26 +17,28 @@ namespace swarmcert::lipschitz {
 
 /// Combettes and Pesquet 2020: ReLU is the mean of the identity and a reflection, so with M_ij = M_j ... M_{i+1}
 ///   L <= 2^{1-K} c_K,  c_0 = 1,  c_j = sum_{i<j} c_i |M_ij|_2.
-/// Every norm is proved in exact arithmetic, the sum rounded up. Nothing where a norm could not be proved, or after a
-/// stop.
+/// Every norm is proved in exact arithmetic and the sum is rounded up. Returns nothing if a norm could not be proved or
+/// after a stop.
 std::optional<UpperBound> combettes_pesquet(const std::vector<check::Matrix>& stages, const Stop& stop = {});
 
-/// The steepest ReLU pattern that was found, whether or not an input reaches it: |M_K D_{K-1} ... D_1 M_1|_2 with D_k
-/// diagonal of zeros and ones. No bound that ignores which patterns are reachable can lie below the largest such norm;
-/// what is found is a floor for them up to floating point, and no bound itself.
+/// The steepest activation pattern found, whether or not an input reaches it: |M_K D_{K-1} ... D_1 M_1|_2 with diagonal
+/// matrices D_k of zeros and ones. No upper bound that ignores which patterns are reachable can lie below the largest
+/// such norm. The value found is therefore a floor for these bounds, up to round-off; it is not itself a bound.
 struct PatternFloor {
   Estimate slope{0};
-  /// Along the top singular direction of that product: |M_k z| / |z|, and |D_k y| / |y|. Their product is `slope`.
+  /// |M_k z| / |z| and |D_k y| / |y| along the top singular direction of that product. Their product is `slope`.
   std::vector<double> gains;       ///< [K]
   std::vector<double> relu_gains;  ///< [K - 1]
 };
 
-/// Alternating maximisation over layers from `starts` random patterns, then single flips; deterministic.
-/// @param stop ends it with what was found.
+/// Searches by alternating maximisation over layers from `starts` random patterns, then by flipping single neurons;
+/// deterministic.
+/// @param stop ends the search; the best pattern so far is returned.
 PatternFloor pattern_floor(const std::vector<check::Matrix>& stages, int starts = 24, std::uint64_t seed = 1,
                            const Stop& stop = {});
 
-/// What one stage of a function loses: its norm over its gain along the steepest pattern, at least 1.
+/// How much one stage of a function loosens the product bound: its norm over its gain along the steepest pattern, at
+/// least 1.
 struct StageLoss {
   std::string name;  ///< "fc2", "fc4 of phi with fc1 of rho"
   double norm = 0;   ///< spectral norm, rounded
@@ -51,7 +53,7 @@ struct Comparison {
   std::vector<StageLoss> stages;
 };
 
-/// All of the above for one function and block of NET. What a stop leaves no time for is not there.
+/// Computes all of the above for one function and block of NET. Entries that a stop leaves no time for are missing.
 Comparison compare(const files::Network& network, const files::FunctionId& function, const std::string& block,
                    const std::vector<double>& scale, const Stop& stop = {});
 

@@ -1,4 +1,4 @@
-/// @file A chain in double, without the neurons that no input reaches or that reach no output. Not for users.
+/// @file A chain in double without the neurons that no input reaches or that reach no output. Not for users.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,31 +9,31 @@
 
 namespace swarmcert::lipschitz {
 
-/// M_1 .. M_K to the nearest doubles.
+/// Returns M_1 .. M_K rounded to the nearest doubles.
 ReluChain rounded(const std::vector<check::Matrix>& stages);
 
-/// What a search for multipliers works on, and the way back to multipliers of the whole chain.
+/// The live part of a chain, for which multipliers are searched, and the conversion to multipliers of the whole chain.
 class LiveChain {
  public:
   explicit LiveChain(const std::vector<check::Matrix>& stages);
 
-  /// Without hidden layers the whole chain.
+  /// Returns the chain of live neurons; the whole chain if there are no hidden layers.
   const ReluChain& live() const { return live_; }
-  /// Whether no neuron is live, so that the function is constant.
+  /// Returns whether no neuron is live, so that the function is constant.
   bool is_constant() const { return !neurons_.empty() && neurons_.front().empty(); }
 
   /// The live neurons of each hidden layer.
   const std::vector<std::vector<Eigen::Index>>& neurons() const { return neurons_; }
 
-  /// Multipliers of the whole chain, one per hidden neuron. A neuron that does not reach the output gets 0, which
-  /// empties its row of the inequality. A neuron that does, but has no input, gets a multiplier so large, larger in
-  /// earlier layers, that its coupling to the next layer does not matter.
-  /// @param t one per live neuron, first layer first.
+  /// Returns multipliers of the whole chain, one per hidden neuron. A neuron that does not reach the output gets 0,
+  /// which makes its row of the inequality zero. A neuron that reaches the output but has no input gets a multiplier so
+  /// large (larger in earlier layers) that its coupling to the next layer does not matter.
+  /// @param t one multiplier per live neuron, first layer first.
   std::vector<double> multipliers(const Eigen::VectorXd& t) const;
 
  private:
   ReluChain chain_;
-  std::vector<std::vector<Eigen::Index>> neurons_;  ///< the live ones, per hidden layer
+  std::vector<std::vector<Eigen::Index>> neurons_;  ///< live neurons per hidden layer
   ReluChain live_;
 };
 

@@ -1,4 +1,4 @@
-/// @file Spectral norms enclosed from both sides, with proofs.
+/// @file Upper and lower bounds on spectral norms, with proofs.
 #pragma once
 
 #include <optional>
@@ -17,22 +17,23 @@ struct SpectralNorm {
   UpperProof upper_proof;            ///< rho I - W W' >= 0 or rho I - W' W >= 0
 };
 
-/// Largest singular value of `layer.weights`.
+/// Encloses the largest singular value of `layer.weights`.
 ///
-/// Proposed by a symmetric eigenvalue decomposition of the smaller Gram matrix, proved from below by the exact
-/// Rayleigh quotient of the eigenvector (rounded down), from above by an exact positive semidefiniteness proof of
-/// rho I minus the Gram matrix with rho a few units in the last place above the estimate. Relative width of the
-/// enclosure: about 1e-13 for 40 x 40.
-/// @param limit a value that matters to the caller, such as gamma: where the norm lies closer to it than the
-///   enclosure's width, proofs with exactly this bound are tried first.
+/// A symmetric eigenvalue decomposition of the smaller Gram matrix gives an estimate. The lower bound is the exact
+/// Rayleigh quotient of the eigenvector, rounded down. The upper bound is an exact proof that rho I minus the Gram
+/// matrix is positive semidefinite, with rho a few units in the last place above the estimate. The relative width of
+/// the enclosure is about 1e-13 for 40 x 40.
+/// @param limit a value of interest to the caller, such as gamma. If the norm is closer to it than the width of the
+///   enclosure, proofs with exactly this bound are tried first.
 /// @throws std::invalid_argument if an entry is not finite.
 SpectralNorm spectral_norm(const files::Layer& layer, std::optional<double> limit = std::nullopt);
 
-/// @throws files::InputError if weights, biases or a bound on a network's slope exceed 1e150, where no bound can be
-///   computed in double.
+/// Requires moderate weights.
+/// @throws files::InputError if weights, biases or a bound on a network's slope exceed 1e150, because no bound can then
+///   be computed in double.
 void require_moderate(const files::Network& network);
 
-/// An upper bound on the product of `factors`, rounded up; their own guarantee carries over.
+/// Returns the product of the upper bounds `factors`, rounded up: an upper bound on the product of the true values.
 UpperBound product_up(const std::vector<UpperBound>& factors);
 
 }  // namespace swarmcert::lipschitz
