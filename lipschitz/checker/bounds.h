@@ -21,7 +21,7 @@ class Guaranteed {
 using UpperBound = detail::Guaranteed<struct UpperBoundTag>;
 /// At most the true value, in exact arithmetic for the weights as stored.
 using LowerBound = detail::Guaranteed<struct LowerBoundTag>;
-/// Near the true value as far as anybody knows; proves nothing.
+/// An approximation of the true value without any guarantee.
 using Estimate = detail::Guaranteed<struct EstimateTag>;
 
 /// lower <= true value <= upper.
@@ -30,7 +30,7 @@ struct Enclosure {
   UpperBound upper;
 };
 
-/// What can be said of a claim. Anything that was not settled is inconclusive.
+/// Result of checking a claim; inconclusive if it is neither proved nor refuted.
 enum class Verdict { kProved, kRefuted, kInconclusive };
 
 /// "proved", "refuted" or "inconclusive".

@@ -1,4 +1,4 @@
-/// @file Internal state of the checker of check.h; its steps fill several files.
+/// @file Internal state of the checker of check.h; its steps are implemented in several files.
 #pragma once
 
 #include <map>
@@ -26,68 +26,72 @@ class CertificateChecker {
  private:
   using Json = files::Json;
   using Row = std::vector<double>;
-  using Neighbours = std::map<std::string, long>;  ///< by kind
+  using Neighbours = std::map<std::string, long>;  ///< number of neighbours by kind
   static constexpr long kMostNeighbours = 1000000;
 
   // check.cpp
   void check_weights(const Json& named);
-  /// Null, or of each network named an interval for every input, whether a bound uses it or not.
+  /// Requires null, or for each named network one interval per input, whether or not a bound uses it.
   void check_boxes(const Json& boxes) const;
-  /// The operations that `part` of NET consists of, in order.
+  /// Requires that the operations stated for `part` are those of NET, in order.
   void check_chain(const Json& stated, const files::FunctionId& part) const;
-  /// What was recorded of the comparison with samples: its form only, because the samples are not here.
+  /// Checks only the format of the recorded comparison with samples, because the samples are not available here.
   static void check_samples(const Json& samples, const std::string& where);
   void check_layer(const Json& entry, const files::FunctionId& part, const files::Layer& layer);
   void check_bound(const Json& bound);
-  /// By the product of the norms and of the activations' steepest slopes; local_product: those on the box.
+  /// Verifies a bound by the product of the norms and of the steepest activation slopes; for local_product, by the
+  /// slopes on the box.
   void check_product(const Json& bound, const std::vector<files::FunctionId>& names, double upper,
                      const std::vector<double>& scale, const std::string& where) const;
-  /// What is stated of functions with other activations than ReLU: nothing by parts of a box.
+  /// Requires that functions with activations other than ReLU have no bound proved by parts of a box, and functions
+  /// with layers that sort only product bounds.
   void check_activations(const Json& bound, const std::vector<files::FunctionId>& names,
                          const std::string& where) const;
-  /// Of functions of rotation invariants: nothing on a box, no witness, no scale.
+  /// Requires that functions of rotation invariants have no bound on a box, no witness and no scale.
   void check_invariants(const Json& bound, const files::FunctionId& function, const std::string& where) const;
-  /// The box that the slopes of a bound are taken on: of the inputs of `part`, as they leave the clamp. Refuses
+  /// Returns the box on which the activation slopes of a bound are taken: the inputs of `part` after the clamp. Refuses
   /// networks of rotation invariants.
   Intervals local_inputs(const Json& bound, const files::FunctionId& part, const std::string& where) const;
-  /// Of a set function, at most how many of each kind there are; empty: any number.
+  /// Returns the largest number of neighbours of each kind for a set function; empty: any number.
   Neighbours neighbours_of(const Json& bound, const std::string& where) const;
   static std::string key(const files::FunctionId& function, const std::string& block,
                          const Neighbours& neighbours);
-  /// Several terms of the sum move: by the triangle inequality one after the other, each by its one_neighbour bound.
-  /// Not by single coordinates: those of the ground are others than those of a neighbour.
+  /// Verifies a law. Several terms of the sum move, one after the other; by the triangle inequality each contributes
+  /// its one_neighbour bound. Laws for single coordinates are refused, because the ground and a neighbour have
+  /// different coordinates.
   void check_law(const Json& law);
 
   // check_local.cpp
-  /// The part's box, or what the input clamp makes of it.
+  /// Reads the box of a part and applies the input clamp, if there is one.
   void read_box(const files::FunctionId& part, std::vector<double>& lower, std::vector<double>& upper,
                 const std::string& where) const;
-  /// What the other terms of the sum add to the values before the first ReLU of rho: each kind's range over its box,
-  /// shown by a tree, as often as there are such neighbours or less; the ground's once.
+  /// Verifies the contribution of the other terms of the sum to the values before the first ReLU of rho: the range of
+  /// each kind's term over its box, proved by a tree, for any number of neighbours of the kind up to its count; the
+  /// ground's term once.
   void check_others(const Json& others, const std::vector<files::FunctionId>& names, Neighbours counts,
                     Row& least, Row& most, const std::string& where) const;
-  /// sqrt(rho) <= `upper` bounds the slope on the box, or on what the input clamp makes of it; of a set function
-  /// through a quadratic form of rho, for so many neighbours one that holds for the sums that they reach. Everywhere:
-  /// by a projective cover.
+  /// Verifies that sqrt(rho) <= `upper` bounds the slope on the box after the input clamp. For a set function, rho is
+  /// replaced by a quadratic form; with a stated number of neighbours, by a form that holds for the sums they reach.
+  /// For all inputs, the boxes are a projective cover.
   void check_local(const Json& bound, double upper, const std::vector<double>& scale,
                    const std::string& where);
-  /// Q with |rho(v) - rho(w)|^2 <= (v - w)' Q (v - w), its lower triangle given row by row.
+  /// Returns a verified Q with |rho(v) - rho(w)|^2 <= (v - w)' Q (v - w). Its lower triangle is given row by row.
   Matrix checked_form(const Json& form, const files::FunctionId& rho, const std::string& where) const;
 
   // check_values.cpp
-  /// Range, jump and float32 error over a box, layer by layer.
+  /// Verifies range, jump and float32 error over a box, layer by layer.
   void check_values(const Json& entry);
-  /// |f - f'| <= jump where a neighbour comes or goes, from the bound of rho and the range of the neighbour's term; and
-  /// |f| <= jump beside compositions in which the network is silent.
+  /// Verifies |f - f'| <= jump when a neighbour enters or leaves, from the bound of rho and the range of the
+  /// neighbour's term; and |f| <= jump for compositions next to one in which the network is silent.
   void check_jump(const Json& entry, const Bounded& moved, const std::vector<files::FunctionId>& names,
                   const std::string& where) const;
-  /// The box of an entry, as the first layer of `part` sees it.
+  /// Returns the box of an entry as the input of the first layer of `part`.
   Intervals values_box(const Json& entry, const files::FunctionId& part, const std::string& where) const;
   /// The same with the errors of the inputs.
   Bounded values_input(const Json& entry, const files::FunctionId& part, const std::string& where) const;
 
   // check_lower.cpp
-  /// |f(x) - f(y)| >= lower |x - y|. In a set function one neighbour moves from x to y, the others stay.
+  /// Verifies |f(x) - f(y)| >= lower |x - y|. In a set function one neighbour moves from x to y, the others stay.
   void check_lower(const Json& bound, double lower, const std::vector<double>& scale,
                    const std::string& where) const;
 
@@ -96,7 +100,7 @@ class CertificateChecker {
   files::Parts parts_;
   std::map<files::FunctionId, Dyadic> norms_;  ///< product of the verified norms, by network
   std::map<std::string, Dyadic> proved_;       ///< verified upper bounds, by key()
-  std::set<std::string> local_;                ///< those of them that hold on the box only
+  std::set<std::string> local_;                ///< keys of the verified bounds that hold on the box only
   int spectral_norms_ = 0, upper_bounds_ = 0, lower_bounds_ = 0, on_boxes_ = 0, values_ = 0;
 };
 

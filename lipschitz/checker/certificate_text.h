@@ -11,19 +11,20 @@
 
 namespace swarmcert::check {
 
-/// @throws std::runtime_error with the reason where the condition does not hold.
+/// @throws std::runtime_error with `reason` if the condition does not hold.
 void require(bool condition, const std::string& reason);
 
-/// A nonnegative number that stands once in decimal and once in hex: both must be the same double.
+/// Reads a nonnegative number that is stored in decimal and in hex; both must denote the same double.
 double number(const files::Json& decimal, const files::Json& hex, const std::string& where);
 
-/// Finite hex floats in one text, separated by single spaces.
+/// Reads finite hex floats from one string, separated by single spaces.
 std::vector<double> hex_floats_in(const files::Json& json);
 
-/// Conflicts in one text, each as "<neuron><+ or -> <neuron><+ or -> <lambda> <multiplier>"; + is on.
+/// Reads conflicts from one string, each as "<neuron><+ or -> <neuron><+ or -> <lambda> <multiplier>"; + means on.
 std::vector<Conflict> conflicts_in(const files::Json& json);
 
-/// What shows that a matrix is positive semidefinite; nothing for null, where the checker finds a factor itself.
+/// Reads the factor that proves a matrix positive semidefinite; nothing for null, in which case the checker computes a
+/// factor itself.
 std::optional<Factor> parse_factor(const files::Json& json, const std::string& where);
 
 }  // namespace swarmcert::check

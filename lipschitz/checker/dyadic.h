@@ -1,4 +1,5 @@
-/// @file Exact arithmetic for the checker: every finite double is a dyadic rational, and sums and products stay so.
+/// @file Exact arithmetic for the checker: finite doubles are dyadic rationals, which are closed under sums and
+/// products.
 #pragma once
 
 #include <gmpxx.h>
@@ -20,7 +21,7 @@ struct Dyadic {
     int e = 0;
     mantissa = std::ldexp(std::frexp(x, &e), 53);  // an integer below 2^53
     const mp_bitcnt_t zeros = mantissa == 0 ? 0 : mpz_scan1(mantissa.get_mpz_t(), 0);
-    mantissa >>= zeros;  // keeps later products short
+    mantissa >>= zeros;  // keeps the mantissas of later products short
     exponent = e - 53 + static_cast<long>(zeros);
   }
 

@@ -1,4 +1,4 @@
-/// @file Real numbers enclosed between integers over 2^256, and the functions that activations are made of. Not for
+/// @file Fixed-point interval arithmetic with 256 fractional bits, and the elementary functions of activations. Not for
 /// users.
 #pragma once
 
@@ -8,7 +8,7 @@
 
 namespace swarmcert::check {
 
-/// Bits behind the point.
+/// Number of fractional bits.
 inline constexpr long kFixedBits = 256;
 
 /// lower 2^-kFixedBits <= x <= upper 2^-kFixedBits. Every operation encloses the exact result.
@@ -17,7 +17,7 @@ struct Fixed {
 
   Fixed(mpz_class low, mpz_class high) : lower(std::move(low)), upper(std::move(high)) {}
   explicit Fixed(const Dyadic& x);
-  /// numerator / denominator. Precondition: denominator > 0.
+  /// Encloses numerator / denominator. Precondition: denominator > 0.
   static Fixed ratio(const mpz_class& numerator, const mpz_class& denominator);
 };
 
@@ -37,7 +37,7 @@ Fixed normal_density(const Fixed& x);
 /// (1 + erf(x / sqrt 2)) / 2.
 Fixed normal_probability(const Fixed& x);
 
-/// The largest multiple of 2^unit that is at most x, and the smallest one that is at least x.
+/// Return the largest multiple of 2^unit that is at most x, and the smallest one that is at least x.
 Dyadic floor_to(const Dyadic& x, long unit);
 Dyadic ceil_to(const Dyadic& x, long unit);
 

@@ -1,4 +1,4 @@
-/// @file The matrix inequality of one part of a box, in double with every rounding accounted for. Not for users.
+/// @file The matrix inequality of one part of a box, in double with bounds on all round-off errors. Not for users.
 #pragma once
 
 #include <map>
@@ -8,7 +8,7 @@
 
 namespace swarmcert::check {
 
-/// A matrix whose entries are off by at most `radius`, both row-major.
+/// A matrix with bounds `radius` on the errors of its entries, both row-major.
 struct Rounded {
   int rows, cols;
   std::vector<double> value, radius;
@@ -20,31 +20,31 @@ struct Rounded {
   const double* radius_at(int i) const { return &radius[static_cast<std::size_t>(i) * cols]; }
 };
 
-/// A matrix in double, with what that rounding may have changed.
-/// @throws std::runtime_error where an entry leaves the range of double.
+/// Rounds a matrix to double and bounds the rounding errors.
+/// @throws std::runtime_error if an entry leaves the range of double.
 Rounded rounded(const Matrix& exact);
 
-/// W' Q W for a form's lower triangle q, up to rounding, W as stored.
+/// Returns W' Q W, with bounds on the round-off errors, for the lower triangle q of a form; W is exactly as stored.
 Rounded gram_of_form(const std::vector<double>& q, const HiddenLayer& last);
 
-/// S of check_tree(), over the moving inputs and the neurons that a part leaves undecided.
+/// The matrix S of check_tree(), over the moving inputs and the undecided neurons of a part.
 class PartInequality {
  public:
-  /// @param gram      G, as what follows the last hidden layer has it.
-  /// @param bounds    of the part.
-  /// @param form      what bounds |df|^2 by dx: symmetric, row-major.
+  /// @param gram      G of the function behind the last hidden layer.
+  /// @param bounds    bounds on the neurons over the part.
+  /// @param form      the quadratic form in dx that is to bound |df|^2: symmetric, row-major.
   /// @param t         one multiplier per output of a hidden layer.
-  /// @param conflicts that hold in the part, between undecided neurons.
+  /// @param conflicts conflicts between undecided neurons that hold in the part.
   PartInequality(const LocalFunction& f, const Rounded& gram, const NeuronBounds& bounds,
                  const std::vector<double>& form, const std::vector<double>& t,
                  const std::vector<const Conflict*>& conflicts);
 
-  /// True only if S is positive definite in exact arithmetic. To be called once.
+  /// Returns true only if S is positive definite in exact arithmetic. May be called only once.
   bool is_positive_definite();
 
  private:
   using Row = std::vector<double>;
-  /// dy of an undecided neuron as a form in the variables, and its own variable dz.
+  /// dy of an undecided neuron as a linear form in the variables, and the index of its own variable dz.
   struct NeuronForms {
     int variable = 0;
     Row value, radius;
@@ -73,9 +73,9 @@ class PartInequality {
   const NeuronBounds& bounds_;
   const Row& t_;
   int moving_, n_ = 0;
-  std::map<std::size_t, NeuronForms> factors_;  ///< of the neurons in conflicts
+  std::map<std::size_t, NeuronForms> factors_;  ///< forms of the neurons in conflicts
   Rounded z_;                                   ///< dz of the last hidden layer as forms in the variables
-  /// Lower triangles, row-major: what the true entries of S are near to, and how near but for what G adds.
+  /// Lower triangles, row-major: the computed entries of S, and bounds on their errors except for those of G's term.
   Row s_, excess_;
 };
 

@@ -1,12 +1,12 @@
-/// @file The loops in which a check of a proof by parts spends its time: sums in double, in no order that is promised,
-/// so that error bounds must hold for all; no fused products. Not for users.
+/// @file The inner loops that dominate the time of checking a proof by parts. Sums in double without a guaranteed order
+/// of summation, so error bounds must hold for every order; no fused multiply-adds. Not for users.
 #pragma once
 
 #include <cstddef>
 #include <vector>
 
-/// A function with doubles four at a time where the processor can, chosen when the program starts; the numbers are the
-/// same.
+/// Compiles a function also for AVX2, four doubles at a time; the version is chosen when the program starts. The
+/// results are the same.
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__)
 #define SWARMCERT_WIDE __attribute__((target_clones("avx2", "default")))
@@ -16,7 +16,7 @@
 
 namespace swarmcert::check {
 
-/// Rows of a matrix, row-major, `stride` numbers from one to the next.
+/// Rows of a row-major matrix; `stride` is the distance between rows in doubles.
 struct Rows {
   const double* data;
   int stride;
@@ -24,18 +24,18 @@ struct Rows {
 };
 
 /// out_rj += sum of a_ri b_ij over the i in `inner`, for r < rows and j < columns.
-/// @param out rows with as many numbers from one to the next as `out_stride` says.
+/// @param out row-major with row stride `out_stride`.
 void add_product(double* out, int out_stride, int rows, int columns, Rows a, Rows b,
                  const std::vector<int>& inner);
 
-/// Sum c b, sum |c b| and sum |c| w.
+/// The sums of c b, |c b| and |c| w.
 struct FormSums {
   double constant, absolute, weighted;
 };
 FormSums form_sums(const double* c, const double* b, const double* w, int size);
 
-/// Sum c+ offset and sum c+ error over the positive c. Replaces each c by c above where it is positive, else by c
-/// below.
+/// The sums of c offset and c error over the positive c. relax() also replaces each c by `c above` if it is positive
+/// and by `c below` otherwise.
 struct RelaxedSums {
   double offsets, errors;
 };

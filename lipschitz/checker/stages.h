@@ -1,5 +1,5 @@
-/// @file The functions of NET as chains of exact matrices with activations of slopes between 0 and 1 in between. Not
-/// for users.
+/// @file The functions of NET as chains of exact matrices separated by activations with slopes in [0, 1]. Not for
+/// users.
 #pragma once
 
 #include <string>
@@ -14,49 +14,52 @@
 
 namespace swarmcert::check {
 
-/// M_1 .. M_K of `function` ("network", "phi:<kind>", "rho:<kind>", "set:<phi kind>:<rho kind>"), exactly, as they act
-/// on the input coordinates of `block`, each in units of its `scale` (empty: 1). In a set function the last layer of
-/// phi and the first of rho, which no activation separates, are one stage: their product.
-/// An activation s of slopes in [0, b] is b times one of slopes in [0, 1]: the stage behind it is multiplied by b. ReLU
-/// has b = 1. Where `function` maps its inputs to invariants, the first stage acts on those, and is multiplied by the
-/// map's Lipschitz constant: every bound of the chain is one of the function.
-/// @throws std::domain_error if an activation of `function` sorts, or is not monotone: see bent_chain();
-///   std::out_of_range or std::invalid_argument if NET has no such function or block, or `scale` has
-///   not one number per input.
+/// Returns the exact stages M_1 .. M_K of `function` ("network", "phi:<kind>", "rho:<kind>",
+/// "set:<phi kind>:<rho kind>"), restricted to the input coordinates of `block`, each in units of its `scale` (empty:
+/// 1). In a set function the last layer of phi and the first layer of rho, which no activation separates, form one
+/// stage: their product.
+///
+/// An activation with slopes in [0, b] is b times one with slopes in [0, 1], so the stage behind it is multiplied by b;
+/// b = 1 for ReLU. If `function` maps its inputs to invariants, the first stage acts on the invariants and is
+/// multiplied by the Lipschitz constant of the map, so that every bound of the chain is a bound of the function.
+/// @throws std::domain_error if an activation of `function` sorts or is not monotone, see bent_chain();
+///   std::out_of_range or std::invalid_argument if NET has no such function or block, or `scale` does not have one
+///   number per input.
 std::vector<Matrix> stages(const files::Network& network, const files::FunctionId& function,
                            const std::string& block = "all", const std::vector<double>& scale = {});
 
-/// The same for any activations, with the slopes of each hidden neuron: [0, 1], and [1 - c, c] where they are such,
-/// 1 < c; those are not divided by their largest slope.
-/// @throws as stages(), but for monotony.
+/// The same for any activations that act entry by entry, with the slope range of each hidden neuron: [0, 1] after
+/// division by the largest slope, or [1 - c, c] with c > 1, which is not divided.
+/// @throws as stages(), except that activations need not be monotone.
 BentChain bent_chain(const files::Network& network, const files::FunctionId& function,
                      const std::string& block = "all", const std::vector<double>& scale = {});
 
-/// The same for inputs in `box`, no activation divided by its largest slope: the neurons of the part that takes them
-/// have the slopes of slopes_on_box(), those of rho behind it all that their activation has, because other terms of the
-/// sum may be anything.
-/// @param box of the inputs of "network" or "phi:<kind>", as they leave the clamp.
+/// The same for inputs in `box`, with no activation divided by its largest slope. The neurons of the plain network or
+/// phi have the slopes of slopes_on_box(). The neurons of rho have the global slope range of their activation, because
+/// the other terms of the sum may be anything.
+/// @param box range of the inputs of "network" or "phi:<kind>" after the clamp.
 /// @throws as bent_chain(); std::domain_error for "rho:<kind>", which has no box.
 BentChain chain_on_box(const files::Network& network, const files::FunctionId& function,
                        const std::string& block, const std::vector<double>& scale, const Intervals& box);
 
-/// At least the product of the steepest slopes between all layers of `weights`, layer by layer, for inputs in `box`.
+/// Returns an upper bound on the product over the layers of `weights` of the steepest activation slope of each layer,
+/// for inputs in `box`.
 Dyadic steepest_on_box(const files::Weights& weights, const Intervals& box);
 
-/// "network" or "phi:<kind>" in front of |.|^2, or of the form Q, exactly, as a proof on a box sees it.
+/// Returns "network" or "phi:<kind>", followed by |.|^2 or by the form Q, exactly, in the form used by proofs on a box.
 /// @param q [outputs x outputs]; no rows: the identity.
-/// @throws as stages(), and std::invalid_argument if the network has no hidden layer or Q another size.
+/// @throws as stages(), and std::invalid_argument if the network has no hidden layer or Q has another size.
 LocalFunction local_function(const files::Network& network, const files::FunctionId& part,
                              const std::string& block, const std::vector<double>& scale, const Matrix& q);
 
-/// What `phi` adds to the values before the first ReLU of `rho`: V phi(x), with V the first layer of rho, its bias left
-/// out. The last layer of phi and V have no ReLU.
+/// Returns the contribution of `phi` to the values before the first ReLU of `rho`: V phi(x), where V is the first layer
+/// of rho without its bias. The last layer of phi and V have no ReLU.
 /// @throws std::out_of_range if NET has no such part; std::invalid_argument if rho has no hidden layer.
 std::vector<HiddenLayer> term_layers(const files::Network& network, const files::FunctionId& phi,
                                      const files::FunctionId& rho);
 
-/// x -> rho(phi(x) + s) of "set:<phi kind>:<rho kind>", for any s with least <= V s <= most; V as in term_layers().
-/// What takes the place of rho, a tree's forms say.
+/// Returns x -> rho(phi(x) + s) of "set:<phi kind>:<rho kind>", for any s with least <= V s <= most; V as in
+/// term_layers(). The forms that replace rho are given by a tree (TreeProof).
 /// @throws as local_function() and term_layers().
 LocalFunction coupled_function(const files::Network& network, const files::FunctionId& function,
                                const std::string& block, const std::vector<double>& scale,

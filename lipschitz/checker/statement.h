@@ -1,4 +1,4 @@
-/// @file What a certificate of this schema states, in words: certify writes it, the checker insists on it.
+/// @file The statements of a certificate of this schema, in words: certify writes them, the checker requires them.
 #pragma once
 
 #include <string>
@@ -32,32 +32,32 @@ inline constexpr const char* kStatement =
     "arithmetic may give, whose inputs after the clamp are off by at most input_error: sums of products in "
     "any order, fused or not, each operation rounded to nearest.";
 
-/// What is added for networks with a layer that is sorted.
+/// Added for networks with a layer that is sorted.
 inline constexpr const char* kSortingStatement =
     " Of the numbers t_1, t_2, ... of a layer, groupsort:k sorts each k side by side, the smallest first; "
     "maxmin:halves, of 2 h numbers, is max(t_i, t_(i+h)) for i = 1 .. h and then min(t_i, t_(i+h)); "
     "maxmin:pairs is max(t_(2i-1), t_(2i)) for i = 1 .. h and then min(t_(2i-1), t_(2i)).";
 
-/// What is added for networks with a skip connection past another activation than ReLU.
+/// Added for networks with a skip connection past an activation other than ReLU.
 inline constexpr const char* kKeepingStatement =
     " tanh:n, and so with other names, is that function of each of the first n numbers of a layer and leaves "
     "the others as they are.";
 
-/// What is added for networks of rotation invariants.
+/// Added for networks of rotation invariants.
 inline constexpr const char* kInvariantsStatement =
     " A set function takes of each neighbour its relative position p in m and velocity v in m/s, whose "
     "vertical components are p_z and v_z, and of the vehicle -z in m and -v in m/s; phi sees their "
     "invariants: of a neighbour |p_xy|, 3/2 p_z, |v_xy|, 3/2 v_z, |p_xy + v_xy / 2|, and the ground's phi "
     "-z, |v_xy|, -v_z. So the input clamp is one of invariants, and phi alone is a function of them.";
 
-/// What is added for networks that are silent in some compositions, before their names.
+/// Added for networks that are silent in some compositions; the list of compositions follows.
 inline constexpr const char* kSilentStatement =
     " Among these neighbours > vehicle, as many of each kind and no others, the set functions of that kind "
     "of vehicle are 0. Bounds and laws hold while the neighbours stay the same, lower bounds at witnesses "
     "among other neighbours than these. Ranges hold this 0, and jumps bound the steps as well by which one "
     "neighbour that comes or goes makes or ends such a composition, while all are in the box or clamp: ";
 
-/// The statement of a certificate for NET.
+/// Returns the statement of a certificate for NET.
 std::string statement_for(const files::Network& network);
 
 }  // namespace swarmcert::check

@@ -1,4 +1,4 @@
-/// @file Two points as proof of a lower bound on a Lipschitz constant: the slope between them, in exact arithmetic.
+/// @file Lower bounds on Lipschitz constants, proved by the slope between two points in exact arithmetic.
 #pragma once
 
 #include <gmpxx.h>
@@ -13,16 +13,15 @@
 
 namespace swarmcert::lipschitz {
 
-/// g(x) = network(clamp(x)): one term of a deep set's sum, or a plain network. Both pointers stay the
-/// caller's.
+/// g(x) = network(clamp(x)): one term of a deep set's sum, or a plain network. The pointers are not owned.
 struct Term {
   const files::Weights* network = nullptr;
   const files::InputClamp* clamp = nullptr;  ///< null: none
 };
 
-/// A function of one vector x, the input of the one neighbour that moves; the points x_j stay where they are:
-///   f(x) = rho(moved(x) + sum_j others_j(x_j)),   or, where `rho` is null,   f(x) = moved(x).
-/// The networks of `others` may differ in kind and in number of inputs; a ground term is one of them.
+/// A function of one vector x, the input of the one neighbour that moves; the points x_j are fixed:
+///   f(x) = rho(moved(x) + sum_j others_j(x_j)),   or, if `rho` is null,   f(x) = moved(x).
+/// The networks of `others` may differ in kind and in number of inputs; the ground's term is one of them.
 struct SlopeFunction {
   Term moved;
   std::vector<Term> others;
@@ -35,49 +34,50 @@ struct SlopePoints {
   std::vector<std::vector<float>> others;  ///< [number of others][inputs of that other]
 };
 
-/// The function that `function` ("network", "phi:<kind>", "rho:<kind>", "set:<phi kind>:<rho kind>") names in NET, with
-/// its clamp, and with the fixed neighbours `others` ("phi:<kind>" each), which only a set function has.
-/// @throws std::invalid_argument or std::out_of_range if NET has no such part, one of `others` is no neighbour, the
-///   ground, where NET has one, does not enter the sum exactly once, or NET is silent among these neighbours.
+/// Returns the function of NET named `function` ("network", "phi:<kind>", "rho:<kind>", "set:<phi kind>:<rho kind>"),
+/// with its clamp and, for a set function, with the fixed neighbours `others` ("phi:<kind>" each).
+/// @throws std::invalid_argument or std::out_of_range if NET has no such part, one of `others` is not a neighbour, the
+///   ground, if NET has one, does not enter the sum exactly once, or NET is silent among these neighbours.
 SlopeFunction slope_function(const files::Network& network, const files::FunctionId& function,
                              const std::vector<files::FunctionId>& others);
 
-/// The value of "network" at one point, or of a set function at the sum of its terms: exact. `networks` names the part
-/// of each point; a set function may have none, and is 0 where NET is silent among them.
+/// Returns the exact value of "network" at one point, or of a set function at the sum of its terms. `networks` names
+/// the part of each point; it may be empty for a set function. The value is 0 if NET is silent among these neighbours.
 /// @throws std::invalid_argument or std::out_of_range as slope_function(), or if a point does not fit its network, or
 ///   an activation is not ReLU.
 std::vector<mpq_class> value(const files::Network& network, const files::FunctionId& function,
                              const std::vector<files::FunctionId>& networks,
                              const std::vector<std::vector<float>>& points);
 
-/// |f(x) - f(y)|_2^2 / |x - y|_2^2 for the weights as stored, as a rational number. Where all activations are ReLU or
-/// sort, nothing is rounded. Elsewhere f(x) and f(y) are enclosed, to about 2^-64 times the gains of the layers behind
-/// an activation (network_intervals()), and the number is the least that the enclosures allow. By the definition of a
-/// Lipschitz constant its root is a lower bound on that of f over any convex set that holds x and y, whether or not
-/// they lie on kinks. With a `block`, x and y agree outside of it, so that the
-/// same number bounds the constant with respect to those coordinates alone.
+/// Returns |f(x) - f(y)|_2^2 / |x - y|_2^2 for the weights as stored, as a rational number.
+///
+/// If all activations are ReLU or sort, nothing is rounded. Otherwise f(x) and f(y) are enclosed to about 2^-64 times
+/// the gains of the layers behind an activation (network_intervals()), and the smallest value that the enclosures allow
+/// is returned. By the definition of a Lipschitz constant, the square root is a lower bound on that of f over any
+/// convex set that contains x and y, whether or not they lie on kinks. With a `block`, x and y agree outside of it, so
+/// that the same number bounds the constant with respect to these coordinates alone.
 /// @param block input coordinates that may differ between x and y; empty: all.
 /// @param scale empty, or one positive number per input: |x - y|^2 is then sum_k ((x_k - y_k) / scale_k)^2.
 /// Cost: about a millisecond for 6-25-40-40-20.
-/// @throws std::invalid_argument if the sizes do not fit, a coordinate is not finite, x == y, x and y differ
-/// outside
+/// @throws std::invalid_argument if the sizes do not match, a coordinate is not finite, x == y, x and y differ outside
 ///   of `block`, or `block` names a coordinate that does not exist.
 mpq_class slope_squared(const SlopeFunction& f, const SlopePoints& points, const std::vector<int>& block = {},
                         const std::vector<double>& scale = {});
 
-/// sqrt(slope_squared(...)), rounded down to a double (guarantee: its square does not exceed the exact one).
+/// Returns sqrt(slope_squared(...)), rounded down to a double whose square does not exceed the exact value.
 LowerBound slope(const SlopeFunction& f, const SlopePoints& points, const std::vector<int>& block = {},
                  const std::vector<double>& scale = {});
 
-/// The largest double whose square is at most `square` >= 0, or one next to it; never above.
+/// Returns the largest double whose square is at most `square` >= 0, or the double below it; never above.
 /// @throws std::invalid_argument if `square` is negative.
 double sqrt_down(const mpq_class& square);
 
-/// Whether all its networks are ReLU networks.
+/// Returns whether all networks of f are ReLU networks.
 bool is_relu(const SlopeFunction& f);
 
+/// Validates a function.
 /// @throws std::invalid_argument unless networks are given, their sizes compose, the clamps have one interval
-///   lower <= upper per input, and `others` is empty where `rho` is null.
+///   lower <= upper per input, and `others` is empty if `rho` is null.
 void check_function(const SlopeFunction& f);
 
 }  // namespace swarmcert::lipschitz

@@ -1,4 +1,4 @@
-/// @file Lower bounds for the claims about NET: which function is searched, with how many neighbours and for how long.
+/// @file Lower bounds for the claims about NET.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,35 +17,40 @@ namespace swarmcert::lipschitz {
 
 struct LowerBoundOptions {
   std::uint64_t seed = 1;
-  /// Per claim; 0: no lower bounds. Nothing: kDefaultSearchRounds, fewer for networks much larger than the paper's,
-  /// for which a round takes longer. With other activations than ReLU a round is a start of steep_place().
+  /// Search rounds per claim; 0: no lower bounds. Nothing: kDefaultSearchRounds, or fewer for networks much larger than
+  /// those of the paper, for which a round takes longer. With activations other than ReLU, a round is one start of
+  /// steep_place().
   std::optional<int> rounds;
-  double seconds = 0;  ///< per claim, as SlopeSearchOptions has it; 0: no limit
+  double seconds = 0;  ///< limit per claim, see SlopeSearchOptions; 0: no limit
   const std::atomic<bool>* cancelled = nullptr;
-  std::optional<Box> moved;             ///< where x and y lie instead of the domain's box
-  std::vector<Eigen::VectorXd> starts;  ///< as SlopeSearchOptions has them
-  /// As SlopeSearchOptions has them; others in the order of FoundSlope::other_networks.
+  std::optional<Box> moved;             ///< box of x and y that replaces the domain's box
+  std::vector<Eigen::VectorXd> starts;  ///< see SlopeSearchOptions
+  /// See SlopeSearchOptions; others are in the order of FoundSlope::other_networks.
   std::vector<Eigen::VectorXd> places;
-  int regions = kRegionsPerRound;  ///< as SlopeSearchOptions has them
+  int regions = kRegionsPerRound;  ///< see SlopeSearchOptions
 };
 
 /// Two points that prove a lower bound for a claim.
 struct FoundSlope {
-  std::optional<SlopeWitness> witness;            ///< nothing where no search ran or no two points exist
-  std::vector<files::FunctionId> other_networks;  ///< of witness->others, "phi:<kind>" each
+  std::optional<SlopeWitness> witness;            ///< nothing if no search ran or there are no two points
+  std::vector<files::FunctionId> other_networks;  ///< networks of witness->others, "phi:<kind>" each
   int rounds = 0;
   bool interrupted = false;  ///< stopped before all rounds were done
 };
 
-/// Whether all networks that enter `function` are ReLU networks: those that it passes through, and of a set function,
-/// whose other terms are of any kind, every phi.
+/// Returns whether all networks that enter `function` are ReLU networks. For a set function, whose other terms may be
+/// of any kind, these include every phi.
 bool has_relu_only(const files::Network& network, const files::FunctionId& function);
 
-/// Searches for the steepest pair of points within the claim's block and domain, as steep in the claim's norm as
-/// slope() proves. Of ReLU networks by search_slope(), a set function with one to three neighbours, of every kind and
-/// with the ground; of others around the steep_place(). Never among neighbours where NET is silent.
+/// Searches for the steepest pair of points within the claim's block and domain. The bound is the slope in the claim's
+/// norm, proved by slope().
+///
+/// ReLU networks are searched by search_slope(); a set function with one to three neighbours, of every kind, and with
+/// the ground. Other networks are searched around the result of steep_place(). Compositions in which NET is silent are
+/// not used.
 /// @param domain the boxes of a claim whose domain is "box", by part.
-/// @throws std::invalid_argument as slope_function(): of functions of rotation invariants there is no such proof.
+/// @throws std::invalid_argument as slope_function(), and for functions of rotation invariants, which have no such
+///   proof.
 FoundSlope lower_bound(const files::Network& network, const Claim& claim, const Domain& domain,
                        const LowerBoundOptions& options);
 

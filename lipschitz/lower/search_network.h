@@ -1,4 +1,4 @@
-/// @file The function whose slope is searched, as one dense ReLU chain in normalised coordinates.
+/// @file The function whose slope is maximised, as one dense ReLU chain in normalised coordinates.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,18 +14,20 @@ namespace swarmcert::lipschitz {
 struct SearchStage {
   Eigen::MatrixXd weights;
   Eigen::VectorXd biases;
-  /// Per neuron: hands y_i on unchanged. It carries a value past the stages of deeper neighbours, without a kink.
+  /// Per neuron: whether it passes y_i on unchanged. Such neurons carry a value past the stages of deeper neighbours
+  /// and have no kink.
   std::vector<char> passes;
-  /// The first `moved` neurons depend on the moved vector. The others cannot, nor can their kinks change the slope.
+  /// The first `moved` neurons depend on the moved vector. The other neurons do not, and their kinks do not change the
+  /// slope.
   int moved = 0;
 };
 
-/// What a search works on. Its weights were multiplied out in double: a search only proposes points.
+/// The function of a search. Its weights were multiplied out in double, because a search only proposes points.
 ///
-/// The variables z are the input coordinates that the domain leaves free, of the moved vector first and then of the
-/// other neighbours, one by one: x = centre + scale * z, coordinate by coordinate. A coordinate in an interval has
-/// -1 <= z <= 1; for an open one, centre and scale follow from where the first stage has its kinks, so that the
-/// search does not depend on the inputs' units.
+/// The variables z are the input coordinates that the domain does not fix, first those of the moved vector and then
+/// those of the other neighbours in order: x = centre + scale * z, coordinate by coordinate. A coordinate in an
+/// interval has -1 <= z <= 1. For an unbounded coordinate, centre and scale are chosen from the kinks of the first
+/// stage, so that the search does not depend on the units of the inputs.
 struct SearchNetwork {
   std::vector<SearchStage> stages;
   Eigen::VectorXd centre, scale;
@@ -34,22 +36,24 @@ struct SearchNetwork {
   std::vector<int> block;
   std::vector<int>
       coordinate;  ///< per variable: its index in (x, x_1, x_2, ...), the inputs one after the other
-  Eigen::VectorXd fixed_inputs;  ///< (x, x_1, x_2, ...), with values where a coordinate is not a variable
-  int moved_inputs = 0;          ///< length of x
+  Eigen::VectorXd
+      fixed_inputs;      ///< (x, x_1, x_2, ...), with the values of coordinates that are not variables
+  int moved_inputs = 0;  ///< length of x
 
   int variables() const { return static_cast<int>(coordinate.size()); }
   int moved_variables() const;
   int outputs() const { return static_cast<int>(stages.back().weights.rows()); }
-  int neurons() const;  ///< in hidden stages, those that pass included
+  int neurons() const;  ///< number of neurons in hidden stages, including those that pass
 
-  /// (x, x_1, x_2, ...) at z.
+  /// Returns (x, x_1, x_2, ...) at z.
   Eigen::VectorXd inputs(const Eigen::VectorXd& z) const;
-  /// f, up to rounding, at (x, x_1, x_2, ...) = `inputs`, which agree with `fixed_inputs` where they are no variables.
+  /// Returns f, up to round-off, at (x, x_1, x_2, ...) = `inputs`, which must agree with `fixed_inputs` in coordinates
+  /// that are not variables.
   Eigen::VectorXd value(const std::vector<float>& inputs) const;
 };
 
-/// Builds the chain: the networks of a deep set side by side, their last layers and rho's first one multiplied out.
-/// Where a clamp acts, the domain is what it lets through: f is constant beyond.
+/// Builds the chain. The networks of a deep set are placed side by side, and their last layers are multiplied by the
+/// first layer of rho. With a clamp, the domain is restricted to the clamp's range, because f is constant outside.
 /// @param boxes one per vector (x, x_1, x_2, ...); nothing: all of R^n.
 /// @param block coordinates of x; empty: all.
 /// Precondition: check_function(f) accepts f, and boxes and block fit it.

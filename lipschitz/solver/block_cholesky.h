@@ -1,4 +1,4 @@
-/// @file Cholesky factors of block tridiagonal matrices, whose cost grows linearly with the number of blocks.
+/// @file Cholesky factors of block tridiagonal matrices, with cost linear in the number of blocks.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,19 +7,20 @@
 
 namespace swarmcert::lipschitz {
 
-/// L with S = L L', where S is symmetric and block tridiagonal, so that L has a diagonal block and one left of it per
-/// block row. Floating point: nothing that rests on it is trusted.
+/// The factor L of S = L L', where S is symmetric and block tridiagonal. Each block row of L has a diagonal block and
+/// one block to its left. Computed in floating point: results are not trusted.
 class BlockCholesky {
  public:
-  /// @param begin first index of each block, ascending from 0; its last entry is the size of S.
-  /// @returns nothing if the factorisation breaks down, so S is not safely positive definite.
+  /// Factorises S.
+  /// @param begin first index of each block, ascending from 0; the last entry is the size of S.
+  /// @returns nothing if the factorisation breaks down, which means that S is not safely positive definite.
   static std::optional<BlockCholesky> of(const Eigen::MatrixXd& s, const std::vector<Eigen::Index>& begin);
 
   /// X <- X S^-1.
   void divide(Eigen::MatrixXd& x) const;
-  /// S^-1, dense.
+  /// Returns S^-1 as a dense matrix.
   Eigen::MatrixXd inverse() const;
-  /// L^-1 D L^-T v, for symmetric D with the blocks of S.
+  /// Returns L^-1 D L^-T v for a symmetric D with the block pattern of S.
   Eigen::VectorXd congruence_times(const Eigen::MatrixXd& d, const Eigen::VectorXd& v) const;
 
  private:
@@ -28,7 +29,7 @@ class BlockCholesky {
 
   std::vector<Eigen::Index> begin_;
   std::vector<Eigen::MatrixXd> diagonal_;  ///< lower triangular
-  std::vector<Eigen::MatrixXd> left_;  ///< of block row k, in the columns of block k - 1; the first is empty
+  std::vector<Eigen::MatrixXd> left_;      ///< block (k, k - 1) of each block row k; the first is empty
 };
 
 }  // namespace swarmcert::lipschitz

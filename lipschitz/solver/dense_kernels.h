@@ -1,21 +1,20 @@
-/// @file The dense products and factorisations that dominate the interior point method, by BLAS and LAPACK.
+/// @file The dense products and factorisations that dominate the interior-point method, by BLAS and LAPACK.
 ///
-/// Eigen's own kernels use what the compiler's baseline has (SSE2 on x86-64); OpenBLAS picks the processor's best at
-/// run time, three to five times faster at these sizes. Its order of summation is unknown, which is no harm here:
-/// nothing that the solver says is trusted.
+/// Eigen's kernels use the compiler's baseline instruction set (SSE2 on x86-64); OpenBLAS selects the best kernels of
+/// the processor at run time and is three to five times faster at these sizes. Its order of summation is unknown, which
+/// is acceptable because no result of the solver is trusted.
 #pragma once
 
 #include <Eigen/Core>
 
 namespace swarmcert::lipschitz {
 
-/// Keeps a threaded OpenBLAS to one thread in this process: callers parallelise over whole problems, and the solver's
-/// bits stay the same for any number of them.
+/// Restricts a threaded OpenBLAS to one thread in this process. Callers parallelise over whole problems, and the
+/// solver's results are then bit-identical for any number of threads.
 void use_one_blas_thread();
 
-/// Lets the process keep what it frees, up to a quarter of a gigabyte: matrices of a few hundred kilobytes that come
-/// and go would otherwise be handed back to the system and zeroed again each time. Nothing where the C library has no
-/// such switch.
+/// Lets the allocator keep freed memory, up to a quarter of a gigabyte. Otherwise temporary matrices of a few hundred
+/// kilobytes would be returned to the system and zeroed again each time. No effect if the C library has no such option.
 void keep_freed_memory();
 
 /// C += A B.
@@ -30,27 +29,27 @@ void add_product_transposed(Eigen::Ref<Eigen::MatrixXd> c, const Eigen::Ref<cons
 void add_transposed_product(Eigen::Ref<Eigen::MatrixXd> c, const Eigen::Ref<const Eigen::MatrixXd>& a,
                             const Eigen::Ref<const Eigen::MatrixXd>& b);
 
-/// C += factor A A', its lower triangle.
+/// C += factor A A', lower triangle only.
 void add_lower_gram(Eigen::Ref<Eigen::MatrixXd> c, double factor, const Eigen::Ref<const Eigen::MatrixXd>& a);
 
-/// C += A' B for symmetric C and A' B, of which half is computed.
+/// C += A' B for symmetric C and A' B; computes only half of the product.
 void add_symmetric_product_transposed(Eigen::Ref<Eigen::MatrixXd> c,
                                       const Eigen::Ref<const Eigen::MatrixXd>& a,
                                       const Eigen::Ref<const Eigen::MatrixXd>& b);
 
-/// L with X = L L' for a symmetric X (its lower triangle is read), zeros above the diagonal. Empty if the
-/// factorisation breaks down, so X is not safely positive definite.
+/// Returns L with X = L L' for a symmetric X (its lower triangle is read), with zeros above the diagonal; an empty
+/// matrix if the factorisation breaks down, which means that X is not safely positive definite.
 Eigen::MatrixXd cholesky(const Eigen::MatrixXd& x);
 
-/// The same in place; what is above the diagonal stays. False if the factorisation breaks down.
+/// The same in place; entries above the diagonal are unchanged. Returns false if the factorisation breaks down.
 bool cholesky_in_place(Eigen::Ref<Eigen::MatrixXd> x);
 
-/// X^-1 for X = L L'. Halves recursively, so that nearly all work is products of matrices.
+/// Returns X^-1 for X = L L'. Recursive bisection, so that nearly all work is matrix products.
 Eigen::MatrixXd inverse_from_cholesky(const Eigen::MatrixXd& l);
 /// The same in place.
 void invert_from_cholesky(Eigen::Ref<Eigen::MatrixXd> l);
 
-/// L^-1 D L^-T v, symmetric D (its lower triangle is read).
+/// Returns L^-1 D L^-T v for symmetric D (its lower triangle is read).
 Eigen::VectorXd congruence_times(const Eigen::MatrixXd& l, const Eigen::MatrixXd& d,
                                  const Eigen::VectorXd& v);
 
@@ -65,12 +64,12 @@ void divide_by_lower_transposed(Eigen::Ref<Eigen::MatrixXd> x, const Eigen::Ref<
 /// Solves L L' v = b in place.
 void solve_cholesky(const Eigen::MatrixXd& l, Eigen::VectorXd& b);
 
-/// y += factor X v, symmetric X (its lower triangle is read).
+/// y += factor X v for symmetric X (its lower triangle is read).
 void add_symmetric_product(Eigen::VectorXd& y, double factor, const Eigen::MatrixXd& x,
                            const Eigen::VectorXd& v);
 
-/// Largest eigenvalue of a symmetric positive semidefinite matrix (its lower triangle is read), an estimate to about
-/// twelve digits; at least 0.
+/// Returns an estimate of the largest eigenvalue of a symmetric positive semidefinite matrix (its lower triangle is
+/// read), to about twelve digits; at least 0.
 double largest_eigenvalue(const Eigen::MatrixXd& m);
 
 }  // namespace swarmcert::lipschitz

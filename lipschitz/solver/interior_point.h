@@ -1,4 +1,4 @@
-/// @file A primal-dual interior point method for matrix inequalities whose constraints have rank two.
+/// @file A primal-dual interior-point method for matrix inequalities whose constraint matrices have rank two.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,39 +20,41 @@ class RankTwoInequality {
   virtual Eigen::Index inputs() const = 0;  ///< rows that A_0 touches, the first ones
   Eigen::Index neurons() const { return size() - inputs(); }
 
-  /// First index of each block in which S is block tridiagonal, and its size at the end; two entries: S is dense.
+  /// Returns the first index of each block of the block tridiagonal S, followed by the size of S; two entries mean that
+  /// S is dense.
   virtual std::vector<Eigen::Index> slack_blocks() const { return {0, size()}; }
 
-  /// Sum_j y_j A_j.
+  /// Returns sum_j y_j A_j.
   virtual Eigen::MatrixXd linear(const Eigen::VectorXd& y) const = 0;
-  /// S(y).
+  /// Returns S(y).
   virtual Eigen::MatrixXd slack(const Eigen::VectorXd& y) const = 0;
-  /// X A, where column i of A is a_i; X is [rows x size].
+  /// Returns X A, where column i of A is a_i; X is [rows x size].
   virtual Eigen::MatrixXd times_a(const Eigen::MatrixXd& x) const = 0;
-  /// A' X.
+  /// Returns A' X.
   virtual Eigen::MatrixXd a_transposed_times(const Eigen::MatrixXd& x) const = 0;
-  /// X D for D with the pattern of S.
+  /// Returns X D for D with the sparsity pattern of S.
   virtual Eigen::MatrixXd times_patterned(const Eigen::MatrixXd& x, const Eigen::MatrixXd& d) const = 0;
 };
 
 struct InteriorPointOptions {
-  double relative_gap = 2e-8;   ///< stop when y_0 is within this of the optimum, as far as mu tells,
-  double infeasibility = 1e-7;  ///< and the dual constraints hold this well
+  double relative_gap =
+      2e-8;  ///< stop when the relative distance to the optimum, judged by mu, is below this
+  double infeasibility = 1e-7;  ///< and the dual constraints are satisfied to this accuracy
   int max_iterations = 80;
-  Stop stop;  ///< looked at several times per iteration
+  Stop stop;  ///< checked several times per iteration
 };
 
-/// Why a search stopped. Every stop leaves usable points; only kGapReached says they are near the optimum.
+/// Why a search stopped. The points are usable in every case; only kGapReached means that they are near the optimum.
 enum class LipSdpStop { kNothingRun, kGapReached, kIterationLimit, kNumericalLimit, kCancelled, kTimeLimit };
 
 /// "gap reached", ...
 const char* name(LipSdpStop stop);
-/// Whether the search would have gone on.
+/// Returns whether the search was stopped from outside and would have continued.
 constexpr bool is_interrupted(LipSdpStop stop) {
   return stop == LipSdpStop::kCancelled || stop == LipSdpStop::kTimeLimit;
 }
 
-/// Why a search has to end now, if it has to.
+/// Returns why a search must end now, or nothing if it may continue.
 std::optional<LipSdpStop> why_stopped(const Stop& stop);
 
 struct InteriorPointResult {
@@ -60,18 +62,18 @@ struct InteriorPointResult {
   int iterations = 0;
   std::vector<Eigen::VectorXd>
       points;  ///< strictly feasible in floating point, best last; the first is the start
-  /// (y_0 - dual objective) / y_0 of the iterate from which each point was reached; infinity for the first
+  /// (y_0 - dual objective) / y_0 of the iterate from which each point was reached; infinity for the first.
   std::vector<double> gaps;
-  double best_dual = 0;  ///< below the optimum, up to floating point
+  double best_dual = 0;  ///< best dual objective: a lower bound on the optimum, up to round-off
 };
 
 /// Minimises y_0 subject to S(y) >= 0.
 ///
-/// HKM direction with Mehrotra's predictor and corrector (Helmberg et al. 1996; Kojima et al. 1997; Monteiro 1997).
-/// Each constraint matrix has rank two, so the Schur complement costs a few products of n x n matrices instead of
-/// one per pair of constraints. S is recomputed from y in each iteration: every iterate is feasible.
-/// @param start strictly feasible, S(start) > 0, and well inside, or progress is slow.
-/// @returns floating point estimates without a guarantee: verify them.
+/// Uses the HKM direction with Mehrotra's predictor-corrector (Helmberg et al. 1996; Kojima et al. 1997; Monteiro
+/// 1997). Each constraint matrix has rank two, so the Schur complement costs a few products of n x n matrices instead
+/// of one per pair of constraints. S is recomputed from y in each iteration, so every iterate is feasible.
+/// @param start strictly feasible, S(start) > 0; progress is slow if it is close to the boundary.
+/// @returns floating-point estimates without a guarantee: verify them.
 InteriorPointResult minimise(const RankTwoInequality& inequality, const Eigen::VectorXd& start,
                              const InteriorPointOptions& options);
 

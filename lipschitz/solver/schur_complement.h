@@ -7,12 +7,12 @@
 
 namespace swarmcert::lipschitz {
 
-/// (<A_j, X>)_j for symmetric X, given X A (see RankTwoInequality::times_a).
+/// Returns the vector of <A_j, X> for symmetric X, given X A (see RankTwoInequality::times_a).
 Eigen::VectorXd functionals(const RankTwoInequality& it, const Eigen::MatrixXd& x,
                             const Eigen::MatrixXd& x_a);
 
-/// M_ij = <A_i, Z A_j Y> for symmetric Z and Y, given Z A and Y A. Each A_j has rank two, so that this costs a few
-/// products of matrices instead of one per pair of constraints.
+/// Returns M_ij = <A_i, Z A_j Y> for symmetric Z and Y, given Z A and Y A. Each A_j has rank two, so this costs a few
+/// matrix products instead of one per pair of constraints.
 Eigen::MatrixXd schur_complement(const RankTwoInequality& it, const Eigen::MatrixXd& z,
                                  const Eigen::MatrixXd& z_a, const Eigen::MatrixXd& y,
                                  const Eigen::MatrixXd& y_a);
@@ -21,7 +21,7 @@ Eigen::MatrixXd schur_complement(const RankTwoInequality& it, const Eigen::Matri
 class SchurSolver {
  public:
   explicit SchurSolver(const Eigen::MatrixXd& schur);
-  /// False where M is not positive definite in floating point, even regularised by 1e-7 of its diagonal.
+  /// Returns false if M is not positive definite in floating point, even after adding 1e-7 of its diagonal.
   bool good() const { return factor_.size() > 0 && scale_.allFinite(); }
   Eigen::VectorXd solve(const Eigen::VectorXd& rhs) const;
 

@@ -1,4 +1,4 @@
-/// @file A ReLU network above a function of a sum that is convex in the sum.
+/// @file A convex upper bound of rho, as a ReLU network.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,20 +8,20 @@
 
 namespace swarmcert::lipschitz {
 
-/// A network of one output, r(n phi(x)) for x of a box, where r is convex and r(s) >= direction rho(s) for every s.
-/// What n neighbours give is then bounded by one alone:
+/// Returns the network r(n phi(x)) with one output for x in a box, where r is convex and r(s) >= direction rho(s) for
+/// every s. The output for n neighbours is then bounded by that for n equal neighbours:
 ///   direction rho(sum_j phi(x_j)) <= r(mean_j n phi(x_j)) <= max_j r(n phi(x_j)),   j = 1 .. n.
 ///
-/// Each neuron z of rho has a convex function U above it and a convex one -L above -z. Where relu(z) counts positively,
-/// relu(U) is above it, convex since relu is and does not fall; where it counts negatively, -relu(z) <= -below z <=
-/// -below L, with `below` 0 or 1. U and L follow layer by layer. r is direction rho itself at every s where each neuron
-/// is on if its `below` is 1, and off if it is 0: at `touched`.
+/// Each neuron z of rho has a convex upper bound U and a convex upper bound -L of -z, computed layer by layer. If
+/// relu(z) has a positive weight, it is replaced by relu(U), which is convex because relu is convex and nondecreasing.
+/// If it has a negative weight, -relu(z) <= -below z <= -below L, with `below` 0 or 1. r equals direction rho at every
+/// s at which each neuron is on if its `below` is 1 and off if it is 0; `below` is chosen such that `touched` is one.
 ///
-/// L, which passes layers without a ReLU, is shifted so far that it is positive on the box. Rounding of shifts and of
-/// n W goes into bias_radius.
+/// L passes layers without a ReLU; it is shifted such that it is positive on the box. Round-off errors of the shifts
+/// and of n W are included in bias_radius.
 /// @param phi its last layer has no ReLU.
 /// @param direction 1 or -1 for one output, 0 for the others.
-/// @param touched [outputs of phi], a sum where r should be tight.
+/// @param touched [outputs of phi], a sum at which r should be tight.
 ReachNetwork convex_majorant(const ReachNetwork& phi, const Box& box, int n, const ReachNetwork& rho,
                              const Eigen::RowVectorXd& direction, const Eigen::VectorXd& touched);
 

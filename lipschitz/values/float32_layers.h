@@ -1,4 +1,4 @@
-/// @file What float32 arithmetic does to the layers of a ReLU network, and how much of it reaches the outputs. Not for
+/// @file Round-off errors of the layers of a ReLU network in float32, and their propagation to the outputs. Not for
 /// users.
 #pragma once
 
@@ -10,35 +10,38 @@
 
 namespace swarmcert::lipschitz {
 
-/// u: a sum or a product in float32 is off by at most this share of itself.
+/// Unit round-off u: the relative error of a sum or a product in float32.
 inline constexpr double kFloatUnit = 0x1p-24;
 
-/// How far fl(W h + b) in the order of nn/dense_layer.h is at most from W h + b, entry by entry, for any float32 h with
-/// lower <= h <= upper; infinite where it might overflow.
+/// Returns a bound, entry by entry, on |fl(W h + b) - (W h + b)| in the order of summation of nn/dense_layer.h, for any
+/// float32 h with lower <= h <= upper; infinite if it might overflow.
 ///
-/// The sum starts from b; each product is rounded, off by at most u |w_j h_j| + 2^-150, and so is each sum, off by at
-/// most u times its size, u = 2^-24. The size of a partial sum comes from the interval of its exact value and from what
-/// was off before. A product with h_j = 0 is exact, and so is its addition. Fused products round less often.
-/// @param forms where h lies as well, so that partial sums lie in the intervals of their own forms; null: nowhere else.
+/// The sum starts from b. Each product has an error of at most u |w_j h_j| + 2^-150 and each sum an error of at most u
+/// times its magnitude, u = 2^-24. The magnitude of a partial sum is bounded by the interval of its exact value and by
+/// the errors so far. A product with h_j = 0 and its addition are exact. Fused multiply-adds round less often.
+/// @param forms affine forms that also enclose h, which give tighter intervals of the partial sums; null: none.
 Eigen::VectorXd layer_rounding(const ReachLayer& layer, const Eigen::VectorXd& lower,
                                const Eigen::VectorXd& upper, const AffineForms* forms = nullptr);
 
 /// Errors of a float32 evaluation over a part of the box, entry by entry and layer by layer.
 struct LayerErrors {
-  std::vector<Eigen::VectorXd> made;   ///< of y_k by itself: what the layer's own rounding adds
-  std::vector<Eigen::VectorXd> total;  ///< of y_k: with what the layers before got wrong
+  std::vector<Eigen::VectorXd> made;   ///< error of y_k from the round-off of layer k alone
+  std::vector<Eigen::VectorXd> total;  ///< error of y_k including the errors of previous layers
 };
 
-/// With affine forms a layer costs about as much as intervals times the number of inputs: not used above this number.
+/// Largest number of inputs for which affine forms are used: a layer costs about this many times as much as with
+/// intervals.
 inline constexpr Eigen::Index kMostFormInputs = 32;
 
-/// Values lie in their bounds and, with at most kMostFormInputs inputs, in affine forms.
-/// @param before the error of what the first layer takes in.
+/// Returns the errors of all layers. Values are enclosed by their bounds and, for at most kMostFormInputs inputs, by
+/// affine forms.
+/// @param before the error of the inputs of the first layer.
 LayerErrors layer_errors(const ReachNetwork& chain, const Reach& reach, const Eigen::VectorXd& before);
 
-/// At least |d y_K / d y_k|, entry by entry [outputs x neurons], for each k: by interval arithmetic backwards through
-/// neurons whose y is anywhere within `reach` and `errors`. A change of y_k within the errors changes the output,
-/// through exact layers, by at most this matrix times its size: its derivative along the way is within these bounds.
+/// Returns for each k an upper bound on |d y_K / d y_k|, entry by entry [outputs x neurons]: by backward interval
+/// arithmetic through neurons whose y is anywhere within `reach` and `errors`. A change of y_k within the errors
+/// changes the output of the exact layers by at most this matrix times the change, because the derivative along the
+/// segment is within these bounds.
 std::vector<Eigen::MatrixXd> sensitivities(const ReachNetwork& chain, const Reach& reach,
                                            const LayerErrors& errors);
 

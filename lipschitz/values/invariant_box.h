@@ -1,4 +1,4 @@
-/// @file Boxes of rotation invariants that hold those of a box of states.
+/// @file Boxes of rotation invariants that enclose the invariants of a box of states.
 #pragma once
 
 #include <map>
@@ -8,12 +8,11 @@
 
 namespace swarmcert::lipschitz {
 
-/// Where the invariants lie that phi sees of states in a box (nn/invariants.h), each by itself: exact bounds, rounded
-/// outwards.
-/// @param part  "phi:<kind>"; states of "phi:ground" are the vehicle's own, of others those of a neighbour.
+/// Returns the range of each invariant (nn/invariants.h) over a box of states: exact bounds, rounded outwards.
+/// @param part  "phi:<kind>"; for "phi:ground", states are those of the vehicle, otherwise those of a neighbour.
 Box invariant_box(const files::FunctionId& part, const Box& states);
 
-/// Of every part.
+/// Returns the invariant boxes of all parts.
 Domain invariant_boxes(const Domain& states);
 
 }  // namespace swarmcert::lipschitz

@@ -1,4 +1,4 @@
-/// @file Linear forms of neurons pulled back through ReLUs. Not for users.
+/// @file Backward substitution of linear forms through ReLUs. Not for users.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,27 +6,29 @@
 
 namespace swarmcert::lipschitz {
 
-/// What becomes of a form lambda h, h = relu(y), over y of a box: per neuron the lines below y <= relu(y) <= slope y +
-/// offset, then the terms of y = W h' + b.
+/// Data to substitute a form lambda h, h = relu(y), over a box: for each neuron the lines
+/// below y <= relu(y) <= slope y + offset, and the constants of y = W h' + b.
 struct ReluLines {
   std::vector<Eigen::Index>
-      neurons;  ///< those that are not off, in order; the vectors have one entry for each
+      neurons;  ///< neurons that are not off, in order; the vectors have one entry for each
   Eigen::VectorXd slope, offset, below;
-  Eigen::VectorXd line_error;         ///< what rounding costs per unit of lambda where the upper line is used
-  Eigen::VectorXd bias, layer_error;  ///< b, and what rounding and a radius of b cost per unit of |lambda|
+  Eigen::VectorXd line_error;  ///< round-off error per unit of lambda if the upper line is used
+  Eigen::VectorXd bias,
+      layer_error;  ///< b, and the error per unit of |lambda| from round-off and the radius of b
 };
 
-/// Layers without the neurons that are off.
+/// Layers restricted to the neurons that are not off.
 struct ActiveLayers {
   std::vector<ReluLines> lines;
   std::vector<Eigen::MatrixXd>
-      weights;  ///< [lines[j].neurons x lines[j - 1].neurons], of layer 0 [.. x inputs]
+      weights;  ///< [lines[j].neurons x lines[j - 1].neurons], for layer 0 [.. x inputs]
 };
 
-/// Replaces each form, a row of `lambda` [forms x lines.neurons], by one above it in y, and adds what it leaves behind:
+/// Replaces each form, a row of `lambda` [forms x lines.neurons], by an upper bound in y, and adds the remaining
+/// constant and error terms:
 ///   v > 0: constants += v offset, error += v line_error, v' = slope v;   v <= 0: v' = below v;
 ///   constants += v' bias, error += |v'| layer_error.
-/// @param below if not null, in place of lines.below: [forms x neurons], those that `lines` has among others.
+/// @param below if not null, replaces lines.below: [forms x neurons] for all neurons, of which lines.neurons are used.
 void pull_back(const ReluLines& lines, const Eigen::MatrixXd* below, Eigen::MatrixXd& lambda,
                Eigen::VectorXd& constants, Eigen::VectorXd& error);
 

@@ -1,4 +1,4 @@
-/// @file Points where a function of sums is large: a search that proves nothing.
+/// @file Heuristic search for points where a function of sums is large. It proves nothing.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,17 +9,17 @@
 
 namespace swarmcert::lipschitz {
 
-/// Some inputs of one network, all in one place of its box.
+/// A number of equal inputs of one network.
 struct PlacedTerm {
   const ReachNetwork* network;
   const Box* box;
   int count;
 };
 
-/// About where direction rho(sum_k count_k phi_k(x_k)) is largest, x_k in its box: the best of random points and of
-/// `starts`, and random steps from there that shrink. The same for the same arguments.
+/// Returns points x_k in their boxes at which direction rho(sum_k count_k phi_k(x_k)) is about largest: starts at the
+/// best of random points and of `starts` and takes random steps of decreasing size. Deterministic.
 /// @param rho empty: the identity.
-/// @param starts one x_k per term each.
+/// @param starts each with one x_k per term.
 std::vector<Eigen::VectorXd> climb(const std::vector<PlacedTerm>& terms, const ReachNetwork& rho,
                                    const Eigen::RowVectorXd& direction,
                                    const std::vector<std::vector<Eigen::VectorXd>>& starts);

@@ -1,4 +1,4 @@
-/// @file Largest values of linear forms over the sums that enter rho.
+/// @file Maxima of linear forms over the sums that enter rho.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,10 +8,10 @@
 
 namespace swarmcert::lipschitz {
 
-/// Sums s = sum_k sum_j phi_k(x_kj) of outputs of several networks, of network k as many as its `count`, each input
+/// The sums s = sum_k sum_j phi_k(x_kj) of outputs of several networks, with `count` terms of network k, each input
 /// anywhere in its box:
-///   max c s + d = sum_k count_k max_x c phi_k(x) + d,
-/// each maximum by branch and bound over the box of one input: its cost does not grow with the counts.
+///   max c s + d = sum_k count_k max_x c phi_k(x) + d.
+/// Each maximum is computed by branch and bound over the box of one input, so the cost does not grow with the counts.
 struct SumSupport {
   struct Term {
     PartTree* tree;
@@ -21,15 +21,15 @@ struct SumSupport {
   Eigen::Index size = 0;  ///< outputs of each network
   PartSearch search;
 
-  /// The box of these sums, rounded outwards.
+  /// Returns the bounding box of these sums, rounded outwards.
   Bounds bounds() const;
-  /// At least the largest value of each form.
+  /// Returns an upper bound on the largest value of each form.
   Eigen::VectorXd operator()(const LinearForms& forms) const;
-  /// About where the one form is largest: an input for each term.
+  /// Returns one input per term at which the form is about largest.
   std::vector<Eigen::VectorXd> steepest(const Eigen::RowVectorXd& form) const;
 };
 
-/// Adds `count` numbers `term` and `constant`, rounded up for every order of summation.
+/// Returns `constant` plus `count` times `term`, rounded up such that it bounds the sum in every order of summation.
 double sum_rounded_up(double constant, int count, double term);
 
 }  // namespace swarmcert::lipschitz
