@@ -16,7 +16,7 @@ Json hex_floats(const std::vector<double>& values) {
   return array;
 }
 
-/// One text: a tree has more numbers than a document should have nodes.
+/// Joins numbers into one string, because a JSON document should not have a node for each number of a tree.
 std::string joined(const std::vector<double>& values) {
   std::string text;
   for (const double value : values) text += (text.empty() ? "" : " ") + hex_float(value);
@@ -27,7 +27,7 @@ Json hex_floats(const std::vector<float>& values) {
   return hex_floats(std::vector<double>(values.begin(), values.end()));
 }
 
-/// Null where the checker finds the factor itself.
+/// Returns null if the checker is to compute the factor itself.
 Json factor_json(const std::optional<check::Factor>& found) {
   if (!found) return nullptr;
   const check::Factor& factor = *found;
@@ -154,7 +154,7 @@ Json vector_json(const VectorBounds& bounds) {
           {"error", bounds.error.empty() ? Json() : Json(joined(bounds.error))}};
 }
 
-/// A number in both notations, or null twice.
+/// Stores a number in decimal and in hex, or null for both.
 void set_number(Json& json, const std::string& name, const std::optional<double>& number) {
   json[name] = number ? Json(*number) : Json();
   json[name + "_hex"] = number ? Json(hex_float(*number)) : Json();

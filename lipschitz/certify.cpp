@@ -26,7 +26,8 @@ check::Dyadic power(double base, std::size_t exponent) {
   return result;
 }
 
-/// Bounds on a box are of relative states; branch and bound is for ReLU as well. @throws std::invalid_argument.
+/// Requires that bounds on a box are about relative states, and that branch and bound is used for ReLU only.
+/// @throws std::invalid_argument otherwise.
 void require_what_is_bounded(const Network& network, const files::Parts& parts,
                              const CertifyOptions& options) {
   if (options.domain.empty() && options.method != UpperMethod::kBranch) return;
@@ -41,13 +42,13 @@ void require_what_is_bounded(const Network& network, const files::Parts& parts,
   }
 }
 
-/// The largest slopes of what lies between the layers of `weights`; nothing where they are 1.
+/// Appends the largest activation slopes of `weights` that differ from 1.
 void add_steepest_slopes(const Weights& weights, std::vector<UpperBound>& factors) {
   for (const double steepest : weights.steepest_slopes())
     if (steepest != 1) factors.emplace_back(steepest);
 }
 
-/// The law's bound from those of its terms, and whether one of them was cut short.
+/// Sets the law's bound from the bounds of its terms, and whether one of them was interrupted.
 void settle(const Network& network, const std::vector<CertifiedBound>& bounds, CertifiedLaw& law) {
   Neighbours neighbours = law.neighbours;
   if (network.phi.count(files::kGroundKind) == 1) neighbours[files::kGroundKind] = 1;
@@ -121,7 +122,7 @@ const char* name(UpperMethod method) {
 
 namespace {
 
-/// The claims that the options ask for, without numbers yet.
+/// Adds the claims requested by the options, without bounds.
 void add_claims(const Network& network, const CertifyOptions& options, Certification& result) {
   ClaimOptions wanted = options;
   wanted.counted = options.method == UpperMethod::kBranch;
@@ -163,8 +164,8 @@ void judge_gamma(const files::Parts& parts, Certification& result) {
   }
 }
 
-/// The product of norms, of the slope of the map to invariants, of the scale and of the steepest slopes between the
-/// layers: the first upper bound.
+/// Sets the first upper bound: the product of the norms, the Lipschitz constant of the map to invariants, the scale and
+/// the steepest activation slopes.
 void multiply_norms(const Network& network, const files::Parts& parts,
                     const std::vector<CertifiedLayer>& layers, CertifiedBound& bound) {
   std::vector<UpperBound> norms;

@@ -15,9 +15,8 @@ namespace {
 
 using files::Network;
 
-/// Of the time of a command, what the bounds for all inputs may take where branch and bound follows; and of the time of
-/// one bound by branch and bound, what the search of boxes may take: its proof is checked afterwards, and lower bounds
-/// are searched once more.
+/// Share of the total time for the bounds over all inputs if branch and bound follows; and share of the time of one
+/// branch-and-bound task for the search itself, after which the proof is checked and lower bounds are searched again.
 constexpr double kShareBeforeBranch = 0.3, kShareOfBoxes = 0.6;
 
 std::string called(const CertifiedBound& bound) {
@@ -33,7 +32,7 @@ bool is_branched(const CertifyOptions& options, const CertifiedBound& bound) {
   return options.method == UpperMethod::kBranch && !bound.function.is_rho() && bound.is_relu;
 }
 
-/// The sooner of a limit of its own, 0: none, and a stop, in seconds; 0: no limit.
+/// Returns the smaller of `own` (0: none) and the time until `stop`, in seconds; 0: no limit.
 double seconds_until(const Stop& stop, double own) {
   if (!stop.has_limit()) return own;
   const double left = std::max(stop.seconds_left(), Stop::kLeast_s);
@@ -42,7 +41,7 @@ double seconds_until(const Stop& stop, double own) {
 
 void bound_layer_by_layer(const Network& network, CertifiedBound& bound) {
   const std::vector<check::Matrix> stages = check::stages(network, bound.function, bound.block, bound.scale);
-  if (stages.size() == 1) return;  // the spectral norm is proved as quickly by sdp_bound()
+  if (stages.size() == 1) return;  // sdp_bound() proves the spectral norm just as fast
   std::optional<UpperProof> proof = eclipse_fast(stages);
   if (!proof || !(proof->upper.value() < bound.upper.value())) return;
   bound.upper = proof->upper;
@@ -65,12 +64,12 @@ void solve_program(const Network& network, const CertifyOptions& options, const 
   bound.sdp.proof.reset();
 }
 
-/// Of the inputs that the bound is about, as they leave the clamp.
+/// Returns the box of the inputs of the bound, after the clamp.
 Box box_of(const Network& network, const CertifyOptions& options, const CertifiedBound& bound) {
   return clamped(network, options.domain).at(bound.function.input_part());
 }
 
-/// The product, with the steepest slopes on the box in place of those of all inputs.
+/// Improves the bound by the product with the steepest activation slopes on the box.
 void multiply_local_slopes(const Network& network, const check::Intervals& box,
                            const std::vector<CertifiedLayer>& layers, CertifiedBound& bound) {
   const std::vector<files::FunctionId> names = bound.function.parts();
@@ -106,7 +105,7 @@ void search_below(const Network& network, const CertifyOptions& options, const S
   bound.lower.interrupted = interrupted;
 }
 
-/// What is proved for any number of neighbours holds for so many.
+/// Initialises the bound for a given number of neighbours with the one proved for any number.
 void start_from_any_number(const std::vector<CertifiedBound>& bounds, CertifiedBound& counted) {
   const auto any = std::find_if(bounds.begin(), bounds.end(), [&](const CertifiedBound& bound) {
     return bound.function == counted.function && bound.block == counted.block && bound.neighbours.empty() &&
@@ -119,7 +118,7 @@ void start_from_any_number(const std::vector<CertifiedBound>& bounds, CertifiedB
   counted.sdp = any->sdp;
 }
 
-/// Replaces the bound for all inputs by a smaller one for the box, where there is one.
+/// Replaces the bound for all inputs by a smaller one for the box, if branch and bound finds one.
 void branch_further(const Network& network, const Domain& domain, const CertifyOptions& options,
                     const Stop& stop, CertifiedBound& bound) {
   BranchOptions branch = options.branch;
@@ -146,11 +145,11 @@ void branch_further(const Network& network, const Domain& domain, const CertifyO
   bound.upper = local.upper;
   bound.method = UpperMethod::kBranch;
   bound.local = std::move(local.proof);
-  if (bound.proof) bound.sdp.proof = std::move(bound.proof);  // where others may start from
+  if (bound.proof) bound.sdp.proof = std::move(bound.proof);  // other searches may start from its multipliers
   bound.proof.reset();
 }
 
-/// Branch and bound for those of `bounds` that it is wanted for; those of any number of neighbours first.
+/// Runs branch and bound for all `bounds` that request it, those for any number of neighbours first.
 void branch_all(const Network& network, const CertifyOptions& options, const Stop& stop,
                 WorkProgress& progress, std::vector<CertifiedBound>& bounds) {
   const Domain domain = clamped(network, options.domain);
@@ -205,7 +204,7 @@ void find_bounds(const Network& network, const CertifyOptions& options, const St
     });
   });
 
-  // Programs and searches are one flat list of independent pieces.
+  // Semidefinite programs and lower-bound searches form one flat list of independent tasks.
   const bool branches = options.method == UpperMethod::kBranch;
   TimeShares shares(branches ? stop.after_share(kShareBeforeBranch) : stop, 2 * count, options.jobs);
   files::parallel_for(2 * count, options.jobs, [&](int i) {

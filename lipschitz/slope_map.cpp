@@ -14,10 +14,10 @@
 namespace swarmcert::lipschitz {
 namespace {
 
-/// Branch and bound need not come closer than this to a slope that is attained, relatively, and the search for
-/// multipliers not closer to the least square of a bound.
+/// Relative distance to an attained slope at which branch and bound stops, and relative gap (of the squared bound) at
+/// which the search for multipliers stops.
 constexpr double kTolerance = 0.01;
-/// Linear regions that a round of the search for steep points enters.
+/// Linear regions entered per round of the lower-bound search.
 constexpr int kRegions = 15;
 
 bool has_map(const files::Network& network, const CertifiedBound& bound) {
@@ -33,7 +33,7 @@ int moving_inputs(const files::Network& network) {
   throw std::invalid_argument("slope map: the network has no part whose input moves");
 }
 
-/// The end of the i-th of n intervals; the outer ends are exactly those of the box.
+/// Returns boundary i, 0 <= i <= n, of n equal intervals; the outer boundaries are exactly those of the box.
 double edge(const Box& box, std::size_t k, int i, int n) {
   if (i == 0) return box.lower[k];
   if (i == n) return box.upper[k];
@@ -51,7 +51,7 @@ Box cell_box(Box box, const SlopeMapOptions& options, int index) {
   return box;
 }
 
-/// Where a search found f steep, as LowerBoundOptions::places takes it.
+/// Appends the points of a witness in the form of LowerBoundOptions::places.
 void add_place(const FoundSlope& found, std::vector<Eigen::VectorXd>& places) {
   if (!found.witness) return;
   std::vector<float> all = found.witness->x;
@@ -61,7 +61,7 @@ void add_place(const FoundSlope& found, std::vector<Eigen::VectorXd>& places) {
       Eigen::Map<const Eigen::VectorXf>(all.data(), static_cast<Eigen::Index>(all.size())).cast<double>());
 }
 
-/// One function's cells, which share what is computed once.
+/// Computes the cells of one function. Data that the cells share are computed once.
 class Cells {
  public:
   Cells(const files::Network& network, const Certification& found, const CertifiedBound& everywhere,
@@ -75,7 +75,8 @@ class Cells {
     if (everywhere.is_relu) bounds_.emplace(network, everywhere, multipliers(everywhere));
   }
 
-  /// @param before the cell beside it, or null: where that one is steep, this one may be.
+  /// Bounds the slope in a cell.
+  /// @param before the adjacent cell or null; points where it is steep are starting points for this cell.
   void look_at(SlopeCell& cell, const SlopeCell* before) const {
     if (options_.cancelled != nullptr && *options_.cancelled) return;
     LowerBoundOptions lower;
@@ -133,7 +134,7 @@ class Cells {
   const std::vector<CertifiedLayer>& layers_;
   const CertifiedBound& everywhere_;
   Claim claim_;
-  std::optional<LocalBounds> bounds_;  ///< of ReLU networks
+  std::optional<LocalBounds> bounds_;  ///< for ReLU networks only
 };
 
 }  // namespace
@@ -171,7 +172,7 @@ std::vector<SlopeMap> slope_maps(const files::Network& network, const Certificat
     for (int i = 0; i < options.cells[0] * options.cells[1]; ++i)
       maps.back().cells.push_back({cell_box(box, options, i), bound.upper, false, UpperMethod::kBranch, {}});
   }
-  // A row from one end to the other, rows at once.
+  // The cells of a row are processed in order, rows in parallel.
   const int rows = options.cells[0], columns = options.cells[1];
   const int total = rows * columns * static_cast<int>(maps.size());
   int done = 0;

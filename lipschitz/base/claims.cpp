@@ -19,13 +19,13 @@ bool contains(const std::vector<std::string>& list, const std::string& text) {
 /// Whether `function` takes inputs of NET rather than hidden values.
 bool takes_inputs(const files::FunctionId& function) { return !function.is_rho(); }
 
-/// Whether there are claims of `function` with weights of its inputs.
+/// Whether there are claims about `function` in a weighted norm of its inputs.
 bool takes_scale(const files::Network& network, const files::FunctionId& function, std::size_t scales) {
   return takes_inputs(function) && !files::maps_to_invariants(network, function) &&
          static_cast<std::size_t>(files::inputs(network, function)) == scales;
 }
 
-/// The groups of neighbours that the options name.
+/// Returns the groups of neighbours named by the options.
 std::vector<Neighbours> groups(const files::Network& network, const ClaimOptions& options) {
   std::vector<Neighbours> result;
   for (const auto& [kind, phi] : network.phi) {
@@ -40,7 +40,8 @@ std::vector<Neighbours> groups(const files::Network& network, const ClaimOptions
   return result;
 }
 
-/// Claims that hold for a group of neighbours only: of the set functions whose moving term is in it, or the ground's.
+/// Adds claims for given groups of neighbours: for each group, those of the set functions whose moving term belongs to
+/// the group or is the ground's.
 void add_counted(const files::Network& network, const ClaimOptions& options, std::vector<Claim>& claims) {
   for (const Neighbours& group : groups(network, options)) {
     for (const files::FunctionId& function : files::functions(network)) {
@@ -80,7 +81,8 @@ const char* name(LawKind law) {
 std::vector<Claim> claims(const files::Network& network, const ClaimOptions& options) {
   std::vector<Claim> result;
   std::vector<std::string> unused = options.blocks;
-  unused.erase(std::remove(unused.begin(), unused.end(), "every"), unused.end());  // which may be none
+  unused.erase(std::remove(unused.begin(), unused.end(), "every"),
+               unused.end());  // "every" may match no block
   bool scale_fits = options.scale.empty();
   for (const double scale : options.scale) {
     if (!(scale > 0) || std::isinf(scale)) throw std::invalid_argument("a scale must be positive");
@@ -112,7 +114,7 @@ std::vector<Claim> claims(const files::Network& network, const ClaimOptions& opt
 }
 
 std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptions& options) {
-  const std::vector<Neighbours> named = groups(network, options);  // which refuses, rho or not
+  const std::vector<Neighbours> named = groups(network, options);  // validates the options even without a rho
   std::vector<LawClaim> result;
   for (const auto& [rho, weights] : network.rho) {
     for (const Neighbours& group : named) {
@@ -145,7 +147,7 @@ Domain read_domain(const std::string& path, const files::Network& network) {
   for (const auto& [kind, phi] : network.phi) {
     if (kind != files::kGroundKind) inputs = static_cast<std::size_t>(phi.inputs());
   }
-  if (network.invariants) inputs = nn::kRelativeState;  // a box of states
+  if (network.invariants) inputs = nn::kRelativeState;  // the box is one of states
   if (inputs > 0) {
     const Box box = read_box(top, inputs);
     for (const auto& [kind, phi] : network.phi) domain[files::FunctionId::phi(kind)] = box;

@@ -12,7 +12,7 @@ using check::Dyadic;
 
 namespace {
 
-/// x = fraction * 2^exponent but for truncation, 1/2 <= |fraction| < 1.
+/// Returns fraction and exponent such that x = fraction * 2^exponent up to truncation, 1/2 <= |fraction| < 1.
 double fraction_of(const Dyadic& x, long* exponent) {
   const double fraction = mpz_get_d_2exp(exponent, x.mantissa.get_mpz_t());
   *exponent += x.exponent;
@@ -43,7 +43,8 @@ double sqrt_up(const Dyadic& square) {
   long exponent = 0;
   const double fraction = fraction_of(square, &exponent);
   const long odd =
-      exponent & 1;  // squares of tiny and of huge numbers are no doubles: the root takes half the exponent
+      exponent &
+      1;  // squares may leave the range of double, so half of the even exponent is applied to the root
   double root = scaled(std::sqrt(odd != 0 ? 2 * fraction : fraction), (exponent - odd) / 2);
   while (std::isfinite(root) && !is_enough(root)) root = up(root);
   while (std::isfinite(root) && is_enough(down(root))) root = down(root);

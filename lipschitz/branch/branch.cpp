@@ -14,21 +14,22 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// What the claimed rho is above the least one, relatively, so that the checker's rounding does not matter.
+/// Relative margin of the claimed rho above the least one, for the round-off of the checker.
 constexpr double kRhoMargin = 1e-8;
-/// A part gets multipliers of its own once its undecided neurons are fewer than this share of those for which the
-/// inherited ones were computed.
+/// A part gets its own multipliers once the number of its undecided neurons is below this share of the number for which
+/// the inherited ones were computed.
 constexpr double kLazy = 0.9;
-/// Or after so many halvings in a row that decided no neuron. Far from the origin of a projective cover neurons stay
-/// undecided that depend on s alone, since nothing reaches them there; they do no harm once their multipliers are
-/// large.
+/// Or after this many successive halvings that decided no neuron. Far from the origin of a projective cover, neurons
+/// that depend on s alone stay undecided, because no input reaches them; they do not affect the bound once their
+/// multipliers are large.
 constexpr int kInVain = 6;
-/// A search that ends with so few parts solves those that dominate, at most kPolished, this well and with kMostPairs.
+/// If a search ends with at most this many parts, at most kPolished dominating ones are solved again, with kFineSteps
+/// steps and up to kMostPairs pairs.
 constexpr std::size_t kFewParts = 64;
 constexpr int kPolished = 8;
 constexpr int kFineSteps = 20;
 constexpr std::size_t kMostPairs = 40;
-/// Points of the part that dominates where its slope is looked at.
+/// Number of points of the dominating part at which the slope is evaluated for the outlook.
 constexpr int kSamples = 500;
 
 }  // namespace
@@ -186,7 +187,8 @@ void BranchSearch::polish(std::priority_queue<Part>& queue) {
 
 namespace {
 
-/// A few parts, each solved in a few steps, may prove less than the boxes as they were given, solved well: then those.
+/// Runs the search. If it ends with few parts, also solves the given boxes accurately without halving them, which may
+/// prove a smaller bound than parts solved in a few steps, and returns the better result.
 BranchResult search(const LocalChain& chain, const SetChain* set, const std::vector<Box>& boxes,
                     const BranchOptions& options) {
   keep_freed_memory();

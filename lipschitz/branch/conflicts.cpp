@@ -9,7 +9,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// How far below zero a pair's sum has to stay, relatively, so that the checker sees it likewise.
+/// Relative margin by which the sum of a pair must be below zero, so that the checker comes to the same result.
 constexpr double kMargin = 1e-7;
 
 }  // namespace
@@ -62,8 +62,8 @@ std::vector<NeuronPair> NeuronForms::pairs(const std::vector<Index>& neurons) co
           if (!(u < 0 || v < 0)) continue;
           const auto p = slopes_[first_on ? 0 : 1].col(pair.first);
           const auto q = slopes_[second_on ? 0 : 1].col(pair.second);
-          if (!(p.dot(q) < 0)) continue;  // neither cancels the other
-          // Convex and piecewise linear in lambda: the least value is at a kink.
+          if (!(p.dot(q) < 0)) continue;  // the forms do not cancel
+          // The largest value is convex and piecewise linear in lambda, so its minimum is at a kink.
           double least = 0, best = -1;
           for (Index k = 0; k < p.size(); ++k) {
             if (!(p(k) * q(k) < 0)) continue;

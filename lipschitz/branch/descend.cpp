@@ -14,14 +14,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Weight of log det S_zz beside log det R: keeps S_zz away from singular, where R alone does not see it.
+/// Weight of log det S_zz relative to log det R. It keeps S_zz away from singularity, which log det R alone does not.
 constexpr double kInterior = 0.01;
-/// A step is shortened by this until the barrier falls: far from the optimum, where rho is nearly linear along t,
-/// Newton's step is far too long.
+/// A step is shortened by this factor until the barrier decreases: far from the optimum, where rho is nearly linear in
+/// t, the Newton step is much too long.
 constexpr double kShorten = 0.3;
 constexpr int kShortest = 12;
 
-/// The barrier's root rho for the eigenvalues g of rho I - R: sum 1 / (rho - g_k) = 1 / mu.
+/// Returns the rho that minimises the barrier for the eigenvalues g of rho I - R: sum 1 / (rho - g_k) = 1 / mu.
 double centred_rho(const VectorXd& g, double mu) {
   double low = g.maxCoeff() + mu, high = g.maxCoeff() + static_cast<double>(g.size()) * mu;
   for (int i = 0; i < 60 && low < high; ++i) {
@@ -33,9 +33,10 @@ double centred_rho(const VectorXd& g, double mu) {
 
 struct Point {
   VectorXd t;
-  MatrixXd factor;  ///< of S_zz, in the lower triangle; empty: not positive definite
-  MatrixXd half;    ///< factor^-1 S_zx
-  VectorXd g;       ///< eigenvalues of rho I - R, and their vectors
+  MatrixXd
+      factor;     ///< Cholesky factor of S_zz, in the lower triangle; empty if S_zz is not positive definite
+  MatrixXd half;  ///< factor^-1 S_zx
+  VectorXd g;     ///< eigenvalues of rho I - R; `vectors` are the eigenvectors
   MatrixXd vectors;
   double rho = 0, value = 0;
 
@@ -62,11 +63,11 @@ struct Point {
   bool good() const { return factor.size() > 0 && g.allFinite(); }
 };
 
-/// x' M y for the vectors x and y of all constraints, where constraint c subtracts t_c (p_c q_c' + q_c p_c').
+/// The products x' M y of the vectors p and q of all constraints; constraint c subtracts t_c (p_c q_c' + q_c p_c').
 struct Products {
   MatrixXd pp;  ///< p_c' M p_d, in the lower triangle
   MatrixXd qp;  ///< q_c' M p_d
-  MatrixXd pq;  ///< its transpose
+  MatrixXd pq;  ///< transpose of qp
   MatrixXd qq;  ///< q_c' M q_d
 
   /// M += U U', for p_c' U and q_c' U.
@@ -86,8 +87,8 @@ struct Products {
   }
 };
 
-/// What gradient and Hessian are made of: S^-1 = S_zz^-1 (padded) + P, P = U U' with U = W R^-1/2 and
-/// W = [I; -S_zz^-1 S_zx]. Of a neuron p = a_i and q = e_i; of a pair they are such of its two neurons.
+/// The products for gradient and Hessian: S^-1 = S_zz^-1 (padded) + P, P = U U' with U = W R^-1/2 and
+/// W = [I; -S_zz^-1 S_zx]. For a neuron, p = a_i and q = e_i; for a pair, p and q are a_i or e_i of its two neurons.
 struct Kernel {
   Products inverse;   ///< M = S_zz^-1
   MatrixXd u_p, u_q;  ///< p_c' U, q_c' U
@@ -109,7 +110,8 @@ struct Kernel {
     inverse.pq = inverse.qp.transpose();
     inverse.pp.resize(m, m);
     for (const NodeInequality::LayerBlock& block : inequality.blocks()) {
-      const Index past = block.first_neuron + block.neurons;  // columns that the lower triangle needs
+      const Index past =
+          block.first_neuron + block.neurons;  // number of columns needed for the lower triangle
       auto rows = inverse.pp.block(block.first_neuron, 0, block.neurons, past);
       rows = -inverse.qp.block(block.first_neuron, 0, block.neurons, past);
       const Index first = std::max(block.first_used - n0, Index{0}), used = block.past_used - n0 - first;
@@ -145,7 +147,7 @@ struct Kernel {
   }
 };
 
-/// Gradient and Hessian of the barrier in t, rho eliminated.
+/// Gradient and Hessian of the barrier with respect to t, with rho eliminated.
 struct Model {
   VectorXd gradient;
   MatrixXd hessian;  ///< in the lower triangle
@@ -154,9 +156,9 @@ struct Model {
     Kernel kernel(inequality, at);
     Products& products = kernel.inverse;
     gradient = 2 * (kernel.u_p.cwiseProduct(kernel.u_q).rowwise().sum() + kInterior * products.pq.diagonal());
-    // tr(X A_i Y A_j) = X_pp o Y_qq + X_qq o Y_pp + X_pq o Y_pq' + X_pq' o Y_pq. Log det R has X = P and
-    // Y = 2 S_zz^-1 + P, so twice what Z = S_zz^-1 + P has in place of both less what S_zz^-1 has; log det S_zz has
-    // kInterior times the latter.
+    // tr(X A_i Y A_j) = X_pp o Y_qq + X_qq o Y_pp + X_pq o Y_pq' + X_pq' o Y_pq. For log det R, X = P and
+    // Y = 2 S_zz^-1 + P. This equals the term with X = Y = S_zz^-1 + P minus the term with X = Y = S_zz^-1. The Hessian
+    // of log det S_zz is kInterior times the latter term.
     hessian = MatrixXd::Zero(gradient.size(), gradient.size());
     products.add_to(hessian, -2 * (1 - kInterior));
     products.add(kernel.u_p, kernel.u_q);
@@ -166,7 +168,8 @@ struct Model {
     hessian.selfadjointView<Eigen::Lower>().rankUpdate(edge, -1 / kernel.weights.squaredNorm());
   }
 
-  /// -H^-1 gradient; empty if H is not positive definite. `decrease`: of the quadratic model, twice.
+  /// Returns -H^-1 gradient, or an empty vector if H is not positive definite. Sets `decrease` to twice the decrease of
+  /// the quadratic model.
   VectorXd step(double& decrease) {
     const VectorXd scale = hessian.diagonal().cwiseSqrt().cwiseInverse();
     if (!scale.allFinite()) return {};
@@ -181,7 +184,7 @@ struct Model {
   }
 };
 
-/// mu for a relative gap at multipliers with the largest eigenvalue g.
+/// Returns mu for a relative gap at multipliers with the largest eigenvalue g.
 double barrier_weight(const NodeInequality& inequality, double g, double relative_gap) {
   return relative_gap * g /
          (static_cast<double>(inequality.inputs()) + kInterior * static_cast<double>(inequality.neurons()));

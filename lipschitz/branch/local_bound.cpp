@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::Index;
 
-/// A constant function has no slope, a proof needs rho > 0.
+/// Smallest rho: a proof needs rho > 0 even for a constant function.
 constexpr double kLeastRho = 1e-100;
 
 check::Matrix exact(const Eigen::MatrixXd& q) {
@@ -25,10 +25,10 @@ check::Matrix exact(const Eigen::MatrixXd& q) {
   return result;
 }
 
-/// Boxes per kind to enclose what a neighbour adds to the sum.
+/// Number of boxes per kind to enclose the term of a neighbour.
 constexpr int kRangeNodes = 400;
 
-/// How far from the origin the first layer has its kinks, in the median: a cover's inner box with this radius.
+/// Returns the median distance of the first layer's kinks from the origin: the radius of the cover's inner box.
 double cover_radius(const files::Layer& layer) {
   std::vector<double> distances;
   for (int i = 0; i < layer.outputs; ++i) {
@@ -43,7 +43,7 @@ double cover_radius(const files::Layer& layer) {
   return std::exp2(std::ceil(std::log2(distances[distances.size() / 2])));
 }
 
-/// The ranges of the other terms, and what they add up to before the first ReLU of rho.
+/// The ranges of the other terms, and the range of their sum before the first ReLU of rho.
 struct Others {
   std::map<files::FunctionId, RangeProof> ranges;
   std::vector<double> least, most;
@@ -67,7 +67,8 @@ Others others_of(const files::Network& network, const Claim& claim, const Domain
   for (const auto& [part, count] : counts) {
     RangeProof range =
         sum_range(check::term_layers(network, part, names[1]), domain.at(part), std::min(nodes, kRangeNodes));
-    for (std::size_t i = 0; i < rows; ++i) {  // all the ground, of the others any number up to `count`
+    for (std::size_t i = 0; i < rows;
+         ++i) {  // the ground's term once, other terms any number of times up to `count`
       others.least[i] += part == ground ? range.least[i] : count * std::min(range.least[i], 0.0);
       others.most[i] += part == ground ? range.most[i] : count * std::max(range.most[i], 0.0);
     }
@@ -76,15 +77,15 @@ Others others_of(const files::Network& network, const Claim& claim, const Domain
   return others;
 }
 
-/// Hidden neurons with a ReLU.
+/// Returns the number of hidden neurons with a ReLU.
 std::size_t multipliers_of(const LocalChain& chain) {
   Index count = chain.neurons();
   for (const Index without : chain.without_relu) count -= without;
   return static_cast<std::size_t>(count);
 }
 
-/// Lets branch and bound work on `f`, and the checker judge what it found.
-/// @param search of the boxes, with the options.
+/// Runs branch and bound on `f` and verifies the result with the checker.
+/// @param search runs the search over the boxes with the options.
 template <class Search>
 void prove(const check::LocalFunction& f, const std::vector<check::Sides>& boxes, const Search& search,
            LocalProof proof, LocalBound& result) {
@@ -100,7 +101,7 @@ void prove(const check::LocalFunction& f, const std::vector<check::Sides>& boxes
   proof.tree.multipliers = std::move(found.tree.multipliers);
   proof.tree.conflicts = std::move(found.tree.conflicts);
   proof.tree.forms = std::move(found.tree.forms);
-  // The search rounds, the checker rounds otherwise: where a part is lost to that, a little more is claimed.
+  // The checker has other round-off errors than the search. If it refuses a part, a slightly larger rho is claimed.
   for (const double slack : {0.0, 1e-7, 1e-6, 1e-5, 1e-4}) {
     proof.rho = std::max(found.tree.rho * (1 + slack), kLeastRho);
     const check::TreeVerdict verdict = check::check_tree(f, boxes, proof.rho, proof.tree);
@@ -112,7 +113,8 @@ void prove(const check::LocalFunction& f, const std::vector<check::Sides>& boxes
   }
 }
 
-/// Multipliers to start from, for the neurons of `chain`, which come first; none where there are too few.
+/// Returns initial multipliers: the first entries of `t`, which belong to the neurons of `chain`; none if `t` is too
+/// short.
 std::vector<double> beginning(const std::vector<double>& t, const LocalChain& chain) {
   const std::size_t size = multipliers_of(chain);
   if (t.size() < size) return {};
@@ -166,7 +168,7 @@ LocalBound LocalBounds::everywhere(const BranchOptions& options) const {
   const std::vector<double> radius(static_cast<std::size_t>(chain_.inputs()), cover_radius_);
   LocalBound result =
       over(check::homogeneous(f_), homogeneous(chain_), check::projective_cover(radius), radius, options);
-  for (Eigen::VectorXd& centre : result.steep_centres) {  // (u, s) is the point u / s
+  for (Eigen::VectorXd& centre : result.steep_centres) {  // (u, s) represents the point u / s
     const double s = centre(centre.size() - 1);
     centre = Eigen::VectorXd(centre.head(centre.size() - 1) / (s > 0 ? s : 1));
   }

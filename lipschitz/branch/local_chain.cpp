@@ -35,7 +35,7 @@ std::size_t LocalChain::layer_of(Index neuron) const {
 
 check::Conflict LocalChain::unscaled(const NeuronPair& pair, double multiplier) const {
   const int first = exponents[layer_of(pair.first)], second = exponents[layer_of(pair.second)];
-  // lambda y_1 2^-first + (1 - lambda) y_2 2^-second, up to a positive factor.
+  // The condition is lambda y_1 2^-first + (1 - lambda) y_2 2^-second, up to a positive factor.
   const double one = std::ldexp(pair.lambda, second - first);
   return {static_cast<std::size_t>(pair.first),
           static_cast<std::size_t>(pair.second),
@@ -76,7 +76,7 @@ LocalChain local_chain(const ReachNetwork& layers, const MatrixXd& form, const s
   chain.gram =
       form.size() == 0 ? MatrixXd(last.transpose() * last) : MatrixXd(last.transpose() * form * last);
 
-  // Stages lie between ReLUs: a layer without one is multiplied out, and is not scaled.
+  // Stages are separated by ReLUs: a layer without ReLU is multiplied by the next one and is not scaled.
   ReluChain stages = {MatrixXd::Zero(chain.inputs(), static_cast<Index>(chain.block.size()))};
   for (std::size_t k = 0; k < chain.weight.size(); ++k)
     stages.front()(chain.block[k], static_cast<Index>(k)) = chain.weight[k];

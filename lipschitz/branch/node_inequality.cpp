@@ -92,7 +92,7 @@ MatrixXd NodeInequality::slack_without_rho(const VectorXd& t) const {
     const double weight = t(m + static_cast<Index>(c));
     if (weight == 0) continue;
     auto [p, q] = pairs_[c];
-    if (p > q) std::swap(p, q);  // a unit vector last
+    if (p > q) std::swap(p, q);  // unit vectors come last
     const Index unit = inputs_ + q - m;
     if (p >= m) {
       s(inputs_ + p - m, unit) -= weight;

@@ -15,7 +15,7 @@ std::optional<RhoForm> rho_form(const std::vector<check::Matrix>& stages, const 
   const std::vector<check::Dyadic> exact_t(t.begin(), t.end());
   const int inputs = stages.front().cols;
   const check::Matrix without = check::quadratic_lmi(stages, check::Matrix(inputs, inputs), exact_t);
-  std::vector<Index> live;  // rows of neurons with a multiplier; the others are empty
+  std::vector<Index> live;  // rows of neurons with a positive multiplier; the other rows are zero
   for (int i = inputs; i < without.rows; ++i)
     if (without(i, i).sign() > 0) live.push_back(i);
   const auto size = static_cast<Index>(live.size());

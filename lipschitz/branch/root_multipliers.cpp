@@ -11,11 +11,11 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// How well the program of the whole box is solved.
+/// Accuracy to which the program of the whole box is solved.
 constexpr double kRootGap = 0.02;
 constexpr int kRootSteps = 12;
 
-/// Those given, one per output of a hidden layer of `chain`.
+/// Returns the given multipliers, one per output of a hidden layer of `chain`, in its units.
 VectorXd given_multipliers(const LocalChain& chain, const std::vector<double>& start) {
   VectorXd all(chain.neurons());
   Index neuron = 0, given = 0;
@@ -29,8 +29,8 @@ VectorXd given_multipliers(const LocalChain& chain, const std::vector<double>& s
   return all;
 }
 
-/// A point well inside: in a balanced chain all-ones is nearly feasible, and earlier layers want more. Empty where the
-/// numbers leave the range of double first.
+/// Returns a point well inside the feasible set. In a balanced chain the vector of ones is nearly feasible, and earlier
+/// layers need larger multipliers. Returns an empty vector if the numbers leave the range of double.
 VectorXd interior(const LocalChain& chain, const NodeInequality& inequality) {
   for (double shrink = 0.5; shrink > 1e-60; shrink *= 0.5) {
     VectorXd layers(chain.neurons());
@@ -65,7 +65,8 @@ VectorXd root_multipliers(const LocalChain& chain, const NodeInequality& inequal
   if (inside.size() == 0) return VectorXd::Zero(inequality.neurons());  // proves nothing
   InteriorPointOptions options;
   options.relative_gap = kRootGap;
-  options.infeasibility = std::numeric_limits<double>::infinity();  // every iterate is a bound
+  options.infeasibility =
+      std::numeric_limits<double>::infinity();  // dual feasibility is not needed for a bound
   const InteriorPointResult found = minimise(inequality, inside, options);
   return found.points.back().tail(inequality.neurons());
 }

@@ -10,11 +10,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Only if of rho's, too, fewer are undecided than this share of those then: for phi alone a program without rho is
-/// cheaper. Otherwise it looks again as if this share of its own had been undecided.
+/// A form is renewed only if the number of undecided neurons of rho is below the share kLazyRho of the number for which
+/// the old form was computed; otherwise improving phi alone, without rho, is cheaper. If it is not renewed, the next
+/// attempt is made as if kFormAgain times the current number of neurons had been undecided.
 constexpr double kLazyRho = 0.985, kFormAgain = 0.95;
-/// What a form is above the least one, relatively to its largest entry: more than rounding it to single precision
-/// takes.
+/// Margin of a form above the least one, relative to its largest entry: more than the error of rounding it to single
+/// precision.
 constexpr double kFormMargin = 4e-6;
 
 }  // namespace
@@ -23,7 +24,7 @@ void BranchSearch::renew_form(Part& part) {
   part.undecided_form = part.undecided;
   const OfRho* const old = part.form >= 0 ? &forms_[static_cast<std::size_t>(part.form)] : nullptr;
   OfRho own;
-  const std::size_t first = chain_.hidden.size() + 1;  // layer of rho
+  const std::size_t first = chain_.hidden.size() + 1;  // first layer of rho
   std::vector<check::Decision> decided;
   own.reach = std::make_shared<const Reach>(set_->whole.hidden, *part.reach,
                                             old != nullptr ? old->reach.get() : nullptr,

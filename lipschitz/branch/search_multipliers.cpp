@@ -12,7 +12,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// What a pair has to take off the barrier to be used.
+/// A pair is used only if it decreases the barrier by more than this.
 constexpr double kLeastGain = 1e-2;
 
 }  // namespace
@@ -113,7 +113,8 @@ void BranchSearch::solve(Part& part, const DescentOptions& descent, std::size_t 
     }
   }
   part.undecided_then = part.undecided;
-  // In single precision: the certificate is half as long, and any multipliers will do that prove the part.
+  // Rounded to single precision, which halves the length of the certificate; any multipliers that prove the part are
+  // valid.
   t = t.cast<float>().cast<double>();
   const double rho = inequality.least_rho(t);
   if (!(rho < part.rho)) return;

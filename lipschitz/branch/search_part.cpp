@@ -11,7 +11,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A neuron counts as decided only with this relative margin, so that the checker's rounding cannot see it otherwise.
+/// A neuron counts as decided only with this relative margin, so that the checker decides it too despite its round-off.
 constexpr double kStateMargin = 1e-9;
 
 }  // namespace
@@ -53,7 +53,7 @@ BranchSearch::Part BranchSearch::part(const Box& box, const Part* parent, int in
     if (part.states != parent->states || !all_pairs) {
       NodeInequality inequality(chain_, part.states, gram_of(part));
       const double rho = inequality.least_rho(inherited(part, pairs, inequality));
-      const bool is_worse = !all_pairs && !(rho <= part.rho);  // for want of a pair
+      const bool is_worse = !all_pairs && !(rho <= part.rho);  // because a pair is missing
       part.rho = is_worse ? rho : std::min(part.rho, rho);
       if (is_worse) solve(part);
     }

@@ -30,7 +30,7 @@ class Writer {
  private:
   const SearchNode& node(int index) const { return nodes_[static_cast<std::size_t>(index)]; }
 
-  /// Which forms a leaf rests on. @param form that of the box above.
+  /// Marks the forms that the leaves depend on. @param form the form of the parent box.
   void mark(int index, int form) {
     if (node(index).form != SearchNode::kNone) form = node(index).form;
     if (node(index).split != BranchTree::kLeaf) {
@@ -63,7 +63,7 @@ class Writer {
     write_from(from.first_child + 1);
   }
 
-  /// Index of the item in `to`, where it is moved at its first use.
+  /// Returns the index of an item in `to`; the item is moved there at its first use.
   template <class Item>
   static int moved(std::size_t item, std::vector<int>& places, std::vector<Item>& from,
                    std::vector<Item>& to) {
@@ -76,8 +76,8 @@ class Writer {
 
   const std::vector<SearchNode>& nodes_;
   BranchTree found_, written_;
-  std::vector<bool> proves_;              ///< by form
-  std::vector<int> multipliers_, forms_;  ///< where they are now
+  std::vector<bool> proves_;              ///< by form: whether a leaf depends on it
+  std::vector<int> multipliers_, forms_;  ///< new indices
 };
 
 }  // namespace

@@ -9,12 +9,12 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// The claimed range is wider than the one found, relatively: the checker rounds otherwise.
+/// Relative margin by which the claimed range is wider than the computed one, for the round-off of the checker.
 constexpr double kRangeMargin = 1e-9;
 
 struct RangePart {
   double width = 0;
-  std::size_t index = 0;  ///< in the tree
+  std::size_t index = 0;  ///< index in the tree
   int split = 0;
   std::shared_ptr<const Reach> reach;
   bool operator<(const RangePart& other) const { return width < other.width; }

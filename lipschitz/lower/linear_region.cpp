@@ -40,7 +40,7 @@ LinearRegion linear_region(const SearchNetwork& network, const VectorXd& z) {
   region.on.resize(static_cast<std::size_t>(neurons));
   region.moved.resize(static_cast<std::size_t>(neurons));
   VectorXd values = z;
-  MatrixXd gradients;  // [width x variables] of the values
+  MatrixXd gradients;  // [width x variables] gradients of the values
   int first = 0;
   for (std::size_t k = 0; k < network.stages.size(); ++k) {
     const SearchStage& stage = network.stages[k];
@@ -67,7 +67,7 @@ LinearRegion linear_region(const SearchNetwork& network, const VectorXd& z) {
     first += static_cast<int>(values.size());
   }
   region.jacobian = block_columns(network, gradients);
-  MatrixXd effects = network.stages.back().weights;  // of the outputs h of the stage before
+  MatrixXd effects = network.stages.back().weights;  // effects of the outputs h of the previous stage
   for (std::size_t k = network.stages.size() - 1; k-- > 0;) {
     const Eigen::Index width = effects.cols();
     first -= static_cast<int>(width);
@@ -83,7 +83,7 @@ LinearRegion linear_region(const SearchNetwork& network, const VectorXd& z) {
 LocalSlope local_slope(const SearchNetwork& network, const VectorXd& z) {
   LocalSlope result{0, 0};
   VectorXd values = z;
-  MatrixXd gradients;  // with respect to the block, of the values that depend on it
+  MatrixXd gradients;  // with respect to the block, for the values that depend on it
   int first = 0;
   for (std::size_t k = 0; k < network.stages.size(); ++k) {
     const SearchStage& stage = network.stages[k];

@@ -16,11 +16,11 @@ namespace {
 using files::Network;
 using files::Weights;
 
-/// Numbers of neighbours at which a set function is searched: more rarely steepen it further.
+/// Largest number of neighbours in the search of a set function; more neighbours rarely increase the slope further.
 constexpr int kMostNeighbours = 3;
 
-/// The fixed neighbours of a set function with `neighbours` neighbours in all: the moving one's own kind first, then
-/// the other kinds in turn, each as often as the claim allows; and the ground.
+/// Returns the fixed neighbours of a set function with `neighbours` neighbours in total: first those of the moving
+/// neighbour's kind, then the other kinds in turn, each as often as the claim allows; and the ground.
 std::vector<files::FunctionId> other_networks(const Network& network, const Claim& claim, int neighbours) {
   const std::vector<files::FunctionId> names = claim.function.parts();
   std::vector<files::FunctionId> others;
@@ -49,13 +49,13 @@ std::vector<files::FunctionId> other_networks(const Network& network, const Clai
   return others;
 }
 
-/// Whether the claim's function is 0 among these neighbours and the one that moves.
+/// Returns whether the claim's function is 0 for these neighbours and the moving one.
 bool is_silent(const Network& network, const Claim& claim, std::vector<files::FunctionId> others) {
   others.push_back(claim.function.input_part());
   return files::is_silent_among(network, claim.function, others);
 }
 
-/// Rounds that keep the search of a function to seconds: a region costs about (weights) x (moving inputs).
+/// Returns the number of rounds for which a search takes seconds; a region costs about (weights) x (moving inputs).
 int default_rounds(const Network& network, const files::FunctionId& function) {
   const files::Parts parts = files::parts(network);
   const std::vector<files::FunctionId> names = function.parts();
@@ -70,8 +70,8 @@ int default_rounds(const Network& network, const files::FunctionId& function) {
       std::clamp(kDefaultSearchRounds * kPapersCost / cost, 2.0, 1.0 * kDefaultSearchRounds));
 }
 
-/// The moved part of the function in coordinates x_k / scale_k, as the search of a weighted norm sees it. Rounded: a
-/// search only proposes points.
+/// The moved part of the function in coordinates x_k / scale_k, for the search in a weighted norm. Its weights are
+/// rounded, because the search only proposes points.
 struct Rescaled {
   Weights network;
   files::InputClamp clamp;
@@ -90,7 +90,7 @@ Rescaled rescaled(const Term& moved, const std::vector<double>& scale) {
   return result;
 }
 
-/// search_slope() in the claim's norm; `box` and `f` in the units of the inputs.
+/// Runs search_slope() in the claim's norm; `box` and `f` are in the units of the inputs.
 SlopeWitness search_scaled(const SlopeFunction& f, const Claim& claim, SlopeSearchOptions search) {
   const Rescaled moved = rescaled(f.moved, claim.scale);
   SlopeFunction scaled = f;
@@ -120,12 +120,12 @@ SlopeWitness search_scaled(const SlopeFunction& f, const Claim& claim, SlopeSear
   return found;
 }
 
-/// Points of a box as float32, nothing being a box that holds none.
+/// Rounds points to float32 points of a box; returns nothing for a box that contains none.
 class FloatPoints {
  public:
   explicit FloatPoints(const Domain& domain) : domain_(domain) {}
 
-  /// The nearest to x in the box of `part`.
+  /// Returns the float32 point nearest to x in the box of `part`.
   std::optional<std::vector<float>> nearest(const files::FunctionId& part, const Eigen::VectorXd& x) const {
     constexpr double kMost = std::numeric_limits<float>::max();
     const auto box = domain_.find(part);
@@ -145,12 +145,12 @@ class FloatPoints {
   const Domain& domain_;
 };
 
-/// The steepest of several pairs around a place. Short ones are steeper where the function is smooth, long ones keep
-/// their direction when they are rounded to float32.
+/// Tries several pairs of points around a place and keeps the steepest. Short pairs are steeper if the function is
+/// smooth; long pairs keep their direction when they are rounded to float32.
 void try_pairs(const SlopeFunction& f, const files::FunctionId& moved, const SteepPlace& place,
                const Claim& claim, const std::vector<int>& block, const FloatPoints& points,
                SlopePoints& pair, FoundSlope& found) {
-  constexpr double kLengths[] = {0.125, 1, 8, 64, 512, 8192};  // of half a step
+  constexpr double kLengths[] = {0.125, 1, 8, 64, 512, 8192};  // in units of half a step
   for (const double length : kLengths) {
     const Eigen::VectorXd step = length * place.half_step * place.direction;
     const auto x = points.nearest(moved, place.x + step), y = points.nearest(moved, place.x - step);
@@ -165,7 +165,7 @@ void try_pairs(const SlopeFunction& f, const files::FunctionId& moved, const Ste
   }
 }
 
-/// Of functions that are not linear by parts, or whose parts search_slope() does not know.
+/// Returns the lower bound of a function that is not piecewise linear or not supported by search_slope().
 FoundSlope sampled_lower_bound(const Network& network, const Claim& claim, const Domain& domain,
                                const LowerBoundOptions& options, int rounds) {
   const Domain boxes = claim.domain == "box" ? domain : Domain();
@@ -216,7 +216,7 @@ FoundSlope lower_bound(const Network& network, const Claim& claim, const Domain&
   if (!has_relu_only(network, claim.function))
     return sampled_lower_bound(network, claim, domain, options, rounds);
   const std::vector<files::FunctionId> names = claim.function.parts();
-  const int cases = names.size() == 2 ? kMostNeighbours : 1;  // they share the rounds and the seconds
+  const int cases = names.size() == 2 ? kMostNeighbours : 1;  // the cases share the rounds and the seconds
   for (int neighbours = 1; neighbours <= cases; ++neighbours) {
     const std::vector<files::FunctionId> others = other_networks(network, claim, neighbours);
     if (is_silent(network, claim, others)) continue;
@@ -237,7 +237,7 @@ FoundSlope lower_bound(const Network& network, const Claim& claim, const Domain&
     SlopeWitness found = claim.scale.empty() ? search_slope(f, search) : search_scaled(f, claim, search);
     best.rounds += found.rounds_done;
     best.interrupted = best.interrupted || found.interrupted;
-    if (found.x.empty()) continue;  // the box holds no two points
+    if (found.x.empty()) continue;  // the box contains fewer than two points
     if (!best.witness || found.slope.value() > best.witness->slope.value()) {
       best.witness = std::move(found);
       best.other_networks = others;

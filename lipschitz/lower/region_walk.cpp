@@ -13,29 +13,29 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Regions that a walk enters without finding a steeper one before it gives up.
+/// A walk ends after this many successive regions without a steeper one.
 constexpr int kPatience = 100;
-/// Random points of which a walk starts at the steepest.
+/// A walk starts at the steepest of this many random points.
 constexpr int kStarts = 50;
-/// And points with the others as at one of the places that are given, the first being that place.
+/// Additional starting points that use the other neighbours of a given place; the first one is the place itself.
 constexpr int kStartsAtPlace = 10;
-/// Newton steps towards a region's centre; the centre need not be accurate.
+/// Maximum number of Newton steps towards the centre of a region, which need not be accurate.
 constexpr int kCentringSteps = 8;
-constexpr double kCentred = 0.3;  ///< Newton decrement at which a point counts as central
-/// How far behind a facet the next region is entered, as a part of the way from that facet to the next one.
+constexpr double kCentred = 0.3;  ///< Newton decrement below which a point counts as central
+/// The next region is entered behind the facet by this share of the distance to the next facet on the ray.
 constexpr double kStepBehind = 0.1;
-/// Distances from the centre at which walks start where the domain is open, and the reach R of their regions, in
+/// If the domain is unbounded: distances from the centre at which walks start, and the range of R of their regions, in
 /// units of the median distance of the first stage's kinks.
 constexpr double kNearest = 0.1, kFarthest = 10, kLeastReach = 1, kLargestReach = 1000;
-/// The same for walks on a ladder of scales. Kinks of later layers may lie anywhere.
+/// Start distances of walks at geometrically spaced scales, because kinks of later layers may lie anywhere.
 constexpr double kLadderNearest = 1e-3, kLadderFarthest = 1e5;
-/// How far out along a ray the slope at infinity is looked for, and in which steps.
+/// Largest distance along a ray at which the slope at infinity is evaluated, and the factor between distances.
 constexpr double kFarOut = 1e12, kFarther = 4;
-/// A slope along a ray counts as that at infinity within this, relatively.
+/// A slope along a ray counts as the slope at infinity if they agree to this relative accuracy.
 constexpr double kSlopeAtInfinity = 1e-9;
 
-/// H = normals diag(1/d^2) normals' + diag(bounds), and H^-1 times something: by Cholesky of H or, where there are
-/// more variables than neurons, of I + S' diag(bounds)^-1 S with S = normals diag(1/d) (Woodbury).
+/// Solves with H = normals diag(1/d^2) normals' + diag(bounds): by a Cholesky factorisation of H or, if there are more
+/// variables than neurons, of I + S' diag(bounds)^-1 S with S = normals diag(1/d) (Woodbury).
 class BarrierHessian {
  public:
   BarrierHessian(const MatrixXd& scaled_normals, const VectorXd& bounds)
@@ -72,7 +72,7 @@ VectorXd reciprocal(const VectorXd& distances) {
   return distances.unaryExpr([](double d) { return d == 0 ? 0.0 : 1 / d; });
 }
 
-/// Diagonal of the barrier's Hessian, and its gradient, that stem from the variables' own bounds.
+/// Contribution of the bounds of the variables to the diagonal of the barrier's Hessian and to its gradient.
 struct BoundTerms {
   VectorXd hessian, gradient;
 };
@@ -92,7 +92,7 @@ BoundTerms bound_terms(const SearchNetwork& network, const VectorXd& z, double r
   return terms;
 }
 
-/// Largest eigenvalue of a small symmetric matrix by `steps` power iterations from v: at most the true one.
+/// Returns a lower bound on the largest eigenvalue of a small symmetric matrix by `steps` power iterations from v.
 double power_iteration(const MatrixXd& matrix, VectorXd v, int steps) {
   double value = 0;
   for (int step = 0; step < steps; ++step) {
@@ -124,7 +124,7 @@ VectorXd RegionWalk::random_point(double nearest, double farthest) {
   for (int v = 0; v < network_.variables(); ++v) {
     if (network_.boxed[v]) {
       z[v] = 2 * random_.uniform() - 1;
-      z[v] *= 1 - 1e-9;  // inside, whatever the rounding
+      z[v] *= 1 - 1e-9;  // stays inside despite round-off
     } else {
       z[v] = random_.bell();
       square += z[v] * z[v];
@@ -241,7 +241,7 @@ void RegionWalk::enter(VectorXd z) {
     const MatrixXd scaled = region.normals * inverse.asDiagonal();
     const VectorXd gradient = bounds.gradient - region.normals * inverse;
     const VectorXd newton = -BarrierHessian(scaled, bounds.hessian).solve(gradient);
-    if (!newton.allFinite()) break;  // z is on the edge of the box, as it is where a kink lies there
+    if (!newton.allFinite()) break;  // z is on the boundary of the box, e.g. because a kink lies there
     const double decrement = std::sqrt(std::max(0.0, -newton.dot(gradient)));
     const double length = decrement < 0.25 ? 1.0 : 1 / (1 + decrement);
     z += length * newton;
@@ -261,7 +261,7 @@ void RegionWalk::keep(const VectorXd& z, double slope) {
   steepest_.insert(place, {z, slope});
 }
 
-/// What a ray from the centre meets: the first kink and how far away, and where the next one or a bound follows.
+/// The first kink on a ray from the centre, its distance, and the distance of the next kink or bound.
 struct RegionWalk::Hit {
   Eigen::Index facet = -1;
   double first = kInfinity;
@@ -279,7 +279,7 @@ void RegionWalk::queue_neighbours(const LinearRegion& region, const VectorXd& z)
     entered_in_vain_ = 0;
   }
 
-  std::vector<Eigen::Index> kinks;  // those that can change the slope
+  std::vector<Eigen::Index> kinks;  // kinks that can change the slope
   for (Eigen::Index i = 0; i < region.distances.size(); ++i) {
     if (region.distances[i] != 0 && region.moved[static_cast<std::size_t>(i)]) kinks.push_back(i);
   }
@@ -287,7 +287,7 @@ void RegionWalk::queue_neighbours(const LinearRegion& region, const VectorXd& z)
   const MatrixXd normals = region.normals(Eigen::all, kinks);
   const MatrixXd scaled = region.normals * reciprocal(region.distances).asDiagonal();
   const BoundTerms bounds = bound_terms(network_, z, reach_);
-  // Ray i moves towards kink i; column i of `rates` has 1 / (distance along it to every kink).
+  // Ray i moves towards kink i. Column i of `rates` contains the inverse distances along ray i to all kinks.
   MatrixXd rays = BarrierHessian(scaled, bounds.hessian).solve(normals);
   for (Eigen::Index i = 0; i < rays.cols(); ++i) rays.col(i) *= distances[i] > 0 ? -1 : 1;
   const MatrixXd rates = -(reciprocal(distances).asDiagonal() * (normals.transpose() * rays));
@@ -312,7 +312,7 @@ RegionWalk::Hit RegionWalk::first_hit(const VectorXd& rates, const VectorXd& ray
   if (!(largest > 0)) return hit;
   hit.facet = std::find(rates.begin(), rates.end(), largest) - rates.begin();
   hit.first = 1 / largest;
-  const double same = largest * (1 - 1e-9);  // kinks at the same place, as those of equal neurons, are one
+  const double same = largest * (1 - 1e-9);  // coinciding kinks, such as those of equal neurons, count as one
   double next = 0;
   for (const double rate : rates) next = std::max(next, rate < same ? rate : 0.0);
   if (next > 0) hit.second = 1 / next;
@@ -329,7 +329,7 @@ double RegionWalk::slope_behind(const LinearRegion& region, Eigen::Index neuron,
   const VectorXd gradient = switched * region.lengths[neuron] *
                             block_columns(network_, region.normals.col(neuron).transpose()).transpose();
   const VectorXd effect = region.effects.col(neuron);
-  // J + effect gradient' has the Gram matrix below.
+  // Computes the Gram matrix of J + effect gradient'.
   const bool by_inputs = region.jacobian.cols() <= region.jacobian.rows();
   const VectorXd& own = by_inputs ? gradient : effect;
   VectorXd cross = by_inputs ? effect.squaredNorm() / 2 * own : gradient.squaredNorm() / 2 * own;

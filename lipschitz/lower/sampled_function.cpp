@@ -15,7 +15,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Half the distance of the points of a quotient: far above rounding, far below the width of an activation's bend.
+/// Half the distance of the points of a quotient: much larger than round-off errors, much smaller than the scale on
+/// which the slope of an activation varies.
 constexpr double kHalfStep = 1e-4;
 
 double random_number(std::mt19937_64& generator) {
@@ -107,8 +108,7 @@ VectorXd SampledFunction::random_point_of(const files::FunctionId& part, const s
 
 void SampledFunction::place_others(std::mt19937_64& generator) {
   if (!last_) return;
-  constexpr int kTries =
-      100;  // a claim may be about neighbours among which there is nothing else than silence
+  constexpr int kTries = 100;  // limited, because a claim may allow only compositions in which NET is silent
   for (int i = 0; i < kTries; ++i) {
     other_networks_.clear();
     others_.clear();
@@ -191,7 +191,7 @@ double SampledFunction::width(Index k) const {
 }
 
 VectorXd SampledFunction::gradient(const VectorXd& x, const VectorXd& direction) const {
-  constexpr double kSteps = 8;  // half steps of the quotients, which are noise on shorter ways
+  constexpr double kSteps = 8;  // distance in half steps; over shorter distances the differences are noise
   VectorXd result = VectorXd::Zero(inputs_);
   for (Index k = 0; k < inputs_; ++k) {
     if (!(width(k) > 0)) continue;

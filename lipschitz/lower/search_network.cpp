@@ -27,8 +27,8 @@ SearchStage stage(const files::Layer& layer) {
           layer.outputs};
 }
 
-/// Stage k of the terms side by side. A term that has no hidden layer k passes its values on.
-/// @param widths of what each term hands to this stage; updated.
+/// Builds stage k of the terms side by side. A term without hidden layer k passes its values on.
+/// @param widths number of values of each term that enter this stage; updated.
 SearchStage side_by_side(const std::vector<Term>& terms, std::size_t k, std::vector<int>& widths) {
   std::vector<SearchStage> parts;
   for (std::size_t j = 0; j < terms.size(); ++j) {
@@ -74,7 +74,7 @@ std::vector<SearchStage> chain(const SlopeFunction& f, const std::vector<Term>& 
     widths.push_back(term.network->inputs());
   }
   for (std::size_t k = 0; k < deepest; ++k) stages.push_back(side_by_side(terms, k, widths));
-  // rho's first layer applied to the sum of the terms' last ones.
+  // The first layer of rho applied to the sum of the last layers of the terms.
   SearchStage merged = stage(f.rho->layers.front());
   const MatrixXd first = merged.weights;
   merged.weights.resize(first.rows(), std::accumulate(widths.begin(), widths.end(), Eigen::Index{0}));
@@ -90,7 +90,7 @@ std::vector<SearchStage> chain(const SlopeFunction& f, const std::vector<Term>& 
   return stages;
 }
 
-/// The values that the networks can see: each box through its clamp. `inputs` receives a point of the boxes.
+/// Returns the image of each box under its clamp. Sets `inputs` to a point of the boxes.
 std::vector<Interval> reachable(const std::vector<Term>& terms, const std::vector<std::optional<Box>>& boxes,
                                 std::vector<double>& inputs) {
   std::vector<Interval> intervals;
@@ -111,9 +111,9 @@ std::vector<Interval> reachable(const std::vector<Term>& terms, const std::vecto
   return intervals;
 }
 
-/// Centre and scale of the open variables, so that the first stage's kinks lie at distances of about 1.
-/// With columns normalised to unit length, which takes the units out, the centre is the regularised least squares
-/// solution of (w_i z + b_i) / |w_i| = 0, and the scale the median distance of the kinks from it.
+/// Chooses centre and scale of the unbounded variables such that the kinks of the first stage lie at distances of about
+/// 1. With columns normalised to unit length, which removes the units, the centre is the regularised least-squares
+/// solution of (w_i z + b_i) / |w_i| = 0, and the scale is the median distance of the kinks from it.
 void normalise_open(const SearchStage& first, SearchNetwork& network) {
   std::vector<int> open;
   for (int v = 0; v < network.variables(); ++v) {
@@ -200,7 +200,7 @@ SearchNetwork search_network(const SlopeFunction& f, const std::vector<std::opti
   std::vector<double> inputs;
   const std::vector<Interval> intervals = reachable(terms, boxes, inputs);
   result.fixed_inputs = Eigen::Map<const VectorXd>(inputs.data(), static_cast<Eigen::Index>(inputs.size()));
-  VectorXd seen(result.fixed_inputs.size());  // what the networks see of the fixed coordinates
+  VectorXd seen(result.fixed_inputs.size());  // the fixed coordinates after the clamp
   std::vector<double> centre, scale;
   for (std::size_t i = 0; i < intervals.size(); ++i) {
     const auto [lower, upper] = intervals[i];

@@ -12,15 +12,15 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// Multiplications that all starts together may take, or the only one.
+/// Maximum number of multiplications of all starts together, or of a single start.
 constexpr double kMostWork = 2e9;
 
-/// Of one start.
+/// Effort for one start.
 struct Effort {
   int climbs, ascents;
 };
 
-/// Less for functions of which a Jacobian alone takes much of kMostWork.
+/// Returns the effort per start: less for functions whose Jacobian alone takes a large share of kMostWork.
 Effort affordable_effort(double work) {
   constexpr int kClimbs = 24, kAscents = 40;
   constexpr double kShareOfClimbs = 1.0 / 6, kShareOfAscents = 1.0 / 12;
@@ -41,7 +41,7 @@ Place at(const SampledFunction& f, VectorXd x) {
   return {std::move(x), std::move(steepness), f.half_step()};
 }
 
-/// One start after the other.
+/// Runs the starts one after the other.
 class SteepSearch {
  public:
   SteepSearch(SampledFunction f, const SlopeEstimateOptions& options)
@@ -50,15 +50,17 @@ class SteepSearch {
         generator_(options.seed),
         stop_(options.stop) {}
 
-  /// Starts that kMostWork allows: a step of an ascent takes a Jacobian and a gradient, which costs as much as two.
+  /// Returns the number of starts that kMostWork allows. A step of the ascent needs a Jacobian and a gradient, which
+  /// costs as much as two Jacobians.
   double affordable_starts() const {
     return kMostWork / (f_.work() * (effort_.climbs + 6.0 * effort_.ascents));
   }
 
   const SampledFunction& function() const { return f_; }
 
-  /// The steepest place from a start, the first one in the middle: 0 is where many activations are steepest. With
-  /// points closer together after some way, where the function bends within the first distance.
+  /// Returns the steepest place reached from the next start. The first start is the centre, because many activations
+  /// are steepest at 0. The search ends with a smaller distance of the points, in case the slope varies within the
+  /// original distance.
   Place next(bool is_first) {
     constexpr double kCloser = 0x1p-6, kMoreThanNoise = 1 + 1e-6, kNear = 0.5;
     constexpr int kClimbsWhereFlat = 8;
@@ -77,7 +79,7 @@ class SteepSearch {
   }
 
  private:
-  /// Towards random points, by ever smaller shares of the way.
+  /// Moves towards random points by decreasing shares of the distance, as long as the slope increases.
   void climb(double share, Place& place) {
     for (int i = 0; i < effort_.climbs && !stop_.now(); ++i) {
       Place next = at(f_, place.x + share * (f_.random_point(generator_) - place.x));
@@ -89,7 +91,8 @@ class SteepSearch {
     }
   }
 
-  /// Along the gradient, by steps that grow while they help. Whether there is any, as inside a linear region is not.
+  /// Moves along the gradient with steps that grow while they increase the slope. Returns false if the gradient is
+  /// zero, as it is inside a linear region.
   bool ascend(Place& place) const {
     constexpr double kFirst = 0.05, kLeast = 1e-7, kGrow = 2, kShrink = 0.25, kNoise = 1e-8;
     double length = kFirst;

@@ -19,10 +19,10 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Lengths of the pairs to try, relative to the region's chord through the centre. Longer ones leave the region: they
-/// serve regions that are too small for float32.
+/// Lengths of the pairs to try, relative to the chord of the region through its centre. Pairs longer than the chord
+/// leave the region; they are for regions that are too small for float32.
 constexpr double kPairLengths[] = {0.9, 0.5, 0.2, 1.5, 4};
-/// A chord that never ends is cut at this length, in the normalised coordinates.
+/// Infinite chords are cut at this length, in normalised coordinates.
 constexpr double kLongestChord = 16;
 
 [[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument("search_slope: " + what); }
@@ -40,7 +40,7 @@ void check_box(const Box& box, const Term& term, const std::string& name) {
   }
 }
 
-/// The boxes of (x, x_1, x_2, ...).
+/// Validates the arguments and returns the boxes of (x, x_1, x_2, ...).
 std::vector<std::optional<Box>> check(const SlopeFunction& f, const SlopeSearchOptions& options) {
   check_function(f);
   if (!is_relu(f)) refuse("an activation is not ReLU");
@@ -71,7 +71,7 @@ std::vector<std::optional<Box>> check(const SlopeFunction& f, const SlopeSearchO
   return boxes;
 }
 
-/// The float32 numbers in an interval: from `least` to `greatest`, none if least > greatest.
+/// The float32 numbers of an interval, from `least` to `greatest`; empty if least > greatest.
 struct FloatInterval {
   float least = std::numeric_limits<float>::lowest();
   float greatest = std::numeric_limits<float>::max();
@@ -87,11 +87,11 @@ FloatInterval floats_within(double lower, double upper) {
   return result;
 }
 
-/// Pairs whose slopes in double are this close, relatively, are compared exactly.
+/// Pairs whose slopes in double agree to this relative accuracy are compared exactly.
 constexpr double kSameSlope = 1e-9;
 
-/// Turns points of the search into float32 points of the boxes, and finds the steepest pair: exactly compared where
-/// double cannot tell.
+/// Rounds points of the search to float32 points of the boxes and finds the steepest pair, by exact comparison if
+/// double precision is not sufficient.
 class Witnesses {
  public:
   Witnesses(const SlopeFunction& f, const SearchNetwork& network, const SlopeSearchOptions& options,
@@ -111,7 +111,7 @@ class Witnesses {
                        [](FloatInterval i) { return i.least <= i.greatest; });
   }
 
-  /// Tries the pair, each a vector (x, x_1, x_2, ...).
+  /// Tries a pair of vectors (x, x_1, x_2, ...).
   void try_pair(const VectorXd& from, const VectorXd& to) {
     SlopePoints points;
     const int inputs = f_.moved.network->inputs();
@@ -132,7 +132,7 @@ class Witnesses {
         {std::isnan(slope) ? std::numeric_limits<double>::infinity() : slope, std::move(points)});
   }
 
-  /// Some pair of the box, so that there is a witness of slope 0 where nothing was found.
+  /// Tries an arbitrary pair of the box, so that there is a witness of slope 0 if nothing was found.
   void try_any_pair(const VectorXd& inputs) {
     for (int k = 0; k < f_.moved.network->inputs(); ++k) {
       if (!moves(k) || !(intervals_[k].least < intervals_[k].greatest)) continue;
@@ -140,7 +140,7 @@ class Witnesses {
       VectorXd to = inputs;
       from[k] = std::max<double>(intervals_[k].least, -1);
       to[k] = std::min<double>(intervals_[k].greatest, 1);
-      if (from[k] > to[k]) {  // the box has none of [-1, 1]
+      if (from[k] > to[k]) {  // the box does not intersect [-1, 1]
         from[k] = intervals_[k].least;
         to[k] = intervals_[k].greatest;
       }
@@ -149,7 +149,7 @@ class Witnesses {
     }
   }
 
-  /// The steepest of the pairs that were tried; no points if there was none.
+  /// Returns the steepest pair that was tried; empty points if there was none.
   SlopeWitness take() {
     std::stable_sort(pairs_.begin(), pairs_.end(),
                      [](const Pair& a, const Pair& b) { return a.estimate > b.estimate; });
@@ -167,7 +167,7 @@ class Witnesses {
 
  private:
   struct Pair {
-    double estimate;  ///< of the slope, in double
+    double estimate;  ///< slope in double
     SlopePoints points;
   };
 
@@ -187,7 +187,7 @@ class Witnesses {
     return options_.block.empty() || std::count(options_.block.begin(), options_.block.end(), k) > 0;
   }
   float rounded(int k, double value) const {
-    // Within the range of float32 before the conversion; to nearest, then back into the box.
+    // Clamped to the range of float32 before the conversion; rounded to nearest, then clamped to the box.
     const double inside = std::clamp<double>(value, intervals_[k].least, intervals_[k].greatest);
     return std::clamp(static_cast<float>(inside), intervals_[k].least, intervals_[k].greatest);
   }
@@ -195,11 +195,11 @@ class Witnesses {
   const SlopeFunction& f_;
   const SearchNetwork& network_;
   const SlopeSearchOptions& options_;
-  std::vector<FloatInterval> intervals_;  ///< of (x, x_1, x_2, ...)
+  std::vector<FloatInterval> intervals_;  ///< intervals of (x, x_1, x_2, ...)
   std::vector<Pair> pairs_;
 };
 
-/// Pairs around the centre z of a region, along its direction of steepest ascent.
+/// Tries pairs around the centre z of a region along its steepest direction.
 void try_region(const SearchNetwork& network, const VectorXd& z, Witnesses& witnesses) {
   const LinearRegion region = linear_region(network, z);
   if (!region.jacobian.allFinite()) return;
@@ -225,7 +225,7 @@ void try_region(const SearchNetwork& network, const VectorXd& z, Witnesses& witn
   }
 }
 
-/// The regions of both, steepest first.
+/// Merges two lists of regions, steepest first.
 std::vector<RegionWalk::Found> both(std::vector<RegionWalk::Found> regions,
                                     const std::vector<RegionWalk::Found>& more) {
   regions.insert(regions.end(), more.begin(), more.end());
@@ -247,7 +247,7 @@ SlopeWitness search_slope(const SlopeFunction& f, const SlopeSearchOptions& opti
   int rounds_done = 0;
   bool interrupted = false;
   if (!network.block.empty() && network.neurons() == 0) {
-    try_region(network, VectorXd::Zero(network.variables()), witnesses);  // f is affine: one region
+    try_region(network, VectorXd::Zero(network.variables()), witnesses);  // f is affine: a single region
   } else if (!network.block.empty()) {
     RegionWalk walk(network, options.seed, options.starts);
     walk.set_places(options.places);

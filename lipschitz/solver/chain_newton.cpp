@@ -40,7 +40,8 @@ class NewtonMatrix {
   bool good_ = false;
 };
 
-/// The point of ECLipsE-Fast, scaled up: every Schur complement of S is then a multiple of I up to a factor of three.
+/// Returns the point of ECLipsE-Fast, scaled up. Every Schur complement of S is then within a factor of three of a
+/// multiple of I.
 VectorXd layerwise_start(const ChainSlack& chain) {
   constexpr double kInside = 1.5;
   VectorXd y(1 + chain.neurons());
@@ -51,14 +52,15 @@ VectorXd layerwise_start(const ChainSlack& chain) {
     const double t = 1 / largest;
     y.segment(chain.place(k), chain.width(k)).setConstant(t);
     gram = layerwise_gram(chain.stage(k + 1), gram, t);
-    if (gram.size() == 0) break;  // cannot be: the least eigenvalue is t
+    if (gram.size() == 0) break;  // impossible: the least eigenvalue is t
     largest = largest_eigenvalue(gram);
   }
   return kInside * largest * y;
 }
 
-/// The same from the output, for layers that bend: with R_k what the layers behind ask for, R <= l I, the least l' with
-/// R_{k-1} <= l' M_k' M_k for multipliers that are equal within the layer is l c^2, at t = l c / (2 c - 1).
+/// The same for layers with slopes in [1 - c, c], computed from the output backwards. R_k is the matrix required by the
+/// layers behind layer k. For R_k <= l I and multipliers that are equal within the layer, the least l' with
+/// R_{k-1} <= l' M_k' M_k is l c^2, at t = l c / (2 c - 1).
 VectorXd layerwise_start_of_bent(const ChainSlack& chain) {
   constexpr double kInside = 1.5;
   VectorXd y = VectorXd::Ones(1 + chain.neurons());
@@ -69,7 +71,7 @@ VectorXd layerwise_start_of_bent(const ChainSlack& chain) {
     // M' (2 g T + T (2 T - R)^-1 T) M.
     MatrixXd inner = -behind;
     inner.diagonal().array() += 2 * t;
-    if (!cholesky_in_place(inner)) break;  // cannot be: the least eigenvalue is t / c
+    if (!cholesky_in_place(inner)) break;  // impossible: the least eigenvalue is t / c
     MatrixXd half = t * chain.stage(k).transpose();
     divide_by_lower_transposed(half, inner);
     behind = MatrixXd::Zero(half.rows(), half.rows());
@@ -86,7 +88,7 @@ bool is_bent(const ChainSlack& chain) {
   return result;
 }
 
-/// Minimises rho / mu - log det S by the BFGS method with limited memory, from Newton's matrix of a point nearby.
+/// Minimises rho / mu - log det S by limited-memory BFGS, preconditioned with the Newton matrix of a nearby point.
 class Centring {
  public:
   Centring(const ChainSlack& chain, const NewtonMatrix& newton, double mu, double scale)
@@ -98,14 +100,14 @@ class Centring {
     return r;
   }
   double value(const ChainPoint& at) const { return at.y(0) / mu_ - at.log_determinant; }
-  /// The norm of the residual by the inverse of Newton's matrix, about the distance from the path.
+  /// Returns the norm of the residual in the metric of the inverse Newton matrix: about the distance from the path.
   double distance(const VectorXd& r) const {
     return std::sqrt(std::max(0.0, scale_ * r.dot(newton_.solve(r))));
   }
 
-  /// Iterates until the estimated distance from the path is below `enough`, for `steps` steps at most.
+  /// Iterates until the estimated distance from the path is below `enough`, for at most `steps` steps.
   ChainPoint run(ChainPoint at, double enough, int steps, const Stop& stop) const {
-    constexpr double kFarthest = 8;  // from far away a whole step leads out of the cone
+    constexpr double kFarthest = 8;  // far from the path a full step would leave the cone
     std::vector<VectorXd> moves, changes;
     VectorXd r = residual(at);
     for (int step = 0; step < steps && !stop.now(); ++step) {
@@ -152,24 +154,24 @@ class Centring {
   double mu_, scale_;
 };
 
-/// The path as Newton's matrix at a point sees it: its own point at mu and its derivative there.
+/// The central path as estimated from the Newton matrix at one point: its point at mu and its derivative there.
 struct PathEstimate {
   double mu;
   VectorXd centre, slope;
 };
 
-/// What Newton's matrix at a point sees of the path: for any mu, v - u / mu is Newton's step to it and u / mu^2 its
-/// derivative.
+/// The central path as the Newton matrix at one point describes it: for any mu, v - u / mu is the Newton step to the
+/// path and u / mu^2 the derivative of the path.
 struct PathView {
   VectorXd u, v;
-  double mu;        ///< where on the path
-  double distance;  ///< from there, in the norm of Newton's matrix
+  double mu;        ///< the point of the path
+  double distance;  ///< distance to that point in the norm of the Newton matrix
 
   bool good() const { return mu > 0 && std::isfinite(distance); }
   PathEstimate estimate(const VectorXd& y) const { return {mu, y + v - u / mu, u / (mu * mu)}; }
 };
 
-/// @param mu where on the path to look; without it, where the path is nearest.
+/// @param mu the point of the path; without it, the nearest one.
 PathView view_of_path(const NewtonMatrix& newton, const ChainPoint& from, std::optional<double> mu) {
   PathView view = {newton.solve(VectorXd::Unit(from.y.size(), 0)), newton.solve(from.gradient), 0, 0};
   view.mu = mu.value_or(view.u(0) / view.v(0));
@@ -178,8 +180,8 @@ PathView view_of_path(const NewtonMatrix& newton, const ChainPoint& from, std::o
   return view;
 }
 
-/// Where the path is at mu, by Hermite's interpolation at the last `points` estimates (Newton's divided differences,
-/// each place taken twice).
+/// Returns an estimate of the path at mu by Hermite interpolation through the last `points` estimates (Newton's divided
+/// differences with each node taken twice).
 VectorXd extrapolated(const std::vector<PathEstimate>& path, std::size_t points, double mu) {
   const std::size_t nodes = 2 * points;
   std::vector<double> place;
@@ -205,14 +207,14 @@ VectorXd extrapolated(const std::vector<PathEstimate>& path, std::size_t points,
   return result;
 }
 
-/// Moves along the path to mu (1 - alpha): alpha is what the last step reached and somewhat more, or less until the
-/// extrapolated point is near enough to the path. Nothing if no alpha will do.
+/// Moves along the path to mu (1 - alpha). The first alpha is somewhat larger than that of the last step; it is reduced
+/// until the extrapolated point is close enough to the path. Returns nothing if no alpha is acceptable.
 std::optional<ChainPoint> follow(const ChainSlack& chain, const NewtonMatrix& newton,
                                  const std::vector<PathEstimate>& path, double& reach, const Stop& stop) {
   constexpr double kLeastStep = 0.02, kFarthest = 2, kLonger = 1.3, kShorter = 0.7, kNear = 0.03;
   constexpr int kSteps = 12;
   for (double alpha = std::min(1 - (1 - reach) / 2, kLonger * reach); alpha > kLeastStep; alpha *= kShorter) {
-    // What S has near its boundary shrinks with mu, and its part of Newton's matrix grows with the square.
+    // The small eigenvalues of S shrink in proportion to mu, so their part of the Newton matrix grows as 1 / mu^2.
     const double mu = path.back().mu * (1 - alpha);
     const Centring centring(chain, newton, mu, (1 - alpha) * (1 - alpha));
     for (std::size_t points = path.size(); points > 0; --points) {
@@ -230,10 +232,11 @@ std::optional<ChainPoint> follow(const ChainSlack& chain, const NewtonMatrix& ne
 
 InteriorPointResult minimise_chain(const ChainSlack& chain, const InteriorPointOptions& options) {
   use_one_blas_thread();
-  // Below kStalledGap a step that gains nothing says that rounding has taken over.
+  // Below the gap kStalledGap, a step without progress means that round-off dominates.
   constexpr double kStalledGap = 1e-4, kFirstGap = 0.2, kOnPath = 0.5, kNear = 0.01, kFirstReach = 0.7;
   constexpr int kMostSteps = 24;
-  int steps = 3;  // with one Newton's matrix, which far from the path is soon another one
+  int steps =
+      3;  // centring steps per Newton matrix; few at first, because far from the path the matrix changes quickly
   const auto size = static_cast<double>(chain.size());
   InteriorPointResult result;
   std::optional<ChainPoint> at;
@@ -275,7 +278,7 @@ InteriorPointResult minimise_chain(const ChainSlack& chain, const InteriorPointO
       if (!next && is_lost) break;
       is_lost = !next.has_value();
     }
-    if (!next) {  // to the path, or nearer to it, where more is seen of it
+    if (!next) {  // moves closer to the path, where its estimate is more accurate
       if (is_lost) path.clear();
       if (distance > last_distance / 2) steps = std::min(2 * steps, kMostSteps);
       last_distance = distance;

@@ -63,14 +63,14 @@ MatrixXd ChainSlack::diagonal_block(const VectorXd& y, std::size_t k) const {
 
 namespace {
 
-/// L_k with D_k = L_k L_k', and B_k = M_k L_{k-1}^-T; of block 0 only what is not a multiple of M_1.
+/// L_k with D_k = L_k L_k', and B_k = M_k L_{k-1}^-T; for block 0 only if it is not a multiple of M_1.
 struct Elimination {
   std::vector<MatrixXd> lower, half;
 };
 
 double log_determinant_of(const MatrixXd& lower) { return 2 * lower.diagonal().array().log().sum(); }
 
-/// Fills in all of `at` but the inverse; nothing if S is not safely positive definite.
+/// Fills in all of `at` except the inverse; returns nothing if S is not safely positive definite.
 std::optional<Elimination> eliminate(const ChainSlack& chain, ChainPoint& at) {
   const VectorXd& y = at.y;
   if (!(y.minCoeff() > 0)) return std::nullopt;  // diagonal entries of S would be negative
@@ -123,10 +123,11 @@ void invert_blocks(const ChainSlack& chain, const Elimination& found, ChainPoint
   }
 }
 
-/// Row sums of A B, element by element.
+/// Returns the row sums of the elementwise product of A and B.
 VectorXd row_sums(const MatrixXd& a, const MatrixXd& b) { return a.cwiseProduct(b).rowwise().sum(); }
 
-/// tr(Y A_i) = -2 p_i' Y q_i = 2 (Y - Y M' - g M Y M')_ii, and Euler's identity tr(Y S) = size for rho.
+/// Gradient of log det S: tr(Y A_i) = -2 p_i' Y q_i = 2 (Y - Y M' - g M Y M')_ii; for rho from Euler's identity,
+/// tr(Y S) = size.
 VectorXd gradient(const ChainSlack& chain, const ChainPoint& at) {
   VectorXd result(1 + chain.neurons());
   for (std::size_t k = 1; k <= chain.layers(); ++k) {
@@ -159,8 +160,8 @@ std::optional<ChainPoint> chain_point(const ChainSlack& chain, VectorXd y) {
 
 namespace {
 
-/// A block column of Y = S^-1 from its own row on, with the products that the Hessian needs of it, row by row of layer
-/// i in column j: Y_ij, M_i Y_i-1,j, Y_i,j-1 M_j' and M_i Y_i-1,j-1 M_j'.
+/// Block column j of Y = S^-1 from its diagonal block down, and the products that the Hessian needs. The rows of layer
+/// i contain Y_ij, M_i Y_i-1,j, Y_i,j-1 M_j' and M_i Y_i-1,j-1 M_j'.
 struct InverseColumn {
   MatrixXd y, m_y, y_m, m_y_m;
   MatrixXd gram_y, gram_y_m;  ///< M_K' M_K times the last rows of y and of y_m
@@ -170,7 +171,7 @@ class HessianColumns {
  public:
   HessianColumns(const ChainSlack& chain, const ChainPoint& at) : chain_(chain), at_(at) {}
 
-  /// @param y of block column j.
+  /// @param y block column j of Y.
   InverseColumn column(std::size_t j, MatrixXd y) const {
     const std::size_t last = chain_.layers();
     const Index width = chain_.width(j), rows = y.rows(), end = chain_.width(last);
@@ -201,7 +202,7 @@ class HessianColumns {
     return c;
   }
 
-  /// Y of block column j - 1, from that of j >= 2.
+  /// Returns block column j - 1 of Y from block column j >= 2.
   MatrixXd before(std::size_t j, const MatrixXd& y) const {
     const Index width = chain_.width(j - 1);
     MatrixXd result(width + y.rows(), width);
@@ -210,17 +211,18 @@ class HessianColumns {
     return result;
   }
 
-  /// Of the rows from layer j on: where those of layer i begin.
+  /// Returns where the rows of layer i begin among the rows from layer j on.
   Index from(std::size_t i, std::size_t j) const { return chain_.place(i) - chain_.place(j); }
 
  private:
-  /// M_K-1 Y of block K - 2, from row K - 1 of S Y = I off the diagonal: T M Y_before = (2 T - M_K' M_K) Y.
+  /// Returns M_K-1 times block K - 2 of Y, from row K - 1 of S Y = I off the diagonal: T M Y_before = (2 T - M_K' M_K)
+  /// Y.
   MatrixXd last_rows(const Ref<const MatrixXd>& y, const MatrixXd& gram_y) const {
     const auto t = chain_.multipliers(at_.y, chain_.layers());
     return 2 * y - t.cwiseInverse().asDiagonal() * gram_y;
   }
 
-  /// X F_j; F_1 = T_1 M_1 M_1' / rho may have a low rank.
+  /// Returns X F_j. F_1 = T_1 M_1 M_1' / rho may have low rank.
   MatrixXd times_f(const Ref<const MatrixXd>& x, const MatrixXd& f, std::size_t j) const {
     const MatrixXd& stage = chain_.stage(j);
     if (j > 1 || chain_.bend(1) > 0 || 2 * stage.cols() > stage.rows()) return product(x, f);

@@ -24,11 +24,11 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Below this size LAPACK's unblocked inversion is as fast as anything.
+/// Below this size LAPACK's unblocked inversion is fastest.
 constexpr int kSmallTriangle = 32;
 
-/// Hold it while OpenBLAS works. A build without threads may leave its buffers unguarded (Debian's does): two calls at
-/// once then give wrong numbers, so there they take turns.
+/// Returns a lock to be held during calls of OpenBLAS. Builds of OpenBLAS without threads may not protect their buffers
+/// (Debian's does not), so that concurrent calls give wrong results; there the calls are serialised.
 std::unique_lock<std::mutex> blas_turn() {
   static std::mutex mutex;
   std::unique_lock<std::mutex> turn(mutex, std::defer_lock);
@@ -199,10 +199,10 @@ void add_symmetric_product(VectorXd& y, double factor, const MatrixXd& x, const 
 
 namespace {
 
-/// Lanczos' method with full reorthogonalisation; nothing where it has not converged.
+/// Lanczos method with full reorthogonalisation; returns nothing if it does not converge.
 std::optional<double> largest_by_lanczos(const MatrixXd& m) {
   constexpr Eigen::Index kSteps = 200, kBetweenLooks = 10;
-  constexpr double kResidual = 1e-8;  // the error of the eigenvalue is of its square's order
+  constexpr double kResidual = 1e-8;  // the error of the eigenvalue is of the order of its square
   const Eigen::Index n = m.rows(), steps = std::min(n, kSteps);
   MatrixXd basis(n, steps + 1);
   VectorXd alpha(steps), beta(steps);
@@ -231,7 +231,7 @@ std::optional<double> largest_by_lanczos(const MatrixXd& m) {
 }  // namespace
 
 double largest_eigenvalue(const MatrixXd& m) {
-  constexpr Eigen::Index kMostDirect = 64;  // beyond, iterations cost less
+  constexpr Eigen::Index kMostDirect = 64;  // for larger matrices, iterations are cheaper
   if (m.rows() > kMostDirect) {
     const std::optional<double> found = largest_by_lanczos(m);
     if (found) return std::max(0.0, *found);

@@ -19,12 +19,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Step lengths come from Lanczos, which can miss the least eigenvalue: shorten until Cholesky agrees.
+/// Step lengths come from the Lanczos method, which can miss the least eigenvalue. They are shortened by this factor
+/// until Cholesky succeeds.
 constexpr double kBacktrack = 0.8;
-/// Relative accuracy of that eigenvalue: for the centring parameter, which is a heuristic, and for the step.
+/// Relative accuracy of that eigenvalue: kRough for the centring parameter, which is a heuristic, kFine for the step.
 constexpr double kRough = 0.1, kFine = 0.02;
 
-/// The factor of S: dense, or by blocks where S has several that are narrow.
+/// The Cholesky factor of S: dense, or by blocks if S has several narrow blocks.
 class SlackFactor {
  public:
   SlackFactor() = default;
@@ -44,7 +45,7 @@ class SlackFactor {
   const std::optional<BlockCholesky>& blocks() const { return blocks_; }
 
  private:
-  /// Two neighbouring blocks are at most a fifth of the whole: below, the dense kernels are as fast.
+  /// Returns whether two adjacent blocks are at most a fifth of the matrix; otherwise the dense kernels are as fast.
   static bool is_narrow(const std::vector<Index>& begin) {
     Index widest = 0;
     for (std::size_t k = 0; k + 2 < begin.size(); ++k) widest = std::max(widest, begin[k + 2] - begin[k]);
@@ -55,8 +56,9 @@ class SlackFactor {
   std::optional<BlockCholesky> blocks_;
 };
 
-/// Largest alpha <= 1 with X + alpha D >= 0 kept at a distance, from the least eigenvalue of L^-1 D L^-T by Lanczos
-/// with full reorthogonalisation, stopped at a relative accuracy. `congruence` gives L^-1 D L^-T v, with X = L L'.
+/// Returns the largest alpha <= 1 for which X + alpha D stays in the interior of the cone, from the least eigenvalue of
+/// L^-1 D L^-T, X = L L', by the Lanczos method with full reorthogonalisation, stopped at a relative accuracy.
+/// @param congruence returns L^-1 D L^-T v.
 template <class Congruence>
 double step_length(Index n, const Congruence& congruence, double fraction, double accuracy) {
   const int steps = static_cast<int>(std::min<Index>(n, 30));
@@ -93,7 +95,7 @@ double step_length(const SlackFactor& factor, const MatrixXd& direction, double 
   return step_length(direction.rows(), congruence, fraction, accuracy);
 }
 
-/// Tries `step`, then shorter ones, until `factor_at(step)` succeeds; empty if none does.
+/// Tries `step`, then shorter steps, until `factor_at(step)` succeeds; returns an empty result if none does.
 template <class FactorAt>
 auto backtrack(double step, const FactorAt& factor_at) {
   const auto is_empty = [](const auto& factor) {
@@ -140,10 +142,10 @@ const char* name(LipSdpStop stop) {
 
 namespace {
 
-/// Columns of a product between two looks at the clock.
+/// Columns of a product that are computed between two checks of the clock.
 constexpr Index kPanel = 512;
 
-/// C += A B for square matrices, or less than that if it has to stop.
+/// C += A B for square matrices; incomplete if `stop` ends the computation.
 void add_large_product(MatrixXd& c, const MatrixXd& a, const MatrixXd& b, const Stop& stop) {
   for (Index column = 0; column < c.cols() && !stop.now(); column += kPanel) {
     const Index width = std::min(kPanel, c.cols() - column);
@@ -151,14 +153,14 @@ void add_large_product(MatrixXd& c, const MatrixXd& a, const MatrixXd& b, const 
   }
 }
 
-/// C += A S^-1, by solving with the factor of S where it has blocks; or less than that if it has to stop.
+/// C += A S^-1, by solving with the factor of S if it has blocks; incomplete if `stop` ends the computation.
 void add_divided(MatrixXd& c, MatrixXd a, const SlackFactor& s, const MatrixXd& s_inverse, const Stop& stop) {
   if (!s.blocks()) return add_large_product(c, a, s_inverse, stop);
   s.blocks()->divide(a);
   c += a;
 }
 
-/// Mehrotra's predictor-corrector method, with the direction of Helmberg, Rendl, Vanderbei and Wolkowicz.
+/// Mehrotra's predictor-corrector method with the direction of Helmberg, Rendl, Vanderbei and Wolkowicz.
 class Minimisation {
  public:
   Minimisation(const RankTwoInequality& inequality, const VectorXd& start,
@@ -179,7 +181,7 @@ class Minimisation {
   }
 
  private:
-  /// What an iteration knows of the point at which it starts.
+  /// Data of the point at which an iteration starts.
   struct Point {
     MatrixXd s_inverse, z_a, y_a;
     double mu, gap, infeasibility;
@@ -188,29 +190,30 @@ class Minimisation {
     VectorXd dy;
     MatrixXd ds, dz;
   };
-  /// Largest steps along a direction.
+  /// Largest step lengths along a direction.
   struct Lengths {
     double primal, dual;
   };
 
-  /// Notes why the search ends; false, so that callers can return it.
+  /// Stores why the search ends. Returns false, so that callers can return the result.
   bool ends(LipSdpStop why) {
     result_.stop = why;
     return false;
   }
 
-  /// An iteration of a large program takes seconds: it ends between its products, and leaves the last iterate.
+  /// Returns whether to stop. Called between the products of an iteration, which takes seconds for a large program; the
+  /// last iterate is then kept.
   bool has_to_stop() {
     const std::optional<LipSdpStop> why = why_stopped(options_.stop);
     if (why) result_.stop = *why;
     return why.has_value();
   }
 
-  /// Factors the first iterates; false where the start is not strictly feasible, or there is no time.
+  /// Factorises the first iterates. Returns false if the start is not strictly feasible or there is no time.
   bool begin() {
     s_factor_ = options_.stop.now() ? SlackFactor() : SlackFactor(s_, block_begin_);
     if (!s_factor_.good()) return ends(why_stopped(options_.stop).value_or(LipSdpStop::kNumericalLimit));
-    // Z = mu S^-1 with trace 1 over the inputs: on the central path but for the constraints of the neurons.
+    // Z = mu S^-1 with trace 1 over the inputs: on the central path except for the constraints of the neurons.
     z_ = s_factor_.inverse();
     z_ /= z_.diagonal().head(it_.inputs()).sum();
     z_factor_ = cholesky(z_);
@@ -219,7 +222,7 @@ class Minimisation {
     return z_factor_.size() > 0 || ends(LipSdpStop::kNumericalLimit);
   }
 
-  /// One step; false where it was the last one, with the reason in the result.
+  /// Makes one step. Returns false if it was the last one; the reason is stored in the result.
   bool iterate() {
     const std::optional<Point> point = linearise();
     if (!point) return false;
@@ -261,12 +264,12 @@ class Minimisation {
     return point;
   }
 
-  /// The dual objective <C, Z>: with a feasible Z it is below the optimum.
+  /// Updates the best dual objective <C, Z>, which is a lower bound on the optimum if Z is feasible.
   void note_dual(const Point& point) {
     if (point.infeasibility < 1e-9) result_.best_dual = std::max(result_.best_dual, y_(0) - size_ * point.mu);
   }
 
-  /// dy from the Schur complement, and dS and dZ from it: dZ = `target` - (Z dS + `q`) S^-1, symmetrised.
+  /// Computes dy from the Schur complement, then dS and dZ: dZ = `target` - (Z dS + `q`) S^-1, symmetrised.
   Direction direction(const SchurSolver& schur, const VectorXd& rhs, MatrixXd target, const MatrixXd* q,
                       const Point& point) {
     Direction found{schur.solve(rhs), {}, std::move(target)};
@@ -283,7 +286,7 @@ class Minimisation {
             step_length(s_factor_, step.ds, fraction, accuracy)};
   }
 
-  /// sigma mu: how far to aim above zero, from how much of mu the predictor would remove.
+  /// Returns the target sigma mu of the corrector, based on the reduction of mu by the predictor.
   double centring_mu(const Direction& predictor, const Lengths& length, double mu) const {
     const double after =
         (z_ + length.primal * predictor.dz).cwiseProduct(s_ + length.dual * predictor.ds).sum() / size_;
@@ -292,7 +295,7 @@ class Minimisation {
     return std::max(1e-6, ratio * ratio * (is_long ? ratio : 1.0)) * mu;
   }
 
-  /// Right-hand side of the corrector, with the second-order term `q` = dZ dS of the predictor.
+  /// Returns the right-hand side of the corrector with the second-order term `q` = dZ dS of the predictor.
   VectorXd corrected(const MatrixXd& q, double centring, const Point& point) const {
     const Index m = it_.neurons();
     VectorXd rhs = centring * functionals(it_, point.s_inverse, point.y_a) - b_;
@@ -303,7 +306,8 @@ class Minimisation {
     return rhs;
   }
 
-  /// Moves both iterates, by less than `length` where a factor fails; false, and y as it was, where none succeeds.
+  /// Moves both iterates, by less than `length` if a factorisation fails. Returns false, with y unchanged, if no step
+  /// succeeds.
   bool advance(const Direction& step, const Lengths& length) {
     const VectorXd y_before = y_;
     s_factor_ = backtrack(length.dual, [&](double by) {

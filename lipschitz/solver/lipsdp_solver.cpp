@@ -15,7 +15,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The chain scaled by a power of two per stage, and where each block lies.
+/// The chain scaled by a power of two per stage, and the layout of its blocks.
 struct ScaledProblem {
   std::vector<MatrixXd> stages;
   std::vector<int> exponents;  ///< stages[k] = chain[k] * 2^-exponents[k]
@@ -23,17 +23,17 @@ struct ScaledProblem {
   Index size() const { return begin.back(); }
   Index inputs() const { return begin[1]; }
   Index neurons() const { return size() - inputs(); }
-  std::size_t layers() const { return stages.size() - 1; }  ///< hidden layers
+  std::size_t layers() const { return stages.size() - 1; }  ///< number of hidden layers
 };
 
-/// The power of two next to x > 0; 1 for x = 0.
+/// Returns the exponent of the power of two nearest to x > 0; 0 for x = 0.
 int nearest_exponent(double x) {
   return x > 0 && std::isfinite(x) ? static_cast<int>(std::lround(std::log2(x))) : 0;
 }
 
-/// Scales layer by layer so that rho = 1 and all t = 1 is nearly optimal among multipliers that are equal within a
+/// Scales layer by layer such that rho = 1 and all t = 1 is nearly optimal among multipliers that are equal within a
 /// layer: t_k = 1 / lambda_max(M_k X_{k-1}^-1 M_k') with X_k = 2 t_k I - t_k^2 M_k X_{k-1}^-1 M_k' >= t_k I
-/// (layerwise_gram()). Blocks of S are then of order one, and 2 (rho, t) is well inside.
+/// (layerwise_gram()). The blocks of S are then of order one, and 2 (rho, t) is well inside the feasible set.
 ScaledProblem scale(const ReluChain& chain) {
   ScaledProblem problem;
   problem.stages = chain;
@@ -47,7 +47,7 @@ ScaledProblem scale(const ReluChain& chain) {
   problem.begin = {0, first.cols()};
   MatrixXd g = MatrixXd::Zero(first.rows(), first.rows());
   add_lower_gram(g, 1, first);
-  int unit_before = 0;  // z_{k-1} is measured in units of 2^unit_before
+  int unit_before = 0;  // z_{k-1} is in units of 2^unit_before
   for (std::size_t k = 0; k < problem.stages.size(); ++k) {
     MatrixXd& m = problem.stages[k];
     problem.begin.push_back(problem.begin.back() + m.rows());
@@ -56,12 +56,13 @@ ScaledProblem scale(const ReluChain& chain) {
     problem.exponents.push_back(unit - unit_before);
     m *= std::ldexp(1.0, unit_before - unit);
     unit_before = unit;
-    const double t = largest > 0 ? 1 / largest : std::ldexp(1.0, -2 * unit);  // nothing comes: of its units
+    const double t =
+        largest > 0 ? 1 / largest : std::ldexp(1.0, -2 * unit);  // no input: only fixes the units
     if (k + 1 == problem.stages.size()) break;
     g = layerwise_gram(problem.stages[k + 1], g, t);
     if (g.size() == 0) g = MatrixXd::Zero(problem.stages[k + 1].rows(), problem.stages[k + 1].rows());
   }
-  problem.begin.pop_back();  // the output is no variable
+  problem.begin.pop_back();  // the output is not a variable
   return problem;
 }
 
@@ -145,7 +146,8 @@ InteriorPointResult minimise(const ScaledProblem& problem, const LipSdpOptions& 
     return *std::move(found);
   const ChainInequality inequality(problem);
 
-  // Within rounding to powers of two all-ones is feasible or nearly so; scaling (rho, t) up moves inside the cone.
+  // The vector of ones is nearly feasible, up to the rounding to powers of two. Scaling (rho, t) up moves it inside the
+  // cone.
   const auto scaled_up = [&problem](double shrink) {
     VectorXd y(1 + problem.neurons());
     double level = 4;

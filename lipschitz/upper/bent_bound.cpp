@@ -15,8 +15,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The chain with stages of norm about one, and what its own are: M_k = stages[k] 2^exponents[k]. Slopes of neuron i of
-/// a hidden layer lie in [low_i, low_i + width_i].
+/// The chain scaled to stages of norm about one: M_k = stages[k] 2^exponents[k]. The slopes of neuron i of a hidden
+/// layer lie in [low_i, low_i + width_i].
 struct ScaledBentChain {
   ReluChain stages;
   std::vector<VectorXd> low, width;
@@ -24,7 +24,7 @@ struct ScaledBentChain {
   Index inputs = 0, neurons = 0;
   Index size() const { return inputs + neurons; }
   std::size_t hidden_layers() const { return low.size(); }
-  /// The largest |slope| of each neuron of a layer.
+  /// Returns the largest |slope| of each neuron of a layer.
   VectorXd steepest(std::size_t k) const {
     return low[k].cwiseAbs().cwiseMax((low[k] + width[k]).cwiseAbs());
   }
@@ -32,7 +32,7 @@ struct ScaledBentChain {
 
 double norm_of(const MatrixXd& m) { return std::sqrt(largest_eigenvalue(m * m.transpose())); }
 
-/// The slopes of the neurons that are live.
+/// Sets the slope ranges of the live neurons.
 void set_slopes(const check::BentChain& chain, const LiveChain& live, ScaledBentChain& result) {
   std::size_t before = 0;
   for (std::size_t k = 0; k < live.neurons().size(); ++k) {
@@ -77,7 +77,8 @@ class BentInequality final : public RankTwoInequality {
  public:
   explicit BentInequality(const ScaledBentChain& chain)
       : inputs_(chain.inputs), a_(chain.size(), chain.neurons) {
-    MatrixXd z = MatrixXd::Identity(inputs_, chain.size());  // what leaves the layer at hand, of (x, w)
+    MatrixXd z =
+        MatrixXd::Identity(inputs_, chain.size());  // output of the current layer as a function of (x, w)
     Index begin = 0;
     for (std::size_t k = 0; k < chain.hidden_layers(); ++k) {
       const MatrixXd y = chain.stages[k] * z;
@@ -113,9 +114,10 @@ class BentInequality final : public RankTwoInequality {
   MatrixXd a_, output_gram_;
 };
 
-/// The multipliers that prove the product of norms, well inside: with |dz_k|^2 weighted by l_k, backwards
-/// l_{k-1} = 2 l_k max c^2 |M_k|^2, c the steepest slope of a neuron, and t = l_k c / (b - a), for which
-/// l_k z^2 + 2 t (z - a y) (b y - z) is at most l_k c^2 y^2. In w it is t (b - a).
+/// Returns multipliers that prove the product of norms with a margin. With weights l_k of |dz_k|^2, computed backwards
+/// as l_{k-1} = 2 l_k max c^2 |M_k|^2, where c is the steepest slope of a neuron, the multiplier is t = l_k c / (b -
+/// a), for which l_k z^2 + 2 t (z - a y) (b y - z) is at most l_k c^2 y^2. In the variables w the multiplier is t (b -
+/// a).
 VectorXd product_start(const ScaledBentChain& chain) {
   constexpr double kInside = 2;
   VectorXd y(1 + chain.neurons);
@@ -133,7 +135,7 @@ VectorXd product_start(const ScaledBentChain& chain) {
   return y;
 }
 
-/// c of each layer if all its neurons have slopes in one [1 - c, c], as they have for all inputs.
+/// Returns c of each layer if all neurons of a layer have the same range [1 - c, c], as is the case for all inputs.
 std::optional<std::vector<double>> slopes_of_layers(const ScaledBentChain& chain) {
   std::vector<double> result;
   for (std::size_t k = 0; k < chain.hidden_layers(); ++k) {
@@ -145,14 +147,14 @@ std::optional<std::vector<double>> slopes_of_layers(const ScaledBentChain& chain
   return result;
 }
 
-/// By blocks where that is faster, else by the dense program; nothing where that is too large.
+/// Solves by blocks if that is faster, else as a dense program; returns nothing if that is too large.
 std::optional<InteriorPointResult> minimise(const ScaledBentChain& chain,
                                             const InteriorPointOptions& options) {
   if (const std::optional<std::vector<double>> slopes = slopes_of_layers(chain)) {
     std::optional<InteriorPointResult> found =
         minimise_long_chain(ChainSlack(chain.stages, *slopes), options);
     if (found) {
-      for (VectorXd& y : found->points) {  // to multipliers in w
+      for (VectorXd& y : found->points) {  // converts to multipliers in w
         Index next = 1;
         for (const VectorXd& width : chain.width) {
           y.segment(next, width.size()).array() *= width.array();
@@ -167,7 +169,7 @@ std::optional<InteriorPointResult> minimise(const ScaledBentChain& chain,
   return minimise(BentInequality(chain), product_start(chain), options);
 }
 
-/// (rho, t) in the units of the chain itself.
+/// Converts (rho, t) to the units of the original chain.
 VectorXd unscaled(const ScaledBentChain& chain, VectorXd y) {
   int total = 0, up_to = 0;
   for (const int e : chain.exponents) total += e;

@@ -27,7 +27,7 @@ constexpr int kFloorStarts = 24;
 
 using Pattern = std::vector<VectorXd>;
 
-/// M_k D_{k-1} ... D_1 M_1 for each k, first to last.
+/// Returns M_k D_{k-1} ... D_1 M_1 for each k, in ascending order.
 std::vector<MatrixXd> partial_products(const std::vector<MatrixXd>& chain, const Pattern& pattern) {
   std::vector<MatrixXd> result = {chain[0]};
   for (std::size_t k = 1; k < chain.size(); ++k)
@@ -35,7 +35,7 @@ std::vector<MatrixXd> partial_products(const std::vector<MatrixXd>& chain, const
   return result;
 }
 
-/// Raises the norm of the product by choosing every D_k for the current singular directions until nothing changes.
+/// Increases the norm of the product by choosing every D_k for the current singular directions until nothing changes.
 double alternate(const std::vector<MatrixXd>& chain, Pattern& pattern) {
   double best = 0;
   for (int round = 0; round < 100; ++round) {
@@ -55,7 +55,7 @@ double alternate(const std::vector<MatrixXd>& chain, Pattern& pattern) {
   return best;
 }
 
-/// Tries every single flip once; true if one of them raised `slope`.
+/// Tries to flip each neuron once; returns whether a flip increased `slope`.
 bool flip(const std::vector<MatrixXd>& chain, Pattern& pattern, double& slope, const Stop& stop) {
   for (std::size_t k = 0; k < pattern.size(); ++k) {
     for (Index i = 0; i < pattern[k].size(); ++i) {

@@ -15,7 +15,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// tau_1 .. tau_{K-1} and rho of a chain of order one.
+/// tau_1 .. tau_{K-1} and rho of a chain whose layers are of order one.
 struct LayerMultipliers {
   std::vector<double> tau;
   double rho = 0;
@@ -28,7 +28,7 @@ LayerMultipliers layer_multipliers(const ReluChain& chain) {
   for (std::size_t k = 1; k < chain.size(); ++k) {
     result.tau.push_back(1 / largest_eigenvalue(gram));
     gram = layerwise_gram(chain[k], gram, result.tau.back());
-    if (gram.size() == 0) return result;  // cannot be: the least eigenvalue of what is inverted is tau
+    if (gram.size() == 0) return result;  // impossible: the least eigenvalue of the inverted matrix is tau
   }
   result.rho = largest_eigenvalue(gram);
   return result;
@@ -43,7 +43,7 @@ std::optional<UpperProof> eclipse_fast(const std::vector<check::Matrix>& stages)
   if (live.is_constant())
     return prove(stages, std::numeric_limits<double>::min(), live.multipliers(VectorXd()));
 
-  // In units in which the layers are of order one: products of many layers leave the range of double.
+  // Scales the layers to order one, because products of many layers could leave the range of double.
   ReluChain chain = live.live();
   const std::vector<int> exponents = balancing_exponents(chain);
   int total = 0;

@@ -11,7 +11,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// The neurons that both depend on the input and reach the output, per hidden layer.
+/// Returns per hidden layer the neurons that depend on the input and reach the output.
 std::vector<std::vector<Index>> live_neurons(const ReluChain& chain) {
   std::vector<std::vector<Index>> live(chain.size() - 1);
   for (std::size_t k = 0; k < live.size(); ++k) {

@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::MatrixXd;
 
-/// Without hidden layers the constant is the norm of the one matrix.
+/// Bounds a chain without hidden layers, whose Lipschitz constant is the norm of its matrix.
 SdpBound linear_bound(const std::vector<check::Matrix>& stages, const MatrixXd& m) {
   SdpBound result;
   const MatrixXd gram = m.rows() <= m.cols() ? MatrixXd(m * m.transpose()) : MatrixXd(m.transpose() * m);
@@ -33,7 +33,7 @@ SdpBound sdp_bound(const std::vector<check::Matrix>& stages, const SdpOptions& o
 
   SdpBound result;
   const LiveChain chain(stages);
-  if (chain.is_constant()) {  // the smallest rho will do
+  if (chain.is_constant()) {  // the smallest positive rho is a bound
     result.stop = LipSdpStop::kGapReached;
     result.proof = prove(stages, std::numeric_limits<double>::min(), chain.multipliers(Eigen::VectorXd()));
     return result;

@@ -27,7 +27,7 @@ mpq_class squared_norm(const check::Matrix& m) {
   return result << static_cast<mp_bitcnt_t>(sum.exponent);
 }
 
-/// sqrt(|W v|^2 / |v|^2), rounded down; v is not zero.
+/// Returns sqrt(|W v|^2 / |v|^2), rounded down; v must not be zero.
 LowerBound rayleigh_root(const files::Layer& layer, const std::vector<double>& v) {
   const check::Matrix w(layer.outputs, layer.inputs, layer.weights);
   const check::Matrix column(layer.inputs, 1, v);
@@ -42,9 +42,9 @@ SpectralNorm spectral_norm(const files::Layer& layer, std::optional<double> limi
       throw std::invalid_argument("spectral_norm: " + layer.name + " has a non-finite weight");
   }
   Eigen::MatrixXd w = Eigen::Map<const RowMajor>(layer.weights.data(), layer.outputs, layer.inputs);
-  // Squares of very large or small weights would leave the range of double: work near one.
+  // Scales the weights to order one, because squares of very large or small weights would leave the range of double.
   const double magnitude = w.cwiseAbs().maxCoeff();
-  // Not below -1000, whose inverse is a double.
+  // At least -1000, because 2^1000 is still a double.
   const int exponent = magnitude > 0 ? std::max(std::ilogb(magnitude), -1000) : 0;
   w *= std::ldexp(1.0, -exponent);
 
@@ -61,7 +61,8 @@ SpectralNorm spectral_norm(const files::Layer& layer, std::optional<double> limi
   result.lower_vector.assign(v.data(), v.data() + v.size());
   const LowerBound lower = rayleigh_root(layer, result.lower_vector);
 
-  // rho from the estimate, then wider until the proof goes through; a zero matrix is covered by the smallest rho.
+  // Tries rho from the estimate, then increasing values until the proof succeeds. For a zero matrix, the smallest rho
+  // is sufficient.
   std::vector<double> candidates;
   const double in_units = std::ldexp(estimate, 2 * exponent);
   if (limit && std::abs(*limit * *limit - in_units) < 1e-9 * in_units) candidates.push_back(*limit * *limit);
@@ -98,7 +99,7 @@ void require_moderate(const files::Network& network) {
       for (const double one : layer.biases) bias = std::max(bias, std::abs(one));
       if (!(largest <= kMost)) refuse(*weights, layer.name + ".weight", largest);
       if (!(bias <= kMost)) refuse(*weights, layer.name + ".bias", bias);
-      // At least the spectral norm; below 1 a layer does not make room for the others.
+      // An upper bound on the spectral norm. Norms below 1 do not compensate for large ones.
       product *= std::max(1.0, largest * std::sqrt(static_cast<double>(layer.outputs) * layer.inputs));
       if (!(product <= kMost)) refuse(*weights, layer.name + ".weight", largest);
     }
