@@ -81,8 +81,7 @@ const char* name(LawKind law) {
 std::vector<Claim> claims(const files::Network& network, const ClaimOptions& options) {
   std::vector<Claim> result;
   std::vector<std::string> unused = options.blocks;
-  unused.erase(std::remove(unused.begin(), unused.end(), "every"),
-               unused.end());  // "every" may match no block
+  unused.erase(std::remove(unused.begin(), unused.end(), "every"), unused.end());  // may match none
   bool scale_fits = options.scale.empty();
   for (const double scale : options.scale) {
     if (!(scale > 0) || std::isinf(scale)) throw std::invalid_argument("a scale must be positive");

@@ -42,9 +42,8 @@ double sqrt_up(const Dyadic& square) {
   const auto is_enough = [&square](double x) { return Dyadic(x) * x >= square; };
   long exponent = 0;
   const double fraction = fraction_of(square, &exponent);
-  const long odd =
-      exponent &
-      1;  // squares may leave the range of double, so half of the even exponent is applied to the root
+  // Squares may leave the range of double, so half of the even exponent is applied to the root.
+  const long odd = exponent & 1;
   double root = scaled(std::sqrt(odd != 0 ? 2 * fraction : fraction), (exponent - odd) / 2);
   while (std::isfinite(root) && !is_enough(root)) root = up(root);
   while (std::isfinite(root) && is_enough(down(root))) root = down(root);

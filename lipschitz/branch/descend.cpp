@@ -33,10 +33,9 @@ double centred_rho(const VectorXd& g, double mu) {
 
 struct Point {
   VectorXd t;
-  MatrixXd
-      factor;     ///< Cholesky factor of S_zz, in the lower triangle; empty if S_zz is not positive definite
-  MatrixXd half;  ///< factor^-1 S_zx
-  VectorXd g;     ///< eigenvalues of rho I - R; `vectors` are the eigenvectors
+  MatrixXd factor;  ///< Cholesky factor of S_zz (lower triangle); empty: not positive definite
+  MatrixXd half;    ///< factor^-1 S_zx
+  VectorXd g;       ///< eigenvalues of rho I - R; `vectors` are the eigenvectors
   MatrixXd vectors;
   double rho = 0, value = 0;
 
@@ -110,8 +109,7 @@ struct Kernel {
     inverse.pq = inverse.qp.transpose();
     inverse.pp.resize(m, m);
     for (const NodeInequality::LayerBlock& block : inequality.blocks()) {
-      const Index past =
-          block.first_neuron + block.neurons;  // number of columns needed for the lower triangle
+      const Index past = block.first_neuron + block.neurons;  // columns needed for the lower triangle
       auto rows = inverse.pp.block(block.first_neuron, 0, block.neurons, past);
       rows = -inverse.qp.block(block.first_neuron, 0, block.neurons, past);
       const Index first = std::max(block.first_used - n0, Index{0}), used = block.past_used - n0 - first;

@@ -67,8 +67,7 @@ Others others_of(const files::Network& network, const Claim& claim, const Domain
   for (const auto& [part, count] : counts) {
     RangeProof range =
         sum_range(check::term_layers(network, part, names[1]), domain.at(part), std::min(nodes, kRangeNodes));
-    for (std::size_t i = 0; i < rows;
-         ++i) {  // the ground's term once, other terms any number of times up to `count`
+    for (std::size_t i = 0; i < rows; ++i) {  // the ground once, others up to `count` times
       others.least[i] += part == ground ? range.least[i] : count * std::min(range.least[i], 0.0);
       others.most[i] += part == ground ? range.most[i] : count * std::max(range.most[i], 0.0);
     }

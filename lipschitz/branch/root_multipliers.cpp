@@ -65,8 +65,7 @@ VectorXd root_multipliers(const LocalChain& chain, const NodeInequality& inequal
   if (inside.size() == 0) return VectorXd::Zero(inequality.neurons());  // proves nothing
   InteriorPointOptions options;
   options.relative_gap = kRootGap;
-  options.infeasibility =
-      std::numeric_limits<double>::infinity();  // dual feasibility is not needed for a bound
+  options.infeasibility = std::numeric_limits<double>::infinity();  // every iterate is a bound
   const InteriorPointResult found = minimise(inequality, inside, options);
   return found.points.back().tail(inequality.neurons());
 }

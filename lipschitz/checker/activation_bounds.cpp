@@ -59,7 +59,7 @@ Fixed value_at(Activation activation, const Dyadic& t) {
   }
 }
 
-/// s'(t); at 0 that of ELU and SELU from below.
+/// s'(t); for ELU and SELU at 0, the derivative from below.
 Fixed slope_at(Activation activation, const Dyadic& t) {
   switch (activation) {
     case Activation::kTanh:
@@ -81,9 +81,9 @@ Fixed slope_at(Activation activation, const Dyadic& t) {
   }
 }
 
-/// Numbers around the place of the minimum of s, and one below that minimum. SiLU: it is 1 + t where e^t + 1 + t, which
-/// rises, is 0, so that 1 + `from` is below. GELU: s' rises for |t| < sqrt 2 and is between 0 and 2^-22 at `to`, so
-/// that s(`to`) - 2^-41 is below.
+/// Bounds on the position of the minimum of s, and a lower bound on its value. SiLU: the minimum is 1 + t where
+/// e^t + 1 + t, which is increasing, is 0, so 1 + `from` is a lower bound. GELU: s' is increasing for |t| < sqrt 2 and
+/// is between 0 and 2^-22 at `to`, so s(`to`) - 2^-41 is a lower bound.
 struct Minimum {
   Dyadic from, to, value;
 };
@@ -92,12 +92,12 @@ Minimum minimum_of(Activation activation) {
                                          : Minimum{-0x1.80eaep-1, -0x1.80eacp-1, -0x1.5c19ep-3};
 }
 
-/// Numbers around the place of the maximum of s'.
+/// Bounds on the position of the maximum of s'.
 Interval steepest_place(Activation activation) {
   return activation == Activation::kSilu ? Interval{0x1.331p+1, 0x1.332p+1} : Interval{0x1.6ap+0, 0x1.6a1p+0};
 }
 
-/// Between which s' lies, of SiLU and GELU. Where s' may have an extreme within, that is the one of all t.
+/// Encloses s' of SiLU and GELU over an interval. If s' may have an extreme inside, its global extreme is used.
 Interval bent_slopes(Activation activation, const Interval& t) {
   const Fixed low = slope_at(activation, t.lower), high = slope_at(activation, t.upper);
   Interval result = {std::min<Dyadic>(lower_end(low), lower_end(high)),
@@ -109,7 +109,7 @@ Interval bent_slopes(Activation activation, const Interval& t) {
   return result;
 }
 
-/// Between which s' lies.
+/// Encloses s' over an interval.
 Interval derivatives(Activation activation, const Interval& t) {
   const bool has_negative = t.lower.sign()<0, has_positive = t.upper.sign()> 0;
   switch (activation) {

@@ -11,22 +11,22 @@ namespace {
 
 using Row = std::vector<double>;
 
-constexpr double kTiny = 0x1p-900;  ///< covers what underflow may cost in sums of at most 10^6 terms
+constexpr double kTiny = 0x1p-900;  ///< covers underflow in sums of at most 10^6 terms
 
 /// Upper bounds on (signed) values of neurons, one per row, as linear forms in some layer's y or h, or in x.
 struct Forms {
   int count = 0, width = 0;
   Row coefficients;        ///< [count x width]
-  Row constant, absolute;  ///< sums of the constants' terms, and of their absolute values
-  Row error;               ///< what rounding the coefficients may have cost
-  double terms = 0;        ///< of each `constant`, at most
+  Row constant, absolute;  ///< sums of the constants' terms and of their absolute values
+  Row error;               ///< bounds on the error due to rounding the coefficients
+  double terms = 0;        ///< largest number of terms of a `constant`
   double* at(int r) { return &coefficients[static_cast<std::size_t>(r) * static_cast<std::size_t>(width)]; }
   const double* at(int r) const {
     return &coefficients[static_cast<std::size_t>(r) * static_cast<std::size_t>(width)];
   }
 };
 
-/// Adds what else enters the layer's sums, at most.
+/// Adds upper bounds on the other terms that enter the layer's sums.
 void add_entering(Forms& forms, int r, const HiddenLayer& layer) {
   if (layer.least.empty()) return;
   const auto row = static_cast<std::size_t>(r);
@@ -38,7 +38,7 @@ void add_entering(Forms& forms, int r, const HiddenLayer& layer) {
   }
 }
 
-/// Substitutes y = W h + b: the forms become such in h. `used`: outputs with a coefficient in any form.
+/// Substitutes y = W h + b, which turns forms in y into forms in h. `used`: outputs with a coefficient in any form.
 void through_layer(Forms& forms, const HiddenLayer& layer, const Row& term, const std::vector<int>& used) {
   Row next(static_cast<std::size_t>(forms.count) * static_cast<std::size_t>(layer.inputs), 0.0);
   add_product(next.data(), layer.inputs, forms.count, layer.inputs, {forms.coefficients.data(), forms.width},
@@ -56,13 +56,13 @@ void through_layer(Forms& forms, const HiddenLayer& layer, const Row& term, cons
   forms.coefficients = std::move(next);
 }
 
-/// What relu(y) is replaced by: `above` y + `offset` where a form's coefficient is positive, `below` y where it is
+/// The lines that replace relu(y): `above` y + `offset` if the coefficient of a form is positive, `below` y if it is
 /// negative.
 struct Relaxation {
-  Row above, below, offset, error;  ///< `error`: of rounding above times a coefficient, relatively to that
+  Row above, below, offset, error;  ///< `error`: round-off of above times a coefficient, per unit of it
   std::vector<int> used;            ///< neurons that are not off
 
-  /// @param lower_slopes of undecided neurons; null: as their range suggests.
+  /// @param lower_slopes lower slopes of undecided neurons; null: chosen from their ranges.
   Relaxation(const HiddenLayer& layer, const NeuronBounds& bounds, std::size_t k,
              const Row* lower_slopes = nullptr) {
     const std::size_t size = bounds.lower[k].size();
@@ -97,13 +97,13 @@ void through_relu(Forms& forms, const Relaxation& relu) {
   forms.terms += forms.width;
 }
 
-/// A form's largest value over the box, rounded up.
+/// Returns the largest value of a form over the box, rounded up.
 double largest(const Forms& forms, int r, const Row& lower, const Row& upper) {
   const auto row = static_cast<std::size_t>(r);
   double value = forms.constant[row], absolute = forms.absolute[row];
   for (std::size_t j = 0; j < lower.size(); ++j) {
     const double c = forms.at(r)[j];
-    if (!std::isfinite(c)) return kInfinity;  // of layers before, `error` is infinite then, or a NaN
+    if (!std::isfinite(c)) return kInfinity;  // in earlier layers, `error` is then infinite or NaN
     value += c * (c > 0 ? upper[j] : lower[j]);
     absolute += std::abs(c) * std::max(std::abs(lower[j]), std::abs(upper[j]));
   }
@@ -118,8 +118,8 @@ struct SignedOutput {
   double sign;
 };
 
-/// Forms in x above the signed outputs of layer `top`.
-/// @param lower_slopes of the layers before, if not null.
+/// Returns upper bounds on the signed outputs of layer `top` as forms in x.
+/// @param lower_slopes lower slopes of the previous layers, if not null.
 Forms above(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds, std::size_t top,
             const std::vector<SignedOutput>& outputs, const std::vector<Row>* lower_slopes = nullptr) {
   const HiddenLayer& layer = layers[top];
@@ -131,7 +131,7 @@ Forms above(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds, 
   forms.absolute.assign(outputs.size(), 0.0);
   forms.constant.assign(outputs.size(), 0.0);
   forms.coefficients.resize(outputs.size() * static_cast<std::size_t>(layer.inputs));
-  for (std::size_t r = 0; r < outputs.size(); ++r) {  // the layer's own row: exact
+  for (std::size_t r = 0; r < outputs.size(); ++r) {  // the row of the layer itself is exact
     const double sign = outputs[r].sign;
     const auto i = static_cast<std::size_t>(outputs[r].output);
     const double* const row = &layer.weights[i * static_cast<std::size_t>(layer.inputs)];
@@ -152,7 +152,8 @@ Forms above(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds, 
   return forms;
 }
 
-/// 1 for outputs of the first `top` layers that are on at the corner, else 0. Roughly: any slopes will do.
+/// Returns 1 for outputs of the first `top` layers that are on at the corner, else 0. Computed without error bounds,
+/// because any slopes are valid.
 std::vector<Row> slopes_at(const std::vector<HiddenLayer>& layers, std::size_t top, const Row& lower,
                            const Row& upper, std::uint64_t corner) {
   Row h;
@@ -178,7 +179,7 @@ std::vector<Row> slopes_at(const std::vector<HiddenLayer>& layers, std::size_t t
   return slopes;
 }
 
-/// Whether the decision of an output of layer k holds; makes it so in `bounds`.
+/// Returns whether the decision for an output of layer k holds; if so, stores it in `bounds`.
 bool decide(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers, const Row& lower, const Row& upper,
             std::size_t k, std::size_t output, const Decision& decision) {
   double &l = bounds.lower[k][output], &u = bounds.upper[k][output];
@@ -193,7 +194,7 @@ bool decide(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers, const 
   return true;
 }
 
-/// w times a form, w >= 0.
+/// Multiplies forms by w >= 0.
 void scale(Forms& forms, double w) {
   for (double& c : forms.coefficients) c *= w;
   forms.constant[0] *= w;
@@ -209,7 +210,7 @@ double largest_sum(const std::vector<HiddenLayer>& layers, const NeuronBounds& b
   Forms other = above(layers, bounds, second.layer, {{second.output, second.weight < 0 ? -1.0 : 1.0}});
   scale(sum, std::abs(first.weight));
   scale(other, std::abs(second.weight));
-  double rounding = 0;  // of products and sums of coefficients, by what they multiply
+  double rounding = 0;  // round-off of the products and sums of coefficients, times the inputs
   for (std::size_t j = 0; j < lower.size(); ++j) {
     rounding += (std::abs(sum.coefficients[j]) + std::abs(other.coefficients[j])) *
                 std::max(std::abs(lower[j]), std::abs(upper[j]));
@@ -218,7 +219,7 @@ double largest_sum(const std::vector<HiddenLayer>& layers, const NeuronBounds& b
   sum.constant[0] += other.constant[0];
   sum.absolute[0] += other.absolute[0];
   sum.error[0] += other.error[0] + 8 * kUnit * (rounding + sum.absolute[0]) + kTiny;
-  sum.error[0] *= 1 + 1e-6;  // roundings of the error terms themselves
+  sum.error[0] *= 1 + 1e-6;  // for round-off of the error terms themselves
   sum.terms += other.terms;
   return largest(sum, 0, lower, upper);
 }
@@ -234,11 +235,11 @@ bool add_layers(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers, co
                 const Row& upper, const NeuronBounds* around, const std::vector<Decision>& decisions) {
   std::vector<Row>& term = bounds.terms;
   bool all_hold = true;
-  std::size_t first = 0;  // of the layer's outputs, counted over all
+  std::size_t first = 0;  // index of the layer's first output over all layers
   for (std::size_t k = 0; k < bounds.lower.size(); ++k) first += bounds.lower[k].size();
   for (std::size_t k = bounds.lower.size(); k < layers.size(); ++k) {
     const HiddenLayer& layer = layers[k];
-    Row magnitude;  // of the layer's input
+    Row magnitude;  // largest absolute values of the layer's input
     for (std::size_t j = 0; j < static_cast<std::size_t>(layer.inputs); ++j) {
       const double l = k == 0 ? lower[j] : bounds.lower[k - 1][j],
                    u = k == 0 ? upper[j] : bounds.upper[k - 1][j];

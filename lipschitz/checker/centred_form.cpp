@@ -20,7 +20,7 @@ struct CentredForm {
   std::vector<Dyadic> middle, error;
 };
 
-/// Follows intervals and the form through the layers.
+/// Propagates intervals and the form through the layers.
 class BoxValues {
  public:
   explicit BoxValues(const Intervals& box) : values_(box), form_(form_of(box)) {
@@ -31,7 +31,7 @@ class BoxValues {
     rounding_ = kUnit * (Dyadic(1.0) + rounding_);
   }
 
-  /// W h + b.
+  /// Applies W h + b and returns its intervals.
   Intervals pass(const files::Layer& layer) {
     const Matrix w(layer.outputs, layer.inputs, layer.weights);
     CentredForm form{product(w, form_.slope), {}, {}};
@@ -51,7 +51,7 @@ class BoxValues {
     return values_;
   }
 
-  /// All numbers but the last ones, which the layer keeps.
+  /// Applies the activation to all entries except the last ones, which the layer keeps.
   void activate(const files::Layer& layer) {
     const Activation activation = layer.activation;
     if (files::function_of(activation).sorts()) {
@@ -75,7 +75,7 @@ class BoxValues {
     return form;
   }
 
-  /// What the form says of the values, and `intervals` as well.
+  /// Returns the intersection of `intervals` with the intervals of the form.
   Intervals intersected(Intervals intervals) const {
     for (std::size_t i = 0; i < intervals.lower.size(); ++i) {
       Dyadic spread = form_.error[i];
@@ -107,7 +107,7 @@ class BoxValues {
     high = all.upper;
   }
 
-  /// The intervals as a form that does not depend on x.
+  /// Returns the intervals as a form that does not depend on x.
   CentredForm constant_form() const {
     CentredForm form{
         Matrix(static_cast<int>(values_.lower.size()), static_cast<int>(radius_.size())), {}, {}};
@@ -121,7 +121,7 @@ class BoxValues {
   Intervals values_;
   CentredForm form_;
   std::vector<Dyadic> radius_;
-  Dyadic rounding_;  ///< what rounding the numbers of a form costs, at most
+  Dyadic rounding_;  ///< bound on the error of rounding the numbers of a form
 };
 
 }  // namespace

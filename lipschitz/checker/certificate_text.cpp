@@ -57,7 +57,7 @@ std::optional<Factor> parse_factor(const Json& json, const std::string& where) {
   Factor factor;
   factor.unit_exponent = json["unit_exponent"].get<long>();
   factor.scale = json["scale"].get<std::vector<long>>();
-  const auto small = [](long e) { return -8192 <= e && e <= 8192; };  // bounds the length of every integer
+  const auto small = [](long e) { return -8192 <= e && e <= 8192; };  // limits the length of integers
   require(small(factor.unit_exponent) && std::all_of(factor.scale.begin(), factor.scale.end(), small),
           where + ": exponent out of range");
   for (const std::string& row : json["rows"].get<std::vector<std::string>>()) {

@@ -18,17 +18,17 @@ Dyadic squared_norm(const Matrix& m) {
   return sum;
 }
 
-/// Bounds from the slopes that activations have on the box.
+/// Returns whether the bound uses the slopes of the activations on the box.
 bool is_from_local_slopes(const files::Json& bound) {
   return bound["upper_method"] == "local_sdp" || bound["upper_method"] == "local_product";
 }
 
-/// The status says whether a search ended by itself. Nothing rests on it.
+/// The status tells whether a search was completed. No statement depends on it.
 void check_status(const files::Json& entry, const std::string& where) {
   require(entry["status"] == "finished" || entry["status"] == "interrupted", where + ": unknown status");
 }
 
-/// Shows that sqrt(rho) <= `upper` bounds the chain's Lipschitz constant.
+/// Verifies that sqrt(rho) <= `upper` bounds the chain's Lipschitz constant.
 void check_upper(const BentChain& chain, const files::Json& proof, double upper, const std::string& where) {
   files::require_keys(proof, {"rho", "t", "factor"}, where + ".proof");
   const Dyadic rho = files::parse_hex_float(proof["rho"].get<std::string>());
@@ -185,7 +185,7 @@ void CertificateChecker::check_bound(const Json& bound) {
   check_status(bound, where);
   check_activations(bound, names, where);
   check_invariants(bound, function, where);
-  files::block_coordinates(network_, function, block);  // refuses what is no block of the function
+  files::block_coordinates(network_, function, block);  // throws if the function has no such block
   if (bound["upper_method"] == "sdp" || bound["upper_method"] == "eclipse_fast") {
     check_upper(bent_chain(network_, function, block, scale), bound["proof"], upper, where);
   } else if (bound["upper_method"] == "local_sdp") {
@@ -349,7 +349,7 @@ std::string statement_for(const files::Network& network) {
 
 namespace {
 
-/// The activations that a chain states, separated by commas.
+/// Returns the activations stated by a chain, separated by commas.
 std::string stated_activations(const files::Json& chain) {
   std::string text;
   for (const files::Json& step : chain) {
@@ -369,9 +369,9 @@ files::Network with_stated_activations(const files::Json& certificate, files::Ne
           stated_activations(certificate.at("network").at("weights").at(part.name()).at("chain"));
       if (text.empty() || !files::activation_misfit(weights, text).empty()) return;
       weights = files::with_activation(std::move(weights), text);
-      weights.activation_is_given = false;  // by the certificate alone
+      weights.activation_is_given = false;  // given by the certificate alone
     } catch (const files::Json::exception&) {
-      return;  // check() says what is wrong with it
+      return;  // check() reports the error
     }
   };
   if (network.plain) adopt("network", *network.plain);

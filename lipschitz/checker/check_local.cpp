@@ -16,7 +16,7 @@ void CertificateChecker::read_box(const files::FunctionId& part, std::vector<dou
   const auto inputs = static_cast<std::size_t>(parts_.at(part)->inputs());
   require(lower.size() == inputs && upper.size() == inputs, where + ": the box has another size");
   for (std::size_t k = 0; k < inputs; ++k) {
-    if (network_.clamp && files::is_clamped(part)) {  // never increases a distance
+    if (network_.clamp && files::is_clamped(part)) {  // the clamp never increases a distance
       lower[k] = std::clamp(lower[k], network_.clamp->lower[k], network_.clamp->upper[k]);
       upper[k] = std::clamp(upper[k], network_.clamp->lower[k], network_.clamp->upper[k]);
     }

@@ -14,13 +14,13 @@ constexpr const char* kNotFloat32 = ": a float32 error of weights that are not f
 
 std::vector<Dyadic> exact(const Row& values) { return {values.begin(), values.end()}; }
 
-/// Entry by entry a <= b.
+/// Returns whether a <= b, entry by entry.
 bool at_most(const std::vector<Dyadic>& a, const std::vector<Dyadic>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
                     [](const Dyadic& x, const Dyadic& y) { return y >= x; });
 }
 
-/// What is stated of one layer, or of a sum.
+/// Reads the bounds stated for one layer or for a sum.
 Bounded stated(const files::Json& json, std::size_t size, bool with_error, const std::string& where) {
   files::require_keys(json, {"lower", "upper", "error"}, where);
   require(json["error"].is_null() != with_error,
@@ -41,7 +41,7 @@ void require_encloses(const Bounded& stated, const Intervals& values,
     require(error && at_most(*error, stated.error), where + ": claims less than the float32 error");
 }
 
-/// Verifies what is stated of every layer of a network with other activations than ReLU.
+/// Verifies the bounds stated for every layer of a network with activations other than ReLU.
 void check_enclosed_layers(const files::Weights& weights, const files::Json& json, const Intervals& input,
                            const std::string& where) {
   const std::vector<Intervals> found = layers_on_box(weights, input);
@@ -49,7 +49,7 @@ void check_enclosed_layers(const files::Weights& weights, const files::Json& jso
     require_encloses(stated(json[k], found[k].lower.size(), false, where), found[k], std::nullopt, where);
 }
 
-/// Verifies what is stated of every layer of a network; returns that of the last one.
+/// Verifies the bounds stated for every layer of a network; returns those of the last layer.
 Bounded check_layers(const files::Weights& weights, const files::Json& json, Bounded input,
                      const std::string& where) {
   require(json.is_array() && json.size() == weights.layers.size(), where + ": needs one entry per layer");
@@ -70,7 +70,7 @@ Bounded check_layers(const files::Weights& weights, const files::Json& json, Bou
   return input;
 }
 
-/// Verifies what is stated of the sum of `terms` and of every layer of rho behind it; returns that of the last one.
+/// Verifies the bounds stated for the sum of `terms` and for every layer of rho; returns those of the last layer.
 Bounded check_sum(const files::Json& entry, const std::vector<SumTerm>& terms, const files::Weights& rho,
                   const std::string& name, const std::string& where) {
   const bool with_error = !entry["input_error"].is_null();

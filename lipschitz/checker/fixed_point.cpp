@@ -34,7 +34,7 @@ Fixed over(const Fixed& a, unsigned long n) {
   return {floor_quotient(a.lower, mpz_class(n)), ceil_quotient(a.upper, mpz_class(n))};
 }
 
-/// artan(1 / n) of an integer n > 1: 1/n - 1/(3 n^3) + ..., whose partial sums lie around it in turn.
+/// arctan(1 / n) for an integer n > 1: 1/n - 1/(3 n^3) + ..., whose partial sums alternately lie above and below it.
 Fixed arctan_of_inverse(unsigned long n) {
   const Fixed square = Fixed::ratio(1, mpz_class(n) * n);
   Fixed power = Fixed::ratio(1, n), sum(0, 0);
@@ -42,10 +42,10 @@ Fixed arctan_of_inverse(unsigned long n) {
     const Fixed term = over(power, 2 * k + 1);
     sum = k % 2 == 0 ? sum + term : sum - term;
   }
-  return {sum.lower - power.upper, sum.upper + power.upper};  // what is left out is at most the next power
+  return {sum.lower - power.upper, sum.upper + power.upper};  // the remainder is at most the next power
 }
 
-/// 1 / sqrt(2 pi), with pi = 16 artan(1/5) - 4 artan(1/239) (Machin).
+/// 1 / sqrt(2 pi), with pi = 16 arctan(1/5) - 4 arctan(1/239) (Machin).
 const Fixed& inverse_root_of_two_pi() {
   static const Fixed value = [] {
     const Fixed a = arctan_of_inverse(5), b = arctan_of_inverse(239);
@@ -95,8 +95,8 @@ Fixed operator/(const Fixed& a, const Fixed& b) {
           ceil_quotient(high, high >= 0 ? b.lower : b.upper)};
 }
 
-/// e^-x = (1 / e^y)^4096, y = x / 4096 < 180 / 4096 < 2^-4.5. The series of e^y ends with y^32/32!; what is left out is
-/// less than twice y^33/33! < 2^-148 2^-122, less than one unit.
+/// e^-x = (1 / e^y)^4096, y = x / 4096 < 180 / 4096 < 2^-4.5. The series of e^y ends with y^32/32!; the remainder is
+/// less than twice y^33/33! < 2^-148 2^-122, hence less than one unit.
 Fixed exp_of_minus(const Fixed& x) {
   constexpr int kHalvings = 12;
   constexpr unsigned long kTerms = 32, kVanishes = 180;  // e^-180 < 2^-256
@@ -115,8 +115,8 @@ Fixed exp_of_minus(const Fixed& x) {
   return result;
 }
 
-/// 2 artanh z = 2 (z + z^3/3 + ...), z = x / (2 + x) <= 1/3. What is left out after z^169/169 is less than 9/8 of
-/// z^171/171 < 2^-270.
+/// ln(1 + x) = 2 artanh z = 2 (z + z^3/3 + ...), z = x / (2 + x) <= 1/3. The remainder after z^169/169 is less than 9/8
+/// of z^171/171 < 2^-270.
 Fixed log_of_one_plus(const Fixed& x) {
   constexpr unsigned long kLast = 169;
   const Fixed z = x / (x + Fixed(2 * one(), 2 * one())), square = z * z;
@@ -135,8 +135,8 @@ Fixed normal_density(const Fixed& x) {
          inverse_root_of_two_pi();
 }
 
-/// For x >= 0 by 1/2 + phi(x) (x + x^3/3 + x^5/(3 5) + ...), whose terms fall by half or more once 2 k + 3 is above
-/// 2 x^2: then what is left out is at most the last term. From 14 on it is between 1 - e^-98 / 2 and 1.
+/// For x >= 0: 1/2 + phi(x) (x + x^3/3 + x^5/(3 5) + ...). Once 2 k + 3 > 2 x^2, each term is at most half of the
+/// previous one, so the remainder is at most the last term. For x >= 14 the value is between 1 - e^-98 / 2 and 1.
 Fixed normal_probability(const Fixed& x) {
   if (x.upper < 0) return Fixed(one(), one()) - normal_probability(-x);
   if (x.lower < 0) {  // an enclosure of 0: the density is below 1/2

@@ -12,7 +12,8 @@ __extension__ typedef __int128 Wide;  // NOLINT(modernize-use-using): __extensio
 
 constexpr int kHalf = 64;
 
-/// A sum of products of words, exact: of at most kAtOnce of them in one wide integer, whose halves are summed in two.
+/// An exact sum of products of words. Up to kAtOnce products are summed in one wide integer; its halves are then added
+/// to `low` and `high`.
 struct WordSum {
   Wide low = 0, high = 0;
 
@@ -26,7 +27,7 @@ struct WordSum {
     }
   }
 
-  /// Sets x, without an allocation where it has room for it.
+  /// Sets x to the sum, without an allocation if x has enough room.
   void get(mpz_class& x) const {
     const Wide upper = high + (low >> kHalf);
     x = static_cast<long>(upper >> kHalf);
@@ -39,7 +40,7 @@ struct WordSum {
 
 constexpr mp_bitcnt_t kRoomForSum = 256;
 
-/// Words that an integer of this many bits takes.
+/// Returns the number of words for an integer of this many bits.
 std::size_t words_for(std::size_t bits) {
   return (bits + IntegerRows::kWordBits - 1) / IntegerRows::kWordBits;
 }
@@ -62,7 +63,7 @@ IntegerRows::IntegerRows(std::vector<std::vector<mpz_class>> rows) : rows_(std::
     for (auto& plane : words_) plane.emplace_back(row.size());
     for (std::size_t k = 0; k < row.size(); ++k) {
       rest = row[k];
-      for (auto& plane : words_) {  // both parts have the sign of the entry
+      for (auto& plane : words_) {  // quotient and remainder have the sign of the entry
         mpz_tdiv_r_2exp(word.get_mpz_t(), rest.get_mpz_t(), kWordBits);
         mpz_tdiv_q_2exp(rest.get_mpz_t(), rest.get_mpz_t(), kWordBits);
         plane.back()[k] = word.get_si();

@@ -18,7 +18,7 @@ Matrix transposed(const Matrix& a) {
   return result;
 }
 
-/// Row i of a matrix is (row i of `rows`) 2^exponents[i], exactly.
+/// A matrix stored as integers: row i is (row i of `rows`) 2^exponents[i], exactly.
 struct ScaledRows {
   std::vector<long> exponents;
   IntegerRows rows;
@@ -92,7 +92,7 @@ SymmetricMatrix::SymmetricMatrix(const Matrix& dense) {
 
 namespace {
 
-/// The first column of each row of the chain's inequality: where the layer before begins.
+/// Returns the first column of each row of the chain's inequality, which is where the previous layer begins.
 std::vector<int> chain_envelope(const std::vector<Matrix>& stages) {
   std::vector<int> first;
   int before = 0, begin = 0;
@@ -206,7 +206,7 @@ SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const s
 
 namespace {
 
-/// The least exponent of an entry of D P D and of R R'.
+/// Returns the least exponent of the entries of D P D and R R'.
 long least_exponent(const SymmetricMatrix& p, const Factor& factor) {
   long least = 2 * factor.unit_exponent;
   for (int i = 0; i < p.size(); ++i)
@@ -256,7 +256,7 @@ bool shows_positive_semidefinite(const SymmetricMatrix& p, const Factor& factor)
 }
 
 bool shows_positive_semidefinite(const SymmetricMatrix& p, const std::optional<Factor>& factor) {
-  // A proposal comes back only after the test above has accepted it.
+  // proposed_factor() returns only factors that the test above has accepted.
   return factor ? shows_positive_semidefinite(p, *factor) : proposed_factor(p).has_value();
 }
 

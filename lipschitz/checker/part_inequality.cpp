@@ -15,7 +15,7 @@ namespace {
 
 using Row = std::vector<double>;
 
-/// More than what a product, or flushing its result to zero, loses below the range of normal numbers.
+/// Bound on the absolute error of a product due to underflow, including flushing to zero.
 constexpr double kLost = 0x1p-1000;
 
 static_assert(std::numeric_limits<double>::is_iec559 && FLT_EVAL_METHOD == 0,
@@ -70,7 +70,7 @@ Rounded gram_of_form(const Row& q, const HiddenLayer& last) {
             1.02 * std::abs(w[i]) * (half.radius_at(k)[j] + gamma * std::abs(half.at(k)[j])) + kLost;
       }
   }
-  for (int i = 0; i < columns; ++i)  // the true one is symmetric: one entry stands for both
+  for (int i = 0; i < columns; ++i)  // the exact matrix is symmetric: one entry is used for both
     for (int j = 0; j < i; ++j) {
       result.at(j)[i] = result.at(i)[j];
       result.radius_at(j)[i] = result.radius_at(i)[j];
@@ -100,12 +100,12 @@ bool PartInequality::is_positive_definite() {
   const Row d = scale();
   const double error = largest_error(d);
   double trace = 0;
-  // D S D, exact short of underflow; overflow ends in a refusal. Onto the upper triangle.
+  // Writes D S D to the upper triangle. It is exact except for underflow; overflow leads to a refusal.
   for (int i = 0; i < n_; ++i)
     for (int j = 0; j <= i; ++j)
       s(j, i) = s(i, j) * (d[static_cast<std::size_t>(i)] * d[static_cast<std::size_t>(j)]);
   for (int i = 0; i < n_; ++i) trace += std::abs(s(i, i));
-  // Sums of nonnegative doubles of at most n terms are too small by at most n u of themselves.
+  // The relative error of a sum of at most n nonnegative doubles is at most n u.
   const double shift = 1.001 * error + 1.01 * (n_ + 4) * kUnit * trace + 0x1p-900;
   if (!std::isfinite(shift)) return false;
   for (int i = 0; i < n_; ++i) s(i, i) = std::nextafter(s(i, i) - shift, -1e300);
@@ -122,7 +122,7 @@ bool PartInequality::off(std::size_t k, int i) const {
          bounds_.upper[k][static_cast<std::size_t>(i)] <= 0;
 }
 
-/// Adds to S and returns dz of the last hidden layer as forms in the variables.
+/// Adds the terms of the neurons to S; returns dz of the last hidden layer as forms in the variables.
 Rounded PartInequality::subtract_neurons() {
   Rounded z(0, 0);
   int variable = moving_;
@@ -130,7 +130,7 @@ Rounded PartInequality::subtract_neurons() {
   for (std::size_t k = 0; k < f_.hidden.size(); ++k) {
     const HiddenLayer& layer = f_.hidden[k];
     Rounded y = k == 0 ? first_layer() : next_layer(layer, k, z, variable);
-    const int known = variable;  // y depends on variables before this one
+    const int known = variable;  // y depends only on previous variables
     for (int i = 0; i < layer.outputs; ++i, ++neuron) {
       if (!undecided(k, i)) continue;
       const double t = t_.at(neuron);
@@ -158,7 +158,7 @@ Rounded PartInequality::subtract_neurons() {
   return z;
 }
 
-/// e_i, or a_i = dy_i - e_i: exact but for dy_i, which does not depend on the neuron's own variable.
+/// Returns e_i, or a_i = dy_i - e_i. Exact except for dy_i, which does not depend on the neuron's own variable.
 PartInequality::NeuronForms PartInequality::factor(NeuronForms forms, bool is_on) {
   if (is_on) {
     std::fill(forms.value.begin(), forms.value.end(), 0.0);
@@ -208,7 +208,8 @@ Rounded PartInequality::first_layer() const {
   return y;
 }
 
-/// W z; rows of neurons that are off stay 0. An undecided neuron's dz is a variable of its own: no product is needed.
+/// Returns W z; rows of neurons that are off stay 0. The dz of an undecided neuron is a variable, so it needs no
+/// product.
 Rounded PartInequality::next_layer(const HiddenLayer& layer, std::size_t k, const Rounded& z,
                                    int known) const {
   Rounded y(layer.outputs, n_);
@@ -217,8 +218,7 @@ Rounded PartInequality::next_layer(const HiddenLayer& layer, std::size_t k, cons
   std::vector<int> own(static_cast<std::size_t>(layer.inputs), -1), on_inputs;
   for (int c = layer.inputs; c-- > 0;)
     if (undecided(k - 1, c)) own[static_cast<std::size_t>(c)] = --variable;
-  Row spread(static_cast<std::size_t>(layer.inputs) *
-             n_);  // what one product with z may be wrong by, per |w|
+  Row spread(static_cast<std::size_t>(layer.inputs) * n_);  // error of one product with z, per |w|
   for (int c = 0; c < layer.inputs; ++c) {
     if (own[static_cast<std::size_t>(c)] >= 0 || !on(k - 1, c)) continue;
     on_inputs.push_back(c);
@@ -234,16 +234,16 @@ Rounded PartInequality::next_layer(const HiddenLayer& layer, std::size_t k, cons
                 {z.value.data(), n_}, on_inputs);
     add_product(y.radius_at(i), n_, 1, variable, {&sizes[static_cast<std::size_t>(first)], layer.inputs},
                 {spread.data(), n_}, on_inputs);
-    for (int j = 0; j < variable; ++j)  // what rounding of the radii themselves may lack
+    for (int j = 0; j < variable; ++j)  // for round-off of the radii themselves
       y.radius_at(i)[j] = on_inputs.empty() ? 0 : 1.01 * y.radius_at(i)[j] + layer.inputs * kLost;
-    for (int c = 0; c < layer.inputs; ++c)  // exact: no other neuron before has this variable
+    for (int c = 0; c < layer.inputs; ++c)  // exact: no other neuron of the previous layer has this variable
       if (own[static_cast<std::size_t>(c)] >= 0)
         y.at(i)[own[static_cast<std::size_t>(c)]] = layer.weights[static_cast<std::size_t>(first + c)];
   }
   return y;
 }
 
-/// S -= F' G F with F = dz of the last hidden layer, on the lower triangle; add_error_of_output() has the rounding.
+/// S -= F' G F with F = dz of the last hidden layer, on the lower triangle. add_error_of_output() bounds the round-off.
 void PartInequality::subtract_output() {
   const int rows = z_.rows;
   std::vector<int> all(static_cast<std::size_t>(rows)), some;
@@ -270,11 +270,11 @@ Row PartInequality::scale() const {
   return d;
 }
 
-/// At least the largest sum of a row of D |S - true S| D, which is no less than the norm of the difference.
+/// Returns an upper bound on the largest row sum of D |S - true S| D, which bounds the norm of the difference.
 double PartInequality::largest_error(const Row& d) const {
-  Row sums(d.size(), 0.0);  // of entry i, without d_i
+  Row sums(d.size(), 0.0);  // row sums, without the factor d_i
   const double total = std::accumulate(d.begin(), d.end(), 0.0);
-  // S was summed up from what stood there and one product per row of F.
+  // Each entry of S is the sum of its previous value and one product per row of F.
   const double gamma = 1.01 * (z_.rows + 2) * kUnit;
   for (std::size_t i = 0; i < d.size(); ++i) {
     double sum = 0;
@@ -289,16 +289,16 @@ double PartInequality::largest_error(const Row& d) const {
   double largest = 0;
   for (std::size_t i = 0; i < d.size(); ++i) {
     const double error = 1.01 * sums[i] * d[i];
-    if (!(error <= largest)) largest = error;  // keeps a NaN
+    if (!(error <= largest)) largest = error;  // propagates NaN
   }
   return largest + static_cast<double>(d.size()) * 0x1p-1000;
 }
 
-/// Of F' G F, for F and G within r_F and r_G of the true ones: at most
+/// Adds the row sums, weighted by d, of a bound on the error of F' G F. For F and G within r_F and r_G of the exact
+/// matrices, the error is at most
 ///   |F|' (r_G + gamma M) |F| + |F|' M r_F + r_F' M |F| + r_F' M r_F,  M = |G| + r_G,
-/// where gamma is for rounding G F, and F' times that, and what it is subtracted from. The bound is symmetric, as G is,
-/// so an entry that was computed for i >= j may stand for both. Of its rows' sums, weighted by d, products with vectors
-/// tell.
+/// where gamma covers the round-off of G F, of F' (G F) and of the subtraction. The bound is symmetric like G, so an
+/// entry computed for i >= j is used for both. Its weighted row sums are products with vectors.
 void PartInequality::add_error_of_output(const Row& d, Row& sums) const {
   const int rows = z_.rows;
   const auto size = static_cast<std::size_t>(rows);
@@ -309,7 +309,7 @@ void PartInequality::add_error_of_output(const Row& d, Row& sums) const {
       f[static_cast<std::size_t>(c)] += std::abs(z_.at(c)[j]) * d[static_cast<std::size_t>(j)];
       f_radius[static_cast<std::size_t>(c)] += z_.radius_at(c)[j] * d[static_cast<std::size_t>(j)];
     }
-  // M x with M = |G| + r_G, and r_G x.
+  // Returns M x with M = |G| + r_G if `whole`, else r_G x.
   const auto times = [&](const Row& x, bool whole) {
     Row result(size);
     for (int i = 0; i < rows; ++i)
@@ -330,7 +330,7 @@ void PartInequality::add_error_of_output(const Row& d, Row& sums) const {
   }
 }
 
-/// S = U' U on the upper triangle, row by row.
+/// Factorises S = U' U on the upper triangle, row by row. Returns whether the factorisation succeeds.
 bool PartInequality::cholesky_runs_through() {
   std::vector<int> before;
   Row factors(static_cast<std::size_t>(n_));

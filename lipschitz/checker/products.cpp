@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t kAtOnce = 4;
 
-/// Two rows of the product at once: what is read of b serves both.
+/// Computes two rows of the product at once, so that each row of b is read only once for both.
 SWARMCERT_WIDE void add_to_two(double* __restrict first, double* __restrict second, int columns,
                                const double* a, const double* a_second, Rows b, const int* inner,
                                std::size_t count) {
@@ -49,7 +49,7 @@ SWARMCERT_WIDE void add_to_one(double* __restrict out, int columns, const double
   }
 }
 
-/// Sums are taken in so many parts, which a processor adds at once.
+/// Sums are split into this many partial sums, which vectorise.
 constexpr int kLanes = 4;
 
 double total(const double* lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); }

@@ -10,16 +10,16 @@ namespace {
 
 constexpr int kUnitExponent = -60;
 
-/// The rows of a lower triangle, each from its first column.
+/// The rows of a lower triangle, each from its first column that may be nonzero.
 using Triangle = std::vector<std::vector<double>>;
 
-/// s with 2^(2 s) x in [1/4, 1]: scales a diagonal entry x > 0 to order one.
+/// Returns s with 2^(2 s) x in [1/4, 1], which scales a diagonal entry x > 0 to order one.
 long scale_exponent(const Dyadic& x) {
   const long magnitude = static_cast<long>(mpz_sizeinbase(x.mantissa.get_mpz_t(), 2)) + x.exponent;
   return -((magnitude + (magnitude > 0 ? 1 : 0)) / 2);
 }
 
-/// Sum of a_k b_k, in four parts, which a processor adds at once.
+/// Returns the sum of a_k b_k, computed in four partial sums that vectorise.
 double inner_product(const double* a, const double* b, int count) {
   double lanes[4] = {};
   int k = 0;
@@ -29,8 +29,8 @@ double inner_product(const double* a, const double* b, int count) {
   return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
 }
 
-/// Replaces a matrix by its Cholesky factor, whose rows begin in the same columns. Rows with an empty diagonal entry
-/// stay empty. False if the factorisation breaks down.
+/// Replaces a matrix by its Cholesky factor, whose rows begin in the same columns. Rows marked as empty are set to
+/// zero. Returns false if the factorisation breaks down.
 bool factorise(Triangle& rows, const std::vector<bool>& is_empty) {
   std::vector<int> first;
   for (std::size_t i = 0; i < rows.size(); ++i)
@@ -99,8 +99,8 @@ std::optional<Factor> proposed_factor(const SymmetricMatrix& p) {
   const double widest_row = n == 0 ? 0 : *std::max_element(row_sums.begin(), row_sums.end());
   if (!std::isfinite(widest_row)) return std::nullopt;
 
-  // Rounding P, factorising and rounding R perturb row sums of E by a small multiple of 2^-53 times P's row sums
-  // and n; the exact check below decides whether the shift was enough.
+  // Rounding P, factorising and rounding R change the row sums of E by a small multiple of 2^-53 times the row sums of
+  // P and n. The exact check below decides whether the shift was sufficient.
   for (double shift = 0x1p-53 * (n + widest_row); shift < 1e-7; shift *= 8) {
     Triangle rows = scaled;
     for (std::vector<double>& row : rows) row.back() -= shift;

@@ -13,7 +13,7 @@
 namespace swarmcert::check {
 namespace {
 
-/// The columns of W of these inputs, each times its scale where there is one.
+/// Returns the columns of W for these inputs, each times its scale if there is one.
 Matrix selected_columns(const Matrix& w, const std::vector<int>& inputs, const std::vector<double>& scale) {
   Matrix result(w.rows, static_cast<int>(inputs.size()));
   for (int j = 0; j < result.cols; ++j) {
@@ -25,13 +25,13 @@ Matrix selected_columns(const Matrix& w, const std::vector<int>& inputs, const s
   return result;
 }
 
-/// W, times the Lipschitz constant of the map to what it sees.
+/// Returns W times `slope`, the Lipschitz constant of the map to its inputs.
 Matrix of_invariants(Matrix w, const Dyadic& slope) {
   for (Dyadic& entry : w.entries) entry = entry * slope;
   return w;
 }
 
-/// What an activation is divided by, and between which slopes the quotient lies: in [0, 1] or [1 - c, c].
+/// The divisor of an activation, and the slope range of the quotient: [0, 1] or [1 - c, c].
 struct Unit {
   Dyadic slope;
   SlopeRange range;
@@ -46,11 +46,11 @@ Unit unit_of(const files::ActivationFunction& function) {
   return {1.0, {function.least_slope, function.greatest_slope}};
 }
 
-/// Of layer k.
+/// Returns the factor of the activation of layer k.
 using FactorOf = std::function<Dyadic(const files::Weights& weights, std::size_t k)>;
 
-/// The stages of `function`, with `factor` of each layer in front of its activation multiplied to what the activation
-/// passes to the stage behind it.
+/// Returns the stages of `function`. The stage behind the activation of a layer is multiplied by the layer's `factor`,
+/// for the entries to which the activation applies.
 std::vector<Matrix> chained(const files::Network& network, const files::FunctionId& function,
                             const std::string& block, const std::vector<double>& scale,
                             const FactorOf& factor) {
@@ -71,7 +71,7 @@ std::vector<Matrix> chained(const files::Network& network, const files::Function
     for (std::size_t k = 0; k < weights.layers.size(); ++k) {
       const files::Layer& layer = weights.layers[k];
       Matrix w(layer.outputs, layer.inputs, layer.weights);
-      if (chain.empty()) {  // the first layer acts on the selected inputs, and that of rho on the last of phi
+      if (chain.empty()) {  // the first layer acts on the inputs, the first of rho on the last of phi
         chain.push_back(maps ? of_invariants(std::move(w), files::slope_of_inputs(network, function))
                              : selected_columns(w, coordinates, scale));
       } else if (k == 0) {
@@ -87,7 +87,7 @@ std::vector<Matrix> chained(const files::Network& network, const files::Function
   return chain;
 }
 
-/// What is between layer k and the next one.
+/// Returns the activation between layer k and the next one.
 const files::ActivationFunction& function_after(const files::Weights& weights, std::size_t k) {
   return files::function_of(weights.layers.at(k).activation);
 }
@@ -105,7 +105,7 @@ std::vector<Matrix> stages(const files::Network& network, const files::FunctionI
 
 BentChain bent_chain(const files::Network& network, const files::FunctionId& function,
                      const std::string& block, const std::vector<double>& scale) {
-  BentChain result;  // what a layer keeps has slope 1, which lies in [0, 1] and in [1 - c, c]
+  BentChain result;  // entries that a layer keeps have slope 1, which is in [0, 1] and in [1 - c, c]
   result.stages = chained(network, function, block, scale, [](const files::Weights& weights, std::size_t k) {
     return unit_of(function_after(weights, k)).slope;
   });
@@ -131,7 +131,7 @@ BentChain chain_on_box(const files::Network& network, const files::FunctionId& f
   const std::vector<files::FunctionId> names = function.parts();
   for (const files::FunctionId& name : names)
     for (std::size_t k = 0; k + 1 < parts.at(name)->layers.size(); ++k)
-      unit_of(function_after(*parts.at(name), k));  // refuses one that sorts
+      unit_of(function_after(*parts.at(name), k));  // throws if it sorts
   for (const std::vector<Interval>& layer : slopes_on_box(*parts.at(names.front()), box))
     for (const Interval& slopes : layer) result.slopes.push_back({slopes.lower, slopes.upper});
   if (names.size() == 1) return result;
@@ -149,7 +149,7 @@ BentChain chain_on_box(const files::Network& network, const files::FunctionId& f
 Dyadic steepest_on_box(const files::Weights& weights, const Intervals& box) {
   Dyadic total = 1.0;
   for (const std::vector<Interval>& layer : slopes_on_box(weights, box)) {
-    Dyadic steepest = layer.empty() ? 1.0 : 0.0;  // one that sorts
+    Dyadic steepest = layer.empty() ? 1.0 : 0.0;  // empty: the layer is sorted
     for (const Interval& slopes : layer) steepest = std::max({steepest, slopes.upper, -slopes.lower});
     total = total * steepest;
   }
@@ -162,14 +162,14 @@ HiddenLayer hidden_layer(const files::Layer& layer, bool has_relu) {
   return {layer.outputs, layer.inputs, layer.weights, layer.biases, has_relu ? 0 : layer.outputs};
 }
 
-/// Parts of a box are decided for ReLU.
+/// Returns the layers of `part`, which must be a ReLU network, because proofs by parts of a box support only ReLU.
 const std::vector<files::Layer>& relu_layers(const files::Network& network, const files::FunctionId& part) {
   const files::Weights& weights = *files::parts(network).at(part);
   if (!weights.is_relu()) throw std::invalid_argument(part.name() + " is no ReLU network");
   return weights.layers;
 }
 
-/// The moving coordinates of `part` and their weights.
+/// Sets the moving coordinates of `part` and their weights.
 void set_coordinates(LocalFunction& f, const files::Network& network, const files::FunctionId& part,
                      const std::string& block, const std::vector<double>& scale) {
   f.coordinates = files::block_coordinates(network, part, block);
@@ -179,7 +179,7 @@ void set_coordinates(LocalFunction& f, const files::Network& network, const file
     f.weight.push_back(scale.empty() ? 1.0 : scale.at(static_cast<std::size_t>(k)));
 }
 
-/// W' Q W of the last layer; no rows: W' W.
+/// Returns W' Q W for the last layer; W' W if Q has no rows.
 Matrix gram(const files::Layer& last, const Matrix& q) {
   const Matrix w(last.outputs, last.inputs, last.weights);
   Matrix transposed(last.inputs, last.outputs);

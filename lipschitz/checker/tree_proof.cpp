@@ -14,25 +14,26 @@ namespace {
 
 using Row = std::vector<double>;
 
-/// Numbers of a proof stay within 2^-kRange .. 2^kRange, so that kLost is small beside what they make.
+/// Numbers of a proof must be within 2^-kRange .. 2^kRange, so that kLost is small compared with their products.
 constexpr int kRange = 400;
 
-/// Halving a coordinate more often than this leaves nothing to halve; and a hostile tree must not take all memory.
+/// Largest depth of a tree. A coordinate cannot be halved more often than this, and a malicious tree must not exhaust
+/// the memory.
 constexpr std::size_t kDeepest = 2000;
 
-/// Where the walk is: the box and what is known of its neurons.
+/// The current box of the walk and the bounds on its neurons.
 struct Part {
   Row lower, upper;
-  std::shared_ptr<const NeuronBounds> around = {};  ///< of the box that was halved; null: of none
-  /// Of the part, once its first word is read that is no decision.
+  std::shared_ptr<const NeuronBounds> around = {};  ///< bounds over the parent box; null for a root
+  /// Bounds over this part, set when its first word that is not a decision is read.
   std::shared_ptr<const NeuronBounds> bounds = {};
-  std::vector<Decision> decisions = {};  ///< that nothing has looked at yet
-  /// Since the last form: of all layers of a set function, and what the form makes of G. Null: no form yet.
+  std::vector<Decision> decisions = {};  ///< decisions that are not yet verified
+  /// Set by the last form: bounds on all layers of a set function, and G of the form. Null: no form yet.
   std::shared_ptr<const NeuronBounds> through_rho = {};
   std::shared_ptr<const Rounded> gram = {};
 };
 
-/// Whether forms of rho hold in parts.
+/// Verifies that forms of rho hold in parts.
 class FormChecker {
  public:
   FormChecker(const LocalFunction& f, const std::vector<Form>& forms) : forms_(forms) {
@@ -47,7 +48,7 @@ class FormChecker {
     rho_.weight.assign(rho_.coordinates.size(), 1.0);
   }
 
-  /// What is wrong with the forms themselves, or nothing.
+  /// Returns an error in the format of the forms, or an empty string.
   std::string fault() const {
     const std::size_t inputs = rho_.coordinates.size();
     std::size_t neurons = 0;
@@ -64,7 +65,7 @@ class FormChecker {
     return "";
   }
 
-  /// Bounds rho's neurons in the part, with what is decided of them; what is wrong with that, or nothing.
+  /// Bounds rho's neurons in the part, using its decisions. Returns an error or an empty string.
   std::string look(Part& part) const {
     if (rho_.coordinates.empty()) return "there is no rho";
     auto through = std::make_shared<NeuronBounds>(*part.bounds);
@@ -79,13 +80,13 @@ class FormChecker {
     return "";
   }
 
-  /// Makes the form the part's; what is wrong with that, or nothing.
+  /// Verifies the form and assigns it to the part. Returns an error or an empty string.
   std::string use(std::size_t index, Part& part) const {
     if (index >= forms_.size()) return "there is no such form";
     const Form& form = forms_[index];
     const std::string fault = look(part);
     if (!fault.empty()) return fault;
-    NeuronBounds bounds;  // of rho's neurons
+    NeuronBounds bounds;  // bounds on rho's neurons
     const auto first = static_cast<std::ptrdiff_t>(first_);
     bounds.lower.assign(part.through_rho->lower.begin() + first, part.through_rho->lower.end());
     bounds.upper.assign(part.through_rho->upper.begin() + first, part.through_rho->upper.end());
@@ -101,13 +102,13 @@ class FormChecker {
 
  private:
   const std::vector<Form>& forms_;
-  std::vector<HiddenLayer> layers_;  ///< of phi and rho
-  std::size_t first_;                ///< of them, rho's first
-  LocalFunction rho_;                ///< as a function of v
+  std::vector<HiddenLayer> layers_;  ///< layers of phi and rho
+  std::size_t first_;                ///< index of rho's first layer
+  LocalFunction rho_;                ///< rho as a function of v
   Rounded gram_ = Rounded(0, 0);
 };
 
-/// Which layer and which of its outputs the n-th one is.
+/// Returns layer and output of the n-th neuron.
 WeightedNeuron neuron_at(const std::vector<HiddenLayer>& layers, std::size_t n, double weight) {
   std::size_t layer = 0;
   for (; n >= static_cast<std::size_t>(layers[layer].outputs); ++layer)
@@ -115,7 +116,7 @@ WeightedNeuron neuron_at(const std::vector<HiddenLayer>& layers, std::size_t n, 
   return {layer, static_cast<int>(n), weight};
 }
 
-/// The conflicts between neurons that the part leaves undecided which their lambda shows there.
+/// Returns the conflicts between undecided neurons of the part that their lambda proves there.
 std::vector<const Conflict*> shown(const std::vector<HiddenLayer>& layers, const Part& part,
                                    const std::vector<Conflict>& conflicts) {
   std::vector<const Conflict*> result;
@@ -127,7 +128,7 @@ std::vector<const Conflict*> shown(const std::vector<HiddenLayer>& layers, const
   for (const Conflict& conflict : conflicts) {
     const WeightedNeuron first =
         neuron_at(layers, conflict.first, conflict.first_on ? conflict.lambda : -conflict.lambda);
-    const double rest = 1 - conflict.lambda;  // rounded: any two nonnegative weights, not both zero, will do
+    const double rest = 1 - conflict.lambda;  // may be rounded: any nonnegative weights, not both 0, will do
     const WeightedNeuron second = neuron_at(layers, conflict.second, conflict.second_on ? rest : -rest);
     if (is_undecided(first) && is_undecided(second) &&
         largest_sum(layers, *part.bounds, part.lower, part.upper, first, second) <= 0)
@@ -147,7 +148,7 @@ bool is_usable(const Sides& box, const std::vector<HiddenLayer>& layers) {
   return true;
 }
 
-/// Bounds the part's neurons, with what is decided of them; what is wrong with that, or nothing.
+/// Bounds the part's neurons, using its decisions. Returns an error or an empty string.
 std::string bound_neurons(const std::vector<HiddenLayer>& layers, Part& part) {
   auto bounds = std::make_shared<NeuronBounds>();
   if (!add_layers(*bounds, layers, part.lower, part.upper, part.around.get(), part.decisions))
@@ -162,7 +163,7 @@ std::string bound_neurons(const std::vector<HiddenLayer>& layers, Part& part) {
   return "";
 }
 
-/// Puts both halves of the part on top of `open`, the lower one last; what is wrong with that, or nothing.
+/// Pushes both halves of the part onto `open`, the lower half last. Returns an error or an empty string.
 std::string halve(const Part& part, std::size_t coordinate, std::vector<Part>& open) {
   if (coordinate >= part.lower.size()) return "there is no such coordinate";
   const double middle = part.lower[coordinate] + (part.upper[coordinate] - part.lower[coordinate]) / 2;
@@ -178,13 +179,13 @@ std::string halve(const Part& part, std::size_t coordinate, std::vector<Part>& o
   return "";
 }
 
-/// Visits the leaves of a tree. `leaf(index, part)` says what is wrong with one, or nothing. `form(word, part)`
-/// likewise with a form or with bounds of rho's neurons, and makes them the part's.
+/// Visits the leaves of a tree. `leaf(index, part)` verifies a leaf and returns an error or an empty string.
+/// `form(word, part)` does the same for a form or for bounds on rho's neurons, and assigns them to the part.
 template <class Leaf, class UseForm>
 TreeVerdict walk(const std::vector<HiddenLayer>& layers, const std::vector<Sides>& boxes,
                  const std::string& tree, const Leaf& leaf, const UseForm& form) {
   TreeVerdict verdict;
-  std::vector<Part> open;  // what preorder has still to visit, the next one last
+  std::vector<Part> open;  // parts that are still to be visited in preorder, the next one last
   for (auto box = boxes.rbegin(); box != boxes.rend(); ++box) open.push_back({box->lower, box->upper});
   Words words(tree);
   for (long count = 1; words.are_left(); ++count) {

@@ -6,7 +6,7 @@
 namespace swarmcert::check {
 namespace {
 
-/// More digits no number of a tree needs.
+/// Largest number of digits of a number in a tree.
 constexpr std::ptrdiff_t kMostDigits = 15;
 
 template <class Number>

@@ -13,7 +13,7 @@ Dyadic largest_absolute(const Dyadic& lower, const Dyadic& upper) {
 }
 Dyadic count(long n) { return {mpz_class(n), 0}; }
 
-/// What rounding may add to `before` in a sum of n summands whose sizes sum up to m.
+/// Returns `before` plus a bound on the round-off error of a sum of n summands whose absolute values add up to m.
 std::optional<Dyadic> rounding_error(long n, const Dyadic& m, const Dyadic& before) {
   constexpr long kMostSummands = 1L << 23;
   if (n > kMostSummands || !(Dyadic(0x1p126) >= m + Dyadic(mpz_class(n), -149))) return std::nullopt;
@@ -50,7 +50,7 @@ Intervals relu_intervals(Intervals intervals) {
 
 Intervals activated_intervals(const files::Layer& layer, const Intervals& values) {
   const files::Activation activation = layer.activation;
-  // Sorting, maxima and minima do not decrease when a number grows: each end by itself.
+  // Sorting, maxima and minima are nondecreasing in every entry, so each end is computed separately.
   if (files::function_of(activation).sorts())
     return {files::rearranged(activation, values.lower), files::rearranged(activation, values.upper)};
   Intervals result = values;

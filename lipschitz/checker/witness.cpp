@@ -15,14 +15,14 @@
 namespace swarmcert::lipschitz {
 namespace {
 
-/// integers[i] * 2^exponent: finite doubles are dyadic, and a ReLU network maps dyadic vectors to dyadic
-/// vectors.
+/// A vector with entries integers[i] * 2^exponent. Finite doubles are dyadic, and a ReLU network maps dyadic vectors to
+/// dyadic vectors.
 struct DyadicVector {
   std::vector<mpz_class> integers;
   long exponent = 0;
 };
 
-/// Exponent of the lowest bit that is set in `x` != 0, finite.
+/// Returns the exponent of the lowest set bit of x, which is finite and not 0.
 long lowest_bit(double x) {
   int exponent = 0;
   const auto mantissa = static_cast<long long>(std::ldexp(std::frexp(x, &exponent), 53));
@@ -87,7 +87,7 @@ DyadicVector apply(const files::Layer& layer, const DyadicVector& x) {
   return y;
 }
 
-/// Of a ReLU network.
+/// Evaluates a ReLU network exactly.
 DyadicVector evaluate(const files::Weights& network, DyadicVector x) {
   if (!network.is_relu()) throw std::invalid_argument("only ReLU networks are evaluated in integers");
   for (std::size_t k = 0; k < network.layers.size(); ++k) {
@@ -100,7 +100,7 @@ DyadicVector evaluate(const files::Weights& network, DyadicVector x) {
   return x;
 }
 
-/// What the network of `term` sees of x.
+/// Returns the input of the term's network for x: x after the clamp.
 std::vector<double> seen(const Term& term, const std::vector<float>& x) {
   std::vector<double> clamped(x.begin(), x.end());
   if (term.clamp != nullptr) {
@@ -115,7 +115,7 @@ DyadicVector evaluate(const Term& term, const std::vector<float>& x) {
   return evaluate(*term.network, exactly(seen(term, x)));
 }
 
-/// The value before rho: moved(x) + sum of the others.
+/// Returns the value before rho: moved(x) + sum of the others.
 DyadicVector evaluate(const SlopeFunction& f, const std::vector<float>& x, const DyadicVector* others_sum) {
   DyadicVector value = evaluate(f.moved, x);
   if (others_sum != nullptr) add(value, *others_sum);
@@ -147,7 +147,7 @@ mpq_class squared_distance(DyadicVector a, DyadicVector b) {
 using check::Dyadic;
 using check::Intervals;
 
-/// Contains the term's value at x.
+/// Encloses the term's value at x.
 Intervals enclosed(const Term& term, const std::vector<float>& x) {
   Intervals at;
   for (const double coordinate : seen(term, x)) at.lower.emplace_back(coordinate);
@@ -155,7 +155,8 @@ Intervals enclosed(const Term& term, const std::vector<float>& x) {
   return check::network_intervals(*term.network, std::move(at));
 }
 
-/// @param terms those that do not move
+/// Encloses f(x).
+/// @param terms the terms that do not move.
 Intervals enclosed(const SlopeFunction& f, const std::vector<float>& x, std::vector<check::SumTerm> terms) {
   Intervals value = enclosed(f.moved, x);
   if (f.rho == nullptr) return value;
@@ -164,7 +165,7 @@ Intervals enclosed(const SlopeFunction& f, const std::vector<float>& x, std::vec
                                   check::sum_intervals(terms, static_cast<std::size_t>(f.rho->inputs())));
 }
 
-/// At most |a - b|_2^2, whatever a and b are in their enclosures.
+/// Returns a lower bound on |a - b|_2^2 for all a and b in their enclosures.
 mpq_class least_squared_distance(const Intervals& a, const Intervals& b) {
   Dyadic sum;
   for (std::size_t i = 0; i < a.lower.size(); ++i) {
@@ -174,7 +175,7 @@ mpq_class least_squared_distance(const Intervals& a, const Intervals& b) {
   return scaled(sum.mantissa, sum.exponent);
 }
 
-/// |f(x) - f(y)|_2^2 of a ReLU function.
+/// Returns |f(x) - f(y)|_2^2 for a ReLU function, exactly.
 mpq_class exact_rise(const SlopeFunction& f, const SlopePoints& points) {
   DyadicVector others_sum;
   for (std::size_t j = 0; j < f.others.size(); ++j) {
@@ -189,7 +190,7 @@ mpq_class exact_rise(const SlopeFunction& f, const SlopePoints& points) {
   return squared_distance(evaluate(f, points.x, sum), evaluate(f, points.y, sum));
 }
 
-/// At most |f(x) - f(y)|_2^2.
+/// Returns a lower bound on |f(x) - f(y)|_2^2.
 mpq_class least_rise(const SlopeFunction& f, const SlopePoints& points) {
   std::vector<check::SumTerm> others;
   for (std::size_t j = 0; j < f.others.size(); ++j)
@@ -251,8 +252,8 @@ double sqrt_down(const mpq_class& square) {
   if (sgn(square) < 0)
     throw std::invalid_argument("sqrt_down: square = " + square.get_str() + " is negative");
   if (sgn(square) == 0) return 0;
-  // With an even shift s, floor(sqrt(floor(square * 2^s))) * 2^(-s/2) <= sqrt(square); 110 bits in front of
-  // the root leave more than the 53 that are kept.
+  // With an even shift s, floor(sqrt(floor(square * 2^s))) * 2^(-s/2) <= sqrt(square). With about 110 bits before the
+  // root, the root has more than the 53 bits that are kept.
   mpz_class n = square.get_num();
   mpz_class d = square.get_den();
   const long bits = static_cast<long>(mpz_sizeinbase(n.get_mpz_t(), 2)) -
@@ -269,7 +270,7 @@ double sqrt_down(const mpq_class& square) {
   exponent -= half_shift;
   double result = std::numeric_limits<double>::max();
   if (exponent <= 1024) result = std::ldexp(fraction, static_cast<int>(std::max(exponent, -2000L)));
-  // Only ldexp into the subnormal range can have rounded up; the check covers any other mistake as well.
+  // Only ldexp into the subnormal range can round up; the check covers any other error as well.
   while (mpq_class(result) * mpq_class(result) > square) result = std::nextafter(result, 0.0);
   return result;
 }

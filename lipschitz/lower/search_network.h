@@ -36,9 +36,8 @@ struct SearchNetwork {
   std::vector<int> block;
   std::vector<int>
       coordinate;  ///< per variable: its index in (x, x_1, x_2, ...), the inputs one after the other
-  Eigen::VectorXd
-      fixed_inputs;      ///< (x, x_1, x_2, ...), with the values of coordinates that are not variables
-  int moved_inputs = 0;  ///< length of x
+  Eigen::VectorXd fixed_inputs;  ///< (x, x_1, x_2, ...), with the values of coordinates that are fixed
+  int moved_inputs = 0;          ///< length of x
 
   int variables() const { return static_cast<int>(coordinate.size()); }
   int moved_variables() const;

@@ -41,8 +41,7 @@ struct SlopeSearchOptions {
   /// Points (x, x_1, x_2, ...) of the moved vector and the first few others at which f was found steep on other boxes.
   /// Walks also start there, after projection into the boxes.
   std::vector<Eigen::VectorXd> places;
-  int regions =
-      kRegionsPerRound;  ///< regions entered per round, at least 1; not counting those far from the kinks
+  int regions = kRegionsPerRound;  ///< regions per round, at least 1; not counting those far from the kinks
 
   const std::atomic<bool>* cancelled = nullptr;  ///< ends the search early, like `seconds`
   /// Called after each round with the steepest slope so far.

@@ -235,8 +235,7 @@ InteriorPointResult minimise_chain(const ChainSlack& chain, const InteriorPointO
   // Below the gap kStalledGap, a step without progress means that round-off dominates.
   constexpr double kStalledGap = 1e-4, kFirstGap = 0.2, kOnPath = 0.5, kNear = 0.01, kFirstReach = 0.7;
   constexpr int kMostSteps = 24;
-  int steps =
-      3;  // centring steps per Newton matrix; few at first, because far from the path the matrix changes quickly
+  int steps = 3;  // centring steps per Newton matrix; few, because far from the path it changes quickly
   const auto size = static_cast<double>(chain.size());
   InteriorPointResult result;
   std::optional<ChainPoint> at;

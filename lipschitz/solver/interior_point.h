@@ -37,8 +37,7 @@ class RankTwoInequality {
 };
 
 struct InteriorPointOptions {
-  double relative_gap =
-      2e-8;  ///< stop when the relative distance to the optimum, judged by mu, is below this
+  double relative_gap = 2e-8;   ///< stop when y_0 is within this of the optimum, judged by mu,
   double infeasibility = 1e-7;  ///< and the dual constraints are satisfied to this accuracy
   int max_iterations = 80;
   Stop stop;  ///< checked several times per iteration

@@ -56,8 +56,7 @@ ScaledProblem scale(const ReluChain& chain) {
     problem.exponents.push_back(unit - unit_before);
     m *= std::ldexp(1.0, unit_before - unit);
     unit_before = unit;
-    const double t =
-        largest > 0 ? 1 / largest : std::ldexp(1.0, -2 * unit);  // no input: only fixes the units
+    const double t = largest > 0 ? 1 / largest : std::ldexp(1.0, -2 * unit);  // no input: fixes the units
     if (k + 1 == problem.stages.size()) break;
     g = layerwise_gram(problem.stages[k + 1], g, t);
     if (g.size() == 0) g = MatrixXd::Zero(problem.stages[k + 1].rows(), problem.stages[k + 1].rows());

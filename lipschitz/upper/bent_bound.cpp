@@ -77,8 +77,7 @@ class BentInequality final : public RankTwoInequality {
  public:
   explicit BentInequality(const ScaledBentChain& chain)
       : inputs_(chain.inputs), a_(chain.size(), chain.neurons) {
-    MatrixXd z =
-        MatrixXd::Identity(inputs_, chain.size());  // output of the current layer as a function of (x, w)
+    MatrixXd z = MatrixXd::Identity(inputs_, chain.size());  // layer output in terms of (x, w)
     Index begin = 0;
     for (std::size_t k = 0; k < chain.hidden_layers(); ++k) {
       const MatrixXd y = chain.stages[k] * z;

@@ -47,9 +47,8 @@ class PartTree {
   struct Layer {
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> weights;
     Eigen::VectorXd bias;
-    Eigen::VectorXd error;  ///< round-off error per unit of a coefficient of y
-    Eigen::VectorXd
-        line_error;  ///< round-off error per unit of a coefficient of relu(y) and of a line's slope
+    Eigen::VectorXd error;       ///< round-off error per unit of a coefficient of y
+    Eigen::VectorXd line_error;  ///< and per unit of a coefficient of relu(y) and of a line's slope
   };
   /// relu(y) <= slope y + offset for a neuron that is not off; relu(y) >= y if the slope is above 1/2, else >= 0.
   struct Line {

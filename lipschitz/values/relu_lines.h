@@ -12,9 +12,8 @@ struct ReluLines {
   std::vector<Eigen::Index>
       neurons;  ///< neurons that are not off, in order; the vectors have one entry for each
   Eigen::VectorXd slope, offset, below;
-  Eigen::VectorXd line_error;  ///< round-off error per unit of lambda if the upper line is used
-  Eigen::VectorXd bias,
-      layer_error;  ///< b, and the error per unit of |lambda| from round-off and the radius of b
+  Eigen::VectorXd line_error;         ///< round-off error per unit of lambda if the upper line is used
+  Eigen::VectorXd bias, layer_error;  ///< b, and the error per unit of |lambda| (round-off, radius of b)
 };
 
 /// Layers restricted to the neurons that are not off.
