@@ -119,9 +119,11 @@ void start_from_any_number(const std::vector<CertifiedBound>& bounds, CertifiedB
 }
 
 /// Replaces the bound for all inputs by a smaller one for the box, if branch and bound finds one.
+/// @param jobs threads for its boxes.
 void branch_further(const Network& network, const Domain& domain, const CertifyOptions& options,
-                    const Stop& stop, CertifiedBound& bound) {
+                    const Stop& stop, int jobs, CertifiedBound& bound) {
   BranchOptions branch = options.branch;
+  branch.jobs = jobs;
   branch.known = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
   branch.cancelled = options.cancelled;
   branch.seconds = seconds_until(stop.after_share(kShareOfBoxes), options.branch.seconds);
@@ -157,13 +159,19 @@ void branch_all(const Network& network, const CertifyOptions& options, const Sto
   const auto tasks = static_cast<int>(std::count_if(bounds.begin(), bounds.end(), is_any));
   TimeShares shares(stop, tasks, options.jobs);
   for (const bool are_counted : {false, true}) {
+    const auto is_due = [&](const CertifiedBound& bound) {
+      return is_branched(options, bound) && bound.neighbours.empty() != are_counted;
+    };
+    // Threads that no bound of its own keeps busy help with the boxes of another.
+    const auto due = static_cast<int>(std::count_if(bounds.begin(), bounds.end(), is_due));
+    const int jobs_per_bound = files::thread_count(options.jobs) / std::max(due, 1);
     files::parallel_for(static_cast<int>(bounds.size()), options.jobs, [&](int i) {
       CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
-      if (!is_branched(options, bound) || bound.neighbours.empty() == are_counted) return;
+      if (!is_due(bound)) return;
       const Stop share = shares.next();
       progress.run("branch and bound of " + called(bound), [&] {
         if (are_counted) start_from_any_number(bounds, bound);
-        branch_further(network, domain, options, share, bound);
+        branch_further(network, domain, options, share, std::max(jobs_per_bound, 1), bound);
       });
     });
   }

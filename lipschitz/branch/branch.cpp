@@ -6,6 +6,7 @@
 
 #include "lipschitz/branch/search.h"
 #include "lipschitz/solver/dense_kernels.h"
+#include "nn/base/parallel.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -23,6 +24,10 @@ constexpr double kLazy = 0.9;
 /// that depend on s alone stay undecided, because no input reaches them; they do not affect the bound once their
 /// multipliers are large.
 constexpr int kInVain = 6;
+/// Parts that take a step at once, on as many threads as there are: a kPartsPerStep-th of the queue, at most kMostSteps.
+/// Nearly all parts that dominate are halved sooner or later, so taking several costs hardly any boxes, except where the
+/// queue is short. The number does not depend on the threads, so neither does the result.
+constexpr std::size_t kPartsPerStep = 8, kMostSteps = 16;
 /// If a search ends with at most this many parts, at most kPolished dominating ones are solved again, with kFineSteps
 /// steps and up to kMostPairs pairs.
 constexpr std::size_t kFewParts = 64;
@@ -52,7 +57,7 @@ const char* name(BranchStop stop) {
   return "nothing run";
 }
 
-bool BranchSearch::sharpen(Part& part) {
+bool BranchSearch::sharpen(Part& part) const {
   if (set_ != nullptr && part.undecided < kFormLazy * part.undecided_form) {
     const double before = part.rho;
     renew_form(part);
@@ -62,7 +67,7 @@ bool BranchSearch::sharpen(Part& part) {
     solve(part);
     return true;
   }
-  if (part.multipliers >= 0 && part.in_vain >= kInVain) {
+  if (part.multipliers && part.in_vain >= kInVain) {
     part.in_vain = 0;
     solve(part, fine_descent(), static_cast<std::size_t>(std::max(options_.pairs, 0)));
     return true;
@@ -70,60 +75,127 @@ bool BranchSearch::sharpen(Part& part) {
   return false;
 }
 
-void BranchSearch::halve(const Part& top, std::priority_queue<Part>& queue) {
-  const auto [first, second] = halves(top.reach->box(), top.split);
-  nodes_[static_cast<std::size_t>(top.index)].split = top.split;
-  for (const Box& half : {first, second}) {
-    const auto index = static_cast<int>(nodes_.size());
-    nodes_.push_back({});
-    queue.push(part(half, &top, index));
+BranchSearch::Step BranchSearch::advanced(Part part) const {
+  Step step;
+  if (share_of_time() < 1 && !is_cancelled() && !sharpen(part)) {
+    step.is_stuck = !part.multipliers ||
+                    !(relative_width(part.reach->box(), static_cast<std::size_t>(part.split)) > kThin);
+    if (!step.is_stuck) {
+      const auto [lower, upper] = halves(part.reach->box(), part.split);
+      step.halves = {this->part(lower, &part), this->part(upper, &part)};
+    }
   }
-  nodes_[static_cast<std::size_t>(top.index)].first_child = static_cast<int>(nodes_.size()) - 2;
+  step.part = std::move(part);
+  return step;
 }
 
-BranchResult BranchSearch::run() {
-  const auto start = std::chrono::steady_clock::now();
-  std::priority_queue<Part> queue;
-  for (const Box& box : boxes_) {
+void BranchSearch::count(const Part& part) {
+  ++result_.nodes;
+  look_at_centre(part.reach->box());
+  result_.undecided_per_box += (part.undecided - result_.undecided_per_box) / result_.nodes;
+}
+
+void BranchSearch::record(Part& part) {
+  SearchNode& node = nodes_[static_cast<std::size_t>(part.index)];
+  node.decided.insert(node.decided.end(), part.decided.begin(), part.decided.end());
+  part.decided.clear();
+  if (part.has_new_form) node.form = {part.form, &part.form->written};
+  part.has_new_form = false;
+}
+
+void BranchSearch::commit(Step step, std::priority_queue<Part>& queue) {
+  record(step.part);
+  if (step.halves.empty()) {
+    queue.push(std::move(step.part));
+    return;
+  }
+  SearchNode& node = nodes_[static_cast<std::size_t>(step.part.index)];
+  node.split = step.part.split;
+  node.first_child = static_cast<int>(nodes_.size());
+  for (Part& half : step.halves) {
+    half.index = static_cast<int>(nodes_.size());
     nodes_.push_back({});
-    Part root = part(box, nullptr, static_cast<int>(nodes_.size()) - 1);
+    count(half);
+    record(half);
+    queue.push(std::move(half));
+  }
+}
+
+std::vector<BranchSearch::Part> BranchSearch::roots() {
+  std::vector<Part> parts(boxes_.size());
+  nodes_.resize(boxes_.size());
+  files::parallel_for(static_cast<int>(boxes_.size()), options_.jobs, [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    parts[k] = part(boxes_[k], nullptr);
+    parts[k].index = i;
+  });
+  for (const Part& root : parts) count(root);
+  files::parallel_for(static_cast<int>(boxes_.size()), options_.jobs, [&](int i) {
+    Part& root = parts[static_cast<std::size_t>(i)];
     if (set_ == nullptr) {
       solve(root);
     } else {
       renew_form(root);
     }
-    queue.push(std::move(root));
-  }
-  const auto enough = [&] {
-    const double attained = std::max(options_.known, std::sqrt(chain_.unscaled_rho(steepest())));
-    return attained * (1 + options_.tolerance);
-  };
-  const auto share_of_time = [&] {
-    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-    return options_.seconds > 0 ? elapsed.count() / options_.seconds : 0;
-  };
-  const auto why_stop = [&] {
-    if (bound(queue.top()) <= enough()) return BranchStop::kCloseEnough;
-    if (share_of_time() >= 1) return BranchStop::kTimeLimit;
-    if (options_.cancelled != nullptr && *options_.cancelled) return BranchStop::kCancelled;
-    return result_.nodes + 2 <= options_.nodes ? BranchStop::kNothingRun : BranchStop::kNodes;
-  };
-  while ((result_.stop = why_stop()) == BranchStop::kNothingRun) {
-    Part top = queue.top();
+  });
+  for (Part& root : parts) record(root);
+  return parts;
+}
+
+std::vector<BranchSearch::Part> BranchSearch::next_batch(std::priority_queue<Part>& queue) const {
+  const std::size_t size = std::clamp<std::size_t>(queue.size() / kPartsPerStep, 1, kMostSteps);
+  std::vector<Part> batch;
+  while (!queue.empty() && batch.size() < size) {
+    const int nodes_after = result_.nodes + 2 * (static_cast<int>(batch.size()) + 1);
+    if (!batch.empty() && (bound(queue.top()) <= enough() || nodes_after > options_.nodes)) break;
+    batch.push_back(queue.top());
     queue.pop();
-    if (sharpen(top)) {
-      queue.push(std::move(top));
-      continue;
+  }
+  return batch;
+}
+
+double BranchSearch::enough() const {
+  const double attained = std::max(options_.known, std::sqrt(chain_.unscaled_rho(steepest())));
+  return attained * (1 + options_.tolerance);
+}
+
+double BranchSearch::share_of_time() const {
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start_;
+  return options_.seconds > 0 ? elapsed.count() / options_.seconds : 0;
+}
+
+BranchStop BranchSearch::why_stop(const std::priority_queue<Part>& queue) const {
+  if (bound(queue.top()) <= enough()) return BranchStop::kCloseEnough;
+  if (share_of_time() >= 1) return BranchStop::kTimeLimit;
+  if (is_cancelled()) return BranchStop::kCancelled;
+  return result_.nodes + 2 <= options_.nodes ? BranchStop::kNothingRun : BranchStop::kNodes;
+}
+
+BranchResult BranchSearch::run() {
+  constexpr int kNodesPerReport = 256;
+  std::priority_queue<Part> queue;
+  for (Part& root : roots()) queue.push(std::move(root));
+  int reported = 0;
+  while ((result_.stop = why_stop(queue)) == BranchStop::kNothingRun) {
+    std::vector<Part> batch = next_batch(queue);
+    std::vector<Step> steps(batch.size());
+    files::parallel_for(static_cast<int>(batch.size()), options_.jobs, [&](int i) {
+      const auto k = static_cast<std::size_t>(i);
+      steps[k] = advanced(std::move(batch[k]));
+    });
+    const bool is_stuck = steps.front().is_stuck;
+    std::size_t halvings = 0;
+    for (Step& step : steps) {
+      halvings += step.halves.empty() ? 0 : 1;
+      commit(std::move(step), queue);
     }
-    if (top.multipliers < 0 ||
-        !(relative_width(top.reach->box(), static_cast<std::size_t>(top.split)) > kThin)) {
-      queue.push(std::move(top));
+    if (is_stuck) {
       result_.stop = BranchStop::kNothingToHalve;
       break;
     }
-    halve(top, queue);
-    course_.push_back(bound(queue.top()));
-    if (options_.progress && result_.nodes % 256 < 2) {
+    course_.insert(course_.end(), halvings, bound(queue.top()));
+    if (options_.progress && result_.nodes / kNodesPerReport > reported) {
+      reported = result_.nodes / kNodesPerReport;
       const double share = std::max(share_of_time(), 1.0 * result_.nodes / options_.nodes);
       options_.progress(std::min(share, 1.0), bound(queue.top()));
     }
@@ -134,11 +206,14 @@ BranchResult BranchSearch::run() {
 BranchResult BranchSearch::finished(std::priority_queue<Part>& queue) {
   if (!options_.boxes_only) polish(queue);
   const double rho = queue.top().rho * (1 + kRhoMargin);
-  result_.tree.rho = chain_.unscaled_rho(rho);
   if (!options_.boxes_only) look_ahead(queue.top());
-  for (; !queue.empty(); queue.pop())
-    nodes_[static_cast<std::size_t>(queue.top().index)].multipliers = queue.top().multipliers;
-  result_.tree = in_preorder(nodes_, boxes_.size(), std::move(result_.tree));
+  for (; !queue.empty(); queue.pop()) {
+    const std::shared_ptr<const Multipliers>& multipliers = queue.top().multipliers;
+    if (multipliers)
+      nodes_[static_cast<std::size_t>(queue.top().index)].proof = {multipliers, &multipliers->written};
+  }
+  result_.tree = in_preorder(nodes_, boxes_.size());
+  result_.tree.rho = chain_.unscaled_rho(rho);
   for (const auto& [slope, centre] : steep_) result_.steep_centres.push_back(centre);
   return std::move(result_);
 }
@@ -175,7 +250,7 @@ void BranchSearch::polish(std::priority_queue<Part>& queue) {
   if (queue.size() > kFewParts) return;
   for (int i = 0; i < kPolished; ++i) {
     Part top = queue.top();
-    if (top.multipliers < 0) return;
+    if (!top.multipliers) return;
     const double before = top.rho;
     queue.pop();
     solve(top, fine_descent(), kMostPairs);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -36,6 +37,21 @@ class BranchSearch {
   /// the number for which the inherited form was computed.
   static constexpr double kFormLazy = 0.85;
 
+  /// A form that bounds rho, in the units of the chain.
+  struct OfRho {
+    Eigen::MatrixXd gram;  ///< G of phi
+    Eigen::VectorXd t;     ///< multipliers of all neurons of rho
+    std::shared_ptr<const Reach> reach;
+    int undecided = 0;    ///< number of undecided neurons of rho
+    check::Form written;  ///< in the units of the network
+  };
+  /// Multipliers in the units of the chain.
+  struct Multipliers {
+    Eigen::VectorXd t;
+    std::vector<NeuronPair> pairs;
+    std::vector<double> of_pairs;
+    LeafProof written;
+  };
   /// A box of the search.
   struct Part {
     double rho = std::numeric_limits<double>::infinity();
@@ -43,44 +59,54 @@ class BranchSearch {
     std::shared_ptr<const Reach> reach;
     std::shared_ptr<const Reach> around;  ///< bounds over the parent box, on which `reach` depends
     std::vector<NeuronState> states;
-    int undecided = 0;       ///< number of undecided neurons
-    int split = 0;           ///< the coordinate to halve
-    int in_vain = 0;         ///< number of successive halvings that decided no neuron
-    int multipliers = -1;    ///< index in scaled_, inherited or own
-    int undecided_then = 0;  ///< number of undecided neurons when these multipliers were computed
-    int form = -1;           ///< index in forms_
-    int undecided_form = 0;  ///< number of undecided neurons when that form was computed
+    int undecided = 0;                               ///< number of undecided neurons
+    int split = 0;                                   ///< the coordinate to halve
+    int in_vain = 0;                                 ///< number of successive halvings that decided no neuron
+    std::shared_ptr<const Multipliers> multipliers;  ///< inherited or own; null if none were found
+    int undecided_then = 0;             ///< number of undecided neurons when these multipliers were computed
+    std::shared_ptr<const OfRho> form;  ///< inherited or own; null if the function is not a set function
+    int undecided_form = 0;             ///< number of undecided neurons when that form was computed
+    // Recorded in the node at the next commit().
+    std::vector<check::Decision> decided;
+    bool has_new_form = false;
     bool operator<(const Part& other) const { return rho < other.rho; }
   };
-  /// A form that bounds rho, in the units of the chain.
-  struct OfRho {
-    Eigen::MatrixXd gram;  ///< G of phi
-    Eigen::VectorXd t;     ///< multipliers of all neurons of rho
-    std::shared_ptr<const Reach> reach;
-    int undecided;  ///< number of undecided neurons of rho
+  /// A part after one step of the search: sharpened, or replaced by its halves.
+  struct Step {
+    Part part;
+    std::vector<Part> halves;
+    bool is_stuck = false;  ///< there is nothing left to halve
   };
-  /// Multipliers in the units of the chain.
-  struct Multipliers {
-    Eigen::VectorXd t;
-    std::vector<NeuronPair> pairs;
-    std::vector<double> of_pairs;
-  };
-  const Multipliers& multipliers_of(const Part& part) const {
-    return scaled_[static_cast<std::size_t>(part.multipliers)];
-  }
 
   const Eigen::MatrixXd& gram_of(const Part& part) const {
-    return set_ == nullptr ? chain_.gram : forms_[static_cast<std::size_t>(part.form)].gram;
+    return set_ == nullptr ? chain_.gram : part.form->gram;
   }
 
   double squared_slope(const Eigen::VectorXd& x) const {
     return set_ == nullptr ? chain_.squared_slope(x) : set_->whole.squared_slope(x);
   }
-  // branch.cpp
+  // branch.cpp. Functions that are const run on several threads at once.
+  /// Returns the parts of the given boxes, with multipliers.
+  std::vector<Part> roots();
+  /// Takes from the queue the parts of the next steps: those that dominate. Their number depends on the queue only.
+  std::vector<Part> next_batch(std::priority_queue<Part>& queue) const;
+  /// One step of a part; none if the search is to stop.
+  Step advanced(Part part) const;
   /// Improves the part's form or multipliers if due. Returns whether it did; the part is then queued by its new rho.
-  bool sharpen(Part& part);
-  /// Adds the two halves of `top` to the queue and to the tree.
-  void halve(const Part& top, std::priority_queue<Part>& queue);
+  bool sharpen(Part& part) const;
+  /// Records a step in the tree and queues the parts that it leaves.
+  void commit(Step step, std::priority_queue<Part>& queue);
+  /// Records what a part has learnt in its node.
+  void record(Part& part);
+  /// Counts a new part of the tree and looks at the slope at its centre.
+  void count(const Part& part);
+  /// Why the search stops now; kNothingRun if it goes on.
+  BranchStop why_stop(const std::priority_queue<Part>& queue) const;
+  /// The share of the time limit that has been used; 0 without a limit.
+  double share_of_time() const;
+  bool is_cancelled() const { return options_.cancelled != nullptr && *options_.cancelled; }
+  /// The bound that is close enough to what is attained.
+  double enough() const;
   /// Returns the result of a search that stopped; empties the queue.
   BranchResult finished(std::priority_queue<Part>& queue);
   /// Computes the outlook.
@@ -94,11 +120,7 @@ class BranchSearch {
   double steepest() const { return steep_.empty() ? 0 : steep_.begin()->first; }
   void look_at_centre(const Box& box);
   /// Creates the part for a box, which inherits multipliers and form from its parent. @param parent null for a root.
-  Part part(const Box& box, const Part* parent, int index);
-  /// Returns where to store the decisions of a node; null if better slopes are not used.
-  std::vector<check::Decision>* decided_in(int index) {
-    return options_.better_slopes ? &nodes_[static_cast<std::size_t>(index)].decided : nullptr;
-  }
+  Part part(const Box& box, const Part* parent) const;
   /// Returns the states of the neurons of `chain`, whose layers start at layer `first` of `reach`.
   static std::vector<NeuronState> states_of(const Reach& reach, const LocalChain& chain, std::size_t first);
   static int undecided_in(const std::vector<NeuronState>& states) {
@@ -124,27 +146,26 @@ class BranchSearch {
   /// Sets `t` to the initial multipliers.
   std::vector<NeuronPair> chosen_pairs(const Part& part, std::size_t most, Eigen::VectorXd& t) const;
   /// Computes multipliers for this part.
-  void solve(Part& part);
-  void solve(Part& part, const DescentOptions& descent, std::size_t most_pairs);
+  void solve(Part& part) const;
+  void solve(Part& part, const DescentOptions& descent, std::size_t most_pairs) const;
   /// Returns options for Newton steps that come close to the optimum.
   static DescentOptions fine_descent();
   /// Stores multipliers of the undecided neurons and of the pairs as those of the part.
   void keep(Part& part, const Eigen::VectorXd& t, std::vector<NeuronPair> pairs,
-            const Eigen::VectorXd& of_pairs);
+            const Eigen::VectorXd& of_pairs) const;
 
   // search_forms.cpp
   /// Computes multipliers of this part for phi and rho together, and from those of rho the form that replaces rho.
-  void renew_form(Part& part);
+  void renew_form(Part& part) const;
 
   const LocalChain& chain_;
   const SetChain* const set_;  ///< null if the function is not a set function
-  std::vector<OfRho> forms_;
   const std::vector<Box>& boxes_;
   const BranchOptions& options_;
   std::vector<SearchNode> nodes_;
-  std::vector<Multipliers> scaled_;
   std::multimap<double, Eigen::VectorXd, std::greater<>> steep_;  ///< box centres by squared slope
   std::vector<double> course_;                                    ///< the bound after each split
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   BranchResult result_;
 };
 

@@ -20,9 +20,9 @@ constexpr double kFormMargin = 4e-6;
 
 }  // namespace
 
-void BranchSearch::renew_form(Part& part) {
+void BranchSearch::renew_form(Part& part) const {
   part.undecided_form = part.undecided;
-  const OfRho* const old = part.form >= 0 ? &forms_[static_cast<std::size_t>(part.form)] : nullptr;
+  const OfRho* const old = part.form.get();
   OfRho own;
   const std::size_t first = chain_.hidden.size() + 1;  // first layer of rho
   std::vector<check::Decision> decided;
@@ -45,7 +45,7 @@ void BranchSearch::renew_form(Part& part) {
     t = root_multipliers(set_->whole, joint, options_.start);
   } else {
     VectorXd all(set_->whole.neurons());
-    all << multipliers_of(part).t, VectorXd::Zero(set_->last.rows()), old->t;
+    all << part.multipliers->t, VectorXd::Zero(set_->last.rows()), old->t;
     DescentOptions descent;
     descent.relative_gap = kGap;
     descent.steps = kSteps;
@@ -64,17 +64,13 @@ void BranchSearch::renew_form(Part& part) {
   part.rho = least;
   own.t = VectorXd::Zero(set_->rho.neurons());
   for (Index i = 0; i < t.size() - m; ++i) own.t(rho.undecided()[static_cast<std::size_t>(i)]) = t(m + i);
-  check::Form form;
   for (Index i = 0; i < q.rows(); ++i)
-    for (Index j = 0; j <= i; ++j) form.q.push_back(std::ldexp(q(i, j), set_->form_exponent()));
+    for (Index j = 0; j <= i; ++j) own.written.q.push_back(std::ldexp(q(i, j), set_->form_exponent()));
   for (Index i = 0; i < own.t.size(); ++i)
-    form.t.push_back(set_->whole.unscaled_multiplier(own.t(i), first + set_->rho.layer_of(i)));
-  result_.tree.forms.push_back(std::move(form));
-  part.form = static_cast<int>(forms_.size());
-  SearchNode& node = nodes_[static_cast<std::size_t>(part.index)];
-  node.form = static_cast<int>(result_.tree.forms.size()) - 1;
-  node.decided.insert(node.decided.end(), decided.begin(), decided.end());
-  forms_.push_back(std::move(own));
+    own.written.t.push_back(set_->whole.unscaled_multiplier(own.t(i), first + set_->rho.layer_of(i)));
+  part.form = std::make_shared<const OfRho>(std::move(own));
+  part.has_new_form = true;
+  part.decided.insert(part.decided.end(), decided.begin(), decided.end());
   keep(part, t.head(m), {}, {});
 }
 

@@ -19,7 +19,7 @@ constexpr double kLeastGain = 1e-2;
 
 std::vector<std::size_t> BranchSearch::still_shown(const Part& part, const NeuronForms& forms) const {
   std::vector<std::size_t> result;
-  const std::vector<NeuronPair>& pairs = multipliers_of(part).pairs;
+  const std::vector<NeuronPair>& pairs = part.multipliers->pairs;
   const auto is_undecided = [&](Index neuron) {
     return part.states[static_cast<std::size_t>(neuron)] == NeuronState::kUndecided;
   };
@@ -31,7 +31,7 @@ std::vector<std::size_t> BranchSearch::still_shown(const Part& part, const Neuro
 
 VectorXd BranchSearch::inherited(const Part& part, const std::vector<std::size_t>& pairs,
                                  NodeInequality& inequality) const {
-  const Multipliers& own = multipliers_of(part);
+  const Multipliers& own = *part.multipliers;
   VectorXd t(inequality.neurons() + static_cast<Index>(pairs.size()));
   t.head(inequality.neurons()) = own.t(inequality.undecided());
   for (std::size_t c = 0; c < pairs.size(); ++c) {
@@ -42,7 +42,7 @@ VectorXd BranchSearch::inherited(const Part& part, const std::vector<std::size_t
 }
 
 std::vector<NeuronPair> BranchSearch::chosen_pairs(const Part& part, std::size_t most, VectorXd& t) const {
-  if (most == 0 && multipliers_of(part).pairs.empty()) {
+  if (most == 0 && part.multipliers->pairs.empty()) {
     NodeInequality inequality(chain_, part.states, gram_of(part));
     t = inherited(part, {}, inequality);
     return {};
@@ -56,7 +56,7 @@ std::vector<NeuronPair> BranchSearch::chosen_pairs(const Part& part, std::size_t
   const std::vector<std::size_t> old = still_shown(part, forms);
   t = inherited(part, old, inequality);
   std::vector<NeuronPair> result;
-  for (const std::size_t c : old) result.push_back(multipliers_of(part).pairs[c]);
+  for (const std::size_t c : old) result.push_back(part.multipliers->pairs[c]);
   const auto same = [](const NeuronPair& a, const NeuronPair& b) {
     return a.first == b.first && a.second == b.second && a.first_on == b.first_on &&
            a.second_on == b.second_on;
@@ -86,7 +86,7 @@ std::vector<NeuronPair> BranchSearch::chosen_pairs(const Part& part, std::size_t
   return result;
 }
 
-void BranchSearch::solve(Part& part) {
+void BranchSearch::solve(Part& part) const {
   const double attained = std::max(steepest(), options_.known * options_.known / chain_.unscaled_rho(1));
   const double wanted = attained > 0 ? kShareOfDistance * (part.rho / attained - 1) : kGap;
   DescentOptions descent;
@@ -95,12 +95,12 @@ void BranchSearch::solve(Part& part) {
   solve(part, descent, static_cast<std::size_t>(std::max(options_.pairs, 0)));
 }
 
-void BranchSearch::solve(Part& part, const DescentOptions& descent, std::size_t most_pairs) {
+void BranchSearch::solve(Part& part, const DescentOptions& descent, std::size_t most_pairs) const {
   NodeInequality inequality(chain_, part.states, gram_of(part));
   const Index m = inequality.neurons();
   std::vector<NeuronPair> pairs;
   VectorXd t;
-  if (part.multipliers < 0) {
+  if (!part.multipliers) {
     t = root_multipliers(chain_, inequality, options_.start);
   } else {
     pairs = chosen_pairs(part, most_pairs, t);
@@ -124,25 +124,20 @@ void BranchSearch::solve(Part& part, const DescentOptions& descent, std::size_t 
 }
 
 void BranchSearch::keep(Part& part, const VectorXd& t, std::vector<NeuronPair> pairs,
-                        const VectorXd& of_pairs) {
+                        const VectorXd& of_pairs) const {
   Multipliers own;
   own.t = VectorXd::Zero(chain_.neurons());
   Index next = 0;
   for (std::size_t i = 0; i < part.states.size(); ++i)
     if (part.states[i] == NeuronState::kUndecided) own.t(static_cast<Index>(i)) = t(next++);
-  std::vector<double> unscaled;
   for (Index i = 0; i < own.t.size(); ++i)
-    unscaled.push_back(chain_.unscaled_multiplier(own.t(i), chain_.layer_of(i)));
-  std::vector<check::Conflict> conflicts;
+    own.written.multipliers.push_back(chain_.unscaled_multiplier(own.t(i), chain_.layer_of(i)));
   for (std::size_t c = 0; c < pairs.size(); ++c) {
     own.of_pairs.push_back(of_pairs(static_cast<Index>(c)));
-    conflicts.push_back(chain_.unscaled(pairs[c], own.of_pairs.back()));
+    own.written.conflicts.push_back(chain_.unscaled(pairs[c], own.of_pairs.back()));
   }
   own.pairs = std::move(pairs);
-  part.multipliers = static_cast<int>(scaled_.size());
-  scaled_.push_back(std::move(own));
-  result_.tree.multipliers.push_back(std::move(unscaled));
-  result_.tree.conflicts.push_back(std::move(conflicts));
+  part.multipliers = std::make_shared<const Multipliers>(std::move(own));
 }
 
 }  // namespace swarmcert::lipschitz

@@ -26,20 +26,17 @@ void BranchSearch::look_at_centre(const Box& box) {
   if (steep_.size() > kSteepCentres) steep_.erase(std::prev(steep_.end()));
 }
 
-BranchSearch::Part BranchSearch::part(const Box& box, const Part* parent, int index) {
-  ++result_.nodes;
-  look_at_centre(box);
+BranchSearch::Part BranchSearch::part(const Box& box, const Part* parent) const {
   Part part;
-  part.index = index;
   std::vector<MatrixXd> slopes;
   std::vector<LinearForms> forms;
   if (parent != nullptr) part.around = parent->reach;
-  const bool has_pairs = parent != nullptr && !multipliers_of(*parent).pairs.empty();
+  const bool has_pairs = parent != nullptr && !parent->multipliers->pairs.empty();
   part.reach = std::make_shared<const Reach>(chain_.hidden, box, part.around.get(), &slopes,
-                                             has_pairs ? &forms : nullptr, decided_in(index));
+                                             has_pairs ? &forms : nullptr,
+                                             options_.better_slopes ? &part.decided : nullptr);
   part.states = states_of(*part.reach, chain_, 0);
   part.undecided = undecided_in(part.states);
-  result_.undecided_per_box += (part.undecided - result_.undecided_per_box) / result_.nodes;
   if (parent != nullptr) {
     part.rho = parent->rho;
     part.multipliers = parent->multipliers;
@@ -49,7 +46,7 @@ BranchSearch::Part BranchSearch::part(const Box& box, const Part* parent, int in
     part.in_vain = part.states == parent->states ? parent->in_vain + 1 : 0;
     std::vector<std::size_t> pairs;
     if (has_pairs) pairs = still_shown(part, NeuronForms(forms, box));
-    const bool all_pairs = pairs.size() == multipliers_of(part).pairs.size();
+    const bool all_pairs = pairs.size() == part.multipliers->pairs.size();
     if (part.states != parent->states || !all_pairs) {
       NodeInequality inequality(chain_, part.states, gram_of(part));
       const double rho = inequality.least_rho(inherited(part, pairs, inequality));

@@ -1,6 +1,8 @@
 #include "lipschitz/branch/search_tree.h"
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include "lipschitz/checker/tree_words.h"
 
@@ -9,17 +11,10 @@ namespace {
 
 class Writer {
  public:
-  Writer(const std::vector<SearchNode>& nodes, BranchTree found)
-      : nodes_(nodes),
-        found_(std::move(found)),
-        proves_(found_.forms.size(), false),
-        multipliers_(found_.multipliers.size(), SearchNode::kNone),
-        forms_(found_.forms.size(), SearchNode::kNone) {
-    written_.rho = found_.rho;
-  }
+  explicit Writer(const std::vector<SearchNode>& nodes) : nodes_(nodes) {}
 
   BranchTree write(std::size_t roots) {
-    for (std::size_t root = 0; root < roots; ++root) mark(static_cast<int>(root), SearchNode::kNone);
+    for (std::size_t root = 0; root < roots; ++root) mark(static_cast<int>(root), nullptr);
     for (std::size_t root = 0; root < roots; ++root) write_from(static_cast<int>(root));
     const auto are_none = [](const std::vector<check::Conflict>& some) { return some.empty(); };
     if (std::all_of(written_.conflicts.begin(), written_.conflicts.end(), are_none))
@@ -31,13 +26,13 @@ class Writer {
   const SearchNode& node(int index) const { return nodes_[static_cast<std::size_t>(index)]; }
 
   /// Marks the forms that the leaves depend on. @param form the form of the parent box.
-  void mark(int index, int form) {
-    if (node(index).form != SearchNode::kNone) form = node(index).form;
+  void mark(int index, const check::Form* form) {
+    if (node(index).form) form = node(index).form.get();
     if (node(index).split != BranchTree::kLeaf) {
       mark(node(index).first_child, form);
       mark(node(index).first_child + 1, form);
-    } else if (form != SearchNode::kNone) {
-      proves_[static_cast<std::size_t>(form)] = true;
+    } else if (form != nullptr) {
+      proves_.insert(form);
     }
   }
 
@@ -46,16 +41,20 @@ class Writer {
     BranchTree::Node to;
     to.split = from.split;
     to.decided = from.decided;
-    if (from.form != SearchNode::kNone) {
-      const auto form = static_cast<std::size_t>(from.form);
-      to.bounds_rho = true;
-      if (proves_[form]) to.form = moved(form, forms_, found_.forms, written_.forms);
+    to.bounds_rho = from.form != nullptr;
+    if (from.form && proves_.count(from.form.get()) != 0) {
+      const auto [place, is_new] = forms_.emplace(from.form.get(), static_cast<int>(written_.forms.size()));
+      if (is_new) written_.forms.push_back(*from.form);
+      to.form = place->second;
     }
-    if (from.split == BranchTree::kLeaf && from.multipliers != SearchNode::kNone) {
-      const auto own = static_cast<std::size_t>(from.multipliers);
-      const bool is_new = multipliers_[own] == SearchNode::kNone;
-      to.multipliers = moved(own, multipliers_, found_.multipliers, written_.multipliers);
-      if (is_new) written_.conflicts.push_back(std::move(found_.conflicts[own]));
+    if (from.split == BranchTree::kLeaf && from.proof) {
+      const auto [place, is_new] =
+          proofs_.emplace(from.proof.get(), static_cast<int>(written_.multipliers.size()));
+      if (is_new) {
+        written_.multipliers.push_back(from.proof->multipliers);
+        written_.conflicts.push_back(from.proof->conflicts);
+      }
+      to.multipliers = place->second;
     }
     written_.nodes.push_back(std::move(to));
     if (from.split == BranchTree::kLeaf) return;
@@ -63,27 +62,17 @@ class Writer {
     write_from(from.first_child + 1);
   }
 
-  /// Returns the index of an item in `to`; the item is moved there at its first use.
-  template <class Item>
-  static int moved(std::size_t item, std::vector<int>& places, std::vector<Item>& from,
-                   std::vector<Item>& to) {
-    if (places[item] == SearchNode::kNone) {
-      places[item] = static_cast<int>(to.size());
-      to.push_back(std::move(from[item]));
-    }
-    return places[item];
-  }
-
   const std::vector<SearchNode>& nodes_;
-  BranchTree found_, written_;
-  std::vector<bool> proves_;              ///< by form: whether a leaf depends on it
-  std::vector<int> multipliers_, forms_;  ///< new indices
+  BranchTree written_;
+  std::set<const check::Form*> proves_;      ///< forms that a leaf depends on
+  std::map<const LeafProof*, int> proofs_;   ///< index in written_
+  std::map<const check::Form*, int> forms_;  ///< index in written_
 };
 
 }  // namespace
 
-BranchTree in_preorder(const std::vector<SearchNode>& nodes, std::size_t roots, BranchTree found) {
-  return Writer(nodes, std::move(found)).write(roots);
+BranchTree in_preorder(const std::vector<SearchNode>& nodes, std::size_t roots) {
+  return Writer(nodes).write(roots);
 }
 
 std::string words_of(const BranchTree& tree) {
