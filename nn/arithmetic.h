@@ -1,9 +1,9 @@
-/// @file The arithmetic that all flight code of this project uses, and a detector for compilers that change it.
+/// @file The arithmetic used by all flight code of this project, and a detector for compilers that change it.
 ///
-/// Every product is rounded to the scalar's precision before it enters a sum. A fused multiply-add rounds once
-/// instead of twice and gives other bits; contraction is on by default in GCC for targets that have the
-/// instruction. `-ffp-contract=off` is an interface option of swarmcert::nn; `rounded()` holds the line where a
-/// build system dropped that option, and `arithmetic_is_fused()` tells at run time whether both failed.
+/// Every product is rounded to the scalar's precision before it is added to a sum. A fused multiply-add rounds once
+/// instead of twice and gives different bits; GCC contracts by default for targets that have the instruction.
+/// `-ffp-contract=off` is an interface option of swarmcert::nn. `rounded()` prevents contraction even if a build system
+/// drops that option, and `arithmetic_is_fused()` detects at run time that both safeguards failed.
 #pragma once
 
 #if defined(__FAST_MATH__)
@@ -18,11 +18,12 @@
 
 namespace swarmcert::nn {
 
-/// Returns `product`, and keeps the compiler from fusing it with a following addition.
+/// Returns `product` and prevents the compiler from fusing it with a following addition.
 ///
-/// The product passes through an empty assembler statement, which no optimiser looks into: clang-14 ignores its own
-/// `#pragma clang fp contract(off)` under -ffp-contract=fast, and the vectoriser of GCC 12 drops GCC's own
-/// __builtin_assoc_barrier, after which what it vectorised is fused. The builtin serves where there are no vectors.
+/// The product passes through an empty assembler statement, which is opaque to the optimiser. Compiler features alone
+/// do not suffice: clang-14 ignores its own `#pragma clang fp contract(off)` under -ffp-contract=fast, and the
+/// vectoriser of GCC 12 drops __builtin_assoc_barrier and then fuses the vectorised code. The builtin is used on
+/// targets without vector registers.
 template <typename Scalar>
 [[gnu::always_inline]] inline Scalar rounded(Scalar product) {
 #if defined(__SSE2__)
@@ -39,7 +40,7 @@ template <typename Scalar>
 #endif
 }
 
-/// True if this translation unit's `a * b + c` is rounded once (fused) instead of twice.
+/// Returns true if `a * b + c` is rounded once (fused) instead of twice in this translation unit.
 ///
 /// With a = b = 1 + 2^-23 and c = -(1 + 2^-22), the rounded product cancels c exactly; a fused one leaves 2^-46.
 inline bool arithmetic_is_fused() {
@@ -68,7 +69,7 @@ struct Bits<double> {
 
 }  // namespace detail
 
-/// The bit pattern of `x`.
+/// Returns the bit pattern of `x`.
 template <typename Scalar>
 inline typename detail::Bits<Scalar>::Type bits(Scalar x) {
   typename detail::Bits<Scalar>::Type pattern;
@@ -76,8 +77,8 @@ inline typename detail::Bits<Scalar>::Type bits(Scalar x) {
   return pattern;
 }
 
-/// True unless `x` is infinite or not a number. By bits, because a compiler told that there are no NaNs
-/// (-ffinite-math-only) folds the library's test to true.
+/// Returns true unless `x` is infinite or NaN. Tests the bits because under -ffinite-math-only compilers fold the
+/// library's test to true.
 template <typename Scalar>
 inline bool is_finite(Scalar x) {
   return (bits(x) & detail::Bits<Scalar>::kExponent) != detail::Bits<Scalar>::kExponent;

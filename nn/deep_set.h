@@ -1,19 +1,19 @@
-/// @file A deep set over neighbours of several kinds; its bits do not depend on the order in which they arrive.
+/// @file A deep set over neighbours of several kinds, whose output is bitwise independent of the neighbours' order.
 ///
 ///   f(own, {x_j, c_j}) = rho(phi_ground(own) + sum_j phi_{c_j}(clamp(x_j)))
 ///
-/// A set of invariants sees J(x_j) in place of x_j, and K(own) in place of own (invariants.h). Among neighbours of the
-/// kinds that `silent` lists, f is 0: a network that was no help there does not speak. So f steps by all of its value
-/// where a neighbour comes or goes that makes or ends such a composition; while the neighbours stay the same, f is
-/// either 0 throughout or the function above.
+/// With `of_invariants`, J(x_j) replaces x_j and K(own) replaces own (invariants.h). For the compositions of neighbours
+/// listed in `silent`, f is 0: the network is switched off where it did not help. f therefore jumps by its full value
+/// when a neighbour arrives or leaves and the composition becomes silent or stops being so; while the neighbours stay
+/// the same, f is either 0 throughout or the function above.
 ///
-/// Addition of floats is not associative: the same neighbours, summed in another order, give other bits. The order in
-/// which radio packets arrive would then be an input of the controller, one that no certificate covers and no log
-/// replays. So the sum has one order, a function of the set alone: first the ground, then the kinds by index, and
-/// within a kind by the clamped inputs of phi, compared number by number as unsigned bit patterns. Any total order
-/// would do; this one needs no case for zeros of either sign. Neighbours that compare equal have equal inputs and are
-/// interchangeable. Neighbours that follow one another in this order and are of one kind go through phi together, a few
-/// at a time; what is added when does not change.
+/// Floating-point addition is not associative: summing the same neighbours in another order gives different bits. The
+/// order in which radio packets arrive would then be an input of the controller that no certificate covers and no log
+/// reproduces. The sum therefore has one canonical order that depends on the set alone: first the ground, then the
+/// kinds by index, and within a kind lexicographically by the clamped inputs of phi, compared as unsigned bit patterns.
+/// Any total order would do; this one needs no special case for signed zeros. Neighbours that compare equal have equal
+/// inputs and are interchangeable. Consecutive neighbours of one kind are passed through phi together, a few at a time;
+/// this does not change the order of the additions.
 #pragma once
 
 #include <cstdint>
@@ -28,20 +28,20 @@ namespace swarmcert::nn {
 /// Precondition: fits_together(set) and lower <= upper.
 template <typename Scalar>
 struct DeepSet {
-  const Mlp<Scalar>* ground;  ///< sees the vehicle's own state; nullptr: no such term
-  const Mlp<Scalar>* phi;     ///< [num_kinds], by the neighbour's kind
+  const Mlp<Scalar>* ground;  ///< input: the vehicle's own state; nullptr: no ground term
+  const Mlp<Scalar>* phi;     ///< [num_kinds], indexed by the neighbour's kind
   int num_kinds;
-  Mlp<Scalar> rho;      ///< of the vehicle's own kind
-  const Scalar* lower;  ///< [phi_inputs()] each; nullptr: no clamp. The ground's input is not clamped.
+  Mlp<Scalar> rho;      ///< for the vehicle's own kind
+  const Scalar* lower;  ///< [phi_inputs()] each; nullptr: no clamp. The input of `ground` is never clamped.
   const Scalar* upper;
   bool of_invariants = false;
-  const int* silent = nullptr;  ///< [num_silent x num_kinds] neighbours of each kind among which f is 0
+  const int* silent = nullptr;  ///< [num_silent x num_kinds]: neighbours per kind where f is 0
   int num_silent = 0;
 
-  /// Numbers per neighbour; not those of phi in a set of invariants.
+  /// Number of inputs per neighbour. Differs from phi_inputs() if `of_invariants` is set.
   constexpr int inputs() const { return of_invariants ? kRelativeState : phi_inputs(); }
   constexpr int phi_inputs() const { return phi[0].inputs(); }
-  /// Of the vehicle's own state; 0 without a ground term.
+  /// Number of inputs that describe the vehicle's own state; 0 without a ground term.
   constexpr int own_inputs() const {
     return ground == nullptr ? 0 : of_invariants ? kOwnState : ground->inputs();
   }
@@ -49,8 +49,8 @@ struct DeepSet {
   constexpr int outputs() const { return rho.outputs(); }
 };
 
-/// True if all phi have the same number of inputs, phi and ground have rho.inputs() outputs, and all are chains; in a
-/// set of invariants, phi and ground take as many as there are.
+/// Returns true if all networks are chains, all phi have the same number of inputs, and phi and ground have
+/// rho.inputs() outputs. With `of_invariants`, phi and ground must also have one input per invariant.
 template <typename Scalar>
 constexpr bool fits_together(const DeepSet<Scalar>& set) {
   if (set.num_kinds < 1 || !is_chain(set.rho)) return false;
@@ -65,36 +65,36 @@ constexpr bool fits_together(const DeepSet<Scalar>& set) {
          (set.ground == nullptr || set.ground->inputs() == kOwnInvariants);
 }
 
-/// One neighbour as the vehicle sees it.
+/// One neighbour as seen by the vehicle.
 template <typename Scalar>
 struct Neighbour {
   const Scalar* input;  ///< [DeepSet::inputs()]
   int kind;             ///< index into DeepSet::phi
 };
 
-/// Why an evaluation has no result.
+/// Result of an evaluation: success or the reason for failure.
 enum class DeepSetStatus : std::uint8_t {
   kOk,
-  kTooManyNeighbours,  ///< more than the workspace holds, or a negative number
+  kTooManyNeighbours,  ///< negative, or more than the workspace can hold
   kUnknownKind,
   kInputNotFinite,
-  kOutputNotFinite  ///< an overflow inside reached the output
+  kOutputNotFinite  ///< an internal overflow reached the output
 };
 
-/// Memory for one evaluation; the caller owns it and need not clear it.
+/// Memory for one evaluation. The caller owns it; it need not be initialised.
 template <typename Scalar>
 struct DeepSetWorkspace {
   Scalar* inputs;      ///< [capacity x DeepSet::phi_inputs()], copies of the clamped inputs of phi
   int* order;          ///< [capacity]
-  int capacity;        ///< most neighbours
+  int capacity;        ///< maximum number of neighbours
   Scalar* hidden_sum;  ///< [DeepSet::hidden()]
   Scalar* scratch;     ///< [scratch_size(set)]
 };
 
-/// Neighbours that go through phi at once, at most.
+/// Largest number of neighbours that are passed through phi together.
 inline constexpr int kMostTogether = 3;
 
-/// Elements that evaluate() needs in DeepSetWorkspace::scratch.
+/// Number of elements that evaluate() needs in DeepSetWorkspace::scratch.
 template <typename Scalar>
 constexpr int scratch_size(const DeepSet<Scalar>& set) {
   int largest = scratch_size(set.rho);
@@ -117,13 +117,13 @@ inline bool comes_before(const Scalar* a, const Scalar* b, int size) {
   return false;
 }
 
-/// Copies the inputs of phi before the clamp: a position that another task updates between sort and sum cannot break
-/// the order.
-/// @returns whether they are finite.
+/// Copies the inputs of phi before they are clamped, so that a position updated by another task between sorting and
+/// summation cannot break the order.
+/// @returns whether all copied inputs are finite.
 template <typename Scalar>
 inline bool take_input(const DeepSet<Scalar>& set, const Scalar* input, Scalar* copy) {
   if (set.of_invariants) {
-    neighbour_invariants(input, copy);  // of an input that is not finite, some are not
+    neighbour_invariants(input, copy);  // a non-finite input gives at least one non-finite invariant
   } else {
     for (int i = 0; i < set.phi_inputs(); ++i) copy[i] = input[i];
   }
@@ -133,7 +133,7 @@ inline bool take_input(const DeepSet<Scalar>& set, const Scalar* input, Scalar* 
   return true;
 }
 
-/// copies = the clamped inputs of phi.
+/// Writes the clamped inputs of phi to `copies`.
 template <typename Scalar>
 inline DeepSetStatus take_inputs(const DeepSet<Scalar>& set, const Neighbour<Scalar>* neighbours,
                                  int num_neighbours, Scalar* copies) {
@@ -150,7 +150,8 @@ inline DeepSetStatus take_inputs(const DeepSet<Scalar>& set, const Neighbour<Sca
   return DeepSetStatus::kOk;
 }
 
-/// Whether there are as many neighbours of each kind as in one of the silent compositions. Their kinds are known.
+/// Returns whether the number of neighbours of each kind equals that of a silent composition.
+/// Precondition: all kinds are valid.
 template <typename Scalar>
 inline bool is_silent(const DeepSet<Scalar>& set, const Neighbour<Scalar>* neighbours, int num_neighbours) {
   for (int s = 0; s < set.num_silent; ++s) {
@@ -166,8 +167,8 @@ inline bool is_silent(const DeepSet<Scalar>& set, const Neighbour<Scalar>* neigh
   return false;
 }
 
-/// hidden_sum = phi_ground(own).
-/// @returns whether its input is finite.
+/// Sets hidden_sum to phi_ground(own).
+/// @returns whether the input of phi_ground is finite.
 template <typename Scalar>
 inline bool add_ground(const DeepSet<Scalar>& set, const Scalar* own,
                        const DeepSetWorkspace<Scalar>& workspace) {
@@ -181,8 +182,8 @@ inline bool add_ground(const DeepSet<Scalar>& set, const Scalar* own,
   return true;
 }
 
-/// order = the neighbours in the canonical order of this file's head. Insertion sort: short, in place, and the number
-/// of neighbours is small.
+/// Writes the neighbours' indices to `order` in the canonical order defined at the top of this file. Uses insertion
+/// sort, which is short, works in place and suits the small number of neighbours.
 template <typename Scalar>
 inline void sort_canonically(const DeepSet<Scalar>& set, const Neighbour<Scalar>* neighbours,
                              int num_neighbours, const Scalar* copies, int* order) {
@@ -203,8 +204,8 @@ inline void sort_canonically(const DeepSet<Scalar>& set, const Neighbour<Scalar>
   }
 }
 
-/// Adds phi of `Together` neighbours to the sum, in their order.
-/// @param order [Together], of neighbours of one kind.
+/// Adds phi of `Together` neighbours of one kind to the sum, in the given order.
+/// @param order [Together], indices of the neighbours.
 template <int Together, typename Scalar>
 inline void add_phi(const DeepSet<Scalar>& set, int kind, const int* order,
                     const DeepSetWorkspace<Scalar>& workspace) {
@@ -246,7 +247,7 @@ inline DeepSetStatus evaluate_checked(const DeepSet<Scalar>& set, const Scalar* 
     while (begin + left < num_neighbours && neighbours[order[left]].kind == kind) ++left;
     if (left == 3 || left > 4) {
       add_phi<3>(set, kind, order, workspace), begin += 3;
-    } else if (left > 1) {  // four are two pairs: cheaper than three and one
+    } else if (left > 1) {  // for four, two pairs are cheaper than three and one
       add_phi<2>(set, kind, order, workspace), begin += 2;
     } else {
       add_phi<1>(set, kind, order, workspace), begin += 1;
@@ -262,9 +263,9 @@ inline DeepSetStatus evaluate_checked(const DeepSet<Scalar>& set, const Scalar* 
 }  // namespace detail
 
 /// Evaluates `set`.
-/// @param own        [set.own_inputs()]; ignored where there is no ground term.
-/// @param neighbours [num_neighbours], in any order: every order gives the same bits.
-/// @param output     [set.outputs()]; zeros unless the status is kOk: no compensation rather than a wrong one.
+/// @param own        [set.own_inputs()]; ignored if there is no ground term.
+/// @param neighbours [num_neighbours], in any order; the result is bitwise the same for every order.
+/// @param output     [set.outputs()]; all zeros unless the status is kOk: no compensation is better than a wrong one.
 template <typename Scalar>
 inline DeepSetStatus evaluate(const DeepSet<Scalar>& set, const Scalar* own,
                               const Neighbour<Scalar>* neighbours, int num_neighbours, Scalar* output,

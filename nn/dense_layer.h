@@ -1,7 +1,8 @@
-/// @file One affine layer and the loop that evaluates it, for one input or for several at once.
+/// @file One affine layer and the loop that evaluates it, for one input or several at once.
 ///
-/// Every output is one sum: the bias, then the products of the inputs in ascending order, in one accumulator, each
-/// product rounded before it is added. No layout of the weights and no grouping of outputs or inputs changes a bit.
+/// Each output is a single sum: the bias, then the products with the inputs in ascending order, in one accumulator;
+/// each product is rounded before it is added. The bits of the result do not depend on the layout of the weights or on
+/// how outputs and inputs are grouped.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +13,13 @@
 
 namespace swarmcert::nn {
 
-/// Where the weight of output i and input j lies.
+/// Memory layout of a weight matrix.
 enum class Layout : std::uint8_t {
-  /// weights[i * inputs + j], as weight files have it.
+  /// weights[i * inputs + j] for output i and input j, as in weight files.
   kRows,
-  /// Outputs in blocks of eight, then, of what is left, one of four, of two and of one; within a block the inputs
-  /// ascending, and for each input the weights of the block's outputs side by side: what a processor reads in a row.
+  /// Outputs in blocks of eight; the remaining outputs in at most one block each of four, two and one. Within a block,
+  /// inputs are in ascending order, and the weights of the block's outputs for one input are adjacent, so that the
+  /// weights are read sequentially.
   kBlocks
 };
 
@@ -31,20 +33,20 @@ struct DenseLayer {
   Layout layout = Layout::kRows;
 };
 
-/// A layer in blocks whose sizes are checked when it is compiled: arrays of another size do not convert.
+/// Makes a layer with Layout::kBlocks. Arrays of the wrong size do not compile.
 template <int Outputs, int Inputs, typename Scalar>
 constexpr DenseLayer<Scalar> layer_in_blocks(const Scalar (&weights)[Outputs * Inputs],
                                              const Scalar (&biases)[Outputs]) {
   return {weights, biases, Outputs, Inputs, Layout::kBlocks};
 }
 
-/// Outputs of the block of Layout::kBlocks that begins at output `first`.
+/// Returns the number of outputs in the Layout::kBlocks block that starts at output `first`.
 constexpr int block_width(int outputs, int first) {
   const int left = outputs - first;
   return left >= 8 ? 8 : left >= 4 ? 4 : left >= 2 ? 2 : 1;
 }
 
-/// Copies W from rows to blocks; both [outputs x inputs], not overlapping.
+/// Copies W from Layout::kRows to Layout::kBlocks. Both arrays are [outputs x inputs] and must not overlap.
 template <typename Scalar>
 inline void to_blocks(const Scalar* rows, int outputs, int inputs, Scalar* blocks) {
   for (int first = 0; first < outputs; first += block_width(outputs, first)) {
@@ -55,22 +57,22 @@ inline void to_blocks(const Scalar* rows, int outputs, int inputs, Scalar* block
   }
 }
 
-/// max(x, 0) after an affine layer, or nothing. A NaN stays a NaN, so that it reaches the caller's check instead of
-/// becoming a zero.
+/// Function applied after an affine layer: none, or max(x, 0). NaN stays NaN, so that it reaches the caller's check
+/// instead of becoming zero.
 enum class Activation : std::uint8_t { kNone, kRelu };
 
 namespace detail {
 
-/// Weights w[i * row + j * column] of the outputs i of one block.
+/// Weights of one block: the weight of output i and input j is first[i * row + j * column].
 template <typename Scalar>
 struct BlockWeights {
   const Scalar* first;
   long row, column;
 };
 
-/// y[i * Inputs + c] = b[i] + sum_j w(i, j) x[j * Inputs + c]: k stands for i * Inputs + c. The sums are named by
-/// constant indices, because compilers do not keep an array in registers that a loop walks through.
-/// @param zero 0.
+/// Computes y[i * Inputs + c] = b[i] + sum_j w(i, j) x[j * Inputs + c] for one block. The pack k enumerates i * Inputs
+/// + c, so that every sum has a constant index: compilers do not keep an array in registers if a loop indexes it.
+/// @param zero must be 0; see apply().
 template <int Inputs, int Outputs, typename Scalar, int... k>
 [[gnu::always_inline]] inline void apply_block(const BlockWeights<Scalar>& weights, const Scalar* biases,
                                                int inputs, const Scalar* x, Scalar* y, Activation activation,
@@ -91,12 +93,12 @@ template <int Inputs, int Outputs, typename Scalar, int... k>
 
 }  // namespace detail
 
-/// y = W x + b, or relu(W x + b), for `Inputs` inputs at once: each weight is loaded once for all of them.
+/// Computes y = W x + b, or relu(W x + b), for `Inputs` inputs at once, loading each weight only once.
 /// @param x [layer.inputs x Inputs]: entry j of input c is x[j * Inputs + c].
-/// @param y [layer.outputs x Inputs] likewise; may not overlap x.
+/// @param y [layer.outputs x Inputs] likewise; must not overlap x.
 template <int Inputs, typename Scalar>
 inline void apply(const DenseLayer<Scalar>& layer, const Scalar* x, Scalar* y, Activation activation) {
-  // A zero that the compiler does not know: one that it knows it loads from flash again for each comparison.
+  // The zero is hidden from the optimiser, which would otherwise reload the constant from flash for each comparison.
   volatile Scalar unknown = Scalar(0);
   const Scalar zero = unknown;
   const long inputs = layer.inputs;
@@ -120,9 +122,9 @@ inline void apply(const DenseLayer<Scalar>& layer, const Scalar* x, Scalar* y, A
   for (; i + 8 <= layer.outputs; i += 8) {
     if constexpr (Inputs <= 2) {
       block(eight, i, 0, 1, 8);
-    } else {  // twelve sums fit into the registers with what they need beside them, twenty-four do not
+    } else {  // twelve sums and their operands fit into the registers, twenty-four sums do not
       block(four, i, 0, 1, 8);
-      block(four, i + 4, 4 - 4 * inputs, 1, 8);  // in the same block, beside the first four
+      block(four, i + 4, 4 - 4 * inputs, 1, 8);  // second half of the same block of eight
     }
   }
   if (layer.outputs - i >= 4) block(four, i, 0, 1, 4), i += 4;

@@ -1,35 +1,36 @@
-/// @file What a vertical force can depend on: relative states without their direction about the vertical.
+/// @file Rotation invariants: relative states without their direction about the vertical.
 ///
-/// A vertical force is the same for neighbours that are turned about the vertical, or mirrored in a vertical plane. A
-/// network that sees invariants in place of the state (p, v) of a neighbour has that symmetry exactly:
+/// A vertical force does not change when the neighbours are rotated about the vertical or mirrored in a vertical plane.
+/// A network that takes invariants instead of a neighbour's state (p, v) has that symmetry exactly:
 ///   J(p, v) = (|p_xy|, 3/2 p_z, |v_xy|, 3/2 v_z, |p_xy + 1/2 s v_xy|),   K(-z, -v) = (-z, |v_xy|, -v_z),
-/// J for neighbours, in m and m/s, K for the vehicle's own state. The five numbers of J determine |p_xy|, |v_xy| and
-/// the product p_xy . v_xy, thus (p, v) up to a turn and a reflection: nothing else is lost.
+/// with J for neighbours, in m and m/s, and K for the vehicle's own state. The five components of J determine |p_xy|,
+/// v_xy| and the product p_xy . v_xy, hence (p, v) up to a rotation and a reflection; no other information is lost.
 ///
-/// Lipschitz constants in Euclidean norms, both attained: 3/2 of J, 1 of K. Proof for J: a norm changes by at most
-/// the norm of the change. With a = |dp_xy| and b = |dv_xy|, the squares of the changes of the three norms sum up to
+/// The Lipschitz constants in Euclidean norms are 3/2 for J and 1 for K; both are attained. Proof for J: a norm changes
+/// by at most the norm of the change. With a = |dp_xy| and b = |dv_xy|, the squared changes of the three norms sum to
 /// at most
 ///   a^2 + b^2 + (a + b / 2)^2 = (a, b) G (a, b)',   G = I + (1, 1/2)' (1, 1/2),
-/// and the eigenvalues of G are 1 and 1 + 1 + 1/4 = (3/2)^2. The vertical components change by 3/2 of their changes.
-/// The factor of the vertical components makes use of what the horizontal ones cost.
+/// and the eigenvalues of G are 1 and 1 + 1 + 1/4 = (3/2)^2. The vertical components are scaled by 3/2, which does not
+/// increase the constant that the horizontal ones already require.
 #pragma once
 
 #include "nn/arithmetic.h"
 
 namespace swarmcert::nn {
 
-/// Numbers per neighbour: p_x, p_y, p_z in m, v_x, v_y, v_z in m/s.
+/// Components of a neighbour's relative state: p_x, p_y, p_z in m, v_x, v_y, v_z in m/s.
 inline constexpr int kRelativeState = 6;
-/// Numbers of the vehicle's own state: -z in m, -v_x, -v_y, -v_z in m/s.
+/// Components of the vehicle's own state: -z in m, -v_x, -v_y, -v_z in m/s.
 inline constexpr int kOwnState = 4;
 inline constexpr int kNeighbourInvariants = 5;
 inline constexpr int kOwnInvariants = 3;
-/// Lipschitz constants of J and K, exact.
+/// Exact Lipschitz constants of J and K.
 inline constexpr double kNeighbourInvariantsSlope = 1.5;
 inline constexpr double kOwnInvariantsSlope = 1;
 
-/// The correctly rounded root (IEEE 754) as one instruction: std::sqrt() may call libm to set errno.
-/// Precondition: x is no negative number.
+/// Returns the correctly rounded square root (IEEE 754) with a single instruction; std::sqrt() may call libm to set
+/// errno.
+/// Precondition: x is not negative.
 inline float square_root(float x) {
 #if defined(__SSE2__)
   asm("sqrtss %1, %0" : "=x"(x) : "x"(x));
@@ -54,14 +55,15 @@ inline double square_root(double x) {
 #endif
 }
 
-/// |(x, y)|. Infinite where a square overflows.
+/// Returns |(x, y)|, or infinity if a square overflows.
 template <typename Scalar>
 inline Scalar horizontal_norm(Scalar x, Scalar y) {
   return square_root(rounded(x * x) + rounded(y * y));
 }
 
-/// J of this file's head.
-/// @param state [kRelativeState]. @param invariants [kNeighbourInvariants].
+/// Computes J as defined at the top of this file.
+/// @param state [kRelativeState].
+/// @param invariants [kNeighbourInvariants].
 template <typename Scalar>
 inline void neighbour_invariants(const Scalar* state, Scalar* invariants) {
   const Scalar half(0.5), vertical(1.5);
@@ -73,8 +75,9 @@ inline void neighbour_invariants(const Scalar* state, Scalar* invariants) {
   invariants[4] = horizontal_norm(p[0] + rounded(half * v[0]), p[1] + rounded(half * v[1]));
 }
 
-/// K of this file's head.
-/// @param state [kOwnState]. @param invariants [kOwnInvariants].
+/// Computes K as defined at the top of this file.
+/// @param state [kOwnState].
+/// @param invariants [kOwnInvariants].
 template <typename Scalar>
 inline void own_invariants(const Scalar* state, Scalar* invariants) {
   invariants[0] = state[0];

@@ -16,8 +16,8 @@ struct Mlp {
   constexpr int outputs() const { return layers[num_layers - 1].outputs; }
 };
 
-/// True if there is a layer and every further one takes what the one before it gives: for a static_assert beside
-/// weights that are known when they are compiled.
+/// Returns true if there is at least one layer and the sizes of consecutive layers match. Intended for a static_assert
+/// on weights that are known at compile time.
 template <typename Scalar>
 constexpr bool is_chain(const Mlp<Scalar>& network) {
   for (int k = 1; k < network.num_layers; ++k) {
@@ -26,8 +26,8 @@ constexpr bool is_chain(const Mlp<Scalar>& network) {
   return network.num_layers >= 1;
 }
 
-/// Elements that evaluate() needs in `scratch`: two buffers as wide as the widest hidden layer, for each of the
-/// `together` inputs that are evaluated at once.
+/// Returns the number of elements that evaluate() needs in `scratch`: two buffers as wide as the widest hidden layer,
+/// for each of the `together` inputs that are evaluated at once.
 template <typename Scalar>
 constexpr int scratch_size(const Mlp<Scalar>& network, int together = 1) {
   int widest = 0;
@@ -37,9 +37,9 @@ constexpr int scratch_size(const Mlp<Scalar>& network, int together = 1) {
   return 2 * widest * together;
 }
 
-/// Evaluates `network` for `Inputs` inputs at once; for each the bits that it has alone.
+/// Evaluates `network` for `Inputs` inputs at once; each output has the same bits as if evaluated alone.
 /// @param input   [network.inputs() x Inputs]: entry j of input c is input[j * Inputs + c].
-/// @param output  [network.outputs() x Inputs] likewise; may not overlap `input` or `scratch`.
+/// @param output  [network.outputs() x Inputs] likewise; must not overlap `input` or `scratch`.
 /// @param scratch [scratch_size(network, Inputs)].
 template <int Inputs, typename Scalar>
 inline void evaluate_together(const Mlp<Scalar>& network, const Scalar* input, Scalar* output,
@@ -59,7 +59,7 @@ inline void evaluate_together(const Mlp<Scalar>& network, const Scalar* input, S
 
 /// Evaluates `network`.
 /// @param input   [network.inputs()].
-/// @param output  [network.outputs()]; may not overlap `input` or `scratch`.
+/// @param output  [network.outputs()]; must not overlap `input` or `scratch`.
 /// @param scratch [scratch_size(network)].
 template <typename Scalar>
 inline void evaluate(const Mlp<Scalar>& network, const Scalar* input, Scalar* output, Scalar* scratch) {

@@ -1,4 +1,4 @@
-/// @file Lines of tables in text files: separators, cells, numbers.
+/// @file Parsing of delimited text tables: separators, cells, numbers.
 #pragma once
 
 #include <string_view>
@@ -6,17 +6,18 @@
 
 namespace swarmcert::files {
 
-/// `text` without the blanks, carriage returns and double quotes at its ends.
+/// Returns `text` without leading and trailing blanks, carriage returns and double quotes.
 std::string_view without_blanks(std::string_view text);
 
-/// The first of comma, semicolon and tab, in this order, that `line` contains; else `otherwise`.
+/// Returns the first of comma, semicolon and tab, in this order of preference, that `line` contains; else `otherwise`.
 char csv_separator(std::string_view line, char otherwise);
 
-/// The cells of `line`, each without blanks and quotes around it. Runs of blanks count as one where ' ' separates.
+/// Returns the cells of `line`, without surrounding blanks and quotes. If `separator` is ' ', a run of blanks is one
+/// separator.
 std::vector<std::string_view> csv_cells(std::string_view line, char separator);
 
-/// True if the whole cell is a number, "nan" and "inf" among them; '+' may stand in front. A number that a double
-/// cannot hold becomes infinite.
+/// Parses a cell. Returns true if the whole cell is a number, including "nan" and "inf"; a leading '+' is allowed.
+/// Numbers beyond the range of double become infinite.
 bool csv_number(std::string_view cell, double& value);
 
 }  // namespace swarmcert::files

@@ -1,4 +1,4 @@
-/// @file Infinity and neighbours of doubles, for bounds that are rounded outwards.
+/// @file Infinity and adjacent doubles, for bounds that are rounded outwards.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,11 @@
 namespace swarmcert {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Unit roundoff of double: x op y is off by at most this, relatively, where nothing underflows.
+/// Unit roundoff of double: the relative error of x op y is at most this unless the result underflows.
 inline constexpr double kUnit = 0x1p-53;
 
-/// The next double above x; +infinity and NaN stay. As nextafter(), which costs a call: doubles of one sign are ordered
-/// as their bits are.
+/// Returns the next double above x; +infinity and NaN are returned unchanged. Same as nextafter() without the cost of a
+/// call: doubles of one sign are ordered like their bit patterns.
 inline double up(double x) {
   if (!(x < kInfinity)) return x;
   if (x == 0) return std::numeric_limits<double>::denorm_min();

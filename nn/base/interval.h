@@ -1,7 +1,8 @@
-/// @file Two numbers with all between them; and operations with outward rounding, which enclose the exact result.
+/// @file Closed intervals with outward-rounded arithmetic, which encloses the exact result.
 ///
-/// Rounding to nearest errs by at most half a unit in the last place, so one step outwards encloses. No
-/// switching of rounding modes, which compilers reorder. Not valid under -ffast-math.
+/// A result that is rounded to nearest is off by at most half a unit in the last place, so moving each bound outwards
+/// to the adjacent double encloses the exact result. Rounding modes are not switched, because compilers reorder
+/// operations across the switch. Not valid under -ffast-math.
 #pragma once
 
 #ifdef __FAST_MATH__
@@ -28,21 +29,21 @@ struct Interval {
   bool is_negative() const { return upper < 0; }
 };
 
-/// The same ends.
+/// Compares the bounds.
 inline bool operator==(Interval a, Interval b) { return a.lower == b.lower && a.upper == b.upper; }
 inline bool operator!=(Interval a, Interval b) { return !(a == b); }
 
 inline Interval operator-(Interval a) { return {-a.upper, -a.lower}; }
 inline Interval operator+(Interval a, Interval b) { return {down(a.lower + b.lower), up(a.upper + b.upper)}; }
 inline Interval operator-(Interval a, Interval b) { return {down(a.lower - b.upper), up(a.upper - b.lower)}; }
-/// All real numbers: what is known of a result where nothing is.
+/// Returns the interval of all real numbers, for results about which nothing is known.
 inline Interval whole_line() { return {-kInfinity, kInfinity}; }
 inline Interval operator*(Interval a, Interval b) {
   const double p[] = {a.lower * b.lower, a.lower * b.upper, a.upper * b.lower, a.upper * b.upper};
   if (std::isnan(p[0] + p[1] + p[2] + p[3])) return whole_line();  // zero times infinity
   return {down(*std::min_element(p, p + 4)), up(*std::max_element(p, p + 4))};
 }
-/// The whole line where b contains zero.
+/// Returns the whole line if b contains zero.
 inline Interval operator/(Interval a, Interval b) {
   if (!b.is_positive() && !b.is_negative()) return whole_line();
   const double q[] = {a.lower / b.lower, a.lower / b.upper, a.upper / b.lower, a.upper / b.upper};
@@ -54,7 +55,7 @@ inline Interval abs(Interval a) { return {a.mig(), a.mag()}; }
 inline Interval sqrt(Interval a) {
   return {a.lower > 0 ? std::max(0.0, down(std::sqrt(a.lower))) : 0, up(std::sqrt(std::max(a.upper, 0.0)))};
 }
-/// x^n for n >= 0, by multiplication: what libm's pow rounds to is nowhere promised.
+/// Returns an enclosure of x^n for n >= 0, by multiplication: the accuracy of libm's pow is not specified.
 inline Interval nth_power(Interval x, int n) {
   Interval result(1);
   for (; n > 0; n /= 2, x = x * x) {

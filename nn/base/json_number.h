@@ -1,4 +1,4 @@
-/// @file Numbers that need not be finite, in JSON.
+/// @file Possibly non-finite numbers in JSON.
 #pragma once
 
 #include <cmath>
@@ -7,7 +7,7 @@
 
 namespace swarmcert::files {
 
-/// x, or null where it is infinite or NaN: JSON has neither.
+/// Returns x, or null if it is infinite or NaN, which JSON cannot represent.
 inline Json finite(double x) { return std::isfinite(x) ? Json(x) : Json(); }
 
 }  // namespace swarmcert::files

@@ -5,14 +5,14 @@
 
 namespace swarmcert::files {
 
-/// `jobs`, or as many threads as the machine has where it is 0 or less.
+/// Returns `jobs` if positive, else the number of hardware threads.
 int thread_count(int jobs);
 
-/// Calls work(0) .. work(count - 1), each once, on up to `jobs` threads; returns when all have ended. Results must
-/// not depend on which thread runs a piece or when.
+/// Calls work(0) .. work(count - 1) once each, on up to `jobs` threads, and returns when all have finished. Results
+/// must not depend on which thread runs an item or when.
 /// @param jobs see thread_count().
-/// @throws what a piece threw, of the lowest such index, after all running pieces ended; pieces not yet begun are
-///   then left out.
+/// @throws the exception of the failed item with the lowest index, after all running items have finished; items that
+///   have not been started by then are skipped.
 void parallel_for(int count, int jobs, const std::function<void(int)>& work);
 
 }  // namespace swarmcert::files

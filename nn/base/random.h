@@ -24,17 +24,18 @@ class Random {
   /// Uniform in [-1, 1).
   double symmetric() { return static_cast<double>(bits() >> 11) * 0x1p-52 - 1; }
 
-  /// One of 0 .. n - 1, n > 0; the bias of the remainder is below n / 2^64.
+  /// Returns one of 0 .. n - 1 for n > 0; the modulo bias is below n / 2^64.
   std::uint64_t below(std::uint64_t n) { return bits() % n; }
 
-  /// Sum of twelve uniform numbers, minus 6: variance 1, near enough to a normal distribution, and no libm in it.
+  /// Returns the sum of twelve uniform numbers minus 6: close to a standard normal distribution, without libm.
   double bell() {
     double sum = -6;
     for (int i = 0; i < 12; ++i) sum += uniform();
     return sum;
   }
 
-  /// low * (high / low)^u for a uniform u, 0 < low <= high; the power by the binary digits of u and square roots.
+  /// Returns low * (high / low)^u for a uniform u, 0 < low <= high. The power is computed from the binary digits of u
+  /// by square roots.
   double log_uniform(double low, double high) {
     double value = low;
     double ratio = high / low;

@@ -1,4 +1,4 @@
-/// @file Long work: cut into parts for several machines, and taken up again where it stopped.
+/// @file Long computations: split into shards for several machines, and resumable after an interruption.
 #pragma once
 
 #include <cstdlib>
@@ -10,7 +10,8 @@
 
 namespace swarmcert::files {
 
-/// Part `index` of `count`: the units whose number leaves this remainder, so that all parts cover each unit once.
+/// Shard `index` of `count`: the units whose number modulo `count` is `index`. All shards together cover each unit
+/// once.
 struct Shard {
   int index = 0, count = 1;
 
@@ -18,8 +19,8 @@ struct Shard {
   bool has(long unit) const { return unit % count == index; }
 };
 
-/// "I/N" with 0 <= I <= N <= 1'000'000; nothing for other texts. Part N of N is part 0, so that 0/4 .. 3/4 and
-/// 1/4 .. 4/4 both cover all.
+/// Parses "I/N" with 0 <= I <= N and 1 <= N <= 1'000'000; returns nothing for any other text. Shard N of N is shard 0,
+/// so that both 0/4 .. 3/4 and 1/4 .. 4/4 cover everything.
 inline std::optional<Shard> shard_of(const std::string& text) {
   constexpr long kMostParts = 1'000'000;
   const std::size_t slash = text.find('/');
@@ -32,10 +33,11 @@ inline std::optional<Shard> shard_of(const std::string& text) {
   return Shard{static_cast<int>(index % count), static_cast<int>(count)};
 }
 
-/// The result of one unit of work: what `file` holds, or else what `compute` returns, which is then written there.
-/// @param key text that changes with everything that the result depends on: a file with another one is replaced.
+/// Returns the result of one unit of work: read from `file` if it is stored there, else computed by `compute` and then
+/// written to `file`.
+/// @param key text that changes with everything that the result depends on; a file with a different key is replaced.
 /// @returns the members of the object that `compute` returned, after "schema" and "key".
-/// @throws InputError if there is a file that is not JSON of this schema.
+/// @throws InputError if the file exists but is not JSON of this schema.
 Json kept_unit(const std::string& file, const std::string& schema, const std::string& key,
                const std::function<Json()>& compute);
 
