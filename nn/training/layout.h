@@ -1,7 +1,7 @@
-/// @file Where each weight of a deep set lies in one flat vector of parameters.
+/// @file Maps the weights of a deep set to positions in one flat parameter vector.
 ///
-/// Training works on that vector: gradients, moments of the optimiser and checkpoints are vectors of the same length,
-/// and only the networks' arithmetic needs to know what stands where.
+/// Training works on that vector: gradients, optimiser moments and checkpoints are vectors of the same length, and only
+/// the evaluation of the networks needs to know the position of each weight.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,12 +17,12 @@ namespace swarmcert::training {
 using Matrix = Eigen::MatrixXf;  ///< one column per sample
 using Vector = Eigen::VectorXf;
 
-/// One multilayer perceptron of the set: "phi:small" or "rho:small".
+/// One multilayer perceptron of the deep set: "phi:small" or "rho:small".
 struct Part {
   files::FunctionId id;    ///< a phi or a rho
   std::vector<int> sizes;  ///< inputs, hidden layers, outputs
   Eigen::Index begin = 0;  ///< first parameter: per layer W (column-major, [outputs x inputs]), then b
-  /// Which inputs are x and y of one vector in the world frame: see turn_about_vertical().
+  /// Pairs of inputs that are the x and y components of one vector in the world frame: see turn_about_vertical().
   std::vector<std::array<int, 2>> horizontal = {};
 
   int layers() const { return static_cast<int>(sizes.size()) - 1; }
@@ -30,7 +30,7 @@ struct Part {
   int outputs() const { return sizes.back(); }
 };
 
-/// Parts and their places. Value type; the views refer to the vector that is passed in.
+/// The parts and their positions. Value type; the returned maps refer to the vector that is passed in.
 class Layout {
  public:
   Layout() = default;
@@ -39,7 +39,7 @@ class Layout {
 
   Eigen::Index size() const { return size_; }
   const std::vector<Part>& parts() const { return parts_; }
-  /// Index of a part; -1 if there is none such.
+  /// Returns the index of a part; -1 if there is no such part.
   int find(const files::FunctionId& id) const;
 
   Eigen::Map<Matrix> weights(Vector& theta, int part, int layer) const;
@@ -47,10 +47,10 @@ class Layout {
   Eigen::Map<Vector> biases(Vector& theta, int part, int layer) const;
   Eigen::Map<const Vector> biases(const Vector& theta, int part, int layer) const;
 
-  /// The part as it is stored: float32, layers named "fc1", "fc2", ...
+  /// Returns the part in the form in which it is stored: float32, layers named "fc1", "fc2", ...
   files::Weights stored(const Vector& theta, int part) const;
 
-  /// The reverse of stored(): the part's place in `theta` takes the values of `weights`.
+  /// Inverse of stored(): copies `weights` to the part's position in `theta`.
   /// @throws std::invalid_argument if the sizes differ.
   void load(Vector& theta, int part, const files::Weights& weights) const;
 
@@ -61,7 +61,8 @@ class Layout {
   Eigen::Index size_ = 0;
 };
 
-/// Weights and biases uniform in +-1 / sqrt(inputs of the layer), the usual start for ReLU networks.
+/// Returns weights and biases drawn uniformly from +-1 / sqrt(inputs of the layer), the usual initialisation of ReLU
+/// networks.
 Vector initial_parameters(const Layout& layout, std::uint64_t seed);
 
 }  // namespace swarmcert::training

@@ -1,4 +1,4 @@
-/// @file Augmentation: forces are equivariant under rotation about the vertical, so rotated samples are samples.
+/// @file Data augmentation: forces are equivariant under rotation about the vertical, so rotated samples are valid.
 #pragma once
 
 #include "nn/base/random.h"
@@ -6,15 +6,15 @@
 
 namespace swarmcert::training {
 
-/// Replaces the inputs of `turned` by those of `source`, each sample turned about the vertical by an angle of its own,
-/// uniform in [0, 2 pi), and mirrored in a vertical plane in half of the cases: the same for all inputs of a sample,
-/// since what they are to one another stays. A network which is fitted to turned samples spends nothing on directions
-/// in which the recorded ones happened to lie. The targets follow: a vertical force stays, a force turns and is
-/// mirrored as the inputs are, a torque turns and, being an axial vector, changes the other two signs where it is
-/// mirrored.
+/// Replaces the inputs of `turned` by those of `source`, with each sample rotated about the vertical by its own angle,
+/// uniform in [0, 2 pi), and mirrored in a vertical plane with probability 1/2. All inputs of a sample undergo the same
+/// transformation, which preserves their relative geometry. A network fitted to rotated samples does not adapt to the
+/// directions that happened to be recorded. The targets are transformed accordingly: a vertical force is unchanged, a
+/// force vector is rotated and mirrored like the inputs, and a torque is rotated and, being an axial vector, changes
+/// the signs of the other two components when it is mirrored.
 ///
-/// @param layout names the horizontal vectors of each part's inputs; parts that name none are left as they are.
-/// @param turned a copy of `source` but for its x and, with three outputs, its targets.
+/// @param layout names the horizontal vectors among each part's inputs; parts without any are unchanged.
+/// @param turned a copy of `source` except for its x and, with three outputs, its targets.
 void turn_about_vertical(const Layout& layout, const Dataset& source, files::Random& random, Dataset& turned);
 
 }  // namespace swarmcert::training

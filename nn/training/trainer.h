@@ -1,4 +1,4 @@
-/// @file Epochs of stochastic gradient descent over a dataset.
+/// @file Stochastic gradient descent over a dataset, epoch by epoch.
 #pragma once
 
 #include <optional>
@@ -16,40 +16,40 @@ struct TrainerOptions {
   Layers layers = Layers::kFree;
   double learning_rate = 1e-3;
   int batch = 1024;    ///< samples per step
-  bool turns = false;  ///< every epoch sees every sample turned about the vertical: see turn_about_vertical()
+  bool turns = false;  ///< rotate every sample about the vertical in every epoch: see turn_about_vertical()
   std::uint64_t seed = 1;
-  int jobs = 0;  ///< threads; 0: all. The bits of the result do not depend on it.
+  int jobs = 0;  ///< number of threads; 0: all. The bits of the result do not depend on it.
 };
 
-/// Minimises deep_set_loss() / (sum of weights) with Adam, over the parameters of bounded layers, or over the weights
-/// with spectral normalisation after every step.
+/// Minimises deep_set_loss() / (sum of weights) with Adam, either over the parameters of bounded layers or over the
+/// weights with spectral normalization after every step.
 ///
-/// A batch is cut into pieces of kPiece samples, whose gradients are summed in their order: the same bits for any
-/// number of threads and on every processor of one instruction set. Everything that a step depends on is in the
-/// parameters, adam, the norms' vectors, the epoch's number, and what weigh() and tighten() were told, so that a run
-/// can be taken up again at the end of any epoch.
+/// A batch is split into pieces of kPiece samples whose gradients are summed in order, so that the bits are the same
+/// for any number of threads and on every processor of one instruction set. A step depends only on the parameters, the
+/// state of Adam, the singular vectors of the norm estimates, the epoch number, and the arguments of weigh() and
+/// tighten(); training can therefore be resumed at the end of any epoch.
 class Trainer {
  public:
   /// @param layout, data must outlive the trainer.
-  /// @param parameters where the optimiser begins: the weights, but for bounded layers.
+  /// @param parameters initial values: the weights, or the parameters of bounded layers.
   Trainer(const Layout& layout, const Dataset& data, std::vector<Eigen::Index> samples, Vector parameters,
           const TrainerOptions& options);
 
-  /// One pass over the samples in an order drawn from seed and `epoch`.
-  /// @returns the mean weighted squared error met on the way, before each step's update.
+  /// Performs one pass over the samples in an order drawn from seed and `epoch`.
+  /// @returns the mean weighted squared error over the pass, each batch evaluated before its update.
   double run_epoch(int epoch, double learning_rate);
 
-  /// From now on sample s of the dataset counts weights[s].
+  /// Sets the weight of sample s of the dataset to weights[s].
   void weigh(std::vector<float> weights) { data_.weight = std::move(weights); }
-  /// From now on the limit of every layer of part p is shares[p] of gamma's.
+  /// Sets the limit of every layer of part p to shares[p] times the limit that gamma implies.
   void tighten(std::vector<double> shares);
 
-  /// Weights and biases.
+  /// Returns the weights and biases.
   const Vector& theta() const { return theta_; }
 
-  /// What a checkpoint must hold, as one vector: parameters, both moments, the number of steps.
+  /// Returns the state for a checkpoint as one vector: parameters, both moments, the number of steps.
   Vector state() const;
-  /// @throws std::invalid_argument if `state` is not of this layout.
+  /// @throws std::invalid_argument if `state` does not match this layout.
   void restore(const Vector& state);
 
  private:
@@ -58,18 +58,19 @@ class Trainer {
 
   const Layout& layout_;
   const Dataset& source_;
-  Dataset data_;  ///< as this epoch sees it
+  Dataset data_;  ///< as transformed for this epoch
   std::vector<Eigen::Index> samples_;
   TrainerOptions options_;
   Vector parameters_, theta_;
   Adam adam_;
   std::vector<double> shares_;
-  SpectralNormalization normalization_;  ///< of free layers
+  SpectralNormalization normalization_;  ///< used with free layers
   BoundedLayers bounded_;
   std::vector<Vector> gradients_;  ///< per piece of a batch
 };
 
-/// Mean weighted squared error of some samples, without a gradient; the same bits for any number of threads.
+/// Returns the mean weighted squared error of some samples, without a gradient; the same bits for any number of
+/// threads.
 double mean_loss(const Layout& layout, const Vector& theta, const Dataset& data,
                  const std::vector<Eigen::Index>& samples, int jobs);
 

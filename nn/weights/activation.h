@@ -1,4 +1,4 @@
-/// @file The activations of weight files that state none: ReLU, other piecewise linear ones, smooth ones.
+/// @file Activations for weight files that do not state any: ReLU, other piecewise linear functions, smooth functions.
 #pragma once
 
 #include <string>
@@ -7,26 +7,26 @@
 
 namespace swarmcert::files {
 
-/// What with_activation() knows, for help and messages.
+/// Returns the list of activations that with_activation() supports, for help and messages.
 std::string activations();
 
-/// Whether `name` is one of activations().
+/// Returns whether `name` is one of activations().
 bool is_activation(const std::string& name);
 
-/// "tanh,relu" as its names.
+/// Splits a comma-separated list such as "tanh,relu" into names.
 std::vector<std::string> listed_activations(const std::string& text);
 
-/// Why `text` cannot be what with_activation() takes for these layers; empty: it can.
+/// Returns why with_activation() cannot apply `text` to these layers; empty if it can.
 std::string activation_misfit(const Weights& weights, const std::string& text);
 
-/// The network whose layers are those of `weights` with `text` between them: one name for all, or, separated by commas,
-/// one for each layer but the last, and possibly one more, which follows the last layer. Nothing is between the layers
-/// of a network of one, and one name means nothing there. Smooth activations (activation_function.h) stay what they
-/// are; piecewise linear ones are written with ReLU, the same function:
-/// leaky_relu(x) = relu(x) - a relu(-x), relu6(x) = relu(x) - relu(x - 6), hardtanh(x) = -1 + relu(x + 1) - relu(x -
-/// 1).
-/// @throws InputError if the file itself or network.toml states others, there are more or fewer than layers take, a
-///   layer has no whole number of groups, or the network becomes too large.
+/// Returns the network with the layers of `weights` and the activations `text`: one name for all layers but the last,
+/// or a comma-separated list with one name for each layer but the last and optionally one more, which follows the last
+/// layer. For a network of one layer, a single name has no effect. Smooth activations (activation_function.h) are kept;
+/// piecewise linear ones are rewritten with ReLU as the same function:
+/// leaky_relu(x) = relu(x) - a relu(-x), relu6(x) = relu(x) - relu(x - 6),
+/// hardtanh(x) = -1 + relu(x + 1) - relu(x - 1).
+/// @throws InputError if the file itself or network.toml states other activations, the number of names does not match
+///   the layers, the width of a layer is not a multiple of the group size, or the network becomes too large.
 /// @throws std::invalid_argument if a name is unknown.
 Weights with_activation(Weights weights, const std::string& text);
 

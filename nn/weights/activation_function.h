@@ -1,4 +1,4 @@
-/// @file The activation functions that a network can have between its layers, with their slopes.
+/// @file The activation functions supported between the layers of a network, with bounds on their slopes.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace swarmcert::files {
 
-/// Between all layers of one stored network.
+/// Activation function after a layer of a stored network.
 enum class Activation : int {
   kRelu,
   kTanh,
@@ -21,37 +21,38 @@ enum class Activation : int {
   kGelu,
   kMaxMinHalves,  ///< of t_1 .. t_2h: max(t_i, t_(i+h)) for each i, then min(t_i, t_(i+h))
   kMaxMinPairs,   ///< of t_1 .. t_2h: max(t_(2i-1), t_2i) for each i, then min(t_(2i-1), t_2i)
-  kGroupSort,     ///< with the size of a group added: group_sort()
+  kGroupSort,     ///< lowest value; add the group size: see group_sort()
 };
 
-/// A group of GroupSort holds 2 to this many numbers.
+/// Maximum group size of GroupSort; the minimum is 2.
 inline constexpr int kLargestGroup = 64;
 
-/// Sorts each `size` numbers side by side, the smallest first. @throws std::invalid_argument for another size.
+/// Returns the activation that sorts each group of `size` adjacent numbers in ascending order.
+/// @throws std::invalid_argument if `size` is out of range.
 Activation group_sort(int size);
 
-/// What bounds and chains need to know of an activation s: for all t and u,
-/// least_slope (t - u) <= s(t) - s(u) <= greatest_slope (t - u) where t >= u, in exact arithmetic.
-/// One that sorts acts on a whole layer, has no slopes of single numbers, and is 1-Lipschitz in the Euclidean norm.
+/// The properties of an activation s that bounds and chains need. For all t >= u, in exact arithmetic, least_slope (t -
+/// u) <= s(t) - s(u) <= greatest_slope (t - u). A sorting activation acts on a whole layer, has no scalar slopes, and
+/// is 1-Lipschitz in the Euclidean norm.
 struct ActivationFunction {
   Activation activation;
-  std::string op;     ///< in chains and as options take it: "tanh", "groupsort:2"
-  std::string words;  ///< in texts: "ReLU", "tanh"
+  std::string op;     ///< name in chains and options: "tanh", "groupsort:2"
+  std::string words;  ///< name in prose: "ReLU", "tanh"
   double least_slope, greatest_slope;
-  double (*value)(double t);  ///< s(t), rounded by a few units in the last place; null where it sorts
-  int group = 1;              ///< the layer's width is a multiple of it
+  double (*value)(double t);  ///< s(t), accurate to a few units in the last place; null if it sorts
+  int group = 1;              ///< the layer's width must be a multiple of it
 
   bool sorts() const { return value == nullptr; }
-  /// Whether s never decreases. Then s / greatest_slope has slopes in [0, 1], as ReLU has.
+  /// Returns whether s never decreases. If so, the slopes of s / greatest_slope are in [0, 1], as for ReLU.
   bool is_monotone() const { return least_slope >= 0; }
-  /// |s(t) - s(u)| <= steepest() |t - u|, for whole layers t and u.
+  /// Returns the Lipschitz constant in |s(t) - s(u)| <= steepest() |t - u|, for whole layers t and u.
   double steepest() const;
 };
 
 const ActivationFunction& function_of(Activation activation);
 
-/// A layer as an activation that sorts leaves it, for numbers of any kind that < compares.
-/// @throws std::invalid_argument if its width is no multiple of the group.
+/// Applies a sorting activation to a layer of numbers of any type that has operator<.
+/// @throws std::invalid_argument if the width is not a multiple of the group size.
 template <class Number>
 std::vector<Number> rearranged(Activation activation, std::vector<Number> layer) {
   const auto group = static_cast<std::size_t>(function_of(activation).group);
@@ -72,13 +73,13 @@ std::vector<Number> rearranged(Activation activation, std::vector<Number> layer)
   return result;
 }
 
-/// s of a whole layer. @throws std::invalid_argument if its width is no multiple of the group.
+/// Applies s to a whole layer. @throws std::invalid_argument if its width is not a multiple of the group size.
 std::vector<double> activated(Activation activation, std::vector<double> layer);
 
-/// The activation with this name; empty if the name is unknown.
+/// Returns the activation with this name, or nothing if the name is unknown.
 std::optional<Activation> activation_called(const std::string& op);
 
-/// "tanh, sigmoid, ..., groupsort:SIZE": all but ReLU.
+/// Returns the names of all activations but ReLU: "tanh, sigmoid, ..., groupsort:SIZE".
 std::string smooth_activations();
 
 }  // namespace swarmcert::files

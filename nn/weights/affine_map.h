@@ -1,4 +1,4 @@
-/// @file Affine maps with exact entries, sparse, as the folding of layers needs them.
+/// @file Sparse affine maps with exact entries, used to fold layers.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace swarmcert::files {
 
-/// Thrown where a map would have more entries, or need more work, than a reader allows; the reader names the node.
+/// Thrown if a map would have more entries, or need more work, than a reader allows; the reader names the node.
 struct FoldingLimit {
   const char* what;
 };
@@ -19,7 +19,7 @@ struct AffineEntry {
   Enclosed factor;
 };
 
-/// x -> M x + c. Rows hold their entries in ascending order of columns; entries that are exactly 0 are left out.
+/// x -> M x + c. Each row holds its entries in ascending order of columns; entries that are exactly 0 are omitted.
 struct AffineMap {
   using Row = std::vector<AffineEntry>;
 
@@ -30,30 +30,30 @@ struct AffineMap {
   int outputs() const { return static_cast<int>(rows.size()); }
   std::uint64_t entries() const;
   bool is_identity() const;
-  /// Whether every entry and shift is finite.
+  /// Returns whether every entry and shift is finite.
   bool is_finite() const;
 };
 
-/// x -> x.
+/// Returns x -> x.
 AffineMap identity_map(int size);
 
-/// x -> second(first(x)), for second.inputs == first.outputs().
+/// Returns x -> second(first(x)), for second.inputs == first.outputs().
 /// @throws FoldingLimit.
 AffineMap composed(const AffineMap& second, const AffineMap& first);
 
-/// x -> a(x) + sign b(x), row by row; of the same sizes. `sign` is 1 or -1.
+/// Returns x -> a(x) + sign b(x) for maps of the same size; `sign` is 1 or -1.
 AffineMap sum_of(const AffineMap& a, const AffineMap& b, double sign);
 
-/// Row i multiplied by factors[i]; one factor serves all rows.
+/// Multiplies row i by factors[i]; a single factor applies to all rows.
 void scale_rows(AffineMap& map, const std::vector<Enclosed>& factors);
 
-/// Row i shifted by sign * amounts[i]; one amount serves all rows.
+/// Shifts row i by sign * amounts[i]; a single amount applies to all rows.
 void shift_rows(AffineMap& map, const std::vector<Enclosed>& amounts, double sign);
 
-/// The rows of all maps, one below the other; of the same number of inputs.
+/// Stacks the rows of maps that have the same number of inputs.
 AffineMap stacked(const std::vector<const AffineMap*>& maps);
 
-/// Rows `which` of `map`, in this order.
+/// Returns the rows `which` of `map`, in the given order.
 AffineMap selected(const AffineMap& map, const std::vector<int>& which);
 
 }  // namespace swarmcert::files

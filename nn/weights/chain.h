@@ -1,4 +1,4 @@
-/// @file The chain of operations that a stored network is taken to be, as results and certificates state it.
+/// @file The sequence of operations as which a stored network is interpreted, in the form used by certificates.
 #pragma once
 
 #include <string>
@@ -11,24 +11,25 @@ namespace swarmcert::files {
 
 struct ChainStep {
   std::string op;     ///< "clamp", "linear" (y = W x + b), or what ActivationFunction::op says
-  std::string layer;  ///< of "linear": its name in the file, which may be empty
+  std::string layer;  ///< for "linear": its name in the file, possibly empty
   int inputs = 0, outputs = 0;
-  std::string words = {};  ///< of an activation, in texts
+  std::string words = {};  ///< for an activation: its name in prose
 };
 
-/// The operations of `part` of NET, first applied first: the clamp where one acts on it, then its layers with an
+/// Returns the operations of `part` of NET in order of evaluation: the clamp if one applies, then its layers with an
 /// activation after each but the last.
 /// @throws std::out_of_range if NET has no such part.
 std::vector<ChainStep> chain(const Network& network, const FunctionId& part);
 
-/// `[{op, layer, inputs, outputs}]`; `layer` is null where the step is none.
+/// Returns `[{op, layer, inputs, outputs}]`; `layer` is null for steps other than "linear".
 Json chain_json(const std::vector<ChainStep>& chain);
 
-/// "fc1 - ReLU - fc2"; "clamp - fc1 - ReLU - fc2".
+/// Returns for example "fc1 - ReLU - fc2" or "clamp - fc1 - ReLU - fc2".
 std::string chain_words(const std::vector<ChainStep>& chain);
 
-/// Of all parts: "fc1 - ReLU - fc2" for a plain network; else one entry per chain with the parts that have it,
-/// "phi:large, phi:small: clamp - fc1 - ReLU - fc2; rho:small: ...", and whether phi sees invariants.
+/// Describes all parts: "fc1 - ReLU - fc2" for a plain network; else each distinct chain with the parts that have it,
+/// "phi:large, phi:small: clamp - fc1 - ReLU - fc2; rho:small: ...", whether phi takes invariants, and silent
+/// compositions.
 std::string chain_words(const Network& network);
 
 }  // namespace swarmcert::files

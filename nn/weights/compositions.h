@@ -1,4 +1,4 @@
-/// @file Which kinds of vehicles are together: "large+small>small" is a small one among a large and a small one.
+/// @file The kinds of a vehicle and its neighbours: "large+small>small" is a small one among a large and a small one.
 #pragma once
 
 #include <set>
@@ -10,34 +10,34 @@
 
 namespace swarmcert::files {
 
-/// The kinds of the neighbours in order of names, then the vehicle's own; ">small" is alone.
+/// Returns the name: the neighbours' kinds in alphabetical order, then the vehicle's own; ">small" has no neighbours.
 std::string composition_name(std::vector<std::string> neighbours, const std::string& own);
 
-/// The kinds of neighbours that NET knows, in the order of their indices in a DeepSet: without the ground.
+/// Returns the neighbour kinds of NET in the order of their indices in a DeepSet, without the ground.
 std::vector<std::string> neighbour_kinds(const Network& network);
 
-/// The names of all compositions in which NET is silent.
+/// Returns the names of all compositions for which NET is silent.
 std::vector<std::string> silent_compositions(const Network& network);
 
-/// Neighbours of each kind in every composition of rho `own` in which NET is silent:
-/// [compositions x neighbour_kinds()], as DeepSet::silent takes them.
+/// Returns the number of neighbours of each kind in every composition of rho `own` for which NET is silent, as a matrix
+/// [compositions x neighbour_kinds()] for DeepSet::silent.
 std::vector<int> silent_counts(const Network& network, const std::string& own);
 
-/// Whether `function` is a set function that is 0 in some compositions. Then it is no composition of rho and a sum as a
-/// whole: slopes are bounded while the neighbours stay the same, and it steps where one that comes or goes makes or
-/// ends such a composition.
+/// Returns whether `function` is a set function that is 0 for some compositions. Such a function does not equal rho of
+/// a sum everywhere: bounds on its slope hold while the neighbours stay the same, and it jumps when an arriving or
+/// leaving neighbour makes the composition silent or stops it from being so.
 bool is_ever_silent(const Network& network, const FunctionId& function);
 
-/// Whether NET is silent for exactly these neighbours ("phi:<kind>" each, an entry for the ground is ignored), so that
-/// the set function `function` is 0.
+/// Returns whether NET is silent for exactly these neighbours ("phi:<kind>" each; an entry for the ground is ignored),
+/// so that the set function `function` is 0.
 bool is_silent_among(const Network& network, const FunctionId& function,
                      const std::vector<FunctionId>& parts);
 
-/// How many of the compositions of 0, 1, ... `most` neighbours of the set function's own kind are silent.
+/// Returns the number of silent compositions that consist of at most `most` neighbours, all of the set function's kind.
 long silent_up_to(const Network& network, const FunctionId& function, long most);
 
-/// The compositions with a network from which one neighbour of the set function's own kind comes or goes to a silent
-/// one: the neighbours of each, "phi:<kind>", in order of names. The function steps there by all of its value.
+/// Returns the compositions that are not silent but become silent when one neighbour of the set function's kind arrives
+/// or leaves: the sorted neighbours of each, as "phi:<kind>". There the function jumps by its full value.
 std::set<std::vector<FunctionId>> beside_silent(const Network& network, const FunctionId& function);
 
 }  // namespace swarmcert::files

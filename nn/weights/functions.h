@@ -1,4 +1,4 @@
-/// @file The functions that NET contains, and the stored networks that they are made of.
+/// @file The functions that NET contains, and the stored networks that they consist of.
 #pragma once
 
 #include <map>
@@ -14,30 +14,31 @@ namespace swarmcert::files {
 using Parts = std::map<FunctionId, const Weights*>;
 Parts parts(const Network& network);
 
-/// Every function of NET: its parts, then every set function, in order of names.
+/// Returns every function of NET: its parts, then every set function, in alphabetical order.
 std::vector<FunctionId> functions(const Network& network);
 
-/// The numbers that `function` takes: of a set function of a network with invariants those of the state, of its phi
-/// the invariants.
+/// Returns the number of inputs of `function`. In a network with invariants, a set function takes the state and its phi
+/// takes the invariants.
 int inputs(const Network& network, const FunctionId& function);
 
-/// True if NET's input clamp acts on the input of `part`: on every phi but the ground's, and on a plain network.
+/// Returns true if NET's input clamp applies to `part`: to every phi except the ground's, and to a plain network.
 bool is_clamped(const FunctionId& part);
 
-/// Input coordinates of `function` that belong to `block`, ascending: "all"; "x<k>", the k-th alone, counted from 0;
-/// "position" and "velocity", the inputs whose names end in "_m" and "_m_s". Where NET does not name its inputs, six
-/// are taken as three of each; the ground's four are one position (-z) and three velocities. A set function of a
-/// network with invariants has "all" only: what is proved of J holds for all inputs together.
+/// Returns the input coordinates of `function` that belong to `block`, in ascending order: "all"; "x<k>", the k-th
+/// coordinate, counted from 0; "position" and "velocity", the inputs whose names end in "_m" and "_m_s". If NET does
+/// not name its inputs, six inputs are taken as three of each; the ground's four are one position (-z) and three
+/// velocities. A set function of a network with invariants has only "all", since bounds on J hold for all inputs
+/// together.
 /// @throws std::invalid_argument if the function has no such block.
 std::vector<int> block_coordinates(const Network& network, const FunctionId& function,
                                    const std::string& block);
 
-/// Every block of `function` besides "all": "position" and "velocity" where it has both, then each coordinate; none
-/// for a rho, whose inputs have no names, and for a function of one input.
+/// Returns every block of `function` except "all": "position" and "velocity" if it has both, then each coordinate.
+/// Empty for a rho, whose inputs have no names, for a function of one input, and for a set function with invariants.
 std::vector<std::string> blocks(const Network& network, const FunctionId& function);
 
-/// Unit of a Lipschitz constant of `function` with respect to `block`, as far as NET states units: "gf/(m, m/s)",
-/// "gf/m" where all inputs are metres, "hidden/input" where nothing is stated.
+/// Returns the unit of a Lipschitz constant of `function` with respect to `block`, as far as NET states units: "gf/(m,
+/// m/s)", "gf/m" if all inputs are in metres, "hidden/input" if nothing is stated.
 std::string unit(const Network& network, const FunctionId& function, const std::string& block = "all");
 
 }  // namespace swarmcert::files

@@ -1,4 +1,4 @@
-/// @file zlib streams in files of unknown origin, decompressed up to a limit.
+/// @file Decompression of zlib streams from untrusted files, up to a size limit.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace swarmcert::files {
 
-/// What the zlib stream `data` decompresses to; nothing if it is damaged or ends early. A result longer than
-/// `limit_bytes` is cut at most 64 KiB beyond it: the caller compares.
+/// Returns the decompressed zlib stream `data`, or nothing if it is damaged or ends early. Decompression stops at most
+/// 64 KiB beyond `limit_bytes`; the caller must compare the size with the limit.
 std::optional<std::string> inflated(std::string_view data, std::uint64_t limit_bytes);
 
 }  // namespace swarmcert::files

@@ -1,4 +1,4 @@
-/// @file From arrays with the names that people give them in .npz and .mat files to the layers of a network.
+/// @file Converts arrays named by common conventions in .npz and .mat files to the layers of a network.
 #pragma once
 
 #include <cstdint>
@@ -16,18 +16,19 @@ struct NamedArray {
   bool is_float32 = false;      ///< stored as float32 or float16
 };
 
-/// Layers out of pairs of names: "fc1.weight" and "fc1.bias", "fc1_weight" and "fc1_bias", "W1" and "b1", "weights_1"
-/// and "biases_1"; or out of NumPy's "arr_0", "arr_1", ..., where each matrix may be followed by its biases. Matrices
-/// are [outputs, inputs]; biases may be rows or columns. Layers follow one another by the numbers in their names.
-/// @throws InputError if an array is neither, or as assemble().
+/// Builds layers from pairs of names, "fc1.weight" and "fc1.bias", "fc1_weight" and "fc1_bias", "W1" and "b1",
+/// "weights_1" and "biases_1", or from NumPy's "arr_0", "arr_1", ..., where each matrix may be followed by its biases.
+/// Matrices are [outputs, inputs]; biases may be rows or columns. The numbers in the names determine the order of
+/// layers.
+/// @throws InputError if an array is neither a weight nor a bias, or as assemble().
 Weights network_of_arrays(const std::vector<NamedArray>& arrays, const std::string& path,
                           const std::vector<std::string>& order);
 
-/// Whether every entry of this zip archive is a .npy array.
+/// Returns whether every entry of this zip archive is a .npy array.
 bool looks_like_npz(const std::string& bytes);
 
-/// The network in an .npz archive that numpy.savez wrote.
-/// @throws InputError as network_of_arrays(), or where the archive or an array of it cannot be read.
+/// Parses the network in an .npz archive written by numpy.savez.
+/// @throws InputError as network_of_arrays(), or if the archive or one of its arrays cannot be read.
 Weights parse_npz(const std::string& bytes, const std::string& path, const std::vector<std::string>& order);
 
 }  // namespace swarmcert::files

@@ -7,12 +7,12 @@
 
 namespace swarmcert::files {
 
-/// True if the first line that is no comment ("//") is four counts with commas.
+/// Returns true if the first line that is not a comment ("//") consists of four comma-separated counts.
 bool looks_like_nnet(const std::string& bytes);
 
-/// The network with the file's normalization folded into its first and last layer: x -> (x - mean) / range of each
-/// input, and back for the outputs. The clamp of the inputs to their least and largest values is left out. Decimal
-/// numbers are read as the nearest doubles.
+/// Parses the network and folds the file's normalization into its first and last layer: x -> (x - mean) / range for
+/// each input, and the inverse for the outputs. The clamp of the inputs to their minimum and maximum values is omitted.
+/// Decimal numbers are read as the nearest doubles.
 /// @throws InputError with the line.
 Weights parse_nnet(const std::string& bytes, const std::string& path, const std::vector<std::string>& order);
 

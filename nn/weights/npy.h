@@ -8,13 +8,13 @@
 namespace swarmcert::files {
 
 struct NpyArray {
-  std::vector<std::uint64_t> shape;  ///< no entry: a single number
+  std::vector<std::uint64_t> shape;  ///< empty: a single number
   std::vector<double> numbers;       ///< row-major
 };
 
-/// Reads the format versions 1 to 3; little-endian float32 and float64 in C order, at most kMostElements numbers.
-/// Finite or not: the caller decides. `path` and `entry` are for messages.
-/// @throws InputError for anything else, and where the header does not fit the length of `bytes`.
+/// Parses format versions 1 to 3: little-endian float32 and float64 in C order, at most kMostElements numbers. Numbers
+/// may be non-finite; the caller must check. `path` and `entry` are used in messages only.
+/// @throws InputError for anything else, and if the header does not match the length of `bytes`.
 NpyArray parse_npy(const std::string& bytes, const std::string& path, const std::string& entry);
 
 }  // namespace swarmcert::files

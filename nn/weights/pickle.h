@@ -1,7 +1,7 @@
-/// @file Pickled state dicts as plain data. Nothing in a pickle is executed: it is read as a list of declarations.
+/// @file Reads pickled state dicts as plain data. Nothing in a pickle is executed.
 ///
-/// Python's unpickler runs whatever a file names. This one knows a few opcodes and a handful of names; anything else
-/// is refused at its offset. It has no recursion, and its memory is bounded by kMostPickleOperations.
+/// Python's unpickler runs whatever a file names. This reader knows a few opcodes and a handful of names, and rejects
+/// anything else with its offset. It does not recurse, and its memory is bounded by kMostPickleOperations.
 #pragma once
 
 #include <cstdint>
@@ -11,18 +11,18 @@
 
 namespace swarmcert::files {
 
-/// Opcodes executed before a pickle is refused: a four-layer network needs two hundred.
+/// Maximum number of opcodes before a pickle is rejected; a four-layer network needs two hundred.
 inline constexpr std::size_t kMostPickleOperations = 1'000'000;
 
-/// Raw numbers that tensors look into. The views point into the parsed bytes.
+/// Raw numbers to which tensors are views. The string views point into the parsed bytes.
 struct PickledStorage {
   std::string_view type;  ///< torch's name: "FloatStorage"
-  std::string_view key;   ///< which raw data of the file: an archive entry, or an entry of the legacy list
+  std::string_view key;   ///< raw data of the file: an archive entry, or an entry of the legacy list
   std::uint64_t elements;
 };
 
-/// A strided view: entry (i, j, ...) is storage[offset + i strides[0] + j strides[1] + ...]. Only declared: neither
-/// the sizes nor the offset have been compared with the storage.
+/// A strided view: entry (i, j, ...) is storage[offset + i strides[0] + j strides[1] + ...]. As declared: the sizes and
+/// the offset have not been checked against the storage.
 struct PickledTensor {
   std::size_t storage;  ///< index into Pickle::storages
   std::uint64_t offset;
@@ -51,22 +51,22 @@ struct PickledValue {
       items;  ///< kTuple, kList: indices into Pickle::values; kDict: key, value, key, ...
 };
 
-/// One pickle. Values refer to one another by index and may form cycles: do not recurse over them.
+/// One pickle. Values refer to each other by index and may form cycles, so do not recurse over them.
 struct Pickle {
   std::vector<PickledValue> values;
   std::vector<PickledStorage> storages;
   std::vector<PickledTensor> tensors;
   std::uint32_t root = 0;
-  std::size_t end = 0;  ///< offset in the parsed bytes behind the STOP opcode
+  std::size_t end = 0;  ///< offset in the parsed bytes just after the STOP opcode
 };
 
-/// Reads the pickle that starts at `begin`.
+/// Parses the pickle that starts at `begin`.
 /// @param path, entry  for messages: the file, and the archive entry or part of it that `bytes` holds.
-/// @throws InputError with the offset for anything but a state dict's opcodes and names.
+/// @throws InputError with the offset for anything but the opcodes and names of a state dict.
 Pickle parse_pickle(std::string_view bytes, std::size_t begin, const std::string& path,
                     const std::string& entry);
 
-/// "an integer", "a dict", ...: for messages.
+/// Returns "an integer", "a dict", ...: for messages.
 const char* name(PickledValue::Kind kind);
 
 }  // namespace swarmcert::files

@@ -1,4 +1,4 @@
-/// @file PyTorch's two containers of a pickled state dict.
+/// @file PyTorch's two container formats for a pickled state dict.
 #pragma once
 
 #include <string>
@@ -7,14 +7,15 @@
 
 namespace swarmcert::files {
 
-/// True if `bytes` begin like a zip archive, PyTorch's container since 1.6.
+/// Returns true if `bytes` begin like a zip archive, PyTorch's container since 1.6.
 bool looks_like_pth_zip(const std::string& bytes);
 
-/// True if `bytes` begin with the magic number of PyTorch's container before 1.6.
+/// Returns true if `bytes` begin with the magic number of PyTorch's container before 1.6.
 bool looks_like_pth_legacy(const std::string& bytes);
 
-/// Both: `key`, `order` and errors as in load_weights(); `path` for messages. Memory: the file, its opcodes
-/// (kMostPickleOperations) and its numbers (kMostElements), whatever sizes it declares.
+/// Parse the two containers. `key`, `order` and errors are as in load_weights(); `path` is used in messages only.
+/// Memory is limited to the file, its opcodes (kMostPickleOperations) and its numbers (kMostElements), whatever sizes
+/// the file declares.
 Weights parse_pth_zip(const std::string& bytes, const std::string& path, const std::string& key,
                       const std::vector<std::string>& order);
 Weights parse_pth_legacy(const std::string& bytes, const std::string& path, const std::string& key,

@@ -1,4 +1,4 @@
-/// @file A network as its weight file holds it: every weight exactly, in double.
+/// @file A network as stored in its weight file: every weight exactly, in double.
 #pragma once
 
 #include <cstdint>
@@ -10,23 +10,23 @@
 
 namespace swarmcert::files {
 
-/// A format of numbers. All convert to double without rounding. A network is float32 or float64: one that a file stores
-/// in half precision, float16 or bfloat16, is a float32 network.
+/// A number format. All formats convert to double without rounding. A network is either float32 or float64; files in
+/// half precision, float16 or bfloat16, are read as float32 networks.
 enum class Precision { kFloat32, kFloat64, kFloat16, kBfloat16 };
 
-/// "float32", "float64", "float16", "bfloat16".
+/// Returns "float32", "float64", "float16" or "bfloat16".
 const char* name(Precision precision);
 
-/// What the order of the layers rests on. A file that states it states the activation between the layers as well; in
-/// every other case the activation is given (`activation_is_given`) or assumed to be ReLU.
+/// What determines the order of the layers. A file that states it also states the activation between the layers;
+/// otherwise the activation is given (`activation_is_given`) or assumed to be ReLU.
 enum class OrderSource {
   kFile,    ///< the file states it: ONNX, our safetensors
-  kNames,   ///< numbers in the names, which agree with the order of registration where there is one
+  kNames,   ///< numbers in the names, consistent with the order of registration if there is one
   kShapes,  ///< no other order fits the shapes
   kUser,    ///< --order, or `order` in network.toml
 };
 
-/// "file", "names", "shapes", "user".
+/// Returns "file", "names", "shapes" or "user".
 const char* name(OrderSource source);
 
 /// One affine layer y = W x + b.
@@ -35,26 +35,26 @@ struct Layer {
   int outputs = 0;
   int inputs = 0;
   std::vector<double> weights;  ///< W, [outputs x inputs], row-major
-  std::vector<double> biases;   ///< b, [outputs]; zeros where the file has none
-  /// Where the file's own W or b, folded out of several layers, is no double: it is within this Frobenius norm of
-  /// `weights`, and within this Euclidean norm of `biases`. 0: they are the file's own.
+  std::vector<double> biases;   ///< b, [outputs]; zeros if the file has none
+  /// Bounds on the rounding error if the file's W or b, folded from several layers, is not representable in double: the
+  /// Frobenius norm of the error of `weights` and the Euclidean norm of that of `biases`. 0: the values are exact.
   double weight_rounding = 0;
   double bias_rounding = 0;
   Activation activation =
-      Activation::kRelu;  ///< between this layer and the next; of the last one without meaning
-  /// How many of the outputs, the last ones, the activation leaves as they are: what a skip connection takes past it. 0
-  /// where the activation is ReLU or sorts.
+      Activation::kRelu;  ///< between this layer and the next; meaningless for the last one
+  /// Number of trailing outputs to which the activation is not applied, because a skip connection carries them past it.
+  /// Is 0 if the activation is ReLU or sorts.
   int kept = 0;
-  bool is_added = false;  ///< no layer of the file: the identity behind an activation that ends the network
+  bool is_added = false;  ///< not in the file: an identity layer added after a final activation
 };
 
-/// What follows `layer`, as chains state it: "tanh", or "tanh:8" of the first 8 outputs only.
+/// Returns the activation after `layer` as stated in chains: "tanh", or "tanh:8" for the first 8 outputs only.
 std::string op_after(const Layer& layer);
-/// The same in texts: "tanh", "tanh of the first 8".
+/// Same, in prose: "tanh", "tanh of the first 8".
 std::string words_after(const Layer& layer);
 
-/// A multilayer perceptron: after every layer but the last an activation, ReLU unless stated otherwise. One that ends
-/// in an activation has an identity layer behind it.
+/// A multilayer perceptron with an activation after every layer but the last, ReLU unless stated otherwise. A network
+/// that ends in an activation is stored with an identity layer after it.
 /// Class invariant after load_weights(): at least one layer, every size positive, layers[k].inputs ==
 /// layers[k - 1].outputs, all entries finite.
 struct Weights {
@@ -64,75 +64,75 @@ struct Weights {
   std::vector<Layer> layers;
   OrderSource order_source = OrderSource::kFile;
   bool activation_is_given = false;  ///< by `activation` in network.toml, or by --activation
-  std::vector<std::string> notes;    ///< what was folded, rewritten, left out or assumed; one clause each
+  std::vector<std::string> notes;    ///< what was folded, rewritten, omitted or assumed; one clause each
 
   int inputs() const { return layers.front().inputs; }
   int outputs() const { return layers.back().outputs; }
-  /// What follows each layer but the last, first layer first.
+  /// Returns the activation after each layer but the last, in order of evaluation.
   std::vector<Activation> activations() const;
-  /// The steepest slope of each.
+  /// Returns the steepest slope of each activation.
   std::vector<double> steepest_slopes() const;
-  /// Their names as chains state them, each once where all are alike: "tanh", "relu, relu, tanh".
+  /// Returns their names as in chains, once if all are the same: "tanh", "relu, relu, tanh".
   std::string activation_names() const;
-  bool is_relu() const;  ///< whether all of them are ReLU
-  /// Sets what lies between all layers. @throws std::invalid_argument unless there is one for each layer but the last.
+  bool is_relu() const;  ///< whether all activations are ReLU
+  /// Sets the activations between all layers. @throws std::invalid_argument unless there is one for each layer but the
+  /// last.
   void set_activations(const std::vector<Activation>& between);
-  /// Puts a layer of weights 1 and biases 0 behind the last one, which `activation` then follows.
+  /// Makes the network end in `activation`: appends an identity layer and puts `activation` in front of it.
   void end_in(Activation activation);
-  /// Whether the file itself, network.toml or the user states the activation.
+  /// Returns whether the file itself, network.toml or the user states the activation.
   bool states_activation() const { return order_source == OrderSource::kFile || activation_is_given; }
 };
 
-/// Reads a weight file. The format is found from the content, not from the name: PyTorch state dicts (`.pth`, zip
+/// Reads a weight file. The format is detected from the content, not from the name: PyTorch state dicts (`.pth`, zip
 /// and legacy pickle, strided views, weights under spectral_norm and weight_norm), safetensors, ONNX models of affine
-/// and piecewise linear operations and smooth activations, NumPy's .npz, MATLAB's .mat (version 5), .nnet, and
+/// and piecewise linear operations and smooth activations, NumPy's .npz, MATLAB's .mat (versions 5 and 7.3), .nnet, and
 /// the C source that the networks' authors generate.
-/// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`. Which layer follows which, ONNX models,
-/// .nnet and our safetensors state; for other files see decide_layer_order().
-/// @param path where no such file exists, "FILE#KEY" is FILE with the key KEY.
-/// @param key for nested checkpoints: the dotted path of the state dict inside it, e.g. "model"; empty: the top. For C
+/// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`. ONNX models, .nnet and our safetensors
+/// state the order of the layers; for other files see decide_layer_order().
+/// @param path if no such file exists, "FILE#KEY" is FILE with the key KEY.
+/// @param key for nested checkpoints: the dotted path of the state dict, e.g. "model"; empty: the top level. For C
 ///   source: the name of one of its networks.
-/// @param order every layer of the file once, first evaluated first; empty: not stated.
-/// @throws InputError for anything that is not such a network: it names offset, field, value and hint.
+/// @param order every layer of the file once, in order of evaluation; empty: not stated.
+/// @throws InputError with offset, field, value and hint for anything that is not such a network.
 Weights load_weights(const std::string& path, const std::string& key = "",
                      const std::vector<std::string>& order = {});
 
-/// As load_weights(), from memory. `path` is used in messages only.
+/// Same as load_weights(), but reads from memory; `path` is used in messages only.
 Weights parse_weights(const std::string& bytes, const std::string& path, const std::string& key = "",
                       const std::vector<std::string>& order = {});
 
 /// Writes safetensors with tensors `<name>.weight` and `<name>.bias` in the network's precision.
-/// @throws InputError if the file exists and `overwrite` is false, if the name of a layer is not UTF-8, or if an
-///   activation is not ReLU, which this format states.
+/// @throws InputError if the file exists and `overwrite` is false, if a layer's name is not UTF-8, or if an activation
+///   is not ReLU, which our safetensors files imply.
 void save_safetensors(const Weights& weights, const std::string& path, bool overwrite);
 
-/// How much larger than the Lipschitz constant of the network as it was read that of the file's own function can be,
-/// where its folded weights are no doubles: the product of |W|_F + weight_rounding less the product of |W|_F, times the
-/// activations' steepest slopes. It may be
-/// added to every bound that holds for all slopes that the activations can have. 0 where nothing was rounded.
+/// Returns a bound on how much larger the Lipschitz constant of the file's own function can be than that of the network
+/// as read, because folded weights were rounded: the product of |W|_F + weight_rounding minus the product of |W|_F,
+/// times the activations' steepest slopes. It may be added to any bound that holds for all slopes that the activations
+/// can have. Is 0 if nothing was rounded.
 double rounding_of_slope(const Weights& weights);
 
-/// Every number rounded to the nearest float32, ties to even: what a C compiler makes of a float64 file's numbers.
-/// A float32 network stays as it is.
-/// @throws InputError if a number is beyond the range of float32.
+/// Returns the network with every number rounded to the nearest float32, ties to even, as a C compiler does with the
+/// numbers of a float64 file. A float32 network is unchanged.
+/// @throws InputError if a number exceeds the range of float32.
 Weights as_float32(Weights weights);
 
-/// The evaluator's view of a network, with the arrays it points to.
-/// In float each weight is rounded to nearest: for a float32 file that is exact. Float evaluates ReLU networks only, as
-/// firmware does.
+/// The evaluator's view of a network, together with the arrays that it points to. In float, each weight is rounded to
+/// nearest, which is exact for a float32 file. Like the firmware, the float instance evaluates ReLU networks only.
 template <typename Scalar>
 class Evaluator {
  public:
-  /// @throws InputError if a weight is beyond the range of Scalar, or Scalar is float and an activation not ReLU.
+  /// @throws InputError if a weight exceeds the range of Scalar, or if Scalar is float and an activation is not ReLU.
   explicit Evaluator(const Weights& weights);
   Evaluator(const Evaluator&) = delete;
   Evaluator& operator=(const Evaluator&) = delete;
   Evaluator(Evaluator&&) = default;
 
-  /// The ReLU network. @throws std::logic_error if an activation is another one.
+  /// Returns the ReLU network. @throws std::logic_error if an activation is not ReLU.
   nn::Mlp<Scalar> mlp() const;
 
-  /// f(x); `input` has as many entries as the network has inputs, the result as many as it has outputs.
+  /// Returns f(x). `input` has one entry per input of the network, the result one per output.
   /// @throws std::invalid_argument if `input` has another length.
   std::vector<Scalar> operator()(const std::vector<Scalar>& input) const;
 
@@ -141,7 +141,7 @@ class Evaluator {
 
   bool is_relu_;
   std::vector<Activation> activations_;  ///< after each layer but the last
-  std::vector<int> kept_;                ///< of each layer
+  std::vector<int> kept_;                ///< of each layer: see Layer::kept
   std::vector<std::vector<Scalar>> arrays_;
   std::vector<nn::DenseLayer<Scalar>> layers_;
 };

@@ -10,7 +10,7 @@ struct zip;
 
 namespace swarmcert::files {
 
-/// Reads uncompressed entries, which is how torch.save writes them. So an entry is never larger than the file.
+/// Reads uncompressed entries only, as torch.save writes them, so that an entry is never larger than the file.
 class ZipArchive {
  public:
   /// @param bytes, path  must outlive the archive; `path` is for messages.
@@ -23,7 +23,7 @@ class ZipArchive {
   const std::vector<std::string>& names() const { return names_; }
   bool has(const std::string& name) const;
 
-  /// The whole entry, its checksum verified.
+  /// Returns the whole entry and verifies its checksum.
   /// @throws InputError if it is missing, compressed, encrypted, larger than `limit_bytes`, or damaged.
   std::string read(const std::string& name, std::uint64_t limit_bytes) const;
 
