@@ -1,21 +1,21 @@
-/// @file From attitude error to torque: geometric control on SE(3), and a robust nonlinear law.
+/// @file Attitude laws, from attitude error to torque: geometric control on SE(3), and a robust nonlinear law.
 ///
-/// Frames: W world, B body, R desired body. R_RB = R_WR' R_WB is the attitude error; theta is its angle. Angular
-/// velocities in rad/s, torques in N m, both in B unless the name ends in _R.
+/// Frames: W world, B body, R desired body. R_RB = R_WR' R_WB is the attitude error and theta its rotation angle.
+/// Angular velocities are in rad/s and torques in N m, both in B unless the name ends in _R.
 #pragma once
 
 #include "controller/linear_algebra.h"
 
 namespace swarmcert::controller {
 
-/// The vehicle's attitude and rate as measured.
+/// The measured attitude and angular velocity of the vehicle.
 template <typename Scalar>
 struct AttitudeState {
   Matrix3<Scalar> R_WB;
   Vector3<Scalar> omega_B_rad_s;
 };
 
-/// What to follow. The rate and its derivative are those of the desired frame, in its own coordinates.
+/// The attitude setpoint. The angular velocity and its derivative are those of the desired frame, expressed in R.
 template <typename Scalar>
 struct AttitudeReference {
   Matrix3<Scalar> R_WR;
@@ -23,13 +23,13 @@ struct AttitudeReference {
   Vector3<Scalar> omega_dot_R_rad_s2{};
 };
 
-/// Attitude and rate error.
+/// Attitude and angular velocity error.
 template <typename Scalar>
 struct AttitudeError {
   Matrix3<Scalar> R_RB;
   Vector3<Scalar> reference_omega_B_rad_s;  ///< R_RB' omega_R
   Vector3<Scalar>
-      reference_omega_dot_B_rad_s2;  ///< derivative of the former: R_RB' omega_dot_R - omega x (R_RB' omega_R)
+      reference_omega_dot_B_rad_s2;  ///< derivative of the above: R_RB' omega_dot_R - omega x (R_RB' omega_R)
   Vector3<Scalar> omega_error_B_rad_s;  ///< omega_B - R_RB' omega_R
 };
 
@@ -46,7 +46,7 @@ inline AttitudeError<Scalar> attitude_error(const AttitudeState<Scalar>& state,
   return error;
 }
 
-/// e_R = (R_RB - R_RB')^v / 2 = sin(theta) times the axis of rotation, in B.
+/// Returns e_R = (R_RB - R_RB')^v / 2, which is sin(theta) times the rotation axis, in B.
 template <typename Scalar>
 inline Vector3<Scalar> rotation_error(const Matrix3<Scalar>& R_RB) {
   const Scalar half(0.5);
@@ -54,17 +54,18 @@ inline Vector3<Scalar> rotation_error(const Matrix3<Scalar>& R_RB) {
           product(half, R_RB.y.x - R_RB.x.y)};
 }
 
-/// Gains of the geometric law, per body axis. Its proof has equal k_R in all axes.
+/// Gains of the geometric law, per body axis. The proof of the law assumes equal k_R in all axes.
 template <typename Scalar>
 struct LeeGains {
   Vector3<Scalar> k_R_N_m;
   Vector3<Scalar> k_omega_N_m_s;
 };
 
-/// tau = -k_R e_R - k_omega e_omega + omega x J omega - J (omega x R_RB' omega_d - R_RB' omega_d_dot).
+/// Returns tau = -k_R e_R - k_omega e_omega + omega x J omega - J (omega x R_RB' omega_d - R_RB' omega_d_dot).
 ///
 /// Lee, Leok, McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, eq. (11). The error
-/// decays exponentially from every attitude but the half turn, slowly near it (tests/controller/attitude_decay.h).
+/// decays exponentially from every attitude error except a rotation by pi, and slowly near it
+/// (tests/controller/attitude_decay.h).
 template <typename Scalar>
 inline Vector3<Scalar> lee_torque(const LeeGains<Scalar>& gains, const Matrix3<Scalar>& inertia_kg_m2,
                                   const AttitudeState<Scalar>& state, const AttitudeError<Scalar>& error) {
@@ -74,16 +75,16 @@ inline Vector3<Scalar> lee_torque(const LeeGains<Scalar>& gains, const Matrix3<S
          diagonal_product(gains.k_omega_N_m_s, error.omega_error_B_rad_s);
 }
 
-/// sigma = tan(theta / 4) times the axis of rotation: modified Rodrigues parameters, |sigma| <= 1.
+/// Returns the modified Rodrigues parameters sigma = tan(theta / 4) times the rotation axis, |sigma| <= 1.
 ///
-/// Through the unit quaternion, of which the largest component is computed first (Shepperd 1978), so that no division
-/// is by less than 1: accurate at every angle. At exactly half a turn both signs of the axis are right; this returns
-/// one of them.
+/// Computed through the unit quaternion, largest component first (Shepperd 1978), so that no divisor is less than 1 and
+/// the result is accurate at every angle. At theta = pi exactly, both signs of the axis are valid; one of them is
+/// returned.
 template <typename Scalar>
 inline Vector3<Scalar> modified_rodrigues(const Matrix3<Scalar>& r) {
   const Scalar one(1), zero(0);
   const Scalar t = trace(r);
-  // The quaternion (w, v) times a common positive factor, and that factor squared.
+  // The quaternion (w, v) times a common positive factor.
   Scalar w = one + t;
   Vector3<Scalar> v{r.z.y - r.y.z, r.x.z - r.z.x, r.y.x - r.x.y};
   if (!(t > r.x.x && t > r.y.y && t > r.z.z)) {
@@ -118,9 +119,9 @@ struct ReferenceRate {
   Vector3<Scalar> omega_r_dot_rad_s2;
 };
 
-/// omega_r = R_RB' omega_d - 4 Lambda sigma, and its derivative, in which
+/// Returns omega_r = R_RB' omega_d - 4 Lambda sigma and its derivative, with
 /// 4 sigma_dot = (1 - |sigma|^2) omega_e + 2 sigma x omega_e + 2 sigma (sigma . omega_e).
-/// For small errors 4 sigma is the rotation vector, so that Lambda is the bandwidth of attitude.
+/// For small errors 4 sigma is the rotation vector, so Lambda is the bandwidth of the attitude loop.
 template <typename Scalar>
 inline ReferenceRate<Scalar> reference_rate(const Vector3<Scalar>& Lambda_1_s, const Vector3<Scalar>& sigma,
                                             const AttitudeError<Scalar>& error) {
@@ -133,11 +134,11 @@ inline ReferenceRate<Scalar> reference_rate(const Vector3<Scalar>& Lambda_1_s, c
           error.reference_omega_dot_B_rad_s2 - diagonal_product(Lambda_1_s, four_sigma_dot)};
 }
 
-/// tau = J omega_r_dot - (J omega) x omega_r - K_omega (omega - omega_r) - K_I integral(omega - omega_r).
+/// Returns tau = J omega_r_dot - (J omega) x omega_r - K_omega (omega - omega_r) - K_I integral(omega - omega_r).
 ///
-/// The attitude law of the paper's section IV (there in a comment of the source, after Morgan et al. 2016 and
-/// Bandyopadhyay, Chung and Hadaegh 2016, who leave the attitude coordinates open). With the coordinates above the
-/// error decays exponentially from every attitude at one rate (tests/controller/attitude_decay.h).
+/// The attitude law of the paper's section IV (given there in a comment of the source, after Morgan et al. 2016 and
+/// Bandyopadhyay, Chung and Hadaegh 2016, who leave the choice of attitude coordinates open). With the coordinates
+/// above, the error decays exponentially at one rate from every attitude (tests/controller/attitude_decay.h).
 template <typename Scalar>
 inline Vector3<Scalar> robust_torque(const RobustGains<Scalar>& gains, const Matrix3<Scalar>& inertia_kg_m2,
                                      const Vector3<Scalar>& omega_B_rad_s, const ReferenceRate<Scalar>& rate,
@@ -147,7 +148,7 @@ inline Vector3<Scalar> robust_torque(const RobustGains<Scalar>& gains, const Mat
          diagonal_product(gains.K_I_N_m, rate_integral_rad);
 }
 
-/// The integral of omega - omega_r after one more period, clamped per axis.
+/// Returns the integral of omega - omega_r after one more period, clamped per axis.
 template <typename Scalar>
 inline Vector3<Scalar> integrate_rate(const RobustGains<Scalar>& gains, const Vector3<Scalar>& integral_rad,
                                       const Vector3<Scalar>& omega_B_rad_s,

@@ -1,5 +1,6 @@
-/// @file From desired force to collective thrust and desired attitude. World frame W: z up; body frame B: x forward,
-/// y left, z up, along which the rotors push; R: the desired body frame.
+/// @file From desired force to collective thrust and desired attitude.
+///
+/// World frame W: z up. Body frame B: x forward, y left, z up, along the rotors' thrust. R: the desired body frame.
 #pragma once
 
 #include <cstdint>
@@ -9,24 +10,24 @@
 
 namespace swarmcert::controller {
 
-/// Where the nose should point, seen from above: (cos yaw, sin yaw).
+/// Desired direction of the nose, seen from above: (cos yaw, sin yaw).
 template <typename Scalar>
 struct Heading {
   Scalar cosine = Scalar(1), sine = Scalar(0);
 };
 
-/// Yaw counts from W's x axis towards its y axis. Not a number where sin_cos() is not.
+/// Returns the heading for a yaw measured from W's x axis towards its y axis. NaN if sin_cos() is NaN.
 template <typename Scalar>
 inline Heading<Scalar> heading_of_yaw(Scalar yaw_rad) {
   const SineCosine<Scalar> s = sin_cos(yaw_rad);
   return {s.cosine, s.sine};
 }
 
-/// Which of the defined cases gave the attitude.
+/// The case that determined the attitude.
 enum class AttitudeCase : std::uint8_t {
   kRegular,
-  kForceTooSmall,   ///< |f_d| says no direction: the body's z axis of the fallback is kept
-  kHeadingParallel  ///< the thrust points along the heading: the body's y axis comes from the heading instead
+  kForceTooSmall,   ///< the direction of f_d is undefined: the z axis of the fallback is kept
+  kHeadingParallel  ///< the thrust is along the heading: y_d follows from y_c
 };
 
 template <typename Scalar>
@@ -35,17 +36,17 @@ struct DesiredAttitude {
   AttitudeCase which;
 };
 
-/// Below this |z_d x x_c| (half a degree) the heading x_c no longer determines the body's y axis.
+/// If |z_d x x_c| is below this (half a degree), the heading x_c no longer determines the body's y axis.
 inline constexpr double kParallel = 0.01;
 
-/// The axes of a body whose thrust points along the unit vector `z_W` and whose nose points to `heading`.
+/// Returns the attitude whose thrust is along the unit vector `z_W` and whose nose points along `heading`.
 ///
 /// z_d = z_W, y_d = z_d x x_c / |z_d x x_c|, x_d = y_d x z_d, with x_c = (cos yaw, sin yaw, 0) (Lee, Leok and
-/// McClamroch 2010). The nose lies in the vertical plane of the heading. This also holds for thrust that points
-/// down: the vehicle then flies on its back with its nose where the heading says. Where z_d is nearly parallel to x_c
-/// (a quarter turn about the y axis), y_d follows from y_c = (-sin yaw, cos yaw, 0), which is then perpendicular to
-/// z_d: x_d = y_c x z_d / |y_c x z_d|, y_d = z_d x x_d. From above the horizon the two cases meet continuously; from
-/// below, y_d turns over, as it must: no continuous choice of y_d exists over all directions.
+/// McClamroch 2010). The nose lies in the vertical plane of the heading. This also holds for thrust that points down:
+/// the vehicle then flies inverted, with its nose along the heading. If z_d is nearly parallel to x_c (a quarter turn
+/// about the y axis), y_d is computed from y_c = (-sin yaw, cos yaw, 0), which is then perpendicular to z_d: x_d = y_c
+/// x z_d / |y_c x z_d|, y_d = z_d x x_d. For thrust above the horizon the two cases join continuously. For thrust below
+/// it, y_d flips sign; this is unavoidable, since no continuous choice of y_d exists over all directions.
 template <typename Scalar>
 inline DesiredAttitude<Scalar> attitude_of_axis(const Vector3<Scalar>& z_W, const Heading<Scalar>& heading) {
   const Scalar zero(0);
@@ -62,8 +63,8 @@ inline DesiredAttitude<Scalar> attitude_of_axis(const Vector3<Scalar>& z_W, cons
   return {from_columns(x, cross(z_W, x), z_W), AttitudeCase::kHeadingParallel};
 }
 
-/// Desired attitude for `force_W_N`. Where |force| <= smallest_force_N it has no direction worth following, and the
-/// body's z axis of `fallback_WR` (the previous desired attitude; the identity at the start) is kept.
+/// Returns the desired attitude for `force_W_N`. If |force| <= smallest_force_N, its direction is not meaningful, and
+/// the z axis of `fallback_WR` (the previous desired attitude; initially the identity) is kept.
 template <typename Scalar>
 inline DesiredAttitude<Scalar> desired_attitude(const Vector3<Scalar>& force_W_N,
                                                 const Heading<Scalar>& heading,
@@ -76,13 +77,13 @@ inline DesiredAttitude<Scalar> desired_attitude(const Vector3<Scalar>& force_W_N
   return kept;
 }
 
-/// How the collective thrust follows from f_d while the attitude is not there yet.
+/// How the collective thrust is computed from f_d while the attitude has not yet converged.
 enum class ThrustRule : std::uint8_t {
   kProjected,  ///< T = f_d . R e_z (Lee 2010): |applied - desired| <= |f_d| sin(angle)
   kMagnitude   ///< T = |f_d| (the earlier firmware): |applied - desired| <= 2 |f_d| sin(angle / 2)
 };
 
-/// Collective thrust in newton, never negative: rotors only push.
+/// Returns the collective thrust in newton, never negative, since rotors only push.
 template <typename Scalar>
 inline Scalar collective_thrust(ThrustRule rule, const Vector3<Scalar>& force_W_N,
                                 const Matrix3<Scalar>& R_WB) {

@@ -1,7 +1,7 @@
-/// @file One control period from measured state to PWM, with a defined answer to every bad input.
+/// @file One control period, from measured state to PWM, with a defined response to every invalid input.
 ///
-/// The pieces (position law, attitude law, mixing, battery) stand in their own headers; this composes them, decides
-/// what is safe when an input cannot be trusted, and says so.
+/// The components (position law, attitude law, mixing, battery) have their own headers. This header combines them,
+/// chooses a safe response when an input cannot be trusted, and reports it.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace swarmcert::controller {
 
 enum class AttitudeLaw : std::uint8_t { kLee, kRobust };
 
-/// All that stays the same in flight. `Gains` is PidGains or CompositeGains.
+/// Settings that do not change in flight. `Gains` is PidGains or CompositeGains.
 template <typename Scalar, typename Gains>
 struct FlightSettings {
   Scalar mass_kg;
@@ -33,10 +33,10 @@ struct FlightSettings {
   Allocation<Scalar> allocation;
   ThrustMap<Scalar> thrust_map;
   LargestForceMap<Scalar> largest_force;
-  Scalar idle_force_N;  ///< of each rotor: below, motors may stop
+  Scalar idle_force_N;  ///< minimum force per rotor; below it motors may stop
 };
 
-/// What is measured, with the time of each measurement.
+/// Measurements with their time stamps.
 template <typename Scalar>
 struct Measured {
   Vector3<Scalar> position_W_m;
@@ -47,7 +47,7 @@ struct Measured {
   Scalar battery_V;
 };
 
-/// What to follow.
+/// The setpoint.
 template <typename Scalar>
 struct FlightReference {
   Vector3<Scalar> position_W_m;
@@ -58,31 +58,31 @@ struct FlightReference {
   Vector3<Scalar> omega_dot_R_rad_s2;
 };
 
-/// Inputs that were not used; values add up.
+/// Inputs that were not used. The values are bit flags.
 enum Fault : std::uint8_t {
   kNoFault = 0,
-  kPositionFault = 1,    ///< position or velocity: not finite, out of range or stale. Answer: level descent
-  kAttitudeFault = 2,    ///< attitude or rate: as above, or not a rotation. Answer: motors off
-  kReferenceFault = 4,   ///< not finite or out of range. Answer: stay at the last position that was asked for
-  kBatteryFault = 8,     ///< outside kLowestVoltage_V to kHighestVoltage_V. Answer: kAssumedVoltage_V
-  kPredictionFault = 16  ///< f_a_hat or tau_a_hat not finite or out of range. Answer: 0 for it
+  kPositionFault = 1,    ///< position or velocity: not finite, out of range or stale. Response: level descent
+  kAttitudeFault = 2,    ///< attitude or rate: as above, or not a rotation. Response: motors off
+  kReferenceFault = 4,   ///< not finite or out of range. Response: hold the last valid position setpoint
+  kBatteryFault = 8,     ///< outside kLowestVoltage_V to kHighestVoltage_V. Response: kAssumedVoltage_V
+  kPredictionFault = 16  ///< f_a_hat or tau_a_hat not finite or out of range. Response: use 0 instead
 };
 
-/// Ages beyond which a measurement no longer describes the vehicle: three losses in a row at 30 Hz, ten at 500 Hz.
+/// Maximum age of valid measurements: three consecutive losses at 30 Hz, ten at 500 Hz.
 inline constexpr std::uint32_t kMaxPositionAge_ms = 100, kMaxAttitudeAge_ms = 20;
-/// Larger numbers are broken, not flown.
+/// Larger values are treated as invalid.
 inline constexpr int kLargestSpeed_m_s = 50, kLargestAcceleration_m_s2 = 50, kLargestRate_rad_s = 100;
 inline constexpr int kLargestRateDerivative_rad_s2 = 10000;
-/// Largest |f_a_hat| per weight of the vehicle.
+/// Maximum ratio of |f_a_hat| to the vehicle's weight.
 inline constexpr int kLargestEffectPerWeight = 2;
-/// Largest |tau_a_hat| per weight of the vehicle, in metre.
+/// Maximum ratio of |tau_a_hat| to the vehicle's weight, in metre.
 inline constexpr double kLargestTorquePerWeight_m = 0.1;
-/// Taken when the sensor has failed: low, so that the motors get rather more than less.
+/// Assumed if the sensor has failed: low, so that the motors get too much rather than too little.
 inline constexpr double kAssumedVoltage_V = 3.4;
-/// Thrust of the level descent over weight: drag and the ground end it at a few m/s.
+/// Ratio of thrust to weight in the level descent: drag and the ground limit the speed to a few m/s.
 inline constexpr double kDescentThrust = 0.9;
 
-/// What one period leaves for the next.
+/// State that is carried from one period to the next.
 template <typename Scalar>
 struct FlightMemory {
   Vector3<Scalar> integral_m_s;
@@ -137,7 +137,7 @@ inline std::uint8_t faults(const Measured<Scalar>& m, std::uint32_t now_ms) {
   return static_cast<std::uint8_t>(result);
 }
 
-/// The position loop: f_d and the desired attitude into `memory`.
+/// Runs the position loop and stores f_d and the desired attitude in `memory`.
 template <typename Scalar, typename Gains>
 inline AttitudeCase position_step(const FlightSettings<Scalar, Gains>& settings, FlightMemory<Scalar>& memory,
                                   const Measured<Scalar>& measured, const FlightReference<Scalar>& reference,
@@ -179,9 +179,9 @@ inline Vector3<Scalar> attitude_torque(const FlightSettings<Scalar, Gains>& sett
 
 }  // namespace detail
 
-/// One period of the attitude loop, with one of the position loop in it where `position_is_due`.
-/// @param effect_W_N       f_a_hat; zero where there is no network.
-/// @param torque_effect_Nm tau_a_hat about the axes of the body: taken from what the attitude law asks for.
+/// Runs one period of the attitude loop, and one of the position loop if `position_is_due`.
+/// @param effect_W_N       f_a_hat; zero if there is no network.
+/// @param torque_effect_Nm tau_a_hat in the body frame; subtracted from the torque of the attitude law.
 template <typename Scalar, typename Gains>
 inline FlightCommand<Scalar> flight_step(const FlightSettings<Scalar, Gains>& settings,
                                          FlightMemory<Scalar>& memory, const Measured<Scalar>& measured,
@@ -200,7 +200,7 @@ inline FlightCommand<Scalar> flight_step(const FlightSettings<Scalar, Gains>& se
     reference = {};
     reference.heading = memory.last_reference.heading;
     reference.position_W_m = memory.last_reference.position_W_m;
-    // Nothing was ever asked for: nowhere to stay.
+    // There has been no valid setpoint, so there is no position to hold.
     if (!memory.has_reference) faults |= kPositionFault;
   }
   Vector3<Scalar> effect = effect_W_N;

@@ -1,10 +1,9 @@
-/// @file Between the paper's gains (Lambda, K) and PID gains, where both forms describe the same law.
+/// @file Conversion between the paper's gains (Lambda, K) and PID gains, where both forms describe the same law.
 ///
-/// Per axis, with a = k / m: Kd = a + 2 l, Kp = 2 a l + l^2, Ki = a l^2, that is
-/// s^3 + Kd s^2 + Kp s + Ki = (s + a)(s + l)^2. A PID law has this form only if its characteristic polynomial has a
-/// real double root -l with 0 < l < Kd / 2: then l solves the derivative 3 l^2 - 2 Kd l + Kp = 0, and
-/// Ki = (Kd - 2 l) l^2. Gains that firmware ships need not have it, and then the tracking theorem says nothing
-/// about them.
+/// Per axis, with a = k / m: Kd = a + 2 l, Kp = 2 a l + l^2, Ki = a l^2, that is s^3 + Kd s^2 + Kp s + Ki = (s + a)(s +
+/// l)^2. A PID law has this form only if its characteristic polynomial has a real double root -l with 0 < l < Kd / 2:
+/// then l is a root of the derivative 3 l^2 - 2 Kd l + Kp = 0, and Ki = (Kd - 2 l) l^2. The gains shipped with firmware
+/// may not have this form; the tracking theorem does not apply to them.
 #pragma once
 
 #include <cstdint>
@@ -14,16 +13,16 @@
 
 namespace swarmcert::controller {
 
-/// Why a conversion has no result.
+/// Result of a conversion: success or the reason for failure.
 enum class ConversionStatus : std::uint8_t {
   kOk,
   kMassNotPositive,
-  kNotPositive,        ///< a gain is zero, negative or not a number
-  kNoDoubleRoot,       ///< Kd^2 < 3 Kp: no real l exists for any Ki
-  kOtherIntegralGain,  ///< a real l exists, but needs another Ki
+  kNotPositive,        ///< a gain is zero, negative or NaN
+  kNoDoubleRoot,       ///< Kd^2 < 3 Kp: no real l exists, whatever Ki
+  kOtherIntegralGain,  ///< a real l exists, but for a different Ki
 };
 
-/// The status in words.
+/// Returns a description of the status.
 inline const char* to_text(ConversionStatus status) {
   switch (status) {
     case ConversionStatus::kOk:
@@ -46,12 +45,13 @@ struct AxisPid {
   Scalar Kp_1_s2, Kd_1_s, Ki_1_s3;
 };
 
-/// Composite gains of one axis, or why there are none.
+/// Composite gains of one axis, or the reason why there are none.
 template <typename Scalar>
 struct AxisComposite {
   ConversionStatus status = ConversionStatus::kNotPositive;
   Scalar lambda_1_s{}, k_kg_s{};
-  /// With kOtherIntegralGain: the Ki that would fit Kp and Kd, nearest to the given one, and its Lambda above.
+  /// For kOtherIntegralGain: the Ki nearest to the given one that is consistent with Kp and Kd; `lambda_1_s` belongs to
+  /// it.
   Scalar needed_Ki_1_s3{};
 };
 
@@ -63,8 +63,8 @@ inline AxisPid<Scalar> to_pid(const Scalar& lambda_1_s, const Scalar& k_kg_s, co
           product(a, square)};
 }
 
-/// @param relative_tolerance how far Ki may be from (Kd - 2 l) l^2, relative to the latter: gains are printed with
-///                           few digits. The bounds of a law converted with a tolerance hold for the converted law.
+/// @param relative_tolerance maximum deviation of Ki from (Kd - 2 l) l^2, relative to the latter; needed because gains
+///   are published with few digits. Bounds for a law converted with a tolerance hold for the converted law.
 template <typename Scalar>
 inline AxisComposite<Scalar> to_composite(const AxisPid<Scalar>& pid, const Scalar& mass_kg,
                                           const Scalar& relative_tolerance) {

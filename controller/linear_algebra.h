@@ -1,4 +1,4 @@
-/// @file Vectors and matrices of three dimensions: plain data, sums from x to z, no heap.
+/// @file Three-dimensional vectors and matrices: plain data, sums in the order x, y, z, no heap.
 #pragma once
 
 #include <cstddef>
@@ -36,7 +36,7 @@ inline Vector3<Scalar> scaled(const Scalar& factor, const Vector3<Scalar>& a) {
   return {product(factor, a.x), product(factor, a.y), product(factor, a.z)};
 }
 
-/// (a_x b_x, a_y b_y, a_z b_z): a diagonal matrix, given by its diagonal, times a vector.
+/// Returns (a_x b_x, a_y b_y, a_z b_z): the product of the diagonal matrix diag(a) with b.
 template <typename Scalar>
 inline Vector3<Scalar> diagonal_product(const Vector3<Scalar>& a, const Vector3<Scalar>& b) {
   return {product(a.x, b.x), product(a.y, b.y), product(a.z, b.z)};
@@ -68,18 +68,19 @@ inline bool is_finite(const Vector3<Scalar>& a) {
   return is_finite(a.x) && is_finite(a.y) && is_finite(a.z);
 }
 
-/// True if no entry is larger than `limit` in magnitude; false if one is not a number.
+/// Returns true if no entry exceeds `limit` in magnitude; false if an entry is NaN.
 template <typename Scalar>
 inline bool is_within(const Vector3<Scalar>& a, Scalar limit) {
   return absolute(a.x) <= limit && absolute(a.y) <= limit && absolute(a.z) <= limit;
 }
 
-/// Rows x, y, z. A rotation R_AB takes coordinates in frame B to coordinates in frame A: its columns are B's axes.
+/// A matrix stored by rows x, y, z. A rotation R_AB transforms coordinates in frame B to frame A: its columns are B's
+/// axes.
 template <typename Scalar>
 struct Matrix3 {
   Vector3<Scalar> x, y, z;
 
-  /// Row `row`: m[i][j] is the entry in row i and column j.
+  /// Returns row `row`: m[i][j] is the entry in row i and column j.
   constexpr const Vector3<Scalar>& operator[](std::size_t row) const {
     return row == 0 ? x : row == 1 ? y : z;
   }
@@ -113,7 +114,7 @@ inline Matrix3<Scalar> scaled(const Scalar& factor, const Matrix3<Scalar>& a) {
   return {scaled(factor, a.x), scaled(factor, a.y), scaled(factor, a.z)};
 }
 
-/// The third column: where a rotation R_WB sends the body's z axis, along which rotors push.
+/// Returns the third column. For a rotation R_WB this is the body's z axis, the thrust direction, in W.
 template <typename Scalar>
 inline Vector3<Scalar> z_axis(const Matrix3<Scalar>& a) {
   return {a.x.z, a.y.z, a.z.z};
@@ -140,7 +141,7 @@ inline bool is_finite(const Matrix3<Scalar>& a) {
   return is_finite(a.x) && is_finite(a.y) && is_finite(a.z);
 }
 
-/// True if |R'R - I| <= tolerance in every entry, and det R > 0. False if an entry is not a number.
+/// Returns true if |R'R - I| <= tolerance in every entry and det R > 0; false if an entry is NaN.
 template <typename Scalar>
 inline bool is_rotation(const Matrix3<Scalar>& r, Scalar tolerance) {
   const Matrix3<Scalar> gram = transpose(r) * r;

@@ -1,5 +1,6 @@
-/// @file From thrust and torque to rotor forces: actuation
-/// matrix, pseudo-inverse, and prioritized mixing under saturation. Body frame: x forward, y left, z up.
+/// @file From thrust and torque to rotor forces: actuation matrix, pseudo-inverse, prioritized mixing under saturation.
+///
+/// Body frame: x forward, y left, z up.
 #pragma once
 
 #include <cstdint>
@@ -10,12 +11,11 @@ namespace swarmcert::controller {
 
 inline constexpr int kMostRotors = 8;
 
-/// One rotor, which pushes along the body's z axis.
+/// One rotor, whose thrust is along the body's z axis.
 template <typename Scalar>
 struct Rotor {
   Scalar x_m, y_m;
-  Scalar
-      torque_per_thrust_m;  ///< about z, with sign: positive if the reaction turns the body from x towards y
+  Scalar torque_per_thrust_m;  ///< signed, about z: positive if the reaction torque turns x towards y
 };
 
 template <typename Scalar>
@@ -31,14 +31,14 @@ struct Wrench {
   Vector3<Scalar> torque_N_m{};
 };
 
-/// Forces of the rotors, in their order.
+/// Rotor forces, in the order of the rotors.
 template <typename Scalar>
 struct RotorForces {
   Scalar at_N[kMostRotors] = {};
 };
 
-/// The four rotors of a Crazyflie in the order of its motors: front right, back right, back left, front left, each
-/// arm_m / sqrt(2) from the axes; the first turns the body clockwise as seen from above.
+/// Returns the four rotors of a Crazyflie in the order of its motors: front right, back right, back left, front left,
+/// each arm_m / sqrt(2) from the axes. The reaction torque of the first turns the body clockwise as seen from above.
 template <typename Scalar>
 inline Rotors<Scalar> crazyflie_rotors(Scalar arm_m, Scalar torque_per_thrust_m) {
   const Scalar d = product(arm_m, Scalar(0.707106781186547524));
@@ -52,9 +52,8 @@ inline Rotors<Scalar> crazyflie_rotors(Scalar arm_m, Scalar torque_per_thrust_m)
   return rotors;
 }
 
-/// Entry (row, rotor) of the actuation matrix B_0, eta = B_0 f: rows T, tau_x, tau_y, tau_z in newton and newton
-/// metre per newton. (The paper writes squared motor speeds for f; the constant between them lies in battery.h's
-/// calibration.)
+/// Returns entry (row, rotor) of the actuation matrix B_0 in eta = B_0 f; the rows are T, tau_x, tau_y, tau_z, in N/N
+/// and N m/N. (The paper uses squared motor speeds for f; the constant factor is part of the calibration in battery.h.)
 template <typename Scalar>
 inline Scalar actuation(const Rotor<Scalar>& rotor, int row) {
   switch (row) {
@@ -69,7 +68,7 @@ inline Scalar actuation(const Rotor<Scalar>& rotor, int row) {
   }
 }
 
-/// eta = B_0 f.
+/// Returns eta = B_0 f.
 template <typename Scalar>
 inline Wrench<Scalar> wrench(const Rotors<Scalar>& rotors, const RotorForces<Scalar>& forces) {
   Scalar eta[4] = {};
@@ -81,21 +80,22 @@ inline Wrench<Scalar> wrench(const Rotors<Scalar>& rotors, const RotorForces<Sca
   return {eta[0], {eta[1], eta[2], eta[3]}};
 }
 
-/// Right inverse of the controlled rows of B_0.
+/// Right inverse of the controllable rows of B_0.
 template <typename Scalar>
 struct Allocation {
-  /// 4: the full wrench is controlled. 3: all but the yaw torque is (three rotors, or no reaction torque), and the
-  /// last column of `inverse` is 0. 0: the rotors control less than thrust, roll and pitch (on one line, fewer than
-  /// three, numbers that are not finite): unusable, `inverse` is 0.
+  /// 4: the full wrench can be controlled. 3: everything but the yaw torque can be controlled (three rotors, or no
+  /// reaction torque), and the last column of `inverse` is 0. 0: unusable, because thrust, roll and pitch cannot all be
+  /// controlled (collinear rotors, fewer than three rotors, non-finite numbers), and `inverse` is 0.
   int rank = 0;
   int count = 0;
-  Scalar inverse[kMostRotors][4] = {};  ///< rotor by row of B_0, N per N or per N m
+  Scalar inverse[kMostRotors][4] = {};  ///< rotors by rows of B_0, in N per N or N per N m
 };
 
 namespace detail {
 
-/// B' (B B')^-1 for the first `rows` rows of B_0, by a Cholesky factorisation of B B' with rows scaled to norm 1.
-/// False if a row, once the rows before it are taken out, keeps less than 1 % of its norm, or something overflows.
+/// Computes B' (B B')^-1 for the first `rows` rows of B_0, by a Cholesky factorization of B B' with rows scaled to norm
+/// 1. Returns false if a row, after elimination of the rows before it, retains less than 1 % of its norm, or if
+/// something overflows.
 template <typename Scalar>
 inline bool right_inverse(const Rotors<Scalar>& rotors, int rows, Allocation<Scalar>& result) {
   const Scalar zero(0), smallest_pivot = Scalar(1e-4);
@@ -122,7 +122,7 @@ inline bool right_inverse(const Rotors<Scalar>& rotors, int rows, Allocation<Sca
       }
     }
   }
-  // Solve (scaled B)(scaled B)' y = unit vector, row by row of the inverse's transpose.
+  // Solve (scaled B)(scaled B)' y = unit vector for each column of the inverse.
   for (int column = 0; column < rows; ++column) {
     Scalar y[4];
     for (int r = 0; r < rows; ++r) {
@@ -148,7 +148,8 @@ inline bool right_inverse(const Rotors<Scalar>& rotors, int rows, Allocation<Sca
 
 }  // namespace detail
 
-/// The Moore-Penrose inverse of B_0, or of its first three rows where yaw cannot be controlled; its rank says which.
+/// Returns the Moore-Penrose inverse of B_0, or of its first three rows if yaw cannot be controlled, as indicated by
+/// the rank.
 template <typename Scalar>
 inline Allocation<Scalar> allocation(const Rotors<Scalar>& rotors) {
   Allocation<Scalar> result;
@@ -164,29 +165,29 @@ inline Allocation<Scalar> allocation(const Rotors<Scalar>& rotors) {
   return result;
 }
 
-/// Range of every rotor's force.
+/// Common limits on the force of every rotor.
 template <typename Scalar>
 struct ForceLimits {
   Scalar lower_N{};
   Scalar upper_N{};
 };
 
-/// Rotor forces, and how much of the wanted wrench they give.
+/// Rotor forces, and the share of the desired wrench that they produce.
 template <typename Scalar>
 struct Mixed {
   RotorForces<Scalar> forces;  ///< each within the limits
-  bool valid = false;  ///< false: bad allocation, limits or wrench; all forces at the lower limit, or 0
+  bool valid = false;  ///< false: invalid allocation, limits or wrench; all forces at the lower limit, or 0
   bool thrust_limited = false;
-  Scalar thrust_N{};  ///< collective thrust that the forces were made for
+  Scalar thrust_N{};  ///< collective thrust for which the forces were computed
   Scalar roll_pitch_share =
-      Scalar(1);                 ///< share of (tau_x, tau_y) kept, 0 to 1; its direction is kept always
+      Scalar(1);                 ///< share of (tau_x, tau_y) kept, 0 to 1; the direction is always kept
   Scalar yaw_share = Scalar(1);  ///< share of tau_z kept
 };
 
 namespace detail {
 
-/// Largest share in [0, 1] of `added` that keeps base + share * added within the limits, for every rotor.
-/// @param limiting set to the rotor that allows no more, where the share is below 1.
+/// Returns the largest share in [0, 1] for which base + share * added is within the limits for every rotor.
+/// @param limiting set to the rotor that limits the share, if the share is below 1.
 template <typename Scalar>
 inline Scalar largest_share(int count, const Scalar* base, const Scalar* added,
                             const ForceLimits<Scalar>& limits, int& limiting) {
@@ -216,19 +217,21 @@ struct TorqueShares {
   Scalar roll_pitch, yaw;
 };
 
-/// The largest share a of roll and pitch for which some share b of yaw keeps base + a tilt + b yaw within the limits.
+/// Returns the largest share a of roll and pitch for which some share b of yaw keeps base + a tilt + b yaw within the
+/// limits.
 ///
-/// The largest a of each b is the least of what the rotors allow, a concave function of b. This walks on it upwards
-/// from b = 0, along the limit of one rotor after the other, while more yaw relieves the rotor that allows least.
+/// For each b, the largest a is the minimum over the rotors' limits, a concave function of b. The algorithm ascends
+/// this function from b = 0, along the limit of one rotor after another, as long as more yaw relieves the limiting
+/// rotor.
 /// @param shares   the largest a for b = 0, below 1.
-/// @param limiting the rotor that allows no more.
+/// @param limiting the rotor that limits it.
 template <typename Scalar>
 inline TorqueShares<Scalar> relieved_by_yaw(int count, const Scalar* base, const Scalar* tilt,
                                             const Scalar* yaw, const ForceLimits<Scalar>& limits,
                                             TorqueShares<Scalar> shares, int limiting) {
   const Scalar zero(0), one(1);
   for (int step = 0; step < count; ++step) {
-    const Scalar slope = -yaw[limiting] / tilt[limiting];  // of a over b along its limit
+    const Scalar slope = -yaw[limiting] / tilt[limiting];  // slope da/db along the limit of this rotor
     if (!(slope > zero)) break;
     Scalar more = one - shares.yaw;
     const Scalar missing = one - shares.roll_pitch;
@@ -253,7 +256,7 @@ inline TorqueShares<Scalar> relieved_by_yaw(int count, const Scalar* base, const
       if (!(own < more)) continue;
       more = own;
       next = i;
-      // A rotor that more roll and pitch would relieve bounds b, not a.
+      // A rotor that is relieved by more roll and pitch limits b, not a.
       ends = end > limits.upper_N ? !(tilt[i] > zero) : !(tilt[i] < zero);
     }
     shares.yaw = shares.yaw + more;
@@ -268,7 +271,7 @@ inline TorqueShares<Scalar> relieved_by_yaw(int count, const Scalar* base, const
   return shares;
 }
 
-/// The thrust nearest to `thrust_N` at which all forces, which are proportional to it, are within the limits.
+/// Returns the thrust nearest to `thrust_N` for which all forces, which are proportional to it, are within the limits.
 template <typename Scalar>
 inline Scalar nearest_thrust_N(const Allocation<Scalar>& allocation, const ForceLimits<Scalar>& limits,
                                Scalar thrust_N) {
@@ -285,17 +288,17 @@ inline Scalar nearest_thrust_N(const Allocation<Scalar>& allocation, const Force
 
 }  // namespace detail
 
-/// Thrust mixing by priority: yaw torque is given up first, then roll and pitch torque (both by the same share), and
-/// thrust last, only where the rotors together cannot push that much or that little.
+/// Mixes thrust and torque with priorities: yaw torque is reduced first, then roll and pitch torque (both by the same
+/// factor), and thrust last, only if the rotors together cannot produce that much or that little.
 ///
-/// f = B^+ (T, 0) + a B^+ (0, tau_x, tau_y, 0) + b B^+ (0, 0, 0, tau_z) with T the nearest feasible thrust, then the
-/// largest a in [0, 1] that some b in [0, 1] allows, then the largest such b, with all forces within the limits. So a
-/// wrench whose forces are within the limits is given as it is, also where roll and pitch alone would not be; and
-/// forces follow the wrench without jumps. Mixing by priority with the
-/// motors' limits at the present battery voltage follows Faessler, Falanga and Scaramuzza, "Thrust mixing,
-/// saturation, and body-rate control for accurate aggressive quadrotor flight", RA-L 2017; the order is that of this
-/// project: the tracking bounds rest on the thrust. Keep the thrust that you ask for below all rotors' limit, or
-/// nothing is left to turn with.
+/// f = B^+ (T, 0) + a B^+ (0, tau_x, tau_y, 0) + b B^+ (0, 0, 0, tau_z), where T is the nearest feasible thrust, a the
+/// largest value in [0, 1] that is feasible with some b in [0, 1], and b the largest value for that a, such that all
+/// forces are within the limits. Hence a wrench whose forces are within the limits is produced exactly, even if roll
+/// and pitch alone would exceed them, and the forces depend continuously on the wrench. Prioritized mixing with the
+/// motor limits at the present battery voltage follows Faessler, Falanga and Scaramuzza, "Thrust mixing, saturation,
+/// and body-rate control for accurate aggressive quadrotor flight", RA-L 2017. The order of priorities is specific to
+/// this project, because the tracking bounds rely on the thrust. Command less thrust than the maximum of all rotors, or
+/// no margin is left for torque.
 template <typename Scalar>
 inline Mixed<Scalar> mix(const Allocation<Scalar>& allocation, const ForceLimits<Scalar>& limits,
                          const Wrench<Scalar>& wanted) {

@@ -1,6 +1,6 @@
 /// @file From neighbours' radio positions to the predicted force f_a_hat: tracks, fading cut-offs, the deep set.
 ///
-/// Every result is a function of the set of neighbours: their order changes no bit.
+/// Every result is a function of the set of neighbours and bitwise independent of their order.
 #pragma once
 
 #include <cstdint>
@@ -11,36 +11,36 @@
 
 namespace swarmcert::controller {
 
-/// Oldest neighbour state that still counts, in milliseconds: beyond it the downwash has moved on.
+/// Maximum age of a neighbour's state, in milliseconds; after that the downwash has moved on.
 inline constexpr std::uint32_t kMaxNeighbourAge_ms = 500;
 
-/// Milliseconds from `stamp_ms` to `now_ms` on a counter that wraps; 0 for stamps that seem to lie in the future,
-/// which a radio task between two readings of the clock can cause.
+/// Returns the milliseconds from `stamp_ms` to `now_ms` on a counter that wraps around; 0 for stamps that appear to be
+/// in the future, which occur when a radio task runs between two readings of the clock.
 inline std::uint32_t age_ms(std::uint32_t now_ms, std::uint32_t stamp_ms) {
   const std::uint32_t age = now_ms - stamp_ms;
   return age < 0x80000000u ? age : 0;
 }
 
-/// What is known of one neighbour. Positions arrive, velocities do not.
+/// Estimated state of one neighbour. Positions are received; velocities are estimated from them.
 template <typename Scalar>
 struct NeighbourTrack {
   Vector3<Scalar> position_W_m;
   Vector3<Scalar> velocity_W_m_s;
   std::uint32_t stamp_ms = 0;           ///< of the position
-  std::uint32_t velocity_since_ms = 0;  ///< when the velocity became known
+  std::uint32_t velocity_since_ms = 0;  ///< when a velocity first became available
   int kind = 0;                         ///< index into DeepSet::phi
   bool has_position = false;
   bool has_velocity = false;
 };
 
-/// v <- smoothing v + (1 - smoothing) (p_new - p_old) / dt, each axis held within largest_m_s.
+/// v <- smoothing v + (1 - smoothing) (p_new - p_old) / dt, with each difference quotient clamped to +-largest_m_s.
 template <typename Scalar>
 struct VelocityFilter {
   Scalar smoothing = Scalar(0.8);    ///< in [0, 1)
-  Scalar largest_m_s = Scalar(2.0);  ///< a lost marker makes positions jump
+  Scalar largest_m_s = Scalar(2.0);  ///< limits jumps of the position due to a lost marker
 };
 
-/// What became of a new position.
+/// Result of processing a new position.
 enum class TrackStatus : std::uint8_t {
   kUpdated,
   kStarted,    ///< the first position, or the first after more than kMaxNeighbourAge_ms: no velocity yet
@@ -49,10 +49,10 @@ enum class TrackStatus : std::uint8_t {
   kOutOfRange  ///< further than kFarthestPosition_m from the origin: ignored
 };
 
-/// Positions beyond are not of this room.
+/// Positions beyond this limit are invalid.
 inline constexpr int kFarthestPosition_m = 1000;
 
-/// Takes a position that was measured at `stamp_ms` into the track.
+/// Updates the track with a position measured at `stamp_ms`.
 template <typename Scalar>
 inline TrackStatus update(NeighbourTrack<Scalar>& track, const VelocityFilter<Scalar>& filter,
                           const Vector3<Scalar>& position_W_m, std::uint32_t stamp_ms) {
@@ -85,10 +85,10 @@ inline TrackStatus update(NeighbourTrack<Scalar>& track, const VelocityFilter<Sc
   return TrackStatus::kUpdated;
 }
 
-/// Which neighbours count: those in a box of relative positions p_j - p_i, in W, that are known and fresh.
-/// A neighbour's weight falls to 0 linearly over fade_m towards each face of the box and over fade_ms towards
-/// kMaxNeighbourAge_ms, and rises over fade_ms from when its velocity is known; the least of these counts. A fade of
-/// 0 makes that cut-off hard.
+/// Which neighbours are taken into account: those with a known velocity and a recent position whose relative position
+/// p_j - p_i, in W, is within a box. A neighbour's weight decreases linearly to 0 over fade_m towards each face of the
+/// box and over fade_ms towards kMaxNeighbourAge_ms, and increases over fade_ms from the time its velocity becomes
+/// known; the smallest of these weights applies. A fade of 0 makes that cut-off hard.
 template <typename Scalar>
 struct CutOffs {
   Vector3<Scalar> lower_m{Scalar(-1), Scalar(-1), Scalar(-1)};
@@ -99,7 +99,7 @@ struct CutOffs {
 
 namespace detail {
 
-/// min(inside / fade, 1), at least 0; with fade 0, whether `inside` is positive.
+/// Returns min(inside / fade, 1), at least 0; with fade 0, returns 1 if `inside` is positive, else 0.
 template <typename Scalar>
 inline Scalar ramp(const Scalar& inside, const Scalar& fade) {
   if (!(inside > Scalar(0))) return Scalar(0);
@@ -113,7 +113,7 @@ inline Scalar least(const Scalar& a, const Scalar& b) {
 
 }  // namespace detail
 
-/// Weight in [0, 1] of a neighbour as CutOffs defines it.
+/// Returns the weight in [0, 1] of a neighbour as defined by CutOffs.
 template <typename Scalar>
 inline Scalar weight(const NeighbourTrack<Scalar>& track, const CutOffs<Scalar>& cut_offs,
                      const Vector3<Scalar>& own_position_W_m, std::uint32_t now_ms) {
@@ -121,7 +121,7 @@ inline Scalar weight(const NeighbourTrack<Scalar>& track, const CutOffs<Scalar>&
   if (!track.has_velocity || age >= kMaxNeighbourAge_ms) return Scalar(0);
   const auto fade_ms = static_cast<Scalar>(cut_offs.fade_ms);
   const auto left_ms = static_cast<Scalar>(kMaxNeighbourAge_ms - age);
-  // One more than the age of the velocity: with a hard cut-off a neighbour counts at once.
+  // One more than the age of the velocity, so that with a hard cut-off a neighbour counts immediately.
   const auto known_ms = static_cast<Scalar>(age_ms(now_ms, track.velocity_since_ms)) + Scalar(1);
   Scalar w = detail::least(detail::ramp(left_ms, fade_ms), detail::ramp(known_ms, fade_ms));
   const Vector3<Scalar> p = track.position_W_m - own_position_W_m;
@@ -136,32 +136,32 @@ inline constexpr int kMostNeighbours = 10;
 inline constexpr int kNeighbourInputs = 6;  ///< p_j - p_i in m, then v_j - v_i in m/s, in W
 inline constexpr int kOwnInputs = 4;        ///< of the ground term: own -z in m, own -v in m/s, in W
 
-/// How a deep set's output becomes a force.
+/// How the output of a deep set is converted to a force.
 template <typename Scalar>
 struct PredictionSettings {
   CutOffs<Scalar> cut_offs;
-  Scalar newton_per_unit = Scalar(9.81e-3);  ///< of the network's output; here gram-force
-  Scalar largest_force_N = Scalar(0.2);      ///< |f_a_hat| is held within: no network may ask for more
+  Scalar newton_per_unit = Scalar(9.81e-3);  ///< unit of the network's output; here gram-force
+  Scalar largest_force_N = Scalar(0.2);      ///< limit on |f_a_hat|, whatever the network predicts
 };
 
-/// Why f_a_hat is what it is.
+/// Result of a prediction: success or the reason for failure.
 enum class PredictionStatus : std::uint8_t {
   kOk,
   kTooManyNeighbours,  ///< more than kMostNeighbours: f_a_hat = 0
   kOwnStateInvalid,    ///< not finite, or out of range: f_a_hat = 0
   kNetworkFailed,      ///< see Prediction::network: f_a_hat = 0
-  kWrongNetwork        ///< other numbers of inputs or outputs: f_a_hat = 0
+  kWrongNetwork        ///< wrong number of inputs or outputs: f_a_hat = 0
 };
 
 template <typename Scalar>
 struct Prediction {
   Vector3<Scalar>
-      effect_W_N;  ///< f_a_hat; zero unless the status is kOk: no compensation rather than a wrong one
+      effect_W_N;  ///< f_a_hat; zero unless the status is kOk, so that a failure means no compensation
   PredictionStatus status = PredictionStatus::kOk;
   nn::DeepSetStatus network = nn::DeepSetStatus::kOk;
   int used = 0;     ///< neighbours with weight 1
   int fading = 0;   ///< neighbours with a weight between 0 and 1
-  Scalar jump_N{};  ///< |f_a_hat - previous|: what the controller sees as a step
+  Scalar jump_N{};  ///< |f_a_hat - previous|: the step that the controller sees
 };
 
 namespace detail {
@@ -224,18 +224,18 @@ inline Prediction<Scalar> predict_from_zero(const nn::DeepSet<Scalar>& set,
 
 }  // namespace detail
 
-/// f_a_hat from the tracks, in any order.
+/// Computes f_a_hat from the tracks, in any order.
 ///
-/// With all weights 0 or 1 this is the deep set of the neighbours with weight 1. In between it is
+/// If all weights are 0 or 1, this is the deep set of the neighbours with weight 1. Otherwise it is
 ///   f = (1 - w_1) F(N_0) + (w_1 - w_2) F(N_1) + ... + w_k F(N_k),   1 > w_1 > ... > w_k > 0,
-/// where N_i holds the neighbours of weight w_i and more, N_0 those of weight 1 (Lovasz's extension of the set
-/// function F). It is a convex combination of values of F, so every bound on F's range holds; it is continuous in the
-/// weights; and while a weight w moves, f moves by at most |w'| times what that neighbour changes F by. Where that
-/// neighbour makes or ends a composition in which the set is silent, it changes F by all of F, whose size no
-/// certificate of the set states: largest_force_N is what limits it. Each distinct weight costs one more evaluation of
-/// the set.
+/// where N_i contains the neighbours with weight at least w_i and N_0 those with weight 1 (the Lovasz extension of the
+/// set function F). This is a convex combination of values of F, so every bound on the range of F holds. It is
+/// continuous in the weights; while a weight w changes, f changes at a rate of at most |w'| times the change of F due
+/// to that neighbour. If that neighbour makes the composition silent or stops it from being so, the change of F is all
+/// of F, whose size no certificate of the set states; it is limited by largest_force_N. Each distinct weight costs one
+/// more evaluation of the set.
 ///
-/// @param previous_W_N f_a_hat of the last execution, for Prediction::jump_N.
+/// @param previous_W_N f_a_hat of the previous execution, for Prediction::jump_N.
 template <typename Scalar>
 inline Prediction<Scalar> predict(const nn::DeepSet<Scalar>& set, const PredictionSettings<Scalar>& settings,
                                   const Vector3<Scalar>& own_position_W_m,

@@ -1,13 +1,13 @@
-/// @file From tracking error to desired force: the paper's position law, and the PID law that firmware ships.
+/// @file From tracking error to desired force: the paper's position law, and the PID law of stock firmware.
 ///
-/// World frame W: z up, gravity (0, 0, -g). Tracking error p~ = p - p_d. I is the integral of p~.
+/// World frame W: z up, gravity (0, 0, -g). The tracking error is p~ = p - p_d, and I is its integral.
 #pragma once
 
 #include "controller/linear_algebra.h"
 
 namespace swarmcert::controller {
 
-/// Standard gravity as the analysed firmware has it, in m/s^2.
+/// Standard gravity as used by the analysed firmware, in m/s^2.
 inline constexpr double kGravity_m_s2 = 9.81;
 
 /// p~ and its derivative, in W.
@@ -17,22 +17,22 @@ struct TrackingError {
   Vector3<Scalar> velocity_m_s;
 };
 
-/// What both laws add to the feedback, in W.
+/// Feed-forward terms of both laws, in W.
 template <typename Scalar>
 struct FeedForward {
   Vector3<Scalar> acceleration_m_s2;  ///< p_d''
   Vector3<Scalar>
-      predicted_effect_N;  ///< f_a_hat: what other vehicles' air does to this one; 0 where unknown
+      predicted_effect_N;  ///< f_a_hat: predicted interaction force from other vehicles; 0 if unknown
 };
 
-/// Gains of the paper, equations (8) and (9). The tracking theorem needs both symmetric positive definite.
+/// Gains of the paper's equations (8) and (9). The tracking theorem requires both to be symmetric positive definite.
 template <typename Scalar>
 struct CompositeGains {
   Matrix3<Scalar> Lambda_1_s;
   Matrix3<Scalar> K_kg_s;
 };
 
-/// Gains as firmware has them: accelerations, per axis.
+/// Gains in the form used by firmware: accelerations, per axis.
 template <typename Scalar>
 struct PidGains {
   Vector3<Scalar> Kp_1_s2;
@@ -40,7 +40,7 @@ struct PidGains {
   Vector3<Scalar> Ki_1_s3;
 };
 
-/// f_d = m v_r_dot - K s - m g - f_a_hat in newton, in W, with the composite variable s = p~' + 2 Lambda p~ +
+/// Returns f_d = m v_r_dot - K s - m g - f_a_hat in newton, in W, with the composite variable s = p~' + 2 Lambda p~ +
 /// Lambda^2 I and the reference acceleration v_r_dot = p_d'' - 2 Lambda p~' - Lambda^2 p~ (paper, section IV-A).
 template <typename Scalar>
 inline Vector3<Scalar> desired_force(const CompositeGains<Scalar>& gains, const Scalar& mass_kg,
@@ -57,7 +57,7 @@ inline Vector3<Scalar> desired_force(const CompositeGains<Scalar>& gains, const 
   return force - feed_forward.predicted_effect_N;
 }
 
-/// f_d = m (p_d'' - Kd p~' - Kp p~ - Ki I) - m g - f_a_hat in newton, in W.
+/// Returns f_d = m (p_d'' - Kd p~' - Kp p~ - Ki I) - m g - f_a_hat in newton, in W.
 template <typename Scalar>
 inline Vector3<Scalar> desired_force(const PidGains<Scalar>& gains, const Scalar& mass_kg,
                                      const TrackingError<Scalar>& error, const Vector3<Scalar>& integral_m_s,
@@ -70,23 +70,24 @@ inline Vector3<Scalar> desired_force(const PidGains<Scalar>& gains, const Scalar
   return force - feed_forward.predicted_effect_N;
 }
 
-/// How the integral of p~ is formed.
+/// How the integral of p~ is computed.
 template <typename Scalar>
 struct Integrator {
-  /// Largest |I| per axis; infinite: none. A clamped integral cancels a constant force of m Ki limit at most.
+  /// Limit on |I| per axis; infinite: no limit. A clamped integral cancels a constant force of at most m Ki limit.
   Vector3<Scalar> limit_m_s;
-  /// What one execution of the position loop adds p~ times: the loop's period. Public firmware has a 100 Hz loop
-  /// with 1/500 s here, which makes Ki five times weaker than it reads.
+  /// Time step by which p~ is multiplied in each execution of the position loop: the period of the loop. Public
+  /// firmware runs the loop at 100 Hz but uses 1/500 s here, which makes Ki effectively five times weaker than its
+  /// nominal value.
   Scalar step_s;
 };
 
-/// Axes on which the integral keeps its value.
+/// Axes on which the integral is held.
 struct HeldAxes {
   bool x = false, y = false, z = false;
 };
 
-/// Anti-windup (conditional integration): while the thrust is at its upper limit, axes stand still on which the next
-/// step of the integral would push `force_N` further out. Without saturation: none.
+/// Anti-windup by conditional integration: while the thrust is at its upper limit, returns the axes on which the next
+/// step of the integral would increase `force_N` further. Without saturation, no axis is held.
 template <typename Scalar>
 inline HeldAxes held_axes(const PidGains<Scalar>& gains, const Vector3<Scalar>& position_error_m,
                           const Vector3<Scalar>& force_N, bool thrust_saturated) {
@@ -97,7 +98,8 @@ inline HeldAxes held_axes(const PidGains<Scalar>& gains, const Vector3<Scalar>& 
           product(push.z, force_N.z) > zero};
 }
 
-/// As above; where Lambda and K couple the axes, all stand still if the whole step would push further out.
+/// Same for composite gains. Since Lambda and K couple the axes, all are held if the whole step would increase the
+/// force.
 template <typename Scalar>
 inline HeldAxes held_axes(const CompositeGains<Scalar>& gains, const Vector3<Scalar>& position_error_m,
                           const Vector3<Scalar>& force_N, bool thrust_saturated) {
@@ -107,8 +109,8 @@ inline HeldAxes held_axes(const CompositeGains<Scalar>& gains, const Vector3<Sca
   return {outward, outward, outward};
 }
 
-/// The integral after one more execution: I + step p~, clamped, on the axes that are not held. Use the result in the
-/// same execution: that is the sampled loop which the bounds analyse.
+/// Returns the integral after one more execution: I + step p~, clamped, on the axes that are not held. Use the result
+/// in the same execution, since that is the sampled loop that the bounds analyse.
 template <typename Scalar>
 inline Vector3<Scalar> integrate(const Integrator<Scalar>& integrator, const Vector3<Scalar>& integral_m_s,
                                  const Vector3<Scalar>& position_error_m, const HeldAxes& held = {}) {

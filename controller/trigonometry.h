@@ -1,4 +1,4 @@
-/// @file Sine and cosine with the same bits on every platform; C libraries differ by an ulp.
+/// @file Sine and cosine with the same bits on every platform; C libraries differ in the last place.
 #pragma once
 
 #include <limits>
@@ -15,12 +15,12 @@ struct SineCosine {
 /// Largest argument of sin_cos(), in radians: sixteen turns.
 inline constexpr int kLargestAngle_rad = 100;
 
-/// sin and cos of `angle_rad`; both NaN where |angle| > kLargestAngle_rad or the angle is not a number.
+/// Returns sin and cos of `angle_rad`; both are NaN if |angle| > kLargestAngle_rad or the angle is NaN.
 ///
-/// The angle is taken modulo pi/2 with pi/2 split in three parts, of which the first two have so few bits that their
-/// products with the number of quarter turns are exact (Cody and Waite 1980); the rest is a Taylor polynomial on
-/// [-pi/4, pi/4], whose remainder is below 3e-14. Error at most 1.2e-7 for float and 1e-13 for double, which a test
-/// measures against long double.
+/// The angle is reduced modulo pi/2, with pi/2 split into three parts, the first two of which have so few bits that
+/// their products with the number of quarter turns are exact (Cody and Waite 1980). A Taylor polynomial on [-pi/4,
+/// pi/4] follows, whose remainder is below 3e-14. The error is at most 1.2e-7 for float and 1e-13 for double; a test
+/// measures it against long double.
 template <typename Scalar>
 inline SineCosine<Scalar> sin_cos(Scalar angle_rad) {
   const Scalar limit(kLargestAngle_rad);

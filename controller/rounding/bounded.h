@@ -1,12 +1,12 @@
 /// @file A number type that bounds the difference between float and double over a set of inputs. Host only.
 ///
-/// One Bounded stands for two numbers, the one that the float instance of a formula computes and the one that the
-/// double instance computes, over a set of inputs. It knows an interval that holds both, and a bound on the distance
-/// between them. Each operation does what rounding analysis does on paper (Higham 2002, chapter 2):
+/// A Bounded represents two numbers over a set of inputs: the results of the float instance and of the double instance
+/// of a formula. It holds an interval that contains both and a bound on the distance between them. Each operation
+/// performs a standard rounding error analysis (Higham 2002, chapter 2):
 ///   fl(x op y) = (x op y)(1 + d) + e,  |d| <= u, |e| <= 2^-150 for float (u = 2^-24) and less for double (u = 2^-53),
 ///   |x_f y_f - x_d y_d| <= |x_f| |y_f - y_d| + |y_d| |x_f - x_d|,
-/// and similarly for the rest; derived at each operation. The bounds themselves are computed in double; each is a sum
-/// of fewer than 16 rounded terms of one sign, so raising it by 2^-48 of its value makes it an upper bound.
+/// and similarly for the other operations, derived there. The bounds themselves are computed in double. Each is a sum
+/// of fewer than 16 rounded terms of one sign, so increasing it by 2^-48 of its value makes it an upper bound.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 
 namespace swarmcert::controller {
 
-/// A comparison whose outcome depends on where in the set the input is: float and double may go different ways.
+/// Thrown if the outcome of a comparison depends on the position in the input set, so float and double may differ.
 class Undecided : public std::runtime_error {
  public:
   Undecided() : std::runtime_error("the set of inputs reaches both sides of a comparison") {}
@@ -26,7 +26,7 @@ class Undecided : public std::runtime_error {
 class Bounded {
  public:
   Bounded() = default;
-  /// A constant of the text: the float instance has it rounded.
+  /// A constant in the source; the float instance rounds it to float.
   explicit Bounded(double constant)
       : lower_(constant),
         upper_(constant),
@@ -35,7 +35,7 @@ class Bounded {
   }
   explicit Bounded(int constant) : Bounded(static_cast<double>(constant)) {}
 
-  /// Any double in [lower, upper], of which the float instance gets the nearest float.
+  /// Returns any double in [lower, upper]; the float instance gets the nearest float.
   static Bounded input(double lower, double upper) {
     Bounded b;
     b.lower_ = lower;
@@ -45,7 +45,7 @@ class Bounded {
     return b;
   }
   static Bounded input(double largest) { return input(-largest, largest); }
-  /// Numbers in [lower, upper] that differ by `error` at most.
+  /// Returns numbers in [lower, upper] that differ by at most `error`.
   static Bounded of(double lower, double upper, double error) {
     Bounded b;
     b.lower_ = lower;
@@ -59,7 +59,7 @@ class Bounded {
   double error() const { return error_; }
   double magnitude() const { return std::max(std::fabs(lower_), std::fabs(upper_)); }
 
-  /// The same numbers, of which more is known: the double one lies in [lower, upper].
+  /// Returns the same numbers with the additional knowledge that the double one is in [lower, upper].
   Bounded within(double lower, double upper) const {
     Bounded b = *this;
     b.lower_ = std::max(lower_, lower - error_);
@@ -95,12 +95,14 @@ class Bounded {
   friend Bounded product(const Bounded& a, const Bounded& b) {
     auto [lower, upper] =
         std::minmax({a.lower_ * b.lower_, a.lower_ * b.upper_, a.upper_ * b.lower_, a.upper_ * b.upper_});
-    // The same object twice is a square, which no independent interval shows.
+    // The product of an object with itself is a square, which is nonnegative; interval arithmetic alone would not show
+    // it.
     if (&a == &b && lower < 0) lower = 0;
     return rounded_result(lower, upper, a.magnitude() * b.error_ + b.magnitude() * a.error_);
   }
 
-  /// |sqrt x_f - sqrt x_d| <= |x_f - x_d| / (2 sqrt(least)), and <= sqrt |x_f - x_d| at zero. Negative numbers give 0.
+  /// Uses |sqrt x_f - sqrt x_d| <= |x_f - x_d| / (2 sqrt(least)), and <= sqrt |x_f - x_d| at zero. Returns 0 for
+  /// negative numbers.
   friend Bounded square_root(const Bounded& a) {
     const double lower = std::max(a.lower_, 0.0), upper = std::max(a.upper_, 0.0);
     const double near_zero = std::sqrt(a.error_);
@@ -108,7 +110,7 @@ class Bounded {
     return rounded_result(std::sqrt(lower), std::sqrt(upper), error);
   }
 
-  /// The three that follow change by no more than their arguments do.
+  /// The following three functions are 1-Lipschitz in their arguments.
   friend Bounded absolute(const Bounded& a) {
     const double lower = a.lower_ > 0 ? a.lower_ : a.upper_ < 0 ? -a.upper_ : 0;
     return of(lower, a.magnitude(), a.error_);
@@ -123,11 +125,11 @@ class Bounded {
   }
 
  private:
-  static constexpr double kUnit = 0x1p-24;  ///< of float
+  static constexpr double kUnit = 0x1p-24;  ///< unit roundoff of float
   static constexpr double kDoubleUnit = 0x1p-53;
-  static constexpr double kUnderflow = 0x1p-149;  ///< more than both formats' together
+  static constexpr double kUnderflow = 0x1p-149;  ///< more than the underflow errors of both formats together
 
-  /// An upper bound of a sum of nonnegative terms that was computed in double.
+  /// Returns an upper bound on a sum of nonnegative terms that was computed in double.
   static double up(double x) { return x * (1 + 0x1p-48) + 0x1p-1070; }
 
   void widen(double by) {
@@ -135,7 +137,7 @@ class Bounded {
     upper_ += up(by + 0x1p-48 * std::fabs(upper_));
   }
 
-  /// What an operation gives whose exact results lie in [lower, upper] and differ by `error` at most.
+  /// Returns the result of an operation whose exact results are in [lower, upper] and differ by at most `error`.
   static Bounded rounded_result(double lower, double upper, double error) {
     Bounded b = of(lower, upper, 0);
     const double rounding = b.magnitude() * (1 + 0x1p-48);

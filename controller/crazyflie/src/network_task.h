@@ -1,4 +1,4 @@
-/// @file The network's task: neighbours' positions in, f_a_hat out, a hundred times per second.
+/// @file The task that runs the network: neighbours' positions in, f_a_hat out, a hundred times per second.
 #pragma once
 
 #include <cstdint>
@@ -7,11 +7,11 @@ namespace swarmcert::crazyflie {
 
 inline constexpr std::uint32_t kPeriod_ms = 10;
 
-/// Runs the self-test, the first time; its result stays in swarmcert_status.self_test.
+/// Runs the self-test on the first call; the result is kept in swarmcert_status.self_test.
 bool passes_self_test();
 
-/// One period at the time `now_ms`: takes the peers' positions into their tracks and, unless the network is off or
-/// failed its self-test, predicts. Anything wrong gives f_a_hat = 0.
+/// Runs one period at the time `now_ms`: updates the tracks with the peers' positions and, unless the network is off or
+/// failed its self-test, predicts. Any error gives f_a_hat = 0.
 void step_network(std::uint32_t now_ms);
 
 }  // namespace swarmcert::crazyflie

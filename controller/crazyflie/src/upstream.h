@@ -1,4 +1,4 @@
-/// @file The stock firmware's interface, as far as the app uses it.
+/// @file The part of the stock firmware's interface that the app uses.
 #pragma once
 
 #if __cplusplus < 201703L
@@ -15,5 +15,5 @@ extern "C" {
 #include "usec_time.h"
 
 void appMain(void);
-float pmGetBatteryVoltage(void);  // pm.h would bring the board's pins with it
+float pmGetBatteryVoltage(void);  // pm.h would also include the board's pin definitions
 }

@@ -1,4 +1,4 @@
-/// @file Which kind each vehicle of the swarm is of: change it to yours.
+/// @file The kind of each vehicle of the swarm: edit this for your swarm.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 namespace swarmcert::crazyflie {
 
 /// The last byte of a radio address, and the index of the vehicle's kind in the exported network (the comment above
-/// deep_set() in swarmcert_network.h lists them).
+/// deep_set() in swarmcert_network.h lists the kinds).
 struct Vehicle {
   std::uint8_t id, kind;
 };

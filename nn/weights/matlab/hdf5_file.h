@@ -1,6 +1,6 @@
-/// @file HDF5, as far as MATLAB's -v7.3 files use it: the superblock, object headers and attributes. From the
-/// "HDF5 File Format Specification", version 3.0. Not the library: it is too large to stand behind files of unknown
-/// origin. Checksums of object headers are not compared.
+/// @file The subset of HDF5 that MATLAB's -v7.3 files use: the superblock, object headers and attributes.
+/// Follows the "HDF5 File Format Specification", version 3.0. The HDF5 library is not used because it is too large an
+/// attack surface for untrusted files. Checksums of object headers are not verified.
 #pragma once
 
 #include <cstddef>
@@ -12,34 +12,35 @@
 
 namespace swarmcert::files {
 
-/// An address that leads nowhere.
+/// The undefined address.
 inline constexpr std::uint64_t kNoAddress = ~std::uint64_t{0};
 
-/// What to do about a file that uses more of HDF5 than is read here.
+/// Hint for a file that uses HDF5 features which this reader does not support.
 inline constexpr char kSaveAsVersion7[] =
     "load it in MATLAB, then save('net.mat', 'weights', '-v7'), or write it with scipy.io.savemat";
 
-/// A piece of a file, read from front to back. Whatever lies beyond its end is refused.
+/// A piece of a file, read sequentially. Reading beyond its end is an error.
 class Hdf5Piece {
  public:
-  /// @param data, path  must outlive the piece. @param offset  of `data` in the file.
+  /// @param data, path  must outlive the piece.
+  /// @param offset  position of `data` in the file.
   Hdf5Piece(std::string_view data, std::size_t offset, const std::string& path)
       : data_(data), offset_(offset), path_(&path) {}
 
   std::size_t left() const { return data_.size() - at_; }
   std::size_t offset() const { return offset_ + at_; }
 
-  /// The next `size` bytes; an unsigned number of `size` <= 8 bytes, the lowest first.
+  /// Return the next `size` bytes, or an unsigned little-endian number of `size` <= 8 bytes.
   std::string_view take(std::uint64_t size);
   std::uint64_t number(std::size_t size);
   Hdf5Piece piece(std::uint64_t size);
   void skip(std::uint64_t size) { take(size); }
-  /// Bytes up to a multiple of 8 of what was taken since the beginning.
+  /// Skips the padding that aligns the bytes read since the beginning to a multiple of 8.
   void skip_padding();
 
   /// @throws InputError unless the next bytes are `signature`.
   void expect(std::string_view signature);
-  /// @throws InputError unless `number` is `expected`; the hint is to save the file in an older version.
+  /// @throws InputError unless `number` equals `expected`; the hint is to save the file in an older version.
   void require(const char* field, std::uint64_t number, std::uint64_t expected) const;
   [[noreturn]] void refuse(const std::string& field, const std::string& value, const std::string& what,
                            const std::string& hint) const;
@@ -68,54 +69,57 @@ enum class Hdf5Kind : std::uint16_t {
 
 struct Hdf5Message {
   Hdf5Kind kind;
-  bool is_shared = false;  ///< its contents lie elsewhere
+  bool is_shared = false;  ///< its contents are stored elsewhere
   Hdf5Piece contents;
 };
 
-/// A group or a dataset: what its object header says.
+/// A group or dataset, as described by its object header.
 struct Hdf5Object {
   std::size_t offset = 0;
   std::vector<Hdf5Message> messages;
 
-  /// The contents of the only message of this kind, or nothing.
-  /// @throws InputError if there are two, or if it is shared.
+  /// Returns the contents of the only message of this kind, or nothing if there is none.
+  /// @throws InputError if there are several, or if it is shared.
   std::optional<Hdf5Piece> find(Hdf5Kind kind) const;
 };
 
-/// A node of a B-tree of version 1.
+/// A node of a version 1 B-tree.
 struct Hdf5TreeNode {
-  std::uint64_t level = 0;  ///< 0: its children are no nodes
-  std::uint64_t count = 0;  ///< of children
+  std::uint64_t level = 0;  ///< 0: its children are not nodes
+  std::uint64_t count = 0;  ///< number of children
   Hdf5Piece entries;        ///< keys and children
 };
 
-/// A whole file in memory. Everything that follows an address counts against two limits, so that references to the
-/// same place cost no more than a large network does.
+/// A whole file in memory. Everything reached through an address counts against two limits, so that repeated references
+/// to the same place cost no more than reading a large network.
 class Hdf5File {
  public:
-  /// @param bytes, path  must outlive the file. @param start  where the superblock lies; addresses count from there.
-  /// @throws InputError unless this is a superblock of version 0, 2 or 3 with addresses and lengths of 8 bytes.
+  /// @param bytes, path  must outlive this object.
+  /// @param start  position of the superblock; addresses are relative to it.
+  /// @throws InputError unless this is a superblock of version 0, 2 or 3 with 8-byte addresses and lengths.
   Hdf5File(const std::string& bytes, std::size_t start, const std::string& path);
 
   std::uint64_t root() const { return root_; }
   std::size_t size_bytes() const { return bytes_.size(); }
 
-  /// @throws InputError if these bytes are not in the file.
+  /// @throws InputError if these bytes are outside the file.
   Hdf5Piece at(std::uint64_t address, std::uint64_t size) const;
-  /// From `address` to the end of the file.
+  /// Returns the bytes from `address` to the end of the file.
   Hdf5Piece from(std::uint64_t address) const;
 
-  /// @throws InputError unless a header of version 1 or 2 is at `address`.
+  /// @throws InputError unless there is an object header of version 1 or 2 at `address`.
   Hdf5Object object(std::uint64_t address);
 
-  /// @param type  0 of groups, 1 of chunks. @param parent_level  of the node that leads here; nothing: none.
-  /// @throws InputError unless the node is one level below its parent, so that no cycle is followed.
+  /// @param type  0 for groups, 1 for chunks.
+  /// @param parent_level  level of the node that refers to this one; nothing for the root.
+  /// @throws InputError unless the node is one level below its parent, which prevents cycles.
   Hdf5TreeNode tree_node(std::uint64_t address, std::uint64_t type,
                          std::optional<std::uint64_t> parent_level) const;
 
-  /// One entry of any table: at most a million in a file. @param piece  for the message.
+  /// Counts one entry of any table, at most a million per file.
+  /// @param piece  for the message.
   void count_entry(const Hdf5Piece& piece);
-  /// `size` bytes of numbers that are read: at most 128 MiB in a file.
+  /// Counts `size` bytes of numbers read, at most 128 MiB per file.
   void count_bytes(std::uint64_t size, const Hdf5Piece& piece);
 
  private:

@@ -1,4 +1,4 @@
-/// @file Groups of HDF5: which names lead to which objects.
+/// @file HDF5 groups: the mapping from names to objects.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,9 @@ struct Hdf5Link {
 
 bool is_group(const Hdf5Object& object);
 
-/// What the group contains, at most 4096 links, as a symbol table (B-tree of version 1) or as link messages.
-/// @throws InputError if the group is damaged, keeps its links in a fractal heap, or has links that are not hard.
+/// Returns the contents of the group, at most 4096 links, stored as a symbol table (version 1 B-tree) or link messages.
+/// @throws InputError if the group is damaged, stores its links in a fractal heap, or has links that are not hard
+///   links.
 std::vector<Hdf5Link> links_of(Hdf5File& file, const Hdf5Object& group);
 
 }  // namespace swarmcert::files

@@ -1,4 +1,4 @@
-/// @file Where the elements of an HDF5 dataset lie in the file, and through which filters they went.
+/// @file Storage layout and filters of the elements of an HDF5 dataset.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,11 @@
 
 namespace swarmcert::files {
 
-/// The bytes of the row-major elements of `dataset`.
-/// @param shape  of the dataset, with at most kMostElements elements. @param element_bytes  of one element.
-/// @throws InputError if the layout or a filter is none of those that hdf5_dataset.h names, if a chunk is missing,
-/// stored twice or not of the size that it must have, or if the file is too small for this number of elements.
+/// Returns the bytes of the row-major elements of `dataset`.
+/// @param shape  of the dataset, with at most kMostElements elements.
+/// @param element_bytes  size of one element.
+/// @throws InputError if the layout or a filter is not one of those named in hdf5_dataset.h, if a chunk is missing,
+///   stored twice or of the wrong size, or if the file is too small for this number of elements.
 std::string stored_bytes(Hdf5File& file, const Hdf5Object& dataset, const std::vector<std::uint64_t>& shape,
                          std::size_t element_bytes);
 

@@ -1,4 +1,4 @@
-/// @file MATLAB's MAT files, version 7.3: HDF5 with attributes that name MATLAB's classes.
+/// @file MATLAB's MAT files, version 7.3: HDF5 with attributes that name MATLAB classes.
 #pragma once
 
 #include <string>
@@ -8,9 +8,9 @@
 
 namespace swarmcert::files {
 
-/// The variables of a MAT file of version 7.3, whose HDF5 part begins at 512.
-/// @throws InputError if the file is damaged, or uses more of HDF5 than hdf5_file.h, hdf5_group.h and hdf5_dataset.h
-/// read.
+/// Reads the variables of a MAT file of version 7.3, whose HDF5 part begins at offset 512.
+/// @throws InputError if the file is damaged, or uses HDF5 features that hdf5_file.h, hdf5_group.h and hdf5_dataset.h
+///   do not support.
 std::vector<MatVariable> mat73_variables(const std::string& bytes, const std::string& path);
 
 }  // namespace swarmcert::files

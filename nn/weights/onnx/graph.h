@@ -1,4 +1,4 @@
-/// @file Follows an ONNX graph from its input to its output and builds the chain that is the same function.
+/// @file Traverses an ONNX graph from its input to its output and builds an equivalent chain of layers.
 #pragma once
 
 #include <functional>
@@ -24,8 +24,8 @@ class OnnxGraph {
  public:
   OnnxGraph(OnnxModel model, const std::string& path);
 
-  /// Layers, precision and notes; order and hash are left to the caller.
-  /// @throws InputError that names the node, its offset and what to do.
+  /// Returns layers, precision and notes; the caller sets order and hash.
+  /// @throws InputError with the node, its offset and a hint.
   Weights run();
 
  private:
@@ -81,12 +81,12 @@ class OnnxGraph {
   OnnxModel model_;
   const std::string& path_;
   ReluChain chain_;
-  std::map<std::string, OnnxValue> values_;  ///< those that a later node takes
-  std::map<std::string, int> uses_;          ///< by later nodes
+  std::map<std::string, OnnxValue> values_;  ///< values that later nodes use
+  std::map<std::string, int> uses_;          ///< number of uses by later nodes
   std::set<std::string> names_;
   int layers_ = 0;
   std::set<std::string> notes_;
-  /// Of a Concat that stands for MaxMin, by its output: the Split, or ReduceMax and ReduceMin, before it.
+  /// For each Concat that implements MaxMin, keyed by its output: the preceding Split, or ReduceMax and ReduceMin.
   std::map<std::string, std::vector<OnnxNode>> joined_;
 };
 

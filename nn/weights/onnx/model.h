@@ -1,4 +1,4 @@
-/// @file An ONNX model as its file holds it: nodes, stored tensors, the graph's input and output.
+/// @file An ONNX model as stored in its file: nodes, stored tensors, the graph's input and output.
 #pragma once
 
 #include <cstddef>
@@ -11,22 +11,22 @@
 
 namespace swarmcert::files {
 
-/// A tensor that lies in the file, or is computed from such.
+/// A tensor that is stored in the file, or computed from stored ones.
 struct OnnxTensor {
   std::string name;
   std::vector<std::uint64_t> shape;
   std::uint64_t type = 0;  ///< TensorProto.data_type
   std::size_t offset = 0;
-  std::vector<double> numbers;         ///< of float16, bfloat16, float32 and float64, row-major
-  std::vector<std::int64_t> integers;  ///< of int32 and int64
-  bool is_read = false;                ///< false: of a type that is neither
+  std::vector<double> numbers;         ///< for float16, bfloat16, float32 and float64; row-major
+  std::vector<std::int64_t> integers;  ///< for int32 and int64
+  bool is_read = false;                ///< false: the type is none of these
 };
 
 struct OnnxAttribute {
-  std::optional<double> number;  ///< of a float or an integer
+  std::optional<double> number;  ///< a float or an integer
   std::optional<std::string> text;
-  std::vector<std::int64_t> integers;  ///< of a list
-  std::vector<double> floats;          ///< of a list
+  std::vector<std::int64_t> integers;  ///< a list of integers
+  std::vector<double> floats;          ///< a list of floats
   std::optional<OnnxTensor> tensor;
 };
 
@@ -36,7 +36,7 @@ struct OnnxNode {
   std::map<std::string, OnnxAttribute> attributes;
   std::size_t offset = 0;
 
-  /// `Gemm "/fc1/Gemm"`, for messages.
+  /// Returns `Gemm "/fc1/Gemm"`, for messages.
   std::string label() const;
   bool has(const std::string& attribute) const { return attributes.count(attribute) == 1; }
   double number(const std::string& attribute, double otherwise) const;
@@ -45,26 +45,26 @@ struct OnnxNode {
   std::string text(const std::string& attribute, const std::string& otherwise) const;
 };
 
-/// A size of -1 is one that the file leaves open.
+/// The graph's input. A size of -1 is left open by the file.
 struct OnnxInput {
   std::string name;
   std::optional<std::vector<std::int64_t>> shape;
 };
 
 struct OnnxModel {
-  std::vector<OnnxNode> nodes;  ///< in the file's order, in which each comes after those that it depends on
+  std::vector<OnnxNode> nodes;  ///< in the file's order, which is topological
   std::map<std::string, OnnxTensor> tensors;
   OnnxInput input;
   std::string output;
 };
 
-/// Types of numbers in TensorProto.data_type.
+/// Number types in TensorProto.data_type.
 inline constexpr std::uint64_t kOnnxFloat = 1, kOnnxInt32 = 6, kOnnxInt64 = 7, kOnnxFloat16 = 10,
                                kOnnxDouble = 11, kOnnxBfloat16 = 16;
 inline constexpr char kReexportOnnx[] =
     "export a plain chain of linear layers with ReLU between them: torch.onnx.export(model, ...)";
 
-/// Reads what is needed of a ModelProto. https://onnx.ai/onnx/repo-docs/IR.html
+/// Parses the needed parts of a ModelProto. https://onnx.ai/onnx/repo-docs/IR.html
 /// @throws InputError with the offset.
 OnnxModel read_onnx_model(const std::string& bytes, const std::string& path);
 

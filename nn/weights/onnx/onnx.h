@@ -1,4 +1,4 @@
-/// @file ONNX models of affine and piecewise linear operations and of activations that are known.
+/// @file ONNX models that consist of affine and piecewise linear operations and supported activations.
 #pragma once
 
 #include <string>
@@ -7,20 +7,23 @@
 
 namespace swarmcert::files {
 
-/// True if `bytes` begin as an ONNX model does: with its IR version and another field of a model.
+/// Returns true if `bytes` begin like an ONNX model: with its IR version and another field of a model.
 bool looks_like_onnx(const std::string& bytes);
 
-/// The network in `bytes`; `path` for messages.
+/// Parses the network in `bytes`; `path` is used in messages only.
 ///
-/// Accepted nodes, from the graph's one input to its one output: affine ones (Gemm, MatMul, Conv, BatchNormalization in
-/// inference, AveragePool, Add, Sub, Mul and Div by constants, skip connections), which are folded exactly or with the
-/// rounding stated in Layer; piecewise linear ones (Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, MaxPool),
-/// which are written with ReLU, the same function; smooth activations (Tanh, Sigmoid, Softplus, Elu, Gelu, x
-/// Sigmoid(x)), past which skip connections are kept as they are; MaxMin and GroupSort without skip connections beside
-/// them; and those that only rearrange. A Softmax at the end is left out. Behind any other activation at the end
-/// follows an identity layer. Weights lie in the file itself, in float16, bfloat16, float32 or float64. The batch is 1.
-/// A layer is called as its first weight without ".weight".
-/// @throws InputError for anything else, naming node, tensor or attribute, or as assemble().
+/// Accepted nodes, from the graph's one input to its one output:
+/// - affine: Gemm, MatMul, Conv, BatchNormalization in inference, AveragePool, Add, Sub, Mul and Div by constants, skip
+///    connections; they are folded exactly, or with the rounding error stated in Layer;
+/// - piecewise linear: Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, MaxPool; they are rewritten with
+///    ReLU as the same function;
+/// - smooth activations: Tanh, Sigmoid, Softplus, Elu, Gelu, x Sigmoid(x); skip connections past them are kept;
+/// - MaxMin and GroupSort, without parallel skip connections;
+/// - nodes that only rearrange.
+/// A final Softmax is omitted. Any other final activation is followed by an identity layer. Weights must be stored in
+/// the file itself, as float16, bfloat16, float32 or float64. The batch size is 1. A layer is named after its first
+/// weight, without ".weight".
+/// @throws InputError with node, tensor or attribute for anything else, or as assemble().
 Weights parse_onnx(const std::string& bytes, const std::string& path, const std::vector<std::string>& order);
 
 }  // namespace swarmcert::files

@@ -1,4 +1,4 @@
-/// @file ONNX operators as affine maps, and the shapes that they give. https://onnx.ai/onnx/operators/
+/// @file ONNX operators as affine maps, with the shapes of their results. https://onnx.ai/onnx/operators/
 #pragma once
 
 #include <cstdint>
@@ -10,57 +10,57 @@
 
 namespace swarmcert::files {
 
-/// Entries that the input, or the result of a convolution, may have.
+/// Maximum number of entries of the input, or of the result of a convolution.
 inline constexpr std::uint64_t kMostRows = std::uint64_t{1} << 20;
 
 using OnnxShape = std::vector<std::int64_t>;  ///< every size at least 1; the batch is 1
 
-/// Thrown by the functions here; the reader adds file, offset and node.
+/// Thrown by these functions; the reader adds file, offset and node.
 struct OperatorRefusal {
   std::string what;
   std::string hint = kReexportOnnx;
 };
 
-/// A tensor that the network computes, row-major, as an affine map of the last ReLU layer's outputs.
+/// A row-major tensor computed by the network, as an affine map of the outputs of the last ReLU layer.
 struct OnnxValue {
   AffineMap map;
   OnnxShape shape;
-  std::string name;  ///< of the first weights since that layer; empty: none yet
+  std::string name;  ///< of the first weights after that layer; empty: none yet
 };
 
 std::int64_t count_of(const OnnxShape& shape);
 
-/// `axis` counted from the end where negative. @throws OperatorRefusal.
+/// Returns `axis`, counted from the end if negative. @throws OperatorRefusal.
 std::size_t axis_of(std::int64_t axis, std::size_t rank);
 
-/// The numbers of a tensor as ONNX broadcasts them to `shape`, one per entry.
-/// @throws OperatorRefusal if they cannot be, or are not floating-point numbers.
+/// Broadcasts the numbers of a tensor to `shape` by the rules of ONNX and returns one per entry.
+/// @throws OperatorRefusal if they cannot be broadcast or are not floating-point numbers.
 std::vector<Enclosed> broadcast(const OnnxTensor& tensor, const OnnxShape& shape);
 
-/// The shape that Reshape gives: 0 copies a size, -1 is what is left.
+/// Returns the result shape of Reshape: 0 copies a size, -1 is inferred.
 OnnxShape reshaped(const OnnxShape& shape, const std::vector<std::int64_t>& wanted, bool zero_is_zero);
 
-/// For each entry of the transposed tensor the entry of the original one.
+/// Returns for each entry of the transposed tensor the index of the original entry.
 std::vector<int> transposition(const OnnxShape& shape, const std::vector<std::int64_t>& permutation,
                                OnnxShape& result);
 
-/// y = x W + c of Gemm and MatMul; the leading sizes of `shape` are 1. `result` is the shape of y.
+/// Return the map y = x W + c of Gemm and MatMul. The leading sizes of `shape` must be 1. `result` is the shape of y.
 AffineMap gemm_map(const OnnxNode& node, const OnnxTensor& weight, const OnnxTensor* bias,
                    const OnnxShape& shape, OnnxShape& result);
 AffineMap matmul_map(const OnnxTensor& weight, bool weight_is_left, const OnnxShape& shape,
                      OnnxShape& result);
 
-/// Convolution over one or more axes, with groups, strides, dilations and padding.
+/// Returns the map of a convolution over one or more axes, with groups, strides, dilations and padding.
 AffineMap convolution_map(const OnnxNode& node, const OnnxTensor& weight, const OnnxTensor* bias,
                           const OnnxShape& shape, OnnxShape& result);
 
-/// AveragePool and GlobalAveragePool.
+/// Returns the map of AveragePool and GlobalAveragePool.
 AffineMap average_map(const OnnxNode& node, const OnnxShape& shape, OnnxShape& result);
 
-/// Of each entry of MaxPool's or GlobalMaxPool's result, the entries of which it is the largest.
+/// Returns for each entry of the result of MaxPool or GlobalMaxPool the entries whose maximum it is.
 std::vector<std::vector<int>> max_windows(const OnnxNode& node, const OnnxShape& shape, OnnxShape& result);
 
-/// Factor and amount of each entry: y = factor x + amount, of BatchNormalization in inference.
+/// Computes for each entry the factor and amount of y = factor x + amount, for BatchNormalization in inference.
 /// @param parameters scale, B, input_mean, input_var.
 void batch_normalization(const OnnxNode& node, const std::vector<const OnnxTensor*>& parameters,
                          const OnnxShape& shape, std::vector<Enclosed>& factors,
