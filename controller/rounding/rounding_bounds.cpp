@@ -8,14 +8,16 @@
 namespace swarmcert::controller {
 namespace {
 
-/// heading_of_yaw() for |yaw| <= pi: yaw rounded to float, 1.9e-7, and sin_cos() in float and double, 1.2e-7 and 1e-13.
+/// Error of heading_of_yaw() for |yaw| <= pi: 1.9e-7 from rounding yaw to float, 1.2e-7 and 1e-13 from sin_cos() in
+/// float and double.
 constexpr double kHeadingError = 3.2e-7;
 
 using Vector = Vector3<Bounded>;
 using Matrix = Matrix3<Bounded>;
 
 constexpr double kPi = 3.14159265358979323846;
-/// Cosines and lengths computed below are right to a few units of 2^-53; sets are cut this much wider.
+/// Cosines and lengths below are accurate to a few units of 2^-53; sets are widened by this much when they are
+/// restricted.
 constexpr double kSlack = 1e-12;
 
 Vector inputs(double largest) {
@@ -35,14 +37,14 @@ void raise(Vector3<double>& bound, const Vector3<double>& by) {
   bound = {std::fmax(bound.x, by.x), std::fmax(bound.y, by.y), std::fmax(bound.z, by.z)};
 }
 
-/// a - b of two inputs whose difference is known to be smaller than they are.
+/// Returns a - b for two inputs whose difference has a known bound smaller than their magnitudes.
 Vector difference(double largest, double largest_difference) {
   return within(inputs(largest) - inputs(largest), largest_difference);
 }
 
 double least(double a, double limit) { return limit < a ? limit : a; }
 
-/// f_d and its integral's step.
+/// Bounds f_d and one step of its integral.
 Vector force_stage(const RoundedLaw& law, const FlightEnvelope& e, RoundingBounds& bounds) {
   const TrackingError<Bounded> error{difference(e.position_m, e.position_error_m),
                                      difference(e.velocity_m_s, e.velocity_error_m_s)};
@@ -53,7 +55,7 @@ Vector force_stage(const RoundedLaw& law, const FlightEnvelope& e, RoundingBound
   const FeedForward<Bounded> forward{inputs(e.acceleration_m_s2), inputs(e.effect_N)};
   const Bounded mass(law.mass_kg);
 
-  // One step from an integral that both instances share; the clamp adds nothing but its limit's own rounding.
+  // One step from an integral that both instances share; the clamp contributes only the rounding of its limit.
   const auto step = [&](double largest, const Bounded& position_error) {
     const Bounded shared = Bounded::of(-largest, largest, 0);
     return (shared + product(Bounded(law.integrator.step_s), position_error)).error() + largest * 0x1p-24;
@@ -74,21 +76,21 @@ Vector force_stage(const RoundedLaw& law, const FlightEnvelope& e, RoundingBound
   return force;
 }
 
-/// f_d restricted to magnitudes in [low, high] and the envelope's tilt.
+/// Restricts f_d to magnitudes in [low, high] and the envelope's tilt.
 Vector force_cell(const Vector& force, double low, double high, double tilt_rad) {
   const double across = high * std::sin(tilt_rad) + kSlack;
   return {force.x.within(-across, across), force.y.within(-across, across),
           force.z.within(low * std::cos(tilt_rad) - kSlack, high + kSlack)};
 }
 
-/// Bounds on how far the columns of the desired attitude part, in the Euclidean norm.
+/// Bounds on the distance between the columns of the desired attitude in float and double, in the Euclidean norm.
 struct ColumnErrors {
   double x = 0, y = 0, z = 0;
 };
 
-/// Exactly, z = f / |f| moves by |df| / |f| at most, y = z x x_c / |z x x_c| by (|dz| + |dx_c|) / |z x x_c| where
-/// |z x x_c| >= cos(tilt), and x = y x z by |dy| + |dz|: norms, because intervals of components would lose a factor of
-/// ten here. What rounding adds to that comes from the templates, evaluated on sets without error in their input.
+/// Without rounding, z = f / |f| changes by at most |df| / |f|, y = z x x_c / |z x x_c| by (|dz| + |dx_c|) / |z x x_c|
+/// with |z x x_c| >= cos(tilt), and x = y x z by |dy| + |dz|. Norms are used because intervals of components would be
+/// ten times wider here. The rounding errors are obtained from the templates, evaluated on sets without input error.
 ColumnErrors attitude_stage(const Vector& force, double low, double high, double tilt_rad) {
   const auto exact = [](const Bounded& b) { return Bounded::of(b.lower(), b.upper(), 0); };
   const Vector f{exact(force.x), exact(force.y), exact(force.z)};
@@ -110,7 +112,7 @@ ColumnErrors attitude_stage(const Vector& force, double low, double high, double
   for (int i = 0; i < kHeadings; ++i) {
     const double from = 2 * kPi * i / kHeadings, to = 2 * kPi * (i + 1) / kHeadings;
     const auto cell = [](double a, double b) {
-      // No extreme of sine or cosine lies inside a cell: they lie at multiples of pi/2, where cells meet.
+      // No extremum of sine or cosine lies inside a cell: they are at multiples of pi/2, which are boundaries of cells.
       return Bounded::of(std::min(a, b) - kHeadingError, std::max(a, b) + kHeadingError, 0);
     };
     const Heading<Bounded> heading{cell(std::cos(from), std::cos(to)), cell(std::sin(from), std::sin(to))};
@@ -119,17 +121,17 @@ ColumnErrors attitude_stage(const Vector& force, double low, double high, double
     rounding.y = std::max(rounding.y, norm(errors(axes.y)));
     rounding.z = std::max(rounding.z, norm(errors(axes.z)));
   }
-  // The double instance also rounds at its own input: 2^-29 of what float does, covered by the factor.
+  // The double instance also rounds its own inputs: 2^-29 of the float error, covered by this factor.
   constexpr double kBoth = 1 + 0x1p-20;
   return {kBoth * (moved.x + rounding.x), kBoth * (moved.y + rounding.y), kBoth * (moved.z + rounding.z)};
 }
 
-/// R_RB = R_WR' R_WB: entry (i, j) is column i of the one times column j of the other, both of norm 1.
+/// Bounds R_RB = R_WR' R_WB: entry (i, j) is the product of column i of R_WR and column j of R_WB, both of norm 1.
 Matrix relative_attitude(const ColumnErrors& columns, double angle_rad) {
   constexpr double kUnit = 0x1p-24;
-  // R_WB rounded to float (sqrt(3) units), and three products and two sums of numbers of size 1 (at most 8 units).
+  // R_WB rounded to float (sqrt(3) units), and three products and two sums of numbers of magnitude 1 (at most 8 units).
   constexpr double kRounding = 10 * kUnit;
-  // A rotation by the angle t: diagonal entries in [cos t, 1], the others within sin t + (1 - cos t) / 2.
+  // For a rotation by the angle t, diagonal entries are in [cos t, 1] and the others within sin t + (1 - cos t) / 2.
   const double c = std::cos(angle_rad);
   const double least_on = angle_rad < kPi / 2 ? c : -1;
   const double most_beside = angle_rad < kPi / 2 ? std::min(1.0, std::sin(angle_rad) + (1 - c) / 2) : 1;
@@ -146,12 +148,12 @@ Matrix relative_attitude(const ColumnErrors& columns, double angle_rad) {
 
 Vector torque_stage(const RoundedLaw& law, const FlightEnvelope& e, const ColumnErrors& columns,
                     RoundingBounds& bounds) {
-  // With R_WB = I the templates compute R_RB from its transpose, which is known better than its factors.
+  // With R_WB = I the templates compute R_RB from its transpose, which has tighter bounds than its factors.
   const AttitudeState<Bounded> state{constants(identity<double>()), inputs(e.rate_rad_s)};
   const Matrix R_RB = relative_attitude(columns, e.attitude_error_rad);
   AttitudeError<Bounded> error = attitude_error(
       state, {transpose(R_RB), inputs(e.reference_rate_rad_s), inputs(e.reference_rate_derivative_rad_s2)});
-  // Rotations keep lengths.
+  // Rotations preserve lengths.
   error.reference_omega_B_rad_s =
       within(error.reference_omega_B_rad_s, std::sqrt(3.0) * e.reference_rate_rad_s + kSlack);
   const Matrix inertia = constants(law.inertia_kg_m2);

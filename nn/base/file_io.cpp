@@ -24,7 +24,7 @@ namespace {
   refuse(path, what + " (" + std::strerror(errno) + ")");
 }
 
-/// A file descriptor that closes itself.
+/// An owning file descriptor.
 class Descriptor {
  public:
   explicit Descriptor(int number) : number_(number) {}
@@ -54,7 +54,8 @@ bool write_all(int descriptor, std::string_view contents) {
   refuse(path, "the file exists", "replace it with --force, or choose another name");
 }
 
-/// Makes the rename itself survive a power cut. Not every file system can, and the file is whole either way.
+/// Syncs the folder so that the rename survives a power failure. Failure is ignored: not every file system supports it,
+/// and the file is complete in any case.
 void sync_folder_of(const std::string& path) {
   const std::size_t slash = path.rfind('/');
   const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
@@ -62,12 +63,13 @@ void sync_folder_of(const std::string& path) {
   if (descriptor.is_open()) ::fsync(descriptor.number());
 }
 
-/// Moves `temporary` to `path`; without `overwrite` a file that appeared meanwhile is kept. 0, or an errno.
+/// Moves `temporary` to `path`; without `overwrite`, keeps a file that has appeared in the meantime. Returns 0 or an
+/// errno.
 int move_into_place(const std::string& temporary, const std::string& path, bool overwrite) {
   if (!overwrite) {
     if (::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) == 0) return 0;
     if (errno != EINVAL && errno != ENOSYS) return errno;
-    if (::access(path.c_str(), F_OK) == 0) return EEXIST;  // a file system that cannot do both in one step
+    if (::access(path.c_str(), F_OK) == 0) return EEXIST;  // the file system cannot do both atomically
   }
   return std::rename(temporary.c_str(), path.c_str()) == 0 ? 0 : errno;
 }
@@ -88,7 +90,7 @@ std::string read_file(const std::string& path, std::size_t limit_bytes) {
     contents.reserve(static_cast<std::size_t>(status.st_size));
   }
   char block[1 << 16];
-  for (;;) {  // to the end rather than to st_size: a pipe has none, and a log may still grow
+  for (;;) {  // to the end, not to st_size: a pipe has no size, and a log may still grow
     const ssize_t count = ::read(descriptor.number(), block, sizeof block);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) refuse_with_errno(path, "cannot be read");
@@ -107,7 +109,7 @@ void write_file(const std::string& path, std::string_view contents, bool overwri
   struct stat status = {};
   if (::stat(path.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) refuse(path, "is a folder", "name a file in it");
-    if (!S_ISREG(status.st_mode)) {  // a device or a pipe is written to, never replaced
+    if (!S_ISREG(status.st_mode)) {  // devices and pipes are written to, never replaced
       const Descriptor device(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
       if (!device.is_open() || !write_all(device.number(), contents))
         refuse_with_errno(path, "cannot be written");

@@ -13,7 +13,7 @@ namespace swarmcert::files {
 namespace {
 
 constexpr int kDeepest = 64;
-constexpr std::size_t kMostKeys = 10'000;  // ordered_json looks a key up by linear search
+constexpr std::size_t kMostKeys = 10'000;  // ordered_json finds keys by linear search
 
 std::string line_and_column(const std::string& text, std::size_t offset) {
   std::size_t line = 1;
@@ -25,7 +25,8 @@ std::string line_and_column(const std::string& text, std::size_t offset) {
   return "line " + std::to_string(line) + ", column " + std::to_string(column);
 }
 
-/// Walks over `text` and tells through `position` how far the parser has come: its callback is not told.
+/// Iterates over `text` and stores the parser's progress in `position`, since the parser does not pass it to its
+/// callback.
 class TrackingIterator {
  public:
   using iterator_category = std::input_iterator_tag;
@@ -59,7 +60,7 @@ std::string reason(const std::string& message) {
   return "is not JSON (" + (colon == std::string::npos ? message : message.substr(colon + 2)) + ")";
 }
 
-/// Reads a hex float from the left. What is no such number refuses the text.
+/// Reads a hex float from left to right. Throws if the text is not a hex float.
 class HexFloatReader {
  public:
   explicit HexFloatReader(const std::string& text) : text_(text) {}
@@ -87,7 +88,7 @@ class HexFloatReader {
     return is_here;
   }
 
-  /// The value of the next character as a hex digit, or -1 if it is not one.
+  /// Returns the value of the next character as a hex digit, or -1 if it is not one.
   int digit() const {
     const char c = at_ < text_.size() ? text_[at_] : '\0';
     if (c >= '0' && c <= '9') return c - '0';
@@ -110,7 +111,7 @@ class HexFloatReader {
       if (mantissa_ >> 60 == 0) {
         mantissa_ = mantissa_ << 4 | static_cast<std::uint64_t>(next);
         exponent_ -= is_fraction ? 4 : 0;
-      } else {  // 64 bits are full: more digits may only be zeros
+      } else {  // all 64 bits are used: further digits must be zero
         if (next != 0) refuse();
         exponent_ += is_fraction ? 0 : 4;
       }
@@ -137,7 +138,7 @@ class HexFloatReader {
     long exponent = exponent_;
     while (mantissa % 2 == 0) mantissa /= 2, ++exponent;
     const bool is_exact =
-        mantissa >> 53 == 0 && exponent >= -1074;  // 53 bits, and none below the least subnormal
+        mantissa >> 53 == 0 && exponent >= -1074;  // at most 53 bits, and none below the smallest subnormal
     const double value =
         is_exact ? std::ldexp(static_cast<double>(mantissa), static_cast<int>(exponent)) : INFINITY;
     if (std::isinf(value)) refuse();
@@ -147,7 +148,7 @@ class HexFloatReader {
   const std::string& text_;
   std::size_t at_ = 0;
   std::uint64_t mantissa_ = 0;
-  long exponent_ = 0;  ///< of the mantissa's last digit
+  long exponent_ = 0;  ///< exponent of the mantissa's last digit
 };
 
 }  // namespace
@@ -185,7 +186,7 @@ Json parse_json(const std::string& text, const std::string& path) {
         {path, "line 1", "", "", "begins with a byte order mark, which is no JSON", "save it without"});
   const char* position = text.data();
   const auto here = [&] { return line_and_column(text, static_cast<std::size_t>(position - text.data())); };
-  std::vector<std::unordered_set<std::string>> keys;  // of the objects that are open
+  std::vector<std::unordered_set<std::string>> keys;  // of the objects that are currently open
   const auto check = [&](int depth, Json::parse_event_t event, Json& parsed) {
     if (event == Json::parse_event_t::object_start || event == Json::parse_event_t::array_start) {
       if (depth >= kDeepest)
@@ -228,7 +229,7 @@ Json read_json(const std::string& path, const std::string& schema) {
 }
 
 std::string to_text(const Json& document) {
-  // A path may hold bytes that are not UTF-8; a report that shows "?" there is better than none.
+  // A path may contain bytes that are not UTF-8; these are written as replacement characters instead of failing.
   return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -8,12 +8,12 @@
 namespace swarmcert::files {
 namespace {
 
-/// Words longer than this are not typing errors of a key, and the distance costs their product.
+/// Longer words are not misspelled keys, and the cost of the distance is the product of the lengths.
 constexpr std::size_t kLongestWord = 100;
 constexpr std::size_t kLongestList = 20;
 
-/// The least number of insertions, deletions, substitutions and swaps of two letters in a row that turn `a` into `b`,
-/// where no part is changed twice (the restricted distance of Damerau and Levenshtein).
+/// Returns the minimum number of insertions, deletions, substitutions and transpositions of adjacent letters that turn
+/// `a` into `b` (the restricted Damerau-Levenshtein distance, in which no substring is edited twice).
 std::size_t edit_distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1), before, last;
   std::iota(row.begin(), row.end(), std::size_t{0});

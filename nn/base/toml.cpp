@@ -14,20 +14,21 @@ namespace swarmcert::files {
 namespace {
 
 constexpr std::size_t kLargestToml_bytes = std::size_t{64} << 10;
-/// Every dot of a key "a.b.c" opens a table, and toml++ destroys nested tables recursively: 30 000 overflow the
-/// stack. Dots in numbers and file names count as well, of which our files have a few hundred.
+/// Every dot of a key "a.b.c" opens a table, and toml++ destroys nested tables recursively: 30 000 overflow the stack.
+/// Dots in numbers and file names are counted as well; our files contain a few hundred.
 constexpr std::ptrdiff_t kMostDots = 4000;
 
-/// The same document in ASCII alone. Letters beyond ASCII that toml++ 3.3 meets outside of quotes and comments run
-/// into its __builtin_unreachable(), and it disagrees with any simple rule about where a broken text has its quotes.
-/// So it gets none: they become "\UXXXXXXXX" in double quotes, "?" in comments, and are refused elsewhere.
+/// Converts a document to ASCII. In toml++ 3.3, non-ASCII characters outside of quotes and comments reach a
+/// __builtin_unreachable(), and for malformed text no simple rule agrees with toml++ on where quotes begin and end. The
+/// parser therefore never gets non-ASCII characters: they become "\UXXXXXXXX" in double quotes and "?" in comments, and
+/// are rejected elsewhere.
 class AsciiWriter {
  public:
   AsciiWriter(const std::string& text, const std::string& path) : text_(text), path_(path) {}
 
   std::string run() {
     if (text_.compare(0, 3, "\xef\xbb\xbf") == 0) at_ = 3;  // a byte order mark
-    char inside = '\0';                                     // the quote or '#' that opened what we are in
+    char inside = '\0';                                     // the quote or '#' that opened this context
     while (at_ < text_.size()) {
       const char c = text_[at_];
       if (static_cast<unsigned char>(c) >= 0x80) {
@@ -60,7 +61,7 @@ class AsciiWriter {
     result_ += escape;
   }
 
-  /// Reads one letter of two to four bytes (RFC 3629).
+  /// Reads one character of two to four bytes (RFC 3629).
   std::uint32_t code_point() {
     const auto byte = [this](std::size_t i) {
       return at_ + i < text_.size() ? static_cast<std::uint32_t>(static_cast<unsigned char>(text_[at_ + i]))
@@ -100,7 +101,7 @@ std::string line_words(const toml::source_region& source) {
   return source.begin.line == 0 ? "" : "line " + std::to_string(source.begin.line);
 }
 
-/// The value as the user could have written it.
+/// Returns the value as the user could have written it.
 std::string text_of(const toml::node& node) {
   if (node.is_table()) return "a table";
   if (node.is_array()) return "a list";

@@ -1,15 +1,15 @@
-// Makes the bundled networks: a deep set fitted to a synthetic downwash. Usage: swarmcert_generate_networks FOLDER
+// Generates the bundled networks: a deep set fitted to a synthetic downwash. Usage: swarmcert_generate_networks FOLDER
 //
-// The truth is a formula of our own, so that the project ships no one's data: a neighbour at height z > 0 above pushes
-// a vehicle down by
+// The ground truth is a formula of our own, so that the project does not ship anyone's data: a neighbour at height z >
+// 0 above a vehicle pushes it down by
 //   F = 9 gf * ramp(z) * 0.45 / (0.15 + z) / (1 + (r / s)^2)^2,   s = 0.06 m + 0.1 z,   ramp = clamp((z - 0.05) / 0.1,
 //   0, 1),
-// with r the lateral distance to the wake, which moves with 0.15 s/m of the relative velocity; forces of several
-// neighbours add as momentum fluxes, f = -sqrt(sum F^2). It is about as strong as between two Crazyflies and
-// otherwise a caricature. The fit is deliberately small; nothing is claimed for it but its certified bounds.
+// where r is the lateral distance to the wake, which is displaced by 0.15 s times the relative velocity. The forces of
+// several neighbours add like momentum fluxes, f = -sqrt(sum F^2). The magnitude is about that between two Crazyflies;
+// otherwise the model is a caricature. The fit is deliberately small; only the certified bounds are claimed for it.
 //
-// The same bits everywhere: own random numbers, loops in a fixed order without fused operations, no library function
-// but sqrt.
+// The bits are the same everywhere: own random numbers, loops in a fixed order without fused operations, and no library
+// function but sqrt.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -30,13 +30,13 @@ using swarmcert::files::Precision;
 using swarmcert::files::Random;
 using swarmcert::files::Weights;
 
-constexpr double kGamma = 3.0;  ///< limit of every layer's spectral norm
-/// Headroom of the stored weights below gamma: rounding to float32 moves a norm by less than 40 * 2^-24 of it.
+constexpr double kGamma = 3.0;  ///< limit on every layer's spectral norm
+/// Margin of the stored weights below gamma: rounding to float32 changes a norm by less than 40 * 2^-24 of its value.
 constexpr double kHeadroom = 1 - 4e-6;
 constexpr int kSteps = 4000;
 constexpr int kBatch = 48;
 
-/// Relative position in m, then relative velocity in m/s, of a neighbour.
+/// A neighbour's relative position in m, then its relative velocity in m/s.
 using Input = std::array<double, 6>;
 
 struct Sample {
@@ -69,7 +69,7 @@ Sample draw(Random& random) {
   return sample;
 }
 
-/// A layer with what Adam (Kingma and Ba 2015) and the power iteration remember.
+/// A layer with the state of Adam (Kingma and Ba 2015) and of the power iteration.
 struct Trained {
   Layer layer;
   std::vector<double> gradient, first_moment, second_moment;  ///< weights, then biases
@@ -89,7 +89,7 @@ struct Trained {
   }
 };
 
-/// Power iteration on W'W from where the last one ended; converges to the spectral norm from below.
+/// Power iteration on W'W with a warm start; converges to the spectral norm from below.
 double spectral_norm(Trained& trained, int iterations) {
   const Layer& layer = trained.layer;
   double norm = 0;
@@ -139,7 +139,8 @@ Activations forward(const Net& net, std::vector<double> x) {
   return all;
 }
 
-/// Adds the gradient of the loss to `net`, given the one with respect to its output; returns that to its input.
+/// Adds the gradient of the loss to `net`, given the gradient with respect to its output; returns the gradient with
+/// respect to its input.
 std::vector<double> backward(Net& net, const Activations& all, std::vector<double> error) {
   for (std::size_t k = net.size(); k-- > 0;) {
     const Layer& layer = net[k].layer;
@@ -177,7 +178,7 @@ class DeepSet {
     return forward(rho_, sum).back()[0];
   }
 
-  /// One step of Adam on the mean squared error, then the clip of every layer.
+  /// Performs one step of Adam on the mean squared error, then clips every layer.
   void step(const std::vector<Sample>& batch, double rate) {
     for (const Sample& sample : batch) add_gradient(sample, 2.0 / static_cast<double>(batch.size()));
     decay1_ *= 0.9;
@@ -190,7 +191,8 @@ class DeepSet {
     }
   }
 
-  /// The network as it is stored: projected once more, exactly enough that float32 rounding cannot exceed gamma.
+  /// Prepares the network for storage: projects once more, accurately enough that rounding to float32 cannot exceed
+  /// gamma.
   void finish() {
     for (Net* net : {&phi_, &rho_}) {
       for (Trained& trained : *net) {

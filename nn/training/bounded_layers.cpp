@@ -13,10 +13,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Keeps the factor of a column of zeros finite.
+/// Keeps the scale factor of a zero column finite.
 constexpr double kLeastSum = 1e-12;
 
-/// A map from matrices to matrices of the same size and of norm at most one, and the transpose of its derivative.
+/// A map from matrices to matrices of the same size with norm at most one, and the transpose of its derivative.
 struct Contraction {
   MatrixXd (*value)(const MatrixXd& v);
   MatrixXd (*pull_back)(const MatrixXd& v, const MatrixXd& gradient);
@@ -40,7 +40,7 @@ MatrixXd aol_pull_back(const MatrixXd& v, const MatrixXd& gradient) {
   return gradient * factors.asDiagonal() + v * (by_product + by_product.transpose());
 }
 
-/// (I + Z)^-1 of the Cayley transform, whose upper part is twice that less I. Its inverse exists: Z + Z' = 2 Y'Y.
+/// Returns (I + Z)^-1 of the Cayley transform, whose upper block is 2 (I + Z)^-1 - I. It exists since Z + Z' = 2 Y'Y.
 MatrixXd cayley_inverse(const MatrixXd& v) {
   const Index columns = v.cols();
   const auto x = v.topRows(columns), y = v.bottomRows(v.rows() - columns);
@@ -71,7 +71,7 @@ MatrixXd orthogonal_pull_back(const MatrixXd& v, const MatrixXd& gradient) {
   return result;
 }
 
-/// One layer of a sandwich.
+/// One layer of a sandwich parametrization.
 struct Slice {
   MatrixXd v, k, c, a;
 };
@@ -86,7 +86,7 @@ Slice slice_of(const MatrixXd& v) {
   return slice;
 }
 
-/// d loss / d v from those with respect to c and a.
+/// Returns d loss / d v from the derivatives with respect to c and a.
 MatrixXd slice_pull_back(const Slice& slice, const MatrixXd& by_c, const MatrixXd& by_a) {
   const MatrixXd by_k = 2 * by_c * slice.v.transpose() + 2 * by_a;
   const MatrixXd by_square = -slice.k * by_k * slice.k;
@@ -119,7 +119,7 @@ Vector BoundedLayers::weights(const Vector& parameters) const {
   Vector theta = parameters;
   for (int p = 0; layers_ != Layers::kFree && p < static_cast<int>(layout_->parts().size()); ++p) {
     const double limit = limit_of(p);
-    MatrixXd before;  // A of the layer before
+    MatrixXd before;  // A of the previous layer
     for (int k = 0; k < layout_->parts()[p].layers(); ++k) {
       const MatrixXd v = matrix_of(parameters, p, k);
       if (layers_ != Layers::kSandwich) {

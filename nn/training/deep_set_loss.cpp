@@ -7,7 +7,7 @@ namespace {
 
 using Eigen::Index;
 
-/// Input of a multilayer perceptron, then the output of each of its layers behind the ReLU, if it has one.
+/// The input of a multilayer perceptron, then the output of each layer, after the ReLU if it has one.
 using Activations = std::vector<Matrix>;
 
 void forward(const Layout& layout, const Vector& theta, int part, Activations& all) {
@@ -21,7 +21,8 @@ void forward(const Layout& layout, const Vector& theta, int part, Activations& a
   }
 }
 
-/// Adds to `gradient` what the error at the output contributes; `error` becomes that at the input, if wanted.
+/// Backpropagates `error`: adds the gradient of the part to `gradient` and, if requested, replaces `error` by its value
+/// at the input.
 void backward(const Layout& layout, const Vector& theta, int part, const Activations& all, Matrix& error,
               Vector& gradient, bool needs_input_error) {
   for (int k = layout.parts()[part].layers() - 1; k >= 0; --k) {
@@ -39,7 +40,7 @@ void backward(const Layout& layout, const Vector& theta, int part, const Activat
 struct Group {
   int part = 0;
   std::vector<Index> columns;  ///< of the dataset's x for phi, of the batch for rho
-  std::vector<Index> owner;    ///< phi: the sample in the batch to which each belongs
+  std::vector<Index> owner;    ///< phi: for each column, its sample in the batch
   Activations activations;
 };
 
@@ -115,7 +116,7 @@ void Dataset::add_sample(int rho_part, const std::vector<float>& force, float sa
 double deep_set_loss(const Layout& layout, const Vector& theta, const Dataset& data, const Index* samples,
                      Index count, Vector* gradient) {
   Batch batch = run(layout, theta, data, samples, count);
-  Matrix& error = batch.output;  // becomes d loss / d output
+  Matrix& error = batch.output;  // reused for d loss / d output
   double loss = 0;
   for (Index s = 0; s < count; ++s) {
     const float weight = data.weight[samples[s]];

@@ -36,7 +36,7 @@ void SpectralNormalization::iterate(const Vector& theta, int part, int layer) {
   norms_[part][layer] = static_cast<double>(image.norm());
   const Vector next = w.transpose() * image;
   const float length = next.norm();
-  if (length > 0) right = next / length;  // else the layer is zero: any direction will do
+  if (length > 0) right = next / length;  // otherwise the layer is zero and any direction is valid
 }
 
 void SpectralNormalization::apply(Vector& theta) {

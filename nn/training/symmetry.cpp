@@ -7,11 +7,11 @@ namespace {
 
 struct Turn {
   float cosine, sine;
-  float mirror;  ///< -1: y changes its sign first
+  float mirror;  ///< -1: the sign of y is changed first
 };
 
-/// A point of the ring between two circles has a uniform direction, and its cosine and sine need a square root only:
-/// the same bits on every platform.
+/// Draws a point between two circles: its direction is uniform, and its cosine and sine need only a square root, so
+/// that the bits are the same on every platform.
 Turn random_turn(files::Random& random) {
   double x = 0, y = 0, square = 0;
   do {

@@ -11,12 +11,13 @@ namespace {
 
 using Eigen::Index;
 
-/// Samples whose gradient one thread computes at a time: matrices of this width stay in the cache.
+/// Number of samples whose gradient one thread computes at a time: matrices of this width stay in the cache.
 constexpr Index kPiece = 128;
-/// A count of steps as two floats, each exact.
+/// Splits a step count into two floats that are each exact.
 constexpr std::uint64_t kHalf = 1u << 20;
 
-/// Eigen cuts the sums of a product into lengths that follow from the processor's caches: say the same everywhere.
+/// Eigen splits the sums of a matrix product into blocks that depend on the cache sizes; fixing the sizes fixes the
+/// order.
 void fix_order_of_sums() { Eigen::setCpuCacheSizes(32 << 10, 256 << 10, 2 << 20); }
 
 double sum_of_weights(const Dataset& data, const Index* samples, Index count) {
@@ -44,7 +45,7 @@ Trainer::Trainer(const Layout& layout, const Dataset& data, std::vector<Index> s
   gradients_.resize(static_cast<std::size_t>((options_.batch + kPiece - 1) / kPiece));
 }
 
-/// The weights after a change of the parameters.
+/// Updates the weights after a change of the parameters.
 void Trainer::settle() {
   if (options_.layers == Layers::kFree) normalization_.apply(parameters_);
   theta_ = bounded_.weights(parameters_);
@@ -83,7 +84,8 @@ double Trainer::run_epoch(int epoch, double learning_rate) {
   std::vector<Index> order = samples_;
   for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);
   if (options_.turns) turn_about_vertical(layout_, source_, random, data_);
-  // Where the power iteration stands is no part of the state: begin anew, as a resumed run must.
+  // The state of the power iteration is not part of the checkpoint, so restart it in every epoch, as a resumed run
+  // must.
   normalization_ = SpectralNormalization(layout_, options_.gamma, parameters_);
   normalization_.tighten(shares_);
   double loss = 0;

@@ -13,7 +13,7 @@
 namespace swarmcert::files {
 namespace {
 
-/// constant + sum of factor s(scale x + shift). For every s but ReLU that is s(x).
+/// constant + sum of factor * s(scale x + shift). Equals s(x) for every s except ReLU.
 struct ActivationTerms {
   struct Term {
     double scale, shift, factor;
@@ -23,7 +23,8 @@ struct ActivationTerms {
   Activation s = Activation::kRelu;
 
   bool is_s_itself() const { return terms.size() == 1; }
-  /// By how much a rounded weight of the layer in front of it, or behind it, grows at most.
+  /// Return the largest factor by which the rounding error of a weight grows in the layer before, or after, the
+  /// activation.
   double share_in_front() const { return norm_of(&Term::scale); }
   double share_behind() const { return norm_of(&Term::factor); }
 
@@ -68,7 +69,7 @@ AffineMap map_of(const Layer& layer) {
   return map;
 }
 
-/// The activation of `before`, as a map of a new layer's outputs.
+/// Returns the activation of `before`, as a map of a new layer's outputs.
 AffineMap activated(ReluChain& chain, const AffineMap& before, const ActivationTerms& activation,
                     const std::string& name) {
   if (activation.s != Activation::kRelu) return chain.activated(before, activation.s, {}, name);
@@ -93,7 +94,7 @@ AffineMap activated(ReluChain& chain, const AffineMap& before, const ActivationT
   return sum;
 }
 
-/// The layers with `between` written as what chains know. @throws FoldingLimit.
+/// Returns the layers with the activations `between` expressed as ReLU chains. @throws FoldingLimit.
 std::vector<Layer> rewritten(const Weights& weights, const std::vector<ActivationTerms>& between) {
   constexpr double kUp = 1 + 1e-6;
   const std::vector<Layer>& own = weights.layers;
@@ -102,7 +103,7 @@ std::vector<Layer> rewritten(const Weights& weights, const std::vector<Activatio
   for (std::size_t k = 1; k < own.size(); ++k)
     current = composed(map_of(own[k]), activated(chain, current, between[k - 1], own[k - 1].name));
   std::vector<Layer> layers = chain.finished(current, own.back().name);
-  for (std::size_t k = 0; k < layers.size(); ++k) {  // what was rounded before enters every copy
+  for (std::size_t k = 0; k < layers.size(); ++k) {  // earlier rounding errors enter every copy
     const double copies = (k < between.size() ? between[k].share_in_front() : 1) *
                           (k > 0 ? between[k - 1].share_behind() : 1) * kUp;
     const double constant = k > 0 ? std::fabs(between[k - 1].constant) : 0;
@@ -115,7 +116,7 @@ std::vector<Layer> rewritten(const Weights& weights, const std::vector<Activatio
   return layers;
 }
 
-/// One for each layer, the last one possibly left out: what `names` say of the layers of `weights`.
+/// Returns the activation names of the layers of `weights`: `names`, or a single name repeated between all layers.
 std::vector<std::string> spread(const Weights& weights, const std::vector<std::string>& names) {
   return names.size() == 1 ? std::vector<std::string>(weights.layers.size() - 1, names.front()) : names;
 }
@@ -180,7 +181,7 @@ Weights with_activation(Weights weights, const std::string& text) {
     throw InputError({weights.path, "", "--activation", text, misfit,
                       is_other ? "leave --activation out" : "state what the network was trained with"});
   }
-  if (weights.states_activation() || between.empty()) return weights;  // as stated, or nothing is between
+  if (weights.states_activation() || between.empty()) return weights;  // already stated, or nothing to set
   weights.activation_is_given = true;
   if (between.size() == weights.layers.size()) {
     weights.end_in(between.back().s);

@@ -11,9 +11,9 @@ namespace {
 constexpr double kSeluScale = 1.0507009873554805, kSeluAlpha = 1.6732632423543772;
 /// The smallest double that is at least 1.0507009873554805 * 1.6732632423543772.
 constexpr double kSeluSlope = 0x1.c212cc640f031p+0;
-/// The largest slope of SiLU is 1.09984, at t = 2.3994; by s'(-t) = 1 - s'(t) the least one is 1 less that.
+/// The largest slope of SiLU is 1.09984, at t = 2.3994; since s'(-t) = 1 - s'(t), the smallest is 1 minus that.
 constexpr double kSiluSlope = 0x1.1999p+0;
-/// The largest slope of GELU is 1.12890, at t = sqrt 2; the least one as for SiLU.
+/// The largest slope of GELU is 1.12890, at t = sqrt 2; the smallest follows as for SiLU.
 constexpr double kGeluSlope = 0x1.211p+0;
 constexpr double kHalfRoot = 0.70710678118654752440;
 

@@ -9,12 +9,12 @@
 namespace swarmcert::files {
 namespace {
 
-constexpr std::uint64_t kMostProducts = std::uint64_t{1} << 30;  ///< of one composition: half a minute
+constexpr std::uint64_t kMostProducts = std::uint64_t{1} << 30;  ///< limit for one composition: half a minute
 
 bool is_one(const Enclosed& factor) { return factor.value == 1 && factor.radius == 0; }
 bool is_zero(const Enclosed& factor) { return factor.value == 0 && factor.radius == 0; }
 
-/// Row by row, `second` times `first`, with one exact sum per column.
+/// Computes `second` times `first` row by row, with one exact sum per column.
 class Composition {
  public:
   Composition(const AffineMap& second, const AffineMap& first)

@@ -22,7 +22,7 @@ bool has_ending(const std::string& text, std::string_view suffix) {
   return text.size() > suffix.size() && text.compare(text.size() - suffix.size(), suffix.size(), suffix) == 0;
 }
 
-/// Words, numbers and single characters of C text, without comments and preprocessor lines.
+/// Tokenizes C text into words, numbers and single characters, skipping comments and preprocessor lines.
 class Scanner {
  public:
   Scanner(std::string_view text, std::string path) : text_(text), path_(std::move(path)) { skip(); }
@@ -45,7 +45,7 @@ class Scanner {
   void expect(char c, const std::string& where) {
     if (!accept(c)) refuse(where, std::string("expected '") + c + "'" + found());
   }
-  /// A name or keyword; empty where none stands here.
+  /// Reads a name or keyword; returns an empty view if there is none here.
   std::string word() {
     const std::size_t first = at_;
     if (!at_end() && !is_digit(text_[at_])) {
@@ -69,19 +69,19 @@ class Scanner {
     skip();
     return value;
   }
-  /// A decimal number as a compiler stores it in a member of this precision.
+  /// Reads a decimal number and rounds it as a compiler does for a member of this precision.
   double number(Precision precision, const std::string& where) {
     const bool is_negative = at_ < text_.size() && text_[at_] == '-';
     const char* const first = text_.data() + at_ + (is_negative ? 1 : 0);
     const char* const last = text_.data() + text_.size();
     double value = 0;
     auto [end, error] = std::from_chars(first, last, value);
-    // from_chars would take "inf" and "nan" as well, which are no numbers of C.
+    // from_chars would also accept "inf" and "nan", which are not C literals.
     if (error == std::errc::invalid_argument || first == last || !(is_digit(*first) || *first == '.'))
       refuse(where, "expected a number" + found());
     float narrow = 0;
     bool is_out_of_range = error != std::errc();
-    if (end != last && (*end == 'f' || *end == 'F')) {  // rounded once, from the decimal
+    if (end != last && (*end == 'f' || *end == 'F')) {  // rounded once, directly from the decimal
       is_out_of_range = std::from_chars(first, last, narrow).ec != std::errc();
       value = static_cast<double>(narrow);
       ++end;
@@ -126,7 +126,7 @@ struct Member {
   std::string name;
   Precision precision = Precision::kFloat32;
   std::vector<std::uint64_t> shape;
-  std::vector<double> values;  ///< in the order of the text
+  std::vector<double> values;  ///< in the order of the source text
 };
 
 class SourceReader {
@@ -309,7 +309,7 @@ std::map<std::string, Weights> parse_pure_c_source(const std::string& bytes, con
     while (!text.empty() && (text.back() == '\r' || text.back() == ' ' || text.back() == '\t'))
       text.remove_suffix(1);
     while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-    // A comment before the directive, "/* */ #if", leaves it a directive.
+    // A comment before a directive, as in "/* */ #if", does not disable it.
     const bool is_plain = text.find('#') == std::string_view::npos || text.substr(0, 8) == "#include" ||
                           text.substr(0, 7) == "#pragma";
     if (!is_plain) refuse("a preprocessor line, after which a compiler may read another text");

@@ -71,7 +71,7 @@ std::set<std::vector<FunctionId>> beside_silent(const Network& network, const Fu
   std::set<std::vector<FunctionId>> result;
   if (!is_ever_silent(network, function)) return result;
   const FunctionId own_phi = function.input_part();
-  if (own_phi.is_ground_phi()) return result;  // the ground stays
+  if (own_phi.is_ground_phi()) return result;  // the ground never arrives or leaves
   for (const std::vector<std::string>& neighbours : network.silent.at(function.rho_kind())) {
     std::vector<FunctionId> parts;
     for (const std::string& kind : neighbours) parts.push_back(FunctionId::phi(kind));

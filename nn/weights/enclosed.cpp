@@ -6,11 +6,11 @@
 namespace swarmcert::files {
 namespace {
 
-/// Covers the rounding of up to 2^25 operations on numbers that are not negative.
+/// Covers the round-off of up to 2^25 operations on nonnegative numbers.
 constexpr double kUp = 1.0 + 0x1p-26;
-constexpr double kUlp = 0x1p-53;  ///< relative error of one operation, rounded to nearest
+constexpr double kUlp = 0x1p-53;  ///< relative error bound of one operation rounded to nearest
 constexpr double kLeast = std::numeric_limits<double>::denorm_min();
-/// Below this magnitude the error of a product, or of a quotient, may be no double.
+/// Below this magnitude the error of a product or quotient may not be representable as a double.
 constexpr double kTiny = 0x1p-960;
 
 double rounding_of(double value) { return std::fabs(value) * kUlp + kLeast; }
@@ -85,7 +85,7 @@ void ExactSum::add_product(const Enclosed& a, const Enclosed& b) {
 
 Enclosed ExactSum::value() const {
   if (parts_.empty()) return {0, radius_};
-  // Summed from the largest, so that the error of each addition is a double: what part misses of next - sum.
+  // Summed in descending order of magnitude, so that the error of each addition, part - (next - sum), is a double.
   double sum = 0, rest = 0;
   for (std::size_t i = parts_.size(); i-- > 0;) {
     const double next = sum + parts_[i];

@@ -12,7 +12,7 @@ namespace {
 template <typename Scalar>
 std::vector<Scalar> converted(const std::vector<double>& values, const std::string& path,
                               const std::string& field) {
-  // The first double that no longer rounds to a finite float: halfway between the largest float and 2^128.
+  // The smallest double that does not round to a finite float: halfway between the largest float and 2^128.
   constexpr bool kIsNarrow = sizeof(Scalar) < sizeof(double);
   constexpr double kOverflow = kIsNarrow ? 0x1.ffffffp127 : std::numeric_limits<double>::infinity();
   std::vector<Scalar> result;
@@ -36,7 +36,7 @@ Weights as_float32(Weights weights) {
     const auto bias = converted<float>(layer.biases, weights.path, layer.name + ".bias");
     layer.weights.assign(weight.begin(), weight.end());
     layer.biases.assign(bias.begin(), bias.end());
-    layer.weight_rounding = layer.bias_rounding = 0;  // the float32 numbers are the network now
+    layer.weight_rounding = layer.bias_rounding = 0;  // the float32 numbers are now the exact network
   }
   weights.precision = Precision::kFloat32;
   return weights;
@@ -64,7 +64,7 @@ nn::Mlp<Scalar> Evaluator<Scalar>::mlp() const {
   return {layers_.data(), static_cast<int>(layers_.size())};
 }
 
-/// Layer by layer, for any activations.
+/// Evaluates layer by layer, for any activations.
 template <typename Scalar>
 std::vector<Scalar> Evaluator<Scalar>::smooth_value(const std::vector<Scalar>& input) const {
   std::vector<Scalar> x = input;

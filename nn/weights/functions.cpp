@@ -13,7 +13,7 @@ bool ends_with(const std::string& text, const std::string& suffix) {
          text.compare(text.size() - suffix.size(), suffix.size(), suffix) == 0;
 }
 
-/// The unit that the names of inputs end in: "dp_x_m" is in m, "dv_x_m_s" in m/s.
+/// Returns the unit implied by the names of the inputs: "dp_x_m" is in m, "dv_x_m_s" in m/s.
 std::string input_unit(const std::vector<std::string>& order) {
   const auto all = [&order](const std::string& suffix) {
     return std::all_of(order.begin(), order.end(),
@@ -29,7 +29,7 @@ std::vector<std::string> ground_names() {
   return {"minus_z_m", "minus_v_x_m_s", "minus_v_y_m_s", "minus_v_z_m_s"};
 }
 
-/// Names that show which inputs are positions and which velocities; empty where nobody knows.
+/// Returns names that show which inputs are positions and which are velocities; empty if that is unknown.
 std::vector<std::string> input_names(const Network& network, const FunctionId& function, int inputs) {
   if (function.is_rho()) return {};
   const bool is_ground = function.input_part().is_ground_phi();
@@ -110,7 +110,7 @@ std::vector<std::string> blocks(const Network& network, const FunctionId& functi
 
 std::string unit(const Network& network, const FunctionId& function, const std::string& block) {
   const std::string output = network.output_unit.empty() ? "output" : network.output_unit;
-  std::vector<std::string> moved;  // stays empty where NET states no names: then their units are unknown
+  std::vector<std::string> moved;  // empty if NET does not name its inputs: then their units are unknown
   if (!network.input_order.empty()) moved = input_names(network, function, inputs(network, function));
   if (block != "all" && !moved.empty()) {
     std::vector<std::string> names;

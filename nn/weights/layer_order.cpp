@@ -12,13 +12,13 @@ namespace {
 
 using Order = std::vector<std::size_t>;
 
-constexpr std::size_t kMostSearched = 256;   ///< layers whose orders are enumerated
-constexpr std::size_t kMostSteps = 100'000;  ///< of that search: beyond, the order counts as undecided
+constexpr std::size_t kMostSearched = 256;   ///< largest number of layers whose orders are enumerated
+constexpr std::size_t kMostSteps = 100'000;  ///< limit of that search; beyond it the order is undecided
 constexpr std::size_t kMostShown = 3;
 
 bool is_decimal(char c) { return c >= '0' && c <= '9'; }
 
-/// The number at `at` without leading zeros, which is passed over.
+/// Returns the number at `at` without leading zeros and advances `at` past it.
 std::string number_at(const std::string& text, std::size_t& at) {
   while (at < text.size() && text[at] == '0') ++at;
   const std::size_t first = at;
@@ -28,7 +28,7 @@ std::string number_at(const std::string& text, std::size_t& at) {
 
 struct Comparison {
   int sign = 0;               ///< negative: a comes first; 0: equal up to leading zeros
-  bool is_by_number = false;  ///< where they first differ, both have a number
+  bool is_by_number = false;  ///< at the first difference both have a number
 };
 
 Comparison compare(const std::string& a, const std::string& b) {
@@ -48,11 +48,11 @@ Comparison compare(const std::string& a, const std::string& b) {
   return {left_a < left_b ? -1 : left_a > left_b ? 1 : 0, false};
 }
 
-/// Orders in which each layer takes what the one before gives, depth first.
+/// Depth-first search for orders in which the sizes of consecutive layers match.
 class OrderSearch {
  public:
-  /// @param preferred indices of all layers: those in front are tried first.
-  /// @param by_number only orders that the numbers in the names allow.
+  /// @param preferred indices of all layers, in the order in which to try them.
+  /// @param by_number only orders consistent with the numbers in the names.
   OrderSearch(const std::vector<LayerShape>& layers, Order preferred, bool by_number)
       : layers_(layers), preferred_(std::move(preferred)), used_(layers.size(), false) {
     if (!by_number) return;
@@ -64,7 +64,7 @@ class OrderSearch {
     }
   }
 
-  /// At most `most` of them; is_complete() tells whether there are no others.
+  /// Returns at most `most` orders; is_complete() tells whether there are no others.
   std::vector<Order> run(std::size_t most) {
     most_ = most;
     extend();
@@ -107,7 +107,7 @@ class OrderSearch {
   const std::vector<LayerShape>& layers_;
   const Order preferred_;
   std::vector<bool> used_;
-  std::vector<Order> earlier_;  ///< by layer: those whose numbers put them before it
+  std::vector<Order> earlier_;  ///< for each layer, those that must precede it by number
   Order current_;
   std::vector<Order> found_;
   std::size_t most_ = 0, steps_ = 0;
@@ -201,7 +201,7 @@ class OrderDecision {
     return true;
   }
 
-  /// Whether the numbers in the names order every pair of layers: it is enough to look at neighbours.
+  /// Returns whether the numbers in the names order every pair of layers; it suffices to compare adjacent ones.
   bool are_all_numbered() const {
     for (std::size_t k = 1; k < natural_.size(); ++k) {
       if (!numbered_before(layers_[natural_[k - 1]].name, layers_[natural_[k]].name)) return false;
@@ -226,7 +226,7 @@ class OrderDecision {
     }
   }
 
-  /// Refuses with the orders that one might mean: by number, as registered, by name, others that fit.
+  /// Throws an error that lists the plausible orders: by number, as registered, by name, and others that fit.
   [[noreturn]] void refuse_undecided(std::vector<Order> candidates) const {
     const bool is_registered = listing_ == Listing::kRegistration;
     if (fits(natural_)) candidates.insert(candidates.begin(), natural_);

@@ -21,7 +21,7 @@ bool name_ends_with(const std::string& text, const std::string& ending) {
          text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
 }
 
-/// "fc1.weight" of "fc1_weight", "layer1.bias" of "b1"; nothing where the name says neither.
+/// Returns "fc1.weight" for "fc1_weight", "layer1.bias" for "b1"; nothing if the name is not that of a weight or bias.
 std::optional<std::string> tensor_name_of(const std::string& name) {
   struct Word {
     const char* word;
@@ -50,7 +50,7 @@ std::optional<std::string> tensor_name_of(const std::string& name) {
   return std::nullopt;
 }
 
-/// The number of NumPy's "arr_12".
+/// Returns the number in NumPy's "arr_12".
 std::optional<std::size_t> place_of(const std::string& name) {
   const std::string digits = name.rfind("arr_", 0) == 0 ? name.substr(4) : "";
   const bool is_number =
@@ -64,11 +64,11 @@ bool is_vector(const NamedArray& array) {
   return array.shape.size() == 1 || (array.shape.size() == 2 && (array.shape[0] == 1 || array.shape[1] == 1));
 }
 
-/// arr_0, arr_1, ...: a matrix begins a layer, biases as long as its outputs complete it.
+/// Names arr_0, arr_1, ...: each matrix begins a layer, and biases whose length is its number of outputs complete it.
 std::vector<std::string> names_by_place(const std::vector<const NamedArray*>& arrays) {
   std::vector<std::string> names;
   std::size_t layer = 0;
-  std::uint64_t outputs = 0;  // of a layer that has no biases yet; 0: none is open
+  std::uint64_t outputs = 0;  // outputs of the layer that has no biases yet; 0: no such layer
   for (const NamedArray* array : arrays) {
     const bool are_biases = outputs > 0 && is_vector(*array) && array->numbers.size() == outputs;
     if (!are_biases) ++layer;
@@ -118,7 +118,7 @@ Weights network_of_arrays(const std::vector<NamedArray>& arrays, const std::stri
 }
 
 bool looks_like_npz(const std::string& bytes) {
-  // The first entry's name stands at 30 in its header, its length at 26.
+  // In a zip header the first entry's name begins at offset 30 and its length is at offset 26.
   if (bytes.size() < 30 || bytes.compare(0, 4, "PK\3\4") != 0) return false;
   const std::size_t length = static_cast<unsigned char>(bytes[26]) |
                              static_cast<std::size_t>(static_cast<unsigned char>(bytes[27])) << 8;

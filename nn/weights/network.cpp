@@ -91,7 +91,8 @@ class NetworkReader {
     network_.clamp = std::move(box);
   }
 
-  /// Other quantities than a vertical force turn with the vehicles; and another order of the inputs would be another J.
+  /// Invariants require a vertical force, since other quantities rotate with the vehicles, and the standard order of
+  /// inputs, since another order would give another J.
   void read_invariants(const TomlTable& input) {
     input.choice("invariants", {"rotation"});
     if (network_.input_order != relative_state())
@@ -117,7 +118,7 @@ class NetworkReader {
     for (const std::string& kind : kinds.keys()) {
       const TomlTable entry = kinds.table(kind);
       entry.allow_only({"weights", "order", "activation"});
-      // "set:<kind>:<kind>" names a function.
+      // "set:<kind>:<kind>" is the name of a function.
       if (kind.find(':') != std::string::npos)
         kinds.refuse(in_quotes(kind), "", "a kind's name must not contain ':'", "rename the kind");
       const std::string file = entry.text("weights");
@@ -140,8 +141,8 @@ class NetworkReader {
     }
   }
 
-  /// A name, or a list of them, separated by commas. As certificates name them: what is written with ReLU instead is
-  /// stated by --activation.
+  /// Returns a name, or a comma-separated list of names, as used in certificates. Activations that are rewritten with
+  /// ReLU can only be stated by --activation.
   static std::string activation_of(const TomlTable& entry) {
     const std::vector<std::string> names = entry.is_list("activation")
                                                ? entry.texts("activation")
@@ -157,7 +158,7 @@ class NetworkReader {
     return activation;
   }
 
-  /// What kind's network has, against what it must have.
+  /// Compares the size `found` in a kind's network with the size it must have.
   void check_size(const std::string& role, const std::string& kind, const char* what, int found,
                   std::size_t expected, const std::string& because) const {
     if (found >= 0 && static_cast<std::size_t>(found) == expected) return;
@@ -226,7 +227,7 @@ class NetworkReader {
     }
   }
 
-  /// The kinds before the arrow, in order of names.
+  /// Returns the kinds before the arrow, in alphabetical order.
   std::vector<std::string> neighbours_in(const std::string& name, std::size_t arrow) const {
     std::vector<std::string> kinds;
     for (std::size_t begin = 0; arrow > 0 && begin <= arrow;) {
@@ -258,7 +259,7 @@ bool is_network_toml(const std::string& path, const std::string& bytes) {
          beginning.find('\0') == std::string_view::npos;
 }
 
-/// --phi F --rho F, which have no network.toml to take a line from.
+/// Loads --phi F --rho F, for which error messages cannot refer to a line of network.toml.
 Network load_pair(const NetworkArguments& arguments) {
   Network network;
   const Weights& phi =

@@ -29,9 +29,9 @@ class NnetReader {
       widths.push_back(static_cast<std::size_t>(count(width, kMostWidth)));
     if (widths.front() != inputs || widths.back() != outputs)
       refuse("the sizes of its layers contradict one another");
-    next_line();  // a flag that nothing uses any more
-    next_line();  // least inputs
-    next_line();  // largest inputs
+    next_line();  // an obsolete flag
+    next_line();  // minimum inputs
+    next_line();  // maximum inputs
     const std::vector<double> means = numbers(inputs + 1), ranges = numbers(inputs + 1);
     for (const double range : ranges)
       if (range == 0) refuse("a range is 0");
@@ -64,7 +64,7 @@ class NnetReader {
     return number;
   }
 
-  /// The next line that is no comment.
+  /// Returns the next line that is not a comment.
   std::string_view next_line() {
     for (;;) {
       if (rest_.empty()) refuse("the file ends early");

@@ -15,7 +15,7 @@ constexpr std::string_view kMagic("\x93NUMPY", 6);
 constexpr std::size_t kLongestHeader_bytes = 65'536;
 constexpr std::size_t kMostArrayDimensions = 8;
 
-/// Reads the header, a Python literal: {'descr': '<f4', 'fortran_order': False, 'shape': (3, 4), }.
+/// Parses the header, a Python literal: {'descr': '<f4', 'fortran_order': False, 'shape': (3, 4), }.
 /// https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
 class NpyHeader {
  public:

@@ -10,9 +10,9 @@ namespace swarmcert::files {
 namespace {
 
 struct Style {
-  const char* matrix;  ///< ending of the name of the stored matrix
-  const char* first;   ///< of u, or of g
-  const char* second;  ///< of v; empty: weight_norm
+  const char* matrix;  ///< suffix of the name of the stored matrix
+  const char* first;   ///< suffix for u or g
+  const char* second;  ///< suffix for v; empty: weight_norm
 };
 
 constexpr Style kStyles[] = {
@@ -65,7 +65,7 @@ class Parametrizations {
 
   bool has(const std::string& name) const { return index_.count(name) == 1; }
 
-  /// "fc1." of "fc1.weight_orig" for the ending "weight_orig".
+  /// Returns the prefix before `ending`: "fc1." for the name "fc1.weight_orig" and the ending "weight_orig".
   static std::optional<std::string> prefix_before(const std::string& name, const std::string& ending) {
     if (name.size() < ending.size()) return std::nullopt;
     const std::string prefix = name.substr(0, name.size() - ending.size());
@@ -74,7 +74,7 @@ class Parametrizations {
     return prefix;
   }
 
-  /// A tensor of a parametrization that is none of those known.
+  /// Rejects a tensor of an unknown parametrization.
   void refuse_leftover(std::size_t i) const {
     const std::string& name = tensors_[i].name;
     const bool is_known = name.find("parametrizations.") != std::string::npos ||
@@ -133,7 +133,7 @@ class Parametrizations {
         ", as PyTorch evaluates it after eval()");
   }
 
-  /// u' W v, which the weight is divided by.
+  /// Returns the divisor of the weight, u' W v.
   Enclosed sigma_of(std::size_t i, const std::vector<double>& stored, std::size_t u_index,
                     std::size_t v_index) const {
     const std::vector<std::uint64_t>& shape = tensors_[i].shape;

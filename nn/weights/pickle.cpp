@@ -17,7 +17,7 @@ constexpr std::size_t kMostDimensions = 8;
 constexpr std::size_t kMostArguments = 8;  // _rebuild_tensor_v2 takes seven
 constexpr char kSaveStateDict[] = "save the weights alone: torch.save(model.state_dict(), ...)";
 
-/// Names that a state dict may call; PickledValue::integer of a kGlobal.
+/// Functions that a state dict may call; PickledValue::integer of a kGlobal.
 enum Callable : std::int64_t { kOrderedDict, kRebuildTensor, kRebuildParameter };
 
 class Machine {
@@ -126,7 +126,7 @@ class Machine {
     push(found->second);
   }
 
-  // --- what the opcodes mean
+  // --- semantics of the opcodes
 
   void execute(unsigned char opcode) {
     if (push_scalar(opcode) || build_container(opcode) || use_memo(opcode)) return;
@@ -151,7 +151,7 @@ class Machine {
       }
       case 'R':
         return reduce();
-      case 'b':  // BUILD: torch hangs version numbers (_metadata) onto the dict
+      case 'b':  // BUILD: torch attaches version numbers (_metadata) to the dict
         pop();
         if (top().kind != Kind::kDict)
           refuse("attributes are set on something that is not a dict", kSaveStateDict);
@@ -166,7 +166,7 @@ class Machine {
     }
   }
 
-  /// Each of these three returns false for opcodes of another group.
+  /// These three return false for opcodes of another group.
   bool push_scalar(unsigned char opcode) {
     switch (opcode) {
       case 'N':
@@ -188,7 +188,7 @@ class Machine {
       case 'G':
         take(8);
         return push(make(Kind::kReal)), true;
-      case 'U':  // SHORT_BINSTRING, as Python 2 wrote it
+      case 'U':  // SHORT_BINSTRING, written by Python 2
       case 0x8c:
         return push(make(Kind::kText, 0, take(take_unsigned(1)))), true;
       case 'T':  // BINSTRING
@@ -294,7 +294,8 @@ class Machine {
     }
   }
 
-  /// A copy, because make() moves the values. Short, because a file can ask for it a million times.
+  /// Returns a copy, because make() moves the values. The length is limited, because a file can request a million
+  /// copies.
   std::vector<Index> few_items(Index tuple) {
     if (value(tuple).items.size() > kMostArguments) refuse("a function gets more than 8 arguments");
     return value(tuple).items;

@@ -16,10 +16,10 @@ namespace {
 using Kind = PickledValue::Kind;
 
 constexpr std::uint64_t kLargestPickle_bytes = std::uint64_t{16} << 20;
-/// PROTO, LONG1 of ten bytes, 0x1950a86a20f9469cfc6c, STOP. The byte behind PROTO is the pickle protocol.
+/// PROTO, LONG1 of ten bytes, 0x1950a86a20f9469cfc6c, STOP. The byte after PROTO is the pickle protocol.
 constexpr std::string_view kLegacyMagic("\x8a\x0a\x6c\xfc\x9c\x46\xf9\x20\x6a\xa8\x50\x19.", 13);
 
-/// Raw bytes of the storage with this key.
+/// Returns the raw bytes of the storage with this key.
 using StorageBytes = std::function<std::string_view(const PickledStorage&, Precision)>;
 
 std::optional<Precision> precision_of(std::string_view storage_type) {
@@ -30,7 +30,7 @@ std::optional<Precision> precision_of(std::string_view storage_type) {
   return std::nullopt;
 }
 
-/// True if every entry of the view lies in its storage.
+/// Returns true if every entry of the view lies inside its storage.
 bool lies_inside(const PickledTensor& tensor, std::uint64_t elements) {
   std::uint64_t last = tensor.offset;
   for (std::size_t d = 0; d < tensor.sizes.size(); ++d) {
@@ -42,7 +42,7 @@ bool lies_inside(const PickledTensor& tensor, std::uint64_t elements) {
   return last < elements;
 }
 
-/// Row-major numbers of a view of one or two dimensions.
+/// Returns the row-major numbers of a view of one or two dimensions.
 std::vector<double> numbers_of(const PickledTensor& tensor, std::string_view storage, Precision precision) {
   const bool is_matrix = tensor.sizes.size() == 2;
   const std::uint64_t rows = is_matrix ? tensor.sizes[0] : 1;
@@ -89,7 +89,7 @@ Weights assemble_state_dict(const Pickle& pickle, const StorageBytes& bytes_of, 
                     std::to_string(storage.elements) + " numbers were declared", kCopyAgain});
 }
 
-/// The archive's one top folder, which is named after the file that torch.save was given.
+/// Returns the archive's only top-level folder, which is named after the file that torch.save was given.
 std::string top_folder(const ZipArchive& archive, const std::string& path) {
   for (const std::string& name : archive.names()) {
     const std::size_t slash = name.find('/');
@@ -119,7 +119,7 @@ void refuse_other_archives(const ZipArchive& archive, const std::string& folder,
   }
 }
 
-/// The legacy container as it was cut: where its pickles and its raw data begin.
+/// The legacy container split into its pickles and its raw data.
 class Legacy {
  public:
   Legacy(const std::string& bytes, const std::string& path) : bytes_(bytes), path_(path) {
@@ -140,8 +140,8 @@ class Legacy {
     data_at_ = keys.end;
   }
 
-  /// Raw data follow one another in the order of the list, each behind its number of elements.
-  /// The size of an element is known only from a tensor's declaration, hence the walk over all storages.
+  /// Locates the raw data, which are stored in the order of the list, each preceded by its number of elements. The
+  /// element size is known only from the declaration of a tensor, so all storages must be visited.
   std::map<std::string_view, std::string_view> locate() const {
     std::map<std::string_view, const PickledStorage*> declared;
     for (const PickledStorage& storage : state.storages) {
@@ -224,7 +224,7 @@ Weights parse_pth_zip(const std::string& bytes, const std::string& path, const s
   const std::string program = archive.read(folder + "data.pkl", kLargestPickle_bytes);
   const Pickle pickle = parse_pickle(program, 0, path, folder + "data.pkl");
 
-  std::map<std::string_view, std::string> storages;  // read once: tensors may share them
+  std::map<std::string_view, std::string> storages;  // read only once, since tensors may share them
   std::uint64_t bytes_read = 0;
   const StorageBytes bytes_of = [&](const PickledStorage& storage, Precision precision) -> std::string_view {
     auto found = storages.find(storage.key);
@@ -245,7 +245,7 @@ Weights parse_pth_zip(const std::string& bytes, const std::string& path, const s
 Weights parse_pth_legacy(const std::string& bytes, const std::string& path, const std::string& key,
                          const std::vector<std::string>& order) {
   const Legacy container(bytes, path);
-  std::optional<std::map<std::string_view, std::string_view>> storages;  // after the names have been checked
+  std::optional<std::map<std::string_view, std::string_view>> storages;  // located after checking the names
   const StorageBytes bytes_of = [&](const PickledStorage& storage, Precision) {
     if (!storages) storages = container.locate();
     const auto found = storages->find(storage.key);

@@ -9,8 +9,8 @@
 namespace swarmcert::files {
 namespace {
 
-constexpr double kReach = 2;        ///< of inputs where nothing limits them
-constexpr double kFarthest = 1000;  ///< of inputs where a clamp is as good as none
+constexpr double kReach = 2;        ///< range of the inputs if nothing limits them
+constexpr double kFarthest = 1000;  ///< range of the inputs if a clamp is wider than this
 
 }  // namespace
 
@@ -28,7 +28,7 @@ std::map<std::string, Samples> record_samples(const Network& network, const Part
       for (std::size_t k = 0; k < static_cast<std::size_t>(samples.inputs); ++k) {
         const double lower = has_clamp ? std::max(network.clamp->lower[k], -kFarthest) : -kReach;
         const double upper = has_clamp ? std::min(network.clamp->upper[k], kFarthest) : kReach;
-        // Halfway inside, so that rounding to float32 does not leave the clamp.
+        // Slightly inside the range, so that rounding to float32 does not leave the clamp.
         const double share = 0.5 + 0.499 * random.symmetric();
         input.push_back(static_cast<float>(lower + share * (upper - lower)));
       }

@@ -11,14 +11,14 @@
 namespace swarmcert::files {
 namespace {
 
-/// Rows that a ReLU layer takes; equal rows are taken once.
+/// Collects the distinct rows of a ReLU layer.
 class Rows {
  public:
   explicit Rows(int inputs) { map.inputs = inputs; }
 
   int add(const AffineMap::Row& row, const Enclosed& shift) {
     const bool is_copy = row.size() == 1 && shift.value == 0 && shift.radius == 0;
-    if (is_copy) {  // the common case of a value that is carried through
+    if (is_copy) {  // the common case of a value that is only carried
       const auto [found, is_new] = copies_.emplace(
           std::make_pair(row[0].column, std::make_pair(row[0].factor.value, row[0].factor.radius)),
           map.outputs());

@@ -14,7 +14,8 @@ namespace swarmcert::files {
 namespace {
 
 constexpr std::uint64_t kLargestHeader_bytes = std::uint64_t{4} << 20;
-/// Key in "__metadata__" with the names of our layers in order of evaluation: safetensors itself has no order.
+/// Key in "__metadata__" for the names of our layers in order of evaluation; safetensors itself does not define an
+/// order.
 constexpr char kOrderKey[] = "swarmcert.layers";
 
 std::uint64_t header_length(const std::string& bytes) {
@@ -25,7 +26,7 @@ std::uint64_t header_length(const std::string& bytes) {
 
 struct Entry {
   DeclaredTensor tensor;
-  std::uint64_t begin = 0, end = 0;  ///< in the data behind the header
+  std::uint64_t begin = 0, end = 0;  ///< in the data after the header
 };
 
 class Reader {
@@ -115,7 +116,7 @@ class Reader {
     return result;
   }
 
-  /// The format demands that tensors cover the data without overlap or gap.
+  /// The format requires that tensors cover the data without overlaps or gaps.
   void check_layout() const {
     std::vector<const Entry*> by_begin;
     for (const Entry& entry : entries_) by_begin.push_back(&entry);
@@ -134,7 +135,7 @@ class Reader {
       refuse("", std::to_string(data_.size() - covered) + " bytes", "belong to no tensor");
   }
 
-  /// Ours list their layers in the order of evaluation; those of others are sorted by name.
+  /// Sorts our own files into the stated order of evaluation, and other files by name.
   Listing sort_by_layer() {
     const std::vector<std::string> order = layer_order();
     const auto layer_of = [](const std::string& tensor) {
@@ -162,7 +163,7 @@ class Reader {
     return is_stated ? Listing::kEvaluation : Listing::kUnordered;
   }
 
-  /// Empty where the file does not say.
+  /// Returns the stated order, or nothing if the file does not state one.
   std::vector<std::string> layer_order() const {
     if (!header_.contains("__metadata__")) return {};
     const Json& metadata = header_["__metadata__"];
@@ -230,7 +231,7 @@ std::string safetensors_bytes(const Weights& weights) {
   } catch (const Json::type_error&) {
     throw InputError({weights.path, "", "", "", "the name of a layer is not UTF-8", "rename the layers"});
   }
-  text.resize((text.size() + 7) / 8 * 8, ' ');  // so that the numbers lie on multiples of 8
+  text.resize((text.size() + 7) / 8 * 8, ' ');  // aligns the numbers to multiples of 8 bytes
   const std::uint64_t length = text.size();
   return std::string(reinterpret_cast<const char*>(&length), sizeof length) + text + data;
 }

@@ -17,7 +17,7 @@ std::string short_text(double value) {
   return text.str();
 }
 
-/// "(0.1, 0.2)"; at most eight numbers.
+/// Returns "(0.1, 0.2)", with at most eight numbers.
 std::string listed(const std::vector<double>& values) {
   constexpr std::size_t kMost = 8;
   std::string text = "(";

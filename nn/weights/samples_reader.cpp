@@ -79,7 +79,7 @@ class CsvSamples {
     has_lines_ = true;
     if (is_first && std::none_of(cells.begin(), cells.end(),
                                  [&value](std::string_view cell) { return csv_number(cell, value); }))
-      return;  // names of columns
+      return;  // column names
     if (samples_.x.size() + samples_.y.size() + columns > kMostElements) refuse_too_many(samples_.path);
     for (std::size_t k = 0; k < columns; ++k) {
       const std::string field = field_of(k, samples_.inputs);
@@ -99,7 +99,7 @@ class CsvSamples {
 
 // --- NumPy
 
-/// The array `name`, which must have `columns` columns; one column may come as a list.
+/// Reads the array `name`, which must have `columns` columns; a single column may be one-dimensional.
 std::vector<double> array_of(const ZipArchive& archive, const std::string& name, int columns,
                              const std::string& path) {
   const std::string entry = name + ".npy";
@@ -205,7 +205,7 @@ Samples samples_of(const Network& network, const std::string& part, const std::s
   return samples;
 }
 
-/// "PART" of "PART=FILE"; empty where `argument` names a file.
+/// Returns "PART" for "PART=FILE"; empty if `argument` is the name of a file.
 std::string part_of(const std::string& argument, const Network& network) {
   const std::size_t equals = argument.find('=');
   if (equals == std::string::npos || std::filesystem::exists(argument)) return "";

@@ -45,7 +45,7 @@ class Selector {
  private:
   const PickledValue& value(Index index) const { return pickle_.values[index]; }
 
-  /// Follows `key`. A name in the file may itself hold dots: the longest one that fits is taken.
+  /// Follows the dotted path `key`. Names in the file may themselves contain dots, so the longest match is taken.
   Index find(const std::string& key) const {
     Index at = pickle_.root;
     std::string_view rest = key;
@@ -70,7 +70,7 @@ class Selector {
     }
   }
 
-  /// The hint: other keys that lead to a dict with tensors.
+  /// Returns the hint: other keys that lead to a dict with tensors.
   std::string choose(const std::string& key) const {
     std::vector<std::string> keys = keys_of_state_dicts();
     if (keys.empty()) return "save one with torch.save(model.state_dict(), ...)";
@@ -83,7 +83,7 @@ class Selector {
     return list;
   }
 
-  /// Breadth first, each dict once, because a pickle may contain itself.
+  /// Breadth-first search that visits each dict once, because a pickle may contain itself.
   std::vector<std::string> keys_of_state_dicts() const {
     std::vector<std::string> keys;
     std::vector<std::pair<std::string, Index>> queue = {{"", pickle_.root}};

@@ -22,7 +22,7 @@ constexpr char kFold[] =
 constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 constexpr std::size_t kMostTensors = 4096;
 
-/// Which tensors make up a layer; indices into the declared ones.
+/// The tensors of one layer, as indices into the declared tensors.
 struct LayerParts {
   std::string name;
   std::size_t weight = kNone;
@@ -62,7 +62,7 @@ class Assembler {
     throw InputError({path_, "", tensors_[i].name, value, what, hint});
   }
 
-  /// Tensors that only layers of other kinds have, with the kind's name and what to do.
+  /// Rejects tensors that occur only in other kinds of layers, with the name of the kind and a hint.
   void refuse_other_structures() const {
     struct Hint {
       const char* ending;
@@ -92,7 +92,7 @@ class Assembler {
     }
   }
 
-  /// True if the i-th tensor is named "<layer>.<part>" or just "<part>"; sets `layer`.
+  /// Returns true if the i-th tensor is named "<layer>.<part>" or just "<part>"; sets `layer`.
   bool is_part(std::size_t i, const std::string& part, std::string& layer) const {
     const std::string& name = tensors_[i].name;
     layer.clear();
@@ -126,7 +126,7 @@ class Assembler {
   }
 
   std::uint64_t elements_in(const std::vector<LayerParts>& parts) const {
-    std::uint64_t sum = 0;  // weights alone: a bias is never larger than its weight
+    std::uint64_t sum = 0;  // only weights: a bias is never larger than its weight
     for (const LayerParts& part : parts) sum += *element_count(tensors_[part.weight].shape);
     return sum;
   }

@@ -21,7 +21,7 @@
 namespace swarmcert::files {
 namespace {
 
-/// HDF5's signature may lie at offset 0, 512, 1024, 2048, ...
+/// HDF5's signature may be at offset 0, 512, 1024, 2048, ...
 bool looks_like_hdf5(const std::string& bytes) {
   constexpr std::string_view kSignature("\x89HDF\r\n\x1a\n", 8);
   for (std::size_t at = 0; at < bytes.size(); at = std::max<std::size_t>(512, 2 * at))
@@ -140,7 +140,7 @@ void Weights::end_in(Activation activation) {
 }
 
 double rounding_of_slope(const Weights& weights) {
-  constexpr double kUp = 1 + 0x1p-26;  // covers the rounding of as many layers as a file can hold
+  constexpr double kUp = 1 + 0x1p-26;  // covers the round-off for as many layers as a file can hold
   double product = 1, share = 0;       // of |W|_F; sum of weight_rounding / |W|_F
   for (const Layer& layer : weights.layers) {
     const double norm = norm_up(layer.weights);

@@ -20,8 +20,9 @@ std::uint64_t little_endian_64(std::string_view bytes) {
   return value;
 }
 
-/// True if the archive has, or says it has, more entries than kMostEntries. libzip allocates for each before it
-/// looks at them, so this comes first. Offsets: PKWARE APPNOTE 6.3.9, sections 4.3.12, 4.3.14, 4.3.15.
+/// Returns true if the archive contains, or claims to contain, more than kMostEntries entries. libzip allocates memory
+/// for each before it checks them, so this must come first. Offsets: PKWARE APPNOTE 6.3.9, sections 4.3.12, 4.3.14,
+/// 4.3.15.
 bool has_too_many_entries(std::string_view bytes) {
   constexpr std::string_view kEntry("PK\1\2", 4);
   std::uint64_t entries = 0;

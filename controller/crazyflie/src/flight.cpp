@@ -15,14 +15,14 @@ using Mode = decltype(setpoint_t{}.mode.x);
 using Settings = controller::FlightSettings<float, controller::PidGains<float>>;
 
 constexpr float kRadianPerDegree = 0.017453292519943295f;
-/// Predictions older than this are of a task that no longer runs.
+/// Older predictions come from a task that is no longer running.
 constexpr std::uint32_t kMaxPredictionAge_ms = 100;
 
 Settings settings;
 controller::FlightMemory<float> memory;
-controller::Heading<float> heading;  ///< that the setpoint asks for, or that its yaw rates add up to
+controller::Heading<float> heading;  ///< from the setpoint, or integrated from its yaw rates
 
-/// Crazyflie 2.1: inertia and calibration as published with the authors' flights; gains of the attitude loop likewise.
+/// Crazyflie 2.1: inertia, calibration and gains of the attitude loop as published with the authors' flights.
 void set_up() {
   settings = {};
   settings.inertia_kg_m2 = controller::diagonal(Vector3<float>{16.57171e-6f, 16.655602e-6f, 29.261652e-6f});
@@ -41,7 +41,7 @@ void take_parameters() {
   settings.position = {{p.kp_xy, p.kp_xy, p.kp_z}, {p.kd_xy, p.kd_xy, p.kd_z}, {p.ki_xy, p.ki_xy, p.ki_z}};
 }
 
-/// From a unit quaternion, with the norm divided out: estimators let it drift.
+/// Returns the rotation matrix of a quaternion divided by its norm, since estimators let the norm drift.
 controller::Matrix3<float> rotation(const quaternion_t& q) {
   using nn::rounded;
   const float xx = rounded(q.x * q.x), yy = rounded(q.y * q.y), zz = rounded(q.z * q.z),
@@ -54,7 +54,7 @@ controller::Matrix3<float> rotation(const quaternion_t& q) {
           {rounded(s * (xz - wy)), rounded(s * (yz + wx)), 1.0f - rounded(s * (xx + yy))}};
 }
 
-/// Where the nose of R_WB points, seen from above; straight ahead where it points up or down.
+/// Returns the direction of the nose of R_WB, seen from above; straight ahead if it points up or down.
 controller::Heading<float> heading_of(const controller::Matrix3<float>& R_WB) {
   const float c = R_WB.x.x, s = R_WB.y.x;
   const float length = controller::square_root(nn::rounded(c * c) + nn::rounded(s * s));
@@ -62,7 +62,7 @@ controller::Heading<float> heading_of(const controller::Matrix3<float>& R_WB) {
   return {c / length, s / length};
 }
 
-/// `from`, turned by a small angle.
+/// Returns `from`, rotated by a small angle.
 controller::Heading<float> turned(const controller::Heading<float>& from, float angle_rad) {
   const controller::SineCosine<float> by = controller::sin_cos(angle_rad);
   const float c = nn::rounded(from.cosine * by.cosine) - nn::rounded(from.sine * by.sine);
@@ -71,8 +71,8 @@ controller::Heading<float> turned(const controller::Heading<float>& from, float 
   return {c / length, s / length};
 }
 
-/// What one axis of the setpoint asks for. Modes without a position or velocity (flying by attitude) are not this
-/// controller's: not a number, upon which flight_step() stays where it is.
+/// Reads one axis of the setpoint. Modes without a position or velocity (attitude control) are not supported: they give
+/// NaN, upon which flight_step() holds the position.
 void take_axis(Mode mode, float position_m, float velocity_m_s, float measured_m, float& wanted_m,
                float& wanted_m_s) {
   wanted_m_s = velocity_m_s;
@@ -122,13 +122,13 @@ controller::Measured<float> measured_of(const sensorData_t& sensors, const state
   m.attitude.omega_B_rad_s = {nn::rounded(sensors.gyro.x * kRadianPerDegree),
                               nn::rounded(sensors.gyro.y * kRadianPerDegree),
                               nn::rounded(sensors.gyro.z * kRadianPerDegree)};
-  m.position_stamp_ms = now_ms;  // the estimator gives its state now
+  m.position_stamp_ms = now_ms;  // the estimator's state is current
   m.attitude_stamp_ms = now_ms;
   m.battery_V = pmGetBatteryVoltage();
   return m;
 }
 
-/// f_a_hat where it may be used: switched on, tested, fresh.
+/// Returns f_a_hat if it may be used: enabled, self-test passed, recent.
 Vector3<float> effect(std::uint32_t now_ms) {
   const bool applies = swarmcert_parameters.enable == kSwarmcertApply &&
                        swarmcert_status.self_test == kSwarmcertPassed &&

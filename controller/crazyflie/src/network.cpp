@@ -1,2 +1,2 @@
-// What 'swarmcert export NET -o network' wrote.
+// Includes the output of 'swarmcert export NET -o network'.
 #include "swarmcert_network.cpp"

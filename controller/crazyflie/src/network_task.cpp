@@ -27,7 +27,7 @@ struct Peer {
 Peer peers[kPeers];
 Vector3<float> last_effect_W_N{};
 
-// The time stamp of a peer's position moved between versions of the firmware.
+// The position of the time stamp in a peer's data differs between firmware versions.
 template <typename Position>
 auto stamp_of(const Position& peer, int) -> decltype(peer.timestamp) {
   return peer.timestamp;
@@ -37,7 +37,7 @@ auto stamp_of(const Position& peer, long) -> decltype(peer.pos.timestamp) {
   return peer.pos.timestamp;
 }
 
-/// What the radio's task writes without a lock: read until two readings agree. False if they do not.
+/// Reads data that the radio task writes without a lock, until two readings agree. Returns false if they do not.
 bool read_peer(int index, std::uint8_t& id, Vector3<float>& position_W_m, std::uint32_t& stamp_ms) {
   const volatile auto* const peer = peerLocalizationGetPositionByIdx(static_cast<std::uint8_t>(index));
   if (peer == nullptr) return false;
@@ -72,7 +72,7 @@ void update_tracks() {
   }
 }
 
-/// The estimator's state of this vehicle, whatever controller flies.
+/// The estimator's state of this vehicle, independent of the active controller.
 class OwnState {
  public:
   Vector3<float> position_W_m() const { return read(position_); }
@@ -82,7 +82,7 @@ class OwnState {
   struct Ids {
     logVarId_t x, y, z;
   };
-  // Some versions of the firmware take the names as char*, none changes them.
+  // Some firmware versions declare the names as char*; none modifies them.
   static logVarId_t find(const char* name) {
     return logGetVarId(const_cast<char*>("stateEstimate"), const_cast<char*>(name));
   }

@@ -1,4 +1,4 @@
-/* Group "swarmcert" of the parameter and log systems. In C: their macros do not compile as C++ under -Werror. */
+/* The parameter and log group "swarmcert". In C, because the macros do not compile as C++ with -Werror. */
 #include "shared.h"
 
 #include "log.h"
@@ -18,7 +18,7 @@ struct SwarmcertParameters swarmcert_parameters = {
 };
 volatile struct SwarmcertStatus swarmcert_status;
 
-/* The type follows from the variable: it cannot be the wrong one. */
+/* The type is deduced from the variable, so it cannot be wrong. */
 #define PARAM_TYPE(variable) _Generic((variable), uint8_t : PARAM_UINT8, float : PARAM_FLOAT)
 #define LOG_TYPE(variable) _Generic((variable), uint8_t : LOG_UINT8, uint16_t : LOG_UINT16, float : LOG_FLOAT)
 #define ADD_PARAM(name, member) \

@@ -17,7 +17,7 @@ constexpr char kSaveAsDouble[] = "convert in MATLAB with double(...) or single(.
 std::vector<std::uint64_t> shape_of(Hdf5Piece message) {
   const std::uint64_t version = message.number(1), rank = message.number(1);
   if (version != 1) message.require("version of a dataspace", version, 2);
-  message.skip(1);  // whether largest sizes follow
+  message.skip(1);  // whether maximum sizes follow
   const std::uint64_t kind = message.number(1);
   if (version == 1) message.skip(4);
   if (version == 2 && kind > 1)
@@ -32,7 +32,7 @@ std::vector<std::uint64_t> shape_of(Hdf5Piece message) {
   return shape;
 }
 
-/// Fields of IEEE's formats: the whole number, sign, exponent, fraction, bias.
+/// Checks the fields of the IEEE formats: size, sign, exponent, fraction, bias.
 void require_ieee(Hdf5Piece message, std::uint64_t bits, std::size_t size) {
   const bool is_double = size == 8;
   if (!is_double) message.require("bytes of a float", size, 4);
@@ -86,7 +86,7 @@ struct Attribute {
   Hdf5Piece type, shape, elements;
 };
 
-/// Versions 1 to 3; in version 1 every part is padded to a multiple of 8 bytes.
+/// Supports versions 1 to 3; in version 1 every part is padded to a multiple of 8 bytes.
 Attribute attribute_parts(Hdf5Piece message) {
   const std::uint64_t version = message.number(1);
   if (version < 1 || version > 3)
@@ -133,7 +133,7 @@ std::optional<Hdf5Array> attribute_of(Hdf5File& file, const Hdf5Object& object, 
     if (message.kind == Hdf5Kind::kAttributeInfo) {
       Hdf5Piece info = message.contents;
       info.require("version of an object's attributes", info.number(1), 0);
-      if ((info.number(1) & 1) != 0) info.skip(2);  // greatest order of creation
+      if ((info.number(1) & 1) != 0) info.skip(2);  // maximum creation order
       if (info.number(8) != kNoAddress)
         info.refuse("", "", "an object keeps its attributes in a fractal heap, which is not read",
                     kSaveAsVersion7);

@@ -78,7 +78,7 @@ Hdf5File::Hdf5File(const std::string& bytes, std::size_t start, const std::strin
   root_ = version == 0 ? symbol_table_root(piece) : plain_root(piece);
 }
 
-/// Version 0: the root group is an entry of a symbol table.
+/// Superblock version 0: the root group is a symbol table entry.
 std::uint64_t Hdf5File::symbol_table_root(Hdf5Piece& piece) {
   piece.require("version of the free space", piece.number(1), 0);
   piece.require("version of the symbol table", piece.number(1), 0);
@@ -92,7 +92,7 @@ std::uint64_t Hdf5File::symbol_table_root(Hdf5Piece& piece) {
   const std::uint64_t end = piece.number(8);
   if (end > bytes_.size())
     piece.refuse("end of the file", std::to_string(end), "lies beyond the end", kCopyAgain);
-  piece.skip(8 + 8);  // driver information; the name of the root
+  piece.skip(8 + 8);  // driver information; name of the root
   return piece.number(8);
 }
 
@@ -151,7 +151,7 @@ Hdf5Object Hdf5File::object(std::uint64_t address) {
   std::vector<Hdf5Piece> continuations;
   int version = static_cast<int>(piece.number(1)), flags = 0;
   if (version == 1) {
-    piece.skip(1 + 2 + 4);  // counts of messages and references
+    piece.skip(1 + 2 + 4);  // number of messages and reference count
     const std::uint64_t size = piece.number(4);
     piece.skip(4);
     read_messages(piece.piece(size), version, flags, object, continuations);
@@ -162,7 +162,7 @@ Hdf5Object Hdf5File::object(std::uint64_t address) {
     piece.require("version of an object header", static_cast<std::uint64_t>(version), 2);
     flags = static_cast<int>(piece.number(1));
     if ((flags & 0x20) != 0) piece.skip(16);  // times
-    if ((flags & 0x10) != 0) piece.skip(4);   // when attributes move elsewhere
+    if ((flags & 0x10) != 0) piece.skip(4);   // thresholds of the attribute storage
     const std::uint64_t size = piece.number(std::size_t{1} << (flags & 3));
     read_messages(piece.piece(size), version, flags, object, continuations);
   }

@@ -85,7 +85,7 @@ Hdf5Link link_of(Hdf5Piece message) {
   message.require("version of a link", message.number(1), 1);
   const std::uint64_t flags = message.number(1);
   const std::uint64_t kind = (flags & 0x8) != 0 ? message.number(1) : 0;
-  if ((flags & 0x4) != 0) message.skip(8);   // order of creation
+  if ((flags & 0x4) != 0) message.skip(8);   // creation order
   if ((flags & 0x10) != 0) message.skip(1);  // character set
   const std::uint64_t length = message.number(std::size_t{1} << (flags & 3));
   const std::string name(message.take(length));
@@ -107,7 +107,7 @@ std::vector<Hdf5Link> links_of(Hdf5File& file, const Hdf5Object& group) {
   std::vector<Hdf5Link> links;
   if (std::optional<Hdf5Piece> info = group.find(Hdf5Kind::kLinkInfo)) {
     info->require("version of a group's links", info->number(1), 0);
-    if ((info->number(1) & 1) != 0) info->skip(8);  // greatest order of creation
+    if ((info->number(1) & 1) != 0) info->skip(8);  // maximum creation order
     if (info->number(8) != kNoAddress)
       info->refuse("", "", "a group keeps its links in a fractal heap, which is not read", kSaveAsVersion7);
   }

@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint64_t kCompact = 0, kContiguous = 1, kChunked = 2;
 constexpr std::uint64_t kDeflate = 1, kShuffle = 2;
 constexpr std::uint64_t kChunkNode = 1;
-/// No zlib stream decompresses to more than 1032 times its size; that much and the room of any header.
+/// A zlib stream decompresses to at most 1032 times its size; the margin covers any header.
 constexpr std::uint64_t kMostExpansion = 1040;
 
 struct Layout {
@@ -31,7 +31,7 @@ std::vector<std::uint64_t> chunk_shape(Hdf5Piece& message, std::uint64_t rank) {
   return chunk;
 }
 
-/// Versions 1 and 2, which MATLAB wrote at first.
+/// Reads layout versions 1 and 2, written by early versions of MATLAB.
 Layout early_layout(Hdf5Piece& message) {
   Layout layout;
   const std::uint64_t rank = message.number(1);
@@ -64,7 +64,7 @@ Layout layout_of(Hdf5Piece message) {
   return layout;
 }
 
-/// The identifiers of the filters, in the order in which the writer applied them: each known, none twice.
+/// Returns the identifiers of the filters in the order in which the writer applied them; each is known and occurs once.
 std::vector<std::uint64_t> filters_of(const Hdf5Object& dataset) {
   std::vector<std::uint64_t> filters;
   std::optional<Hdf5Piece> message = dataset.find(Hdf5Kind::kFilters);
@@ -79,7 +79,7 @@ std::vector<std::uint64_t> filters_of(const Hdf5Object& dataset) {
       message->refuse("filter", std::to_string(filter), "only deflate and shuffle are read, each once",
                       kSaveAsVersion7);
     const std::uint64_t name_bytes = version == 1 ? message->number(2) : 0;
-    message->skip(2);  // whether it is optional
+    message->skip(2);  // whether the filter is optional
     const std::uint64_t values = message->number(2);
     message->skip(name_bytes + 4 * values + (version == 1 && values % 2 == 1 ? 4 : 0));
     filters.push_back(filter);
@@ -87,7 +87,8 @@ std::vector<std::uint64_t> filters_of(const Hdf5Object& dataset) {
   return filters;
 }
 
-/// The writer put the first bytes of all elements first, then the second ones, ...; what no whole element is, last.
+/// Undoes the shuffle filter: the first bytes of all elements come first, then the second ones, ...; the bytes of an
+/// incomplete last element come last.
 std::string unshuffled(const std::string& shuffled, std::size_t element_bytes) {
   const std::size_t count = shuffled.size() / element_bytes;
   std::string result = shuffled;
@@ -143,7 +144,7 @@ class Chunks {
       const std::uint64_t size = node.entries.number(4), skipped_filters = node.entries.number(4);
       std::vector<std::uint64_t> corner;
       for (std::size_t axis = 0; axis < shape_.size(); ++axis) corner.push_back(node.entries.number(8));
-      node.entries.skip(8);  // within an element
+      node.entries.skip(8);  // offset within an element
       const std::uint64_t child = node.entries.number(8);
       if (node.level > 0) {
         read_tree(child, node.level);
@@ -167,7 +168,7 @@ class Chunks {
     is_read_[static_cast<std::size_t>(place)] = true;
   }
 
-  /// One chunk, the filters undone from the last to the first but those that the writer skipped.
+  /// Reads one chunk and undoes the filters in reverse order, except those that the writer skipped.
   std::string contents(Hdf5Piece stored, std::uint64_t skipped_filters) {
     file_.count_bytes(std::max<std::uint64_t>(chunk_bytes_, stored.left()), stored);
     std::string bytes(stored.take(stored.left()));
@@ -186,7 +187,7 @@ class Chunks {
     return bytes;
   }
 
-  /// Copies the part of a chunk that is inside the dataset, row by row along the last axis.
+  /// Copies the part of a chunk that lies inside the dataset, row by row along the last axis.
   void place(const std::string& chunk, const std::vector<std::uint64_t>& corner) {
     const std::size_t last = shape_.size() - 1;
     std::vector<std::uint64_t> extent;

@@ -24,7 +24,7 @@ class Mat73Reader {
   std::vector<MatVariable> run() { return variables(file_.object(file_.root()), MatInside::kFile); }
 
  private:
-  /// Names that begin with # are MATLAB's own: what references lead to.
+  /// Returns the variables of a group. Names that begin with # are internal to MATLAB: the targets of references.
   std::vector<MatVariable> variables(const Hdf5Object& group, MatInside inside) {
     std::vector<MatVariable> result;
     for (const Hdf5Link& link : links_of(file_, group))
@@ -50,14 +50,14 @@ class Mat73Reader {
     return result;
   }
 
-  /// Empty where the object states none.
+  /// Returns the MATLAB class of the object, or "" if it states none.
   std::string class_of(const Hdf5Object& object) {
     const std::optional<Hdf5Array> text = attribute_of(file_, object, "MATLAB_class");
     if (!text || text->type.type_class != Hdf5Class::kText) return "";
     return text->bytes.substr(0, text->bytes.find('\0'));
   }
 
-  /// MATLAB stores the size of an empty array in its place.
+  /// Returns whether the array is empty; MATLAB then stores its size in place of its elements.
   bool is_empty(const Hdf5Object& object) {
     const std::optional<Hdf5Array> flag = attribute_of(file_, object, "MATLAB_empty");
     return flag && flag->bytes.find_first_not_of('\0') != std::string::npos;
@@ -80,7 +80,7 @@ class Mat73Reader {
     }
   }
 
-  /// MATLAB lists columns first and HDF5 the last dimension fastest, so that the sizes are reversed.
+  /// MATLAB stores matrices column-major, whereas HDF5 is row-major, so the dimensions are reversed.
   NamedArray numbers(const Hdf5Object& object, const std::string& name) {
     if (is_empty(object)) return {name, {0, 0}, {}, false};
     const Hdf5Array stored = array_of(file_, object);

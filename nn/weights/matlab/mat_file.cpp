@@ -30,7 +30,7 @@ struct MatElement {
   std::size_t offset = 0;
 };
 
-/// Elements that follow one another in a piece of the file, or of what a piece of it decompresses to.
+/// Iterates over consecutive data elements of a piece of the file, or of decompressed data.
 class MatElements {
  public:
   MatElements(std::string_view data, std::size_t offset, const std::string& path)
@@ -41,7 +41,7 @@ class MatElements {
     element.offset = offset_ + at_;
     if (data_.size() - at_ < 8) refuse(element.offset, "an element is cut off");
     const std::uint32_t first = word(at_), second = word(at_ + 4);
-    if (first >> 16 != 0) {  // small: size and type share a word
+    if (first >> 16 != 0) {  // small data element: size and type share a word
       const std::uint32_t size = first >> 16;
       if (size > 4) refuse(element.offset, "a small element has more than 4 bytes");
       element.type = first & 0xffff;
@@ -119,7 +119,7 @@ class MatReader {
     throw InputError({path_, "offset " + std::to_string(offset), name, "", what, hint});
   }
 
-  /// At most what the largest network needs, however much the file claims.
+  /// Decompresses an element, up to what the largest network needs, whatever size the file claims.
   std::string decompressed(const MatElement& element) {
     std::optional<std::string> result = inflated(element.data, room_bytes_);
     if (!result) refuse(element.offset, "", "its compressed data are damaged", kCopyAgain);
@@ -181,7 +181,7 @@ class MatReader {
     }
   }
 
-  /// The names have the same length, filled with zeros.
+  /// Reads the field names, which all have the same length and are padded with zeros.
   void read_fields(MatElements& parts, MatVariable& result) {
     std::vector<double> lengths;
     append_values<std::int32_t>(parts.expect(kInt32, "length of names").data, lengths);
@@ -295,7 +295,7 @@ Weights network_of_variables(std::vector<MatVariable>& variables, const std::str
 
 std::vector<double> rows_first(std::vector<double> columns_first, const std::vector<std::uint64_t>& shape) {
   if (shape.size() != 2 || columns_first.empty())
-    return columns_first;  // 2^60 rows of no columns are no work
+    return columns_first;  // avoids a long loop for 2^60 rows and no columns
   std::vector<double> numbers;
   numbers.reserve(columns_first.size());
   for (std::uint64_t i = 0; i < shape[0]; ++i)

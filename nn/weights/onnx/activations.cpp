@@ -1,4 +1,4 @@
-/// Piecewise linear functions of an ONNX graph, written with ReLU, and constants that are computed from constants.
+/// Piecewise linear functions of an ONNX graph, rewritten with ReLU, and constants computed from constants.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -27,7 +27,7 @@ std::vector<Enclosed> negated(std::vector<Enclosed> numbers) {
 
 }  // namespace
 
-/// Adds a ReLU layer; every value that a later node takes is carried along.
+/// Adds a ReLU layer and carries along every value that a later node uses.
 AffineMap OnnxGraph::relu(const Node& node, const AffineMap& rows, const std::string& name,
                           const std::vector<AffineMap*>& also_carried) {
   std::vector<AffineMap*> carried = also_carried;
@@ -35,11 +35,11 @@ AffineMap OnnxGraph::relu(const Node& node, const AffineMap& rows, const std::st
   const std::string layer = layer_name(name);
   AffineMap result = chain_.relu(rows, carried, layer);
   for (auto& [value_name, value] : values_) value.name.clear();
-  // Values that no later node takes stay maps of the layer before; only this node, which is done with them, names them.
+  // Other values remain maps of the previous layer; only this node refers to them, and it no longer needs them.
   return result;
 }
 
-/// shift + sum of factors[k] relu(terms[k]).
+/// Returns shift + sum of factors[k] relu(terms[k]).
 OnnxValue OnnxGraph::sum_of_relus(const Node& node, const OnnxValue& x, const std::vector<AffineMap>& terms,
                                   const std::vector<std::vector<Enclosed>>& factors,
                                   const std::vector<Enclosed>& shift) {
@@ -91,7 +91,7 @@ OnnxValue OnnxGraph::computed_activation(const Node& node) {
     most.numbers = {1};
     return clipped(node, line, &least, &most);
   }
-  OnnxTensor attribute_least, attribute_most;  // of Clip before operator set 11
+  OnnxTensor attribute_least, attribute_most;  // attributes of Clip before operator set 11
   const OnnxTensor* least = constant(node, 1);
   const OnnxTensor* most = constant(node, 2);
   const auto take = [&node](const char* name, OnnxTensor& tensor, const OnnxTensor*& limit) {
@@ -105,7 +105,7 @@ OnnxValue OnnxGraph::computed_activation(const Node& node) {
   return clipped(node, x, least, most);
 }
 
-/// min(max(x, least), most), each of which may be missing: least + relu(x - least) - relu(x - most).
+/// Returns min(max(x, least), most) = least + relu(x - least) - relu(x - most). Each limit may be missing.
 OnnxValue OnnxGraph::clipped(const Node& node, const OnnxValue& x, const OnnxTensor* least,
                              const OnnxTensor* most) {
   const Enclosed one{1, 0}, minus_one{-1, 0};
@@ -113,7 +113,7 @@ OnnxValue OnnxGraph::clipped(const Node& node, const OnnxValue& x, const OnnxTen
     std::vector<Enclosed> numbers;
     if (tensor != nullptr) numbers = broadcast(*tensor, x.shape);
     const bool is_open = std::any_of(numbers.begin(), numbers.end(), [](const Enclosed& number) {
-      return !(std::fabs(number.value) <= 0x1p127);  // the largest float32 stands for no limit
+      return !(std::fabs(number.value) <= 0x1p127);  // the largest float32 means no limit
     });
     return is_open ? std::vector<Enclosed>{} : numbers;
   };
@@ -128,7 +128,7 @@ OnnxValue OnnxGraph::clipped(const Node& node, const OnnxValue& x, const OnnxTen
                       low);
 }
 
-/// Pairwise max(a, b) = b + relu(a - b), until one entry of each window is left.
+/// Reduces by pairwise max(a, b) = b + relu(a - b) until one entry of each window is left.
 OnnxValue OnnxGraph::largest(const Node& node, OnnxValue from, std::vector<std::vector<int>> windows,
                              OnnxShape shape) {
   const auto is_reduced = [](const std::vector<int>& window) { return window.size() == 1; };
@@ -192,7 +192,7 @@ OnnxValue OnnxGraph::largest_of_inputs(const Node& node) {
   return result;
 }
 
-/// Whether the node only computes a constant; then it is kept.
+/// Returns whether the node only computes a constant; if so, stores it.
 bool OnnxGraph::follow_constant(const Node& node) {
   const auto is_stored = [this](const std::string& name) {
     return name.empty() || model_.tensors.count(name) == 1;
@@ -230,7 +230,7 @@ void OnnxGraph::compute_constant(const Node& node) {
     } else if (result.integers.empty()) {
       throw OperatorRefusal{"cannot be computed from constants",
                             "fold constants: torch.onnx.export(..., do_constant_folding=True)"};
-    }  // lists of sizes stay lists
+    }  // lists of sizes remain lists of integers
   } else if (node.type == "Transpose" && !result.numbers.empty()) {
     OnnxShape shape;
     const OnnxShape own(result.shape.begin(), result.shape.end());

@@ -95,7 +95,7 @@ OnnxShape OnnxGraph::input_shape() const {
   return stated;
 }
 
-/// A stored tensor, also one that a Constant node holds or an Identity node hands on; null: none.
+/// Returns a tensor that is stored, held by a Constant node or passed on by an Identity node; null if there is none.
 const OnnxTensor* OnnxGraph::stored_anywhere(const std::string& name) const {
   const auto stored = model_.tensors.find(name);
   if (stored != model_.tensors.end()) return &stored->second;
@@ -112,7 +112,7 @@ const OnnxTensor* OnnxGraph::stored_anywhere(const std::string& name) const {
   return nullptr;
 }
 
-/// Where the file does not state the size of the input: what the first node with weights takes.
+/// Infers the size of the input, if the file does not state it, from the first node with weights.
 std::int64_t OnnxGraph::inputs_by_first_node() const {
   std::string current = model_.input.name;
   for (const Node& node : model_.nodes) {
@@ -150,7 +150,7 @@ void OnnxGraph::follow(const Node& node) {
       if (--uses_[name] == 0) values_.erase(name);
     }
     const std::string& name = node.outputs[0];
-    if (uses_[name] == 0) return;  // nothing takes it
+    if (uses_[name] == 0) return;  // its output is unused
     if (values_.count(name) == 1 || model_.tensors.count(name) == 1)
       refuse(node.offset, node.label(), "its output " + in_quotes(name) + " already exists");
     values_[name] = std::move(result);
@@ -176,7 +176,7 @@ const OnnxValue& OnnxGraph::value(const Node& node, std::size_t k) const {
   return values_.at(node.inputs[k]);
 }
 
-/// Input `k` where it is stored; null where the node leaves it out.
+/// Returns input `k` if it is stored; null if the node omits it.
 const OnnxTensor* OnnxGraph::constant(const Node& node, std::size_t k) const {
   if (k >= node.inputs.size() || node.inputs[k].empty()) return nullptr;
   const auto found = model_.tensors.find(node.inputs[k]);
@@ -191,14 +191,14 @@ const OnnxTensor& OnnxGraph::needed_constant(const Node& node, std::size_t k) co
   return *tensor;
 }
 
-/// Integers that older operator sets hold in an attribute, newer ones in input `k`.
+/// Returns integers that are an attribute in older operator sets and input `k` in newer ones.
 std::vector<std::int64_t> OnnxGraph::integers(const Node& node, std::size_t k, const char* attribute) const {
   if (node.has(attribute)) return node.integers(attribute, {});
   const OnnxTensor* const tensor = constant(node, k);
   return tensor == nullptr ? std::vector<std::int64_t>{} : tensor->integers;
 }
 
-/// "fc1" from "fc1.weight"; a layer whose name is taken, or empty, is numbered.
+/// Returns "fc1" for "fc1.weight"; a layer whose name is empty or already used gets a number.
 std::string OnnxGraph::layer_name(const std::string& weight) {
   constexpr std::string_view kSuffix = ".weight";
   std::string name = weight;
@@ -291,7 +291,7 @@ OnnxValue OnnxGraph::computed_affine(const Node& node) {
   return elementwise(node);
 }
 
-/// Add, Sub, Mul, Div, Neg and Sum: of two values, or of a value and a constant.
+/// Handles Add, Sub, Mul, Div, Neg and Sum, of two values or of a value and a constant.
 OnnxValue OnnxGraph::elementwise(const Node& node) {
   if (node.type == "Neg") {
     OnnxValue result = value(node, 0);

@@ -1,5 +1,5 @@
-// The operators of OnnxGraph that move numbers and compute none: Pad, Cast, Flatten, Reshape, Squeeze, Transpose,
-// Concat.
+// The operators of OnnxGraph that rearrange numbers without arithmetic: Pad, Cast, Flatten, Reshape, Squeeze,
+// Transpose, Concat.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -10,7 +10,7 @@
 namespace swarmcert::files {
 namespace {
 
-/// "Squeeze" and "Unsqueeze": the shape without, or with, dimensions of one at `axes`.
+/// Returns the shape without, or with, dimensions of size one at `axes`, for Squeeze and Unsqueeze.
 OnnxShape squeezed(const OnnxShape& from, const std::vector<std::int64_t>& axes, bool adds) {
   const std::size_t rank = adds ? from.size() + axes.size() : from.size();
   if (rank > 16) throw OperatorRefusal{"its result has too many dimensions"};
@@ -30,7 +30,7 @@ OnnxShape squeezed(const OnnxShape& from, const std::vector<std::int64_t>& axes,
   return shape;
 }
 
-/// "Flatten": two dimensions, those before `axis` and the others.
+/// Returns the two-dimensional shape of Flatten: the dimensions before `axis`, and the remaining ones.
 OnnxShape flattened(const OnnxShape& from, std::int64_t axis) {
   const std::size_t at =
       axis == static_cast<std::int64_t>(from.size()) ? from.size() : axis_of(axis, from.size());
@@ -52,7 +52,7 @@ void require_cast_to_float(const OnnxNode& node) {
 
 }  // namespace
 
-/// Pad with a constant, which is 0 unless input 2 says otherwise.
+/// Pads with a constant, which is 0 unless input 2 states another.
 OnnxValue OnnxGraph::padded(const Node& node, const OnnxValue& x) const {
   const std::vector<std::int64_t> pads = integers(node, 1, "pads");
   const OnnxTensor* const filler = constant(node, 2);

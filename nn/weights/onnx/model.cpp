@@ -26,7 +26,7 @@ std::optional<Precision> onnx_precision(std::uint64_t type) {
   }
 }
 
-/// Field of TensorProto that holds numbers of `type` when they are not raw.
+/// Returns the field of TensorProto that holds numbers of `type` when they are not raw.
 std::uint32_t typed_field(std::uint64_t type) {
   switch (type) {
     case kOnnxFloat:
@@ -36,7 +36,7 @@ std::uint32_t typed_field(std::uint64_t type) {
     case kOnnxDouble:
       return 10;
     default:
-      return 5;  // int32 and both half precisions
+      return 5;  // int32 and both half-precision types
   }
 }
 
@@ -48,7 +48,7 @@ class OnnxModelReader {
     ProtobufReader model(bytes_, 0, path_);
     bool has_graph = false;
     for (ProtobufField field; model.next(field);) {
-      if (field.number != 7) continue;  // 7: graph; the rest says who wrote it and when
+      if (field.number != 7) continue;  // 7: graph; the other fields only say who wrote the file and when
       if (std::exchange(has_graph, true)) refuse(field.offset, "graph", "appears twice");
       read_graph(field);
     }
@@ -97,7 +97,7 @@ class OnnxModelReader {
       refuse(offset, in_quotes(name), "appears twice");
   }
 
-  /// The graph's one input that is not a stored tensor: old exporters list those as inputs too.
+  /// Finds the graph's only input that is not a stored tensor; old exporters also list stored tensors as inputs.
   void choose_input() {
     int count = 0;
     for (OnnxInput& input : inputs_) {
@@ -155,7 +155,8 @@ class OnnxModelReader {
       if (field.number == 7 && !text(field).empty() && text(field) != "ai.onnx")
         refuse(field.offset, in_quotes(text(field)), "the node is of an operator set that cannot be read");
     }
-    // Dropout and BatchNormalization may name further outputs, which nothing uses in inference; TopK's are indices.
+    // Dropout and BatchNormalization may have further outputs, unused in inference; the second output of TopK is
+    // indices.
     const bool may_have_more = node.type == "Dropout" || node.type == "BatchNormalization" ||
                                node.type == "TopK" || node.type == "Split";
     if (node.outputs.empty() || (node.outputs.size() > 1 && !may_have_more))
@@ -191,7 +192,7 @@ class OnnxModelReader {
     OnnxTensor tensor;
     tensor.offset = message.offset;
     std::vector<std::int64_t> dims;
-    std::map<std::uint32_t, ProtobufField> data;  // by field of TensorProto
+    std::map<std::uint32_t, ProtobufField> data;  // keyed by field number of TensorProto
     ProtobufReader reader = fields(message);
     for (ProtobufField field; reader.next(field);) {
       if (field.number == 1) append_integers(field, path_, dims);
@@ -213,7 +214,7 @@ class OnnxModelReader {
     return tensor;
   }
 
-  /// Refuses what does not fit the shape. A tensor of another type is refused where a node uses it.
+  /// Rejects data that do not match the shape. A tensor of an unsupported type is rejected when a node uses it.
   void read_numbers(const std::map<std::uint32_t, ProtobufField>& data, OnnxTensor& tensor) const {
     const std::optional<Precision> precision = onnx_precision(tensor.type);
     const bool is_integer = tensor.type == kOnnxInt64 || tensor.type == kOnnxInt32;

@@ -7,7 +7,7 @@
 namespace swarmcert::files {
 
 bool looks_like_onnx(const std::string& bytes) {
-  // Field 1 (the IR version, a small varint), then the tag of another field of a model: producer, graph, opset.
+  // Field 1 (the IR version, a small varint), then the tag of another model field: producer, graph, opset.
   if (bytes.size() < 3 || bytes[0] != '\x08' || bytes[1] < 1 || bytes[1] > 31) return false;
   const std::string tags = "\x12\x1a\x22\x28\x32\x3a\x42";
   return tags.find(bytes[2]) != std::string::npos;

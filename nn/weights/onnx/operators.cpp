@@ -18,10 +18,10 @@ void require_numbers(const OnnxTensor& tensor) {
                           "convert before exporting: model.float()"};
 }
 
-/// Entries of a convolution or a pooling, whose file may be far smaller than the map.
+/// Limit on the entries of the map of a convolution or pooling, which can be far larger than the file.
 constexpr std::uint64_t kMostWindowEntries = std::uint64_t{1} << 23;
 
-/// Counts the entries of a map as it is built, and limits them.
+/// Counts and limits the entries of a map as it is built.
 class MapBuilder {
  public:
   MapBuilder(std::int64_t inputs, std::int64_t outputs) {
@@ -53,7 +53,7 @@ void add_shift(AffineMap& map, const OnnxTensor& bias, double factor, std::int64
   }
 }
 
-/// Where a sliding window stands and what it covers, along all its axes.
+/// Positions of a sliding window and the entries that it covers, along all its axes.
 class Window {
  public:
   Window(const OnnxNode& node, const OnnxShape& shape, const OnnxShape& kernel) : kernel_(kernel) {
@@ -77,7 +77,7 @@ class Window {
   std::int64_t places() const { return count_of(out); }
   std::int64_t size() const { return count_of(kernel_); }
 
-  /// The entry that element `k` of the window covers at `place`, or -1 in the padding.
+  /// Returns the entry that element `k` of the window covers at `place`, or -1 if it is in the padding.
   std::int64_t covered(std::int64_t place, std::int64_t k) const {
     std::int64_t index = 0, factor = 1;
     for (std::size_t a = in_.size(); a-- > 0;) {
@@ -141,7 +141,7 @@ void limit_work(std::int64_t a, std::int64_t b, std::int64_t c) {
     throw FoldingLimit{"written as a dense layer it has too many numbers"};
 }
 
-/// The window of a pooling node; that of a global one covers the whole input.
+/// Returns the window of a pooling node; for a global one it covers the whole input.
 Window pooling_window(const OnnxNode& node, const OnnxShape& shape) {
   if (shape.size() < 3) throw OperatorRefusal{"its input must have the shape [1, channels, sizes...]"};
   if (node.type.rfind("Global", 0) == 0) return {node, shape, OnnxShape(shape.begin() + 2, shape.end())};
@@ -388,7 +388,7 @@ void batch_normalization(const OnnxNode& node, const std::vector<const OnnxTenso
     if (tensor->numbers.size() != static_cast<std::size_t>(channels))
       throw OperatorRefusal{"its parameters do not fit its channels"};
   }
-  // The attribute is a float32; where it is missing, the standard's 1e-5 is one as well.
+  // The attribute is a float32, and so is the standard's default value of 1e-5.
   const Enclosed epsilon{node.number("epsilon", static_cast<double>(1e-5F)), 0};
   factors.clear();
   amounts.clear();

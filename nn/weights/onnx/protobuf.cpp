@@ -5,10 +5,10 @@
 namespace swarmcert::files {
 namespace {
 
-/// Field numbers end at 2^29.
+/// Field numbers are below 2^29.
 constexpr std::uint64_t kLargestNumber = (std::uint64_t{1} << 29) - 1;
 
-/// Reads a varint at `at`; false where it is cut off or longer than 64 bits.
+/// Reads a varint at `at`; returns false if it is truncated or longer than 64 bits.
 bool read_varint(std::string_view bytes, std::size_t& at, std::uint64_t& value) {
   value = 0;
   for (int shift = 0; shift < 64; shift += 7) {

@@ -11,7 +11,7 @@ namespace swarmcert::files {
 namespace {
 
 constexpr double kRootOfTwo = 1.41421356237309504880;
-constexpr double kRootRounding = 1e-7;  ///< of sqrt 2 as float32
+constexpr double kRootRounding = 1e-7;  ///< rounding error of sqrt 2 as float32
 constexpr char kOtherParameters[] = "use the activation with its default parameters";
 
 void require_parameter(const OnnxNode& node, const char* attribute, double value) {
@@ -19,7 +19,7 @@ void require_parameter(const OnnxNode& node, const char* attribute, double value
     throw OperatorRefusal{std::string(attribute) + " is not " + std::to_string(value), kOtherParameters};
 }
 
-/// The other one of two inputs; empty if `node` does not take `name` and one more.
+/// Returns the other of two inputs; empty if `node` does not have exactly two inputs, one of which is `name`.
 std::string other_input(const OnnxNode& node, const std::string& name) {
   if (node.inputs.size() != 2) return {};
   if (node.inputs[0] == name) return node.inputs[1];
@@ -30,7 +30,7 @@ Activation smooth_activation(const OnnxNode& node) {
   if (node.type == "Tanh") return Activation::kTanh;
   if (node.type == "Sigmoid") return Activation::kSigmoid;
   if (node.type == "Softplus") return Activation::kSoftplus;
-  if (node.type == "Elu" || node.type == "Celu") {  // with alpha = 1 they are the same
+  if (node.type == "Elu" || node.type == "Celu") {  // identical for alpha = 1
     require_parameter(node, "alpha", 1);
     return Activation::kElu;
   }
@@ -48,7 +48,7 @@ Activation smooth_activation(const OnnxNode& node) {
 
 }  // namespace
 
-/// The only node that takes `name`; null where several do, none does, or it is the graph's output.
+/// Returns the only node that uses `name`; null if there are several, there is none, or it is the graph's output.
 OnnxNode* OnnxGraph::only_user(const std::string& name) {
   OnnxNode* found = nullptr;
   for (OnnxNode& node : model_.nodes) {
@@ -59,15 +59,15 @@ OnnxNode* OnnxGraph::only_user(const std::string& name) {
   return name == model_.output ? nullptr : found;
 }
 
-/// Whether `name` is a stored number and off `wanted` by `error` at most.
+/// Returns whether `name` is a stored number that differs from `wanted` by at most `error`.
 bool OnnxGraph::holds(const std::string& name, double wanted, double error) const {
   const OnnxTensor* const tensor = name.empty() ? nullptr : stored_anywhere(name);
   return tensor != nullptr && tensor->numbers.size() == 1 &&
          std::fabs(tensor->numbers.front() - wanted) <= error;
 }
 
-/// x Sigmoid(x) becomes one node Swish, and x (1 + Erf(x / sqrt 2)) 0.5, in the order in which PyTorch exports it, one
-/// node Gelu.
+/// Replaces x Sigmoid(x) by a single node Swish, and x (1 + Erf(x / sqrt 2)) 0.5, in the order in which PyTorch exports
+/// it, by a single node Gelu.
 void OnnxGraph::join_smooth_activations() {
   const auto replace = [](OnnxNode& last, const char* type, const std::string& input,
                           const std::vector<OnnxNode*>& others) {
@@ -108,7 +108,7 @@ void OnnxGraph::join_smooth_activations() {
   model_.nodes.erase(std::remove_if(model_.nodes.begin(), model_.nodes.end(), is_joined), model_.nodes.end());
 }
 
-/// What nodes after `node` take of the values before it.
+/// Returns the values computed so far that nodes after `node` use.
 std::vector<AffineMap*> OnnxGraph::needed_after(const Node& node) {
   std::vector<AffineMap*> needed;
   for (auto& [value_name, value] : values_) {

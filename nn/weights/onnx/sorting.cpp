@@ -23,7 +23,7 @@ void require_sorting(bool condition, const char* what) {
   if (!condition) throw OperatorRefusal{what, kReadSorting};
 }
 
-/// Whether the whole value lies along `axis` and those behind it.
+/// Returns whether all dimensions before `axis` have size 1.
 bool is_first(const OnnxShape& shape, std::size_t axis) {
   return std::all_of(shape.begin(), shape.begin() + static_cast<std::ptrdiff_t>(axis),
                      [](std::int64_t size) { return size == 1; });
@@ -38,7 +38,8 @@ std::vector<OnnxNode*> OnnxGraph::users_of(const std::string& name) {
   return name == model_.output ? std::vector<OnnxNode*>{} : found;
 }
 
-/// Two nodes whose results, the larger numbers first, one Concat takes and nothing else: that Concat, or null.
+/// Returns the Concat that is the only user of the results of two nodes, the larger numbers first; null if there is
+/// none.
 OnnxNode* OnnxGraph::joined_by_concat(const std::vector<OnnxNode*>& pair) {
   OnnxNode* const first = only_user(pair[0]->outputs[0]);
   OnnxNode* const second = only_user(pair[1]->outputs[0]);
@@ -47,7 +48,7 @@ OnnxNode* OnnxGraph::joined_by_concat(const std::vector<OnnxNode*>& pair) {
   return joins ? first : nullptr;
 }
 
-/// Each group becomes its Concat alone, which then takes what the group takes: see sorted_by_concat().
+/// Replaces each group by its Concat alone, with the inputs of the group: see sorted_by_concat().
 void OnnxGraph::join_sorting() {
   for (OnnxNode& node : model_.nodes) {
     const bool splits = node.type == "Split" && node.outputs.size() == 2 && !node.inputs.empty();
@@ -76,7 +77,7 @@ void OnnxGraph::join_sorting() {
   }
 }
 
-/// The activation of the whole value `x`, as it lies in memory.
+/// Applies the activation to the whole value `x`, in memory order.
 OnnxValue OnnxGraph::sorted(const Node& node, const OnnxValue& x, Activation activation) {
   if (!needed_after(node).empty())
     throw OperatorRefusal{"has a skip connection beside it, which can be read beside other activations only",
