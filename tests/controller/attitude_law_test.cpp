@@ -12,11 +12,12 @@ namespace swarmcert::controller {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-// The Crazyflie's (Förster 2015, "System identification of the Crazyflie 2.0 nano quadrocopter", ETH Zürich).
+// Crazyflie inertia (Förster 2015, "System identification of the Crazyflie 2.0 nano quadrocopter", ETH Zürich).
 const Matrix3<double> kInertia = diagonal(Vector3<double>{16.571710e-6, 16.655602e-6, 29.261652e-6});
 constexpr InertiaRange kInertiaRange{16.571710e-6, 29.261652e-6};
 
-/// The desired frame turns at constant rate in its own coordinates; the vehicle obeys J omega' = J omega x omega + tau.
+/// The desired frame rotates at a constant rate in its own coordinates; the vehicle obeys J omega' = J omega x omega +
+/// tau.
 struct Simulation {
   AttitudeState<double> state;
   AttitudeReference<double> reference;
@@ -81,7 +82,7 @@ TEST(ModifiedRodrigues, IsTheTangentOfAQuarterOfTheAngleAlongTheAxis) {
         i % 4 == 0 ? kPi - tests::uniform(generator, 0, 1e-3) : tests::uniform(generator, 0, kPi);
     const Vector3<float> sigma = modified_rodrigues(tests::cast<float>(tests::rotation(axis, angle)));
     const Vector3<double> expected = scaled(std::tan(angle / 4), axis);
-    // Within rounding of half a turn either sign of the axis is right.
+    // For rotations by pi, up to round-off, either sign of the axis is correct.
     const double gap = std::fmin(norm(tests::cast<double>(sigma) - expected),
                                  kPi - angle < 1e-6 ? norm(tests::cast<double>(sigma) + expected) : 1.0);
     EXPECT_LE(gap, 1e-6) << "angle " << angle;
@@ -98,7 +99,7 @@ TEST(ModifiedRodrigues, HalfTurnsAboutEveryAxisAreDefined) {
   }
 }
 
-// omega_r_dot is the derivative of omega_r along the motion, not only a formula: compare with differences.
+// omega_r_dot must be the derivative of omega_r along the motion: compare it with finite differences.
 TEST(RobustLaw, ReferenceRatesDerivativeIsItsDerivative) {
   std::mt19937 generator(9);
   const Vector3<double> lambda{10, 8, 4};
@@ -114,7 +115,7 @@ TEST(RobustLaw, ReferenceRatesDerivativeIsItsDerivative) {
     const double h = 1e-5;
     const Vector3<double> at_start = rate_now().omega_r_rad_s;
     sim.step(h, no_torque);
-    // omega_r_dot is evaluated for the present omega, so the middle of the interval is where both agree.
+    // omega_r_dot is evaluated for the current omega, so it is compared at the midpoint of the interval.
     const Vector3<double> derivative = rate_now().omega_r_dot_rad_s2;
     sim.step(h, no_torque);
     const Vector3<double> difference = divided(rate_now().omega_r_rad_s - at_start, 2 * h);
@@ -153,7 +154,8 @@ TEST(RobustLaw, From170DegreesStaysUnderItsStatedDecay) {
   EXPECT_GT(close, 100) << "the stated decay is far above everything that happens";
 }
 
-// Started with the rate that the law wants, only the attitude's own decay is left, and that is nearly attained.
+// If the initial rate is the reference rate, only the decay of the attitude itself remains, and it nearly attains the
+// bound.
 TEST(RobustLaw, From170DegreesAtTheReferenceRateTheStatedDecayIsNearlyAttained) {
   std::mt19937 generator(12);
   const RobustGains<double> gains{{6, 6, 6}, {5e-4, 5e-4, 1e-3}, {}, {}};
@@ -181,7 +183,7 @@ TEST(RobustLaw, From170DegreesAtTheReferenceRateTheStatedDecayIsNearlyAttained) 
 
 TEST(LeeLaw, From170DegreesStaysUnderItsStatedDecay) {
   std::mt19937 generator(11);
-  // Upstream's defaults with equal k_R, as the theorem has it.
+  // Upstream's defaults with equal k_R, as the theorem requires.
   const LeeGains<double> gains{{7e-3, 7e-3, 7e-3}, {1.15e-3, 1.15e-3, 2e-3}};
   for (int run = 0; run < 20; ++run) {
     const double angle = 170.0 / 180.0 * kPi;

@@ -11,7 +11,7 @@
 namespace swarmcert::controller {
 namespace {
 
-// Coefficients published with the paper's flights (aerorobotics/neural-swarm), vehicles of the small kind.
+// Coefficients published with the paper's flights (aerorobotics/neural-swarm), for small vehicles.
 constexpr ThrustMap<double> kThrust{11.093358483549203, -39.08104165843915, -9.525647087583181,
                                     20.573302305476638, 38.42885066644033};
 constexpr LargestForceMap<double> kLargest{-9.855774395877377, 3.0164756915292554, 26.716368783384496, 8.0,
@@ -29,7 +29,7 @@ TEST(Battery, PwmOfForceOfPwmIsThePwm) {
   for (int i = 0; i < 20000; ++i) {
     const double p = tests::uniform(generator, 0, 1), volts = tests::uniform(generator, 3.0, 4.2);
     const double v = volts / 4.2;
-    // On the rising branch, where the polynomial is a model of a propeller.
+    // Only the rising branch, where the polynomial models a propeller.
     if (kThrust.c10 + kThrust.c11 * v + 2 * kThrust.c20 * p < 2.0) continue;
     const double force = force_of_pwm(kThrust, p, volts);
     if (force <= 0) continue;
@@ -41,7 +41,7 @@ TEST(Battery, PwmOfForceOfPwmIsThePwm) {
   EXPECT_GT(tried, 10000);
 }
 
-// Below 4 gf the published polynomial is no model any more: there it falls with PWM and voltage.
+// Below 4 gf the published polynomial is not a valid model: there it decreases with PWM and voltage.
 TEST(Battery, PwmGrowsWithForceAndFallsWithVoltage) {
   double last = 0;
   for (double force = 0.04; force < 0.14; force += 0.005) {
@@ -52,7 +52,7 @@ TEST(Battery, PwmGrowsWithForceAndFallsWithVoltage) {
   }
 }
 
-// Usable 12.4 to 16.8 gf per motor were logged in the paper's flights.
+// The paper's flights logged a maximum force of 12.4 to 16.8 gf per motor.
 TEST(Battery, LargestForceFollowsVoltageWithinItsLimits) {
   EXPECT_NEAR(largest_force(kLargest, 0.7, 3.8) / kNewtonPerGramForce, 16.4, 0.1);
   EXPECT_LT(largest_force(kLargest, 0.7, 3.4), largest_force(kLargest, 0.7, 3.8));
@@ -65,7 +65,7 @@ TEST(Battery, ForcesOutOfReachGiveTheEndsOfTheRange) {
   EXPECT_EQ(pwm_of_force(kThrust, 10.0, 3.9), 1.0);
   EXPECT_EQ(pwm_of_force(kThrust, 0.0, 3.9), 0.0);
   EXPECT_EQ(pwm_of_force(kThrust, std::nan(""), 3.9), 0.0);
-  // A parabola that opens downwards reaches no more than its highest point.
+  // A parabola that opens downwards cannot exceed its maximum.
   EXPECT_EQ(pwm_of_force(ThrustMap<double>{0, 20, 0, -10, 0}, 0.2, 4.2), 1.0);
   EXPECT_NEAR(pwm_of_force(ThrustMap<double>{0, 20, 0, -10, 0}, 7.5 * kNewtonPerGramForce, 4.2), 0.5, 1e-12);
 }

@@ -19,7 +19,7 @@ TEST(DesiredAttitude, IsARotationThatPushesAlongTheForceWithTheNoseInTheHeadings
     const double yaw = tests::uniform(generator, -4, 4);
     const Heading<float> heading = heading_of_yaw(static_cast<float>(yaw));
     Vector3<double> direction = tests::random_unit_vector(generator);
-    if (i % 10 == 0) {  // close to the heading, on every side
+    if (i % 10 == 0) {  // close to the heading, on all sides
       direction = Vector3<double>{std::cos(yaw), std::sin(yaw), 0} +
                   scaled(tests::uniform(generator, 0, 0.02), tests::random_unit_vector(generator));
     }
@@ -35,7 +35,7 @@ TEST(DesiredAttitude, IsARotationThatPushesAlongTheForceWithTheNoseInTheHeadings
       continue;
     }
     ASSERT_EQ(desired.which, AttitudeCase::kRegular);
-    // y_d is horizontal across the heading: y_d . x_c = 0. The nose does not point backwards.
+    // y_d is horizontal and perpendicular to the heading: y_d . x_c = 0. The nose does not point backwards.
     const Vector3<float> x_c{heading.cosine, heading.sine, 0};
     const Matrix3<float> axes = transpose(desired.R_WR);
     EXPECT_NEAR(dot(axes.y, x_c), 0, 1e-4);
@@ -51,7 +51,7 @@ TEST(DesiredAttitude, UprightHoverLooksAlongTheHeading) {
   EXPECT_LE(tests::largest_entry(tests::difference(desired.R_WR, tests::rotation({0, 0, 1}, 1.0))), 1e-13);
 }
 
-// On its back with the nose where it was: x_d stays, y_d and z_d turn over.
+// In inverted flight the nose keeps its direction: x_d is unchanged, y_d and z_d change sign.
 TEST(DesiredAttitude, InvertedFlightKeepsTheNose) {
   const DesiredAttitude<double> desired =
       desired_attitude<double>({0, 0, -0.3}, heading_of_yaw(0.5), identity<double>(), 1e-3);
@@ -84,7 +84,7 @@ TEST(DesiredAttitude, TooSmallAForceKeepsTheLastDirection) {
   }
 }
 
-// What the bounds use: |T R e_z - f_d| is at most |f_d| sin(angle), or 2 |f_d| sin(angle / 2), for the two rules.
+// The bounds assume that |T R e_z - f_d| is at most |f_d| sin(angle), or 2 |f_d| sin(angle / 2), for the two rules.
 TEST(CollectiveThrust, MissesTheForceByAtMostTheStatedShare) {
   std::mt19937 generator(6);
   for (int i = 0; i < 2000; ++i) {

@@ -68,7 +68,7 @@ TEST_F(FlightTest, BadPositionsGiveALevelDescent) {
   measured_.position_W_m.y = kNaN, expect_descent(), measured_ = good;
   measured_.velocity_W_m_s.z = 1e9f, expect_descent(), measured_ = good;
   measured_.position_stamp_ms = kNow_ms - 101, expect_descent(), measured_ = good;
-  reference_.position_W_m.x = kNaN, expect_descent();  // and nothing was asked for before
+  reference_.position_W_m.x = kNaN, expect_descent();  // and there has been no valid setpoint before
 }
 
 TEST_F(FlightTest, BadAttitudesStopTheMotors) {
@@ -95,7 +95,7 @@ TEST_F(FlightTest, BadReferencesKeepTheLastPosition) {
   settings_.integrator.step_s = 0;
   const FlightCommand<float> command = step();
   EXPECT_EQ(command.faults, kReferenceFault);
-  // Kp pulls towards the last position; no reference velocity is left.
+  // Kp pulls towards the last position; the reference velocity is zero.
   EXPECT_NEAR(command.force_W_N.z, 0.034f * (9.81f + 10 * 0.1f - 10 * memory_.integral_m_s.z), 1e-5);
   EXPECT_NEAR(command.force_W_N.x, 0, 1e-7);
 }
@@ -133,7 +133,7 @@ TEST_F(FlightTest, BadVoltagesAreReplacedByALowOne) {
   EXPECT_GT(command.pwm[0], at_full);
 }
 
-// Every input at once may be anything: the output is still within range and the memory stays finite.
+// All inputs at once may be arbitrary: the output is still within range and the memory stays finite.
 TEST_F(FlightTest, NothingThatComesInGetsThrough) {
   std::mt19937 generator(30);
   const float strange[] = {kNaN,
@@ -147,7 +147,7 @@ TEST_F(FlightTest, NothingThatComesInGetsThrough) {
                            1.0f};
   int flown = 0;
   for (int i = 0; i < 20000; ++i) {
-    // What is really in memory: floats side by side.
+    // Start from valid random inputs and overwrite up to two of their numbers.
     Measured<float> m = measured_;
     FlightReference<float> r = reference_;
     Vector3<float> e = effect_;
@@ -185,7 +185,7 @@ TEST_F(FlightTest, NothingThatComesInGetsThrough) {
 
 TEST_F(FlightTest, SaturatedThrustStopsTheIntegralAndReleasesIt) {
   settings_.integrator.limit_m_s = {10, 10, 10};
-  reference_.position_W_m.z = 5;  // far below the reference: more thrust than there is
+  reference_.position_W_m.z = 5;  // far below the setpoint: needs more thrust than is available
   for (int i = 0; i < 200; ++i) step();
   EXPECT_LE(std::fabs(memory_.integral_m_s.z), 0.051f) << "one step before saturation was known";
   reference_.position_W_m.z = -0.1f;

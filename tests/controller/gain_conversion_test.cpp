@@ -60,8 +60,8 @@ TEST(GainConversion, TripleRootConverts) {
   EXPECT_NEAR(back.lambda_1_s, 4.0, 1e-4);
 }
 
-// Expected numbers: real roots of 3 l^2 - 2 Kd l + Kp = 0, and Ki = (Kd - 2 l) l^2, for the gains published with the
-// paper and the firmware's defaults.
+// Expected values: real roots of 3 l^2 - 2 Kd l + Kp = 0, and Ki = (Kd - 2 l) l^2, for the gains published with the
+// paper and the defaults of the firmware.
 TEST(GainConversion, PublishedGainsAreNotOfTheTheoremsForm) {
   EXPECT_EQ(convert(10, 5, 10).status, ConversionStatus::kNoDoubleRoot);
   const AxisComposite<double> xy = convert(20, 10, 3);

@@ -23,7 +23,7 @@ TEST(ShippedGains, AllCanBeRead) {
   EXPECT_GE(files, 5);
 }
 
-// The expected numbers have the source that the comments of the gains files name.
+// The comments in the gains files name the sources of the expected values.
 TEST(ShippedGains, SmallCrazyflieIsTheOneThatFlew) {
   const stability::Gains gains = shipped("crazyflie-small.toml");
   ASSERT_TRUE(gains.pid.has_value());

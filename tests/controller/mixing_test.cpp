@@ -46,7 +46,7 @@ TEST(Allocation, IsARightInverseOnTheControlledRows) {
   }
 }
 
-// With the right inverse above, symmetry of B^+ B is what remains of the Moore-Penrose conditions.
+// Given the right inverse above, the only remaining Moore-Penrose condition is the symmetry of B^+ B.
 TEST(Allocation, IsTheMoorePenroseInverse) {
   for (const Rotors<double>& rotors : all_vehicles()) {
     const Allocation<double> a = allocation(rotors);
@@ -63,8 +63,8 @@ TEST(Allocation, IsTheMoorePenroseInverse) {
   }
 }
 
-// The firmware's own mixer for this frame: m1 = t - r - p - y, m2 = t - r + p + y, m3 = t + r + p - y, m4 = t + r - p +
-// y.
+// The firmware's own mixer for this frame:
+// m1 = t - r - p - y, m2 = t - r + p + y, m3 = t + r + p - y, m4 = t + r - p + y.
 TEST(Allocation, OfACrazyflieIsItsMixer) {
   const Allocation<double> a = allocation(crazyflie_rotors(kArm_m, kTorquePerThrust_m));
   const double rp = 0.25 / (kArm_m / std::sqrt(2.0)), y = 0.25 / kTorquePerThrust_m;
@@ -111,8 +111,8 @@ class Mixing : public testing::Test {
 };
 
 TEST_F(Mixing, FeasibleWrenchesAreGivenExactly) {
-  // Feasible: the least forces that give the wrench lie within the limits. Where roll or pitch alone would not, with
-  // the yaw torque that is wanted too it may.
+  // Feasible: the minimum-norm forces that produce the wrench are within the limits. If roll or pitch alone exceed
+  // them, the desired yaw torque may still make the wrench feasible.
   int kept = 0, needs_yaw = 0;
   for (const Rotors<double>& vehicle : all_vehicles()) {
     const Rotors<float> rotors = cast<float>(vehicle);
@@ -155,7 +155,8 @@ TEST_F(Mixing, FeasibleWrenchesAreGivenExactly) {
 }
 
 TEST_F(Mixing, ForcesFollowTheWrenchWithoutJumps) {
-  // Out from feasible wrenches through every limit: a step of 1e-4 of the torques moves no force by more than 1e-2.
+  // From feasible wrenches outwards through every limit: a step of 1e-4 of the torques changes no force by more than
+  // 1e-2.
   for (const Rotors<double>& rotors : all_vehicles()) {
     const Allocation<double> a = allocation(rotors);
     const ForceLimits<double> limits{0, 0.15};
@@ -197,8 +198,8 @@ TEST_F(Mixing, ForcesStayWithinTheLimitsWhateverIsAsked) {
   }
 }
 
-// Thrust is kept whenever all rotors together can give it; roll and pitch are given up only when yaw is gone;
-// and nothing is given up that would still have been possible.
+// Thrust is kept whenever all rotors together can produce it, roll and pitch are reduced only after yaw is zero, and
+// nothing is reduced more than necessary.
 TEST_F(Mixing, GivesUpYawBeforeRollAndPitchBeforeThrust) {
   int lost_yaw = 0, lost_roll = 0, lost_thrust = 0;
   for (const Rotors<double>& vehicle : all_vehicles()) {
@@ -217,7 +218,7 @@ TEST_F(Mixing, GivesUpYawBeforeRollAndPitchBeforeThrust) {
       EXPECT_NEAR(given.torque_N_m.y, mixed.roll_pitch_share * wanted.torque_N_m.y, 2e-7);
       lost_roll += mixed.roll_pitch_share < 1.0f;
       if (mixed.roll_pitch_share > 0.01f && mixed.roll_pitch_share < 0.98f) {
-        // As much as the limits allow, whatever the share of yaw.
+        // No larger share of roll and pitch is feasible with any share of yaw.
         for (int share = 0; share <= 10; ++share) {
           Wrench<float> more = wanted;
           more.torque_N_m = scaled(1.01f * mixed.roll_pitch_share, wanted.torque_N_m);
@@ -229,7 +230,7 @@ TEST_F(Mixing, GivesUpYawBeforeRollAndPitchBeforeThrust) {
       if (a.rank == 4) {
         EXPECT_NEAR(given.torque_N_m.z, mixed.yaw_share * wanted.torque_N_m.z, 5e-8);
       }
-      // The yaw torque does not take from the others.
+      // The yaw torque does not reduce the others.
       Wrench<float> without_yaw = wanted;
       without_yaw.torque_N_m.z = 0;
       EXPECT_LE(mix(a, kLimits, without_yaw).roll_pitch_share, mixed.roll_pitch_share);

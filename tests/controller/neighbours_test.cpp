@@ -133,7 +133,7 @@ TEST_F(NeighboursTest, StaleAndUnknownNeighboursChangeNothing) {
   EXPECT_EQ(predicted(with).used, 1);
 }
 
-// Moving out of the box, growing old, and being found again: small steps in, small steps out.
+// A neighbour that leaves the box, becomes stale, and is found again: small steps in, small steps out.
 TEST_F(NeighboursTest, ForceIsContinuousAcrossEveryCutOff) {
   settings_.cut_offs.fade_m = 0.1f;
   const std::vector<NeighbourTrack<float>> two = {track({0.1f, 0.2f, 0.3f}), track({0.5f, 0.1f, 0.2f})};
@@ -150,7 +150,8 @@ TEST_F(NeighboursTest, ForceIsContinuousAcrossEveryCutOff) {
     EXPECT_EQ(last, predicted({two[0]}).effect_W_N.z) << "the neighbour must be gone in the end";
     return worst;
   };
-  // 1 mm steps from inside to outside; without the network's own slope, because the force moves in any case.
+  // 1 mm steps from inside to outside. The bound exceeds the 1 % of the fade, since the network's own slope also moves
+  // the force.
   NeighbourTrack<float> leaving = two[1];
   const float slope_step = largest_step(600, [&](int i) {
     leaving.position_W_m.x = 0.5f + 0.001f * static_cast<float>(i);
@@ -171,7 +172,7 @@ TEST_F(NeighboursTest, ForceIsContinuousAcrossEveryCutOff) {
   EXPECT_LE(std::fabs(joining), 0.0101f * whole_jump + 1e-7f);
 }
 
-// A neighbour that makes the composition silent takes all of the force with it: over the fade, or at once.
+// A neighbour that makes the composition silent removes the whole force: during the fade, or at once.
 TEST_F(NeighboursTest, WhereANeighbourMakesTheSetSilentAllOfTheForceFadesAndTheStepIsNeverMoreThanAllOfIt) {
   std::vector<NeighbourTrack<float>> two = {track({0.1f, 0.2f, 0.3f}), track({0.5f, 0.1f, 0.2f})};
   two[0].kind = 0, two[1].kind = 1;
@@ -188,7 +189,7 @@ TEST_F(NeighboursTest, WhereANeighbourMakesTheSetSilentAllOfTheForceFadesAndTheS
   EXPECT_EQ(bits(force(two)), 0u);
   settings_.cut_offs.fade_m = 0.1f;
   float last = 0;
-  for (int i = 0; i <= 600; ++i) {  // the second leaves by 1 mm at a time
+  for (int i = 0; i <= 600; ++i) {  // the second neighbour leaves in steps of 1 mm
     two[1].position_W_m.x = 0.5f + 0.001f * static_cast<float>(i);
     const float now = force(two).effect_W_N.z;
     EXPECT_LE(std::fabs(now - last), 0.0101f * std::fabs(alone)) << i;

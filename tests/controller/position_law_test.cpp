@@ -24,12 +24,12 @@ Situation random_situation(std::mt19937& generator) {
           {tests::random_vector(generator, 2.0), tests::random_vector(generator, 0.1)}};
 }
 
-// The closed loop that the theorem analyses: with f_d applied to the mass, m s_dot = -K s - (f_a_hat - f_a).
+// The closed loop analysed by the theorem: with f_d applied to the mass, m s_dot = -K s - (f_a_hat - f_a).
 TEST(PositionLaw, CompositeVariableObeysTheClosedLoopOfThePaper) {
   std::mt19937 generator(2);
   for (int i = 0; i < 200; ++i) {
     const Situation now = random_situation(generator);
-    // Coupled axes on purpose.
+    // Intentionally coupled axes.
     const CompositeGains<double> gains{{{4, 0.5, 0}, {0.5, 3, 0.2}, {0, 0.2, 5}},
                                        {{0.2, 0.01, 0}, {0.01, 0.3, 0}, {0, 0, 0.15}}};
     const Vector3<double> effect_N = tests::random_vector(generator, 0.1);
@@ -76,7 +76,7 @@ TEST(PositionLaw, InfiniteLimitIsNoLimit) {
   EXPECT_EQ(integral.z, 3.0);
 }
 
-// Windup: the vehicle is too low, the thrust is at its limit, the integral of the error would ask for more still.
+// Windup: the vehicle is too low, the thrust is saturated, and integrating the error would increase the demand further.
 TEST(PositionLaw, SaturatedThrustHoldsOnlyTheAxesThatWouldPushFurther) {
   const PidGains<double> gains{{20, 20, 10}, {10, 10, 5}, {3, 3, 10}};
   const Vector3<double> error{0.2, -0.1, -0.3}, force{0.05, 0.1, 0.6};

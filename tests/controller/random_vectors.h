@@ -26,7 +26,7 @@ inline Vector3<double> random_unit_vector(std::mt19937& generator) {
   }
 }
 
-/// Rodrigues' formula: the rotation by `angle_rad` about the unit vector `axis`.
+/// Rodrigues' formula: returns the rotation by `angle_rad` about the unit vector `axis`.
 inline Matrix3<double> rotation(const Vector3<double>& axis, double angle_rad) {
   const auto column = [&](const Vector3<double>& e) {
     return scaled(std::cos(angle_rad), e) + scaled(std::sin(angle_rad), cross(axis, e)) +

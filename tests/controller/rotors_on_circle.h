@@ -6,9 +6,9 @@
 
 namespace swarmcert::controller {
 
-/// `count` rotors on a circle, the first at `first_angle_rad` from x towards y, the others following in that
-/// direction, their torques alternating from +torque_per_thrust_m. For three rotors that is what remains of a
-/// tricopter without its tilting rotor: yaw is not controlled. No rotors for a count outside 3 to kMostRotors.
+/// Returns `count` rotors on a circle, the first at `first_angle_rad` from x towards y and the others following in that
+/// direction, with torques alternating from +torque_per_thrust_m. Three rotors represent a tricopter without its
+/// tilting rotor, whose yaw cannot be controlled. Returns no rotors for a count outside 3 to kMostRotors.
 template <typename Scalar>
 inline Rotors<Scalar> rotors_on_circle(int count, Scalar arm_m, Scalar first_angle_rad,
                                        Scalar torque_per_thrust_m) {

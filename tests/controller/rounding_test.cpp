@@ -17,7 +17,7 @@ RoundedLaw crazyflie(bool composite, bool robust, ThrustRule rule) {
   RoundedLaw law;
   law.mass_kg = 0.034;
   law.is_composite = composite;
-  // Coupled on purpose.
+  // Intentionally coupled axes.
   law.composite = {{{4, 0.3, 0}, {0.3, 4, 0}, {0, 0, 3}}, {{.136, .01, 0}, {.01, .136, 0}, {0, 0, .2}}};
   law.pid = {{20, 20, 10}, {10, 10, 5}, {3, 3, 10}};
   law.integrator = {{0.1, 0.1, 0.1}, 0.01};
@@ -29,7 +29,7 @@ RoundedLaw crazyflie(bool composite, bool robust, ThrustRule rule) {
   return law;
 }
 
-/// What the laws see, in double.
+/// The inputs of the laws, in double.
 struct RoundedSituation {
   Vector3<double> p, p_d, v, v_d, integral, a_d, effect, omega, omega_R, omega_dot_R, rate_integral;
   double yaw_rad;
@@ -73,7 +73,7 @@ Outcome evaluate(const RoundedLaw& law, const RoundedSituation& s, const Matrix3
         reference_rate(gains.Lambda_1_s, modified_rodrigues(attitude.R_RB), attitude);
     outcome.torque =
         cast<double>(robust_torque(gains, inertia, state.omega_B_rad_s, rate, cast<Scalar>(s.rate_integral)));
-    // From an integral that both instances share.
+    // Both instances start from the same integral.
     outcome.rate_integral =
         cast<double>(integrate_rate(gains, cast<Scalar>(cast<float>(s.rate_integral)), state.omega_B_rad_s,
                                     rate.omega_r_rad_s, static_cast<Scalar>(law.attitude_step_s)));
@@ -118,11 +118,11 @@ bool is_within_envelope(const Vector3<double>& force, const FlightEnvelope& e) {
 
 class RoundingTest : public testing::TestWithParam<std::tuple<bool, bool, ThrustRule>> {};
 
-// Bounds hold for every state tried, and are small enough to be of use in the error budget.
+// Bounds hold for every tested state, and are small enough to be useful in the error budget.
 TEST_P(RoundingTest, NoStateExceedsTheBoundsAndTheyAreNotAbsurdlyLoose) {
   const auto [composite, robust, rule] = GetParam();
   const RoundedLaw law = crazyflie(composite, robust, rule);
-  // Everyday flight: narrower than the default, so that random states fill it.
+  // Normal flight: an envelope narrower than the default, so that random states fill it.
   FlightEnvelope e;
   e.position_m = 3, e.velocity_m_s = 2, e.position_error_m = 0.3, e.velocity_error_m_s = 0.5,
   e.acceleration_m_s2 = 3;
@@ -155,11 +155,12 @@ TEST_P(RoundingTest, NoStateExceedsTheBoundsAndTheyAreNotAbsurdlyLoose) {
     worst.thrust = std::fmax(worst.thrust, std::fabs(f.thrust - d.thrust));
   }
   EXPECT_GT(tried, 20000);
-  // Random roundings add up like their square root, bounds like their sum, over some 200 operations for a torque.
+  // Random rounding errors grow like the square root of their number, bounds like the number: some 200 operations for a
+  // torque.
   EXPECT_LE(bounds.force_N.z, 10 * worst.force.z);
   EXPECT_LE(bounds.thrust_N, 30 * worst.thrust);
   EXPECT_LE(tests::largest_entry(bounds.torque_N_m), 700 * tests::largest_entry(worst.torque));
-  // A thousandth of what the rotors can turn with: 0.15 N each on an arm of 0.046 m.
+  // A thousandth of the maximum torque of the rotors: 0.15 N each on an arm of 0.046 m.
   EXPECT_LE(tests::largest_entry(bounds.torque_N_m), 1e-3 * 2 * 0.15 * 0.046);
   EXPECT_LE(bounds.integral_m_s.x, 10 * worst.integral.x);
 }
@@ -184,7 +185,7 @@ TEST(RoundingBounds, SayWhyTheyDoNotApply) {
   EXPECT_FALSE(rounding_bounds(law, e).applies);
 }
 
-// Each operation by itself, on random pairs: the distance of the float result from the double one stays within.
+// Each operation separately, on random pairs: the distance between the float and double results is within the bound.
 TEST(Bounded, EveryOperationHoldsForRandomPairs) {
   std::mt19937 generator(41);
   for (int i = 0; i < 20000; ++i) {

@@ -1,4 +1,4 @@
-/// Smooth activations: their slopes lie where bounds take them to lie, and their values are those of the formulas.
+/// Activations: slopes are within the assumed bounds, and values agree with the formulas.
 #include "nn/weights/activation_function.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ namespace {
 
 using tests::refuses;
 
-/// The formulas of the certificate's statement, in long double.
+/// The formulas in the certificate's statement, in long double.
 struct Formula {
   Activation activation;
   std::function<long double(long double)> value;
@@ -47,8 +47,8 @@ const std::vector<Formula>& formulas() {
   return made;
 }
 
-/// Pairs of any distance around every place at which one of the slopes is steepest or flattest: 0 from both sides, the
-/// extrema of SiLU (2.3994) and GELU (sqrt 2), far out; and random ones.
+/// Returns pairs at all distances around every point where a slope is extreme, 0 from both sides, the extrema of SiLU
+/// (2.3994) and GELU (sqrt 2), and far out; and random pairs.
 std::vector<std::pair<long double, long double>> pairs() {
   std::mt19937 generator(5);
   std::vector<std::pair<long double, long double>> result;
@@ -64,7 +64,7 @@ std::vector<std::pair<long double, long double>> pairs() {
 }
 
 TEST(ActivationFunction, EveryDifferenceQuotientLiesBetweenTheSlopesAndTheSteepestAreReached) {
-  constexpr long double kRounding = 1e-11L;  // of values up to 2000 whose arguments are 1e-6 apart
+  constexpr long double kRounding = 1e-11L;  // for values up to 2000 with arguments 1e-6 apart
   const auto tried = pairs();
   ASSERT_GT(tried.size(), 90000u);
   for (const Formula& formula : formulas()) {
@@ -104,7 +104,7 @@ TEST(ActivationFunction, ValuesAreThoseOfTheFormulasAndDoNotOverflow) {
   EXPECT_FALSE(activation_called("mish"));
 }
 
-/// A network of two inputs and one output whose file states neither order nor activation.
+/// Returns a network of two inputs and one output whose file states neither order nor activation.
 Weights unstated() {
   std::mt19937 generator(3);
   Weights weights = tests::random_network({2, 6, 5, 1}, generator);
@@ -178,7 +178,7 @@ TEST(SmoothActivation, RoundedWeightsCountTimesTheSteepestSlopes) {
   Weights weights = unstated();
   weights.layers[0].weight_rounding = 1e-12;
   const double with_relu = rounding_of_slope(weights);
-  tests::set_activation(weights, Activation::kSigmoid);  // two of them: 1/16
+  tests::set_activation(weights, Activation::kSigmoid);  // two sigmoids: 1/16
   EXPECT_NEAR(rounding_of_slope(weights), with_relu / 16, 1e-6 * with_relu);
   tests::set_activation(weights, Activation::kSilu);
   EXPECT_GT(rounding_of_slope(weights), with_relu * 1.2);
@@ -193,7 +193,7 @@ weights = "rho"
 activation = "sigmoid"
 )";
 
-/// phi 2-6-5-1 and rho 1-3-1, whose files state no activation unless `source` says so.
+/// Returns phi 2-6-5-1 and rho 1-3-1, whose files state no activation unless `source` is kFile.
 Network pair(const std::string& text, OrderSource source = OrderSource::kNames) {
   return parse_network(
       text, "network.toml", [source](const std::string& path, const std::vector<std::string>&) {
@@ -221,12 +221,12 @@ TEST(SmoothActivation, NetworkTomlStatesItForEachPart) {
 TEST(SmoothActivation, IsReadForBoundsOnly) {
   const tests::TempFolder folder;
   Weights weights = unstated();
-  save_safetensors(weights, folder / "net.safetensors", true);  // states the order, and so ReLU
+  save_safetensors(weights, folder / "net.safetensors", true);  // states the order, and thus ReLU
   NetworkArguments arguments;
   arguments.file = folder / "net.safetensors";
   arguments.activation = "tanh";
   EXPECT_TRUE(refuses([&] { load_any_network(arguments); }, {"the file itself states relu"}));
-  // .npz states neither; a C source likewise. Here: the same safetensors without their order.
+  // Neither .npz nor C source states the order. Simulated here with the same safetensors without their order.
   std::string bytes = read_file(arguments.file);
   const std::size_t at = bytes.find("swarmcert.layers");
   ASSERT_NE(at, std::string::npos);

@@ -21,7 +21,7 @@ TEST(Adam, TheFirstStepHasTheLengthOfTheRateWhateverTheSizeOfTheGradient) {
   }
 }
 
-/// Kingma and Ba 2015, algorithm 1, in double.
+/// Compares with Kingma and Ba 2015, algorithm 1, in double.
 TEST(Adam, FollowsThePublishedAlgorithm) {
   Adam adam(1);
   Vector theta = Vector::Ones(1), gradient(1);

@@ -17,7 +17,7 @@ TEST(Arithmetic, AProductIsRoundedBeforeItEntersASum) {
   int different = 0;
   for (int i = 0; i < 10000; ++i) {
     const auto a = static_cast<float>(random.symmetric()), b = static_cast<float>(random.symmetric());
-    const volatile float product = a * b;  // through memory: nothing can fuse it
+    const volatile float product = a * b;  // stored to memory, so it cannot be fused
     const float c = -product;
     ASSERT_EQ(rounded(a * b) + c, 0.0F) << a << ", " << b;
     different += std::fma(a, b, c) != 0.0F ? 1 : 0;

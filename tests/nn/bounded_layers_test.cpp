@@ -14,7 +14,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// Layers that grow, keep their width and shrink, parts of one layer and of four.
+/// Layers that increase, keep and decrease the width, in parts of one layer and of four.
 Layout layout_of_shapes() {
   return Layout({{"phi:small", {6, 9, 9, 7, 4}}, {"phi:ground", {4, 4}}, {"rho:small", {4, 8, 1}}});
 }
@@ -36,10 +36,12 @@ MatrixXd weights_of(const Layout& layout, const Vector& theta, int part, int lay
   return layout.weights(theta, part, layer).cast<double>();
 }
 
-/// Least eigenvalue of the matrix of LipSDP-Neuron (Fazlyab et al. 2019, the last block by a Schur complement),
-///   [L^2 I, -W_1'; -W_1, 2 I, -W_2'; ...; -W_n, I],
-/// with all multipliers one, both ends scaled to one, and the layers scaled so that their product stays and the outer
-/// two are sqrt(2) smaller than the others, which ReLU lets pass: if it is not negative, L is a Lipschitz bound.
+/// Returns the smallest eigenvalue of the matrix of LipSDP-Neuron (Fazlyab et al. 2019, the last block by a Schur
+/// complement),
+///    [L^2 I, -W_1'; -W_1, 2 I, -W_2'; ...; -W_n, I],
+/// with all multipliers one, both ends scaled to one, and the layers rescaled, which commutes with ReLU, such that
+/// their product is unchanged and the outer two are smaller by a factor of sqrt(2). If it is nonnegative, L is a
+/// Lipschitz bound.
 double least_eigenvalue(const Layout& layout, const Vector& theta, int part, double lipschitz) {
   const std::vector<int>& sizes = layout.parts()[part].sizes;
   const std::size_t layers = sizes.size() - 1;
@@ -96,7 +98,7 @@ TEST(BoundedLayers, KeepTheirBoundForAnyParameters) {
 }
 
 TEST(BoundedLayers, SandwichesReachNetworksWhoseProductOfNormsIsAboveTheirBound) {
-  // |x| = relu(x) + relu(-x) has the bound 1, which LipSDP proves; the norms of its layers multiply to 2.
+  // x| = relu(x) + relu(-x) has the Lipschitz constant 1, which LipSDP proves; the product of its layers' norms is 2.
   const Layout layout({{"phi:small", {1, 2, 1}}});
   Vector parameters = Vector::Zero(layout.size());
   layout.weights(parameters, 0, 0) << 1, -1;
@@ -108,7 +110,7 @@ TEST(BoundedLayers, SandwichesReachNetworksWhoseProductOfNormsIsAboveTheirBound)
   EXPECT_GE(least_eigenvalue(layout, theta, 0, 1), -1e-6);
 }
 
-/// d (c' weights(parameters)) / d parameters by central differences of weights that are rounded to float32.
+/// Compares with d (c' weights(parameters)) / d parameters by central differences of weights rounded to float32.
 TEST(BoundedLayers, PullBackIsTheDerivativeInEveryParameter) {
   const Layout layout = layout_of_shapes();
   const Vector c = random_vector(layout.size(), 1, 3);
@@ -120,7 +122,7 @@ TEST(BoundedLayers, PullBackIsTheDerivativeInEveryParameter) {
     bounded.pull_back(parameters, gradient);
     const double tolerance = 2e-3 * static_cast<double>(gradient.cwiseAbs().maxCoeff());
     for (Index i = 0; i < layout.size(); ++i) {
-      const float step = 0x1p-11f, before = parameters(i);  // few kinks of |V'V| are that near
+      const float step = 0x1p-11f, before = parameters(i);  // few kinks of |V'V| are that close
       const auto value = [&](float x) {
         parameters(i) = x;
         return c.cast<double>().dot(bounded.weights(parameters).cast<double>());

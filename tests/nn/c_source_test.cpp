@@ -1,4 +1,4 @@
-/// The authors' generated C layout. Its text is made here, from matrices of our own and from the published networks.
+/// The C format of the authors. Its text is generated here, from our own matrices and from the published networks.
 #include "nn/weights/c_source.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ std::string shortest(double value, bool narrow) {
   return {digits, result.ptr};
 }
 
-/// As the authors' generator writes a network: matrices transposed, shortest decimals.
+/// Writes a network like the authors' generator: matrices transposed, shortest decimals.
 std::string c_source(const Weights& weights, const std::string& name) {
   const bool narrow = weights.precision == Precision::kFloat32;
   std::string type = "struct neuralNetworkFF_" + name + "\n{\n";
@@ -88,7 +88,7 @@ TEST(CSource, IsReadTransposedAndAsACompilerStoresIt) {
 }
 
 TEST(CSource, DecimalsAreRoundedToDoubleFirstUnlessTheyHaveASuffix) {
-  // Just above the middle of two floats: to double it rounds to the middle, and from there to even, which is 1.
+  // Just above the midpoint of two floats: rounds to the midpoint in double, and from there to even, which is 1.
   const std::string decimal = "1.000000059604644775390626";
   EXPECT_EQ(parse_weights(changed("6f", decimal), "weights.c").layers[0].weights[5], 1.0);
   EXPECT_EQ(parse_weights(changed("6f", decimal + "f"), "weights.c").layers[0].weights[5],

@@ -18,7 +18,7 @@ constexpr int kCapacity = 8;
 constexpr int kInputs = 6;
 constexpr int kHidden = 20;
 
-/// The networks, and the arrays that an evaluation of their deep set needs.
+/// The networks, and the arrays needed to evaluate their deep set.
 template <typename Scalar>
 class Fixture {
  public:
@@ -33,7 +33,7 @@ class Fixture {
     return {inputs_.data(), order_.data(), kCapacity, sum_.data(), scratch_.data()};
   }
 
-  /// The result, where the evaluation must succeed.
+  /// Returns the result of an evaluation that must succeed.
   Scalar operator()(const std::vector<Neighbour<Scalar>>& neighbours) { return (*this)(set(), neighbours); }
   Scalar operator()(const DeepSet<Scalar>& set, const std::vector<Neighbour<Scalar>>& neighbours) {
     Scalar y = 0;
@@ -86,7 +86,7 @@ class DeepSetTest : public testing::Test {
       result.push_back({inputs[j].data(), static_cast<int>(j % 2)});
     return result;
   }
-  /// The sum in the order of arrival, as code without a canonical order computes it.
+  /// Returns the sum in the order of arrival, as computed by code without a canonical order.
   float in_order_of_arrival(const std::vector<Neighbour<float>>& arrived) {
     const files::Evaluator<float> phi[2] = {files::Evaluator<float>(small_), files::Evaluator<float>(large_)};
     std::vector<float> sum = files::Evaluator<float>(ground_)({f_.own.begin(), f_.own.end()});
@@ -137,7 +137,7 @@ TEST_F(DeepSetTest, ItIsZeroAmongExactlyTheNeighboursThatSilentListsInAnyOrderAn
   const std::vector<Input> inputs = random_inputs(4);
   int silent = 0;
   for (int count = 0; count <= 4; ++count) {
-    for (unsigned kinds = 0; kinds < 1u << count; ++kinds) {  // every kind for each of the neighbours
+    for (unsigned kinds = 0; kinds < 1u << count; ++kinds) {  // each neighbour takes every kind
       std::vector<Neighbour<float>> some;
       int ones = 0;
       for (int j = 0; j < count; ++j) {
@@ -150,7 +150,7 @@ TEST_F(DeepSetTest, ItIsZeroAmongExactlyTheNeighboursThatSilentListsInAnyOrderAn
     }
   }
   EXPECT_EQ(silent, 4);
-  // A silent set still refuses what it cannot take.
+  // A silent set still rejects invalid inputs.
   float y = 1;
   EXPECT_EQ(f_.status(set, {{inputs[0].data(), 2}}, f_.own.data(), y), DeepSetStatus::kUnknownKind);
   Input broken = inputs[0];
@@ -199,7 +199,8 @@ TEST_F(DeepSetTest, ClampIsAppliedBeforePhi) {
 }
 
 TEST_F(DeepSetTest, OrderIsThatOfClampedInputs) {
-  // Unclamped, `high` would come after `middle`; at the clamp it comes before. The result is that of the clamped set.
+  // Without the clamp, `high` would come after `middle`; with it, it comes before. The result is that of the clamped
+  // set.
   const Input lower = {-1, -1, -1, -1, -1, -1};
   const Input upper = {0.5f, 1, 1, 1, 1, 1};
   DeepSet<float> clamped = f_.set();
@@ -286,7 +287,7 @@ struct Enclosed {
 /// a term by at most gamma(n) = n u / (1 - n u). Doubled where this test itself computes in double.
 double gamma(int roundings) { return roundings * 0x1p-24 / (1 - roundings * 0x1p-24) * (1 + 1e-6); }
 
-/// y_i = b_i + sum_j W_ij x_j: every term passes through at most one product and `inputs` additions.
+/// y_i = b_i + sum_j W_ij x_j: every term undergoes at most one product and `inputs` additions.
 Enclosed propagate(const files::Weights& weights, Enclosed x) {
   for (std::size_t k = 0; k < weights.layers.size(); ++k) {
     const files::Layer& layer = weights.layers[k];

@@ -36,7 +36,7 @@ class DenseLayerTest : public testing::Test {
     return numbers;
   }
 
-  /// One layer in one layout, for `Together` inputs at once, against its definition.
+  /// Compares one layer in one layout, for `Together` inputs at once, with its definition.
   template <int Together>
   void expect_the_definition(Layout layout, int outputs, int inputs, bool with_strange_inputs) {
     const std::vector<float> rows = random(static_cast<std::size_t>(outputs) * inputs);

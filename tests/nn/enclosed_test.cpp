@@ -1,4 +1,4 @@
-/// Exact sums and enclosed numbers, against identities that hold in double.
+/// Tests exact sums and enclosed numbers against identities that hold in double.
 #include "nn/weights/enclosed.h"
 
 #include <gtest/gtest.h>

@@ -66,7 +66,7 @@ TEST_F(FileIo, AnOpenFileKeepsItsOldContents) {
   write_file(path("x"), "new!", true);
   std::string seen;
   reader >> seen;
-  EXPECT_EQ(seen, "old");  // replaced by a rename, not written over
+  EXPECT_EQ(seen, "old");  // replaced by a rename, not overwritten
 }
 
 TEST_F(FileIo, PlacesThatCannotBeWrittenAreNamed) {

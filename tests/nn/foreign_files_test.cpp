@@ -1,5 +1,5 @@
-/// Files that PyTorch, onnx, SciPy, NumPy and h5py wrote (files/make_files.py, make_mat_files.py), with what these
-/// programs compute from them; .nnet files by hand; and damaged ones.
+/// Files written by PyTorch, onnx, SciPy, NumPy and h5py (files/make_files.py, make_mat_files.py), with the outputs
+/// that these programs compute; .nnet files written by hand; and damaged files.
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -165,7 +165,7 @@ TEST(Hdf5, OtherFilesThanMatlabsAreRefusedWithAFormatThatIsRead) {
   const std::string hdf5 = std::string("\x89HDF\r\n\x1a\n", 8) + std::string(100, '\0');
   EXPECT_TRUE(foreign_is_refused(hdf5, {"HDF5", "ONNX", "numpy.savez"}));
   EXPECT_TRUE(foreign_is_refused(std::string(1024, '#') + hdf5, {"HDF5", "numpy.savez"}));
-  EXPECT_TRUE(foreign_is_refused(std::string(700, '#') + hdf5, {"is neither"}));  // no offset of HDF5
+  EXPECT_TRUE(foreign_is_refused(std::string(700, '#') + hdf5, {"is neither"}));  // no valid HDF5 offset
 }
 
 TEST(MatFile, ABombOfZerosIsRefused) {

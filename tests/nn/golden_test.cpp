@@ -1,4 +1,4 @@
-/// The published networks, against outputs that an independent program computed from the same files.
+/// The published networks, compared with outputs that an independent program computed from the same files.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ std::vector<double> hex_floats(const Json& list) {
   return numbers;
 }
 
-/// golden.json and the file it speaks of; one test per network.
+/// golden.json and the file that it refers to; one test per network.
 class Golden : public testing::TestWithParam<const char*> {
  protected:
   void load() {

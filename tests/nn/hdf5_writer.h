@@ -1,4 +1,4 @@
-/// @file Writes MAT files of version 7.3, good and damaged ones: HDF5 with object headers of version 2.
+/// @file Writes valid and damaged MAT files of version 7.3: HDF5 with object headers of version 2.
 #pragma once
 
 #include <zlib.h>
@@ -12,7 +12,7 @@
 
 namespace swarmcert::tests {
 
-/// A header message; `type` as in the format's specification.
+/// Returns a header message; `type` as in the specification of the format.
 inline std::string hdf5_message(int type, const std::string& contents, int flags = 0) {
   return little_endian(static_cast<std::uint64_t>(type), 1) + little_endian(contents.size(), 2) +
          little_endian(static_cast<std::uint64_t>(flags), 1) + contents;
@@ -24,7 +24,7 @@ inline std::string hdf5_shape(const std::vector<std::uint64_t>& sizes) {
   return hdf5_message(1, contents);
 }
 
-/// float64, and references to objects.
+/// Return the datatype messages of float64 and of references to objects.
 inline std::string hdf5_double() {
   return hdf5_message(3, std::string("\x11\x20\x3f\0", 4) + little_endian(8, 4) +
                              std::string("\0\0\x40\0\x34\x0b\0\x34", 8) + little_endian(1023, 4));
@@ -37,7 +37,7 @@ inline std::string hdf5_contiguous(std::uint64_t address, std::uint64_t size) {
   return hdf5_message(8, std::string("\3\1") + little_endian(address, 8) + little_endian(size, 8));
 }
 
-/// @param shape  of a chunk, without the size of an element, which is 8.
+/// @param shape  of a chunk, without the element size, which is 8.
 inline std::string hdf5_chunked(std::uint64_t tree, const std::vector<std::uint64_t>& shape) {
   std::string contents = std::string("\3\2") + little_endian(shape.size() + 1, 1) + little_endian(tree, 8);
   for (const std::uint64_t size : shape) contents += little_endian(size, 4);
@@ -50,7 +50,7 @@ inline std::string hdf5_filters(const std::vector<std::uint64_t>& filters) {
   return hdf5_message(0xb, contents);
 }
 
-/// The attribute MATLAB_class.
+/// Returns the attribute MATLAB_class.
 inline std::string hdf5_class(const std::string& name) {
   const std::string type = std::string("\x13\0\0\0", 4) + little_endian(name.size(), 4);
   const std::string shape = little_endian(2, 4);  // a single text
@@ -78,7 +78,7 @@ struct Hdf5Chunk {
   std::uint64_t address = 0, size = 0;
 };
 
-/// A node of the B-tree of chunks; at level 0 its children are the chunks themselves.
+/// Returns a node of the B-tree of chunks; at level 0 its children are the chunks themselves.
 inline std::string hdf5_chunk_tree(const std::vector<Hdf5Chunk>& chunks, std::uint64_t level = 0) {
   std::string bytes = std::string("TREE\1") + little_endian(level, 1) + little_endian(chunks.size(), 2) +
                       std::string(16, '\xff');
@@ -99,20 +99,20 @@ inline std::string deflated(const std::string& bytes) {
   return packed;
 }
 
-/// Objects behind one another, behind MATLAB's head; addresses count from the superblock.
+/// Writes consecutive objects after MATLAB's header; addresses are relative to the superblock.
 class Mat73Writer {
  public:
-  /// Where the next piece will lie.
+  /// Returns the address of the next piece.
   std::uint64_t end() const { return kSuperblock_bytes + body_.size(); }
 
-  /// The address of `piece`.
+  /// Appends `piece` and returns its address.
   std::uint64_t add(const std::string& piece) {
     const std::uint64_t address = end();
     body_ += piece;
     return address;
   }
 
-  /// A matrix of `sizes` as MATLAB states them, its numbers column by column.
+  /// Adds a matrix with `sizes` as MATLAB states them and its numbers in column-major order.
   std::uint64_t add_matrix(const std::vector<std::uint64_t>& sizes, const std::vector<double>& numbers) {
     const std::uint64_t elements = add(raw_numbers(numbers));
     return add(hdf5_object(hdf5_shape({sizes.rbegin(), sizes.rend()}) + hdf5_double() +
@@ -129,7 +129,7 @@ class Mat73Writer {
            little_endian(0, 4) + body_;
   }
 
-  /// The file whose root has these links.
+  /// Returns the file whose root group has these links.
   std::string file_with(const std::vector<std::pair<std::string, std::uint64_t>>& links) {
     std::string messages;
     for (const auto& [name, address] : links) messages += hdf5_link(name, address);
@@ -141,7 +141,7 @@ class Mat73Writer {
   std::string body_;
 };
 
-/// Two layers, 2-2-1, as the cell arrays "weights" and "biases".
+/// Returns a file with two layers, 2-2-1, as the cell arrays "weights" and "biases".
 inline std::string small_mat73() {
   Mat73Writer writer;
   const auto cells = [&writer](const std::vector<std::uint64_t>& objects) {

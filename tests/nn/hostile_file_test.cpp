@@ -1,5 +1,5 @@
-/// Files made to harm: bombs, cycles and every small damage. Each must end in InputError or a sound network, within
-/// bounded memory. The sanitizer builds run these as well.
+/// Malicious files: decompression bombs, cycles and every small damage. Each must end in an InputError or a valid
+/// network, within bounded memory. The sanitizer builds run these as well.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -29,20 +29,20 @@ std::string repeated(const std::string& text, std::size_t times) {
   return result;
 }
 
-/// Most memory that this process has held so far, in bytes. The sanitizers' own needs would be counted as well.
+/// Returns the peak memory of this process in bytes. Under a sanitizer this would include the sanitizer's own memory.
 [[maybe_unused]] std::size_t peak_memory_bytes() {
   rusage usage = {};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<std::size_t>(usage.ru_maxrss) << 10;
 }
 
-/// Counts how many inputs were refused and how many gave a network.
+/// Counts how many inputs were rejected and how many gave a network.
 struct Outcomes {
   int refused = 0;
   int loaded = 0;
 };
 
-/// Loads `bytes`; what loads must keep the invariant of Weights.
+/// Loads `bytes`; a loaded network must satisfy the invariant of Weights.
 void try_to_load(const std::string& bytes, Outcomes& outcomes) {
   try {
     const Weights weights = parse_weights(bytes, "damaged");
@@ -103,7 +103,7 @@ TEST(HostileFile, EveryFlippedBitIsRefusedOrGivesASoundNetwork) {
 }
 
 TEST(HostileFile, EveryDamagedSmallFileStaysSmallInMemory) {
-  // Alone, the process may take 300 MB; after other tests no more than 100 MB beyond what they took.
+  // Alone, the process may use 300 MB; after other tests, at most 100 MB more than they used.
   [[maybe_unused]] const std::size_t before = std::max(peak_memory_bytes(), std::size_t{200} << 20);
   Outcomes outcomes;
   for (const Sample& sample : samples()) {

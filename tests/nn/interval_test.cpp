@@ -1,4 +1,4 @@
-// Every operation on intervals contains what the operation gives for numbers of the intervals.
+// Every interval operation contains the results of the operation for numbers in the intervals.
 #include "nn/base/interval.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace {
 
 bool contains(Interval a, double x) { return a.lower <= x && x <= a.upper; }
 
-/// Of the kinds that occur: around zero, beside it, touching it, a single number.
+/// Returns a random interval: around zero, beside zero, touching zero, or a single number.
 Interval random_interval(files::Random& random) {
   const double a = 3 * random.symmetric(), b = 3 * random.symmetric();
   switch (random.below(4)) {
@@ -36,7 +36,7 @@ TEST(Interval, DivisionByAnIntervalWithZeroGivesTheWholeLine) {
     EXPECT_EQ(quotient.lower, -infinity);
     EXPECT_EQ(quotient.upper, infinity);
   }
-  // What is computed with it stays an enclosure.
+  // Further operations on the result are still enclosures.
   const Interval product = Interval(1, 2) / Interval(-1, 1) * Interval(0, 1);
   EXPECT_TRUE(contains(product, 1e300) && contains(product, -1e300));
 }

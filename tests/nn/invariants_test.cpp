@@ -28,7 +28,7 @@ double distance(const Vector& a, const Vector& b) {
   return std::sqrt(square);
 }
 
-/// Turned about the vertical, after a reflection in the plane y = 0 where that is asked for.
+/// Returns the state rotated about the vertical, after a reflection in the plane y = 0 if `mirrored`.
 template <typename Scalar>
 std::array<Scalar, 6> turned(std::array<Scalar, 6> state, Scalar cosine, Scalar sine, bool mirrored) {
   for (const std::size_t x : {0u, 3u}) {
@@ -69,7 +69,7 @@ TEST_F(InvariantsTest, NoPairChangesByMoreThanTheStatedSlopesAndBothAreAttained)
   }
   EXPECT_GT(steepest, 1.45);
   EXPECT_GT(steepest_own, 0.999);
-  // Along (p, v) = (2, 1) in one direction, and along the vertical, the constant is attained.
+  // The constant is attained along (p, v) = (2, 1) in one direction, and along the vertical.
   EXPECT_NEAR(distance(of({10, 0, 0, 10, 0, 0}), of({12, 0, 0, 11, 0, 0})) / std::sqrt(5.0), 1.5, 1e-12);
   EXPECT_EQ(distance(of({1, 1, 0, 1, 1, 0}), of({1, 1, 2, 1, 1, 0})), 3);
 }
@@ -89,14 +89,14 @@ TEST_F(InvariantsTest, NothingButATurnAndAReflectionIsLost) {
 TEST_F(InvariantsTest, RootsAreCorrectlyRounded) {
   for (int i = 0; i < 100000; ++i) {
     const float x = std::abs(tests::random_number(generator_)) * std::exp2(static_cast<float>(i % 60 - 30));
-    // The root of a float in double, rounded once more, is the correctly rounded one: 53 >= 2 * 24 + 2.
+    // The square root of a float computed in double and rounded to float is correctly rounded, since 53 >= 2 * 24 + 2.
     ASSERT_EQ(square_root(x), static_cast<float>(std::sqrt(static_cast<double>(x)))) << x;
     ASSERT_EQ(square_root(static_cast<double>(x)), std::sqrt(static_cast<double>(x)));
   }
   EXPECT_EQ(square_root(std::numeric_limits<float>::infinity()), std::numeric_limits<float>::infinity());
 }
 
-/// A deep set of invariants in float, and what an evaluation needs.
+/// A deep set of invariants in float, and the arrays needed to evaluate it.
 class SetOfInvariants {
  public:
   explicit SetOfInvariants(std::mt19937& generator)
@@ -167,7 +167,7 @@ TEST_F(InvariantsTest, ASetOfThemRefusesInputsThatAreNotFiniteOrWhoseSquaresOver
       float force = 1;
       EXPECT_EQ(set({0, 0, 0, 0}, {state}, force), DeepSetStatus::kInputNotFinite) << k << " " << bad;
       EXPECT_EQ(force, 0);
-      if (k >= 4 || (bad == 3e38f && k % 3 == 0)) continue;  // the height of the vehicle alone has no square
+      if (k >= 4 || (bad == 3e38f && k % 3 == 0)) continue;  // only the vehicle's height is not squared
       std::array<float, 4> own = {0, 0, 0, 0};
       own[k] = bad;
       EXPECT_EQ(set(own, {}, force), DeepSetStatus::kInputNotFinite) << k << " " << bad;

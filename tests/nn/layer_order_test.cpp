@@ -23,7 +23,7 @@ Listed listed(const Listed& layers, const std::vector<std::size_t>& order) {
   return result;
 }
 
-/// Names in the order of evaluation.
+/// Returns the names in the order of evaluation.
 std::string decided(const Listed& layers, Listing listing = Listing::kRegistration,
                     const std::vector<std::string>& stated = {}) {
   std::string text;
@@ -43,7 +43,7 @@ testing::AssertionResult order_is_refused(const Listed& layers, const std::vecto
   return refuses([&] { decided(layers, listing, stated); }, pieces);
 }
 
-/// A state dict of square float32 layers [2 x 2] with the given names, in the order of registration.
+/// Returns a state dict of square float32 layers [2 x 2] with the given names, in the order of registration.
 std::string square_state_dict(const std::vector<std::string>& names,
                               const std::vector<tests::TensorSpec>& more = {}) {
   std::vector<tests::TensorSpec> tensors;

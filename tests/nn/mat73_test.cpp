@@ -1,5 +1,5 @@
-/// MAT files of version 7.3: exact values, what is left out, and refusals of what is damaged or made to harm. Files
-/// that h5py wrote are in foreign_files_test.
+/// MAT files of version 7.3: exact values, omitted variables, and rejection of damaged and malicious files. Files
+/// written by h5py are tested in foreign_files_test.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,7 +18,8 @@ testing::AssertionResult mat_file_is_refused(const std::string& bytes,
   return refuses([&] { parse_weights(bytes, "net.mat"); }, pieces);
 }
 
-/// A dataset of one matrix named W1, with `layout` and `filters` for its elements, and sizes as HDF5 states them.
+/// Returns a file with one matrix named W1, with `layout` and `filters` for its elements, and sizes as HDF5 states
+/// them.
 std::string file_of(Mat73Writer& writer, const std::string& layout, const std::string& filters = "",
                     const std::vector<std::uint64_t>& sizes = {2, 3}) {
   return writer.file_with({{"W1", writer.add(hdf5_object(hdf5_shape(sizes) + hdf5_double() + layout +
@@ -35,7 +36,7 @@ TEST(Mat73, NumbersAreReadColumnByColumn) {
 }
 
 TEST(Mat73, ChunksCompressedOrNotGiveTheSameNumbers) {
-  // HDF5's 2 x 3 elements are MATLAB's 3 x 2 matrix.
+  // HDF5's 2 x 3 elements are a 3 x 2 matrix in MATLAB.
   const std::vector<double> padded = {1, 2, 4, 5}, rest = {3, 99, 6, 99};
   for (const bool is_compressed : {false, true}) {
     Mat73Writer writer;
@@ -160,7 +161,7 @@ TEST(Mat73, AMatrixOfManyRowsWithoutColumnsCostsNoTime) {
 }
 
 TEST(Mat73, ABombOfZerosIsRefused) {
-  // A chunk of 1 MiB in 1 KiB, which 200 matrices of four numbers refer to.
+  // A chunk of 1 MiB compressed to 1 KiB, to which 200 matrices of four numbers refer.
   Mat73Writer writer;
   const std::uint64_t side = 362;
   const std::string packed = deflated(std::string(8 * side * side, '\0'));

@@ -1,4 +1,4 @@
-/// Networks with different activations between their layers and after the last one: read from ONNX, stated by names.
+/// Networks with different activations between their layers and after the last one, read from ONNX or stated by name.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,7 +25,7 @@ double silu(double t) { return t / (1 + std::exp(-t)); }
 double gelu(double t) { return t / 2 * (1 + std::erf(t / std::sqrt(2.0))); }
 double tanh_of(double t) { return std::tanh(t); }
 
-/// W x + b by its definition.
+/// Computes W x + b by definition.
 Values affine(const Values& w, const Values& b, const Values& x) {
   Values y = b;
   for (std::size_t i = 0; i < y.size(); ++i)
@@ -38,7 +38,8 @@ Values each(const Function& function, Values values) {
   return values;
 }
 
-/// x -> h1 = W x + b -> t1 -> ... of 2 - 2 - 2: Gemm layers with transB, named l1, l2, ... in the order of `nodes`.
+/// x -> h1 = W x + b -> t1 -> ... with sizes 2 - 2 - 2: Gemm layers with transB, named l1, l2, ... in the order of
+/// `nodes`.
 struct Model {
   const Values w = {1, -2, 0.5, 3}, b = {0.25, -1};
   OnnxModel model;
@@ -65,7 +66,7 @@ struct Model {
 
 const Values kPoints[] = {{0.75, -0.5}, {-1.5, 0.25}, {0.125, 2}, {-0.25, -0.75}};
 
-/// Whether `weights` is `f` at every point.
+/// Expects that `weights` equals `f` at every point.
 void expect_function(const Weights& weights, const std::function<Values(const Values&)>& f) {
   const Evaluator<double> evaluator(weights);
   for (const Values& x : kPoints) {
@@ -122,7 +123,7 @@ TEST(MixedActivations, GroupsThatExportersWriteAndPiecewiseLinearOnesStandBeside
   });
 }
 
-/// What is carried past a ReLU as relu(x) is never negative behind a ReLU, but may be behind tanh.
+/// A value carried past a ReLU as relu(x) is never negative after a ReLU, but may be negative after tanh.
 TEST(MixedActivations, ASkipConnectionPastAReluTakesNegativeValuesOfAnotherActivationAlong) {
   Model m;
   m.gemm("x", "h")
@@ -147,7 +148,7 @@ TEST(MixedActivations, ASkipConnectionPastAReluTakesNegativeValuesOfAnotherActiv
 }
 
 TEST(MixedActivations, SkipConnectionsPastSmoothOnesAreKeptAsTheyAre) {
-  Model around;  // y = W (t + h) + b, t = tanh h
+  Model around;  // y = W (t + h) + b with t = tanh h
   around.gemm("x", "h").node("Tanh", {"h"}, "t").node("Add", {"t", "h"}, "s").gemm("s", "y");
   const Weights weights = around.weights();
   EXPECT_EQ(weights.activation_names(), "tanh:2");
@@ -195,7 +196,7 @@ TEST(MixedActivations, ResidualBlocksAndParallelBranchesAreTheSameFunction) {
     return y;
   });
 
-  Model parallel;  // tanh h - sigmoid h, then tanh of it all
+  Model parallel;  // tanh h - sigmoid h, then tanh of the difference
   parallel.gemm("x", "h").node("Tanh", {"h"}, "t").node("Sigmoid", {"h"}, "s").node("Sub", {"t", "s"}, "d");
   parallel.gemm("d", "g").node("Tanh", {"g"}, "y");
   const Weights branches = parallel.weights();
@@ -283,7 +284,7 @@ TEST(MixedActivations, RoundedWeightsCountTimesTheSteepestSlopeOfEachLayer) {
   weights.set_activations({Activation::kRelu, Activation::kSigmoid});
   EXPECT_NEAR(rounding_of_slope(weights), with_relu / 4, 1e-6 * with_relu);
   EXPECT_THROW(weights.set_activations({Activation::kRelu}), std::invalid_argument);
-  // Each copy of a layer that is written twice counts: hardtanh in front and behind.
+  // Each copy of a duplicated layer counts: hardtanh before and after it.
   const Weights doubled = with_activation(unstated_network({2, 6, 4, 3}), "hardtanh,tanh");
   EXPECT_EQ(doubled.layers[0].weight_rounding + doubled.layers[2].weight_rounding, 0);
   Weights rounded = unstated_network({2, 6, 4, 3});

@@ -43,7 +43,7 @@ TEST(Mlp, NotANumberReachesTheOutput) {
 TEST(Mlp, ProductsAreRoundedBeforeTheSum) { EXPECT_FALSE(nn::arithmetic_is_fused()); }
 
 TEST(Mlp, AddsTheBiasFirstAndTheInputsInOrder) {
-  files::Weights weights;  // 2^24 + 1 is no float: with the bias first, both ones are lost
+  files::Weights weights;  // 2^24 + 1 is not a float: starting from the bias, both ones are lost
   weights.layers = {{"fc1", 1, 2, {1, 1}, {0x1p24}}};
   EXPECT_EQ(files::Evaluator<float>(weights)({1, 1})[0], 0x1p24f);
   EXPECT_EQ(files::Evaluator<double>(weights)({1, 1})[0], 0x1p24 + 2);

@@ -33,7 +33,7 @@ weights = "20x1"
 weights = "20x1"
 )";
 
-/// A network of the size that its file name states.
+/// Returns a network of the size stated in its file name.
 Weights sized(const std::string& path, const std::vector<std::string>& order = {}) {
   std::mt19937 generator(1);
   const std::string name = std::filesystem::path(path).filename().string();
@@ -48,7 +48,7 @@ testing::AssertionResult network_is_refused(const std::string& text, const std::
   return refuses([&] { parse(text); }, pieces);
 }
 
-/// kFull with `from` replaced by `to`.
+/// Returns kFull with `from` replaced by `to`.
 std::string with(const std::string& from, const std::string& to) {
   std::string text = kFull;
   const std::size_t at = text.find(from);
@@ -56,7 +56,7 @@ std::string with(const std::string& from, const std::string& to) {
   return text.replace(at, from.size(), to);
 }
 
-/// kFull whose phi see invariants.
+/// Returns kFull with phi that take invariants.
 std::string of_invariants() {
   std::string text = kFull;
   const auto replace = [&text](const std::string& from, const std::string& to) {
@@ -229,7 +229,7 @@ TEST(NetworkToml, MissingKeysAreRefused) {
                                  {"line 2: phi", "no kind of vehicle"}));
 }
 
-/// kFull with another output and as many numbers from every rho.
+/// Returns kFull with another output quantity and `numbers` outputs from every rho.
 std::string of_quantity(const std::string& output, int numbers) {
   std::string text = with("{ quantity = \"force_z\", unit = \"gf\" }", output);
   for (std::size_t at = 0; (at = text.find("20x1", at)) != std::string::npos; ++at)
@@ -319,7 +319,7 @@ TEST(NetworkToml, TextThatIsNotTomlIsRefusedWithLineAndColumn) {
 }
 
 TEST(NetworkToml, TextThatTomlPlusPlusReadsInUndefinedWaysIsRefusedBefore) {
-  // Found by fuzzing toml++ 3.3 under the sanitizers: letters beyond ASCII outside of what it takes for a text.
+  // Found by fuzzing toml++ 3.3 under the sanitizers: non-ASCII characters outside of what it treats as a string.
   EXPECT_TRUE(
       network_is_refused("\xc5\xb0", {"nets/network.toml: line 1, column 1", "in double quotes only"}));
   EXPECT_TRUE(network_is_refused("a = 1\n\xc3\xa4 = 2\n", {"line 2, column 1", "in double quotes only"}));
@@ -373,7 +373,7 @@ TEST(NetworkToml, DeepNestingIsRefused) {
   EXPECT_TRUE(network_is_refused(tables, {"is not TOML"}));
 }
 
-/// Weight files and a network.toml on disk.
+/// Fixture with weight files and a network.toml on disk.
 class LoadNetwork : public testing::Test {
  protected:
   void SetUp() override {

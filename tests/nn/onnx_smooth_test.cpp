@@ -1,4 +1,4 @@
-/// Smooth activations in ONNX models: single nodes, the groups of nodes that PyTorch exports, and what is refused.
+/// Smooth activations in ONNX models: single nodes, the groups of nodes that PyTorch exports, and rejected models.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -118,7 +118,7 @@ TEST(OnnxSmooth, AProductThatOnlyResemblesSiluOrGeluIsRefused) {
                                  onnx_node("Mul", {"n", "s"}, {"a"})},
                                 {"Mul: is no affine function"}));
   EXPECT_TRUE(smooth_is_refused(gelu_nodes("half"), {"Erf: is none of the operators"}));
-  // Such a function has a slope above GELU's by half of what the number is off.
+  // Such a function's slope exceeds GELU's by half of the number's deviation.
   EXPECT_TRUE(smooth_is_refused(gelu_nodes("root", "above_one"), {"Erf: is none of the operators"}));
 }
 

@@ -1,4 +1,4 @@
-/// MaxMin and GroupSort in ONNX models: the groups of nodes that PyTorch exports, and what is refused.
+/// MaxMin and GroupSort in ONNX models: the groups of nodes that PyTorch exports, and rejected models.
 #include <gtest/gtest.h>
 
 #include "nn/weights/weights.h"

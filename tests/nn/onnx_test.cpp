@@ -1,5 +1,5 @@
-/// ONNX models: two written by the onnx package (1.12, opset 13), with the outputs that NumPy computes from the same
-/// arrays; and damaged or unsuitable ones, built field by field.
+/// ONNX models: two written by the onnx package (1.12, opset 13), with outputs computed by NumPy from the same arrays;
+/// and damaged or unsuitable ones, built field by field.
 #include "nn/weights/onnx/onnx.h"
 
 #include <gtest/gtest.h>
@@ -70,11 +70,11 @@ TEST(Onnx, ModelsOfTheOnnxPackageGiveTheValuesThatNumPyComputes) {
     EXPECT_EQ(weights.precision, narrow ? Precision::kFloat32 : Precision::kFloat64);
     ASSERT_EQ(weights.layers.size(), 3u);
     EXPECT_EQ(weights.layers[0].name, "fc1");
-    EXPECT_EQ(weights.layers[1].name, "onnx::MatMul_9");  // as the exporter calls it
+    EXPECT_EQ(weights.layers[1].name, "onnx::MatMul_9");  // the exporter's name
     EXPECT_EQ(weights.layers[2].name, "fc3");
     const Evaluator<double> f(weights);
     for (const Case& one : cases)
-      EXPECT_EQ(f(one.x)[0], one.y);  // every number is a multiple of 2^-18: nothing rounds
+      EXPECT_EQ(f(one.x)[0], one.y);  // every number is a multiple of 2^-18, so there is no round-off
   }
 }
 
@@ -170,7 +170,7 @@ TEST(Onnx, TensorsThatCannotBeWeightsAreRefused) {
   EXPECT_TRUE(onnx_is_refused(with({onnx_raw("w", {2, 2}, {1, 2, 3, NAN})}), {"not finite"}));
 }
 
-/// The layers of a model of `nodes` on two inputs, with w = [[1, 2], [3, 4]] and b = [1, -2].
+/// Returns the layers of a model of `nodes` with two inputs, w = [[1, 2], [3, 4]] and b = [1, -2].
 Weights of_nodes(std::vector<std::string> nodes) {
   OnnxModel model;
   model.nodes = std::move(nodes);
@@ -279,7 +279,7 @@ TEST(Onnx, ModelsWithoutOneGraphInputAndOutputAreRefused) {
   other.inputs = {};
   EXPECT_TRUE(onnx_is_refused(other.bytes(), {"has 0 inputs"}));
   other = model;
-  other.inputs = {"x", "w"};  // old exporters list the weights
+  other.inputs = {"x", "w"};  // old exporters also list the weights
   EXPECT_EQ(parse_weights(other.bytes(), "net.onnx").layers.size(), 1u);
   other = model;
   other.outputs = {"y", "z"};

@@ -1,4 +1,4 @@
-/// @file Writes ONNX models field by field, good and damaged ones.
+/// @file Writes valid and damaged ONNX models field by field.
 #pragma once
 
 #include <cmath>
@@ -18,12 +18,12 @@ inline std::string onnx_varint(std::uint64_t value) {
 inline std::string onnx_varint_field(int number, std::uint64_t value) {
   return onnx_varint(static_cast<std::uint64_t>(number) << 3) + onnx_varint(value);
 }
-/// A length-delimited field: text, message or packed numbers.
+/// Returns a length-delimited field: text, message or packed numbers.
 inline std::string onnx_text(int number, const std::string& bytes) {
   return onnx_varint(static_cast<std::uint64_t>(number) << 3 | 2) + onnx_varint(bytes.size()) + bytes;
 }
 
-/// A TensorProto; `data` are its fields that hold numbers.
+/// Returns a TensorProto; `data` are its fields that hold numbers.
 inline std::string onnx_tensor(const std::string& name, const std::vector<std::uint64_t>& shape,
                                std::uint64_t type, const std::string& data) {
   std::string dims;
@@ -65,7 +65,7 @@ inline std::string constant_node(const std::string& output, const std::string& t
   return onnx_node("Constant", {}, {output}, {onnx_text(1, "value") + onnx_text(5, tensor)});
 }
 
-/// The type of a value of float32 numbers.
+/// Returns the type of a float32 value of this shape.
 inline std::string onnx_shape(const std::vector<std::uint64_t>& shape) {
   std::string dimensions;
   for (const std::uint64_t size : shape) dimensions += onnx_text(1, onnx_varint_field(1, size));

@@ -1,4 +1,4 @@
-/// PyTorch files that must be refused, each with the field at fault and a way out.
+/// PyTorch files that must be rejected, each with the field at fault and a remedy.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@ testing::AssertionResult pth_is_refused(const std::vector<TensorSpec>& tensors,
                                         const std::vector<std::string>& pieces) {
   return pth_is_refused(zip_file(tensors, small_storages<float>()), pieces);
 }
-/// An archive whose data.pkl is `ops` between PROTO and STOP.
+/// Returns an archive whose data.pkl is `ops` between PROTO and STOP.
 std::string program(const std::string& ops) { return zip_file(pickle(ops), small_storages<float>()); }
 
 TEST(PthRefusal, NamesThePlaceOfANumberThatIsNotFinite) {
@@ -175,7 +175,7 @@ TEST(PthRefusal, NamesWhatStandsInTheTensorsPlace) {
       {"]", "a list"},
       {global_op("torch._utils", "_rebuild_tensor_v2"), "a function"},
       {"r" + little_endian(7, 4) + "j" + little_endian(7, 4),
-       "text"},  // the name itself, remembered and recalled
+       "text"},  // the name itself, stored in the memo and recalled
       {global_op("torch", "FloatStorage"), "a storage type"},
       {storage_op(small_tensors()[0], false), "a storage"}};
   for (const auto& [op, what] : ops_and_names) {

@@ -1,4 +1,4 @@
-/// State dicts that must load, in every form in which torch.save writes them.
+/// State dicts that must load, in every form written by torch.save.
 #include <gtest/gtest.h>
 
 #include "nn/base/file_io.h"
@@ -12,7 +12,7 @@ namespace {
 
 using namespace tests;
 
-/// Weights and biases of small_storages().
+/// Weights and biases in small_storages().
 const std::vector<double> kFirst = {1, -2, 0.5, 3, -0.25, 4};
 const std::vector<double> kFirstBias = {0.125, 0, -1};
 const std::vector<double> kSecond = {1, 2, -3};
@@ -124,7 +124,7 @@ TEST(Pth, PrefixesOfWrappersStayInTheNamesOfLayers) {
 }
 
 TEST(Pth, ACheckpointWithItsOptimizerNamesTheStateDictsInIt) {
-  // As torch.save writes {"model": ..., "optimizer": ...}: the optimizer numbers its parameters.
+  // As in torch.save({"model": ..., "optimizer": ...}): the optimizer numbers its parameters.
   const std::string model = state_dict_op(small_tensors(), false);
   const std::string moments = "}" + text_op("exp_avg") + tensor_op(small_tensors()[0], false) + "s";
   const std::string optimizer = "}(" + text_op("state") + "}" + std::string("K\0", 2) + moments + "s" +
@@ -154,7 +154,7 @@ TEST(Pth, NestedCheckpointsAreReachedByKey) {
 }
 
 TEST(Pth, LegacyStoragesOfOtherTypesBesideTheNetworkAreSkipped) {
-  // An optimizer's integer counter, whose raw data lie between the network's.
+  // An optimizer's integer counter, whose raw data are stored between those of the network.
   const TensorSpec counter = {"", "step", 2, {2}, {1}, 0, "LongStorage"};
   const std::string checkpoint = "}(" + text_op("optimizer") + tensor_op(counter, true) + text_op("model") +
                                  state_dict_op(small_tensors(), true) + "u";
@@ -178,7 +178,7 @@ TEST(Pth, StringsOfPython2AreRead) {
 }
 
 TEST(Pth, MetadataAndNewerPicklesAreRead) {
-  // What torch hangs onto a state dict, and the opcodes of pickle protocol 4.
+  // The metadata that torch attaches to a state dict, and the opcodes of pickle protocol 4.
   const std::string metadata =
       "}" + text_op("_metadata") + "}" + text_op("") + "}" + text_op("version") + "K\1sssb";
   expect_small_network(parse_weights(

@@ -1,4 +1,4 @@
-/// @file Writes PyTorch's file formats, good and damaged ones, because the project ships no .pth.
+/// @file Writes valid and damaged files in PyTorch's formats, since no .pth files are part of the project.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +8,14 @@
 
 namespace swarmcert::tests {
 
-/// Little-endian bytes of `value`.
+/// Returns `value` as little-endian bytes.
 inline std::string little_endian(std::uint64_t value, int width) {
   std::string bytes;
   for (int i = 0; i < width; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xff);
   return bytes;
 }
 
-/// Raw little-endian numbers, as a storage holds them.
+/// Returns raw little-endian numbers as they appear in a storage.
 template <typename Scalar>
 std::string raw_numbers(const std::vector<Scalar>& numbers) {
   return std::string(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Scalar));
@@ -42,7 +42,7 @@ inline std::string ordered_dict_op(const std::vector<std::pair<std::string, std:
 }
 inline std::string pickle(const std::string& ops) { return "\x80\x02" + ops + "."; }
 
-/// A tensor as torch.save declares it.
+/// A tensor as declared by torch.save.
 struct TensorSpec {
   std::string name;
   std::string key;  ///< of its storage
@@ -112,7 +112,7 @@ inline std::string zip(const std::vector<ZipEntry>& entries) {
 
 // --- whole files
 
-/// Key and raw bytes of each storage, in the order of a legacy file's list.
+/// Key and raw bytes of each storage, in the order of the list in a legacy file.
 using Storages = std::vector<std::pair<std::string, std::string>>;
 
 inline std::string zip_file(const std::string& program, const Storages& storages,
@@ -145,7 +145,7 @@ inline std::string legacy_file(const std::vector<TensorSpec>& tensors, const Sto
   return legacy_file(pickle(state_dict_op(tensors, true)), storages, bytes_each);
 }
 
-// --- the example of most tests: 2 inputs, 3 hidden units, 1 output
+// --- the example used by most tests: 2 inputs, 3 hidden units, 1 output
 
 inline std::vector<TensorSpec> small_tensors(const std::string& type = "FloatStorage") {
   return {{"fc1.weight", "0", 6, {3, 2}, {2, 1}, 0, type},

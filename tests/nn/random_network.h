@@ -10,18 +10,18 @@
 
 namespace swarmcert::tests {
 
-/// A float in [-1, 1) with 24 random bits; the same on every platform, unlike std::uniform_real_distribution.
+/// Returns a float in [-1, 1) with 24 random bits; the same on every platform, unlike std::uniform_real_distribution.
 inline float random_number(std::mt19937& generator) {
   return static_cast<float>(static_cast<std::int32_t>(generator() >> 8) - (1 << 23)) * 0x1p-23f;
 }
 
-/// Puts one activation between all layers.
+/// Sets the same activation between all layers.
 inline void set_activation(files::Weights& weights, files::Activation activation) {
   weights.set_activations(std::vector<files::Activation>(weights.layers.size() - 1, activation));
 }
 
-/// Fully connected layers "fc1", "fc2", ... with `sizes` = {inputs, hidden..., outputs} and entries
-/// that are floats and keep the size of a random vector about the same.
+/// Returns fully connected layers "fc1", "fc2", ... with `sizes` = {inputs, hidden..., outputs}. The entries are
+/// floats, scaled so that the norm of a random vector is approximately preserved.
 inline files::Weights random_network(const std::vector<int>& sizes, std::mt19937& generator) {
   files::Weights weights;
   weights.path = "random";

@@ -1,4 +1,4 @@
-/// @file One claim for all readers: this input is refused, with a message that helps.
+/// @file An assertion for all readers: an input is rejected with a helpful message.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 
 namespace swarmcert::tests {
 
-/// Holds if `action` throws InputError whose one-line message has every one of `pieces`.
+/// Succeeds if `action` throws an InputError whose one-line message contains each of `pieces`.
 template <typename Action>
 testing::AssertionResult refuses(const Action& action, const std::vector<std::string>& pieces) {
   try {

@@ -32,7 +32,7 @@ void expect_equal(const Weights& a, const Weights& b) {
     EXPECT_EQ(a.layers[k].outputs, b.layers[k].outputs);
     EXPECT_EQ(a.layers[k].inputs, b.layers[k].inputs);
     EXPECT_EQ(tests::raw_numbers(a.layers[k].weights),
-              tests::raw_numbers(b.layers[k].weights));  // bits, not values
+              tests::raw_numbers(b.layers[k].weights));  // compare bits, not values
     EXPECT_EQ(tests::raw_numbers(a.layers[k].biases), tests::raw_numbers(b.layers[k].biases));
   }
 }
@@ -41,7 +41,7 @@ TEST(Safetensors, RoundTripIsExactInBothPrecisions) {
   std::mt19937 generator(3);
   Weights weights = tests::random_network({6, 25, 40, 20}, generator);
   weights.layers[0].weights[0] = -0.0;
-  weights.layers[0].weights[1] = 0x1p-149;  // the least float
+  weights.layers[0].weights[1] = 0x1p-149;  // the smallest float
   const tests::TempFolder folder;
   for (const Precision precision : {Precision::kFloat32, Precision::kFloat64}) {
     weights.precision = precision;
@@ -76,7 +76,7 @@ TEST(Safetensors, PublishedNetworksSurviveTheRoundTrip) {
 }
 
 TEST(Safetensors, FilesOfOthersAreReadInNaturalOrder) {
-  // fc2 before fc10, and the bias of a layer in front of its weight.
+  // fc2 comes before fc10, and a bias before its weight.
   const std::string header =
       R"({"fc10.weight":{"dtype":"F32","shape":[1,2],"data_offsets":[8,16]},)"
       R"("fc2.bias":{"dtype":"F32","shape":[2],"data_offsets":[0,8]},)"

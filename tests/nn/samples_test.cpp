@@ -19,7 +19,7 @@ namespace {
 
 using tests::refuses;
 
-/// An array as numpy.save writes it, format version 1.
+/// Returns an array as numpy.save writes it, format version 1.
 template <typename Scalar>
 std::string npy(const std::string& shape, const std::vector<Scalar>& numbers, const std::string& more = "",
                 const std::string& type = sizeof(Scalar) == 4 ? "<f4" : "<f8",
@@ -34,7 +34,7 @@ std::string npz(const std::string& inputs, const std::string& outputs) {
   return tests::zip({{"inputs.npy", inputs}, {"outputs.npy", outputs}});
 }
 
-/// Of a network of two inputs and one output.
+/// Parses samples of a network with two inputs and one output.
 Samples parsed(const std::string& bytes) { return parse_samples(bytes, "samples", 2, 1); }
 testing::AssertionResult samples_are_refused(const std::string& bytes,
                                              const std::vector<std::string>& pieces) {

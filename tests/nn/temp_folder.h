@@ -1,4 +1,4 @@
-/// @file A folder for the files of one test.
+/// @file A temporary folder for the files of one test.
 #pragma once
 
 #include <cstdlib>
@@ -8,7 +8,7 @@
 
 namespace swarmcert::tests {
 
-/// Made empty, with a name of its own so that tests may run at once; removed with what is in it.
+/// Created empty, under a unique name so that tests can run in parallel; removed with its contents.
 class TempFolder {
  public:
   TempFolder() {

@@ -1,4 +1,4 @@
-/// Our strict reading of TOML: the right value, or an error with line, dotted key, value and what is expected.
+/// Our strict TOML reader: the right value, or an error with line, dotted key, value and what is expected.
 #include "nn/base/toml.h"
 
 #include <gtest/gtest.h>

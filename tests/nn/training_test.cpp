@@ -51,7 +51,8 @@ std::vector<Index> all_samples(const Dataset& data) {
   return samples;
 }
 
-/// The loss in double by the evaluator that is certified and flown: shares no code with training.
+/// Returns the loss in double, computed by the evaluator that is certified and flown, which shares no code with
+/// training.
 double evaluator_loss(const std::vector<files::Weights>& parts, const Dataset& data) {
   std::vector<files::Evaluator<double>> evaluators;
   for (const files::Weights& part : parts) evaluators.emplace_back(part);
@@ -129,7 +130,7 @@ TEST(DeepSetLoss, GradientIsTheDerivativeInEveryParameter) {
   EXPECT_EQ(compared, layout.size());
 }
 
-/// x and y of all horizontal vectors of a sample's inputs.
+/// Returns the x and y components of all horizontal vectors among a sample's inputs.
 std::vector<Eigen::Vector2f> horizontal_vectors(const Layout& layout, const Dataset& data, Index sample) {
   std::vector<Eigen::Vector2f> vectors;
   for (Index i = data.first[sample]; i < data.first[sample + 1]; ++i) {
@@ -152,7 +153,7 @@ TEST(Symmetry, TurnedSamplesKeepHeightsAndWhatTheirVectorsAreToOneAnother) {
     const auto cross = [](const Eigen::Vector2f& a, const Eigen::Vector2f& b) {
       return a.x() * b.y() - a.y() * b.x();
     };
-    float orientation = 0;  // of the first two vectors, and so of all
+    float orientation = 0;  // orientation of the first two vectors, which determines that of all
     for (std::size_t i = 0; i < before.size(); ++i) {
       moved += (after[i] - before[i]).norm() > 0.01f;
       for (std::size_t j = i; j < before.size(); ++j) {
@@ -178,8 +179,8 @@ TEST(Symmetry, TurnedSamplesKeepHeightsAndWhatTheirVectorsAreToOneAnother) {
   EXPECT_LT(mirrored, 2 * pairs / 3);
 }
 
-/// A force that is dp and a torque that is dp x dv: whatever turns and mirrors the inputs, these stay what they are to
-/// them.
+/// The force is dp and the torque is dp x dv, so both relations must be preserved when the inputs are rotated and
+/// mirrored.
 TEST(Symmetry, TargetsTurnWithTheInputsTorquesAsAxialVectors) {
   const Layout layout({{"phi:small", {6, 4, 3}, 0, {{0, 1}, {3, 4}}}, {"rho:small", {3, 4, 3}, 0}});
   for (const bool is_torque : {false, true}) {
@@ -300,7 +301,7 @@ TEST(Adam, StepIsTheFormulaInFloatToTheBit) {
   }
 }
 
-/// The weights after three epochs.
+/// Returns the weights after three epochs.
 Vector trained(const Layout& layout, const Dataset& data, const TrainerOptions& options) {
   Trainer trainer(layout, data, all_samples(data), initial_parameters(layout, 1), options);
   for (int epoch = 0; epoch < 3; ++epoch) trainer.run_epoch(epoch, 1e-2);
@@ -361,7 +362,7 @@ TEST(Trainer, ARunThatWasTakenUpAgainEndsWithTheSameBits) {
 }
 
 TEST(Trainer, TurnsLetItPredictDirectionsThatItNeverSaw) {
-  // f = 1 where the neighbour is beside, 0 where it is far; recorded to the east only.
+  // f = 1 if the neighbour is beside the vehicle and 0 if it is far away; recorded to the east only.
   const Layout layout({{"phi:default", {6, 16, 8}, 0, {{0, 1}, {3, 4}}}, {"rho:default", {8, 16, 1}, 0}});
   files::Random random(3);
   Dataset east, west;

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Writes the weight files of this folder with PyTorch, onnx, SciPy and NumPy, and what these networks compute.
+"""Writes the weight files of this folder with PyTorch, onnx, SciPy and NumPy, and the outputs of these networks.
 
 Run it in this folder: `python3 make_files.py`. It needs Debian's python3-torch, python3-onnx and python3-scipy.
 """
@@ -18,7 +18,7 @@ expected = {}
 
 
 def record(name, inputs, function, count=6):
-    """Inputs, and outputs that `function` computes in double."""
+    """Returns inputs, and the outputs of `function` in double."""
     cases = []
     for _ in range(count):
         x = rng.normal(size=inputs).round(3) * 2
@@ -90,7 +90,7 @@ def normal(*shape):
 
 
 def collision_avoidance():
-    """As VNN-COMP's ACAS-Xu files: Flatten, Sub, then MatMul, Add and Relu."""
+    """Like VNN-COMP's ACAS-Xu files: Flatten, Sub, then MatMul, Add and Relu."""
     widths = [5, 6, 6, 5]
     constants = {"mean": normal(1, 5)}
     nodes = [helper.make_node("Flatten", ["input"], ["flat"], axis=1),
@@ -115,7 +115,7 @@ def collision_avoidance():
 
 
 def digits():
-    """As an MNIST file with its normalization inside, channels last as TensorFlow writes them, and a Softmax."""
+    """Like an MNIST model with built-in normalization, channels last as written by TensorFlow, and a Softmax."""
     constants = {"mean": np.float32(0.1307).reshape(1), "deviation": np.float32(0.3081).reshape(1),
                  "kernel": normal(2, 1, 2, 2), "W": normal(8, 3), "b": normal(3), "shape": np.array([-1, 8])}
     nodes = [helper.make_node("Transpose", ["input"], ["planes"], perm=[0, 3, 1, 2]),

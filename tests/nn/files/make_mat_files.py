@@ -22,7 +22,7 @@ def open_file(name, **options):
 
 
 def add_head(name):
-    """MATLAB's text and version 0x0200, in the block that HDF5 leaves to the user."""
+    """Writes MATLAB's text and version 0x0200 to the HDF5 user block."""
     with open(name, "r+b") as file:
         file.write(b"MATLAB 7.3 MAT-file, written by h5py HDF5 schema 1.00 .".ljust(116) + bytes(8) + b"\0\2IM")
 
@@ -32,7 +32,7 @@ def set_class(item, name):
 
 
 def matrix(group, name, values, **options):
-    """MATLAB's columns are HDF5's rows."""
+    """Writes a matrix; MATLAB's columns are HDF5's rows."""
     stored = group.create_dataset(name, data=np.atleast_2d(values).T, **options)
     set_class(stored, {"float64": "double", "float32": "single"}[values.dtype.name])
     return stored
@@ -56,7 +56,7 @@ def compact(group, name, values):
 
 
 def cell_file(name):
-    """Symbol tables and contiguous numbers; text is left out."""
+    """Symbol tables and contiguous numbers; the reader skips text."""
     with open_file(name) as file:
         file.create_group("#refs#")
         cells(file, "weights", weights)
@@ -67,7 +67,7 @@ def cell_file(name):
 
 
 def chunked_file(name):
-    """The second version of object headers, and chunks that stand out over the matrix, with each filter."""
+    """Version 2 object headers, and chunks that extend beyond the matrix, with each filter."""
     filters = [{"compression": 3}, {"compression": 9, "shuffle": True}, {}]
     with open_file(name, libver=("v108", "v108")) as file:
         for k, options in enumerate(filters):
