@@ -1,4 +1,4 @@
-/// @file NET of the command line: one plain network, or a deep set with its kinds of vehicles, units and input clamp.
+/// @file NET of the command line: a plain network, or a deep set with its kinds of vehicles, units and input clamp.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 
 namespace swarmcert::files {
 
-/// What the networks were declared to satisfy: `gamma = { value, scope, mode }`.
+/// The stated limit on the networks' spectral norms: `gamma = { value, scope, mode }`.
 struct GammaStatement {
   enum class Scope { kLayer, kNetwork };
   enum class Mode { kClip, kEqual };
@@ -22,98 +22,100 @@ struct GammaStatement {
   Mode mode = Mode::kClip;  ///< kClip: at most `value`; kEqual: equal to it up to the stored precision
 };
 
-/// What phi sees of a neighbour, the inputs or their invariants, is clamped to [lower, upper] before; part of the
-/// function. The ground's phi, which sees the vehicle's own state, has no clamp.
+/// Bounds [lower, upper] to which the input of phi, either a neighbour's state or its invariants, is clamped. The clamp
+/// is part of the function. It does not apply to the ground's phi, whose input is the vehicle's own state.
 struct InputClamp {
   std::vector<double> lower, upper;
 };
 
-/// Inputs of the phi of kind "ground": the vehicle's own -z and -v.
+/// Number of inputs of the phi of kind "ground": the vehicle's own -z and -v.
 inline constexpr int kGroundInputs = 4;
 
-/// NET. Either `plain` is set, or `phi` and `rho` hold at least one kind each.
+/// NET. Either `plain` is set, or `phi` and `rho` contain at least one kind each.
 ///
-/// Deep set of a vehicle of kind r with neighbours x_1..x_n of kinds c_1..c_n:
+/// For a vehicle of kind r with neighbours x_1..x_n of kinds c_1..c_n, the deep set is
 ///   f(x) = rho_r(phi_ground(own) + sum_j phi_{c_j}(x_j)),
-/// where the ground term is present iff phi has the kind "ground", or 0 where `silent` lists r among these neighbours
-/// (compositions.h). With `invariants`, J(x_j) stands in place of x_j and K(own) in place of own (nn/invariants.h): see
-/// invariants.h.
-/// Class invariant after load: every phi but "ground" has the same number of inputs, which is the length of
-/// `input_order`, unless there are invariants, and of the clamp where they are given; "ground" has kGroundInputs; all
-/// phi have the same number of outputs, which is every rho's number of inputs; all rho have the same number of outputs,
-/// components(output_quantity) where that is stated. With invariants: phi has kNeighbourInvariants inputs and "ground"
-/// kOwnInvariants, `input_order` is the state that they are made from, and the output a vertical force.
+/// where the ground term is present iff phi has the kind "ground"; it is 0 if `silent` lists r among these neighbours
+/// (compositions.h). With `invariants`, J(x_j) replaces x_j and K(own) replaces own (nn/invariants.h); see
+/// invariants.h. Class invariant after load:
+/// - Every phi but "ground" has the same number of inputs, which is the length of `input_order`, unless there are
+///    invariants, and of the clamp, where these are given; "ground" has kGroundInputs.
+/// - All phi have the same number of outputs, which is every rho's number of inputs.
+/// - All rho have the same number of outputs, which is components(output_quantity) if that is stated.
+/// - With invariants, phi has kNeighbourInvariants inputs and "ground" has kOwnInvariants, `input_order` is the state
+///    that they are computed from, and the output is a vertical force.
 struct Network {
-  std::string path;    ///< of network.toml; empty where weight files were named directly
+  std::string path;    ///< of network.toml; empty if weight files were given directly
   std::string sha256;  ///< of network.toml; empty likewise
   std::optional<Weights> plain;
-  std::map<std::string, Weights> phi;  ///< by the neighbour's kind
-  std::map<std::string, Weights> rho;  ///< by the vehicle's own kind
+  std::map<std::string, Weights> phi;  ///< keyed by the neighbour's kind
+  std::map<std::string, Weights> rho;  ///< keyed by the vehicle's own kind
 
   std::string output_quantity;           ///< "force_z", "force" or "torque"; empty if not stated
-  std::string output_unit;               ///< "gf" or "N", of torques "mN_m" or "N_m"; empty if not stated
+  std::string output_unit;               ///< "gf" or "N"; for torques "mN_m" or "N_m"; empty if not stated
   std::vector<std::string> input_order;  ///< "dp_x_m", ...; empty if not stated
   bool invariants = false;               ///< `invariants = "rotation"`
   std::optional<InputClamp> clamp;
   std::optional<GammaStatement> gamma;
-  /// `silent`, by the vehicle's own kind: the kinds of its neighbours, in order of names, among which f is 0.
+  /// `silent`, keyed by the vehicle's own kind: the alphabetically sorted kinds of the neighbours for which f is 0.
   std::map<std::string, std::set<std::vector<std::string>>> silent;
 };
 
-/// Numbers that a quantity has: one for "force_z", the vertical force; three for "force" and "torque", along the axes
-/// of the world, as the inputs are. 0 where it is empty.
+/// Returns the number of components of a quantity: one for "force_z", the vertical force; three for "force" and
+/// "torque", in world coordinates like the inputs; 0 for an empty string.
 int components(const std::string& quantity);
 
-/// @throws InputError if the network states another output than the vertical force, which is what flight code takes.
+/// @throws InputError if the network states another output than the vertical force, which flight code requires.
 void require_force_z(const Network& network);
 /// @throws InputError unless the network states a torque.
 void require_torque(const Network& network);
 
-/// Which files make up NET: exactly one of `file`, or `phi` with `rho`.
+/// The files that make up NET: either `file`, or `phi` and `rho`.
 struct NetworkArguments {
-  std::string file;      ///< network.toml or one plain weight file
-  std::string phi, rho;  ///< weight files; their kind is "default"
+  std::string file;      ///< network.toml or a single plain weight file
+  std::string phi, rho;  ///< see load_weights(); applies to every weight file
   std::string key;       ///< see load_weights(); holds for every weight file
-  /// Orders of layers as load_weights() takes them: of `file`, where that is one plain weight file, of `phi` and `rho`.
+  /// Orders of layers as in load_weights(): of `file`, if it is a plain weight file, of `phi` and of `rho`.
   std::vector<std::string> order = {}, phi_order = {}, rho_order = {};
   std::string activation =
       {};  ///< names, for the layers of every weight file: see with_activation(); empty: not stated
 };
 
-/// @throws InputError that names the part, if a part of NET has another activation than ReLU; `what` says what is for
-///   ReLU networks only.
+/// @throws InputError that names the part, if a part of NET has an activation other than ReLU; `what` names what
+///   supports only ReLU networks.
 void require_relu(const Network& network, const std::string& what);
 
-/// Whether every network that `function` passes through has ReLU (functions.h).
+/// Returns whether every network that `function` passes through has only ReLU activations (functions.h).
 /// @throws std::out_of_range if NET has no such part.
 bool is_relu(const Network& network, const FunctionId& function);
 
-/// with_activation() of every part (activation.h).
+/// Applies with_activation() to every part (activation.h).
 Network with_activation(Network network, const std::string& activation);
 
-/// load_network() of networks with any activation, with invariants, and silent in some compositions. What evaluates,
-/// exports or searches a network is for ReLU and for relative states: call load_network() there.
+/// Same as load_network(), but also accepts networks with any activation, with invariants, and silent ones. Code that
+/// supports only ReLU networks of relative states calls load_network() instead.
 Network load_any_network(const NetworkArguments& arguments);
 
-/// What the evaluator runs (nn/deep_set.h): ReLU networks, of relative states or invariants, silent or not.
+/// Loads a network that the evaluator supports (nn/deep_set.h): ReLU networks of relative states or invariants, silent
+/// or not.
 /// @throws as load_any_network() and require_relu().
 Network load_evaluated_network(const NetworkArguments& arguments);
 
-/// Loads NET, whose activation must be ReLU, and whose inputs relative states; it may be silent. A `file` is a
-/// network.toml if its name ends in ".toml" or its text names that schema. Weight files named in a network.toml are
-/// relative to its folder, which also states the order of their layers.
-/// @throws InputError with line, field, value and hint; unknown keys are errors that suggest a known one. Throws what
-///   require_relu() and require_relative_states() throw as well.
+/// Loads NET, which must have ReLU activations and relative states as inputs; it may be silent. A `file` is a
+/// network.toml if its name ends in ".toml" or its text names that schema. Paths of weight files in a network.toml are
+/// relative to its folder; the file also states the order of their layers.
+/// @throws InputError with line, field, value and hint; unknown keys are errors that suggest a known one.
+/// @throws as require_relu() and require_relative_states().
 Network load_network(const NetworkArguments& arguments);
 
-/// as_float32() of every part.
+/// Applies as_float32() to every part.
 Network as_float32(Network network);
 
-/// Reads the weight file at a path; `order` as in load_weights().
+/// Reads the weight file at a path; `order` is as in load_weights().
 using WeightsLoader = std::function<Weights(const std::string& path, const std::vector<std::string>& order)>;
 
-/// A network.toml from memory, with any activation: `path` gives its folder and the name in messages, `load` reads the
-/// weight files.
+/// Parses a network.toml from memory, with any activation. `path` gives its folder and its name in messages; `load`
+/// reads the weight files.
 /// @throws InputError as load_network().
 Network parse_network(const std::string& text, const std::string& path, const WeightsLoader& load);
 
