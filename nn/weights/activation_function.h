@@ -21,7 +21,7 @@ enum class Activation : int {
   kGelu,
   kMaxMinHalves,  ///< of t_1 .. t_2h: max(t_i, t_(i+h)) for each i, then min(t_i, t_(i+h))
   kMaxMinPairs,   ///< of t_1 .. t_2h: max(t_(2i-1), t_2i) for each i, then min(t_(2i-1), t_2i)
-  kGroupSort,     ///< lowest value; add the group size: see group_sort()
+  kGroupSort,     ///< plus the group size: see group_sort()
 };
 
 /// Maximum group size of GroupSort; the minimum is 2.

@@ -35,15 +35,17 @@ inline constexpr int kGroundInputs = 4;
 ///
 /// For a vehicle of kind r with neighbours x_1..x_n of kinds c_1..c_n, the deep set is
 ///   f(x) = rho_r(phi_ground(own) + sum_j phi_{c_j}(x_j)),
-/// where the ground term is present iff phi has the kind "ground"; it is 0 if `silent` lists r among these neighbours
+/// where the ground term is present iff phi has the kind "ground"; f is 0 if `silent` lists r among these neighbours
 /// (compositions.h). With `invariants`, J(x_j) replaces x_j and K(own) replaces own (nn/invariants.h); see
-/// invariants.h. Class invariant after load:
+/// invariants.h.
+///
+/// Class invariant after load:
 /// - Every phi but "ground" has the same number of inputs, which is the length of `input_order`, unless there are
-///    invariants, and of the clamp, where these are given; "ground" has kGroundInputs.
+///   invariants, and of the clamp, where these are given; "ground" has kGroundInputs.
 /// - All phi have the same number of outputs, which is every rho's number of inputs.
 /// - All rho have the same number of outputs, which is components(output_quantity) if that is stated.
 /// - With invariants, phi has kNeighbourInvariants inputs and "ground" has kOwnInvariants, `input_order` is the state
-///    that they are computed from, and the output is a vertical force.
+///   that they are computed from, and the output is a vertical force.
 struct Network {
   std::string path;    ///< of network.toml; empty if weight files were given directly
   std::string sha256;  ///< of network.toml; empty likewise
@@ -73,8 +75,8 @@ void require_torque(const Network& network);
 /// The files that make up NET: either `file`, or `phi` and `rho`.
 struct NetworkArguments {
   std::string file;      ///< network.toml or a single plain weight file
-  std::string phi, rho;  ///< see load_weights(); applies to every weight file
-  std::string key;       ///< see load_weights(); holds for every weight file
+  std::string phi, rho;  ///< weight files; their kind is "default"
+  std::string key;       ///< see load_weights(); applies to every weight file
   /// Orders of layers as in load_weights(): of `file`, if it is a plain weight file, of `phi` and of `rho`.
   std::vector<std::string> order = {}, phi_order = {}, rho_order = {};
   std::string activation =

@@ -27,7 +27,7 @@ struct Samples {
 
 /// Reads samples of the parts of NET, keyed by the name of the part. The format is detected from the content:
 /// - CSV: per line the inputs, then the outputs, separated by commas, semicolons, tabs or blanks. The first line may
-///    name the columns; lines that begin with # are ignored.
+///   name the columns; lines that begin with # are ignored.
 /// - .npz (numpy.savez): arrays `inputs` [count x inputs] and `outputs` [count x outputs], float32 or float64.
 /// - JSON: {"inputs": [[...]], "outputs": [[...]]}; for parts {"networks": {"phi:small": {"inputs": ..., ...}}}.
 /// @param argument "FILE", or "PART=FILE" for samples of that part. A FILE without a part belongs to the plain network.

@@ -14,9 +14,9 @@ bool looks_like_onnx(const std::string& bytes);
 ///
 /// Accepted nodes, from the graph's one input to its one output:
 /// - affine: Gemm, MatMul, Conv, BatchNormalization in inference, AveragePool, Add, Sub, Mul and Div by constants, skip
-///    connections; they are folded exactly, or with the rounding error stated in Layer;
+///   connections; they are folded exactly, or with the rounding error stated in Layer;
 /// - piecewise linear: Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, MaxPool; they are rewritten with
-///    ReLU as the same function;
+///   ReLU as the same function;
 /// - smooth activations: Tanh, Sigmoid, Softplus, Elu, Gelu, x Sigmoid(x); skip connections past them are kept;
 /// - MaxMin and GroupSort, without parallel skip connections;
 /// - nodes that only rearrange.
