@@ -34,7 +34,7 @@ inline const char* to_text(ConversionStatus status) {
     case ConversionStatus::kNoDoubleRoot:
       return "Kd^2 < 3 Kp: no Lambda exists, whatever Ki";
     case ConversionStatus::kOtherIntegralGain:
-      return "Lambda exists for another Ki only";
+      return "Lambda exists only for a different Ki";
   }
   return "unknown status";
 }

@@ -178,12 +178,13 @@ Vector torque_stage(const RoundedLaw& law, const FlightEnvelope& e, const Column
 std::string refusal(const RoundedLaw& law, const FlightEnvelope& e) {
   if (!(law.mass_kg > 0)) return "the mass is not positive";
   if (!(e.least_force_N > 0 && e.least_force_N < e.largest_force_N))
-    return "the range of |f_d| is empty or holds 0";
+    return "the range of |f_d| is empty or contains 0";
   if (!(e.tilt_rad >= 0 && e.tilt_rad < 1.5)) return "the envelope's tilt is not below 1.5 rad";
   if (!(e.attitude_error_rad >= 0 && e.attitude_error_rad < kPi))
     return "the envelope's attitude error is not below pi";
   if (law.is_robust && e.attitude_error_rad >= 1.2) {
-    return "the robust law's two instances may take different branches from 1.2 rad of attitude error";
+    return "the two instances of the robust law may take different branches if the attitude error reaches "
+           "1.2 rad";
   }
   return "";
 }

@@ -182,8 +182,8 @@ std::vector<double> parse_hex_floats(const Json& array) {
 
 Json parse_json(const std::string& text, const std::string& path) {
   if (text.compare(0, 3, "\xef\xbb\xbf") == 0)
-    throw InputError(
-        {path, "line 1", "", "", "begins with a byte order mark, which is no JSON", "save it without"});
+    throw InputError({path, "line 1", "", "", "begins with a byte order mark, which is not valid JSON",
+                      "save it without"});
   const char* position = text.data();
   const auto here = [&] { return line_and_column(text, static_cast<std::size_t>(position - text.data())); };
   std::vector<std::unordered_set<std::string>> keys;  // of the objects that are currently open

@@ -55,7 +55,7 @@ class AsciiWriter {
       ++at_;
       return;
     }
-    if (inside != '"') refuse("this letter may stand in double quotes only");
+    if (inside != '"') refuse("this character is allowed in double quotes only");
     char escape[16];
     std::snprintf(escape, sizeof escape, "\\U%08X", static_cast<unsigned>(code_point()));
     result_ += escape;

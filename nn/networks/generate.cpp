@@ -281,7 +281,7 @@ void generate(const std::filesystem::path& folder) {
   net.finish();
   std::filesystem::create_directories(folder);
   net.save(folder);
-  std::printf("rms force %.3f gf, rms error of the fit on samples it has not seen %.3f gf\n", rms_force(7),
+  std::printf("rms force %.3f gf, rms error of the fit on held-out samples %.3f gf\n", rms_force(7),
               rms_error(net, 7));
 }
 

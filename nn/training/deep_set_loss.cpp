@@ -99,14 +99,15 @@ Batch run(const Layout& layout, const Vector& theta, const Dataset& data, const 
 }  // namespace
 
 void Dataset::add_input(int phi_part, const std::vector<float>& values) {
-  if (static_cast<int>(values.size()) > width) throw std::invalid_argument("an input wider than the dataset");
+  if (static_cast<int>(values.size()) > width)
+    throw std::invalid_argument("an input is wider than the dataset");
   x.insert(x.end(), values.begin(), values.end());
   x.insert(x.end(), static_cast<std::size_t>(width) - values.size(), 0.0f);
   phi.push_back(phi_part);
 }
 
 void Dataset::add_sample(int rho_part, const std::vector<float>& force, float sample_weight) {
-  if (static_cast<int>(force.size()) != outputs) throw std::invalid_argument("a force of another size");
+  if (static_cast<int>(force.size()) != outputs) throw std::invalid_argument("a force has the wrong size");
   first.push_back(static_cast<Index>(phi.size()));
   rho.push_back(rho_part);
   target.insert(target.end(), force.begin(), force.end());

@@ -77,13 +77,13 @@ files::Weights Layout::stored(const Vector& theta, int part) const {
 void Layout::load(Vector& theta, int part, const files::Weights& stored_part) const {
   const Part& p = parts_[part];
   if (static_cast<int>(stored_part.layers.size()) != p.layers())
-    throw std::invalid_argument(p.id.name() + ": other number of layers");
+    throw std::invalid_argument(p.id.name() + ": wrong number of layers");
   for (int k = 0; k < p.layers(); ++k) {
     const files::Layer& layer = stored_part.layers[k];
     Eigen::Map<Matrix> w = weights(theta, part, k);
     Eigen::Map<Vector> b = biases(theta, part, k);
     if (layer.outputs != w.rows() || layer.inputs != w.cols())
-      throw std::invalid_argument(p.id.name() + ": other size of layer " + layer.name);
+      throw std::invalid_argument(p.id.name() + ": wrong size of layer " + layer.name);
     for (int i = 0; i < layer.outputs; ++i) {
       for (int j = 0; j < layer.inputs; ++j)
         w(i, j) = static_cast<float>(layer.weights[static_cast<std::size_t>(i) * layer.inputs + j]);

@@ -106,7 +106,8 @@ Vector Trainer::state() const {
 
 void Trainer::restore(const Vector& state) {
   const Index size = layout_.size();
-  if (state.size() != 3 * size + 2) throw std::invalid_argument("a checkpoint of other networks");
+  if (state.size() != 3 * size + 2)
+    throw std::invalid_argument("the checkpoint does not match these networks");
   parameters_ = state.head(size);
   theta_ = bounded_.weights(parameters_);
   adam_.first_moment = state.segment(size, size);

@@ -56,7 +56,8 @@ const ActivationFunction& function_of(Activation activation);
 template <class Number>
 std::vector<Number> rearranged(Activation activation, std::vector<Number> layer) {
   const auto group = static_cast<std::size_t>(function_of(activation).group);
-  if (layer.size() % group != 0) throw std::invalid_argument("rearranged: no whole number of groups");
+  if (layer.size() % group != 0)
+    throw std::invalid_argument("rearranged: the width is not a multiple of the group size");
   if (activation != Activation::kMaxMinHalves && activation != Activation::kMaxMinPairs) {
     for (std::size_t first = 0; first < layer.size(); first += group)
       std::sort(&layer[first], &layer[first] + group);

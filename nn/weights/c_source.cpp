@@ -312,8 +312,8 @@ std::map<std::string, Weights> parse_pure_c_source(const std::string& bytes, con
     // A comment before a directive, as in "/* */ #if", does not disable it.
     const bool is_plain = text.find('#') == std::string_view::npos || text.substr(0, 8) == "#include" ||
                           text.substr(0, 7) == "#pragma";
-    if (!is_plain) refuse("a preprocessor line, after which a compiler may read another text");
-    if (!text.empty() && text.back() == '\\') refuse("a line that is continued on the next one");
+    if (!is_plain) refuse("a preprocessor line, which may change the text that a compiler sees");
+    if (!text.empty() && text.back() == '\\') refuse("a continued line");
     at = end + 1;
   }
   return SourceReader(bytes, path, {}).run_all();

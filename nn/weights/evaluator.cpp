@@ -60,7 +60,7 @@ Evaluator<Scalar>::Evaluator(const Weights& weights)
 
 template <typename Scalar>
 nn::Mlp<Scalar> Evaluator<Scalar>::mlp() const {
-  if (!is_relu_) throw std::logic_error("Evaluator: this is no ReLU network");
+  if (!is_relu_) throw std::logic_error("Evaluator: this is not a ReLU network");
   return {layers_.data(), static_cast<int>(layers_.size())};
 }
 

@@ -44,7 +44,7 @@ std::vector<double> invariants_of(const FunctionId& phi, const std::vector<doubl
 void require_relative_states(const Network& network, const std::string& what) {
   if (!network.invariants) return;
   throw InputError({network.path, "", "input.invariants", "\"rotation\"", "but " + what,
-                    "certify without --domain, simulate, export and match take it"});
+                    "certify without --domain, simulate, export and match accept it"});
 }
 
 }  // namespace swarmcert::files

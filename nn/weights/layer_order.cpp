@@ -164,8 +164,7 @@ class OrderDecision {
     OrderSearch any(layers_, is_registered ? listed_ : natural_, false);
     const std::vector<Order> fitting = any.run(kMostShown);
     if (fitting.empty() && any.is_complete())
-      check_chain(is_registered ? listed_ : natural_,
-                  "the layers must follow one another: no order of them fits");
+      check_chain(is_registered ? listed_ : natural_, "no order of the layers fits their shapes");
     if (fitting.size() == 1 && any.is_complete()) return {fitting.front(), OrderSource::kShapes};
     OrderSearch numbered(layers_, natural_, true);
     const std::vector<Order> by_number = numbered.run(1);

@@ -133,7 +133,7 @@ Weights parse_npz(const std::string& bytes, const std::string& path, const std::
     throw InputError({path, "", "", "", "holds more than " + std::to_string(kMostArrays) + " arrays", ""});
   for (const std::string& entry : archive.names()) {
     if (!name_ends_with(entry, ".npy"))
-      throw InputError({path, "", in_quotes(entry), "", "is no .npy array", "save with numpy.savez"});
+      throw InputError({path, "", in_quotes(entry), "", "is not a .npy array", "save with numpy.savez"});
     const std::string contents = archive.read(entry, room_bytes);
     room_bytes -= contents.size();
     NpyArray array = parse_npy(contents, path, entry);

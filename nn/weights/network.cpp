@@ -100,7 +100,7 @@ class NetworkReader {
           "order", "", "invariants are made from a relative state",
           "write order = [\"dp_x_m\", \"dp_y_m\", \"dp_z_m\", \"dv_x_m_s\", \"dv_y_m_s\", \"dv_z_m_s\"]");
     if (network_.output_quantity != "force_z")
-      input.refuse("invariants", "\"rotation\"", "are for a vertical force, which no turn changes",
+      input.refuse("invariants", "\"rotation\"", "require a vertical force, which is unchanged by rotations",
                    "write output = { quantity = \"force_z\", ... }, or leave invariants out");
     network_.invariants = true;
   }
@@ -169,17 +169,17 @@ class NetworkReader {
   void check_phi() const {
     const auto& [first_kind, first] = *network_.phi.begin();
     std::size_t inputs = network_.input_order.size();
-    std::string because = "input.order names as many";
+    std::string because = "input.order names that many";
     if (network_.invariants) {
       inputs = nn::kNeighbourInvariants;
-      because = "input.invariants are as many";
+      because = "there are that many input.invariants";
     } else if (inputs == 0 && network_.clamp) {
       inputs = network_.clamp->lower.size();
-      because = "input.clamp has as many";
+      because = "input.clamp has that many";
     }
     for (const auto& [kind, phi] : network_.phi) {
       check_size("phi", kind, "outputs", phi.outputs(), static_cast<std::size_t>(first.outputs()),
-                 "all phi are summed, and phi." + first_kind + " has as many");
+                 "all phi are summed, and phi." + first_kind + " has that many");
       if (kind == kGround) {
         if (network_.invariants)
           check_size("phi", kind, "inputs", phi.inputs(), nn::kOwnInvariants,
@@ -190,7 +190,7 @@ class NetworkReader {
       }
       if (inputs == 0) {
         inputs = static_cast<std::size_t>(phi.inputs());
-        because = "phi." + kind + " has as many";
+        because = "phi." + kind + " has that many";
       }
       check_size("phi", kind, "inputs", phi.inputs(), inputs, because);
     }
@@ -201,9 +201,9 @@ class NetworkReader {
     const auto& [phi_kind, phi] = *network_.phi.begin();
     for (const auto& [kind, rho] : network_.rho) {
       check_size("rho", kind, "inputs", rho.inputs(), static_cast<std::size_t>(phi.outputs()),
-                 "phi." + phi_kind + " has as many outputs");
+                 "phi." + phi_kind + " has that many outputs");
       check_size("rho", kind, "outputs", rho.outputs(), static_cast<std::size_t>(first.outputs()),
-                 "rho." + first_kind + " has as many");
+                 "rho." + first_kind + " has that many");
       if (const int stated = components(network_.output_quantity); stated > 0) {
         check_size("rho", kind, "outputs", rho.outputs(), static_cast<std::size_t>(stated),
                    "output.quantity is " + network_.output_quantity);
@@ -271,7 +271,7 @@ Network load_pair(const NetworkArguments& arguments) {
   if (phi.outputs() != rho.inputs()) {
     throw InputError(
         {arguments.rho, "", rho.layers.front().name + ".weight", std::to_string(rho.inputs()) + " inputs",
-         "must be " + std::to_string(phi.outputs()) + ": " + arguments.phi + " has as many outputs",
+         "must be " + std::to_string(phi.outputs()) + ": " + arguments.phi + " has that many outputs",
          "name a phi and a rho that were trained together"});
   }
   return network;
@@ -284,8 +284,8 @@ int components(const std::string& quantity) { return quantity.empty() ? 0 : quan
 void require_force_z(const Network& network) {
   if (network.output_quantity.empty() || network.output_quantity == "force_z") return;
   throw InputError({network.path, "", "output.quantity", in_quotes(network.output_quantity),
-                    "is not the vertical force that is flown",
-                    "name a network of force_z; as an effect of a model this one acts in simulation"});
+                    "is not the vertical force, which flight code requires",
+                    "name a network of force_z; this one can be simulated as an effect of a model"});
 }
 
 void require_torque(const Network& network) {
@@ -346,7 +346,7 @@ void require_relu(const Network& network, const std::string& what) {
     if (weights->is_relu()) continue;
     throw InputError({weights->path, "", "activation", in_quotes(weights->activation_names()),
                       "is between the layers of " + part.name() + ", but " + what,
-                      "bounds for all inputs are what can be said of this network: certify it"});
+                      "only bounds for all inputs are available for this network: use certify"});
   }
 }
 

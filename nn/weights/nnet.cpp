@@ -28,7 +28,7 @@ class NnetReader {
     for (const double width : numbers(layers + 1))
       widths.push_back(static_cast<std::size_t>(count(width, kMostWidth)));
     if (widths.front() != inputs || widths.back() != outputs)
-      refuse("the sizes of its layers contradict one another");
+      refuse("the sizes of its layers are inconsistent");
     next_line();  // an obsolete flag
     next_line();  // minimum inputs
     next_line();  // maximum inputs
@@ -55,8 +55,8 @@ class NnetReader {
   [[noreturn]] void refuse(const std::string& what) const {
     throw InputError(
         {path_, "line " + std::to_string(line_), "", "", what,
-         "the format: numLayers,inputSize,outputSize,maxLayerSize; the sizes; a flag; least and largest "
-         "inputs; means; ranges; then weights and biases, one neuron a line"});
+         "the format: numLayers,inputSize,outputSize,maxLayerSize; the sizes; a flag; minimum and maximum "
+         "inputs; means; ranges; then weights and biases, one neuron per line"});
   }
 
   double count(double number, double most) const {
@@ -151,7 +151,7 @@ Weights parse_nnet(const std::string& bytes, const std::string& path, const std:
     throw InputError({path, "", "", "", limit.what, "certify a smaller network"});
   }
   weights.notes = {"the normalization of inputs and outputs is folded into the first and the last layer",
-                   "the clamp of inputs to their least and largest values is left out"};
+                   "the clamp of inputs to their minimum and maximum values is omitted"};
   weights.order_source = stated_order(weights.layers, order, path);
   return weights;
 }

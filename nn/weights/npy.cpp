@@ -45,7 +45,7 @@ class NpyHeader {
       }
     }
     skip_blanks();
-    if (at_ != text_.size()) refuse("", "", "has text behind its header");
+    if (at_ != text_.size()) refuse("", "", "has text after its header");
     if (type.empty() || !order_ || !has_shape_) refuse("", "", "lacks descr, fortran_order or shape");
     if (*order_ != "False")
       refuse("fortran_order", *order_, "must be False", "numpy.ascontiguousarray(array) before saving");
@@ -82,7 +82,7 @@ class NpyHeader {
   std::string quoted() {
     expect('\'');
     const std::size_t end = text_.find('\'', at_);
-    if (end == std::string_view::npos) refuse("", "", "has a text without an end in its header");
+    if (end == std::string_view::npos) refuse("", "", "has an unterminated string in its header");
     const std::string result(text_.substr(at_, end - at_));
     at_ = end + 1;
     return result;

@@ -88,7 +88,7 @@ class Parametrizations {
     const DeclaredTensor& tensor = tensors_[i];
     if (tensor.shape != shape)
       refuse(i, shape_text(tensor.shape), "the parametrization needs the shape " + shape_text(shape));
-    if (!tensor.precision) refuse(i, tensor.type, "is not of floating-point numbers");
+    if (!tensor.precision) refuse(i, tensor.type, "does not hold floating-point numbers");
     std::vector<double> result = read_(i);
     for (const double number : result)
       if (!std::isfinite(number)) refuse(i, "", "holds a number that is not finite");

@@ -50,7 +50,7 @@ class Machine {
 
   std::string_view take(std::uint64_t count) {
     if (count > bytes_.size() - position_) {
-      refuse("the pickle ends in the middle", "the file is truncated or damaged: copy it again");
+      refuse("the pickle ends prematurely", "the file is truncated or damaged: copy it again");
     }
     const std::string_view taken = bytes_.substr(position_, static_cast<std::size_t>(count));
     position_ += static_cast<std::size_t>(count);
@@ -75,7 +75,7 @@ class Machine {
   std::string_view take_line() {
     const std::size_t end = bytes_.find('\n', position_);
     if (end == std::string_view::npos)
-      refuse("a name has no end", "the file is truncated or damaged: copy it again");
+      refuse("a name is not terminated", "the file is truncated or damaged: copy it again");
     const std::string_view line = bytes_.substr(position_, end - position_);
     position_ = end + 1;
     return line;
@@ -326,7 +326,7 @@ class Machine {
     tensor.sizes = counts(items[2], "the shape of a tensor");
     tensor.strides = counts(items[3], "the strides of a tensor");
     if (tensor.sizes.size() != tensor.strides.size())
-      refuse("a tensor has another number of strides than of sizes");
+      refuse("a tensor has different numbers of strides and sizes");
     pickle_.tensors.push_back(std::move(tensor));
     return static_cast<std::int64_t>(pickle_.tensors.size() - 1);
   }
@@ -370,7 +370,7 @@ const char* name(PickledValue::Kind kind) {
     case Kind::kNone:
       return "None";
     case Kind::kBool:
-      return "a truth value";
+      return "a Boolean";
     case Kind::kInteger:
       return "an integer";
     case Kind::kReal:

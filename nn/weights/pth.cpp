@@ -98,7 +98,8 @@ std::string top_folder(const ZipArchive& archive, const std::string& path) {
     }
   }
   if (archive.has("model.weights.h5"))
-    throw InputError({path, "", "model.weights.h5", "", "the archive is a Keras model, which is not read",
+    throw InputError({path, "", "model.weights.h5", "",
+                      "the archive is a Keras model, which is not supported",
                       "export it to ONNX: model.export('net.onnx', format='onnx')"});
   throw InputError({path, "", "", "",
                     "the zip archive has no <folder>/data.pkl, so torch.save did not write it",
@@ -148,7 +149,7 @@ class Legacy {
       const auto [entry, is_new] = declared.emplace(storage.key, &storage);
       if (!is_new && (entry->second->type != storage.type || entry->second->elements != storage.elements)) {
         throw InputError(
-            {path_, "", "storage " + in_quotes(storage.key), "", "is declared in two ways", kCopyAgain});
+            {path_, "", "storage " + in_quotes(storage.key), "", "is declared inconsistently", kCopyAgain});
       }
     }
     std::map<std::string_view, std::string_view> located;

@@ -57,8 +57,8 @@ struct Worst {
            short_text(tolerance) + ")",
        is_clamped_there
            ? "this input lies outside input.clamp: record inputs inside it"
-           : "the file is of another network than the one recorded: another order of layers (--order), "
-             "another activation (--activation), a skip connection, or other weights"});
+           : "the file is not the recorded network: it may differ in the order of its layers (--order), an "
+             "activation (--activation), a skip connection, or its weights"});
 }
 
 }  // namespace

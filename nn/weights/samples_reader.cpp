@@ -183,7 +183,8 @@ void check_count(const Samples& samples) {
   const std::size_t outputs = samples.y.size() / static_cast<std::size_t>(samples.outputs);
   if (samples.count() != outputs)
     throw InputError({samples.path, "", "outputs", std::to_string(outputs) + " samples",
-                      "there are " + std::to_string(samples.count()) + " of the inputs", kHowToRecord});
+                      "but there are " + std::to_string(samples.count()) + " samples of the inputs",
+                      kHowToRecord});
   if (samples.count() == 0) throw InputError({samples.path, "", "", "", "holds no sample", kHowToRecord});
 }
 
@@ -195,7 +196,8 @@ Samples samples_of(const Network& network, const std::string& part, const std::s
   if (found == all.end()) {
     std::string list;
     for (const auto& [known, weights] : all) list += (list.empty() ? "" : ", ") + known.name();
-    throw InputError({path, "", in_quotes(part), "", "is no part of this network", "its parts are: " + list});
+    throw InputError(
+        {path, "", in_quotes(part), "", "is not a part of this network", "its parts are: " + list});
   }
   Samples samples;
   samples.path = path;
@@ -247,7 +249,7 @@ std::map<std::string, Samples> read_samples(const std::string& argument, const N
   if (document.contains("networks")) {
     allow_only_keys(document, {"schema", "networks"}, path, "");
     if (!document["networks"].is_object() || document["networks"].empty())
-      throw InputError({path, "", "networks", "", "names no part of a network", kHowToRecord});
+      throw InputError({path, "", "networks", "", "does not contain any part of a network", kHowToRecord});
     for (const auto& item : document["networks"].items()) {
       if (!part.empty() && part != item.key()) continue;
       Samples samples = samples_of(network, item.key(), bytes, path);
@@ -259,11 +261,11 @@ std::map<std::string, Samples> read_samples(const std::string& argument, const N
       result.emplace(item.key(), std::move(samples));
     }
     if (result.empty())
-      throw InputError({path, "", in_quotes(part), "", "the file has no samples of it", ""});
+      throw InputError({path, "", in_quotes(part), "", "the file has no samples of this part", ""});
     return result;
   }
   if (part.empty() && !network.plain)
-    throw InputError({path, "", "", "", "does not say of which part of the network its samples are",
+    throw InputError({path, "", "", "", "does not state to which part of the network its samples belong",
                       "name it: --samples phi:KIND=FILE, rho:KIND=FILE"});
   if (part.empty()) part = "network";
   const Samples shape = samples_of(network, part, bytes, path);

@@ -16,7 +16,7 @@
 namespace swarmcert::files {
 namespace {
 
-constexpr char kOnlyLinear[] = "only networks of linear layers with ReLU between them can be read";
+constexpr char kOnlyLinear[] = "only networks of linear layers with ReLU between them are supported";
 constexpr char kFold[] =
     "fold it into the layer before it: torch.nn.utils.fusion.fuse_linear_bn_eval(linear, bn)";
 constexpr std::size_t kNone = static_cast<std::size_t>(-1);

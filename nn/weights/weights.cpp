@@ -42,10 +42,10 @@ bool looks_like_hdf5(const std::string& bytes) {
     what = "is a Git LFS pointer, not the file itself";
     hint = "fetch it: git lfs pull";
   } else if (bytes.compare(std::min<std::size_t>(4, bytes.size()), 4, "TFL3") == 0) {
-    what = "is a TensorFlow Lite model (.tflite), which is not read";
+    what = "is a TensorFlow Lite model (.tflite), which is not supported";
     hint = "convert it to ONNX: python -m tf2onnx.convert --tflite net.tflite --output net.onnx";
   } else if (looks_like_hdf5(bytes)) {
-    what = "is an HDF5 file (.h5, .hdf5), which is not read";
+    what = "is an HDF5 file (.h5, .hdf5), which is not supported";
     hint = "export the model to ONNX, or write W1, b1, W2, b2, ... [outputs x inputs] with numpy.savez";
   }
   throw InputError({path, "offset 0", "", "", what, hint});
@@ -116,7 +116,7 @@ bool Weights::is_relu() const {
 
 void Weights::set_activations(const std::vector<Activation>& between) {
   if (between.size() + 1 != layers.size())
-    throw std::invalid_argument("Weights: there is not one activation for each layer but the last");
+    throw std::invalid_argument("Weights: needs one activation for each layer but the last");
   for (std::size_t k = 0; k < between.size(); ++k) layers[k].activation = between[k];
 }
 

@@ -98,7 +98,7 @@ std::string ZipArchive::read(const std::string& name, std::uint64_t limit_bytes)
            "save again with torch.save or numpy.savez, which do neither");
   }
   if (status.size > limit_bytes || status.size > size_bytes_) {
-    refuse("the entry declares " + std::to_string(status.size) + " bytes, more than fit here", kCopyAgain);
+    refuse("the entry declares " + std::to_string(status.size) + " bytes, more than the limit", kCopyAgain);
   }
   std::string contents(static_cast<std::size_t>(status.size), '\0');
   const std::unique_ptr<zip_file_t, CloseEntry> file(zip_fopen_index(archive_, index, 0));

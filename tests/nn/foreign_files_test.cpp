@@ -66,11 +66,11 @@ TEST(ForeignFiles, WhatWasComputedOrAssumedIsSaid) {
   EXPECT_TRUE(says(notes_of("torch_half.pth"), "stored as float16"));
   EXPECT_TRUE(says(notes_of("torch_image.onnx"), "batch normalization in inference is folded"));
   EXPECT_TRUE(says(notes_of("torch_series.onnx"), "one layer"));
-  EXPECT_TRUE(says(notes_of("onnx_digits.onnx"), "Softmax is left out"));
+  EXPECT_TRUE(says(notes_of("onnx_digits.onnx"), "Softmax is omitted"));
   EXPECT_TRUE(says(notes_of("h5py_struct.mat"), "the network is the struct \"net\""));
   EXPECT_TRUE(says(notes_of("scipy_struct.mat"), "the network is the struct \"net\""));
   EXPECT_EQ(load_weights(foreign("h5py_struct.mat")).precision, Precision::kFloat32);
-  EXPECT_EQ(notes_of("h5py_cells.mat"), "other variables are left out: \"comment\"\n");
+  EXPECT_EQ(notes_of("h5py_cells.mat"), "other variables are ignored: \"comment\"\n");
   EXPECT_EQ(notes_of("onnx_acas.onnx"), "");
 }
 
@@ -146,7 +146,7 @@ TEST(Nnet, DamagedLinesAreRefusedByNumber) {
   EXPECT_TRUE(foreign_is_refused(with("2,2,1,\n0", "2,3,1,\n0"), {"line 11", "expected 2 numbers"}));
   EXPECT_TRUE(foreign_is_refused(with("2.0,4.0,8.0", "0.0,4.0,8.0"), {"line 8", "a range is 0"}));
   EXPECT_TRUE(foreign_is_refused(with("0.5,2.0", "0.5,nan"), {"line 10", "finite number"}));
-  EXPECT_TRUE(foreign_is_refused(with("2,2,1,\n0", "2,2,2,\n0"), {"line 3", "contradict"}));
+  EXPECT_TRUE(foreign_is_refused(with("2,2,1,\n0", "2,2,2,\n0"), {"line 3", "inconsistent"}));
   EXPECT_TRUE(foreign_is_refused(with("2,2,1,2", "99999999,2,1,2"), {"line 2", "expected a count"}));
   EXPECT_TRUE(foreign_is_refused(text.substr(0, text.size() - 5), {"ends early"}));
 }
@@ -155,7 +155,7 @@ TEST(MatFile, OtherVersionsAreRefusedWithTheCallThatMendsThem) {
   const std::string good = read_file(foreign("scipy_weights.mat"));
   std::string newer = good;
   newer[125] = '\3';
-  EXPECT_TRUE(foreign_is_refused(newer, {"another version than 5 and 7.3", "-v7"}));
+  EXPECT_TRUE(foreign_is_refused(newer, {"a version other than 5 and 7.3", "-v7"}));
   std::string big_endian = good;
   big_endian.replace(126, 2, "MI");
   EXPECT_TRUE(foreign_is_refused(big_endian, {"not little-endian"}));

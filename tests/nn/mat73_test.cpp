@@ -64,7 +64,7 @@ TEST(Mat73, WhatIsNoNetworkIsRefusedByName) {
   const std::uint64_t weights = cells.add(hdf5_object(hdf5_shape({1, 1}) + hdf5_reference() +
                                                       hdf5_contiguous(reference, 8) + hdf5_class("cell")));
   EXPECT_TRUE(mat_file_is_refused(cells.file_with({{"weights", weights}}),
-                                  {"\"weights\"", "cell 1 is no numeric array"}));
+                                  {"\"weights\"", "cell 1 is not a numeric array"}));
   const std::string good = small_mat73();
   EXPECT_TRUE(
       mat_file_is_refused(good.substr(0, 200), {"address", "beyond the end of the file", "copy it again"}));
@@ -92,7 +92,7 @@ TEST(Mat73, LayoutsAndFiltersThatAreNotReadAreNamed) {
       mat_file_is_refused(file_of(writer, hdf5_contiguous(48, 40)), {"shape = [2, 3]", "does not fit"}));
   const std::string outside = hdf5_message(7, std::string(24, '\0'));
   EXPECT_TRUE(
-      mat_file_is_refused(file_of(writer, hdf5_contiguous(48, 48) + outside), {"lie in another file"}));
+      mat_file_is_refused(file_of(writer, hdf5_contiguous(48, 48) + outside), {"stored in another file"}));
   const std::string link = writer.file(writer.add(hdf5_object(hdf5_link("W1", 0, 64))));
   EXPECT_TRUE(mat_file_is_refused(link, {"link = \"W1\"", "only hard links"}));
   const std::string dense =
@@ -133,7 +133,7 @@ TEST(Mat73, ChunksThatOverlapOrAreMissingAreRefused) {
   };
   EXPECT_EQ(parse_weights(with({{0, 0}, {0, 2}}), "net.mat").layers.size(), 1u);
   EXPECT_TRUE(mat_file_is_refused(with({{0, 0}, {0, 0}}), {"corner of a chunk = [0, 0]", "overlap"}));
-  EXPECT_TRUE(mat_file_is_refused(with({{0, 0}, {0, 1}}), {"corner of a chunk = [0, 1]", "no multiple"}));
+  EXPECT_TRUE(mat_file_is_refused(with({{0, 0}, {0, 1}}), {"corner of a chunk = [0, 1]", "not a multiple"}));
   EXPECT_TRUE(
       mat_file_is_refused(with({{0, 0}, {2, 0}}), {"corner of a chunk = [2, 0]", "inside the dataset"}));
   EXPECT_TRUE(mat_file_is_refused(with({{0, 0}}), {"chunks = 1", "lacks 1 of its chunks"}));

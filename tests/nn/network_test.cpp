@@ -307,7 +307,7 @@ TEST(NetworkToml, NetworksMustFitTogether) {
       "schema = \"swarmcert/network/1\"\nphi.a.weights = \"3x5\"\nphi.b.weights = \"4x5\"\nrho.b.weights = "
       "\"5x2\"\n";
   EXPECT_TRUE(network_is_refused(without_order,
-                                 {"line 3: phi.b.weights = 4 inputs", "must be 3", "phi.a has as many"}));
+                                 {"line 3: phi.b.weights = 4 inputs", "must be 3", "phi.a has that many"}));
   EXPECT_TRUE(network_is_refused(without_order + "[input]\nclamp = { lower = [0, 0], upper = [1, 1] }\n",
                                  {"phi.a.weights = 3 inputs", "must be 2", "input.clamp"}));
 }

@@ -102,24 +102,25 @@ TEST(OnnxSmooth, OtherParametersAreRefused) {
       smooth_is_refused({onnx_node("Elu", {"h"}, {"a"}, {onnx_float("alpha", 0.5F)})}, {"Elu: alpha"}));
   // 1.05070102214813232 * 1.67326319217681885 = 1.75809934634, above the slope 1.75809934085 of the statement's SELU.
   EXPECT_TRUE(smooth_is_refused({onnx_node("Selu", {"h"}, {"a"})},
-                                {"Selu: takes its constants", "--activation selu"}));
+                                {"Selu: uses float32 constants", "--activation selu"}));
   EXPECT_TRUE(
       smooth_is_refused({onnx_node("Swish", {"h"}, {"a"}, {onnx_float("alpha", 2)})}, {"Swish: alpha"}));
   const std::string tanh_form = onnx_text(1, "approximate") + onnx_text(4, "tanh");
   EXPECT_TRUE(smooth_is_refused({onnx_node("Gelu", {"h"}, {"a"}, {tanh_form})}, {"Gelu: approximate"}));
-  EXPECT_TRUE(
-      smooth_is_refused({onnx_node("Mish", {"h"}, {"a"})}, {"Mish: is none of the operators", "SiLU"}));
+  EXPECT_TRUE(smooth_is_refused({onnx_node("Mish", {"h"}, {"a"})},
+                                {"Mish: is not one of the supported operators", "SiLU"}));
 }
 
 TEST(OnnxSmooth, AProductThatOnlyResemblesSiluOrGeluIsRefused) {
   EXPECT_TRUE(smooth_is_refused({onnx_node("Sigmoid", {"h"}, {"s"}), onnx_node("Mul", {"s", "s"}, {"a"})},
-                                {"Mul: is no affine function"}));
+                                {"Mul: is not an affine function"}));
   EXPECT_TRUE(smooth_is_refused({onnx_node("Neg", {"h"}, {"n"}), onnx_node("Sigmoid", {"h"}, {"s"}),
                                  onnx_node("Mul", {"n", "s"}, {"a"})},
-                                {"Mul: is no affine function"}));
-  EXPECT_TRUE(smooth_is_refused(gelu_nodes("half"), {"Erf: is none of the operators"}));
+                                {"Mul: is not an affine function"}));
+  EXPECT_TRUE(smooth_is_refused(gelu_nodes("half"), {"Erf: is not one of the supported operators"}));
   // Such a function's slope exceeds GELU's by half of the number's deviation.
-  EXPECT_TRUE(smooth_is_refused(gelu_nodes("root", "above_one"), {"Erf: is none of the operators"}));
+  EXPECT_TRUE(
+      smooth_is_refused(gelu_nodes("root", "above_one"), {"Erf: is not one of the supported operators"}));
 }
 
 TEST(OnnxSmooth, EveryTruncatedOrFlippedModelIsRefusedOrSound) {

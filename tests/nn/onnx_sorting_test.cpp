@@ -83,11 +83,11 @@ TEST(OnnxSorting, OtherGroupsOfNodesAreRefusedByName) {
   const auto refused = [](const std::vector<std::string>& nodes, const std::vector<std::string>& pieces) {
     return refuses([&] { sorting_weights(nodes); }, pieces);
   };
-  EXPECT_TRUE(refused(halves_nodes("unequal"), {"Concat", "no halves", "--activation maxmin:halves"}));
+  EXPECT_TRUE(refused(halves_nodes("unequal"), {"Concat", "not halves", "--activation maxmin:halves"}));
   EXPECT_TRUE(refused(halves_nodes("halves", 0), {"Concat", "does not join the halves"}));
   std::vector<std::string> other = halves_nodes();
   other[3] = onnx_node("Concat", {"d", "c"}, {"a"}, {onnx_integer("axis", 1)});
-  EXPECT_TRUE(refused(other, {"Split", "none of the operators", "--activation maxmin:halves"}));
+  EXPECT_TRUE(refused(other, {"Split", "not one of the supported operators", "--activation maxmin:halves"}));
   EXPECT_TRUE(refused(pairs_nodes(1), {"Concat", "joins other maxima", "GroupSort as TopK"}));
   EXPECT_TRUE(refused(sort_nodes(0, "one"), {"TopK", "does not sort the whole last axis"}));
   std::vector<std::string> indices = sort_nodes(0);

@@ -116,17 +116,17 @@ TEST(Onnx, GraphsThatAreNoChainOfLinearLayersAreRefusedByNode) {
   const auto expect = [&](const std::vector<std::string>& nodes, const std::string& piece) {
     EXPECT_TRUE(onnx_is_refused(with(nodes), {"net.onnx: offset ", piece}));
   };
-  expect({onnx_node("Mish", {"x"}, {"y"})}, "Mish: is none of the operators");
+  expect({onnx_node("Mish", {"x"}, {"y"})}, "Mish: is not one of the supported operators");
   expect({gemm, onnx_node("Mish", {"h"}, {"y"})}, "train with ReLU, LeakyReLU, Hardtanh");
-  expect({gemm, onnx_node("Mul", {"h", "h"}, {"y"})}, "Mul: is no affine function");
+  expect({gemm, onnx_node("Mul", {"h", "h"}, {"y"})}, "Mul: is not an affine function");
   expect({gemm, onnx_node("Div", {"w", "h"}, {"y"})}, "Div: divides a constant by a value");
   expect({onnx_node("Gemm", {"x", "w", "b"}, {"y"}, {onnx_integer("transA", 1)})}, "transposes its input");
   expect({onnx_node("Gemm", {"w", "x", "b"}, {"y"})}, "is not the input times weights");
-  expect({onnx_node("Gemm", {"x", "x", "b"}, {"y"})}, "\"x\" for an input that must be stored");
-  expect({onnx_node("Gemm", {"x", "other"}, {"y"})}, "neither computed before it nor stored");
+  expect({onnx_node("Gemm", {"x", "x", "b"}, {"y"})}, "\"x\" as an input that must be stored");
+  expect({onnx_node("Gemm", {"x", "other"}, {"y"})}, "neither stored nor computed before it");
   expect({onnx_node("MatMul", {"x", ""}, {"y"})}, "lacks its weights");
-  expect({gemm, onnx_node("Relu", {"w"}, {"y"})}, "does not take the value that the node before it gives");
-  expect({gemm, onnx_node("Conv", {"h", "w"}, {"y"})}, "Conv: its weights of shape [2, 2] are no kernel");
+  expect({gemm, onnx_node("Relu", {"w"}, {"y"})}, "does not use the output of the preceding node");
+  expect({gemm, onnx_node("Conv", {"h", "w"}, {"y"})}, "Conv: its weights of shape [2, 2] are not a kernel");
   expect({gemm, onnx_node("MaxPool", {"h"}, {"y"})}, "MaxPool: its input must have the shape [1, channels");
   expect({gemm, onnx_node("Reshape", {"h"}, {"y"}, {onnx_integers("shape", {3})})},
          "Reshape: its shape does not fit");
@@ -156,7 +156,7 @@ TEST(Onnx, TensorsThatCannotBeWeightsAreRefused) {
   EXPECT_TRUE(
       onnx_is_refused(with({onnx_raw("w", {1u << 31, 1u << 31}, {1})}), {"bytes of numbers for the shape"}));
   EXPECT_TRUE(onnx_is_refused(with({onnx_tensor("w", {2, ~std::uint64_t{0}}, 1, onnx_text(9, data))}),
-                              {"dimension below 0"}));
+                              {"negative dimension"}));
   EXPECT_TRUE(onnx_is_refused(with({onnx_raw("w", {4}, {1, 2, 3, 4})}), {"two dimensions"}));
   EXPECT_TRUE(onnx_is_refused(
       with({good.substr(0, 0) + onnx_tensor("w", {2, 2}, 1, onnx_text(4, data) + onnx_text(9, data))}),
@@ -308,7 +308,7 @@ TEST(Onnx, DamagedProtobufIsRefusedAtItsOffset) {
   EXPECT_TRUE(onnx_is_refused(head + onnx_text(7, onnx_text(1, onnx_varint_field(4, 1))),
                               {"a name is stored as a number"}));
   EXPECT_TRUE(onnx_is_refused(head + onnx_text(7, onnx_text(5, onnx_text(1, "\xff"))),
-                              {"packed numbers are cut off"}));
+                              {"packed numbers are truncated"}));
 }
 
 TEST(Onnx, EveryTruncationAndFlippedBitIsRefusedOrGivesASoundNetwork) {

@@ -153,7 +153,7 @@ TEST(PthRefusal, FilesOfOtherKinds) {
   EXPECT_TRUE(pth_is_refused(std::string("\x1c\0\0\0TFL3", 8) + std::string(40, '\0'),
                              {"TensorFlow Lite", "tf2onnx.convert --tflite"}));
   const std::string saved_model("\x8\1\x12\4\x8\1\x12\0", 8);
-  EXPECT_TRUE(pth_is_refused(saved_model, {"graph", "no ONNX model", "tf2onnx.convert --saved-model"}));
+  EXPECT_TRUE(pth_is_refused(saved_model, {"graph", "not an ONNX model", "tf2onnx.convert --saved-model"}));
 }
 
 TEST(PthRefusal, ThingsThatAreNotStateDicts) {
@@ -167,7 +167,7 @@ TEST(PthRefusal, ThingsThatAreNotStateDicts) {
 TEST(PthRefusal, NamesWhatStandsInTheTensorsPlace) {
   const std::vector<std::pair<std::string, std::string>> ops_and_names = {
       {"N", "None"},
-      {"\x88", "a truth value"},
+      {"\x88", "a Boolean"},
       {integer_op(7), "an integer"},
       {"G" + std::string(8, '\0'), "a number"},
       {text_op("x"), "text"},
@@ -200,7 +200,7 @@ TEST(PthRefusal, ViewsThatLeaveTheirStorage) {
       pth_is_refused(with(0, {std::numeric_limits<std::int64_t>::max(), 1}), {"does not fit its storage"}));
   EXPECT_TRUE(pth_is_refused(with(-1, {2, 1}), {"the offset of a tensor", "negative"}));
   EXPECT_TRUE(pth_is_refused(with(0, {-2, 1}), {"the strides of a tensor", "negative"}));
-  EXPECT_TRUE(pth_is_refused(with(0, {2}), {"another number of strides"}));
+  EXPECT_TRUE(pth_is_refused(with(0, {2}), {"different numbers of strides"}));
 }
 
 TEST(PthRefusal, ExpandedViewsThatTakeMoreThanTheirStorage) {
@@ -253,7 +253,7 @@ TEST(PthRefusal, LegacyStoragesThatAreInconsistent) {
   std::vector<TensorSpec> tensors = small_tensors();
   tensors[1].key = "0";
   EXPECT_TRUE(pth_is_refused(legacy_file(tensors, small_storages<float>(), 4),
-                             {"storage \"0\"", "declared in two ways"}));
+                             {"storage \"0\"", "declared inconsistently"}));
   tensors = small_tensors();
   tensors[3].key = "2", tensors[3].elements = 3, tensors[3].type = "ComplexFloatStorage";
   EXPECT_TRUE(

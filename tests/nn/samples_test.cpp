@@ -178,7 +178,7 @@ TEST_F(HeldAgainst, AnotherOrderAnotherActivationAndASkipConnectionAreRefused) {
   const auto refused_for = [&](const std::function<double(double)>& last) {
     Samples samples = recorded();
     for (double& y : samples.y) y = last(y);
-    return refuses([&] { hold_against(network_, "network", samples); }, {"another activation"});
+    return refuses([&] { hold_against(network_, "network", samples); }, {"--activation"});
   };
   EXPECT_TRUE(refused_for([](double y) { return y > 0 ? y : 0.01 * y; }));
   Samples skip = recorded();
@@ -240,9 +240,9 @@ TEST(ReadSamples, OfADeepSetNamesItsParts) {
   write_file(folder / "rho.csv", "1,2,3,4,5\n", false);
   EXPECT_EQ(read_samples("rho=" + (folder / "rho.csv"), set).count("rho:default"), 1u);
   EXPECT_EQ(read_samples("rho:default=" + (folder / "rho.csv"), set).count("rho:default"), 1u);
-  EXPECT_TRUE(refuses([&] { read_samples(folder / "rho.csv", set); }, {"does not say of which part"}));
+  EXPECT_TRUE(refuses([&] { read_samples(folder / "rho.csv", set); }, {"does not state to which part"}));
   EXPECT_TRUE(refuses([&] { read_samples("phi:large=" + (folder / "rho.csv"), set); },
-                      {"\"phi:large\"", "no part", "phi:default, rho:default"}));
+                      {"\"phi:large\"", "not a part", "phi:default, rho:default"}));
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 using controller::Vector3;
 
 static_assert(swarmcert_network::kTakesRelativeState,
-              "the app feeds relative position and velocity: this network has other inputs");
+              "the app provides relative position and velocity, but this network has other inputs");
 static_assert(swarmcert_network::kMostNeighbours >= PEER_LOCALIZATION_MAX_NEIGHBORS,
               "export with --most-neighbours of at least PEER_LOCALIZATION_MAX_NEIGHBORS");
 static_assert(PEER_LOCALIZATION_MAX_NEIGHBORS <= controller::kMostNeighbours);

@@ -52,12 +52,14 @@ Hdf5Type type_of(Hdf5Piece message) {
   const std::uint64_t head = message.number(1), bits = message.number(3);
   const std::uint64_t version = head >> 4, type_class = head & 0xf;
   if (version < 1 || version > 3)
-    message.refuse("version of a datatype", std::to_string(version), "only 1 to 3 are read", kSaveAsVersion7);
+    message.refuse("version of a datatype", std::to_string(version), "only 1 to 3 are supported",
+                   kSaveAsVersion7);
   const auto size = static_cast<std::size_t>(message.number(4));
   switch (type_class) {
     case kInteger:
       if (size == 0 || size > 8)
-        message.refuse("bytes of an integer", std::to_string(size), "is none of 1 to 8", kSaveAsVersion7);
+        message.refuse("bytes of an integer", std::to_string(size), "is not between 1 and 8",
+                       kSaveAsVersion7);
       message.require("byte order", bits & 1, 0);
       message.require("first bit of an integer", message.number(2), 0);
       message.require("bits of an integer", message.number(2), 8 * size);
@@ -67,7 +69,7 @@ Hdf5Type type_of(Hdf5Piece message) {
       return {Hdf5Class::kFloat, size, true};
     case kText:
       if (size == 0 || size > kMostText_bytes)
-        message.refuse("bytes of a text", std::to_string(size), "is none of 1 to 4096", kSaveAsVersion7);
+        message.refuse("bytes of a text", std::to_string(size), "is not between 1 and 4096", kSaveAsVersion7);
       return {Hdf5Class::kText, size, false};
     case kReference:
       message.require("kind of a reference", bits & 0xf, 0);
@@ -90,7 +92,7 @@ struct Attribute {
 Attribute attribute_parts(Hdf5Piece message) {
   const std::uint64_t version = message.number(1);
   if (version < 1 || version > 3)
-    message.refuse("version of an attribute", std::to_string(version), "only 1 to 3 are read",
+    message.refuse("version of an attribute", std::to_string(version), "only 1 to 3 are supported",
                    kSaveAsVersion7);
   const std::uint64_t flags = message.number(1);
   const std::uint64_t name_bytes = message.number(2), type_bytes = message.number(2);
@@ -105,7 +107,7 @@ Attribute attribute_parts(Hdf5Piece message) {
   const Hdf5Piece type = part(type_bytes), shape = part(shape_bytes);
   const std::string plain = name.substr(0, name.find('\0'));
   if (version > 1 && flags != 0)
-    message.refuse("attribute", in_quotes(plain), "has a type that lies elsewhere", kSaveAsVersion7);
+    message.refuse("attribute", in_quotes(plain), "has a type that is stored elsewhere", kSaveAsVersion7);
   return {plain, type, shape, message};
 }
 
@@ -135,7 +137,7 @@ std::optional<Hdf5Array> attribute_of(Hdf5File& file, const Hdf5Object& object, 
       info.require("version of an object's attributes", info.number(1), 0);
       if ((info.number(1) & 1) != 0) info.skip(2);  // maximum creation order
       if (info.number(8) != kNoAddress)
-        info.refuse("", "", "an object keeps its attributes in a fractal heap, which is not read",
+        info.refuse("", "", "an object keeps its attributes in a fractal heap, which is not supported",
                     kSaveAsVersion7);
     }
   }
@@ -161,7 +163,7 @@ std::vector<double> numbers_of(const Hdf5Array& array, const std::string& name, 
   const bool is_small_integer = array.type.type_class == Hdf5Class::kInteger && size <= 4;
   if (!is_float && !is_small_integer)
     throw InputError({path, "offset " + std::to_string(array.offset), in_quotes(name), "",
-                      "holds numbers of a type that weights do not have", kSaveAsDouble});
+                      "holds numbers of an unsupported type", kSaveAsDouble});
   std::vector<double> numbers;
   numbers.reserve(count);
   if (is_float) {

@@ -10,7 +10,7 @@ namespace {
 constexpr std::size_t kMostLinks = 4096;
 constexpr std::uint64_t kGroupNode = 0;
 constexpr std::uint64_t kSymbolicLink = 2;
-constexpr char kOtherLink[] = "only hard links are read";
+constexpr char kOtherLink[] = "only hard links are supported";
 
 void add(std::vector<Hdf5Link>& links, Hdf5Link link, const Hdf5Piece& piece) {
   if (links.size() == kMostLinks) piece.refuse("", "", "a group has more than 4096 links", kSaveAsVersion7);
@@ -71,7 +71,8 @@ class SymbolTable {
     heap.skip(offset);
     const std::string_view rest = heap.take(heap.left());
     const std::size_t end = rest.find('\0');
-    if (end == std::string_view::npos) names_.refuse("", "", "a name in a local heap has no end", kCopyAgain);
+    if (end == std::string_view::npos)
+      names_.refuse("", "", "a name in a local heap is not terminated", kCopyAgain);
     return std::string(rest.substr(0, end));
   }
 
@@ -109,7 +110,8 @@ std::vector<Hdf5Link> links_of(Hdf5File& file, const Hdf5Object& group) {
     info->require("version of a group's links", info->number(1), 0);
     if ((info->number(1) & 1) != 0) info->skip(8);  // maximum creation order
     if (info->number(8) != kNoAddress)
-      info->refuse("", "", "a group keeps its links in a fractal heap, which is not read", kSaveAsVersion7);
+      info->refuse("", "", "a group keeps its links in a fractal heap, which is not supported",
+                   kSaveAsVersion7);
   }
   for (const Hdf5Message& message : group.messages) {
     if (message.kind != Hdf5Kind::kLink) continue;

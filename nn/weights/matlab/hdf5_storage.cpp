@@ -76,7 +76,7 @@ std::vector<std::uint64_t> filters_of(const Hdf5Object& dataset) {
     const std::uint64_t filter = message->number(2);
     if ((filter != kDeflate && filter != kShuffle) ||
         std::find(filters.begin(), filters.end(), filter) != filters.end())
-      message->refuse("filter", std::to_string(filter), "only deflate and shuffle are read, each once",
+      message->refuse("filter", std::to_string(filter), "only deflate and shuffle are supported, each once",
                       kSaveAsVersion7);
     const std::uint64_t name_bytes = version == 1 ? message->number(2) : 0;
     message->skip(2);  // whether the filter is optional
@@ -159,8 +159,8 @@ class Chunks {
     std::uint64_t place = 0;
     for (std::size_t k = 0; k < shape_.size(); ++k) {
       if (corner[k] >= shape_[k] || corner[k] % chunk_[k] != 0)
-        node.refuse("corner of a chunk", shape_text(corner), "is no multiple of its shape inside the dataset",
-                    kCopyAgain);
+        node.refuse("corner of a chunk", shape_text(corner),
+                    "is not a multiple of its shape inside the dataset", kCopyAgain);
       place = place * ((shape_[k] - 1) / chunk_[k] + 1) + corner[k] / chunk_[k];
     }
     if (is_read_[static_cast<std::size_t>(place)])
@@ -183,7 +183,7 @@ class Chunks {
       bytes = std::move(*inner);
     }
     if (bytes.size() != chunk_bytes_)
-      stored.refuse("", "", "a chunk is not of " + std::to_string(chunk_bytes_) + " bytes", kCopyAgain);
+      stored.refuse("", "", "a chunk does not have " + std::to_string(chunk_bytes_) + " bytes", kCopyAgain);
     return bytes;
   }
 
@@ -229,7 +229,8 @@ std::string stored_bytes(Hdf5File& file, const Hdf5Object& dataset, const std::v
   const std::optional<Hdf5Piece> message = dataset.find(Hdf5Kind::kLayout);
   if (!message || dataset.find(Hdf5Kind::kExternalFiles))
     file.from(0).refuse("dataset at offset", std::to_string(dataset.offset),
-                        message ? "its elements lie in another file" : "has no layout", kSaveAsVersion7);
+                        message ? "its elements are stored in another file" : "has no layout",
+                        kSaveAsVersion7);
   const std::uint64_t size = *element_count(shape) * element_bytes;
   if (size == 0) return "";
   if (size / kMostExpansion > file.size_bytes())

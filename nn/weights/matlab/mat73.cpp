@@ -75,7 +75,7 @@ class Mat73Reader {
     for (std::size_t at = 0; at < cells.bytes.size(); at += 8) {
       Hdf5Piece reference(std::string_view(cells.bytes).substr(at, 8), cells.offset, path_);
       MatVariable cell = variable(result.name, reference.number(8), MatInside::kCell);
-      if (!cell.array) refuse("cell " + std::to_string(at / 8 + 1) + " is no numeric array");
+      if (!cell.array) refuse("cell " + std::to_string(at / 8 + 1) + " is not a numeric array");
       result.cells.push_back(std::move(*cell.array));
     }
   }

@@ -39,7 +39,7 @@ class MatElements {
   bool next(MatElement& element) {
     if (at_ >= data_.size()) return false;
     element.offset = offset_ + at_;
-    if (data_.size() - at_ < 8) refuse(element.offset, "an element is cut off");
+    if (data_.size() - at_ < 8) refuse(element.offset, "an element is truncated");
     const std::uint32_t first = word(at_), second = word(at_ + 4);
     if (first >> 16 != 0) {  // small data element: size and type share a word
       const std::uint32_t size = first >> 16;
@@ -50,7 +50,7 @@ class MatElements {
       return true;
     }
     element.type = first;
-    if (second > data_.size() - at_ - 8) refuse(element.offset, "an element is longer than what holds it");
+    if (second > data_.size() - at_ - 8) refuse(element.offset, "an element is longer than its container");
     element.data = data_.substr(at_ + 8, second);
     at_ += 8 + second;
     if (element.type != kCompressed) at_ = std::min(data_.size(), (at_ + 7) / 8 * 8);
@@ -106,7 +106,7 @@ class MatReader {
       } else if (element.type == kMatrix) {
         variables.push_back(variable(element, MatInside::kFile));
       } else {
-        elements.refuse(element.offset, "an element is no array");
+        elements.refuse(element.offset, "an element is not an array");
       }
       if (variables.size() > kMostCells) elements.refuse(element.offset, "holds too many variables");
     }
@@ -160,7 +160,7 @@ class MatReader {
     append_values<std::int32_t>(element.data, stated);
     std::vector<std::uint64_t> shape;
     for (const double size : stated) {
-      if (size < 0) refuse(element.offset, "", "a dimension is below 0", kCopyAgain);
+      if (size < 0) refuse(element.offset, "", "a dimension is negative", kCopyAgain);
       shape.push_back(static_cast<std::uint64_t>(size));
     }
     if (shape.size() < 2 || shape.size() > 8 || !element_count(shape))
@@ -176,7 +176,7 @@ class MatReader {
       MatVariable cell = variable(element, MatInside::kCell);
       if (!cell.array)
         refuse(element.offset, in_quotes(result.name),
-               "cell " + std::to_string(k + 1) + " is no numeric array");
+               "cell " + std::to_string(k + 1) + " is not a numeric array");
       result.cells.push_back(std::move(*cell.array));
     }
   }
@@ -229,7 +229,7 @@ class MatReader {
       case kInt64:
       case kUint64:
       default:
-        refuse(element.offset, in_quotes(name), "holds numbers of a type that weights do not have");
+        refuse(element.offset, in_quotes(name), "holds numbers of an unsupported type");
     }
     if (listed.size() != *element_count(shape))
       refuse(element.offset, in_quotes(name),
@@ -249,7 +249,7 @@ std::vector<MatVariable> variables_of(const std::string& bytes, const std::strin
   if (bytes.compare(124, 2, std::string("\0\2", 2)) == 0) return mat73_variables(bytes, path);
   if (bytes.compare(124, 2, std::string("\0\1", 2)) != 0)
     throw InputError(
-        {path, "offset 124", "", "", "is a MAT file of another version than 5 and 7.3", kSaveAgain});
+        {path, "offset 124", "", "", "is a MAT file of a version other than 5 and 7.3", kSaveAgain});
   return MatReader(bytes, path).run();
 }
 
@@ -287,7 +287,7 @@ Weights network_of_variables(std::vector<MatVariable>& variables, const std::str
     throw InputError(
         {path, "", "", "", "holds neither a cell array \"weights\" nor numeric matrices", kSaveAgain});
   Weights weights = network_of_arrays(has_weights ? cells : arrays, path, order);
-  if (!left_out.empty()) weights.notes.push_back("other variables are left out: " + left_out);
+  if (!left_out.empty()) weights.notes.push_back("other variables are ignored: " + left_out);
   return weights;
 }
 

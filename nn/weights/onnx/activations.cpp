@@ -119,7 +119,7 @@ OnnxValue OnnxGraph::clipped(const Node& node, const OnnxValue& x, const OnnxTen
   };
   const std::vector<Enclosed> low = limits(least), high = limits(most);
   for (std::size_t i = 0; i < std::min(low.size(), high.size()); ++i)
-    if (low[i].value > high[i].value) throw OperatorRefusal{"its least value is above its largest"};
+    if (low[i].value > high[i].value) throw OperatorRefusal{"its minimum is above its maximum"};
   if (low.empty() && high.empty()) return x;
   if (high.empty()) return sum_of_relus(node, x, {shifted(x.map, low, -1)}, {{one}}, low);
   if (low.empty()) return sum_of_relus(node, x, {shifted(scaled(x.map, -1), high, 1)}, {{minus_one}}, high);
@@ -165,7 +165,7 @@ OnnxValue OnnxGraph::largest_of_inputs(const Node& node) {
   const OnnxValue* first = nullptr;
   for (std::size_t k = 0; k < node.inputs.size() && first == nullptr; ++k)
     if (is_value(node, k)) first = &value(node, k);
-  if (first == nullptr) throw OperatorRefusal{"does not take the value that the node before it gives"};
+  if (first == nullptr) throw OperatorRefusal{"does not use the output of the preceding node"};
   const OnnxShape shape = first->shape;
   const auto size = static_cast<int>(count_of(shape));
   std::vector<AffineMap> parts;
@@ -255,8 +255,7 @@ void OnnxGraph::compute_constant(const Node& node) {
     result.shape = {result.integers.size()};
   } else if (node.type != "Identity" && node.type != "Cast") {
     throw OperatorRefusal{
-        "does not take the value that the node before it gives; constants are not computed "
-        "with this operator",
+        "does not use the output of the preceding node; constants are not computed with this operator",
         "fold constants: torch.onnx.export(..., do_constant_folding=True)"};
   }
   result.offset = node.offset;

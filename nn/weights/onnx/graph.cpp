@@ -11,13 +11,13 @@ namespace swarmcert::files {
 namespace {
 
 constexpr char kOperators[] =
-    "is none of the operators that can be read: Gemm, MatMul, Conv, BatchNormalization, AveragePool, "
+    "is not one of the supported operators: Gemm, MatMul, Conv, BatchNormalization, AveragePool, "
     "MaxPool, Add, Sub, Mul, Div, Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, Tanh, Sigmoid, "
     "Softplus, Elu, Gelu, TopK, Split with Max and Min for MaxMin, Flatten, Reshape, Transpose, Concat and "
     "the like";
 constexpr char kSmooth[] =
-    "leave it out of the exported model where it is the last node; a network with it between its layers "
-    "cannot be read: train with ReLU, LeakyReLU, Hardtanh, tanh, sigmoid, softplus, ELU, SELU, SiLU or GELU";
+    "omit it from the exported model if it is the last node; a network with it between its layers is not "
+    "supported: train with ReLU, LeakyReLU, Hardtanh, tanh, sigmoid, softplus, ELU, SELU, SiLU or GELU";
 
 bool is_unread_activation(const std::string& type) {
   static const std::set<std::string> kTypes = {"Erf", "Exp", "Mish", "HardSwish", "Softsign"};
@@ -163,7 +163,7 @@ void OnnxGraph::follow(const Node& node) {
 
 void OnnxGraph::require_finite(const Node& node, const AffineMap& map) const {
   if (!map.is_finite())
-    refuse(node.offset, node.label(), "its weights, or what they fold into, are not finite",
+    refuse(node.offset, node.label(), "its weights, or their folded values, are not finite",
            "the training has diverged, or the file is damaged: take an earlier checkpoint");
 }
 
@@ -172,7 +172,7 @@ bool OnnxGraph::is_value(const Node& node, std::size_t k) const {
 }
 
 const OnnxValue& OnnxGraph::value(const Node& node, std::size_t k) const {
-  if (!is_value(node, k)) throw OperatorRefusal{"does not take the value that the node before it gives"};
+  if (!is_value(node, k)) throw OperatorRefusal{"does not use the output of the preceding node"};
   return values_.at(node.inputs[k]);
 }
 
@@ -181,7 +181,7 @@ const OnnxTensor* OnnxGraph::constant(const Node& node, std::size_t k) const {
   if (k >= node.inputs.size() || node.inputs[k].empty()) return nullptr;
   const auto found = model_.tensors.find(node.inputs[k]);
   if (found == model_.tensors.end())
-    throw OperatorRefusal{"takes " + in_quotes(node.inputs[k]) + " for an input that must be stored"};
+    throw OperatorRefusal{"uses " + in_quotes(node.inputs[k]) + " as an input that must be stored"};
   return &found->second;
 }
 
@@ -218,9 +218,9 @@ OnnxValue OnnxGraph::computed(const Node& node) {
     const std::string& name = node.inputs[k];
     has_value = has_value || values_.count(name) == 1;
     if (!name.empty() && values_.count(name) == 0 && model_.tensors.count(name) == 0)
-      throw OperatorRefusal{"takes " + in_quotes(name) + ", which is neither computed before it nor stored"};
+      throw OperatorRefusal{"uses " + in_quotes(name) + ", which is neither stored nor computed before it"};
   }
-  if (!has_value) throw OperatorRefusal{"does not take the value that the node before it gives"};
+  if (!has_value) throw OperatorRefusal{"does not use the output of the preceding node"};
   static const std::set<std::string> kAffine = {
       "Gemm", "MatMul", "Conv", "BatchNormalization", "AveragePool", "GlobalAveragePool", "Add", "Sub", "Mul",
       "Div",  "Neg",    "Sum"};
@@ -238,7 +238,7 @@ OnnxValue OnnxGraph::computed(const Node& node) {
   if (kSmoothRead.count(node.type) == 1) return computed_smooth(node);
   const bool is_last = node.outputs[0] == model_.output;
   if (is_last && (node.type == "Softmax" || node.type == "LogSoftmax")) {
-    notes_.insert("the last " + node.type + " is left out: everything is said of the logits");
+    notes_.insert("the final " + node.type + " is omitted: all results are for the logits");
     return value(node, 0);
   }
   throw OperatorRefusal{kOperators, is_unread_activation(node.type) ? kSmooth
@@ -250,7 +250,7 @@ OnnxValue OnnxGraph::applied(const Node& node, const AffineMap& map, const OnnxS
                              const OnnxTensor* weight) {
   const OnnxValue& x = value(node, is_value(node, 0) ? 0 : 1);
   if (!x.map.is_identity() && !x.name.empty() && weight != nullptr)
-    notes_.insert("linear operations that no activation separates are one layer");
+    notes_.insert("linear operations without an activation between them are folded into one layer");
   return {composed(map, x.map), shape, x.name.empty() && weight != nullptr ? weight->name : x.name};
 }
 
@@ -299,7 +299,7 @@ OnnxValue OnnxGraph::elementwise(const Node& node) {
     return result;
   }
   if (node.inputs.size() != 2 && !(node.type == "Sum" && !node.inputs.empty()))
-    throw OperatorRefusal{"has not two inputs"};
+    throw OperatorRefusal{"does not have two inputs"};
   const bool value_first = is_value(node, 0);
   OnnxValue result = value(node, value_first ? 0 : 1);
   for (std::size_t k = 1; k < node.inputs.size(); ++k) {
@@ -307,7 +307,7 @@ OnnxValue OnnxGraph::elementwise(const Node& node) {
     const bool adds = node.type == "Add" || node.type == "Sum" || node.type == "Sub";
     const double sign = node.type == "Sub" ? -1 : 1;
     if (is_value(node, other)) {
-      if (!adds) throw OperatorRefusal{"is no affine function of the network's input"};
+      if (!adds) throw OperatorRefusal{"is not an affine function of the network's input"};
       const OnnxValue& second = value(node, other);
       if (second.shape != result.shape) throw OperatorRefusal{"its inputs are of different shapes"};
       result.map = sum_of(result.map, second.map, sign);

@@ -14,11 +14,9 @@
 namespace swarmcert::files {
 
 inline constexpr char kReadSorting[] =
-    "MaxMin is read as Split in two halves, Max and Min of them, Concat; or as ReduceMax and ReduceMin of "
-    "pairs "
-    "along the last axis, Concat; GroupSort as TopK of the whole last axis; or save the state dict, and "
-    "certify "
-    "it with --activation maxmin:halves, maxmin:pairs or groupsort:SIZE";
+    "MaxMin is recognized as Split into two halves, their Max and Min, and Concat, or as ReduceMax and "
+    "ReduceMin of pairs along the last axis and Concat; GroupSort as TopK of the whole last axis; otherwise "
+    "save the state dict and certify it with --activation maxmin:halves, maxmin:pairs or groupsort:SIZE";
 
 class OnnxGraph {
  public:

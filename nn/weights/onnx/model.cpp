@@ -53,9 +53,9 @@ class OnnxModelReader {
       read_graph(field);
     }
     if (!has_graph)
-      refuse(0, "graph", "is missing, so this is no ONNX model",
-             "a SavedModel of TensorFlow is converted: python -m tf2onnx.convert --saved-model FOLDER "
-             "--output net.onnx");
+      refuse(0, "graph", "is missing, so this is not an ONNX model",
+             "convert a TensorFlow SavedModel: python -m tf2onnx.convert --saved-model FOLDER --output "
+             "net.onnx");
     choose_input();
     return std::move(model_);
   }
@@ -207,7 +207,7 @@ class OnnxModelReader {
                "save the model in one file: onnx.save(model, path, save_as_external_data=False)");
     }
     for (const std::int64_t size : dims) {
-      if (size < 0) refuse(tensor.offset, in_quotes(tensor.name), "has a dimension below 0");
+      if (size < 0) refuse(tensor.offset, in_quotes(tensor.name), "has a negative dimension");
       tensor.shape.push_back(static_cast<std::uint64_t>(size));
     }
     read_numbers(data, tensor);

@@ -26,7 +26,7 @@ class MapBuilder {
  public:
   MapBuilder(std::int64_t inputs, std::int64_t outputs) {
     if (inputs > static_cast<std::int64_t>(kMostElements) || outputs > static_cast<std::int64_t>(kMostRows))
-      throw FoldingLimit{"written as a dense layer it has too many numbers"};
+      throw FoldingLimit{"as a dense layer it has too many numbers"};
     map.inputs = static_cast<int>(inputs);
     map.rows.resize(static_cast<std::size_t>(outputs));
     map.shift.resize(static_cast<std::size_t>(outputs));
@@ -137,8 +137,7 @@ class Window {
 void limit_work(std::int64_t a, std::int64_t b, std::int64_t c) {
   const auto count = element_count(
       {static_cast<std::uint64_t>(a), static_cast<std::uint64_t>(b), static_cast<std::uint64_t>(c)});
-  if (!count || *count > kMostWindowEntries)
-    throw FoldingLimit{"written as a dense layer it has too many numbers"};
+  if (!count || *count > kMostWindowEntries) throw FoldingLimit{"as a dense layer it has too many numbers"};
 }
 
 /// Returns the window of a pooling node; for a global one it covers the whole input.
@@ -250,7 +249,7 @@ std::vector<int> transposition(const OnnxShape& shape, const std::vector<std::in
     const std::size_t axis = permutation.empty()          ? rank - 1 - d
                              : permutation.size() == rank ? axis_of(permutation[d], rank)
                                                           : rank;
-    if (axis >= rank || seen[axis]) throw OperatorRefusal{"perm is no permutation of its axes"};
+    if (axis >= rank || seen[axis]) throw OperatorRefusal{"perm is not a permutation of its axes"};
     seen[axis] = true;
     from.push_back(axis);
   }
@@ -310,7 +309,7 @@ AffineMap convolution_map(const OnnxNode& node, const OnnxTensor& weight, const 
   require_numbers(weight);
   const OnnxShape sizes = signed_shape(weight);
   if (sizes.size() < 3 || weight.numbers.empty())
-    throw OperatorRefusal{"its weights of shape " + shape_text(weight.shape) + " are no kernel"};
+    throw OperatorRefusal{"its weights of shape " + shape_text(weight.shape) + " are not a kernel"};
   const Window window(node, shape, OnnxShape(sizes.begin() + 2, sizes.end()));
   const double groups_stated = node.number("group", 1);
   const std::int64_t outputs = sizes[0], per_group = sizes[1];
@@ -348,7 +347,7 @@ AffineMap average_map(const OnnxNode& node, const OnnxShape& shape, OnnxShape& r
     std::vector<std::int64_t> covered;
     for (std::int64_t k = 0; k < size; ++k)
       if (window.covered(place, k) >= 0) covered.push_back(window.covered(place, k));
-    if (covered.empty()) throw OperatorRefusal{"its window lies in the padding"};
+    if (covered.empty()) throw OperatorRefusal{"its window lies entirely in the padding"};
     const auto count = static_cast<double>(counts_padding ? size : static_cast<std::int64_t>(covered.size()));
     const Enclosed share = divided({1, 0}, {count, 0});
     for (std::int64_t c = 0; c < shape[1]; ++c)
@@ -370,7 +369,7 @@ std::vector<std::vector<int>> max_windows(const OnnxNode& node, const OnnxShape&
         const std::int64_t at = window.covered(place, k);
         if (at >= 0) windows.back().push_back(static_cast<int>(c * image + at));
       }
-      if (windows.back().empty()) throw OperatorRefusal{"its window lies in the padding"};
+      if (windows.back().empty()) throw OperatorRefusal{"its window lies entirely in the padding"};
     }
   }
   result = pooled(shape, window);

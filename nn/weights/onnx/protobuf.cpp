@@ -25,7 +25,7 @@ bool read_varint(std::string_view bytes, std::size_t& at, std::uint64_t& value) 
 
 void ProtobufReader::refuse(const std::string& what) const {
   throw InputError({path_, "offset " + std::to_string(offset_ + at_), "", "", what,
-                    "the file is truncated, damaged or no ONNX model: copy or export it again"});
+                    "the file is truncated, damaged or not an ONNX model: copy or export it again"});
 }
 
 std::uint64_t ProtobufReader::varint() {
@@ -68,8 +68,8 @@ void append_integers(const ProtobufField& field, const std::string& path,
   while (at < field.bytes.size()) {
     std::uint64_t value = 0;
     if (!read_varint(field.bytes, at, value)) {
-      throw InputError({path, "offset " + std::to_string(field.offset), "", "", "packed numbers are cut off",
-                        "the file is truncated or damaged: copy it again"});
+      throw InputError({path, "offset " + std::to_string(field.offset), "", "",
+                        "packed numbers are truncated", "the file is truncated or damaged: copy it again"});
     }
     integers.push_back(static_cast<std::int64_t>(value));
   }

@@ -35,7 +35,7 @@ Activation smooth_activation(const OnnxNode& node) {
     return Activation::kElu;
   }
   if (node.type == "Selu")
-    throw OperatorRefusal{"takes its constants as float32 numbers, whose product is above the slope of SELU",
+    throw OperatorRefusal{"uses float32 constants whose product exceeds the slope of SELU",
                           "save the state dict, and certify it with --activation selu"};
   if (node.type == "Gelu") {
     if (node.text("approximate", "none") != "none")
@@ -102,7 +102,8 @@ void OnnxGraph::join_smooth_activations() {
     if (half == nullptr || half->type != "Mul" || !holds(other_input(*half, product->outputs[0]), 0.5, 0))
       continue;
     replace(*half, "Gelu", x, {&node, &*quotient, user, product});
-    notes_.insert("GELU is taken with sqrt 2 exactly; the file's rounded one leaves the slopes as they are");
+    notes_.insert(
+        "GELU is evaluated with the exact sqrt 2; the rounded value in the file does not change its slopes");
   }
   const auto is_joined = [](const OnnxNode& node) { return node.type.empty(); };
   model_.nodes.erase(std::remove_if(model_.nodes.begin(), model_.nodes.end(), is_joined), model_.nodes.end());

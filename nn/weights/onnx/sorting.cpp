@@ -80,7 +80,7 @@ void OnnxGraph::join_sorting() {
 /// Applies the activation to the whole value `x`, in memory order.
 OnnxValue OnnxGraph::sorted(const Node& node, const OnnxValue& x, Activation activation) {
   if (!needed_after(node).empty())
-    throw OperatorRefusal{"has a skip connection beside it, which can be read beside other activations only",
+    throw OperatorRefusal{"has a parallel skip connection, which is supported only for other activations",
                           "leave the skip connection out, or train with ReLU"};
   const AffineMap result = chain_.activated(x.map, activation, {}, layer_name(x.name));
   for (auto& [value_name, value] : values_) value.name.clear();
@@ -96,7 +96,7 @@ OnnxValue OnnxGraph::sorted_by_concat(const Node& node) {
     const std::vector<std::int64_t> sizes = integers(group[0], 1, "split");
     const std::int64_t half = x.shape[axis] / 2;
     require_sorting(x.shape[axis] == 2 * half && (sizes.empty() || sizes == std::vector{half, half}),
-                    "joins parts that are no halves");
+                    "joins parts that are not halves");
     require_sorting(axis_of(integer(node, "axis", 0), rank) == axis && is_first(x.shape, axis),
                     "does not join the halves of the whole layer along the axis of the Split before it");
     return sorted(node, x, Activation::kMaxMinHalves);
