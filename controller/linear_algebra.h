@@ -11,7 +11,7 @@ template <typename Scalar>
 struct Vector3 {
   Scalar x{}, y{}, z{};
 
-  /// Component `axis`: 0, 1, 2 for x, y, z.
+  /// Returns component `axis`: 0, 1, 2 for x, y, z.
   constexpr const Scalar& operator[](std::size_t axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
   constexpr Scalar& operator[](std::size_t axis) { return axis == 0 ? x : axis == 1 ? y : z; }
 };

@@ -18,7 +18,7 @@ class TomlTable {
   /// @param table must outlive this.
   TomlTable(const toml::table& table, std::string path) : table_(&table), path_(std::move(path)) {}
 
-  /// @throws InputError at the first key that is not one of `known`, with a did-you-mean.
+  /// @throws InputError at the first key that is not one of `known`, with a spelling suggestion.
   void allow_only(const std::vector<std::string>& known) const;
 
   /// @throws InputError unless the key `schema`, with which each of our files begins, has the value `schema`.

@@ -1,9 +1,9 @@
 // Generates the bundled networks: a deep set fitted to a synthetic downwash. Usage: swarmcert_generate_networks FOLDER
 //
-// The ground truth is a formula of our own, so that the project does not ship anyone's data: a neighbour at height z >
-// 0 above a vehicle pushes it down by
-//   F = 9 gf * ramp(z) * 0.45 / (0.15 + z) / (1 + (r / s)^2)^2,   s = 0.06 m + 0.1 z,   ramp = clamp((z - 0.05) / 0.1,
-//   0, 1),
+// The ground truth is a formula of our own, so that the project does not ship anyone's data: a neighbour at the height
+// z > 0 above a vehicle pushes it down by
+//   F = 9 gf * ramp(z) * 0.45 / (0.15 + z) / (1 + (r / s)^2)^2,
+//   s = 0.06 m + 0.1 z,   ramp = clamp((z - 0.05) / 0.1, 0, 1),
 // where r is the lateral distance to the wake, which is displaced by 0.15 s times the relative velocity. The forces of
 // several neighbours add like momentum fluxes, f = -sqrt(sum F^2). The magnitude is about that between two Crazyflies;
 // otherwise the model is a caricature. The fit is deliberately small; only the certified bounds are claimed for it.

@@ -152,7 +152,7 @@ void BoundedLayers::pull_back(const Vector& parameters, Vector& gradient) const 
 void BoundedLayers::pull_back_sandwich(const Vector& parameters, int part, Vector& gradient) const {
   const int last = layout_->parts()[part].layers() - 1;
   Slice slice = slice_of(matrix_of(parameters, part, last));
-  MatrixXd by_a = MatrixXd::Zero(slice.a.rows(), slice.a.cols());  // no layer follows
+  MatrixXd by_a = MatrixXd::Zero(slice.a.rows(), slice.a.cols());  // the last layer has no successor
   for (int k = last; k > 0; --k) {
     const MatrixXd by_w = limit_of(part) * matrix_of(gradient, part, k);
     Slice before = slice_of(matrix_of(parameters, part, k - 1));

@@ -7,8 +7,8 @@
 
 namespace swarmcert::training {
 
-/// Samples of the interaction force, from all vehicles of all flights. Sample s has the inputs first[s] .. first[s + 1]
-/// - 1; input i passes through part phi[i], the sum through part rho[s].
+/// Samples of the interaction force, from all vehicles of all flights. Sample s has the inputs
+/// first[s] .. first[s + 1] - 1; input i passes through part phi[i], the sum through part rho[s].
 struct Dataset {
   int width = 6;                 ///< numbers stored per input: the largest input size of all phi
   int outputs = 1;               ///< components of the target per sample
