@@ -30,8 +30,7 @@ struct LargestForceMap {
   Scalar lower_gf, upper_gf;  ///< limits on the result for any voltage reading
 };
 
-/// Returns the force of one rotor in newton, never negative: outside the calibrated range the polynomial may be
-/// negative.
+/// Returns the force of one rotor in newton, at least 0: outside the calibrated range the polynomial may be negative.
 template <typename Scalar>
 inline Scalar force_of_pwm(const ThrustMap<Scalar>& map, const Scalar& p, const Scalar& voltage_V) {
   const Scalar v = voltage_V / Scalar(kReferenceVoltage_V);

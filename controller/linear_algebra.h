@@ -74,8 +74,7 @@ inline bool is_within(const Vector3<Scalar>& a, Scalar limit) {
   return absolute(a.x) <= limit && absolute(a.y) <= limit && absolute(a.z) <= limit;
 }
 
-/// A matrix stored by rows x, y, z. A rotation R_AB transforms coordinates in frame B to frame A: its columns are B's
-/// axes.
+/// A matrix with rows x, y, z. A rotation R_AB maps coordinates in B to those in A; its columns are the axes of B.
 template <typename Scalar>
 struct Matrix3 {
   Vector3<Scalar> x, y, z;

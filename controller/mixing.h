@@ -217,8 +217,7 @@ struct TorqueShares {
   Scalar roll_pitch, yaw;
 };
 
-/// Returns the largest share a of roll and pitch for which some share b of yaw keeps base + a tilt + b yaw within the
-/// limits.
+/// Returns the largest share a of roll and pitch for which base + a tilt + b yaw is within the limits for some share b.
 ///
 /// For each b, the largest a is the minimum over the rotors' limits, a concave function of b. The algorithm ascends
 /// this function from b = 0, along the limit of one rotor after another, as long as more yaw relieves the limiting

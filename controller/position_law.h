@@ -98,8 +98,7 @@ inline HeldAxes held_axes(const PidGains<Scalar>& gains, const Vector3<Scalar>& 
           product(push.z, force_N.z) > zero};
 }
 
-/// Same for composite gains. Since Lambda and K couple the axes, all are held if the whole step would increase the
-/// force.
+/// Same for composite gains. Lambda and K couple the axes, so all are held if the whole step would increase the force.
 template <typename Scalar>
 inline HeldAxes held_axes(const CompositeGains<Scalar>& gains, const Vector3<Scalar>& position_error_m,
                           const Vector3<Scalar>& force_N, bool thrust_saturated) {

@@ -1,5 +1,4 @@
-/// @file Requirements on the scalar type of the control laws, which are used for flight, integration and error
-/// analysis.
+/// @file Requirements on the scalar type of the control laws, used in flight, integration and error analysis.
 ///
 /// float is used in flight and double in the integrator. A third type (controller/rounding/bounded.h, host only)
 /// propagates bounds on their difference through the same operations. The laws use +, -, /, comparisons, and the

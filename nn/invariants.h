@@ -28,8 +28,7 @@ inline constexpr int kOwnInvariants = 3;
 inline constexpr double kNeighbourInvariantsSlope = 1.5;
 inline constexpr double kOwnInvariantsSlope = 1;
 
-/// Returns the correctly rounded square root (IEEE 754) with a single instruction; std::sqrt() may call libm to set
-/// errno.
+/// Returns the correctly rounded square root (IEEE 754) in one instruction; std::sqrt() may call libm to set errno.
 /// Precondition: x is not negative.
 inline float square_root(float x) {
 #if defined(__SSE2__)

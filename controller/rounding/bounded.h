@@ -95,8 +95,7 @@ class Bounded {
   friend Bounded product(const Bounded& a, const Bounded& b) {
     auto [lower, upper] =
         std::minmax({a.lower_ * b.lower_, a.lower_ * b.upper_, a.upper_ * b.lower_, a.upper_ * b.upper_});
-    // The product of an object with itself is a square, which is nonnegative; interval arithmetic alone would not show
-    // it.
+    // The product of an object with itself is nonnegative, which interval arithmetic alone would not show.
     if (&a == &b && lower < 0) lower = 0;
     return rounded_result(lower, upper, a.magnitude() * b.error_ + b.magnitude() * a.error_);
   }

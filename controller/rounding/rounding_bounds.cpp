@@ -16,8 +16,7 @@ using Vector = Vector3<Bounded>;
 using Matrix = Matrix3<Bounded>;
 
 constexpr double kPi = 3.14159265358979323846;
-/// Cosines and lengths below are accurate to a few units of 2^-53; sets are widened by this much when they are
-/// restricted.
+/// Cosines and lengths below are accurate to a few units of 2^-53; restricted sets are widened by this margin.
 constexpr double kSlack = 1e-12;
 
 Vector inputs(double largest) {

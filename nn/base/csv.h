@@ -12,8 +12,7 @@ std::string_view without_blanks(std::string_view text);
 /// Returns the first of comma, semicolon and tab, in this order of preference, that `line` contains; else `otherwise`.
 char csv_separator(std::string_view line, char otherwise);
 
-/// Returns the cells of `line`, without surrounding blanks and quotes. If `separator` is ' ', a run of blanks is one
-/// separator.
+/// Returns the cells of `line`, without blanks and quotes around them. With separator ' ', runs of blanks count once.
 std::vector<std::string_view> csv_cells(std::string_view line, char separator);
 
 /// Parses a cell. Returns true if the whole cell is a number, including "nan" and "inf"; a leading '+' is allowed.

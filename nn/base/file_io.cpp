@@ -63,8 +63,7 @@ void sync_folder_of(const std::string& path) {
   if (descriptor.is_open()) ::fsync(descriptor.number());
 }
 
-/// Moves `temporary` to `path`; without `overwrite`, keeps a file that has appeared in the meantime. Returns 0 or an
-/// errno.
+/// Moves `temporary` to `path`; without `overwrite`, keeps a file that has appeared meanwhile. Returns 0 or an errno.
 int move_into_place(const std::string& temporary, const std::string& path, bool overwrite) {
   if (!overwrite) {
     if (::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) == 0) return 0;

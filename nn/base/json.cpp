@@ -25,8 +25,7 @@ std::string line_and_column(const std::string& text, std::size_t offset) {
   return "line " + std::to_string(line) + ", column " + std::to_string(column);
 }
 
-/// Iterates over `text` and stores the parser's progress in `position`, since the parser does not pass it to its
-/// callback.
+/// Iterates over `text` and stores the parser's progress in `position`, which its callback does not receive.
 class TrackingIterator {
  public:
   using iterator_category = std::input_iterator_tag;

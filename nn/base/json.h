@@ -12,8 +12,7 @@ namespace swarmcert::files {
 
 using Json = nlohmann::ordered_json;
 
-/// Returns `value` as a C99 hex float ("0x1.8p+1"): exact and the same on every platform. Otherwise "inf", "-inf" or
-/// "nan".
+/// Returns `value` as a C99 hex float ("0x1.8p+1"), exact and the same on every platform, or "inf", "-inf" or "nan".
 std::string hex_float(double value);
 
 /// Inverse of hex_float() for finite values.

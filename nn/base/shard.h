@@ -10,8 +10,7 @@
 
 namespace swarmcert::files {
 
-/// Shard `index` of `count`: the units whose number modulo `count` is `index`. All shards together cover each unit
-/// once.
+/// Shard `index` of `count`: the units whose number modulo `count` is `index`, so that the shards cover each unit once.
 struct Shard {
   int index = 0, count = 1;
 

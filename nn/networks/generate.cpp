@@ -191,8 +191,7 @@ class DeepSet {
     }
   }
 
-  /// Prepares the network for storage: projects once more, accurately enough that rounding to float32 cannot exceed
-  /// gamma.
+  /// Prepares the network for storage: projects it again, so accurately that rounding to float32 cannot exceed gamma.
   void finish() {
     for (Net* net : {&phi_, &rho_}) {
       for (Trained& trained : *net) {

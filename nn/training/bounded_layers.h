@@ -24,8 +24,7 @@ enum class Layers {
   /// = [X; Y], X square, and Z = X - X' + Y'Y, Q is the Cayley transform [(I - Z) (I + Z)^-1; -2 Y (I + Z)^-1]
   /// (Trockman and Kolter 2021).
   kOrthogonal,
-  /// With K_k = (I + V_k V_k')^-1, contractions C_k = 2 K_k V_k and A_k = 2 K_k - I, which satisfy C_k C_k' + A_k A_k =
-  /// I:
+  /// With K_k = (I + V_k V_k')^-1, contractions C_k = 2 K_k V_k and A_k = 2 K_k - I with C_k C_k' + A_k A_k = I:
   ///    W_1 = s C_1,  W_k = s C_k A_{k-1}.
   /// Here |W_k| <= s, and the part as a whole has the Lipschitz bound s^n / 2^(n - 1). Up to positive scalings of the
   /// neurons, which commute with ReLU, these are all networks for which LipSDP-Neuron proves that bound (Wang and
@@ -33,8 +32,7 @@ enum class Layers {
   kSandwich,
 };
 
-/// Returns the product of the layers' limits divided by the Lipschitz bound that a part of `count` layers satisfies by
-/// construction.
+/// Returns the product of the layers' limits over the Lipschitz bound that `count` layers satisfy by construction.
 double slack_of_product(Layers layers, int count);
 
 class BoundedLayers {
@@ -42,8 +40,8 @@ class BoundedLayers {
   /// @param layout must outlive this object.
   BoundedLayers(const Layout& layout, Layers layers, const files::GammaStatement& gamma);
 
-  /// Sets the limit of every layer of each part to its share of the limit that gamma implies. @param shares one per
-  /// part.
+  /// Sets the limit of every layer of each part to its share of the limit that gamma implies.
+  /// @param shares one per part.
   void tighten(const std::vector<double>& shares) { shares_ = shares; }
 
   /// Returns the weights, rounded to float32, so the bounds hold up to rounding; the biases are those of `parameters`.

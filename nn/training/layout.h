@@ -61,8 +61,7 @@ class Layout {
   Eigen::Index size_ = 0;
 };
 
-/// Returns weights and biases drawn uniformly from +-1 / sqrt(inputs of the layer), the usual initialisation of ReLU
-/// networks.
+/// Returns weights and biases that are uniform in +-1 / sqrt(inputs of the layer), as is usual for ReLU networks.
 Vector initial_parameters(const Layout& layout, std::uint64_t seed);
 
 }  // namespace swarmcert::training

@@ -16,8 +16,7 @@ constexpr Index kPiece = 128;
 /// Splits a step count into two floats that are each exact.
 constexpr std::uint64_t kHalf = 1u << 20;
 
-/// Eigen splits the sums of a matrix product into blocks that depend on the cache sizes; fixing the sizes fixes the
-/// order.
+/// Fixes the cache sizes, on which the order of the sums in Eigen's matrix products depends.
 void fix_order_of_sums() { Eigen::setCpuCacheSizes(32 << 10, 256 << 10, 2 << 20); }
 
 double sum_of_weights(const Dataset& data, const Index* samples, Index count) {
@@ -84,8 +83,7 @@ double Trainer::run_epoch(int epoch, double learning_rate) {
   std::vector<Index> order = samples_;
   for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);
   if (options_.turns) turn_about_vertical(layout_, source_, random, data_);
-  // The state of the power iteration is not part of the checkpoint, so restart it in every epoch, as a resumed run
-  // must.
+  // The power iteration is not part of the checkpoint, so restart it in every epoch, as a resumed run must.
   normalization_ = SpectralNormalization(layout_, options_.gamma, parameters_);
   normalization_.tighten(shares_);
   double loss = 0;

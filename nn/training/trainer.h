@@ -69,8 +69,7 @@ class Trainer {
   std::vector<Vector> gradients_;  ///< per piece of a batch
 };
 
-/// Returns the mean weighted squared error of some samples, without a gradient; the same bits for any number of
-/// threads.
+/// Returns the mean weighted squared error of some samples; the bits are the same for any number of threads.
 double mean_loss(const Layout& layout, const Vector& theta, const Dataset& data,
                  const std::vector<Eigen::Index>& samples, int jobs);
 

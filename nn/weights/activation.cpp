@@ -23,8 +23,7 @@ struct ActivationTerms {
   Activation s = Activation::kRelu;
 
   bool is_s_itself() const { return terms.size() == 1; }
-  /// Return the largest factor by which the rounding error of a weight grows in the layer before, or after, the
-  /// activation.
+  /// Return the largest growth factor of a weight's rounding error in the layer before, or after, the activation.
   double share_in_front() const { return norm_of(&Term::scale); }
   double share_behind() const { return norm_of(&Term::factor); }
 

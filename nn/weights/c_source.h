@@ -8,8 +8,7 @@
 
 namespace swarmcert::files {
 
-/// Returns true if `bytes` are text that begins, after comments and preprocessor lines, with a struct or a static
-/// object.
+/// Returns true if `bytes` are text that begins with a struct or static object, after comments and preprocessor lines.
 bool looks_like_c_source(const std::string& bytes);
 
 /// Parses the network `key` of the C source in `bytes`; `path` is used in messages only.

@@ -15,16 +15,14 @@ const std::vector<std::string>& relative_state();
 const std::vector<std::string>& neighbour_invariant_names();
 const std::vector<std::string>& own_invariant_names();
 
-/// Returns whether `function` takes states while its phi takes invariants: the set functions of a network with
-/// invariants.
+/// Returns whether `function` takes states but its phi invariants: the set functions of a network with invariants.
 bool maps_to_invariants(const Network& network, const FunctionId& function);
 
 /// Returns the exact Lipschitz constant, in Euclidean norms, of the map from the inputs of `function` to those of its
 /// first layer: 3/2 or 1 if it maps to invariants, else 1.
 double slope_of_inputs(const Network& network, const FunctionId& function);
 
-/// Returns the invariants of a state as part `phi` of a network with invariants takes them, in rounded double
-/// arithmetic.
+/// Returns the invariants of a state that are the inputs of `phi`, computed in rounded double arithmetic.
 /// @param state [kOwnState] for the ground's phi, else [kRelativeState].
 std::vector<double> invariants_of(const FunctionId& phi, const std::vector<double>& state);
 

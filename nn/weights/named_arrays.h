@@ -18,8 +18,7 @@ struct NamedArray {
 
 /// Builds layers from pairs of names, "fc1.weight" and "fc1.bias", "fc1_weight" and "fc1_bias", "W1" and "b1",
 /// "weights_1" and "biases_1", or from NumPy's "arr_0", "arr_1", ..., where each matrix may be followed by its biases.
-/// Matrices are [outputs, inputs]; biases may be rows or columns. The numbers in the names determine the order of
-/// layers.
+/// Matrices are [outputs, inputs]; biases may be rows or columns. The numbers in the names order the layers.
 /// @throws InputError if an array is neither a weight nor a bias, or as assemble().
 Weights network_of_arrays(const std::vector<NamedArray>& arrays, const std::string& path,
                           const std::vector<std::string>& order);

@@ -294,8 +294,7 @@ class Machine {
     }
   }
 
-  /// Returns a copy, because make() moves the values. The length is limited, because a file can request a million
-  /// copies.
+  /// Returns a copy, because make() moves the values. Its length is limited: a file can request a million copies.
   std::vector<Index> few_items(Index tuple) {
     if (value(tuple).items.size() > kMostArguments) refuse("a function gets more than 8 arguments");
     return value(tuple).items;

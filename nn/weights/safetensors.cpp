@@ -14,8 +14,7 @@ namespace swarmcert::files {
 namespace {
 
 constexpr std::uint64_t kLargestHeader_bytes = std::uint64_t{4} << 20;
-/// Key in "__metadata__" for the names of our layers in order of evaluation; safetensors itself does not define an
-/// order.
+/// Key in "__metadata__" for the names of our layers in order of evaluation; safetensors does not define an order.
 constexpr char kOrderKey[] = "swarmcert.layers";
 
 std::uint64_t header_length(const std::string& bytes) {

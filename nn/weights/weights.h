@@ -75,8 +75,8 @@ struct Weights {
   /// Returns their names as in chains, once if all are the same: "tanh", "relu, relu, tanh".
   std::string activation_names() const;
   bool is_relu() const;  ///< whether all activations are ReLU
-  /// Sets the activations between all layers. @throws std::invalid_argument unless there is one for each layer but the
-  /// last.
+  /// Sets the activations between all layers.
+  /// @throws std::invalid_argument unless there is one for each layer but the last.
   void set_activations(const std::vector<Activation>& between);
   /// Makes the network end in `activation`: appends an identity layer and puts `activation` in front of it.
   void end_in(Activation activation);

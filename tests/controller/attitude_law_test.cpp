@@ -16,8 +16,7 @@ constexpr double kPi = 3.14159265358979323846;
 const Matrix3<double> kInertia = diagonal(Vector3<double>{16.571710e-6, 16.655602e-6, 29.261652e-6});
 constexpr InertiaRange kInertiaRange{16.571710e-6, 29.261652e-6};
 
-/// The desired frame rotates at a constant rate in its own coordinates; the vehicle obeys J omega' = J omega x omega +
-/// tau.
+/// The desired frame rotates at a constant rate in its own coordinates, and J omega' = J omega x omega + tau.
 struct Simulation {
   AttitudeState<double> state;
   AttitudeReference<double> reference;
@@ -154,8 +153,7 @@ TEST(RobustLaw, From170DegreesStaysUnderItsStatedDecay) {
   EXPECT_GT(close, 100) << "the stated decay is far above everything that happens";
 }
 
-// If the initial rate is the reference rate, only the decay of the attitude itself remains, and it nearly attains the
-// bound.
+// Starting at the reference rate, only the decay of the attitude itself remains, which nearly attains the bound.
 TEST(RobustLaw, From170DegreesAtTheReferenceRateTheStatedDecayIsNearlyAttained) {
   std::mt19937 generator(12);
   const RobustGains<double> gains{{6, 6, 6}, {5e-4, 5e-4, 1e-3}, {}, {}};

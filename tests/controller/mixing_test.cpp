@@ -155,8 +155,7 @@ TEST_F(Mixing, FeasibleWrenchesAreGivenExactly) {
 }
 
 TEST_F(Mixing, ForcesFollowTheWrenchWithoutJumps) {
-  // From feasible wrenches outwards through every limit: a step of 1e-4 of the torques changes no force by more than
-  // 1e-2.
+  // From feasible wrenches outwards through every limit, a step of 1e-4 of the torques changes no force by over 1e-2.
   for (const Rotors<double>& rotors : all_vehicles()) {
     const Allocation<double> a = allocation(rotors);
     const ForceLimits<double> limits{0, 0.15};

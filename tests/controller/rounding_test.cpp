@@ -155,8 +155,7 @@ TEST_P(RoundingTest, NoStateExceedsTheBoundsAndTheyAreNotAbsurdlyLoose) {
     worst.thrust = std::fmax(worst.thrust, std::fabs(f.thrust - d.thrust));
   }
   EXPECT_GT(tried, 20000);
-  // Random rounding errors grow like the square root of their number, bounds like the number: some 200 operations for a
-  // torque.
+  // Rounding errors of some 200 operations (for a torque) add up like the square root of their number, bounds linearly.
   EXPECT_LE(bounds.force_N.z, 10 * worst.force.z);
   EXPECT_LE(bounds.thrust_N, 30 * worst.thrust);
   EXPECT_LE(tests::largest_entry(bounds.torque_N_m), 700 * tests::largest_entry(worst.torque));

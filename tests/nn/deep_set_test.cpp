@@ -199,8 +199,7 @@ TEST_F(DeepSetTest, ClampIsAppliedBeforePhi) {
 }
 
 TEST_F(DeepSetTest, OrderIsThatOfClampedInputs) {
-  // Without the clamp, `high` would come after `middle`; with it, it comes before. The result is that of the clamped
-  // set.
+  // Without the clamp, `high` would come after `middle`; with it, before. The result is that of the clamped set.
   const Input lower = {-1, -1, -1, -1, -1, -1};
   const Input upper = {0.5f, 1, 1, 1, 1, 1};
   DeepSet<float> clamped = f_.set();

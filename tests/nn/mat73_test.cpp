@@ -18,8 +18,7 @@ testing::AssertionResult mat_file_is_refused(const std::string& bytes,
   return refuses([&] { parse_weights(bytes, "net.mat"); }, pieces);
 }
 
-/// Returns a file with one matrix named W1, with `layout` and `filters` for its elements, and sizes as HDF5 states
-/// them.
+/// Returns a file with one matrix W1, with `layout` and `filters` for its elements, and sizes as HDF5 states them.
 std::string file_of(Mat73Writer& writer, const std::string& layout, const std::string& filters = "",
                     const std::vector<std::uint64_t>& sizes = {2, 3}) {
   return writer.file_with({{"W1", writer.add(hdf5_object(hdf5_shape(sizes) + hdf5_double() + layout +

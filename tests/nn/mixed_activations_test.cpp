@@ -38,8 +38,7 @@ Values each(const Function& function, Values values) {
   return values;
 }
 
-/// x -> h1 = W x + b -> t1 -> ... with sizes 2 - 2 - 2: Gemm layers with transB, named l1, l2, ... in the order of
-/// `nodes`.
+/// x -> h1 = W x + b -> t1 -> ..., sizes 2 - 2 - 2: Gemm layers with transB, named l1, l2, ... in the order of `nodes`.
 struct Model {
   const Values w = {1, -2, 0.5, 3}, b = {0.25, -1};
   OnnxModel model;

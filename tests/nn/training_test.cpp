@@ -51,8 +51,7 @@ std::vector<Index> all_samples(const Dataset& data) {
   return samples;
 }
 
-/// Returns the loss in double, computed by the evaluator that is certified and flown, which shares no code with
-/// training.
+/// Returns the loss in double by the evaluator that is certified and flown, which shares no code with training.
 double evaluator_loss(const std::vector<files::Weights>& parts, const Dataset& data) {
   std::vector<files::Evaluator<double>> evaluators;
   for (const files::Weights& part : parts) evaluators.emplace_back(part);
@@ -179,8 +178,7 @@ TEST(Symmetry, TurnedSamplesKeepHeightsAndWhatTheirVectorsAreToOneAnother) {
   EXPECT_LT(mirrored, 2 * pairs / 3);
 }
 
-/// The force is dp and the torque is dp x dv, so both relations must be preserved when the inputs are rotated and
-/// mirrored.
+/// The force is dp and the torque is dp x dv; both relations must hold after rotating and mirroring the inputs.
 TEST(Symmetry, TargetsTurnWithTheInputsTorquesAsAxialVectors) {
   const Layout layout({{"phi:small", {6, 4, 3}, 0, {{0, 1}, {3, 4}}}, {"rho:small", {3, 4, 3}, 0}});
   for (const bool is_torque : {false, true}) {

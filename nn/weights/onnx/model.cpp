@@ -155,8 +155,7 @@ class OnnxModelReader {
       if (field.number == 7 && !text(field).empty() && text(field) != "ai.onnx")
         refuse(field.offset, in_quotes(text(field)), "the node is of an operator set that cannot be read");
     }
-    // Dropout and BatchNormalization may have further outputs, unused in inference; the second output of TopK is
-    // indices.
+    // Dropout and BatchNormalization may have further outputs, unused in inference; TopK also returns indices.
     const bool may_have_more = node.type == "Dropout" || node.type == "BatchNormalization" ||
                                node.type == "TopK" || node.type == "Split";
     if (node.outputs.empty() || (node.outputs.size() > 1 && !may_have_more))

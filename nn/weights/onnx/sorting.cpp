@@ -38,8 +38,7 @@ std::vector<OnnxNode*> OnnxGraph::users_of(const std::string& name) {
   return name == model_.output ? std::vector<OnnxNode*>{} : found;
 }
 
-/// Returns the Concat that is the only user of the results of two nodes, the larger numbers first; null if there is
-/// none.
+/// Returns the Concat that alone uses the results of two nodes, the larger numbers first; null if there is none.
 OnnxNode* OnnxGraph::joined_by_concat(const std::vector<OnnxNode*>& pair) {
   OnnxNode* const first = only_user(pair[0]->outputs[0]);
   OnnxNode* const second = only_user(pair[1]->outputs[0]);
