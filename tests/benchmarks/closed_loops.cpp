@@ -1,4 +1,4 @@
-// Speed of the closed loops, beside a plain Boost odeint loop on the same equations.
+// Speed of the closed loops compared with a plain Boost odeint loop on the same equations.
 //   cmake --build --preset release --target benchmark_closed_loops &&
 //   build/release/tests/benchmarks/benchmark_closed_loops
 #include <fmt/core.h>
@@ -18,21 +18,21 @@ namespace {
 
 using namespace swarmcert::stability;
 
-/// Processor time, which other programs on the machine disturb less than the clock on the wall.
+/// Returns the processor time, which is less disturbed by other programs than wall-clock time.
 double seconds(const std::function<void()>& work) {
   const std::clock_t start = std::clock();
   work();
   return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
 }
 
-/// Best of twenty, in simulated seconds per second.
+/// Returns the best speed of twenty runs, in simulated seconds per second.
 double speed(double simulated_s, const std::function<void()>& work) {
   double best = 1e300;
   for (int i = 0; i < 20; ++i) best = std::min(best, seconds(work));
   return simulated_s / best;
 }
 
-/// Read once: what is timed is flying.
+/// Returns the vehicle, which is read only once so that reading is not timed.
 const Model& vehicle() {
   static const Model read = [] {
     Model model = read_model(swarmcert::tests::source_path("stability/models/crazyflie-small.toml"));
@@ -61,8 +61,8 @@ const Gains& continuous_gains() {
   return read;
 }
 
-/// What one would write without this project: the sampled loop's plant under odeint's fixed-step RK4, every pair of
-/// vehicles in every evaluation, the same flight code in the same float.
+/// A baseline without this project: the plant of the sampled loop under odeint's fixed-step RK4, with every pair of
+/// vehicles in every evaluation and the same flight code in the same float type.
 double odeint_sampled(int vehicles, double end_s) {
   return speed(end_s, [=] {
     using State = std::vector<double>;

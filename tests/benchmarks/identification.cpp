@@ -1,13 +1,13 @@
-/// How long diagnose takes, and whether its 90 % intervals hold 90 %. In one process, on flights of the tests' own
-/// simulator (hidden_effect/other_simulator.h).
+/// Run time of diagnose, and coverage of its 90 % confidence intervals. Runs in one process, on flights of the tests'
+/// own simulator (hidden_effect/other_simulator.h).
 ///   benchmark_identification speed [count] [gust_N]
 ///   benchmark_identification recorded MODEL FLIGHTS...
 ///   benchmark_identification coverage [count] [gust_N] [gust_time_s] [parameter]
-/// speed: one flight of 40 s, then `count` flights of two vehicles (default 240: 1.9 million records), in gusts if
-/// asked for. Goals: 1 s of the processor; 60 s on two cores and 2 GiB.
+/// speed: one flight of 40 s, then `count` flights of two vehicles (default 240: 1.9 million records), optionally in
+/// gusts. Goals: 1 s of processor time; 60 s on two cores and 2 GiB.
 /// recorded: the same for logs. Both print the ratio to a search of all blocks instead of kMostSearched of them.
 /// coverage: for each effect, `count` flights (default 100) under a gust (default 0.006 N rms and 0.5 s) that no column
-/// explains; with the name of a parameter, only the cases that have it.
+/// of the regression explains; with the name of a parameter, only the cases that have it.
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 #include <sys/resource.h>
@@ -85,7 +85,7 @@ Timed time_diagnosis(const residuals::InputArguments& arguments, const std::stri
   return {used_s, wall_s};
 }
 
-/// With and without an excerpt. The peak of the second counts the first as well.
+/// Compares the diagnosis with and without an excerpt. The peak memory of the second run includes the first.
 void compare_searches(const residuals::InputArguments& arguments, const std::string& name) {
   const Timed excerpt = time_diagnosis(arguments, name, identification::kMostSearched);
   std::fflush(stdout);
@@ -112,7 +112,7 @@ void speed(const std::string& folder, int count, double gust_N) {
   compare_searches(small_flights(folder + "/many"), "many flights");
 }
 
-/// Effects that are fitted together, with a truth that has their form.
+/// Effects that are fitted together, and true values of their parameters.
 struct Case {
   std::vector<std::string> effects;
   tests::Truth truth;
@@ -120,7 +120,7 @@ struct Case {
   std::map<std::string, double> values;  ///< by parameter
 };
 
-/// Drag, lag and ground at once, then every effect of the campaigns that has the library's form.
+/// Returns drag, lag and ground together, then every effect of the campaigns that has the form of the library.
 std::vector<Case> cases() {
   std::vector<Case> all = {{{"drag_linear", "motor_lag", "ground"},
                             drag_lag_ground(),
@@ -136,7 +136,7 @@ std::vector<Case> cases() {
 
 /// Errors of one parameter over the flights of a case.
 struct Count {
-  int below = 0, above = 0, runs = 0;  ///< intervals that end below the true value; that begin above it
+  int below = 0, above = 0, runs = 0;  ///< intervals that end below, or begin above, the true value
   double sum = 0, squares = 0, half_widths = 0;
 };
 

@@ -1,16 +1,17 @@
-// Bounds on a box side by side: branch and bound with its checked proof, the bound for all inputs, and the norm of the
-// interval Jacobian over the whole box. Usage: benchmark_local_bounds [SECONDS [default-slopes]], per function (default
-// 60), with default-slopes as --default-slopes of certify; "per box": undecided neurons that a box has on average. The
-// recorded networks where they are present, else the bundled one. One thread. "witness": a slope attained in the box.
-// "1.01 at": boxes for that ratio, if the gap goes on falling as over the second half of the search: an estimate.
+// Compares bounds on a box: branch and bound with its verified proof, the bound for all inputs, and the norm of the
+// interval Jacobian over the whole box. Usage: benchmark_local_bounds [SECONDS [default-slopes]]; SECONDS per function
+// (default 60), default-slopes as --default-slopes of certify. Uses the recorded networks if they are present, else the
+// bundled one. Runs on one thread. "per box": average number of undecided neurons per box. "witness": a slope attained
+// in the box. "1.01 at": estimated number of boxes for that ratio, if the gap continues to decrease as in the second
+// half of the search.
 //
-// What better slopes bring to the same bound, with and without, processor seconds of search and check on a busy
-// machine:
+// Effect of better slopes: boxes and processor seconds of search and check until the same bound is reached, with and
+// without better slopes, on a busy machine:
 //   phi_G 14.873    9689 and 10593 boxes, 2.7 + 1.0 and 2.9 + 1.4 s
 //   phi_L 22.705   25003 and 28127 boxes, 12.5 + 4.7 and 13.2 + 6.2 s (the lesser of two runs)
 //   set L 388      16713 and 18897 boxes, 10.9 + 3.1 and 10.8 + 3.6 s (the least of three)
 //   set L, 1 366   11425 and 14717 boxes, 27.3 + 7.7 and 28.9 + 12.3 s
-// Undecided neurons per box stay within two percent: boxes that would be halved again are not.
+// The number of undecided neurons per box changes by less than two percent, because some boxes need no further halving.
 #include <fmt/core.h>
 
 #include <Eigen/SVD>
@@ -35,8 +36,8 @@ double since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// |mid J| + |rad J| for J = W_K D_K-1 ... D_1 W_1, the D in {0}, {1} or [0, 1] as the box decides; the relaxation that
-/// branch and bound starts from, without a semidefinite program.
+/// Returns |mid J| + |rad J| for J = W_K D_K-1 ... D_1 W_1 with the entries of D in {0}, {1} or [0, 1] as decided by
+/// the box: the initial relaxation of branch and bound without a semidefinite program.
 double interval_jacobian(const files::Weights& weights, const lipschitz::Box& box) {
   const lipschitz::ReachNetwork network = lipschitz::reach_network(weights);
   const lipschitz::Reach reach(network, box);
@@ -62,7 +63,7 @@ double interval_jacobian(const files::Weights& weights, const lipschitz::Box& bo
   return middle.jacobiSvd().singularValues()(0) + radius.jacobiSvd().singularValues()(0);
 }
 
-/// Boxes for a ratio of 1.01, if the gap falls by the same power of them as from the first half to the end.
+/// Returns the number of boxes for a ratio of 1.01 if the gap follows the power law of the second half of the search.
 std::string boxes_for_one_percent(const lipschitz::LocalBound& bound, double witness) {
   const double gap = bound.upper.value() / witness - 1, before = bound.outlook.bound_halfway / witness - 1;
   if (gap <= 0.01) return "reached";
@@ -76,7 +77,7 @@ void run(const std::string& name, const files::Network& network, const files::Fu
   const std::string part = function == "network" ? "network" : "phi:default";
   const files::Weights& weights = *parts.at(part);
   lipschitz::Box box;
-  const std::size_t positions = weights.inputs() == 4 ? 1 : 3;  // the ground sees its height and its velocity
+  const std::size_t positions = weights.inputs() == 4 ? 1 : 3;  // the ground has height and velocity
   for (std::size_t k = 0; k < static_cast<std::size_t>(weights.inputs()); ++k) {
     box.upper.push_back(k < positions ? 1 : 2);
     box.lower.push_back(-box.upper.back());

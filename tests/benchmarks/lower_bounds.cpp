@@ -1,6 +1,6 @@
-// Lower bounds from many seeds: how often the search reaches the best slope known before, how good it is, how long it
-// takes. Usage: benchmark_lower_bounds [FILE...]; without arguments the recorded networks where they are present, else
-// the bundled one. One thread; seconds of processor time; kDefaultSearchRounds rounds.
+// Lower bounds from many seeds: how often the search reaches the best previously known slope, the quality of the bound
+// and the run time. Usage: benchmark_lower_bounds [FILE...]; without arguments the recorded networks if they are
+// present, else the bundled one. One thread; seconds of processor time; kDefaultSearchRounds rounds.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ constexpr int kSeeds = 20;
 struct Case {
   std::string name;
   lipschitz::SlopeFunction function;
-  double target = 0;  ///< best slope known before this search; 0: none
+  double target = 0;  ///< best previously known slope; 0: none
 };
 
 void run(const Case& subject) {

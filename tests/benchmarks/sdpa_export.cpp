@@ -7,7 +7,7 @@ namespace swarmcert::benchmarks {
 using Eigen::Index;
 
 void write_sdpa(const lipschitz::ReluChain& chain, std::ostream& out) {
-  std::vector<Index> begin = {0, chain.front().cols()};  // of x, z_1, ...
+  std::vector<Index> begin = {0, chain.front().cols()};  // first indices of x, z_1, ...
   for (std::size_t k = 0; k + 1 < chain.size(); ++k) begin.push_back(begin.back() + chain[k].rows());
   const Index size = begin.back();
   const Index inputs = begin[1];

@@ -1,4 +1,4 @@
-/// @file LipSDP-Neuron in the sparse SDPA format, for other solvers to hold ours against.
+/// @file Export of LipSDP-Neuron in the sparse SDPA format, for comparison with other solvers.
 #pragma once
 
 #include <ostream>

@@ -1,5 +1,6 @@
-// Seconds of an epoch over 10^6 samples with two neighbours each, of the paper's networks (phi 6-25-40-40-40, rho
-// 40-40-40-40-1), beside the same gradient computed sample by sample. Usage: benchmark_training_epoch [SAMPLES [JOBS]].
+// Run time of an epoch over 10^6 samples with two neighbours each for the networks of the paper (phi 6-25-40-40-40, rho
+// 40-40-40-40-1), compared with the same gradient computed sample by sample.
+// Usage: benchmark_training_epoch [SAMPLES [JOBS]].
 #include <fmt/core.h>
 
 #include <chrono>

@@ -1,6 +1,6 @@
-// Upper bounds side by side: our interior point method with its exact proof, csdp on the same program, and the product
-// of spectral norms. Usage: benchmark_upper_bounds [--phi F --rho F]; without arguments the recorded networks L and S
-// where they are present, else the bundled one. Processes run on one thread.
+// Compares upper bounds: our interior-point method with its exact proof, csdp on the same program, and the product of
+// spectral norms. Usage: benchmark_upper_bounds [--phi F --rho F]; without arguments the recorded networks L and S if
+// they are present, else the bundled one. Processes run on one thread.
 #include <fmt/core.h>
 #include <unistd.h>
 
@@ -24,7 +24,7 @@ namespace {
 
 using namespace swarmcert;
 
-/// Median seconds of five calls after one that does not count.
+/// Returns the median time of five calls after a warm-up call.
 double seconds(const std::function<void()>& work) {
   std::vector<double> times;
   for (int i = 0; i < 6; ++i) {
@@ -37,7 +37,8 @@ double seconds(const std::function<void()>& work) {
   return times[times.size() / 2];
 }
 
-/// The chain as csdp likes it best: every layer with spectral norm one. `factor` is the product of what was divided.
+/// Returns the chain in the scaling that suits csdp best: every layer has spectral norm one. Sets `factor` to the
+/// product of the divisors.
 lipschitz::ReluChain normalised(const std::vector<check::Matrix>& stages, double& factor) {
   lipschitz::ReluChain chain;
   factor = 1;

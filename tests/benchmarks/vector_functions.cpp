@@ -1,5 +1,5 @@
-// Powers x^-1.7 = e^(-1.7 ln x) by stability/effects/vector_functions.inc, beside those of SLEEF's functions that give
-// the same bits for every width of registers (cinz, without fused operations).
+// Powers x^-1.7 = e^(-1.7 ln x) by stability/effects/vector_functions.inc, compared with those functions of SLEEF that
+// give the same bits for every SIMD width (cinz, without fused multiply-adds).
 //   cmake --build --preset release --target benchmark_vector_functions &&
 //   build/release/tests/benchmarks/benchmark_vector_functions
 #include <fmt/core.h>
@@ -49,7 +49,7 @@ void sleef_by_eight(const double* x, int count, double exponent, double* result)
 
 using Powers = decltype(&sleef_by_two);
 
-/// Processor time per number in ns, the best of many rounds.
+/// Returns the processor time per number in ns, the best of many rounds.
 double time_ns(Powers powers, const Rows& x, Rows& result) {
   double best = 1e300;
   for (int round = 0; round < 100; ++round) {

@@ -1,4 +1,4 @@
-/// Values and slopes of activations on intervals: against known digits, against samples, and how close they are.
+/// Values and slopes of activations on intervals: compared with known digits and with samples, and their tightness.
 #include "lipschitz/checker/activation_bounds.h"
 
 #include <gmpxx.h>
@@ -32,7 +32,7 @@ mpq_class exact(const Dyadic& x) {
   return result;
 }
 
-/// "-0.9051..." as a fraction.
+/// Converts decimal digits such as "-0.9051..." to a fraction.
 mpq_class decimal(const std::string& digits) {
   const std::size_t point = digits.find('.');
   mpz_class denominator;
@@ -42,7 +42,7 @@ mpq_class decimal(const std::string& digits) {
   return result;
 }
 
-/// At t = -1.5, from the formulas of the statement with 60 digits of Python's decimal: s(t) and s'(t).
+/// s(t) and s'(t) at t = -1.5, from the formulas of the statement with 60 digits of Python's decimal.
 struct Digits {
   Activation activation;
   const char *value, *slope;
@@ -121,7 +121,7 @@ TEST(ActivationBounds, ContainEverySampledValueAndSlopeOfAnInterval) {
                     least_slope - to_double(slopes.lower), to_double(slopes.upper) - greatest_slope});
     }
     const double jump =
-        activation == Activation::kSelu ? 0.71 : 0;  // of its slope at 0, which a sample averages
+        activation == Activation::kSelu ? 0.71 : 0;  // jump of the slope at 0, over which a sample averages
     EXPECT_LT(widest_excess, 0.12 + jump) << function.op << ": far wider than what the samples leave open";
   }
 }
@@ -152,7 +152,7 @@ TEST(ActivationBounds, LieWithinTheSlopesOfAllInputsAndReachThem) {
     EXPECT_NEAR(to_double(slopes.lower), function.least_slope, 1e-7);
     EXPECT_NEAR(to_double(slopes.upper), function.greatest_slope, 1e-7);
   }
-  // Far out, where an activation hardly changes, and where it is linear.
+  // Far from 0, where an activation hardly changes, and where it is linear.
   EXPECT_EQ(to_double(slopes_between(Activation::kTanh, {40, 1e9}).upper), 0x1p-24);
   EXPECT_EQ(to_double(slopes_between(Activation::kElu, {0, 5}).lower), 1 - 0x1p-24);
   EXPECT_EQ(to_double(slopes_between(Activation::kRelu, {-5, 0}).upper), 0x1p-24);

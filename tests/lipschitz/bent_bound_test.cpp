@@ -1,4 +1,4 @@
-/// The matrix inequality of neurons whose slopes lie in any [a, b]: values that are known, proofs and refusals.
+/// The matrix inequality of neurons with slopes in any [a, b]: known values, proofs and refusals.
 #include "lipschitz/upper/bent_bound.h"
 
 #include <algorithm>
@@ -52,8 +52,8 @@ TEST(BentBound, OfOneNeuronPerLayerIsTheProductOfWeightsAndLargestSlopes) {
   }
 }
 
-/// s(x) - s(x), seen as two neurons that know nothing of each other: the slopes d_1 - d_2 reach c - (1 - c). With
-/// slopes in [0, 1] it would be 1.
+/// s(x) - s(x), bounded as two independent neurons: the slopes d_1 - d_2 reach c - (1 - c). With slopes in [0, 1] the
+/// bound would be 1.
 TEST(BentBound, OfADifferenceCountsTheNegativeSlopes) {
   const Weights difference = tests::weights({layer(2, 1, {1, 1}), layer(1, 2, {1, -1})});
   for (const Activation activation : kBent) {
@@ -63,7 +63,7 @@ TEST(BentBound, OfADifferenceCountsTheNegativeSlopes) {
   EXPECT_NEAR(tests::proved(sdp_bound(check::stages(tests::plain(difference), "network"))), 1, 1e-6);
 }
 
-/// Slopes of almost one number: the function is almost linear, and its constant the norm of the product of matrices.
+/// Nearly constant slopes: the function is nearly linear, and its Lipschitz constant is the norm of the matrix product.
 /// With slopes in [0, 1] the bound is larger.
 TEST(BentBound, OfNarrowSlopesIsTheNormOfALinearMap) {
   std::mt19937 generator(48);
@@ -96,7 +96,7 @@ TEST(BentBound, IsAtMostTheProductAndAboveThatOfRelu) {
       const double upper = bound_of(network);
       EXPECT_LT(upper, 0.9 * product_of(network));
       Network relu = network;
-      tests::set_activation(*relu.plain, Activation::kRelu);  // [0, 1] lies in [1 - c, c]
+      tests::set_activation(*relu.plain, Activation::kRelu);  // [0, 1] is contained in [1 - c, c]
       EXPECT_GT(upper, tests::proved(sdp_bound(check::stages(relu, "network"))));
     }
   }
@@ -135,8 +135,7 @@ TEST(BentBound, IsLeftToTheProductWhereNeuronsDifferAndTheProgramIsTooLarge) {
   EXPECT_FALSE(bent_bound(chain).proof.has_value());
 }
 
-/// The two methods see the program in different variables: a dense matrix of (z - (1 - c) y) / sqrt(2 c - 1), blocks of
-/// z.
+/// The two methods use different variables: the dense program (z - (1 - c) y) / sqrt(2 c - 1), the block program z.
 TEST(BentBound, OfAChainByBlocksIsThatOfTheDenseProgram) {
   std::mt19937 generator(44);
   for (const Activation activation : kBent) {
@@ -188,7 +187,7 @@ TEST(BentChain, HasTheSlopesOfEachHiddenNeuronAndZeroToOneWhereTheyAreDivided) {
   EXPECT_THROW(check::lipschitz_lmi(wrong, 1.0, {}), std::invalid_argument);
 }
 
-/// c of GELU is above that of SiLU: a proof for GELU holds for SiLU, one for ReLU does not.
+/// c of GELU is larger than that of SiLU: a proof for GELU holds for SiLU, a proof for ReLU does not.
 TEST(BentCertificate, IsAcceptedAndRefusedForOtherNumbersAndActivations) {
   std::mt19937 generator(46);
   const Network network = bent_network(tests::random_network({3, 6, 5, 2}, generator), Activation::kSilu);

@@ -1,4 +1,4 @@
-/// Factors of block tridiagonal matrices, against Eigen's dense ones; and a program that is solved with them.
+/// Factors of block tridiagonal matrices, compared with Eigen's dense factors, and a program solved with them.
 #include "lipschitz/solver/block_cholesky.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ MatrixXd random_entries(std::mt19937& random, Index rows, Index cols) {
   return m;
 }
 
-/// Symmetric, with blocks only next to the diagonal; `shift` is added to it.
+/// Returns a random symmetric block tridiagonal matrix; `shift` is added to the diagonal.
 MatrixXd block_tridiagonal(std::mt19937& random, const std::vector<Index>& begin, double shift) {
   MatrixXd s = MatrixXd::Zero(begin.back(), begin.back());
   for (std::size_t k = 0; k + 1 < begin.size(); ++k) {
@@ -81,7 +81,7 @@ TEST(BlockCholesky, ADeepChainIsSolvedToItsGap) {
   const LipSdpResult result = solve_lipsdp(chain);
   EXPECT_EQ(result.stop, LipSdpStop::kGapReached);
   EXPECT_LT(result.optimum_upper.value(), result.optimum_lower.value() * (1 + 1e-6));
-  // No slope of a ReLU pattern exceeds the bound; with all neurons on it is that of the product.
+  // No activation pattern has a slope above the bound. With all neurons on, the slope is the norm of the product.
   MatrixXd product = chain.front();
   for (std::size_t k = 1; k < chain.size(); ++k) product = chain[k] * product;
   EXPECT_GE(result.optimum_upper.value(), std::sqrt((product * product.transpose()).trace() / 2));

@@ -1,4 +1,4 @@
-/// Certificates of networks of other activations than ReLU on a box.
+/// Certificates of networks with activations other than ReLU on a box.
 #include <cmath>
 #include <cstdlib>
 
@@ -59,7 +59,7 @@ std::string reason(Json changed) {
   return result.accepted ? "accepted" : result.reason;
 }
 
-/// The next double towards `goal`, in both notations.
+/// Replaces a number by the next double towards `goal`, in decimal and in hex.
 void move(Json& entry, const std::string& key, double goal) {
   const double moved = std::nextafter(entry[key].get<double>(), goal);
   entry[key] = moved;
@@ -71,9 +71,9 @@ TEST(BoxCertificate, IsAcceptedWithBoundsOfTheBox) {
   int local = 0;
   for (const Json& bound : made().certificate["bounds"])
     local += bound["upper_method"] == "local_sdp" ? 1 : 0;
-  EXPECT_EQ(local, 2);  // phi and the set
+  EXPECT_EQ(local, 2);  // phi and the set function
   EXPECT_EQ(made().certificate["laws"][0]["domain"], "box");
-  EXPECT_EQ(made().certificate["values"].size(), 2u);  // one neighbour, two
+  EXPECT_EQ(made().certificate["values"].size(), 2u);  // for one and two neighbours
 }
 
 TEST(BoxCertificate, IsRefusedWithAnyBoundOneUnitBelowWhatIsProved) {
@@ -175,7 +175,7 @@ TEST(BoxCertificate, SaysNothingOfFloat32) {
   EXPECT_NE(reason(changed).find("float32"), std::string::npos) << reason(changed);
 }
 
-/// What is proved for one order of the activations is refused for another: each layer is judged by its own.
+/// A proof for one order of the activations is refused for another, because each layer is checked with its own.
 TEST(BoxCertificate, IsRefusedWithTheActivationsInAnotherOrder) {
   std::mt19937 generator(94);
   Network network = tests::plain(tests::random_network({3, 8, 8, 2}, generator));
@@ -194,12 +194,12 @@ TEST(BoxCertificate, IsRefusedWithTheActivationsInAnotherOrder) {
     return check::check(changed, other).reason;
   };
   EXPECT_NE(refusal(made).find("does not show"), std::string::npos) << refusal(made);
-  Json values = made;  // with the bounds of the other network, so that the values decide
+  Json values = made;  // with the bounds of the other network, so that only the values are wrong
   values["bounds"] = lipschitz::certificate(other, certify(other, on_box(domain)))["bounds"];
   EXPECT_NE(refusal(values).find("the values leave the bounds"), std::string::npos) << refusal(values);
 }
 
-/// A network of rotation invariants has no box, not even of its parts.
+/// Networks of rotation invariants get no bounds on a box, not even for their parts.
 TEST(BoxCertificate, IsRefusedOfRotationInvariants) {
   std::mt19937 generator(95);
   Network network = tests::deep_set(with(tests::random_network({5, 6, 4}, generator), Activation::kTanh),

@@ -1,4 +1,4 @@
-/// Networks of other activations than ReLU on a box: values, and bounds from the slopes there.
+/// Networks with activations other than ReLU on a box: values, and bounds from the slopes there.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -33,8 +33,8 @@ constexpr Activation kSmooth[] = {Activation::kTanh, Activation::kSigmoid, Activ
                                   Activation::kElu,  Activation::kSelu,    Activation::kSilu,
                                   Activation::kGelu};
 
-/// Networks of three inputs with several activations, some with one at the end, behind which is an identity layer, and
-/// some that keep numbers past them.
+/// Returns networks of three inputs with several activations; some end with an activation, followed by an identity
+/// layer, and some keep entries past the activations.
 std::vector<Weights> mixtures(std::mt19937& generator) {
   using A = Activation;
   struct Mixture {
@@ -93,7 +93,7 @@ double distance(const std::vector<double>& x, const std::vector<double>& y) {
   return std::sqrt(square);
 }
 
-/// The steepest of `samples` slopes between points of the box, far apart and close together.
+/// Returns the largest of `samples` slopes between points of the box, both far apart and close together.
 double sampled_slope(const Weights& weights, const Box& box, std::mt19937& generator, int samples) {
   const files::Evaluator<double> f(weights);
   double steepest = 0;
@@ -155,7 +155,7 @@ TEST(LayersOnBox, ContainEveryLayerOfNetworksWithSeveralActivations) {
   }
 }
 
-/// Each layer's slopes are those of its own activation, between the quotients that samples show.
+/// The slope range of each layer contains the sampled difference quotients of its own activation.
 TEST(SlopesOnBox, ContainEverySampledQuotientOfEachLayersOwnActivation) {
   std::mt19937 generator(92);
   for (const Weights& weights : mixtures(generator)) {
@@ -181,7 +181,7 @@ TEST(SlopesOnBox, ContainEverySampledQuotientOfEachLayersOwnActivation) {
   }
 }
 
-/// In a small box the linear form is exact up to the square of its size: what is stated is what is attained.
+/// In a small box the error of the linear form is quadratic in its size, so stated and attained ranges nearly agree.
 TEST(RangesOnBox, ContainWhatIsAttainedAndComeCloserAsTheBoxShrinks) {
   std::mt19937 generator(82);
   for (const Activation activation : kSmooth) {
@@ -263,8 +263,8 @@ TEST(LocalSlopes, OfSeveralActivationsAreAboveAllSampledOnesAndCheckedAgain) {
   EXPECT_GE(by_program, with_slopes) << "the slopes on the box hardly ever serve";
 }
 
-/// A chain of single neurons behind weights w_k has derivatives in prod |w_k| [prod a_k, prod b_k], [a_k, b_k] the
-/// slopes on the box, here positive: nothing is lost but the width of those, however many activations there are.
+/// A chain of single neurons behind weights w_k has derivatives in prod |w_k| [prod a_k, prod b_k], where [a_k, b_k]
+/// are the slopes on the box, here positive. The bound is loose only by the width of these ranges, whatever the depth.
 TEST(LocalSlopes, OfAChainOfSingleNeuronsLieBetweenTheProductsOfLeastAndGreatestSlopes) {
   std::mt19937 generator(96);
   std::vector<Activation> between(std::begin(kSmooth), std::end(kSmooth));
@@ -286,7 +286,7 @@ TEST(LocalSlopes, OfAChainOfSingleNeuronsLieBetweenTheProductsOfLeastAndGreatest
       least *= std::max(0.0, to_double(layer[0].lower));
       greatest *= to_double(layer[0].upper);
     }
-    if (!(least > 1e-3)) continue;  // an activation that does not rise all over the box
+    if (!(least > 1e-3)) continue;  // an activation is not increasing on the whole box
     const Network network = tests::plain(weights);
     const lipschitz::CertifiedBound bound = bound_of(certify(network, on_box(domain)), "network");
     EXPECT_GE(sampled_slope(weights, domain.at("network"), generator, 50), least * (1 - 1e-9));
@@ -348,7 +348,7 @@ TEST(LocalSlopes, GiveAProductWhereNoProgramIsAskedFor) {
   int local = 0;
   for (const Activation activation : kSmooth) {
     const Network network = tests::plain(with(tests::random_network({3, 10, 8, 2}, generator), activation));
-    Box far = cube(3, 0.1);  // where no tanh of the first layer is at its steepest
+    Box far = cube(3, 0.1);  // no tanh of the first layer reaches its steepest slope here
     for (std::vector<double>* const side : {&far.lower, &far.upper})
       for (double& end : *side) end += 10;
     const Domain domain = {{"network", far}};

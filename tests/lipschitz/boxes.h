@@ -1,4 +1,4 @@
-/// @file Networks of other activations than ReLU on boxes, as tests of bounds on a box share them.
+/// @file Boxes and certifications shared by tests of networks with activations other than ReLU on a box.
 #pragma once
 
 #include <map>
@@ -19,7 +19,7 @@ inline files::Weights with(files::Weights weights, files::Activation activation)
   return weights;
 }
 
-/// Reaches `radius` to both sides of a point that is not symmetric.
+/// Returns a cube with half-width `radius` around a point that is not symmetric.
 inline lipschitz::Box cube(int inputs, double radius) {
   lipschitz::Box box;
   for (int k = 0; k < inputs; ++k) {
@@ -44,7 +44,7 @@ inline lipschitz::CertifyOptions on_box(const Domain& domain,
   return options;
 }
 
-/// With respect to all inputs.
+/// Returns the bound of a function with respect to all inputs.
 inline const lipschitz::CertifiedBound& bound_of(const lipschitz::Certification& found,
                                                  const files::FunctionId& function) {
   for (const lipschitz::CertifiedBound& bound : found.bounds)

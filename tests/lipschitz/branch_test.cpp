@@ -1,4 +1,4 @@
-/// Bounds that hold on a box: above every slope there, near the true constant, and proved by what the checker accepts.
+/// Bounds on a box: above every slope there, close to the true constant, and with a proof that the checker accepts.
 #include "lipschitz/branch/branch.h"
 
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ double proved_on(const files::Network& network, const Box& box, int nodes,
   return bound.proof ? bound.upper.value() : std::nan("");
 }
 
-/// |f(x) - f(y)| / |x - y| of the evaluator's double instance, for points of the box.
+/// Returns |f(x) - f(y)| / |x - y| for two random points of the box, evaluated in double.
 double slope_in(const files::Evaluator<double>& f, const Box& box, std::mt19937& generator) {
   std::vector<double> x, y;
   const double distance = std::exp(std::uniform_real_distribution<double>(-12, 0)(generator));
@@ -123,7 +123,7 @@ TEST(LocalBound, IsTheSlopeWhereTheBoxDecidesEveryNeuron) {
 }
 
 TEST(LocalBound, OfABlockIsForPointsThatDifferThereOnly) {
-  // |df| = 4 |dx_1| where x_0 > 0 switches nothing: f = x_0 + 4 x_1, both neurons on.
+  // Both neurons are on: f = x_0 + 4 x_1, so |df| = 4 |dx_1|.
   const files::Network network = plain(weights({{"", 2, 2, {1, 0, 0, 1}, {5, 5}}, layer(1, 2, {1, 4})}));
   Claim claim = claim_of("network");
   const Box box{{-1, -1}, {1, 1}};
@@ -205,7 +205,7 @@ TEST(LocalBound, SurvivesNetworksThatNeverChange) {
   EXPECT_LT(proved_on(constant, kBox, 5), 1e-6);
   const files::Network silent = plain(weights({layer(2, 3, {1, 2, 3, 4, 5, 6}), layer(1, 2, {0, 0})}));
   const LocalBound bound = local_bound(silent, claim_of("network"), kBox, {}, boxes(5));
-  EXPECT_TRUE(!bound.proof || bound.upper.value() < 1e-6);  // the bound for all inputs is as good
+  EXPECT_TRUE(!bound.proof || bound.upper.value() < 1e-6);  // no proof: the bound for all inputs is as good
 }
 
 TEST(LocalBound, OfABoxWithoutVolumeIsStillAbound) {
@@ -315,7 +315,7 @@ TEST(TreeProof, IsRefusedWhereWordsOrMultipliersAreMissingOrWrong) {
 }
 
 TEST(TreeProof, UnderflowProvesNothing) {
-  // 64 neurons that are on, slope 64 / 8 / 8 = 1; in units in which every product of the inequality underflows.
+  // 64 neurons that are on, slope 64 / 8 / 8 = 1, in units in which every product in the inequality underflows.
   const std::vector<double> eighths(64, 0.125), ones(64, 1.0);
   const files::Network network =
       plain(weights({{"fc1", 64, 1, eighths, ones}, {"fc2", 1, 64, eighths, {0}}}));
@@ -339,7 +339,7 @@ TEST(TreeProof, IsRefusedForBoxesThatAreNone) {
 
 // --- the published networks
 
-/// Lower bounds: exact slopes between points of the box that a separate search found.
+/// The lower bounds are exact slopes between points of the box found by a separate search.
 TEST(LocalBoundPublishedNetwork, OfTheGroundIsWithinFourPercentOfAnAttainedSlope) {
   SWARMCERT_NEEDS_DATA();
   const files::Network network = plain(files::load_weights(tests::data_path("weights/zip_f32/phi_G.pth")));

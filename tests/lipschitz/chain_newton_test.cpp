@@ -15,7 +15,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kGap = 1e-6;  ///< what minimise_chain() is meant for
+constexpr double kGap = 1e-6;  ///< the relative gap for which minimise_chain() is meant
 
 InteriorPointOptions options() {
   InteriorPointOptions options;
@@ -30,7 +30,8 @@ double best_rho(const std::vector<MatrixXd>& stages) {
   return found.points.back()(0);
 }
 
-/// Neurons that share neither input nor output: the function's constant is the steepest of them, and LipSDP attains it.
+/// Neurons that share neither input nor output: the Lipschitz constant is the largest slope of a neuron, and LipSDP
+/// attains it.
 TEST(ChainNewton, ReachesTheSteepestOfSeparateNeurons) {
   files::Random random(4);
   for (const int size : {3, 20, 60}) {
@@ -68,7 +69,7 @@ TEST(ChainNewton, StaysAboveEveryLinearRegionAndBelowTheProductOfNorms) {
     EXPECT_LE(bound, product * (1 + kGap));
     attained += steepest > 0.6 * bound ? 1 : 0;
   }
-  EXPECT_GT(attained, 5);  // the patterns came near
+  EXPECT_GT(attained, 5);  // some activation patterns come close to the bound
 }
 
 TEST(ChainNewton, ItsMultipliersAreProvedAndThoseOfASmallerRhoAreNot) {

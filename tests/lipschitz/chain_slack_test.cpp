@@ -1,4 +1,4 @@
-/// log det S and its derivatives against the definition of S, assembled as one dense matrix.
+/// log det S and its derivatives, compared with the definition of S assembled as one dense matrix.
 #include "lipschitz/solver/chain_slack.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ struct Case {
   VectorXd y;
 };
 
-/// A_0 and, per neuron, A_i = -(p_i q_i' + q_i p_i'), from the definition.
+/// Returns A_0 and, for each neuron, A_i = -(p_i q_i' + q_i p_i'), from the definition.
 std::vector<MatrixXd> constraints(const Case& of) {
   const Index inputs = of.stages.front().cols(), size = inputs + of.y.size() - 1;
   std::vector<MatrixXd> result(1, MatrixXd::Zero(size, size));
@@ -52,7 +52,7 @@ MatrixXd dense_slack(const Case& of, const VectorXd& y) {
   return s;
 }
 
-/// A chain of these sizes with a point at which S is positive definite: multipliers that grow towards the input.
+/// Returns a chain of these sizes and a point at which S is positive definite: multipliers that grow towards the input.
 Case random_case(const std::vector<Index>& sizes, bool is_bent, files::Random& random) {
   Case made;
   Index neurons = 0;

@@ -1,4 +1,4 @@
-# The checker's sources and libraries are those of checker_links.txt, and its files include nothing of the search.
+# Tests that the checker's sources and libraries are those of checker_links.txt and its files include no search code.
 cmake_minimum_required(VERSION 3.25)
 file(STRINGS ${CMAKE_CURRENT_LIST_DIR}/checker_links.txt listed)
 file(STRINGS ${FOUND} found)

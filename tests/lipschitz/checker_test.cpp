@@ -14,7 +14,7 @@ using check::check;
 using files::Json;
 using files::Network;
 
-/// A small heterogeneous NET with ground, clamp and units: every kind of statement that a certificate makes.
+/// A small heterogeneous NET with ground, clamp and units, so that its certificate has every kind of statement.
 const Network& network() {
   static const Network made = [] {
     std::mt19937 generator(11);
@@ -53,13 +53,13 @@ const Json& certificate() {
   return made;
 }
 
-/// `changed` with a content hash that fits, as somebody would forge it.
+/// Returns `changed` with a matching content hash, as a forger would write it.
 Json rehashed(Json changed) {
   changed["content_sha256"] = files::content_sha256(changed);
   return changed;
 }
 
-/// Every leaf of `document`, by JSON pointer.
+/// Returns the JSON pointers of all leaves of `document`.
 std::vector<std::string> leaves(const Json& document) {
   std::vector<std::string> pointers;
   const Json flat = document.flatten();
@@ -67,7 +67,7 @@ std::vector<std::string> leaves(const Json& document) {
   return pointers;
 }
 
-/// Another value of the same type, as a forger or a damaged disk would leave it; for an integer of a factor one that
+/// Returns another value of the same type, as from a forger or a damaged disk; for an integer of a factor, one that
 /// makes the factor too large.
 Json altered(const Json& value, const std::string& pointer) {
   if (value.is_null() || value.is_structured()) return 1;
@@ -82,7 +82,7 @@ Json altered(const Json& value, const std::string& pointer) {
   }
   std::string other = text;
   if (other.empty()) return "x";
-  other[0] = other[0] == 'f' ? '0' : 'f';  // another digest, another word
+  other[0] = other[0] == 'f' ? '0' : 'f';  // gives another digest or word
   return other;
 }
 
@@ -121,19 +121,19 @@ TEST(Checker, RejectsEveryChangedFieldEvenWithAForgedContentHash) {
   int rows_seen = 0;
   for (const std::string& pointer : leaves(certificate())) {
     if (pointer == "/tool" || pointer == "/content_sha256")
-      continue;  // the one states nothing, the other is forged
+      continue;  // the former states nothing, the latter is forged
     if (certificate()[Json::json_pointer(pointer)].is_null()) continue;
     if (certificate()[Json::json_pointer(pointer)].is_structured()) continue;
-    // There are many rows: every fourth will do here.
+    // There are many rows, so only every fourth entry is tested.
     if (pointer.find("/factor/rows/") != std::string::npos && ++rows_seen % 4 != 0) continue;
     if (pointer.rfind("/box/", 0) == 0)
-      continue;  // a smaller box that holds the witnesses makes a true statement
+      continue;  // with a smaller box that contains the witnesses, the statement is true
     Json changed = certificate();
     Json& value = changed[Json::json_pointer(pointer)];
     value = altered(value, pointer);
     const std::string::size_type rows = pointer.find("/factor/rows/");
     if (rows !=
-        std::string::npos) {  // one digit in the last place may stay within the proof's slack: change many
+        std::string::npos) {  // changes many digits, because one last digit may stay within the proof's slack
       value = certificate()[Json::json_pointer(pointer)].get<std::string>() + "7";
     }
     const check::CheckResult result = check(rehashed(changed), network());
@@ -301,7 +301,7 @@ TEST(Checker, RoundsToFloat32WhereTheCertificateSaysSo) {
   for (auto& [kind, weights] : wide.phi) {
     weights.precision = files::Precision::kFloat64;
     for (files::Layer& layer : weights.layers)
-      for (double& weight : layer.weights) weight *= 1 + 1e-9;  // more digits than float32 holds
+      for (double& weight : layer.weights) weight *= 1 + 1e-9;  // not representable in float32
   }
   lipschitz::Certification found = lipschitz::certify(files::as_float32(wide), quick());
   found.as_float32 = true;
@@ -337,7 +337,7 @@ TEST(Checker, CertificateBytesAreTheSameForAnyNumberOfJobs) {
   }
 }
 
-/// P = [[2, 1], [1, 2]] with R from its Cholesky factor: E is tiny.
+/// P = [[2, 1], [1, 2]] with R from its Cholesky factor, so that E is tiny.
 TEST(Checker, FactorMustFitTheMatrix) {
   check::Matrix p(2, 2, {2, 1, 1, 2});
   check::Factor factor;
@@ -351,7 +351,8 @@ TEST(Checker, FactorMustFitTheMatrix) {
   EXPECT_FALSE(check::shows_positive_semidefinite(p, factor));
 }
 
-/// 2 I - a path's adjacency matrix: eigenvalues 2 - 2 cos(pi k / (n + 1)), the least one about 1e-3 for n = 100.
+/// Returns `diagonal` I minus the adjacency matrix of a path. For 2 I, the eigenvalues are 2 - 2 cos(pi k / (n + 1)),
+/// the least one about 1e-3 for n = 100.
 check::Matrix path_matrix(int n, double diagonal) {
   check::Matrix p(n, n);
   for (int i = 0; i < n; ++i) {

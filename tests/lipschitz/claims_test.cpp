@@ -41,7 +41,7 @@ Network published(const std::string& phi, const std::string& rho) {
   return files::load_network(arguments);
 }
 
-/// NET with two kinds of six inputs and a ground of four.
+/// Returns a NET with two kinds of six inputs and a ground of four inputs.
 Network mixed_network(std::mt19937& generator) {
   Network network;
   network.phi["ground"] = tests::random_network({4, 5, 4}, generator);
@@ -52,11 +52,12 @@ Network mixed_network(std::mt19937& generator) {
   return network;
 }
 
-/// The set function of several neighbours as one chain in all their inputs at once: what a law must not undercut.
+/// Returns the set function of several neighbours as one chain in all their inputs, whose bound a law must not
+/// undercut.
 std::vector<check::Matrix> joint_stages(const std::vector<std::vector<check::Matrix>>& terms) {
   std::vector<check::Matrix> joint;
   const std::size_t depth = terms.front().size();
-  std::size_t shared = 0;  // stages of phi, which stand side by side; all phi here have the same depth
+  std::size_t shared = 0;  // number of stages of phi, placed side by side; all phi here have the same depth
   while (shared + 1 < depth && terms.size() > 1 && terms[0][depth - 1 - shared].entries.size() > 0) {
     bool equal = true;
     for (const auto& term : terms) {
@@ -95,7 +96,7 @@ std::vector<check::Matrix> joint_stages(const std::vector<std::vector<check::Mat
 TEST(Claims, BlocksOfTheFlownNetworkAreAsPublishedInTheReference) {
   SWARMCERT_NEEDS_DATA();
   const Network network = published("phi_L.pth", "rho_L.pth");
-  // Joint LipSDP with the columns of the block, from an independent solver (two more digits than it printed agree).
+  // Joint LipSDP with the columns of the block, from an independent solver.
   EXPECT_NEAR(block_bound(network, "set:default:default", "position"), 415.12925, 5e-4);
   EXPECT_NEAR(block_bound(network, "set:default:default", "velocity"), 63.222528, 5e-5);
   EXPECT_NEAR(block_bound(network, "set:default:default", "x2"), 165.65935, 5e-4);
@@ -124,7 +125,7 @@ TEST(Claims, NoBlockExceedsTheWholeAndTogetherTheyReachIt) {
     const double velocity = block_bound(network, "set:small:small", "velocity");
     EXPECT_LE(position, whole * (1 + 1e-7));
     EXPECT_LE(velocity, whole * (1 + 1e-7));
-    // By Cauchy's inequality sqrt(Lp^2 + Lv^2) bounds the whole from above, so the SDP cannot be looser by much.
+    // By the Cauchy-Schwarz inequality, sqrt(Lp^2 + Lv^2) bounds the whole, so the SDP cannot be much looser.
     EXPECT_GE(std::hypot(position, velocity), whole * 0.999);
   }
 }
@@ -218,8 +219,8 @@ TEST(Claims, LawsAddUpTheirTermsAndTheGround) {
   EXPECT_TRUE(result.accepted) << result.reason;
 }
 
-/// f(own) = relu(x1) + ... with every neighbour at the same place: the own-state law is attained, sqrt(n) would be
-/// wrong.
+/// f(own) = relu(x1) + ... with all neighbours at the same place: the own-state law, with factor n, is attained, so a
+/// factor sqrt(n) would be wrong.
 TEST(Claims, OwnStateLawIsAttainedAndGrowsWithNNotWithItsRoot) {
   Network network = tests::deep_set(tests::weights({tests::layer(1, 2, {2, 0})}),
                                     tests::weights({tests::layer(1, 1, {3})}));
@@ -295,7 +296,8 @@ TEST(Gamma, IsJudgedAsItIsStated) {
   const Verdict unknown = Verdict::kInconclusive;
   const std::vector<Enclosure> norms = {norm(2, 2), norm(8, 8)};
   EXPECT_EQ(judged(4, layer, clip, norms), (Verdicts{yes, no}));
-  EXPECT_EQ(judged(16, whole, clip, norms), (Verdicts{yes, yes}));  // 2 * 8, though 8 is above its share of 4
+  EXPECT_EQ(judged(16, whole, clip, norms),
+            (Verdicts{yes, yes}));  // 2 * 8, although 8 is above its share of 4
   EXPECT_EQ(judged(15.999, whole, clip, norms), (Verdicts{no, no}));
   EXPECT_EQ(judged(16, whole, equal, norms), (Verdicts{no, no}));
   EXPECT_EQ(judged(16, whole, equal, {norm(4, 4), norm(4 * (1 - 1e-8), 4)}), (Verdicts{yes, yes}));

@@ -19,7 +19,7 @@ TEST(Comparison, PublishedNetworksHaveTheReferencesBounds) {
     const char* name;
     double combettes_pesquet, eclipse_fast, floor;
   };
-  // From an independent implementation; Combettes-Pesquet printed with four digits, the floor a lower bound.
+  // From an independent implementation: Combettes-Pesquet with four digits, and a lower bound for the floor.
   const std::vector<Row> rows = {{"phi_L.pth", 41.1968, 47.66665891, 23.73870},
                                  {"phi_G.pth", 28.5169, 26.31880352, 20.46756},
                                  {"rho_L.pth", 24.7570, 24.52722213, 19.79465},

@@ -1,4 +1,4 @@
-// The convex network above a function of a sum: above the function of any neighbours, tight where it was asked to be.
+// The convex upper bound of a function of a sum: above the function for any neighbours, tight at the requested point.
 #include "lipschitz/values/convex_majorant.h"
 
 #include <gtest/gtest.h>
@@ -59,7 +59,7 @@ TEST(ConvexMajorant, OneNeighbourOfItIsAboveAnyNeighboursOfTheFunctionAndTightWh
       alike_is_less += f(sum) > alike + 1e-3;
     }
   }
-  // Without the majorant the same would not hold, and it is another function than f.
+  // The same does not hold for f itself, and the majorant differs from f.
   EXPECT_GT(alike_is_less, 100);
   EXPECT_GT(above, 1000);
 }

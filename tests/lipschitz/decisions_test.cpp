@@ -1,4 +1,4 @@
-/// Neurons that lower slopes of their own decide: what they claim is true, and what nobody proved is refused.
+/// Neurons decided by better lower slopes: their decisions are true, and decisions that are not proved are refused.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,7 +29,7 @@ Box random_box(std::mt19937& generator) {
   return box;
 }
 
-/// y of a neuron, counted over all outputs.
+/// Returns y of a neuron, numbered over all outputs.
 double neuron_at(const ReachNetwork& network, const VectorXd& x, std::size_t neuron) {
   VectorXd h = x;
   for (const ReachLayer& layer : network) {
@@ -41,7 +41,7 @@ double neuron_at(const ReachNetwork& network, const VectorXd& x, std::size_t neu
   return std::nan("");
 }
 
-/// The largest sign * y that climbing from random points and all corners finds in the box.
+/// Returns the largest sign * y in the box found by climbing from random points and all corners.
 double largest_found(const ReachNetwork& network, const Box& box, std::size_t neuron, double sign,
                      std::mt19937& generator) {
   std::uniform_real_distribution<double> unit(0, 1);
@@ -134,7 +134,7 @@ TEST(Decisions, OfTheCheckerAreThoseOfTheSearchAndNoOther) {
       decision.is_on = !decision.is_on;
       EXPECT_FALSE(hold({decision})) << "neuron " << decision.neuron;
     }
-    for (std::size_t neuron = 8; neuron < 24; ++neuron) {  // on at one point and off at another
+    for (std::size_t neuron = 8; neuron < 24; ++neuron) {  // neurons on at one point, off at another
       if (!(largest_found(network, box, neuron, 1, generator) > 0)) continue;
       if (!(largest_found(network, box, neuron, -1, generator) > 0)) continue;
       for (std::uint64_t corner = 0; corner < 8; ++corner)
@@ -239,7 +239,7 @@ TEST(Tree, HasNoMultipliersAndNoFormsThatNoLeafUses) {
     EXPECT_EQ(*multipliers.rbegin() + 1, multipliers.size());
     EXPECT_EQ(is_set, !forms.empty());
     EXPECT_TRUE(made.proof.tree.conflicts.empty());
-    check::TreeProof longer = made.proof.tree;  // what nobody uses does no harm
+    check::TreeProof longer = made.proof.tree;  // unused entries are harmless
     longer.multipliers.push_back(longer.multipliers.front());
     if (is_set) longer.forms.push_back(longer.forms.front());
     EXPECT_TRUE(made.accepts(longer));

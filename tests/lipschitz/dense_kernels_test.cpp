@@ -1,4 +1,4 @@
-// The kernels of the interior point method give one thread's bits to every thread.
+// The kernels of the interior-point method give the same bits on every thread.
 #include "lipschitz/solver/dense_kernels.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Every kernel once; what they factorise is well conditioned.
+/// Calls every kernel once, with well-conditioned matrices.
 MatrixXd through_all_kernels(const MatrixXd& a) {
   const Eigen::Index n = a.rows();
   MatrixXd x = n * MatrixXd::Identity(n, n);
@@ -48,7 +48,7 @@ TEST(DenseKernels, ThreadsThatWorkAtTheSameTimeGetTheBitsOfOneAlone) {
   EXPECT_EQ(different, 0) << "of " << kThreads * kRounds;
 }
 
-/// Q diag(values) Q' for an orthogonal Q of many reflections.
+/// Returns Q diag(values) Q' for an orthogonal Q composed of many reflections.
 MatrixXd with_eigenvalues(const VectorXd& values) {
   MatrixXd m = values.asDiagonal();
   for (int i = 0; i < 20; ++i) {
@@ -68,7 +68,7 @@ TEST(DenseKernels, FindTheLargestEigenvalueOfMatricesOfKnownOnes) {
     for (const VectorXd& values : {spread, twice, close, VectorXd(VectorXd::Constant(n, 2)),
                                    VectorXd(5 * VectorXd::Unit(n, n / 2)), VectorXd(VectorXd::Zero(n))}) {
       MatrixXd m = with_eigenvalues(values);
-      m.triangularView<Eigen::StrictlyUpper>().setConstant(99);  // is not read
+      m.triangularView<Eigen::StrictlyUpper>().setConstant(99);  // must not be read
       EXPECT_NEAR(largest_eigenvalue(m), values.maxCoeff(), 1e-12 * values.maxCoeff()) << n;
     }
   }

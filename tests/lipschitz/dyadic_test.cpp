@@ -21,7 +21,7 @@ mpq_class rational(const Dyadic& x) {
   return value;
 }
 
-/// Zeros, ends of the range, subnormal numbers, and finite doubles of random bits.
+/// Zeros, extreme and subnormal numbers, and finite doubles with random bits.
 std::vector<double> doubles() {
   using Limits = std::numeric_limits<double>;
   std::vector<double> all = {0.0,

@@ -1,5 +1,4 @@
-// Largest values of networks over a box: never below a value, close to the exact maximum, the same for any number of
-// threads.
+// Maxima of networks over a box: never below a value, close to the exact maximum, independent of the number of threads.
 #include "lipschitz/values/extremes.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +29,7 @@ VectorXd point_in(const Box& box, files::Random& random) {
   return x;
 }
 
-/// max(x) over [-1, 1]^3 of |x1| + |x2 - 1/2| - |x3|, written with six ReLUs: 1 + 3/2 - 0.
+/// |x1| + |x2 - 1/2| - |x3| written with six ReLUs; its maximum over [-1, 1]^3 is 1 + 3/2 - 0.
 lipschitz::ReachNetwork sum_of_absolute_values() {
   lipschitz::ReachLayer first{Eigen::MatrixXd::Zero(6, 3), VectorXd::Zero(6), VectorXd::Zero(6), true};
   for (int k = 0; k < 3; ++k) first.weights(2 * k, k) = 1, first.weights(2 * k + 1, k) = -1;
@@ -95,7 +94,7 @@ TEST(Extremes, FormsOverSumsAreNotBelowAnySumOfOutputs) {
     largest = largest.cwiseMax(forms.rows * sum + forms.constants);
   }
   for (int i = 0; i < 5; ++i) EXPECT_LE(largest(i), bound(i) + 1e-12) << i;
-  // The box of the sums alone would say much more.
+  // The bounding box of the sums alone would give much larger bounds.
   const lipschitz::Bounds box = support.bounds();
   const VectorXd from_box =
       forms.rows.cwiseMax(0.0) * box.upper + forms.rows.cwiseMin(0.0) * box.lower + forms.constants;

@@ -30,7 +30,8 @@ files::Weights network_with_biases(const std::vector<int>& sizes, Random& random
   return tests::weights(std::move(layers));
 }
 
-/// 1 to 4 inputs, 1 to 3 hidden layers of 2 to 8 neurons, 1 to 3 outputs; biases of size 0.1 to 10.
+/// Returns a random network with 1 to 4 inputs, 1 to 3 hidden layers of 2 to 8 neurons and 1 to 3 outputs; biases have
+/// magnitudes of 0.1 to 10.
 files::Weights small_network(std::uint64_t seed) {
   Random random(7919 * seed + 13);
   std::vector<int> sizes = {1 + static_cast<int>(random.below(4))};
@@ -40,7 +41,7 @@ files::Weights small_network(std::uint64_t seed) {
   return network_with_biases(sizes, random);
 }
 
-/// The steepest Jacobian at random points in random directions, at distances from 0.1 to 1000.
+/// Returns the largest slope at random points in random directions, at distances from 0.1 to 1000.
 double plainly_sampled(const files::Weights& weights, int samples, std::uint64_t seed) {
   const SearchNetwork network = search_network(slope_of(weights), {std::nullopt}, {});
   Random random(seed);
@@ -55,7 +56,7 @@ double plainly_sampled(const files::Weights& weights, int samples, std::uint64_t
   return steepest;
 }
 
-/// Of networks 1 .. `count`, how many plain samples beat the search by more than 2 %.
+/// Returns for how many of the networks 1 .. `count` plain samples beat the search by more than 2 %.
 int beaten(int count, int samples) {
   int result = 0;
   for (int i = 1; i <= count; ++i) {
@@ -70,8 +71,8 @@ int beaten(int count, int samples) {
 }
 
 TEST(FarSlopes, FewSmallNetworksAreBeatenByPlainSamples) {
-  // All of these were beaten by more than 15 %, network 178 by a factor of 9, when searches started near the kinks of
-  // the first layer only.
+  // If searches start near the kinks of the first layer only, samples beat all of these by more than 15 %, network 178
+  // by a factor of 9.
   int found = 0;
   for (const std::uint64_t i : {41, 48, 106, 147, 166, 178, 227}) {
     const files::Weights network = small_network(i);
@@ -86,7 +87,7 @@ TEST(FarSlopes, LessThanOneInAHundredSmallNetworksIsBeatenByPlainSamples_slow) {
 }
 
 TEST(FarSlopes, GlobalBranchAndBoundThatStallsSaysSoAfterFewBoxes) {
-  // Halving s down to the smallest number took 1,500 boxes and more, and then the search stopped without a reason.
+  // Without this stop, halving s down to the smallest number takes 1,500 boxes or more.
   int stalls = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     Random random(seed);

@@ -1,4 +1,5 @@
-// Rounding of layers in float32, by the loop that flies, and what reaches the outputs, against exact arithmetic.
+// Round-off of layers in float32 by the loop of the flight code and its propagation to the outputs, compared with exact
+// arithmetic.
 #include "lipschitz/values/float32_layers.h"
 
 #include <gmpxx.h>
@@ -36,7 +37,7 @@ struct Sum {
     result.bias_radius = VectorXd::Zero(1);
     return result;
   }
-  /// |what flies - exact| at h.
+  /// Returns |float32 value - exact value| at h, computed by the loop of the flight code.
   double off(const std::vector<float>& h) const {
     const nn::DenseLayer<float> layer{weights.data(), &bias, 1, static_cast<int>(weights.size())};
     float computed = 0;
@@ -59,7 +60,7 @@ double bound(const Sum& sum, const VectorXd& lower, const VectorXd& upper) {
   return lipschitz::layer_rounding(sum.layer(), lower, upper)(0);
 }
 
-/// Points that a climb finds ever further off, for sums of ordinary size and at the border of underflow.
+/// Climbs to points of increasing error, for sums of ordinary size and close to underflow.
 TEST(LayerRounding, IsNeverExceededByWhatFlies) {
   Random random(5);
   for (const double scale : {1.0, 0x1p-70}) {
@@ -94,7 +95,7 @@ TEST(LayerRounding, IsNeverExceededByWhatFlies) {
       }
       if (at_most > 0) closest = std::max(closest, furthest / at_most);
     }
-    EXPECT_GT(closest, 0.2) << scale;  // some sum comes close
+    EXPECT_GT(closest, 0.2) << scale;  // some sums come close to the bound
   }
 }
 
@@ -109,11 +110,11 @@ TEST(LayerRounding, CountsNeitherProductsWithZeroNorTheirAdditions) {
   EXPECT_EQ(bound(sum, zero, one), with_one);
 }
 
-/// 1 - 1 + tiny: any order of summation allows for errors of the size of 1, this one does not.
+/// 1 - 1 + tiny: a bound for any order of summation allows errors relative to 1, a bound for this order does not.
 TEST(LayerRounding, TakesPartialSumsAsTheyAreAdded) {
   const Sum sum{{-1, 0x1p-30f}, 1};
   const VectorXd ones = VectorXd::Ones(2);
-  EXPECT_LE(bound(sum, ones, ones), 1.001 * 0x1p-24);  // of the product 1; the sums are 0 and 2^-30
+  EXPECT_LE(bound(sum, ones, ones), 1.001 * 0x1p-24);  // from the product 1; the sums are 0 and 2^-30
   const Sum other{{0x1p-30f, -1}, 1};
   EXPECT_GE(bound(other, ones, ones), 1.9 * 0x1p-24);
   EXPECT_GE(bound(other, ones, ones), other.off({1, 1}));
@@ -126,7 +127,7 @@ TEST(LayerRounding, IsInfiniteWhereFloat32MightOverflow) {
   EXPECT_TRUE(std::isfinite(bound(sum, VectorXd::Zero(1), VectorXd::Constant(1, 0x1p20))));
 }
 
-/// h = (x, x, x, ...) with weights 1, -1, 1, ...: the sums are x and 0 by turns, which intervals cannot know.
+/// h = (x, x, x, ...) with weights 1, -1, 1, ...: the sums alternate between x and 0, which intervals cannot represent.
 TEST(LayerRounding, KnowsWhatTheTermsOfAPartialSumHaveInCommon) {
   constexpr Index kInputs = 20;
   Sum sum;
@@ -136,11 +137,11 @@ TEST(LayerRounding, KnowsWhatTheTermsOfAPartialSumHaveInCommon) {
                                      VectorXd::Zero(kInputs)};
   const double u = 0x1p-24;
   const double with_forms = lipschitz::layer_rounding(sum.layer(), -ones, ones, &forms)(0);
-  EXPECT_NEAR(with_forms, (kInputs + kInputs / 2) * u, 1e-4 * u);  // products, and every other sum
+  EXPECT_NEAR(with_forms, (kInputs + kInputs / 2) * u, 1e-4 * u);  // all products and every second sum
   EXPECT_NEAR(bound(sum, -ones, ones), (kInputs + kInputs * (kInputs + 1) / 2) * u, 1e-4 * u);
 }
 
-/// Layer by layer in exact arithmetic, but for double's rounding, and by the loop that flies.
+/// The layers in exact arithmetic, up to the round-off of double, and by the loop of the flight code.
 struct BothWays {
   std::vector<VectorXd> exact, computed;
 
@@ -171,7 +172,7 @@ struct BothWays {
   }
 };
 
-/// All weights are float32 numbers.
+/// Returns a random network whose weights are float32 numbers.
 ReachNetwork float32_network(std::mt19937& generator) {
   ReachNetwork network = lipschitz::reach_network(tests::random_network({3, 8, 10, 6, 2}, generator));
   for (lipschitz::ReachLayer& layer : network) {
@@ -249,7 +250,7 @@ TEST(AffineForms, AreTheValuesAtAPointAndNotFiniteWhereTheBoundsAreNot) {
   EXPECT_FALSE(unknown.all_finite());
 }
 
-/// d y_K / d y_k at x, for k = 0 .. K.
+/// Returns d y_K / d y_k at x for k = 0 .. K.
 std::vector<RowVectorXd> derivatives(const ReachNetwork& network, VectorXd h) {
   std::vector<VectorXd> before;
   for (const lipschitz::ReachLayer& layer : network) {

@@ -1,4 +1,4 @@
-/// Proofs by parts for a stated number of neighbours: forms of rho that hold in some parts only.
+/// Proofs by parts for a stated number of neighbours, with forms of rho that hold in some parts only.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,8 +17,8 @@ using tests::weights;
 
 const std::string kFunction = "set:default:default";
 
-/// phi(x) = relu(x), rho(s) = relu(s) + 10 relu(s - 1.5): for x in [0.1, 1] and nothing else in the sum the slope is 1,
-/// above 1.5 it is 11.
+/// phi(x) = relu(x), rho(s) = relu(s) + 10 relu(s - 1.5). For x in [0.1, 1] without other terms the slope is 1; for
+/// sums above 1.5 it is 11.
 check::LocalFunction steep_from_one_and_a_half() {
   const files::Network network =
       tests::deep_set(weights({layer(1, 1, {1}), layer(1, 1, {1})}),
@@ -39,7 +39,7 @@ TEST(Forms, HoldWhereTheSumDecidesRho) {
   EXPECT_FALSE(holds(1, 1.001, "q0 t0", {{{0.9999}, {0, 0}}})) << "less than rho's slope";
   EXPECT_FALSE(holds(2, 1.001, "q0 t0", {unit})) << "rho is steeper in this box";
   EXPECT_TRUE(holds(2, 122, "q0 t0", {{{121.9}, {0, 120}}})) << "a larger form holds there";
-  // In halves: up to 1.05 the small form, above it a large one. The large one proves no small bound.
+  // In two halves: the small form up to 1.05, a large form above. The large form does not prove a small bound.
   EXPECT_TRUE(holds(2, 122, "s0 q0 t0 q1 t0", {unit, {{121.9}, {0, 120}}}));
   EXPECT_FALSE(holds(2, 1.001, "s0 q0 t0 q1 t0", {unit, {{121.9}, {0, 120}}}));
   EXPECT_FALSE(holds(2, 122, "s0 q0 t0 q0 t0", {unit}));

@@ -1,4 +1,4 @@
-/// What is left of a certification whose searches are cut short: bounds that are proved, and that say so.
+/// Certifications whose searches are cut short: their bounds are proved and marked as interrupted.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -58,7 +58,7 @@ TEST(Interruption, TheTimeLimitStopsTheSemidefiniteProgramAndTheSearch) {
   const files::Network network = network_of({6, 60, 60, 60, 1});
   CertifyOptions options;
   options.lower.rounds = 1000000;
-  options.seconds = 1e-3;  // less than the first iteration and the first round take
+  options.seconds = 1e-3;  // less than the first iteration or the first round needs
   const Certification found = certify(network, options);
   const CertifiedBound& bound = found.bounds.front();
   EXPECT_EQ(bound.sdp.stop, LipSdpStop::kTimeLimit);
@@ -140,7 +140,7 @@ TEST(EclipseFast, DeadNeuronsAndHugeWeightsStillGetAProof) {
 TEST(TimeShares, AreEqualPartsOfWhatIsLeft) {
   const Stop whole(nullptr, 1e6);
   TimeShares shares(whole, 4, 2);
-  EXPECT_NEAR(shares.next().seconds_left(), 5e5, 1e3);  // four tasks on two threads
+  EXPECT_NEAR(shares.next().seconds_left(), 5e5, 1e3);  // half of the time: four tasks on two threads
   EXPECT_NEAR(shares.next().seconds_left(), 1e6 * 2 / 3, 1e3);
   EXPECT_NEAR(shares.next().seconds_left(), 1e6, 1e3);
   EXPECT_NEAR(shares.next().seconds_left(), 1e6, 1e3);

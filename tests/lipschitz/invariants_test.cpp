@@ -35,7 +35,7 @@ Network network() {
   return net;
 }
 
-/// The same weights as a network of five inputs, without a map in front.
+/// Returns the same weights as a network of five inputs without the map to invariants.
 Network without_map(Network net) {
   net.invariants = false;
   net.input_order.clear();
@@ -56,7 +56,7 @@ const CertifiedBound& bound_of(const lipschitz::Certification& found, const file
 TEST(Invariants, BoundsOfSetsAreThoseOfTheirNetworksTimesTheSlopeOfTheMapAndPartsStayAsTheyAre) {
   const lipschitz::Certification found = lipschitz::certify(network(), quick());
   const lipschitz::Certification plain = lipschitz::certify(without_map(network()), quick());
-  const double tolerance = 1e-5;  // of the solver
+  const double tolerance = 1e-5;  // accuracy of the solver
   for (const auto& [function, slope] : {std::pair{"set:small:small", 1.5},
                                         {"set:ground:small", 1.0},
                                         {"phi:small", 1.0},
@@ -118,7 +118,8 @@ TEST(Invariants, NothingIsStatedOfABoxOfBlocksOfScalesOrWitnessesOfSets) {
   EXPECT_TRUE(checked.accepted) << checked.reason;
 }
 
-/// f among neighbours at these states, the last one the vehicle's own, evaluated without the functions under test.
+/// Returns f for neighbours with these states, the last one the vehicle's own, evaluated without the functions under
+/// test.
 double value_at(const Network& net, const std::vector<std::vector<double>>& states) {
   if (states.size() == 3) return 0;  // two neighbours
   std::vector<double> sum(5);

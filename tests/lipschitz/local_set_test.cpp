@@ -1,4 +1,4 @@
-/// Bounds by parts of boxes beyond one box: for a stated number of neighbours, and everywhere by a projective cover.
+/// Bounds by parts for a stated number of neighbours, and for all inputs by a projective cover.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -46,7 +46,7 @@ Claim counted(const files::FunctionId& function, const Neighbours& neighbours) {
 }
 
 TEST(CountedNeighbours, AreBoundedByTheSlopesThatSoManyCanReach) {
-  // phi(x) = relu(x), rho(s) = relu(s) + 10 relu(s - 1.5): below 1.5 the slope is 1, above 11; x in [0, 1].
+  // phi(x) = relu(x), rho(s) = relu(s) + 10 relu(s - 1.5), x in [0, 1]: the slope is 1 for sums below 1.5, 11 above.
   const files::Network network =
       tests::deep_set(weights({layer(1, 1, {1}), layer(1, 1, {1})}),
                       weights({{"", 2, 1, {1, 1}, {0, -1.5}}, layer(1, 2, {1, 10})}));
@@ -96,7 +96,8 @@ TEST(CountedNeighbours, BoundIsAboveEverySampledSlope) {
     }
   }
   std::printf("closest slope over bound: %.4f, least over any number: %.4f\n", closest, gain);
-  // 0.658 here. It cannot be 1: the others enter as one interval per neuron, which no sum of theirs fills at once.
+  // 0.658 here. It cannot be 1, because the other terms enter as one interval per neuron, whose extremes they do not
+  // attain simultaneously.
   EXPECT_GT(closest, 0.6) << "the samples do not come near the bounds: they test nothing";
   EXPECT_LT(gain, 0.95) << "a number of neighbours never helped";
 }
@@ -193,7 +194,8 @@ TEST(Conflicts, OfABoxAreNeverMetByASample) {
 }
 
 TEST(Conflicts, ProveWhatNeuronsAloneDoNotAndOnlyWhereTheyAreShown) {
-  // f = 3 relu(x) - 5 relu(-x - 1): never both. With t = (25, 25) and 40 for the pair S >= 0 from rho = 25 on.
+  // f = 3 relu(x) - 5 relu(-x - 1): the neurons are never on at once. With t = (25, 25) and multiplier 40 for the pair,
+  // S >= 0 for rho >= 25.
   const files::Network network = plain(weights({{"", 2, 1, {1, -1}, {0, -1}}, layer(1, 2, {3, -5})}));
   const check::LocalFunction f = check::local_function(network, "network", "all", {}, check::Matrix(0, 0));
   const check::Conflict both_on{0, 1, true, true, 0.5, 40};

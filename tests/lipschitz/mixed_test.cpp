@@ -48,7 +48,7 @@ CertifiedBound mixed_bound(const Network& network, UpperMethod method = UpperMet
   return {};
 }
 
-/// The norm of W_K D_(K-1) ... D_1 W_1 for the best slopes that an ascent finds, each at an end of its interval.
+/// Maximises the norm of W_K D_(K-1) ... D_1 W_1 over slopes by an ascent; each slope is at an end of its interval.
 class AdversarialSlopes {
  public:
   AdversarialSlopes(const Weights& weights, std::mt19937& generator) {
@@ -97,7 +97,7 @@ class AdversarialSlopes {
 
   std::vector<MatrixXd> w_;
   std::vector<std::array<double, 2>> ends_;
-  std::vector<Index> kept_;  ///< numbers at the end of a layer, of slope 1
+  std::vector<Index> kept_;  ///< number of entries at the end of a layer that have slope 1
   std::vector<VectorXd> slopes_;
 };
 
@@ -194,7 +194,7 @@ TEST(MixedBounds, BesideALayerThatSortsAreTheProduct) {
   }
 }
 
-/// The last `kept` numbers of each layer stay as they are, as past a skip connection.
+/// Returns a network that leaves the last `kept` entries of each layer unchanged, as with a skip connection.
 Weights with_skip(const std::vector<int>& sizes, const std::vector<int>& kept, const Mixture& between,
                   unsigned seed) {
   Weights weights = mixed(sizes, between, seed);
@@ -230,7 +230,7 @@ TEST(MixedBounds, PastSkipConnectionsAreAboveSampledAndAdversarialSlopes) {
 }
 
 TEST(MixedBounds, OfOneNumberAndItsSkipConnectionAreExact) {
-  // sigmoid(2 x) + 3 x has the slopes 3 to 3.5; tanh(x) - x has 0 to 1 in absolute value.
+  // sigmoid(2 x) + 3 x has slopes 3 to 3.5; tanh(x) - x has slopes of absolute value 0 to 1.
   Weights sum = tests::weights({tests::layer(2, 1, {2, 1}), tests::layer(1, 2, {1, 3})});
   sum.layers[0].activation = Activation::kSigmoid;
   sum.layers[0].kept = 1;
@@ -261,7 +261,7 @@ TEST(MixedBounds, TheStageBehindEachActivationIsMultipliedByItsOwnSlope) {
   }
 }
 
-/// phi with tanh, then ReLU, and sigmoid at the end; rho with ReLU and SiLU; with a law.
+/// phi with tanh, ReLU and a final sigmoid; rho with ReLU and SiLU.
 const Network& mixed_set() {
   static const Network made = [] {
     Weights phi = mixed({3, 6, 5, 4}, {Activation::kTanh, Activation::kRelu}, 57);
@@ -335,7 +335,7 @@ TEST(MixedCertificate, IsRejectedWithAnyClaimBelowWhatIsProved) {
       EXPECT_NE(check_mixed(changed).reason.find("claims less than"), std::string::npos) << list << " " << i;
     }
   }
-  // A proof for the activations in another order shows nothing.
+  // A proof for the activations in another order is refused.
   Network other = mixed_set();
   other.rho.at("default").set_activations({Activation::kSilu, Activation::kRelu});
   Json changed = mixed_certificate();
@@ -362,12 +362,12 @@ TEST(MixedCertificate, OfTheProductCountsEachSlopeExactly) {
 TEST(MixedCertificate, StatesTheActivationsForFilesThatDoNot) {
   Network unstated = mixed_set();
   Weights& phi = unstated.phi.at("default");
-  phi.layers.pop_back();  // the identity is no layer of the file
+  phi.layers.pop_back();  // the identity is not a layer of the file
   for (Weights* const weights : {&phi, &unstated.rho.at("default")}) {
     tests::set_activation(*weights, Activation::kRelu);
     weights->order_source = files::OrderSource::kNames;
   }
-  // The name of the identity layer is that of the certificate's, because the file's layers have the same names.
+  // The identity layer has the name used in the certificate, because the layers of the file have the same names.
   const Network adopted = check::with_stated_activations(mixed_certificate(), unstated);
   EXPECT_EQ(adopted.phi.at("default").activation_names(), "tanh, relu, sigmoid");
   EXPECT_EQ(adopted.rho.at("default").activation_names(), "relu, silu");
@@ -391,7 +391,7 @@ TEST(MixedCertificate, PastSkipConnectionsIsOfTheNumbersThatAreKept) {
       changed["network"]["weights"]["network"]["chain"][1]["op"] = other;
       EXPECT_NE(check_mixed(changed, network).reason.find("chain"), std::string::npos) << other;
     }
-    // What holds where nothing is kept does not hold here: what is kept is steeper than a sigmoid.
+    // A bound for the network without kept entries does not hold here, because kept entries are steeper than a sigmoid.
     Weights all = weights;
     for (files::Layer& layer : all.layers) layer.kept = 0;
     Json changed = made;

@@ -1,4 +1,4 @@
-/// @file Networks that tests of bounds share: random ones, transformed ones, and slopes to hold against bounds.
+/// @file Networks shared by tests of bounds, and sampled slopes to compare with bounds.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -16,19 +16,19 @@
 
 namespace swarmcert::tests {
 
-/// NET with one plain network.
+/// Returns a NET with one plain network.
 inline files::Network plain(files::Weights weights) {
   files::Network network;
   network.plain = std::move(weights);
   return network;
 }
 
-/// The slope of one plain network; `weights` stays the caller's.
+/// Returns the slope function of one plain network; `weights` is not owned.
 inline lipschitz::SlopeFunction slope_of(const files::Weights& weights) {
   return {{&weights, nullptr}, {}, nullptr};
 }
 
-/// NET with phi and rho of kind "default".
+/// Returns a NET with phi and rho of kind "default".
 inline files::Network deep_set(files::Weights phi, files::Weights rho) {
   files::Network network;
   network.phi["default"] = std::move(phi);
@@ -41,7 +41,7 @@ inline lipschitz::SdpBound sdp_bound_of(const files::Network& network,
   return lipschitz::sdp_bound(check::stages(network, function));
 }
 
-/// The proved bound, or a failed test and NaN where there is none.
+/// Returns the proved bound; if there is none, fails the test and returns NaN.
 inline double proved(const lipschitz::SdpBound& bound) {
   EXPECT_TRUE(bound.proof.has_value()) << "no iterate could be proved: " << name(bound.stop);
   return bound.proof ? bound.proof->upper.value() : std::nan("");
@@ -60,7 +60,8 @@ inline files::Weights weights(std::vector<files::Layer> layers) {
   return result;
 }
 
-/// The largest slope of `network` over pairs of random points at several distances: a lower bound up to rounding.
+/// Returns the largest slope of `network` over pairs of random points at several distances: a lower bound up to
+/// round-off.
 inline double sampled_slope(const files::Weights& network, std::mt19937& generator, int samples) {
   const files::Evaluator<double> f(network);
   double steepest = 0;

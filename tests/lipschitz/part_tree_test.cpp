@@ -1,5 +1,5 @@
-// Largest values of many forms over one tree of parts: those of Reach where nothing is halved, never below a value,
-// close to the largest one found, whatever was asked for before and with any number of threads.
+// Maxima of many forms over one tree of parts: equal to those of Reach if nothing is halved, never below a value, close
+// to the largest value found, independent of previous queries and of the number of threads.
 #include "lipschitz/values/part_tree.h"
 
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ TEST(PartTree, NoValueIsAboveABoundAndHalvedPartsBringItClose) {
     const MatrixXd forms = MatrixXd::Random(6, 5);
     const LargestValues whole = tree.largest(forms, {0, 0, 1}), halved = tree.largest(forms, {800, 0.001, 2});
     for (Index i = 0; i < forms.rows(); ++i) {
-      EXPECT_LT(halved.upper(i), whole.upper(i));  // parts were halved, and told something
+      EXPECT_LT(halved.upper(i), whole.upper(i));  // halving parts improved the bound
       EXPECT_GE(halved.upper(i), halved.value(i));
       EXPECT_NEAR(halved.value(i), forms.row(i) * lipschitz::evaluate_roughly(phi, halved.x.col(i)), 1e-12);
       close += halved.upper(i) - halved.value(i) < 0.05 * (whole.upper(i) - halved.value(i));

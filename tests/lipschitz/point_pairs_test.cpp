@@ -1,4 +1,4 @@
-/// Lower bounds by two points of networks with other activations than ReLU: what is enclosed, found and checked.
+/// Lower bounds by two points for networks with activations other than ReLU: enclosures, search and check.
 #include <cmath>
 #include <optional>
 
@@ -64,7 +64,7 @@ Certification certified_pairs(const Network& network, lipschitz::Domain domain =
   return certify(network, options);
 }
 
-/// |f(x) - f(y)| / |x - y| in double.
+/// Returns |f(x) - f(y)| / |x - y| in double.
 double quotient(const Weights& weights, const SlopePoints& pair) {
   const files::Evaluator<double> f(weights);
   const std::vector<double> fx = f({pair.x.begin(), pair.x.end()}), fy = f({pair.y.begin(), pair.y.end()});
@@ -75,7 +75,7 @@ double quotient(const Weights& weights, const SlopePoints& pair) {
   return rise / run;
 }
 
-/// tanh(1/2) and tanh(1/4) with 32 digits, of Python's decimal.
+/// tanh(1/2) and tanh(1/4) with 32 digits are from Python's decimal.
 TEST(PointPairs, AreAsSteepAsKnownDigitsUpToTheWidthOfTheEnclosures) {
   Weights weights = tests::weights({tests::layer(1, 1, {1}), tests::layer(1, 1, {1})});
   weights.set_activations({Activation::kTanh});
@@ -87,7 +87,7 @@ TEST(PointPairs, AreAsSteepAsKnownDigitsUpToTheWidthOfTheEnclosures) {
   EXPECT_GE(square, (known - off) * (known - off));
 }
 
-/// The smaller of two numbers minus the larger one, after a layer that is sorted.
+/// The smaller of two numbers minus the larger one, behind a layer that is sorted.
 TEST(PointPairs, OfLayersThatAreSortedAreExact) {
   Weights weights = tests::weights({tests::layer(2, 2, {1, 0, 0, 1}), tests::layer(1, 2, {1, -1})});
   weights.set_activations({files::group_sort(2)});
@@ -120,8 +120,8 @@ TEST(PointPairs, AreBelowEveryProvedBoundAndAsSteepAsTheirValuesInDouble) {
   }
 }
 
-/// Behind a turn all neurons are steepest at 0, so that the bound is the norm behind them times that slope. Between
-/// points h from 0 tanh(t) / t and its like are 1 - O(h^2), with h <= 1e-4.
+/// Behind a rotation all neurons are steepest at 0, so the bound is the norm of the next layer times that slope. For
+/// points at distance h <= 1e-4 from 0, tanh(t) / t and similar quotients are 1 - O(h^2).
 TEST(PointPairs, AttainTheBoundWhereAllNeuronsAreSteepestAtOnePlace) {
   for (const Activation activation : {Activation::kTanh, Activation::kSigmoid, files::group_sort(2)}) {
     Weights weights =
@@ -183,19 +183,19 @@ TEST(PointPairs, AreNoneWhereTheBoxHoldsNoTwoFloat32PointsAndInTheBoxWhereTheCla
   const auto pair = [&](const Box& box) {
     return certified_pairs(network, {{"network", box}}).bounds.front().lower.witness;
   };
-  const double tenth = 0.1;  // no float32
+  const double tenth = 0.1;  // not a float32 number
   EXPECT_FALSE(pair({{tenth, 0}, {tenth, 1}}));
   EXPECT_FALSE(pair({{0.5, 0.25}, {0.5, 0.25}}));
   ASSERT_TRUE(pair({{0.5, 0}, {0.5, 1}}));
   EXPECT_EQ(pair({{0.5, 0}, {0.5, 1}})->x[0], 0.5F);
   network.clamp = files::InputClamp{{-1, -1}, {1, 1}};
-  const auto beyond = pair({{2, 0}, {3, 1}});  // the clamp lets through x[0] = 1
+  const auto beyond = pair({{2, 0}, {3, 1}});  // the clamp maps x[0] to 1
   ASSERT_TRUE(beyond);
   EXPECT_EQ(beyond->x[0], 2);
   EXPECT_EQ(beyond->y[0], 2);
 }
 
-/// A deep set beside a ground of another activation: all its terms stand in the pair, and the checker sees them.
+/// A deep set with a ground of another activation: the pair contains all terms, and the checker verifies them.
 TEST(PointPairs, OfADeepSetHoldTheOtherTermsAndThoseOfInvariantsAreOfItsPartsOnly) {
   std::mt19937 generator(35);
   const auto with = [&](const std::vector<int>& sizes, Activation activation) {
@@ -270,7 +270,7 @@ TEST(PointPairCertificate, IsRefusedWithAnyLowerBoundAboveItsPairAndPointsThatDo
   }
 }
 
-/// What is as steep with one activation is refused with a flatter one in its place.
+/// A slope attained with one activation is refused for a flatter activation.
 TEST(PointPairCertificate, IsRefusedForAnotherActivation) {
   std::mt19937 generator(38);
   Network network = tests::plain(made({{2, 6, 1}, {Activation::kTanh}, {}}, generator));

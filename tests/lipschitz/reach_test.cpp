@@ -1,4 +1,4 @@
-// Linear bounds of ReLU networks over a box: those of plain backward substitution, and never below a value.
+// Linear bounds of ReLU networks over a box: equal to plain backward substitution, and never below a value.
 #include "lipschitz/values/reach.h"
 
 #include <gtest/gtest.h>
@@ -20,8 +20,8 @@ using lipschitz::ReachNetwork;
 
 const lipschitz::Box kCube{{-1, -1, -1}, {1, 1, 1}};
 
-/// The largest value of one form above lambda y_top over kCube, without any care for rounding: every neuron by itself,
-/// no matrix smaller than its layer.
+/// Returns the largest value over kCube of an upper bound on lambda y_top, without regard to round-off and without
+/// removing neurons.
 double substituted(const ReachNetwork& network, const std::vector<Bounds>& bounds, std::size_t top,
                    VectorXd lambda) {
   double constant = 0;
@@ -64,7 +64,7 @@ TEST(Reach, BoundsAreThoseOfPlainBackwardSubstitution) {
         undecided += network[k].has_relu && expected.lower(i) < 0 && expected.upper(i) > 0;
         EXPECT_NEAR(reach.before_relu(k).upper(i), expected.upper(i), 1e-9);
         EXPECT_NEAR(reach.before_relu(k).lower(i), expected.lower(i), 1e-9);
-        // Rounding only ever widens them.
+        // Round-off only widens the bounds.
         EXPECT_GE(reach.before_relu(k).upper(i), expected.upper(i) - 1e-14);
       }
       bounds.push_back(reach.before_relu(k));

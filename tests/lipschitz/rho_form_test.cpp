@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// Five inputs, two hidden layers of twelve.
+/// Returns a rho with five inputs and two hidden layers of twelve neurons.
 files::Network a_rho(std::uint32_t seed) {
   std::mt19937 random(seed);
   return tests::plain(tests::random_network({5, 12, 12, 2}, random));

@@ -1,4 +1,4 @@
-// Exact numbers rounded to doubles that stay bounds.
+// Directed rounding of exact numbers to doubles.
 #include "lipschitz/base/rounding.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,8 @@ using lipschitz::sqrt_up;
 constexpr double kLargest = std::numeric_limits<double>::max();
 constexpr double kLeast = std::numeric_limits<double>::denorm_min();
 
-/// Products of two doubles, as small and as large as double holds and beyond, and with more bits than one has.
+/// Returns a product of two doubles, whose magnitude may exceed the range of double and which has more bits than a
+/// double.
 Dyadic product_of_two(files::Random& random) {
   const double a = 0.5 + random.uniform() / 2, b = 0.5 + random.uniform() / 2;
   Dyadic x = Dyadic(a) * b;
@@ -56,7 +57,7 @@ TEST(Rounding, ARootIsTheSmallestDoubleWhoseSquareIsEnough) {
   files::Random random(2);
   for (int k = 0; k < 5000; ++k) {
     Dyadic square = product_of_two(random);
-    if (k % 2 == 0) square.exponent *= 2;  // beyond the doubles, with a root among them
+    if (k % 2 == 0) square.exponent *= 2;  // beyond the range of double, with a root inside it
     const double root = sqrt_up(square);
     ASSERT_TRUE(std::isfinite(root));
     EXPECT_TRUE(Dyadic(root) * root >= square) << root;

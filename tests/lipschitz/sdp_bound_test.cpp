@@ -18,7 +18,7 @@ using tests::proved;
 using tests::random_network;
 using tests::sdp_bound_of;
 
-/// Relative agreement that the solver must reach wherever an optimum is known or must not change.
+/// Relative accuracy required of the solver if the optimum is known or must not change.
 constexpr double kOptimality = 1e-6;
 
 struct Published {
@@ -107,7 +107,7 @@ TEST(SdpBound, PositiveRescalingBetweenLayersLeavesTheBoundUnchanged) {
   std::mt19937 generator(3);
   const files::Weights net = random_network({4, 15, 12, 3}, generator);
   files::Weights rescaled = net;
-  for (int i = 0; i < 15; ++i) {  // relu(c y) = c relu(y) for c > 0, here over twenty orders of magnitude
+  for (int i = 0; i < 15; ++i) {  // relu(c y) = c relu(y) for c > 0, with c over twenty orders of magnitude
     const double c = std::exp2(static_cast<double>(generator() % 64) - 32.0);
     for (int j = 0; j < 4; ++j) rescaled.layers[0].weights[i * 4 + j] *= c;
     for (int r = 0; r < 12; ++r) rescaled.layers[1].weights[r * 15 + i] /= c;
@@ -158,8 +158,7 @@ TEST(SdpBound, DeadAndDuplicatedNeuronsChangeNothing) {
   const files::Weights net = random_network({3, 8, 6, 2}, generator);
   const double before = proved(sdp_bound_of(plain(net)));
 
-  files::Weights with_dead =
-      net;  // a neuron without input, one without effect, one of which neither can be seen
+  files::Weights with_dead = net;  // has a neuron without input, one without effect, and one without either
   files::Layer& first = with_dead.layers[0];
   files::Layer& second = with_dead.layers[1];
   first.outputs = 11;
@@ -174,7 +173,7 @@ TEST(SdpBound, DeadAndDuplicatedNeuronsChangeNothing) {
   }
   EXPECT_NEAR(proved(sdp_bound_of(plain(with_dead))), before, kOptimality * before);
 
-  files::Weights twins = net;  // neuron 0 twice, each with half of its effect
+  files::Weights twins = net;  // neuron 0 duplicated, each copy with half of its effect
   first = twins.layers[0];
   twins.layers[0].outputs = 9;
   twins.layers[0].biases.push_back(twins.layers[0].biases[0]);
@@ -189,7 +188,7 @@ TEST(SdpBound, DeadAndDuplicatedNeuronsChangeNothing) {
   EXPECT_LE(proved(sdp_bound_of(plain(twins))), before * (1 + kOptimality));
 }
 
-/// Every hidden neuron so many times, each copy with its share of the effect: the same function.
+/// Returns the same function with every hidden neuron replaced by `copies` neurons that share its effect.
 files::Weights repeated(const files::Weights& net, int copies) {
   files::Weights result = net;
   for (std::size_t k = 0; k < net.layers.size(); ++k) {
@@ -221,7 +220,8 @@ TEST(SdpBound, RepeatingEveryNeuronLeavesTheBoundUnchangedForLargeNetworksToo) {
 }
 
 TEST(SdpBound, ChainsOfDeadNeuronsAreCovered) {
-  // Of two neurons per layer one has input but no way out, the other a way out but no input: f is constant.
+  // In each layer one neuron has an input but does not reach the output, and the other reaches the output but has no
+  // input: f is constant.
   const files::Weights constant =
       tests::weights({tests::layer(2, 1, {1, 0}), tests::layer(2, 2, {0, 3, 0, 0}),
                       tests::layer(2, 2, {5, 0, 0, 1}), tests::layer(1, 2, {1, 1})});

@@ -21,8 +21,8 @@ using lipschitz::CertifiedBound;
 using lipschitz::CertifiedRange;
 using Compositions = std::set<std::vector<std::string>>;
 
-/// Two kinds of vehicles; small ones have no network in some compositions. Neighbours change f by little, and it is
-/// near 5: without 0 in its range, and with steps to 0 that are larger than all others.
+/// Two kinds of vehicles; small ones have no network in some compositions. f is near 5 and neighbours change it little,
+/// so its range does not contain 0, and steps to 0 are larger than all others.
 Network two_kinds(const Compositions& silent, bool with_ground = false) {
   std::mt19937 generator(6);
   Network net;
@@ -65,7 +65,7 @@ std::map<std::string, double> rho_bounds(const lipschitz::Certification& found) 
   return bounds;
 }
 
-/// With ranges, jumps and float32 errors among up to `neighbours` neighbours.
+/// Certifies ranges, jumps and float32 errors for up to `neighbours` neighbours.
 lipschitz::Certification with_values(const Network& net, int neighbours) {
   lipschitz::CertifyOptions options = one_round();
   options.domain = cubes(net);
@@ -75,7 +75,7 @@ lipschitz::Certification with_values(const Network& net, int neighbours) {
   return found;
 }
 
-/// Flights of one vehicle among neighbours anywhere in their boxes, evaluated without the functions under test.
+/// Values of f for neighbours anywhere in their boxes, evaluated without the functions under test.
 class Flown {
  public:
   explicit Flown(const Network& net) : net_(net), random_(3) {
@@ -154,7 +154,8 @@ std::vector<Stated> all_stated(const Network& net, int neighbours) {
   return result;
 }
 
-/// The largest step by which a neighbour that came or went ended or made a silent composition.
+/// Checks random compositions against the certified values. Returns the largest step to or from a silent composition
+/// when a neighbour enters or leaves.
 double expect_flights_within(const Network& net, int neighbours) {
   const std::vector<Stated> all = all_stated(net, neighbours);
   EXPECT_EQ(all.size(), 2 * 4 * static_cast<std::size_t>(neighbours))
@@ -243,7 +244,7 @@ TEST(Silent, UpperBoundsAndLawsStayOnBoxesAsWellAndWitnessesAreAmongOtherNeighbo
     ASSERT_EQ(found.bounds.size(), plain.bounds.size());
     for (std::size_t i = 0; i < found.bounds.size(); ++i) {
       const CertifiedBound &bound = found.bounds[i], &same = plain.bounds[i];
-      // Branch and bound ends where it is close to a witness, and these are others.
+      // Branch and bound stops close to a witness, and the witnesses differ.
       EXPECT_LE(std::abs(bound.upper.value() - same.upper.value()), (on_box ? 0.05 : 0) * same.upper.value());
       std::vector<files::FunctionId> there = bound.lower.other_networks;
       there.push_back(bound.function.input_part());
@@ -286,7 +287,7 @@ TEST(Silent, CellsOfAMapAreWitnessedAmongOtherNeighbours) {
   EXPECT_GE(witnesses, 12);
 }
 
-/// What holds of rho of a sum is false where the function is 0 instead.
+/// Statements about rho of a sum are false if the function is 0 instead.
 TEST(Silent, TheCheckerRefusesWhatIsTrueOfTheNetworkThatIsNeverSilentOnly) {
   const Network plain = two_kinds({});
   const lipschitz::Certification found = with_values(plain, 2);
@@ -319,7 +320,7 @@ TEST(Silent, TheCheckerRefusesWhatIsTrueOfTheNetworkThatIsNeverSilentOnly) {
 }
 
 TEST(Silent, FromTheFirstLayerOnTheStepIsBoundedByWhatItIsBesideSilence) {
-  // One input and no rounding: f = 5 + x beside silence, |x| <= 1; the network itself moves by 1 at most.
+  // One input, no round-off: f = 5 + x next to silence, |x| <= 1; the network itself changes by at most 1.
   Network net =
       tests::deep_set(tests::weights({tests::layer(1, 1, {1})}), tests::weights({tests::layer(1, 1, {1})}));
   net.rho.at("default").layers[0].biases[0] = 5;

@@ -1,4 +1,4 @@
-/// Slope maps: every cell's number is above each slope in it and at least the slope of its witness.
+/// Slope maps: the upper bound of a cell is at least every slope in it, including that of its witness.
 #include "lipschitz/slope_map.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ std::vector<SlopeMap> maps_of(const files::Network& network, const SlopeMapOptio
 }
 
 TEST(SlopeMap, SeesWhereTheNetworkIsFlat) {
-  // f(x, y) = 3 relu(x): slope 3 for x > 0, none for x < 0.
+  // f(x, y) = 3 relu(x): slope 3 for x > 0, slope 0 for x < 0.
   const files::Network network = plain(weights({layer(1, 2, {3, 0}), layer(1, 1, {1})}));
   const std::vector<SlopeMap> maps = maps_of(network, map_of({{-1, -1}, {1, 1}}, {4, 2}));
   ASSERT_EQ(maps.size(), 1u);
@@ -130,7 +130,7 @@ TEST(SlopeMap, IsTheSameForAnyNumberOfThreadsAndHasOneMapPerSetFunction) {
 }
 
 TEST(SlopeMap, OtherNeighboursOfWitnessesAreAnywhereInTheirBox) {
-  // f(x) = rho(x_0 + sum of the others), rho(s) = relu(s - 1.5): steep where x_0 <= 0 through others elsewhere alone.
+  // f(x) = rho(x_0 + sum of the others), rho(s) = relu(s - 1.5): for x_0 <= 0, f is steep only because of the others.
   files::Weights rho = weights({layer(1, 1, {1}), layer(1, 1, {1})});
   rho.layers[0].biases[0] = -1.5;
   const files::Network network =
@@ -148,10 +148,10 @@ TEST(SlopeMap, OtherNeighboursOfWitnessesAreAnywhereInTheirBox) {
   }
 }
 
-/// Of networks with other activations, with the bounds of the whole box beside them.
+/// A map of a network with activations other than ReLU, and the bounds on the whole box.
 struct SmoothMap {
   Certification found;
-  SlopeMap map;  ///< of the last function that has one
+  SlopeMap map;  ///< the map of the last function that has one
 };
 
 SmoothMap smooth_map(const files::Network& network, const SlopeMapOptions& options) {
@@ -164,8 +164,8 @@ SmoothMap smooth_map(const files::Network& network, const SlopeMapOptions& optio
   return result;
 }
 
-/// No cell is above the bound of the whole box, one at most `share` of it, and above all that is found in it: by the
-/// map, and by a longer climb from other starts.
+/// Expects that no cell exceeds the bound of the whole box, that some cell is at most `share` of it, and that each cell
+/// is above the slopes found in it by the map and by a longer climb from other starts.
 void expect_sound(const files::Network& network, const SlopeMapOptions& options, const std::string& name,
                   double share = 0.9) {
   SCOPED_TRACE(name);
@@ -220,7 +220,7 @@ TEST(SlopeMap, OfSmoothNetworksNoClimbedSlopeExceedsItsCell) {
   expect_sound(plain(with_skip), options, "tanh:6, silu:6");
   mixed.set_activations({A::kTanh, A::kMaxMinPairs});
   expect_sound(plain(mixed), options, "tanh, maxmin:pairs",
-               0.95);  // the product, by each layer's steepest neuron
+               0.95);  // the bound is the product with the steepest neuron of each layer
 }
 
 TEST(SlopeMap, OfSmoothSetFunctionsHoldsWhereverTheOthersAre) {
@@ -239,7 +239,7 @@ TEST(SlopeMap, OfSmoothSetFunctionsHoldsWhereverTheOthersAre) {
 }
 
 TEST(SlopeMap, SeesWhereTanhIsFlat) {
-  // f(x, y) = tanh(3 x): the slope is 3 (1 - tanh(3 x)^2), steepest at the end of a cell that is nearest to 0.
+  // f(x, y) = tanh(3 x): the slope is 3 (1 - tanh(3 x)^2), largest at the point of a cell that is nearest to 0.
   const files::Network network =
       plain(tests::with(weights({layer(1, 2, {3, 0}), layer(1, 1, {1})}), files::Activation::kTanh));
   const SmoothMap smooth = smooth_map(network, map_of({{-2, -1}, {2, 1}}, {8, 2}));

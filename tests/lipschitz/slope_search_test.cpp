@@ -43,7 +43,7 @@ double product_of_norms(const std::vector<const files::Weights*>& networks) {
   return product;
 }
 
-/// The stated slope is the exact slope of the points, so whoever has the points can check it.
+/// Checks that the stated slope is the exact slope between the points.
 testing::AssertionResult proves_its_slope(const SlopeFunction& f, const SlopeWitness& witness,
                                           const std::vector<int>& block = {}) {
   const double exact = slope(f, witness, block).value();
@@ -59,7 +59,7 @@ void expect_within(const std::vector<float>& x, const Box& box) {
 }
 
 TEST(SlopeSearch, StartsAtPlacesAndWithTheirOtherNeighbours) {
-  // f(x) = rho(x + x_1), rho(s) = s + 100 relu(s - 1.999): steep only where both are near 1.
+  // f(x) = rho(x + x_1), rho(s) = s + 100 relu(s - 1.999): steep only if both are near 1.
   const files::Weights phi = chain_of({tests::layer(1, 1, {1})});
   files::Weights rho = chain_of({tests::layer(3, 1, {1, -1, 1}), tests::layer(1, 3, {1, -1, 100})});
   rho.layers[0].biases[2] = -1.999;
@@ -74,7 +74,7 @@ TEST(SlopeSearch, StartsAtPlacesAndWithTheirOtherNeighbours) {
   const SlopeWitness found = search_slope(f, options);
   EXPECT_NEAR(found.slope.value(), 101, 1e-3);
   EXPECT_TRUE(proves_its_slope(f, found));
-  options.box = cube(1, -1, 0.9995);  // the place is put into the box
+  options.box = cube(1, -1, 0.9995);  // the place is projected into the box
   EXPECT_NEAR(search_slope(f, options).slope.value(), 101, 1e-2);
   options.regions = 0;
   EXPECT_THROW(search_slope(f, options), std::invalid_argument);
@@ -95,7 +95,7 @@ TEST(SlopeSearch, StaysBelowTheProductOfSpectralNorms) {
 }
 
 TEST(SlopeSearch, FindsTheSteepestRegionOfANetworkOfOneInput) {
-  // Slopes on the line, by pieces: 0, 1, -2 (on (1, 1.001), the narrow steepest piece), 0.5.
+  // Slopes of the pieces from left to right: 0, 1, -2 (on (1, 1.001), the narrow steepest piece), 0.5.
   const files::Weights net =
       chain_of({{"fc1", 3, 1, {1, 1, 1}, {0, -1, -1.001}}, {"fc2", 1, 3, {1, -3, 2.5}, {0}}});
   EXPECT_NEAR(search_slope(slope_of(net), few_search_rounds()).slope.value(), 2, 1e-3);
@@ -145,7 +145,7 @@ TEST(SlopeSearch, SolvesTheCounterexampleToLipSdpNetwork) {
 TEST(SlopeSearch, DoesNotDependOnTheUnitsOfTheInputs) {
   std::mt19937 generator(11);
   const files::Weights net = random_network({3, 10, 10, 2}, generator);
-  files::Weights scaled = net;  // every input in units 2^20 times smaller
+  files::Weights scaled = net;  // the same with inputs in units 2^20 times smaller
   for (double& weight : scaled.layers[0].weights) weight *= 0x1p-20;
   const double reference = search_slope(slope_of(net), few_search_rounds()).slope.value();
   EXPECT_NEAR(search_slope(slope_of(scaled), few_search_rounds()).slope.value() * 0x1p20, reference,
@@ -153,7 +153,7 @@ TEST(SlopeSearch, DoesNotDependOnTheUnitsOfTheInputs) {
 }
 
 TEST(SlopeSearch, DuplicatedAndOppositeNeuronsAreFine) {
-  // |x| = relu(x) + relu(-x), each twice; all four kinks coincide.
+  // |x| = relu(x) + relu(-x) with each neuron duplicated; all four kinks coincide.
   const files::Weights net =
       chain_of({{"fc1", 4, 1, {1, -1, 1, -1}, {0, 0, 0, 0}}, {"fc2", 1, 4, {1, 1, 1, 1}, {0}}});
   EXPECT_EQ(search_slope(slope_of(net), few_search_rounds()).slope.value(), 2);
@@ -185,7 +185,7 @@ TEST(SlopeSearch, MoreRoundsNeverFindLess) {
 TEST(SlopeSearch, PointsStayInTheBox) {
   std::mt19937 generator(2);
   const files::Weights net = random_network({4, 12, 12, 3}, generator);
-  const double third = 1.0 / 3;  // not a float: rounding must go inwards
+  const double third = 1.0 / 3;  // not a float32 number, so it must be rounded inwards
   const std::vector<Box> boxes = {cube(4, -third, third), {{0, 0.1, -2, 5}, {1, 0.1 + 1e-6, 1e5, 5}}};
   for (const Box& box : boxes) {
     SlopeSearchOptions options = few_search_rounds();
@@ -213,7 +213,7 @@ TEST(SlopeSearch, OnlyTheBlockMoves) {
 }
 
 TEST(SlopeSearch, AKinkOnTheEdgeOfTheBoxIsNoObstacle) {
-  // f(x, y) = 3 relu(x) where x >= 0.
+  // f(x, y) = 3 relu(x) on x >= 0.
   const files::Weights net = chain_of({{"fc1", 1, 2, {3, 0}, {0}}, {"fc2", 1, 1, {1}, {0}}});
   SlopeSearchOptions options = few_search_rounds();
   options.box = Box{{0, -1}, {0.5, -0.5}};
@@ -345,7 +345,7 @@ struct Target {
 
 TEST(SlopeSearch, PublishedNetworksReachTheBestKnownSlopesFromMostSeeds_slow) {
   SWARMCERT_NEEDS_DATA();
-  // Best values known before, by evolution strategies and branch and bound.
+  // Best previously known values, from evolution strategies and branch and bound.
   for (const Target target : {Target{"phi_L", 21.88}, Target{"phi_S", 21.80}, Target{"phi_G", 14.83},
                               Target{"rho_L", 19.55}, Target{"rho_S", 15.92}}) {
     SCOPED_TRACE(target.file);

@@ -1,4 +1,4 @@
-/// Bounds and certificates of networks with other activations than ReLU.
+/// Bounds and certificates of networks with activations other than ReLU.
 #include <cmath>
 
 #include "lipschitz/certify.h"
@@ -43,7 +43,7 @@ double upper_of(const Certification& found, const files::FunctionId& function) {
   return 0;
 }
 
-/// rho(phi(x) + s) with phi(x) + s evaluated where one neighbour moves and s stays.
+/// Returns the largest sampled slope of rho(phi(x) + s), where one neighbour moves and s is fixed.
 double sampled_set_slope(const files::Weights& phi, const files::Weights& rho, std::mt19937& generator,
                          int samples) {
   const files::Evaluator<double> inner(phi), outer(rho);
@@ -163,7 +163,7 @@ TEST(SmoothBounds, TheStageBehindAnActivationIsMultipliedByItsSlope) {
     for (std::size_t i = 0; i < folded[k].entries.size(); ++i)
       EXPECT_EQ((folded[k].entries[i] * (k == 0 ? 1.0 : 4.0) - plain[k].entries[i]).sign(), 0);
   }
-  // Without a hidden layer in phi no activation is in front of the product.
+  // Without a hidden layer in phi there is no activation before the product of phi's last and rho's first layer.
   const Network linear =
       tests::deep_set(tests::random_network({3, 5}, generator), with(rho, Activation::kSigmoid));
   const auto first = check::stages(linear, "set:default:default");
@@ -243,7 +243,7 @@ TEST(SmoothCertificate, IsRejectedWithAnyClaimBelowWhatIsProved) {
       EXPECT_NE(checked(changed).reason.find("claims less than"), std::string::npos) << list << " " << i;
     }
   }
-  // Not even where ReLU, whose slopes are four times as steep, would allow the factor 1/4 to be left out.
+  // It is also refused for ReLU, whose slopes are four times as steep: stating ReLU must not drop the factor 1/4.
   const Network relu = tests::deep_set(smooth_set().phi.at("default"),
                                        with(smooth_set().rho.at("default"), Activation::kRelu));
   Json changed = smooth_certificate();
@@ -290,7 +290,7 @@ TEST(SmoothCertificate, OfTheProductIsRejectedForABlockThatIsNone) {
 TEST(SmoothCertificate, StatesTheActivationForFilesThatDoNot) {
   Network unstated = smooth_set();
   for (files::Weights* const weights : {&unstated.phi.at("default"), &unstated.rho.at("default")}) {
-    tests::set_activation(*weights, Activation::kRelu);  // as it is assumed
+    tests::set_activation(*weights, Activation::kRelu);  // the default
     weights->order_source = files::OrderSource::kNames;
   }
   EXPECT_FALSE(checked(smooth_certificate(), unstated).accepted) << "check() itself takes NET as it is";

@@ -100,7 +100,7 @@ TEST(Sorting, TheProductIsAttainedByOrthogonalLayersAndBelowTheBoundThatReluGive
   EXPECT_GT(certify(tests::plain(relu), quick()).bounds.front().upper.value(), 1.2);
 }
 
-/// A certificate of a network with `activation`, whose file does not state it.
+/// Returns the certificate of a network whose file does not state its activation.
 Json certificate_of(const Network& network) {
   return lipschitz::certificate(network, certify(network, quick()));
 }

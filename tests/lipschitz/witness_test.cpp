@@ -26,7 +26,7 @@ files::Weights tiny() {
   return network({layer(2, 2, {1, -1, 0, 1}, {0, 0}), layer(2, 2, {3, -1, 0, 1}, {0, 0})});
 }
 
-/// A 3-4-5-2 network with weights that are not round in binary.
+/// Returns a 3-4-5-2 network whose weights have many binary digits.
 files::Weights irregular() {
   std::vector<double> numbers;
   for (int i = 0; i < 60; ++i) numbers.push_back(static_cast<float>(((i * 37) % 23 - 11) / 7.0));
@@ -74,7 +74,7 @@ TEST(Witness, ReversedItGivesTheSameSlope) {
 TEST(Witness, PermutedAndRescaledNeuronsLeaveItUnchanged) {
   const files::Weights net = irregular();
   files::Weights other = net;
-  // Neurons 0 and 2 of the first hidden layer change places; the new neuron 2 is scaled by 2^-3.
+  // Swaps neurons 0 and 2 of the first hidden layer and scales the new neuron 2 by 2^-3.
   for (int j = 0; j < 3; ++j) {
     std::swap(other.layers[0].weights[0 * 3 + j], other.layers[0].weights[2 * 3 + j]);
     other.layers[0].weights[2 * 3 + j] *= 0.125;
