@@ -57,7 +57,7 @@ SORTING_STATEMENT = (
     " Of the numbers t_1, t_2, ... of a layer, groupsort:k sorts each k side by side, the smallest first; "
     "maxmin:halves, of 2 h numbers, is max(t_i, t_(i+h)) for i = 1 .. h and then min(t_i, t_(i+h)); "
     "maxmin:pairs is max(t_(2i-1), t_(2i)) for i = 1 .. h and then min(t_(2i-1), t_(2i)).")
-# Added for networks with a skip connection past another activation than ReLU.
+# Added for networks with a skip connection past an activation other than ReLU.
 KEEPING_STATEMENT = (
     " tanh:n, and so with other names, is that function of each of the first n numbers of a layer and leaves the "
     "others as they are.")
@@ -73,22 +73,22 @@ SILENT_STATEMENT = (
     "are 0. Bounds and laws hold while the neighbours stay the same, lower bounds at witnesses among other neighbours "
     "than these. Ranges hold this 0, and jumps bound the steps as well by which one neighbour that comes or goes makes "
     "or ends such a composition, while all are in the box or clamp: ")
-# The map to a neighbour's is 3/2-Lipschitz: the three norms change by at most the square root of the largest eigenvalue
-# of I + (1, 1/2)' (1, 1/2), which is 1 + 1 + 1/4; the ground's is 1-Lipschitz.
+# The map to the invariants of a neighbour is 3/2-Lipschitz: the three norms change by at most the square root of the
+# largest eigenvalue of I + (1, 1/2)' (1, 1/2), which is 1 + 1 + 1/4. The map for the ground is 1-Lipschitz.
 SLOPE_OF_INVARIANTS, SLOPE_OF_GROUND_INVARIANTS = Fraction(3, 2), Fraction(1)
 
 
-# What lies between layers, by the name that a chain gives it: its slopes are in [0, steepest] where it is monotone,
-# else in [1 - steepest, steepest], because s(t) - t / 2 is even.
+# Activations by their name in a chain, with their steepest slope: slopes are in [0, steepest] if the activation is
+# monotone, else in [1 - steepest, steepest], because s(t) - t / 2 is even.
 MONOTONE = {"relu": Fraction(1), "tanh": Fraction(1), "sigmoid": Fraction(1, 4), "softplus": Fraction(1),
             "elu": Fraction(1),
             # at least 1.0507009873554805 * 1.6732632423543772
             "selu": Fraction(0x1c212cc640f031, 2 ** 52)}
-# These act on whole layers and are 1-Lipschitz; the width of a layer is a multiple of the number.
+# Operations that act on whole layers and are 1-Lipschitz; the width of a layer must be a multiple of the number.
 SORTING = {"maxmin:halves": 2, "maxmin:pairs": 2, **{f"groupsort:{k}": k for k in range(2, 65)}}
 STEEPEST = {**MONOTONE, "silu": 1 + Fraction(0x1999, 2 ** 16), "gelu": 1 + Fraction(0x211, 2 ** 12),
             **dict.fromkeys(SORTING, Fraction(1))}
-# Around the slope 1 of numbers that an activation leaves as they are, on a box.
+# Enclosure of the slope 1 of entries that an activation leaves unchanged, for bounds on a box.
 KEPT_SLOPES = (1 - Fraction(1, 2 ** 24), Fraction(1))
 
 
@@ -97,7 +97,7 @@ class Rejected(Exception):
 
 
 class BadInput(Exception):
-    """A weight file, network.toml or option that is wrong in itself or contradicts another one."""
+    """A weight file, network.toml or option that is invalid or contradicts another one."""
 
 
 def require(condition, reason):
@@ -106,7 +106,7 @@ def require(condition, reason):
 
 
 def require_input(condition, reason):
-    """In place of `assert`, which `python3 -O` drops: a checker must refuse however it is run."""
+    """Replaces `assert`, which `python3 -O` removes: the checker must refuse invalid input in every mode."""
     if not condition:
         raise BadInput(reason)
 
@@ -116,7 +116,7 @@ def f32(x):
 
 
 def f32_of(decimal):
-    """A decimal rounded once. By way of double it would be rounded twice, which matters in the middle between
+    """Rounds a decimal to float32 in one step. Via double it would be rounded twice, which matters halfway between two
     floats."""
     double = float(decimal)
     near = f32(double)
@@ -131,7 +131,7 @@ def f32_of(decimal):
 # --- exact numbers -------------------------------------------------------------------------------------------------
 
 def dyadics(values):
-    """Doubles as integers over one power of two: (integers, exponent)."""
+    """Returns doubles as integers times one power of two: (integers, exponent)."""
     ratios = [x.as_integer_ratio() for x in values]
     exponent = -max((d.bit_length() - 1 for _, d in ratios), default=0)
     return [n << (-exponent - d.bit_length() + 1) for n, d in ratios], exponent
@@ -226,7 +226,7 @@ def require_keys(value, keys, where):
 
 
 def encode(value):
-    """The bytes that content_sha256 hashes: independent of white space and of the order of members."""
+    """Returns the bytes hashed by content_sha256, which do not depend on white space or on the order of members."""
     if value is None:
         return b"n"
     if isinstance(value, bool):
@@ -249,7 +249,7 @@ def content_sha256(document):
 # --- weight files --------------------------------------------------------------------------------------------------
 
 class Layer:
-    """`kept`: how many of the outputs, the last ones, the activation behind it leaves as they are."""
+    """`kept`: number of outputs, the last ones, that the activation behind the layer leaves unchanged."""
 
     def __init__(self, name, outputs, inputs, weights, biases, kept=0):
         self.name, self.outputs, self.inputs, self.weights, self.biases = name, outputs, inputs, weights, biases
@@ -265,7 +265,7 @@ def identity_layer(name, size):
 
 
 def numbered_before(a, b):
-    """Whether the names first differ in a number, and that of `a` is smaller."""
+    """Returns whether the names first differ in a number and the number of `a` is smaller."""
     for x, y in zip(natural(a), natural(b)):
         if x != y:
             return isinstance(x, int) and isinstance(y, int) and x < y
@@ -273,7 +273,8 @@ def numbered_before(a, b):
 
 
 def orders_of(layers, by_number, used=()):
-    """Every order in which each layer takes what the one before gives; `by_number`: and the names' numbers allow."""
+    """Yields every order in which the inputs of each layer fit the outputs of the previous one and, with `by_number`,
+    that agrees with the numbers in the names."""
     if len(used) == len(layers):
         yield [layers[i] for i in used]
     for i, layer in enumerate(layers):
@@ -285,7 +286,7 @@ def orders_of(layers, by_number, used=()):
 
 
 def in_order(layers, listing, stated):
-    """The layers in the order of evaluation. `listing`: what their order in the file means, "evaluation",
+    """Returns the layers in the order of evaluation. `listing`: meaning of their order in the file, "evaluation",
     "registration" or "none"."""
     if stated:
         by_name = {layer.name: layer for layer in layers}
@@ -326,8 +327,8 @@ class Weights:
         require_input(all(a.outputs == b.inputs for a, b in zip(self.layers, self.layers[1:])),
                       "a layer does not take what the one before gives")
         self.precision = "float32" if precision in ("float16", "bfloat16") else precision
-        # Of each layer but the last. None: the file does not state them. One that states the order of the layers states
-        # ReLU unless its reader says more.
+        # Activations of all layers but the last. None: the file does not state them. A file that states the order of
+        # the layers states ReLU unless its reader finds other activations.
         self.activations = ["relu"] * (len(self.layers) - 1) if listing == "evaluation" else None
         self.sha256 = hashlib.sha256(data).hexdigest()
 
@@ -338,7 +339,8 @@ class Weights:
         return set(self.between()) <= {"relu"}
 
     def state(self, names):
-        """One name for all, or one for each layer but the last, or one more, which an identity layer follows."""
+        """Sets the activations: one name for all layers, or one for each layer but the last, or one for each layer, in
+        which case an identity layer is appended."""
         if len(names) == 1:
             names = names * (len(self.layers) - 1)
         require_input(all(name in STEEPEST for name in names), f"an activation of {names} is unknown")
@@ -382,7 +384,7 @@ class Tensor:
         self.storage, self.offset, self.shape, self.strides = storage, offset, shape, strides
 
     def numbers(self, data):
-        """Row-major, from the storage's bytes."""
+        """Returns the numbers in row-major order from the bytes of the storage."""
         flat = unpack(self.storage[0].precision, data)
         indices = [self.offset]
         for size, stride in zip(self.shape, self.strides):
@@ -391,7 +393,7 @@ class Tensor:
 
 
 class TorchUnpickler(pickle.Unpickler):
-    """An allow-list: nothing of the file is executed."""
+    """Accepts only the types of an allow-list, so that no code of the file is executed."""
 
     def find_class(self, module, name):
         if (module, name) == ("collections", "OrderedDict"):
@@ -475,7 +477,7 @@ def varint(data, at):
 
 
 def protobuf(data):
-    """(field number, value) of a message; values of length-delimited and fixed fields are bytes."""
+    """Yields (field number, value) of a message; values of length-delimited and fixed fields are bytes."""
     at = 0
     while at < len(data):
         tag, at = varint(data, at)
@@ -489,7 +491,7 @@ def protobuf(data):
 
 
 def integers_of(value):
-    """Of a repeated field, whether it came as one number or packed."""
+    """Returns the integers of a repeated field, which may be stored as single numbers or packed."""
     if isinstance(value, int):
         return [value]
     result, at = [], 0
@@ -500,7 +502,7 @@ def integers_of(value):
 
 
 class OnnxNode:
-    """`attributes`: fields of each by name. `parts`: the nodes that this one stands for."""
+    """`attributes`: fields of each attribute by name. `parts`: the nodes that this node replaces."""
 
     def __init__(self, kind, inputs, outputs, attributes, parts=()):
         self.kind, self.inputs, self.outputs, self.attributes, self.parts = kind, inputs, outputs, attributes, parts
@@ -521,7 +523,7 @@ class OnnxNode:
         return [signed(k) for n, v in self.attributes.get(name, []) if n == 8 for k in integers_of(v)]
 
     def has_only(self, number_, name, values):
-        """Whether the attribute is left out or its field `number_` has one of `values`."""
+        """Returns whether the attribute is absent or its field `number_` has one of `values`."""
         return all(v in values for n, v in self.attributes.get(name, []) if n == number_)
 
 
@@ -545,7 +547,7 @@ class OnnxTensor:
 
 
 def group_from(node, takers):
-    """The nodes that compute one activation together and of which `node` is the first, the last one behind them."""
+    """Returns the nodes that together compute one activation, starting with `node`; the last node comes last."""
     if len(node.inputs) == 0 or len(node.outputs) == 0:
         return []
     x, y = node.inputs[0], node.outputs[0]
@@ -572,8 +574,8 @@ def group_from(node, takers):
 
 
 def with_groups_joined(nodes):
-    """Each group as one node in the place of its last one: "Swish", "MaxMin" of halves, "PairsMaxMin". What else takes
-    a value from inside of a group takes one that is not known any more, and is refused."""
+    """Replaces each group by one node at the position of its last node: "Swish", "MaxMin" of halves, "PairsMaxMin".
+    Another node that uses a value inside a group then refers to an unknown value and is refused."""
     takers = {}
     for node in nodes:
         for name in set(node.inputs):
@@ -590,11 +592,11 @@ def with_groups_joined(nodes):
 
 
 ACTIVATIONS_OF_ONNX = {"Relu": "relu", "Tanh": "tanh", "Sigmoid": "sigmoid", "Softplus": "softplus", "Elu": "elu",
-                       "Celu": "elu", "Gelu": "gelu", "Swish": "silu"}  # with their alpha, 1
+                       "Celu": "elu", "Gelu": "gelu", "Swish": "silu"}  # with alpha = 1
 
 
 def stores(stored, node):
-    """Whether the node is a constant, or another name of one: then `stored` has it."""
+    """Returns whether the node is a constant or an alias of one; if so, adds it to `stored`."""
     if node.kind == "Constant":
         stored[node.outputs[0]] = OnnxTensor(next(v for n, v in node.attributes["value"] if n == 5))
         return True
@@ -611,7 +613,7 @@ def require_no_factors(node):
 
 
 def layer_name(weight, names):
-    """Of the layer with these weights, behind layers that have `names`."""
+    """Returns the name of the layer with these weights, given the `names` of the previous layers."""
     name = weight[:-7] if weight.endswith(".weight") and len(weight) > 7 else weight
     while not name or name in names:
         name = f"layer{len(names) + 1}" + (f"_{name}" if name else "")
@@ -619,14 +621,14 @@ def layer_name(weight, names):
 
 
 class OnnxChain:
-    """Linear layers with an activation behind each, the last one possibly not, which take one another's results."""
+    """A chain of linear layers, each followed by an activation, which is optional for the last layer."""
 
     def __init__(self, stored, value, shape):
-        """`shape` of the input; its last size is None where the file leaves it open."""
+        """`shape`: shape of the input; its last size is None if the file does not state it."""
         self.stored, self.value, self.shape = stored, value, shape
         self.layers = []  # [name, rows of the stored matrix, biases]
         self.kinds, self.activations, self.is_activated = set(), [], False
-        self.order = None  # in which the next layer takes what is sorted, where it is another
+        self.order = None  # permutation of the sorted entries before the next layer, if any
 
     def follow(self, node):
         if stores(self.stored, node):
@@ -680,7 +682,7 @@ class OnnxChain:
         self.is_activated = True
 
     def integers_at(self, node, k, attribute):
-        """What older operator sets hold in an attribute, newer ones in input `k`."""
+        """Returns integers that older operator sets store in an attribute and newer ones in input `k`."""
         if attribute in node.attributes:
             return node.integers(attribute)
         return self.stored[node.inputs[k]].numbers if k < len(node.inputs) and node.inputs[k] else []
@@ -706,7 +708,7 @@ class OnnxChain:
         self.shape = sizes
 
     def is_last_axis(self, axis, shape):
-        """Whether the whole value lies along this axis."""
+        """Returns whether all entries of the value are along this axis."""
         return axis in (-1, len(shape) - 1) and math.prod(shape) == shape[-1]
 
     def halves(self, node):
@@ -738,8 +740,9 @@ class OnnxChain:
 
 
 class OnnxFolding:
-    """A graph with skip connections as a chain of layers. Every value is an affine map of the last layer's outputs,
-    each number of it rounded once where it is no double: (rows {column: factor}, shifts, name of its first weight)."""
+    """Converts a graph with skip connections to a chain of layers. Every value is an affine map of the outputs of the
+    last layer: (rows {column: factor}, shifts, name of its first weight). Numbers that are not doubles are rounded
+    once."""
 
     def __init__(self, stored, value, shape):
         self.stored, self.layers, self.ops, self.is_exact, self.is_double = stored, [], [], True, False
@@ -757,7 +760,7 @@ class OnnxFolding:
         return result
 
     def sums(self, terms):
-        """Rows of columns and exact factors, summed up."""
+        """Returns sums of rows, each given by columns and exact factors."""
         result = {}
         for column, factor in terms:
             result[column] = result.get(column, 0) + factor
@@ -808,8 +811,8 @@ class OnnxFolding:
         return shift >= 0 and behind_relu and all(x > 0 for x in row.values())
 
     def activated(self, op, value, needed):
-        """What is needed later passes a smooth activation as it is; of ReLU, as x where x >= 0, else as relu(x) -
-        relu(-x)."""
+        """Applies an activation. Values that are needed later pass a smooth activation unchanged; they pass a ReLU as x
+        if x >= 0, else as relu(x) - relu(-x)."""
         rows, shifts, kept_from = [], [], {}
 
         def taken(row, shift):
@@ -890,7 +893,7 @@ class OnnxFolding:
 
 
 def input_shape(message):
-    """Of a ValueInfoProto; without one, a row of any size."""
+    """Returns the shape in a ValueInfoProto; without one, a row of any size."""
     def inside(data, numbers):
         found = [data]
         for number_ in numbers:
@@ -923,7 +926,7 @@ def read_onnx(data, order):
     for node in joined:
         chain.follow(node)
     require_input([name for name, _ in named(12)] == [chain.value], "the chain does not end at the graph's output")
-    if chain.is_activated:  # what ends in an activation is followed by the identity
+    if chain.is_activated:  # a final activation is followed by an identity layer
         size = len(chain.layers[-1][1])
         which = chain.order or range(size)
         name = layer_name("", [name for name, _, _ in chain.layers])
@@ -961,7 +964,7 @@ def read_c_source(data, key, order):
 
 
 def read_weights(path, key="", order=None, activation=None):
-    """`activation` is what network.toml or the user states: names separated by commas."""
+    """Reads a weight file. `activation`: activations stated by network.toml or the user, separated by commas."""
     weights = read_file(path, key, order)
     if activation is not None:
         weights.state(activation.split(","))
@@ -988,13 +991,13 @@ RELATIVE_STATE = ["dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_
 
 
 class Network:
-    """parts by name ("network", "phi:<kind>", "rho:<kind>"), and what network.toml states."""
+    """The parts by name ("network", "phi:<kind>", "rho:<kind>") and the statements of network.toml."""
 
     def __init__(self, net="", phi="", rho="", key="", orders=None, activation=None):
-        """orders: of layers, by "network", "phi" and "rho"; those of a network.toml stand there."""
+        """orders: orders of layers by "network", "phi" and "rho"; a network.toml states its own."""
         orders = orders or {}
         self.sha256, self.unit, self.order, self.clamp, self.invariants = "", "", [], None, False
-        self.silent = set()  # (kind of the vehicle, kinds of its neighbours in order) where it has no network
+        self.silent = set()  # (kind of the vehicle, sorted kinds of its neighbours) for which it has no network
         if phi:
             self.parts = {f"{role}:default": read_weights(file, key, orders.get(role), activation)
                           for role, file in (("phi", phi), ("rho", rho))}
@@ -1037,7 +1040,7 @@ class Network:
             self.parts = {"network": read_weights(net, key, orders.get("network"), activation)}
 
     def chain(self, part):
-        """(op, layer, inputs, outputs) of each operation."""
+        """Returns (op, layer, inputs, outputs) of each operation."""
         layers = self.parts[part].layers
         clamps = self.clamp and part != "phi:ground" and not part.startswith("rho:")
         result = [("clamp", None, layers[0].inputs, layers[0].inputs)] if clamps else []
@@ -1051,18 +1054,19 @@ class Network:
         return self.invariants and function.startswith("set:")
 
     def is_silent_among(self, function, parts):
-        """Whether a set function is 0 among these neighbours, "phi:<kind>" each, besides the ground."""
+        """Returns whether a set function is 0 for these neighbours, "phi:<kind>" each; the ground is ignored."""
         kinds = sorted(part[4:] for part in parts if part != "phi:ground")
         return function.startswith("set:") and (function.rpartition(":")[2], tuple(kinds)) in self.silent
 
     def silent_up_to(self, function, most):
-        """Number of silent compositions that consist of 0 to `most` neighbours of the function's own kind."""
+        """Returns the number of silent compositions of 0 to `most` neighbours of the function's own kind."""
         kind, _, own = function[4:].partition(":")
         return sum(function.startswith("set:") and vehicle == own and len(kinds) <= most and set(kinds) <= {kind}
                    for vehicle, kinds in self.silent)
 
     def beside_silent(self, function):
-        """Compositions with a network that one neighbour of the function's own kind makes of a silent one, or ends."""
+        """Returns the compositions with a network that become silent when one neighbour of the function's own kind
+        enters or leaves."""
         kind, _, own = function[4:].partition(":")
         found = set()
         for vehicle, kinds in self.silent:
@@ -1079,7 +1083,7 @@ class Network:
         return ["+".join(kinds) + ">" + own for own, kinds in sorted(self.silent)]
 
     def slope_of_inputs(self, function):
-        """Lipschitz constant of the map from the function's inputs to what its first layer sees."""
+        """Returns the Lipschitz constant of the map from the function's inputs to the inputs of its first layer."""
         if not self.maps_to_invariants(function):
             return Fraction(1)
         return SLOPE_OF_GROUND_INVARIANTS if function.startswith("set:ground:") else SLOPE_OF_INVARIANTS
@@ -1133,10 +1137,11 @@ def unit_of(network, function, block):
 # --- the mathematics -----------------------------------------------------------------------------------------------
 
 def stages(network, function, block, scale, divided=True):
-    """The matrices between the activations, from the block's inputs in units of their scale to the output. An
-    activation of slopes in [0, b] is b times one of slopes in [0, 1]: b goes to the columns behind it of what it does
-    not keep. Others, and all if not `divided`, stay as they are. Of a function of rotation invariants, the inputs are
-    those, times the slope of the map to them."""
+    """Returns the matrices between the activations, from the inputs of the block, in units of their scale, to the
+    output. An activation with slopes in [0, b] is b times one with slopes in [0, 1]: b is multiplied into the columns
+    behind it, except those of kept entries. Other activations are unchanged, as are all if not `divided`. For a
+    function of rotation invariants, the inputs are the invariants, and the first matrix is multiplied by the slope of
+    the map to them."""
     names = networks_of(function)
     require(all(name in network.parts for name in names), f"there is no {function}")
     inputs = network.parts[names[0]].layers[0].inputs
@@ -1161,9 +1166,9 @@ def stages(network, function, block, scale, divided=True):
 
 
 def lmi(chain, rho, t):
-    """The matrix P(rho, t) over the hidden increments dz whose positive semidefiniteness gives |df|^2 <= rho |dx|^2:
-    from rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_i t_i dz_i (dy_i - dz_i) >= 0, minimised over dx and multiplied by
-    rho."""
+    """Returns the matrix P(rho, t) over the hidden increments dz whose positive semidefiniteness proves
+    |df|^2 <= rho |dx|^2: the form rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_i t_i dz_i (dy_i - dz_i) >= 0, minimised over
+    dx and multiplied by rho."""
     (rho_integer,), rho_exponent = dyadics([rho])
     if len(chain) == 1:
         m = chain[0]
@@ -1201,17 +1206,18 @@ def lmi(chain, rho, t):
 
 
 def slope_ranges(network, function):
-    """Per hidden neuron: slopes of stages() lie in [0, 1], or in [1 - c, c], c > 1, where they are not divided by c; 1,
-    of what is kept, is in both."""
+    """Returns the slope range of each hidden neuron of stages(): [0, 1], or [1 - c, c], c > 1, if it is not divided by
+    c. Kept entries have slope 1, which is in both ranges."""
     return [(Fraction(0), Fraction(1)) if op in MONOTONE else (1 - STEEPEST[op], STEEPEST[op])
             for part in (network.parts[name] for name in networks_of(function))
             for op, layer in zip(part.between(), part.layers[:-1]) for _ in range(layer.outputs)]
 
 
 def bent_lmi(chain, slopes, rho, t):
-    """The matrix over (dx, dz) of rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_i t_i (dz_i - a_i dy_i) (b_i dy_i - dz_i) >= 0
-    for slopes in [a_i, b_i]. With dy_i = m_i' dz of the layer before, neuron i gives 2 t_i at (i, i), - t_i (a_i + b_i)
-    m_i beside it, and 2 t_i a_i b_i m_i m_i' where the layer before stands."""
+    """Returns the matrix over (dx, dz) of
+    rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_i t_i (dz_i - a_i dy_i) (b_i dy_i - dz_i) >= 0 for slopes in [a_i, b_i].
+    With dy_i = m_i' dz of the previous layer, neuron i contributes 2 t_i at (i, i), - t_i (a_i + b_i) m_i to its row,
+    and 2 t_i a_i b_i m_i m_i' to the diagonal block of the previous layer."""
     (integer,), exponent = dyadics([rho])
     inputs, neuron, weighted = range(len(chain[0].rows[0])), 0, []
     for m in chain[:-1]:
@@ -1238,7 +1244,7 @@ def bent_lmi(chain, slopes, rho, t):
 
 
 def parse_factor(factor, where):
-    """None where the certificate leaves the factor to its reader."""
+    """Reads a factor; returns None if the certificate omits it."""
     if factor is None:
         return None
     require_keys(factor, ["unit_exponent", "scale", "rows"], where)
@@ -1254,7 +1260,7 @@ def parse_factor(factor, where):
 
 
 def quadratic_lmi(chain, q, t):
-    """The matrix over (dv, dz) whose positive semidefiniteness gives |drho|^2 <= dv' Q dv."""
+    """Returns the matrix over (dv, dz) whose positive semidefiniteness proves |drho|^2 <= dv' Q dv."""
     size, fraction = len(q.rows), [[q.fraction(i, j) for j in range(len(q.rows))] for i in range(len(q.rows))]
     n = size + len(t)
     p = [[Fraction(0)] * n for _ in range(n)]
@@ -1277,7 +1283,7 @@ def quadratic_lmi(chain, q, t):
 
 
 def shows_positive_semidefinite(p, unit, scale, rows):
-    """E = D P D - R R' is diagonally dominant with a nonnegative diagonal."""
+    """Returns whether E = D P D - R R' is diagonally dominant with a nonnegative diagonal."""
     n = len(p.rows)
     if len(scale) != n or len(rows) != n or any(len(row) > i + 1 for i, row in enumerate(rows)):
         return False
@@ -1298,14 +1304,14 @@ def shows_positive_semidefinite(p, unit, scale, rows):
 
 
 def scaled_double(integer, exponent):
-    """integer 2^exponent as a double, roughly."""
+    """Returns an approximation of integer 2^exponent as a double."""
     excess = max(integer.bit_length() - 64, 0)
     return math.ldexp(integer >> excess, exponent + excess)
 
 
 def factorised(rows, first, shift):
-    """R with R R' = the matrix with these lower rows - shift I, in floating point; rows with an empty diagonal stay
-    empty. None if that breaks down."""
+    """Returns R with R R' = (the matrix with these lower rows) - shift I, in floating point; rows with a zero diagonal
+    stay zero. Returns None if the factorisation breaks down."""
     result = []
     for i, row in enumerate(rows):
         if row[-1] == 0:
@@ -1324,7 +1330,7 @@ def factorised(rows, first, shift):
 
 
 def shows_or_finds(p, factor):
-    """What a certificate leaves out, floating point proposes; exact integers decide in either case."""
+    """Verifies the factor in exact integers; if the certificate omits it, first computes one in floating point."""
     if factor is not None:
         return shows_positive_semidefinite(p, *factor)
     n = len(p.rows)
@@ -1341,7 +1347,7 @@ def shows_or_finds(p, factor):
     for i, row in enumerate(rows):
         for j, x in zip(range(first[i], i), row):
             sums[j] += abs(x)
-    shift = 2.0 ** -56 * (n + max(sums, default=0.0))  # an eighth of the first one of the writer, who adds otherwise
+    shift = 2.0 ** -56 * (n + max(sums, default=0.0))  # an eighth of the writer's first shift: sums differ
     while shift < 1e-7:
         found = factorised(rows, first, shift)
         if found is None:
@@ -1354,12 +1360,12 @@ def shows_or_finds(p, factor):
 
 
 def rounded_up(x):
-    """The next multiple of 2^-80: keeps fractions short."""
+    """Returns the next multiple of 2^-80, which keeps fractions short."""
     return Fraction(-((-x.numerator << 80) // x.denominator), 1 << 80)
 
 
 def conflicts_in(text, where):
-    """(neuron, is on, neuron, is on, lambda, multiplier) of "3+ 17- <lambda> <multiplier>", ..."""
+    """Reads (neuron, is on, neuron, is on, lambda, multiplier) from "3+ 17- <lambda> <multiplier>", ..."""
     require(isinstance(text, str), f"{where}: conflicts are not text")
     words = [w for w in re.split("[ \t\n\v\f\r]+", text) if w]
     require(len(words) % 4 == 0, f"{where}: a conflict lacks words")
@@ -1373,7 +1379,7 @@ def conflicts_in(text, where):
 
 
 class Hidden:
-    """y = W h + b + e for any least <= e <= most; the next h is relu(y), of the last `without_relu` outputs y."""
+    """y = W h + b + e for any least <= e <= most; the next h is relu(y), or y for the last `without_relu` outputs."""
 
     def __init__(self, layer, has_relu=True, bias=True):
         self.weights = [[Fraction(w) for w in layer.weights[i * layer.inputs:(i + 1) * layer.inputs]]
@@ -1382,7 +1388,7 @@ class Hidden:
         self.without_relu, self.least, self.most = 0 if has_relu else layer.outputs, None, None
 
     def homogeneous(self, is_last):
-        """y = W h + b s, s the last input and, but for the last layer, the last output."""
+        """Returns the layer y = W h + b s, where s is the last input and, except in the last layer, the last output."""
         self.weights = [row + [b] for row, b in zip(self.weights, self.biases)]
         if not is_last:
             self.weights.append([Fraction(0)] * (len(self.weights[0]) - 1) + [Fraction(1)])
@@ -1393,7 +1399,7 @@ class Hidden:
         return i < len(self.biases) - self.without_relu
 
     def constant(self, form):
-        """The largest of form (b + e)."""
+        """Returns the largest value of form (b + e)."""
         total = sum(map(mul, form, self.biases))
         if self.least:
             total += sum(c * (m if c > 0 else l) for c, l, m in zip(form, self.least, self.most))
@@ -1401,7 +1407,8 @@ class Hidden:
 
 
 def slopes_at(layers, point, top):
-    """Per layer before `top`, which outputs are on at a point. Roughly: whatever slopes follow from it hold."""
+    """Returns for each layer before `top` which outputs are on at a point. An approximation is sufficient, because any
+    lower slopes are valid."""
     h, slopes = [float(x) for x in point], []
     for layer in layers[:top]:
         y, is_on = [], []
@@ -1416,8 +1423,8 @@ def slopes_at(layers, point, top):
 
 
 def above(layers, bounds, layer, neuron, sign, slopes=None):
-    """A linear form in x above sign * y by relaxation of ReLU: coefficients and constant. `slopes`: which undecided
-    neurons are bounded below by themselves, the others by 0."""
+    """Returns coefficients and constant of a linear form in x that bounds sign * y from above, by relaxation of ReLU.
+    `slopes`: which undecided neurons have the lower bound y; the others have the lower bound 0."""
     form, constant = [Fraction(0)] * len(layers[layer].biases), Fraction(0)
     form[neuron] = Fraction(sign)
     for j in range(layer, -1, -1):
@@ -1444,10 +1451,11 @@ def largest(form, constant, low, high):
 
 
 def neuron_bounds(layers, low, high, around, first=(), decisions=()):
-    """Bounds on every neuron over a box by linear relaxation of ReLU, layer by layer; those that `around` decides keep
-    its bounds. Exact but for bounds and slopes, which are rounded so that they still hold. `first`: those of the first
-    layers, which are taken as they are. `decisions`: (neuron, is on, corner), of neurons that the lower slopes tight at
-    a corner decide; those of other layers are not looked at. None where one of them does not hold."""
+    """Returns bounds on every neuron over a box by linear relaxation of ReLU, layer by layer. Neurons decided by
+    `around` keep its bounds. Exact except for bounds and slopes, which are rounded such that they remain valid.
+    `first`: given bounds of the first layers. `decisions`: (neuron, is on, corner) of neurons decided by the lower
+    slopes that are tight at a corner; decisions for other layers are ignored. Returns None if one of them does not
+    hold."""
     bounds = list(first)
     before = sum(len(layer.biases) for layer in layers[:len(bounds)])
     for k in range(len(bounds), len(layers)):
@@ -1480,7 +1488,7 @@ def neuron_bounds(layers, low, high, around, first=(), decisions=()):
 
 
 def is_positive_semidefinite(s):
-    """L D L' in fractions."""
+    """Returns whether s is positive semidefinite, by an L D L' factorisation in fractions."""
     n = len(s)
     for j in range(n):
         pivot = s[j][j]
@@ -1496,7 +1504,7 @@ def is_positive_semidefinite(s):
 
 
 def shown(layers, low, high, bounds, conflicts):
-    """The conflicts between undecided neurons that their lambda shows in this box."""
+    """Returns the conflicts between undecided neurons that are proved by their lambda in this box."""
     places = [(k, i) for k, layer in enumerate(layers) for i in range(len(layer.biases))]
     undecided = lambda at: bounds[at[0]][at[1]][0] < 0 < bounds[at[0]][at[1]][1] and layers[at[0]].has_relu(at[1])
     result = []
@@ -1512,8 +1520,8 @@ def shown(layers, low, high, bounds, conflicts):
 
 
 def part_holds(layers, gram, moving, weight, bounds, form, t, conflicts):
-    """S = form - F' G F - sum_i t_i (a_i e_i' + e_i a_i') - sum_c s_c (p_c q_c' + q_c p_c') over the moving inputs and
-    the undecided neurons."""
+    """Returns whether S = form - F' G F - sum_i t_i (a_i e_i' + e_i a_i') - sum_c s_c (p_c q_c' + q_c p_c') over the
+    moving inputs and the undecided neurons is positive semidefinite."""
     forms = {}
     n = len(moving) + sum(l < 0 < u and layer.has_relu(i) for layer, ends in zip(layers, bounds)
                           for i, (l, u) in enumerate(ends))
@@ -1555,7 +1563,7 @@ def part_holds(layers, gram, moving, weight, bounds, form, t, conflicts):
 
 
 def projective_cover(radius):
-    """Boxes of (u, s), s >= 0, such that every x is u / s for a point of one."""
+    """Returns boxes of (u, s), s >= 0, such that every x equals u / s for a point of one of them."""
     one = Fraction(1)
     boxes = [([-r for r in radius] + [one], radius + [one])]
     for k, r in enumerate(radius):
@@ -1571,15 +1579,15 @@ def scaled_identity(rho, size):
 
 
 class Part:
-    """A box, bounds on its neurons and, once a form holds in it, those of the whole set function and the form's Gram
-    matrix. `around`: bounds on the neurons of the box that was halved. `decisions`: that nothing has looked at yet."""
+    """A box, bounds on its neurons and, once a form holds in it, bounds on the neurons of the whole set function and
+    the Gram matrix of the form. `around`: bounds over the parent box. `decisions`: decisions not yet verified."""
 
     def __init__(self, low, high, around, through_rho=None, gram=None):
         self.low, self.high, self.around, self.through_rho, self.gram = low, high, around, through_rho, gram
         self.bounds, self.decisions = None, []
 
     def bound_neurons(self, layers):
-        """Whether what is decided of the layers' neurons holds."""
+        """Bounds the neurons; returns whether their decisions hold."""
         self.bounds = neuron_bounds(layers, self.low, self.high, self.around, (), self.decisions)
         count = sum(len(layer.biases) for layer in layers)
         self.decisions = [decision for decision in self.decisions if decision[0] >= count]
@@ -1587,14 +1595,14 @@ class Part:
 
 
 class Forms:
-    """|drho|^2 <= dv' Q dv where rho's neurons are as a part decides them: (Q, t) each. `behind`: phi's last layer,
-    then rho's hidden layers."""
+    """Forms (Q, t) with |drho|^2 <= dv' Q dv for rho's neurons as decided by a part. `behind`: phi's last layer, then
+    rho's hidden layers."""
 
     def __init__(self, forms, hidden, behind, gram):
         self.forms, self.layers, self.first, self.gram = forms, hidden + behind, len(hidden) + 1, gram
 
     def look(self, part):
-        """Bounds rho's neurons in the part; whether what is decided of them holds."""
+        """Bounds rho's neurons in the part; returns whether their decisions hold."""
         count = sum(len(layer.biases) for layer in self.layers)
         through = neuron_bounds(self.layers, part.low, part.high, part.through_rho, part.bounds, part.decisions)
         if through is None or any(decision[0] >= count for decision in part.decisions):
@@ -1603,7 +1611,7 @@ class Forms:
         return True
 
     def use(self, index, part):
-        """Makes the form the part's, if it holds there."""
+        """Assigns the form to the part if it holds there."""
         if index >= len(self.forms) or not self.look(part):
             return False
         q, t = self.forms[index]
@@ -1619,7 +1627,7 @@ class Forms:
 
 
 def tree_fails(layers, boxes, text, proves, forms=None):
-    """"" if proves(part, index) for every leaf, else why not."""
+    """Returns "" if proves(part, index) for every leaf, else the reason."""
     open_parts = [Part(low, high, None) for low, high in reversed(boxes)]
     for word in text.split(" ") if text else []:
         if not re.fullmatch("[stq][0-9]{1,15}|r|d[0-9]{1,15}[+-][0-9]{1,15}", word) or not open_parts:
@@ -1657,8 +1665,8 @@ def tree_fails(layers, boxes, text, proves, forms=None):
 
 
 def proves_in_double(layers, boxes, proof, gram, moving, weight, rho):
-    """Whether floating point with bounded errors accepts the tree, which takes seconds where fractions take hours.
-    Needs numpy; where it is absent, or in doubt, fractions decide."""
+    """Returns whether floating point with bounded errors accepts the tree, which takes seconds instead of hours with
+    fractions. Needs numpy. Without numpy, and if the tree is not accepted, fractions decide."""
     texts = proof["multipliers"]
     if parts_in_double is None or not isinstance(proof["tree"], str) or not isinstance(texts, list) or not texts:
         return False
@@ -1689,7 +1697,7 @@ def proves_in_double(layers, boxes, proof, gram, moving, weight, rho):
 
 
 def conflicts_in_double(text):
-    """As conflicts_in(), of a text that is written as certify writes it."""
+    """The same as conflicts_in() for text in the format written by certify."""
     if not isinstance(text, str):
         raise ValueError("not text")
     words = text.split(" ") if text else []
@@ -1706,7 +1714,7 @@ def conflicts_in_double(text):
 
 
 def evaluate(weights, values, exponent):
-    """The network at integers times 2^exponent; exact."""
+    """Evaluates the network at integers times 2^exponent, exactly."""
     for k, layer in enumerate(weights.layers):
         w = Matrix.of(layer.weights, layer.inputs)
         biases, bias_exponent = dyadics(layer.biases)
@@ -1725,8 +1733,8 @@ def add(a, b):
 
 
 # --- activations on intervals --------------------------------------------------------------------------------------
-# No value of a mathematical library is used. A number is enclosed as a pair of integers over 2^BITS; each operation
-# rounds outwards. The series are others than those of the C++ checker.
+# No mathematical library is used. A number is enclosed by a pair of integers over 2^BITS; each operation rounds
+# outwards. The series differ from those of the C++ checker.
 
 BITS = 384
 ONE = 1 << BITS
@@ -1734,7 +1742,7 @@ VALUE_UNIT, SLOPE_UNIT = power(-64), power(-24)
 
 
 def enclosed(x):
-    """Of a fraction."""
+    """Returns an enclosure of a fraction."""
     x = Fraction(x) * ONE
     return math.floor(x), math.ceil(x)
 
@@ -1753,7 +1761,7 @@ def times(a, b):
 
 
 def inverse(a):
-    """Of a positive number."""
+    """Returns an enclosure of the inverse of a positive number."""
     return ONE * ONE // a[1], -(-ONE * ONE // a[0])
 
 
@@ -1762,7 +1770,7 @@ def over(a, n):
 
 
 def exponential_of_minus(x):
-    """e^-x of a fraction x >= 0: 1 - y + y^2/2 - ..., y = x / 2^k <= 1/2, whose terms fall, squared k times."""
+    """e^-x for a fraction x >= 0: 1 - y + y^2/2 - ..., y = x / 2^k <= 1/2, whose terms decrease, squared k times."""
     if x >= 267:
         return 0, 1
     halvings = max(0, math.ceil(x)).bit_length() + 8
@@ -1794,7 +1802,7 @@ def log_of_one_plus(e):
 
 
 def arctangent(x):
-    """Of a fraction between 0 and 1/2: x - x^3/3 + ..."""
+    """arctan x for a fraction x between 0 and 1/2: x - x^3/3 + ..."""
     p, square, total, k = enclosed(x), enclosed(x * x), (0, 0), 0
     while p[1] > 1:
         term = over(p, 2 * k + 1)
@@ -1802,7 +1810,7 @@ def arctangent(x):
     return total[0] - p[1], total[1] + p[1]
 
 
-# Euler: pi = 20 artan(1/7) + 8 artan(3/79)
+# Euler: pi = 20 arctan(1/7) + 8 arctan(3/79)
 PI = tuple(20 * a + 8 * b for a, b in zip(arctangent(Fraction(1, 7)), arctangent(Fraction(3, 79))))
 ROOT_OF_TWO_PI = math.isqrt(2 * PI[0] << BITS), math.isqrt(2 * PI[1] << BITS) + 1
 
@@ -1812,7 +1820,7 @@ def normal_density(t):
 
 
 def normal_probability(t):
-    """1/2 + (t - t^3/(2 3) + t^5/(4 2! 5) - ...) / sqrt(2 pi); with |t| >= 14 it is within e^-98 / 2 of 0 or 1."""
+    """1/2 + (t - t^3/(2 3) + t^5/(4 2! 5) - ...) / sqrt(2 pi); for |t| >= 14 it is within e^-98 / 2 of 0 or 1."""
     if t <= -14:
         return 0, ONE >> 141
     if t >= 14:
@@ -1848,7 +1856,7 @@ def value_of(op, t):
 
 
 def slope_of(op, t):
-    """The derivative; at 0 that of ELU and SELU from below."""
+    """Returns an enclosure of the derivative; for ELU and SELU at 0, of the derivative from below."""
     if op in ("elu", "selu"):
         slopes = (1, 1) if op == "elu" else (SELU_SCALE, SELU_SLOPE)
         return enclosed(slopes[0]) if t > 0 else times(enclosed(slopes[1]), exponential_of_minus(-t))
@@ -1860,7 +1868,8 @@ def slope_of(op, t):
             "silu": plus(s, times(enclosed(t), falls))}[op]
 
 
-# SiLU and GELU: around the place of the minimum, a number below it, and around the place of the steepest slope.
+# SiLU and GELU: bounds on the position of the minimum, a lower bound on its value, bounds on the position of the
+# steepest slope.
 BENT_PLACES = {op: tuple(map(Fraction, map(float.fromhex, places))) for op, places in {
     "silu": ("-0x1.47498p+0", "-0x1.47497p+0", "-0x1.1d26p-2", "0x1.331p+1", "0x1.332p+1"),
     "gelu": ("-0x1.80eaep-1", "-0x1.80eacp-1", "-0x1.5c19ep-3", "0x1.6ap+0", "0x1.6a1p+0")}.items()}
@@ -1871,7 +1880,7 @@ def meets(low, high, first, last):
 
 
 def values_between(op, low, high):
-    """Between which the values lie of t between low and high."""
+    """Returns bounds on the values for t between low and high."""
     if op == "relu":
         return max(low, Fraction(0)), max(high, Fraction(0))
     ends = [value_of(op, t) for t in {low, high}]
@@ -1882,8 +1891,9 @@ def values_between(op, low, high):
 
 
 def slopes_between(op, low, high):
-    """Between which the slopes lie of t between low and high: of tanh and sigmoid steepest nearest to 0, of SiLU and
-    GELU at the ends or at one place each, of the others rising (SELU's falls once, at 0)."""
+    """Returns bounds on the slopes for t between low and high. tanh and sigmoid are steepest at the point nearest to 0;
+    the slopes of SiLU and GELU have their extremes at the ends or at one point each; those of the others are increasing
+    (except that SELU's jumps down at 0)."""
     least_of_all = Fraction(0) if op in MONOTONE else 1 - STEEPEST[op]
     if op == "relu":
         ends = (Fraction(low >= 0 and high > 0), Fraction(high > 0))
@@ -1891,7 +1901,7 @@ def slopes_between(op, low, high):
         points = {low, high}
         if low < 0 < high and op not in BENT_PLACES:
             points.add(Fraction(0))
-        if op == "selu" and low == 0:  # its slope from below is none of these
+        if op == "selu" and low == 0:  # its slope from below does not belong to the interval
             points.remove(0)
         found = [slope_of(op, t) for t in points]
         found += [enclosed(SELU_SCALE)] * (op == "selu" and (low == 0 or high > 0))
@@ -1928,7 +1938,7 @@ def up(x):
 
 
 def layer_ends(layer, low, high):
-    """Between which W h + b lies for h between low and high."""
+    """Returns bounds on W h + b for h between low and high."""
     w = Matrix.of(layer.weights, layer.inputs)
     rises = Matrix([[max(x, 0) for x in row] for row in w.rows], w.exponent)
     falls = Matrix([[min(x, 0) for x in row] for row in w.rows], w.exponent)
@@ -1937,9 +1947,10 @@ def layer_ends(layer, low, high):
 
 
 def layers_on_box(weights, low, high):
-    """Per layer the ends (low, high) of what leaves it before its activation, and the slopes of the activation there:
-    intervals, intersected with a linear form G (x - c) + m, off by at most E, c the middle of the box. For slopes in
-    [a, b] around a point p of [l, u], |s(y) - s(p) - (a + b)/2 (y - p)| <= (b - a)/2 max(u - p, p - l)."""
+    """Returns for each layer bounds (low, high) on its output before the activation, and the slopes of the activation
+    there: intervals, intersected with a linear form G (x - c) + m with error at most E, where c is the centre of the
+    box. For slopes in [a, b] and a point p of [l, u], |s(y) - s(p) - (a + b)/2 (y - p)| <= (b - a)/2 max(u - p, p -
+    l)."""
     radius = [(h - l) / 2 for l, h in zip(low, high)]
     rounding = VALUE_UNIT * (1 + sum(radius))
     columns = [[Fraction(i == j) for i in range(len(low))] for j in range(len(low))]
@@ -1980,14 +1991,14 @@ def layers_on_box(weights, low, high):
 
 
 def values_behind(op, layer, low, high):
-    """Of the layer's numbers, those that it keeps at the end."""
+    """Returns bounds on the output after the activation; the last entries that the layer keeps are unchanged."""
     changed = layer.outputs - layer.kept
     ends = [values_between(op, l, h) for l, h in zip(low[:changed], high)]
     return [a for a, _ in ends] + low[changed:], [b for _, b in ends] + high[changed:]
 
 
 def enclosed_values(weights, low, high):
-    """Between which the outputs lie of inputs between low and high, layer by layer."""
+    """Returns bounds on the outputs for inputs between low and high, layer by layer."""
     for k, layer in enumerate(weights.layers):
         if k > 0:
             op = weights.between()[k - 1]
@@ -2002,7 +2013,7 @@ def enclosed_values(weights, low, high):
 # --- values over boxes ---------------------------------------------------------------------------------------------
 
 class Bounded:
-    """lower <= x <= upper, entry by entry, and |computed - x| <= error where a float32 evaluation is spoken of."""
+    """lower <= x <= upper, entry by entry, and |computed - x| <= error if a float32 evaluation is bounded."""
 
     def __init__(self, lower, upper, error):
         self.lower, self.upper, self.error = lower, upper, error
@@ -2012,7 +2023,7 @@ class Bounded:
 
 
 def layer_bounds(layer, inputs):
-    """(lower, upper, error) of W h + b; error None where it is not asked for or cannot be bounded."""
+    """Returns (lower, upper, error) of W h + b; error is None if it is not requested or cannot be bounded."""
     size = layer.inputs
     ends, exponent = dyadics([float(x) for x in inputs.lower + inputs.upper])
     errors, error_exponent = dyadics([float(x) for x in inputs.error or []])
@@ -2032,8 +2043,8 @@ def layer_bounds(layer, inputs):
 
 
 def rounding_error(n, size, before):
-    """Of a float32 sum of n summands whose absolute values sum up to `size`, in any order; None if it might
-    overflow."""
+    """Returns the error bound of a float32 sum of n summands whose absolute values add up to `size`, in any order; None
+    if it might overflow."""
     nu = n * power(-24)
     if n > 1 << 23 or size + n * power(-149) > power(126):
         return None
@@ -2041,7 +2052,7 @@ def rounding_error(n, size, before):
 
 
 def sum_bounds(terms, size, is_float32):
-    """Bounds on a sum of terms, each given as (Bounded, minimum count, maximum count)."""
+    """Returns bounds on a sum of terms, each given as (Bounded, minimum count, maximum count)."""
     lower, upper, error = [Fraction(0)] * size, [Fraction(0)] * size, []
     for i in range(size):
         for term, fewest, most in terms:
@@ -2131,7 +2142,7 @@ class Checker:
         require(deviation <= tolerance, f"{where}: the largest deviation is above the tolerance")
 
     def check_boxes(self, boxes):
-        """Whether a bound uses it or not: null, or intervals for the inputs of networks that have a box."""
+        """Requires null, or intervals for the inputs of networks that have a box, whether or not a bound uses them."""
         if boxes is None:
             return
         require(isinstance(boxes, dict) and boxes, "box is neither null nor an object with boxes")
@@ -2240,14 +2251,15 @@ class Checker:
         self.check_lower(bound, Fraction(lower), scale, boxed, where)
 
     def slopes_on_box(self, part, boxed, where):
-        """Per hidden layer the slopes of its neurons over the box; none of one that is sorted."""
+        """Returns for each hidden layer the slope ranges of its neurons over the box; none for a layer that is
+        sorted."""
         require(boxed and part[:4] != "rho:", f"{where}: slopes on a box of a bound without one")
         require(not self.network.invariants, f"{where}: slopes on a box of a network of rotation invariants")
         low, high = self.box_of(part, where, limited=False)
         return [slopes for _, _, slopes in layers_on_box(self.network.parts[part], low, high)[:-1]]
 
     def neighbours_of(self, bound, where):
-        """Of a set function, at most how many of each kind; empty: any number."""
+        """Returns the largest number of neighbours of each kind for a set function; empty: any number."""
         if "neighbours" not in bound:
             return {}
         names = networks_of(bound["function"])
@@ -2261,7 +2273,7 @@ class Checker:
         return neighbours
 
     def box_of(self, part, where, limited=True):
-        """The part's box, or what the input clamp makes of it. `limited`: of a size that proofs by parts can bear."""
+        """Returns the part's box after the input clamp. `limited`: requires a size that proofs by parts support."""
         require(part in self.c["box"] and part in self.network.parts, f"{where}: no box for {part}")
         low, high = (hex_floats(self.c["box"][part][side]) for side in ("lower", "upper"))
         require(len(low) == len(high) == self.network.parts[part].layers[0].inputs,
@@ -2274,13 +2286,13 @@ class Checker:
         return [Fraction(x) for x in low], [Fraction(x) for x in high]
 
     def term_layers(self, phi, rho):
-        """V phi(x), V the first layer of rho without its bias."""
+        """Returns the layers of V phi(x), where V is the first layer of rho without its bias."""
         layers = [Hidden(layer) for layer in self.network.parts[phi].layers]
         layers[-1].without_relu = len(layers[-1].biases)
         return layers + [Hidden(self.network.parts[rho].layers[0], False, False)]
 
     def check_others(self, others, names, neighbours, where):
-        """What the other terms of the sum add before the first ReLU of rho: least and most."""
+        """Returns bounds on the contribution of the other terms of the sum before the first ReLU of rho."""
         counts = dict(neighbours)
         if names[0] != "phi:ground":
             counts[names[0][4:]] -= 1
@@ -2379,7 +2391,7 @@ class Checker:
         require(not reason, f"{where}: {reason}")
 
     def form_of_part(self, form, size, rho_layers, where):
-        """(Q, t); whether it holds in a part, Forms tells."""
+        """Reads (Q, t). Forms verifies whether it holds in a part."""
         require_keys(form, ["q", "t"], where)
         values = []
         for key in "q", "t":
@@ -2393,7 +2405,7 @@ class Checker:
         return [[q[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for j in range(size)] for i in range(size)], t
 
     def checked_form(self, form, name, where):
-        """Q with |rho(v) - rho(w)|^2 <= (v - w)' Q (v - w)."""
+        """Returns a verified Q with |rho(v) - rho(w)|^2 <= (v - w)' Q (v - w)."""
         require_keys(form, ["q", "t", "factor"], where)
         chain = stages(self.network, name, "all", [])
         size, t = len(chain[0].rows[0]), hex_floats(form["t"])
@@ -2418,7 +2430,7 @@ class Checker:
         return values
 
     def seen(self, part, values):
-        """What the clamp lets through."""
+        """Returns the values after the clamp."""
         if self.network.clamp and (part == "network" or (part.startswith("phi:") and part != "phi:ground")):
             low, high = self.network.clamp
             values = [float(min(max(x, a), b)) for x, a, b in zip(values, low, high)]
@@ -2455,7 +2467,7 @@ class Checker:
         require(lower ** 2 * run <= rise, f"{where}: claims more than the slope between x and y")
 
     def exact_rise(self, names, x, y, others):
-        """|f(x) - f(y)|^2 of ReLU networks."""
+        """Returns |f(x) - f(y)|^2 for ReLU networks, exactly."""
         outputs = []
         for moved in (x, y):
             value = self.term(names[0], moved)
@@ -2466,7 +2478,7 @@ class Checker:
         return sum(v * v for v in difference) * power(2 * exponent)
 
     def least_rise(self, names, x, y, others):
-        """At most |f(x) - f(y)|^2, from enclosures of both."""
+        """Returns a lower bound on |f(x) - f(y)|^2 from enclosures of both values."""
         ends = []
         for moved in (x, y):
             terms = [enclosed_values(self.network.parts[part], *[list(map(Fraction, self.seen(part, point)))] * 2)
@@ -2504,7 +2516,7 @@ class Checker:
                 f"{where}: claims less than the law gives")
 
     def check_values(self, entry):
-        """Range, jump and float32 error over a box, layer by layer."""
+        """Verifies range, jump and float32 error over a box, layer by layer."""
         require_keys(entry, ["function", "neighbours", "domain", "input_error", "networks", "sum", "lower", "upper",
                              "jump", "jump_hex", "float32_error", "float32_error_hex"], "values")
         require(isinstance(entry["function"], str), "values: function is not text")
@@ -2562,7 +2574,7 @@ class Checker:
             require(error ** 2 >= sum(x * x for x in result.error), f"{where}: claims less than the float32 error")
 
     def largest_square(self, kinds, rho, entry, where):
-        """At least |f|^2 among exactly these neighbours."""
+        """Returns an upper bound on |f|^2 for exactly these neighbours."""
         without_error = dict(entry, input_error=None)
         low = high = [Fraction(0)] * self.network.parts[rho].layers[0].inputs
         for part in ["phi:" + kind for kind in kinds] + ["phi:ground"] * ("phi:ground" in self.network.parts):
@@ -2573,7 +2585,7 @@ class Checker:
         return sum(max(abs(a), abs(b)) ** 2 for a, b in zip(low, high))
 
     def values_input(self, name, entry, where):
-        """What reaches the first layer of a network."""
+        """Returns bounds on the input of the first layer of a network."""
         if entry["domain"] == "box":
             require(isinstance(self.c["box"], dict), f"{where}: there is no box")
             lower, upper = self.box_of(name, where, limited=False)
@@ -2589,7 +2601,7 @@ class Checker:
         return Bounded(lower, upper, error)
 
     def stated(self, stated, size, found, is_float32, where):
-        """What is stated of a vector, which must enclose what was found."""
+        """Returns the bounds stated for a vector, which must enclose the computed ones."""
         require_keys(stated, ["lower", "upper", "error"], where)
         require((stated["error"] is not None) == is_float32,
                 f"{where}: an error where there are input errors, and only there")
@@ -2625,7 +2637,8 @@ class Checker:
 
 
 def check(certificate, network):
-    """"" if accepted, else why not. A malformed certificate is answered with a reason, not with an exception."""
+    """Returns "" if the certificate is accepted, else the reason. A malformed certificate yields a reason, not an
+    exception."""
     try:
         Checker(certificate, network).run()
     except Rejected as reason:
@@ -2646,7 +2659,7 @@ def refuse_constant(text):
 
 
 def parse(text):
-    """A byte order mark is refused, as json.loads() does."""
+    """Parses JSON. A byte order mark is refused, as by json.loads()."""
     return json.loads(text, object_pairs_hook=unique, parse_constant=refuse_constant)
 
 
@@ -2667,7 +2680,7 @@ def main(arguments):
     try:
         network = Network(*positional[1:], **options)
         certificate = parse(Path(positional[0]).read_bytes().decode())
-    except Exception as fault:  # whatever it is: this file cannot be read
+    except Exception as fault:  # any exception means that the file cannot be read
         print(f"cannot be read: {type(fault).__name__} {fault}", file=sys.stderr)
         return 3
     reason = check(certificate, network)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Runs both checkers over the same certificates: sound ones, and mutations of every part under a forged content hash.
-They must agree on each, and reject each mutation that makes a statement false.
+"""Runs both checkers on the same certificates: valid ones, and mutations of every part with a forged content hash.
+They must agree on each certificate and reject each mutation that makes a statement false.
 
     check_certificate_test.py SWARMCERT SOURCE_DIR [MUTATIONS]
 """
@@ -56,7 +56,8 @@ def onnx(nodes, sizes, generator):
 
 
 def smooth_models(folder, generator):
-    """ONNX models with activations: some end in one, SiLU as PyTorch exports it, several in one model."""
+    """ONNX models with activations: final activations, SiLU as exported by PyTorch, several activations in one
+    model."""
     layer = lambda k, x, y: ("MatMul", [x, f"w{k}"], y)
     models = {
         "tanh": ([layer(1, "x", "a"), ("Tanh", ["a"], "b"), layer(2, "b", "c"), ("Tanh", ["c"], "y")], [3, 5, 2]),
@@ -74,8 +75,8 @@ def smooth_models(folder, generator):
 
 
 def skip_models(folder, generator):
-    """ONNX models with skip connections past smooth activations: residual blocks, branches side by side, ReLU blocks
-    beside them; some fold two layers into one whose weights are no doubles."""
+    """ONNX models with skip connections past smooth activations: residual blocks, parallel branches, also with ReLU
+    blocks; some fold two layers into one whose weights are not doubles."""
     layer = lambda k, x, y: ("MatMul", [x, f"w{k}"], y)
     block = lambda k, x, y, *nodes: [layer(k, x, f"{y}a"), *nodes, layer(k + 1, f"{y}b", f"{y}c"),
                                      ("Add", [x, f"{y}c"], y)]
@@ -120,7 +121,7 @@ weights = "rho.safetensors"
 
 
 def smooth(folder):
-    """A network.toml with the parts of heterogeneous(), each with other activations."""
+    """A network.toml with the parts of heterogeneous(), each with different activations."""
     net, text = folder / "smooth.toml", (folder / "network.toml").read_text()
     for part, activation in (("small", '["tanh", "sigmoid"]'), ("large", '["relu", "sigmoid"]'),
                              ("ground", '"softplus"'), ("rho", '"selu"')):
@@ -131,7 +132,7 @@ def smooth(folder):
 
 
 def of_invariants(folder, generator):
-    """A network.toml with two kinds and ground, whose phi see rotation invariants."""
+    """A network.toml with two kinds and ground, whose phi take rotation invariants."""
     for name, sizes in (("five", [5, 5, 4]), ("more", [5, 4, 4, 4]), ("three", [3, 5, 4])):
         (folder / f"{name}.safetensors").write_bytes(safetensors(sizes, generator))
     net, text = folder / "invariants.toml", (folder / "network.toml").read_text()
@@ -144,7 +145,7 @@ def of_invariants(folder, generator):
 
 
 def silent(folder):
-    """The network of heterogeneous(), without a word near a small one, alone or with a large one."""
+    """The network of heterogeneous(), silent next to a small neighbour, alone or together with a large one."""
     net = folder / "silent.toml"
     net.write_text((folder / "network.toml").read_text().replace(
         "[input]", 'silent = ["large+small>small", "small>small"]\n[input]', 1))
@@ -152,7 +153,7 @@ def silent(folder):
 
 
 def check_silent(certificate, net, folder):
-    """What is 0 in some compositions has no witness there, a 0 in its range, and another statement."""
+    """A function that is 0 in some compositions has no witness there, 0 in its range, and another statement."""
     def said_of(change):
         changed = json.loads(json.dumps(certificate))
         change(changed)
@@ -184,7 +185,7 @@ def check_silent(certificate, net, folder):
 
 
 def check_invariants(certificate, net, folder):
-    """Bounds of set functions need the slope of the map to invariants, and hold for all inputs together only."""
+    """Bounds of set functions need the slope of the map to invariants and hold only for all inputs together."""
     def refused(i, **fields):
         changed = json.loads(json.dumps(certificate))
         changed["bounds"][i].update(fields)
@@ -193,7 +194,7 @@ def check_invariants(certificate, net, folder):
         reason = second.check(changed, second.Network(**arguments(net)))
         assert not accepted and reason, f"{fields}: first says {said!r}, second says {reason!r}"
 
-    # Not even of a part, which is a function of invariants: however large the claim.
+    # Refused even for a part, which is a function of invariants, however large the claim.
     part = next(i for i, bound in enumerate(certificate["bounds"]) if bound["function"] == "phi:small")
     changed = json.loads(json.dumps(certificate))
     changed["box"] = {"phi:small": {"lower": ["0x0p+0"] * 5, "upper": ["0x1p+0"] * 5}}
@@ -218,7 +219,7 @@ def check_invariants(certificate, net, folder):
         bound = certificate["bounds"][i]
         assert bound["unit"] == "gf/(m, m/s)" and bound["lower"] is None, bound
         phi, rho = second.networks_of(bound["function"])
-        of_network = norms[phi] * norms[rho]  # without the slope
+        of_network = norms[phi] * norms[rho]  # without the slope of the map
         slope = 1 if phi == "phi:ground" else 1.5
         for product in (of_network * slope * 0.999,) + (of_network,) * (slope > 1):
             refused(i, upper=product, upper_hex=product.hex(), upper_method="product", proof=None)
@@ -270,8 +271,7 @@ def is_tree(value):
 
 
 def with_other_decisions(tree, generator):
-    """Of the neurons that a tree says are decided, one the other way, by another corner, or another one; or all left
-    out."""
+    """Changes a decision of a tree to the other state, another corner or another neuron, or removes all decisions."""
     words = tree.split()
     decided = [i for i, word in enumerate(words) if word[0] == "d"]
     if not decided:
@@ -284,7 +284,7 @@ def with_other_decisions(tree, generator):
 
 
 def mutated(value, generator):
-    """Another value in its place: near it, of the same type, or of another."""
+    """Returns another value: close to the original, of the same type, or of another type."""
     if isinstance(value, str) and value.startswith(("0x", "-0x")) and " " not in value:
         number = second.hex_float(value)
         return generator.choice([(number * (1 - 2 ** -20)).hex(), (-number).hex(), (0.0).hex(), "0x1p5000", "1.5", ""])
@@ -314,7 +314,7 @@ def mutated(value, generator):
 
 
 def decided_otherwise(certificate, changed, path):
-    """Whether a tree was changed only in what it says of decided neurons."""
+    """Returns whether only the decisions of a tree were changed."""
     if path[-1] != "tree":
         return False
     for key in path:
@@ -325,7 +325,7 @@ def decided_otherwise(certificate, changed, path):
 
 
 def forged(certificate, path, generator):
-    """The mutated certificate, and whether an array merely got longer: what nobody reads states nothing."""
+    """Returns the mutated certificate, and whether an array was only extended: unused entries state nothing."""
     is_longer = False
     changed = json.loads(json.dumps(certificate))
     place = changed
@@ -353,19 +353,19 @@ def first_checker(certificate, net, folder, number):
     path.unlink()
     assert done.returncode in (0, 1, 3), f"exit {done.returncode}: {done.stderr}"
     if done.returncode == 3:
-        assert "schema" in done.stderr, done.stderr  # the file is none of its kind
+        assert "schema" in done.stderr, done.stderr  # the file has another schema
     return done.returncode == 0, done.stdout + done.stderr
 
 
 def arguments(net):
-    """Those of second.Network()."""
+    """Returns the arguments of second.Network()."""
     if net[0].startswith("--"):
         return dict(zip((a[2:] for a in net[::2]), net[1::2]))
     return {"net": net[0], "orders": {"network": net[2].split(",")} if "--order" in net else {}}
 
 
 def check_orders(folder, square, order):
-    """A certificate of one order of the layers is none of another, and a file that has several is refused."""
+    """A certificate for one order of the layers is refused for another, and a file that allows several is refused."""
     certificate = folder / "certificate0.json"
     assert second.parse(certificate.read_text())["network"]["weights"]["network"]["samples"]["count"] == 30
     other = [str(square), "--order", "after,first,last"]
@@ -377,7 +377,7 @@ def check_orders(folder, square, order):
 
 
 def check_fixed(certificate, net, folder):
-    """What nothing but the check of its form reads is refused by both, with a reason that names it."""
+    """Fields that are only checked for their format are refused by both if malformed, with a reason that names them."""
     def refused(changed, word):
         changed["content_sha256"] = second.content_sha256(changed)
         accepted, said = first_checker(changed, net, folder, 0)
@@ -417,7 +417,7 @@ def is_in_box(box, point):
 
 
 def check_activations(certificate, net, folder):
-    """Another activation in a chain, lower bounds or boxes of it, a smaller claim: the checkers agree on each."""
+    """Another activation in a chain, with lower bounds or boxes, and smaller claims: the checkers agree on each."""
     def both(changed):
         changed["content_sha256"] = second.content_sha256(changed)
         accepted, said = first_checker(changed, net, folder, 0)
@@ -471,7 +471,7 @@ def is_identity(entry, net):
 
 
 def check_enclosures():
-    """Softplus next to 0, where the terms of its series are halved: it ends, around ln 2."""
+    """Softplus near 0, where the terms of its series are halved: the series ends with an enclosure of ln 2."""
     for t in 0.0, 5e-324, -5e-324, 2.0 ** -80:
         low, high = second.values_between("softplus", second.Fraction(t), second.Fraction(t))
         assert low <= second.Fraction("0.693147180559945309417232121458") <= high <= low + 2 * second.VALUE_UNIT, t
@@ -556,14 +556,12 @@ def run():
             for where, mutation, is_longer, (accepted, said) in zip(chosen, changed, longer, first):
                 other = second.check(mutation, second.Network(**arguments(net)))
                 assert accepted == (not other), f"{where}: first says {said!r}, second says {other!r}"
-                # Where the slack of a proof allows it, another factor or multiplier proves the same; a law that holds
-                # for two neighbours holds for one.
-                # Another pair of points may be as steep.
-                # Wider bounds of values hold as well, and so do those for fewer neighbours or smaller errors of the
-                # inputs.
+                # If the slack of a proof allows it, another factor or multiplier also proves the bound; a law that
+                # holds for two neighbours holds for one. Another pair of points may be just as steep. Wider bounds on
+                # values are also valid, as are bounds for fewer neighbours or smaller input errors.
                 wider = ("networks", "sum", "lower", "upper", "neighbours", "input_error")
-                # Another corner may decide a neuron as well, and the part may hold without.
-                # Every vector shows the norm of the identity behind an activation that ends a network.
+                # Another corner may also decide a neuron, and the part may be proved without the decision.
+                # Every vector proves the norm of the identity layer behind a final activation.
                 harmless = mutation == certificate or is_longer or decided_otherwise(certificate, mutation, where) or \
                     where[0] in ("tool", "box") or \
                     any(key in where for key in ("factor", "t", "q", "multipliers", "conflicts", "least", "most",

@@ -296,8 +296,8 @@ TEST(Gamma, IsJudgedAsItIsStated) {
   const Verdict unknown = Verdict::kInconclusive;
   const std::vector<Enclosure> norms = {norm(2, 2), norm(8, 8)};
   EXPECT_EQ(judged(4, layer, clip, norms), (Verdicts{yes, no}));
-  EXPECT_EQ(judged(16, whole, clip, norms),
-            (Verdicts{yes, yes}));  // 2 * 8, although 8 is above its share of 4
+  // 2 * 8 = 16, although 8 is above its share of 4.
+  EXPECT_EQ(judged(16, whole, clip, norms), (Verdicts{yes, yes}));
   EXPECT_EQ(judged(15.999, whole, clip, norms), (Verdicts{no, no}));
   EXPECT_EQ(judged(16, whole, equal, norms), (Verdicts{no, no}));
   EXPECT_EQ(judged(16, whole, equal, {norm(4, 4), norm(4 * (1 - 1e-8), 4)}), (Verdicts{yes, yes}));

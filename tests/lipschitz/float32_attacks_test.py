@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Two attacks on certifiers that prove bounds for real arithmetic while float32 flies. Biases far larger than the
-inputs make the float32 evaluation a step function: its slope between neighbouring floats, and its values at the border
-of the range, leave the bounds of the exact function. Both must be so here, and both must stay within the float32 error
-that certify states.
+"""Two attacks on certifiers that prove bounds for real arithmetic although the flight code uses float32. Biases much
+larger than the inputs turn the float32 evaluation into a step function: its slope between adjacent floats and its
+values at the border of the range violate the bounds of the exact function. Both must happen here, and both must stay
+within the float32 error stated by certify.
 
     float32_attacks_test.py SWARMCERT
 """
@@ -23,7 +23,7 @@ def f32(x):
 
 
 def after(x):
-    """The next float above a positive one."""
+    """Returns the next float above a positive one."""
     return struct.unpack("<f", struct.pack("<I", struct.unpack("<I", struct.pack("<f", x))[0] + 1))[0]
 
 
@@ -41,7 +41,7 @@ def safetensors(layers):
 
 
 def exact(layers, x):
-    """The only output at float x, as a fraction."""
+    """Returns the single output at float x as a fraction."""
     h = [Fraction(x)]
     for k, (weights, biases) in enumerate(layers):
         y = [sum(map(lambda w, v: Fraction(w) * v, row, h), Fraction(b)) for row, b in zip(weights, biases)]
@@ -50,7 +50,7 @@ def exact(layers, x):
 
 
 def in_float32(layers, x, bias_first):
-    """As firmware computes it, each product and sum rounded to float32."""
+    """Evaluates like the firmware, with each product and sum rounded to float32."""
     h = [x]
     for k, (weights, biases) in enumerate(layers):
         y = []
@@ -66,15 +66,15 @@ def in_float32(layers, x, bias_first):
 
 
 def largest_step(layers, low, high, bias_first, generator):
-    """(step, x, next float): bisection to neighbouring floats between which the values differ most, from many
-    places."""
+    """Returns (step, x, next float): adjacent floats between which the values differ most, found by bisection from many
+    starting intervals."""
     value = lambda x: Fraction(in_float32(layers, x, bias_first))
     best = (Fraction(0), low, after(low))
     for _ in range(40):
         a, b = sorted(f32(generator.uniform(low, high)) for _ in range(2))
         if a == b:
             continue
-        rate = exact(layers, b) - exact(layers, a)  # what the exact function contributes is no step
+        rate = exact(layers, b) - exact(layers, a)  # the change of the exact function is not part of the step
         while after(a) < b:
             middle = f32(a + (b - a) / 2)
             left, right = value(middle) - value(a), value(b) - value(middle)
@@ -88,12 +88,12 @@ def largest_step(layers, low, high, bias_first, generator):
 
 
 def through_biases(bias):
-    """f(x) = x for x >= -bias, by way of a sum with the bias."""
+    """f(x) = x for x >= -bias, computed via a sum with the bias."""
     return [([[1.0]], [bias]), ([[1.0]], [-bias])]
 
 
 def random_network(bias, generator):
-    """Every hidden neuron is active on [0, 1], and its bias is taken off again by the layer behind it."""
+    """Every hidden neuron is active on [0, 1], and the next layer subtracts its bias again."""
     inward = [f32(generator.uniform(0.2, 1)) for _ in range(6)]
     onward = [[f32(generator.uniform(-1, 1)) for _ in range(6)] for _ in range(5)]
     outward = [f32(generator.uniform(-1, 1)) for _ in range(5)]
@@ -136,10 +136,10 @@ def slopes_through_biases(folder, generator):
 
 
 def values_outside_of_the_range(folder):
-    """Rounding carries the value at the end of the box beyond the proved range, by less than the stated error."""
+    """Round-off moves the value at the end of the box out of the proved range, by less than the stated error."""
     outside = 0
     for k in 8, 12, 16:
-        grain = 2.0 ** (k - 23)  # between floats in [2^k, 2^(k+1))
+        grain = 2.0 ** (k - 23)  # distance of adjacent floats in [2^k, 2^(k+1))
         layers, high = through_biases(2.0 ** k), f32(0.5 + 0.75 * grain)
         _, error, lower, upper = certify(folder, layers, 0.25, high)
         assert lower <= Fraction(1, 4) and upper >= Fraction(high)

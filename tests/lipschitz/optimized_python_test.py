@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Input that is wrong in itself, or contradicts another one, is refused by the Python checker with exit code 3, also
-under `python3 -O`, which drops every assert; the C++ checker refuses the same input with the same code.
+"""Invalid or contradictory input is refused by the Python checker with exit code 3, also under `python3 -O`, which
+removes every assert; the C++ checker refuses the same input with the same code.
 
     optimized_python_test.py SWARMCERT SOURCE_DIR
 """
@@ -27,7 +27,7 @@ def optimized(path, net):
 
 
 def certified(net, path):
-    """A certificate of the network that python -O accepts, so that a refusal is not one of the certificate."""
+    """Returns a certificate of the network that python -O accepts, so that a later refusal is not due to it."""
     code, words = code_and_words([common.SWARMCERT, "certify", *net, "--method", "product", "-q", "-o", path])
     assert code == 0, words
     code, words = optimized(path, net)
@@ -41,7 +41,7 @@ def written(path, data):
 
 
 def contradictory_inputs(folder, generator):
-    """Pairs of a network, for which a certificate holds, and arguments that are refused, with a word of the reason."""
+    """Returns networks with a valid certificate, arguments that are refused, and a word of the reason."""
     def network(name, sizes, names=()):
         return written(folder / name, common.safetensors(sizes, generator, names))
 
@@ -67,7 +67,7 @@ def contradictory_inputs(folder, generator):
 
 
 def joined(*files):
-    """One safetensors file with the tensors of all."""
+    """Returns one safetensors file with the tensors of all files."""
     header, data = {}, b""
     for file in files:
         size = int.from_bytes(file[:8], "little")

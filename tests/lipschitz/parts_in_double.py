@@ -1,10 +1,10 @@
-"""Proofs by parts for check_certificate.py in double precision, many parts at once, with numpy. What `holds` accepts
-holds in exact arithmetic, as every rounding error is bounded; what it does not accept has to be decided in fractions.
+"""Proofs by parts for check_certificate.py in double precision with numpy, many parts at a time. Proofs accepted by
+`holds` are valid in exact arithmetic, because every round-off error is bounded; others must be decided in fractions.
 
-Error bounds are those of sums and products in any order (Higham 2002, sections 3.1 and 4.2): a sum of n products
-differs from the exact one by at most n u / (1 - n u) times the sum of their absolute values. A Cholesky factorization
-that runs to its end shows that a matrix of n rows, less gamma_(n+1) times its trace, is positive definite (Rump 2006,
-BIT 46).
+The error bounds hold for sums and products in any order (Higham 2002, sections 3.1 and 4.2): a sum of n products
+differs from the exact one by at most n u / (1 - n u) times the sum of their absolute values. A matrix of n rows is
+positive definite if a Cholesky factorization succeeds after gamma_(n+1) times its trace is subtracted from the diagonal
+(Rump 2006, BIT 46).
 """
 import re
 from collections import namedtuple
@@ -14,7 +14,7 @@ import numpy as np
 U = 2.0 ** -53
 TINY = 2.0 ** -900
 CORNER = 2.0 ** -30
-MOST_AT_ONCE = 1 << 22  # numbers of an array of forms
+MOST_AT_ONCE = 1 << 22  # largest number of entries of an array of forms
 WORD = re.compile(r"(s|t)([0-9]{1,9})|d([0-9]{1,9})([+-])([0-9]{1,15})")
 
 
@@ -63,7 +63,7 @@ class Tree:
 
 
 class Bounds:
-    """Of all neurons over a batch of boxes, layer by layer, by linear relaxation of ReLU."""
+    """Bounds on all neurons over a batch of boxes, layer by layer, by linear relaxation of ReLU."""
 
     def __init__(self, layers, low, high, around, decisions):
         self.layers, self.low, self.high = layers, low, high
@@ -85,7 +85,7 @@ class Bounds:
             first += layer.outputs
 
     def add_terms(self, k):
-        """At least |W| |h| + |b|."""
+        """Appends an upper bound on |W| |h| + |b|."""
         layer = self.layers[k]
         if k == 0:
             size = np.maximum(abs(self.low), abs(self.high))
@@ -107,9 +107,9 @@ class Bounds:
         self.offset.append(np.where(is_open, offset, 0.0))
 
     def in_inputs(self, top, form, constant, which, below):
-        """Forms in the inputs of layer `top`, [1 or parts, forms, inputs], as forms in x that are no less over the
-        boxes `which`: (form, constant, sum of the absolute values of the constant's terms, what rounding may have cost,
-        number of terms). `below`: slopes below ReLU, one row per box of `which`."""
+        """Substitutes forms in the inputs of layer `top`, [1 or parts, forms, inputs], back to forms in x that bound
+        them from above over the boxes `which`: (form, constant, sum of the absolute values of the constant's terms,
+        bound on the round-off error, number of terms). `below`: lower slopes of ReLUs, one row per box of `which`."""
         absolute, error, terms = abs(constant), np.zeros((1, 1)), 4
         for j in range(top - 1, -1, -1):
             layer, is_positive = self.layers[j], form > 0
@@ -129,7 +129,7 @@ class Bounds:
         return form, constant, absolute, error, terms
 
     def largest(self, form, constant, absolute, error, terms, which):
-        """Upper bounds of such forms over the boxes."""
+        """Returns upper bounds on such forms over the boxes."""
         low, high = self.low[which][:, :, None], self.high[which][:, :, None]
         value = constant + np.matmul(np.maximum(form, 0), high)[..., 0] + np.matmul(np.minimum(form, 0), low)[..., 0]
         absolute = absolute + np.matmul(abs(form), np.maximum(abs(low), abs(high)))[..., 0]
@@ -138,7 +138,7 @@ class Bounds:
         return np.where(np.isfinite(result), result, np.inf)
 
     def decide(self, k, first, decisions):
-        """Those of this layer, (row of the batch, neuron, is on, corner) as arrays."""
+        """Verifies the decisions of this layer, given as arrays (row of the batch, neuron, is on, corner)."""
         layer = self.layers[k]
         mine = (decisions[1] >= first) & (decisions[1] < first + layer.outputs)
         row, neuron, is_on, corner = (column[mine] for column in decisions)
@@ -159,7 +159,8 @@ class Bounds:
         self.upper[k][row[~is_on], neuron[~is_on]] = ends[~is_on]
 
     def slopes_at(self, top, row, corner):
-        """Lower slopes: of open neurons, which are on at a corner of the box. Any in [0, 1] hold."""
+        """Returns lower slopes: 1 for open neurons that are on at a corner of the box. Any slopes in [0, 1] are
+        valid."""
         bits = corner[:, None] >> np.arange(self.low.shape[1]) & 1
         h = np.where(bits == 1, self.high[row], self.low[row])
         slopes = []
@@ -174,8 +175,8 @@ class Bounds:
 
 
     def side_of(self, row, neuron, is_on):
-        """Of neurons of the boxes `row`, counted over all layers: the form in x above y (on) or -y (off), as
-        in_inputs(), and whether the neuron is open."""
+        """Returns for neurons of the boxes `row`, numbered over all layers, the upper bound on y (on) or -y (off) as a
+        form in x, see in_inputs(), and whether the neuron is open."""
         inputs = self.low.shape[1]
         form, (constant, absolute, error) = np.zeros((len(row), 1, inputs)), np.zeros((3, len(row), 1))
         is_open, most, first = np.zeros(len(row), dtype=bool), 0, 0
@@ -191,8 +192,9 @@ class Bounds:
         return form, constant, absolute, error, most, is_open
 
     def shown(self, row, first, first_on, second, second_on, weight):
-        """Which conflicts hold: both neurons are open, and the weighted sum of y, negated where the state is off, is
-        nowhere positive. Any two nonnegative weights that are not both zero will do, so 1 - weight may be rounded."""
+        """Returns which conflicts hold: both neurons are open, and the weighted sum of y, negated if the state is off,
+        is nowhere positive. Any two nonnegative weights that are not both zero are valid, so 1 - weight may be
+        rounded."""
         one, other, rest = self.side_of(row, first, first_on), self.side_of(row, second, second_on), 1 - weight
         form, constant, absolute, error = (
             a * weight[:, None, None] + b * rest[:, None, None] if a.ndim == 3
@@ -206,7 +208,7 @@ class Bounds:
 
 
 class Conflicts:
-    """Columns first, is on, second, is on, weight, multiplier of those of all leaf numbers, one after the other."""
+    """Columns first, is on, second, is on, weight, multiplier of the conflicts of all leaf numbers, concatenated."""
 
     def __init__(self, by_leaf):
         counts = np.array([len(some) for some in by_leaf])
@@ -217,15 +219,15 @@ class Conflicts:
         self.weight, self.multiplier = flat[:, 4], flat[:, 5]
 
     def of(self, leaves):
-        """(which of `leaves`, number) of each conflict of these."""
+        """Returns (index in `leaves`, number) of each conflict of these leaves."""
         counts = self.counts[leaves]
         within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
         return np.repeat(np.arange(len(leaves)), counts), np.repeat(self.start[leaves], counts) + within
 
 
 class Inequality:
-    """S of a batch of parts: |df|^2 <= rho |dx|^2 in the moving inputs and the increments of open neurons; rows of
-    other neurons are those of the identity."""
+    """The matrix S of a batch of parts for |df|^2 <= rho |dx|^2, in the moving inputs and the increments of open
+    neurons; rows of other neurons are those of the identity."""
 
     def __init__(self, layers, gram, gram_error, moving, weight, rho):
         self.layers, self.gram, self.gram_error, self.rho, self.moving = layers, gram, gram_error, rho, len(moving)
@@ -234,7 +236,8 @@ class Inequality:
         self.size = len(moving) + sum(layer.outputs for layer in layers)
 
     def are_positive_definite(self, bounds, t, conflicts):
-        """`bounds`: of the parts; `conflicts`: (part, neuron, is on, neuron, is on, multiplier) of those that hold."""
+        """Returns whether all S are positive definite. `bounds`: bounds of the parts; `conflicts`: (part, neuron, is
+        on, neuron, is on, multiplier) of the conflicts that hold."""
         parts, n, p = len(t), self.size, self.moving
         s = np.zeros((parts, n, n))
         s[:, range(p), range(p)] = self.rho
@@ -261,7 +264,7 @@ class Inequality:
         if not (np.isfinite(s).all() and (diagonal > 0).all()):
             return False
         d = np.ldexp(1.0, -(np.frexp(diagonal)[1] // 2))
-        if d.max() > 2.0 ** 300:  # what underflows would matter
+        if d.max() > 2.0 ** 300:  # underflow would matter
             return False
         s *= d[:, :, None] * d[:, None]
         shift = self.error(rows, abs(z), d, conflicts) * 1.01
@@ -273,7 +276,7 @@ class Inequality:
             return False
 
     def subtract(self, conflicts, rows, s):
-        """Of neurons in conflict one has u = 0, u = dz (on) or dy - dz (off): their product times any number."""
+        """Subtracts the terms of conflicts: u_1 u_2 = 0, u = dz (on) or dy - dz (off), times any multiplier."""
         part, first, first_on, second, second_on, multiplier = conflicts
         for start in range(0, len(part), 512):
             some = slice(start, start + 512)
@@ -294,9 +297,9 @@ class Inequality:
         return result
 
     def error(self, rows, z, d, conflicts):
-        """At least the norm of D (S - true S) D. With R the error of increments as forms, only R d is followed: the sum
-        of all entries of a matrix of no negative ones bounds its norm, and so does the largest sum of a row of a
-        symmetric one."""
+        """Returns an upper bound on the norm of D (S - true S) D. For the errors R of the increments as forms, only R d
+        is computed: the sum of all entries of a nonnegative matrix bounds its norm, and so does the largest row sum of
+        a symmetric one."""
         radius, squares, first = np.zeros((1, self.layers[0].inputs)), 0, self.moving
         here, radii, sizes = d[:, :first] @ abs(self.inputs).T, [], []  # here: |what enters the layer| d
         for layer, (y, times, is_open, is_off) in zip(self.layers, rows):
@@ -328,15 +331,16 @@ class Inequality:
                        [np.where(is_on, 0, sizes[part, neuron]) + d[part, self.moving + neuron]
                         for neuron, is_on in ((first, first_on), (second, second_on))])
         each = wrong[0] * size[1] + size[0] * wrong[1] + wrong[0] * wrong[1] + 16 * U * size[0] * size[1]
-        # Sums of several conflicts and of what stood there: each addition is off by U times all that is added.
+        # Sums of the previous entry and several conflicts: the error of each addition is at most U times the sum of all
+        # absolute values.
         counts = np.bincount(part, minlength=len(total))[part]
         each += 2 * U * counts * size[0] * size[1]
         np.add.at(total, part, 2.02 * abs(multiplier) * each)
 
 
 class Walk:
-    """The parts of a tree, level by level: boxes, and bounds of their neurons, which stay within those of the part
-    above."""
+    """The parts of a tree, level by level: their boxes and bounds on their neurons, which stay within those of the
+    parent part."""
 
     def __init__(self, layers, boxes, tree, inequality, multipliers, conflicts):
         self.layers, self.inequality, self.multipliers, self.conflicts = layers, inequality, multipliers, conflicts
@@ -354,7 +358,7 @@ class Walk:
                 and (len(self.decisions) == 0 or self.decisions[:, 1].max() < neurons))
 
     def halve(self, nodes, position):
-        """The boxes of `nodes` from those of their parents, or False."""
+        """Computes the boxes of `nodes` from those of their parents; returns False if that fails."""
         self.low, self.high = self.low[position], self.high[position]
         row, k, is_upper = np.arange(len(nodes)), self.coordinate[nodes], self.upper[nodes]
         low, high = self.low[row, k], self.high[row, k]
@@ -381,7 +385,7 @@ class Walk:
         return True
 
     def bounds_of(self, nodes, around):
-        """Of all nodes of a level, if what is decided and what its leaves claim holds; else None."""
+        """Returns the bounds of all nodes of a level, or None if a decision or the claim of a leaf does not hold."""
         found = [[np.empty((len(nodes), layer.outputs)) for layer in self.layers] for _ in range(2)]
         told = self.decisions[np.isin(self.decisions[:, 0], nodes)]
         told_row = np.searchsorted(nodes, told[:, 0])
@@ -415,13 +419,13 @@ class Walk:
 Leaves = namedtuple("Leaves", "lower upper")
 
 
-@np.errstate(all="ignore")  # what is not finite is taken for unbounded
+@np.errstate(all="ignore")  # values that are not finite are treated as unbounded
 def holds(layers, boxes, text, gram, moving, weight, rho, multipliers, conflicts):
-    """Whether a tree of splits, leaves and decisions proves its parts.
+    """Returns whether a tree of splits, leaves and decisions proves its parts.
 
     layers: (W, b, outputs without ReLU); boxes: (low, high); gram: (G, error of its entries); multipliers: one row per
     number of a leaf; conflicts: (neuron, is on, neuron, is on, weight, multiplier) for each such number. All numbers
-    are doubles, and exact but for G."""
+    are doubles and exact except for G."""
     layers = [Layer(*layer) for layer in layers]
     try:
         tree = Tree(text, len(boxes))

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Trees of parts decided in double precision (parts_in_double.py) against the same trees decided in fractions.
+"""Compares decisions on trees of parts in double precision (parts_in_double.py) with decisions in fractions.
 
     parts_in_double_test.py SWARMCERT
 """
@@ -44,7 +44,7 @@ def network_of(net):
 
 
 def calls_of(certificate, net):
-    """What parts_in_double.holds was asked, and answered; and the same of the function that fractions would call."""
+    """Returns the arguments of all calls of parts_in_double.holds, which must accept without resorting to fractions."""
     asked, holds, in_fractions = [], parts_in_double.holds, checker.tree_fails
 
     def spy(*arguments):
@@ -62,7 +62,7 @@ def calls_of(certificate, net):
 
 
 def holds_in_fractions(layers, boxes, text, gram, moving, weight, rho, multipliers, conflicts):
-    """The same question, where the Gram matrix is one of doubles."""
+    """Decides the same in fractions, for a Gram matrix of doubles."""
     hidden = []
     for w, b, without_relu in layers:
         layer = checker.Hidden.__new__(checker.Hidden)
@@ -81,7 +81,7 @@ def holds_in_fractions(layers, boxes, text, gram, moving, weight, rho, multiplie
 
 
 def refuses_conflicts_that_are_no_text():
-    """As fractions do, which decide then: an empty list is no empty text."""
+    """Conflicts that are not text are refused as by fractions, which then decide: an empty list is not empty text."""
     assert checker.conflicts_in_double("") == []
     for no_text in ([], {}, None, 0, ["0+ 1- 0x1p-1 0x1p-1"]):
         try:
@@ -96,7 +96,7 @@ def with_rho(arguments, rho):
 
 
 def least_accepted(arguments):
-    """The least rho that double precision accepts, and one just below it."""
+    """Returns the least rho that double precision accepts, and one just below it."""
     low, high = 0.0, arguments[6]
     while high - low > 1e-9 * high:
         middle = (low + high) / 2
@@ -121,7 +121,7 @@ def refuses_what_lacks_a_part(arguments):
     changed = [words[:leaves[-1]], words + ["t0"], words[:leaves[0]] + ["t999999"] + words[leaves[0] + 1:],
                *(words[:k] + ["s9"] + words[k + 1:] for k in splits[:1]), ["d9999+0"] + words, words + ["d0+0"],
                ["r"] + words]
-    for k in decisions[:5]:  # the other state than the one that is shown
+    for k in decisions[:5]:  # the opposite of the proved state
         changed.append(words[:k] + [words[k].translate(str.maketrans("+-", "-+"))] + words[k + 1:])
     for some in changed:
         assert not parts_in_double.holds(layers, boxes, " ".join(some), gram, moving, weight, rho, multipliers,
@@ -131,7 +131,7 @@ def refuses_what_lacks_a_part(arguments):
 
 
 def bounds_contain_the_neurons(generator):
-    """Exact values of all neurons at points of random boxes, of networks with small and large numbers."""
+    """Bounds contain the exact values of all neurons at points of random boxes, for small and large weights."""
     checked = 0
     for size in (1.0, 1e-12, 1e8):
         weights = [[[generator.gauss(0, size) for _ in range(n)] for _ in range(m)]
@@ -176,7 +176,7 @@ def main():
                                    ("set", pair, ["--domain", folder / "part.toml"])):
             certificate = certified(folder, kind, net, "--nodes", "60", *options)
             bound = next(b for b in certificate["bounds"] if b["upper_method"] == "branch")
-            # of a set function rho is that of phi in front of a form
+            # for a set function, rho is that of phi in front of a form
             witnessed = bound["lower"] if len(net) == 1 else 0
             arguments = calls_of(certificate, net)[0]
             least = accepts_no_less_than_fractions(arguments, witnessed)
