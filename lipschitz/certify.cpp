@@ -33,7 +33,7 @@ void require_what_is_bounded(const Network& network, const files::Parts& parts,
   if (options.domain.empty() && options.method != UpperMethod::kBranch) return;
   if (network.invariants)
     throw std::invalid_argument(std::string(options.domain.empty() ? "--method branch" : "bounds on a box") +
-                                ": for networks of relative states only, and these are rotation invariants");
+                                ": only for networks of relative states, not of rotation invariants");
   if (options.method != UpperMethod::kBranch) return;
   for (const auto& [part, weights] : parts) {
     if (weights->is_relu()) continue;

@@ -107,7 +107,7 @@ std::vector<Claim> claims(const files::Network& network, const ClaimOptions& opt
   if (!unused.empty()) throw std::invalid_argument("no function has a block \"" + unused.front() + "\"");
   if (!scale_fits)
     throw std::invalid_argument("no function has " + std::to_string(options.scale.size()) +
-                                " inputs, as the scale has");
+                                " inputs, the number of entries of scale");
   if (options.counted && !options.domain.empty()) add_counted(network, options, result);
   return result;
 }
@@ -160,7 +160,7 @@ Domain read_domain(const std::string& path, const files::Network& network) {
     table.allow_only({"lower", "upper"});
     ground = read_box(table, files::kGroundInputs);
   } else if (inputs < files::kGroundInputs) {
-    top.refuse("ground", "", "is missing, and the box has too few intervals to take the ground's from them");
+    top.refuse("ground", "", "is missing, and the box has too few intervals for the ground's inputs");
   } else {
     ground.lower.assign(ground.lower.end() - files::kGroundInputs, ground.lower.end());
     ground.upper.assign(ground.upper.end() - files::kGroundInputs, ground.upper.end());

@@ -39,7 +39,7 @@ struct Unit {
 
 Unit unit_of(const files::ActivationFunction& function) {
   if (function.sorts())
-    throw std::domain_error(function.words + " acts on whole layers: it has no slopes of single numbers");
+    throw std::domain_error(function.words + " acts on whole layers and has no entrywise slopes");
   if (function.is_monotone()) return {function.greatest_slope, {0.0, 1.0}};
   if (function.least_slope != 1 - function.greatest_slope)
     throw std::logic_error(function.op + ": slopes that do not add up to 1");
@@ -165,7 +165,7 @@ HiddenLayer hidden_layer(const files::Layer& layer, bool has_relu) {
 /// Returns the layers of `part`, which must be a ReLU network, because proofs by parts of a box support only ReLU.
 const std::vector<files::Layer>& relu_layers(const files::Network& network, const files::FunctionId& part) {
   const files::Weights& weights = *files::parts(network).at(part);
-  if (!weights.is_relu()) throw std::invalid_argument(part.name() + " is no ReLU network");
+  if (!weights.is_relu()) throw std::invalid_argument(part.name() + " is not a ReLU network");
   return weights.layers;
 }
 
@@ -174,7 +174,7 @@ void set_coordinates(LocalFunction& f, const files::Network& network, const file
                      const std::string& block, const std::vector<double>& scale) {
   f.coordinates = files::block_coordinates(network, part, block);
   if (!scale.empty() && scale.size() != static_cast<std::size_t>(f.hidden.front().inputs))
-    throw std::invalid_argument("scale has not one number per input of " + part.name());
+    throw std::invalid_argument("scale must have one number per input of " + part.name());
   for (const int k : f.coordinates)
     f.weight.push_back(scale.empty() ? 1.0 : scale.at(static_cast<std::size_t>(k)));
 }
@@ -196,7 +196,7 @@ LocalFunction local_function(const files::Network& network, const files::Functio
   const files::Layer& last = layers.back();
   if (layers.size() < 2) throw std::invalid_argument(part.name() + " has no hidden layer");
   if (q.rows != 0 && q.rows != last.outputs)
-    throw std::invalid_argument("the form is not of the outputs of " + part.name());
+    throw std::invalid_argument("the form does not fit the outputs of " + part.name());
   LocalFunction f;
   for (std::size_t k = 0; k + 1 < layers.size(); ++k) f.hidden.push_back(hidden_layer(layers[k], true));
   f.gram = gram(last, q);

@@ -308,8 +308,8 @@ std::vector<mpq_class> value(const files::Network& network, const files::Functio
   const files::Parts parts = files::parts(network);
   const std::vector<files::FunctionId> names = function.parts();
   if (files::maps_to_invariants(network, function)) refuse(function.name() + " maps to rotation invariants");
-  if (names.size() == 1 && networks.size() != 1) refuse("a plain network has one point");
-  if (networks.size() != points.size()) refuse("there is not one point per network");
+  if (names.size() == 1 && networks.size() != 1) refuse("a plain network needs exactly one point");
+  if (networks.size() != points.size()) refuse("there must be one point per network");
   DyadicVector sum;
   sum.integers.resize(static_cast<std::size_t>(parts.at(names[0])->outputs()));
   for (std::size_t j = 0; j < points.size(); ++j) {

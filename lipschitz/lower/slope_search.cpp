@@ -36,7 +36,8 @@ void check_box(const Box& box, const Term& term, const std::string& name) {
     const std::string interval = "interval " + std::to_string(k) + " of " + name;
     if (!(box.lower[k] <= box.upper[k])) refuse(interval + " is empty");
     if (std::isinf(box.lower[k]) && std::isinf(box.upper[k]) && box.lower[k] < box.upper[k]) continue;
-    if (std::isinf(box.lower[k]) || std::isinf(box.upper[k])) refuse(interval + " is open to one side only");
+    if (std::isinf(box.lower[k]) || std::isinf(box.upper[k]))
+      refuse(interval + " is unbounded on one side only");
   }
 }
 

@@ -71,7 +71,7 @@ Timed time_diagnosis(const residuals::InputArguments& arguments, const std::stri
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const double used_s = processor_s() - before_s;
   fmt::print(
-      "{}: {} records, {} of {} blocks searched: {:.2f} s of the processor, {:.2f} s on the clock, peak "
+      "{}: {} records, {} of {} blocks searched: {:.2f} s processor time, {:.2f} s wall-clock time, peak "
       "{:.0f} MiB; RMSE {:.5f} -> {:.5f} N\n",
       name, diagnosis.records, diagnosis.searched_blocks, diagnosis.blocks, used_s, wall_s, peak_MiB(),
       diagnosis.rmse_before_N, diagnosis.rmse_after_N);
@@ -90,7 +90,7 @@ void compare_searches(const residuals::InputArguments& arguments, const std::str
   const Timed excerpt = time_diagnosis(arguments, name, identification::kMostSearched);
   std::fflush(stdout);
   const Timed whole = time_diagnosis(arguments, name + ", all searched", SIZE_MAX);
-  fmt::print("  ratio: {:.2f} of the processor, {:.2f} on the clock\n",
+  fmt::print("  ratio: {:.2f} of processor time, {:.2f} of wall-clock time\n",
              whole.processor_s / excerpt.processor_s, whole.wall_s / excerpt.wall_s);
 }
 

@@ -123,8 +123,8 @@ void compare(const files::Network& network, const std::string& title) {
 
 int main(int argc, char** argv) {
   fmt::print(
-      "median wall seconds of 5 runs; solve includes the exact proof; csdp/us: its time over ours;\n"
-      "prod/us: product bound over proved bound. csdp's value is no bound, and 0 where csdp is not "
+      "median wall seconds of 5 runs; solve includes the exact proof; csdp/us: csdp's time over ours;\n"
+      "prod/us: product bound over proved bound. csdp's value is not a bound; it is 0 if csdp is not "
       "installed.\n");
   files::NetworkArguments arguments;
   if (argc == 5) {

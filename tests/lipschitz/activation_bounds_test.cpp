@@ -122,7 +122,7 @@ TEST(ActivationBounds, ContainEverySampledValueAndSlopeOfAnInterval) {
     }
     const double jump =
         activation == Activation::kSelu ? 0.71 : 0;  // jump of the slope at 0, over which a sample averages
-    EXPECT_LT(widest_excess, 0.12 + jump) << function.op << ": far wider than what the samples leave open";
+    EXPECT_LT(widest_excess, 0.12 + jump) << function.op << ": much wider than the sampled range";
   }
 }
 

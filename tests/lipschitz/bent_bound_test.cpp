@@ -240,7 +240,7 @@ TEST(BentBound, NoneOfAMillionSlopesIsAbove) {
     }
   }
   EXPECT_EQ(tried, 1000000);
-  EXPECT_GT(closest, 0.8) << "the samples are too flat to mean anything";
+  EXPECT_GT(closest, 0.8) << "the sampled slopes are too small for a meaningful test";
 }
 
 }  // namespace

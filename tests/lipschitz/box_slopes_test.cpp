@@ -201,7 +201,7 @@ TEST(RangesOnBox, ContainWhatIsAttainedAndComeCloserAsTheBoxShrinks) {
       EXPECT_LT(widest, excess) << files::function_of(activation).op << " " << radius;
       excess = widest;
     }
-    EXPECT_LT(excess, 1.2) << files::function_of(activation).op << ": 200 steps find most of a width";
+    EXPECT_LT(excess, 1.2) << files::function_of(activation).op << ": much wider than what 200 steps find";
   }
 }
 
@@ -228,8 +228,8 @@ TEST(LocalSlopes, NoneOf100000SlopesInTheBoxIsAboveAndTheGlobalBoundIsNotBelow) 
     }
   }
   EXPECT_GE(tried, 100000);
-  EXPECT_GT(closest, 0.9) << "the slopes are too flat to mean anything";
-  EXPECT_GT(most_gained, 1.3) << "the box is never used";
+  EXPECT_GT(closest, 0.9) << "the slopes found are too small for a meaningful test";
+  EXPECT_GT(most_gained, 1.3) << "the box never improves a bound";
 }
 
 TEST(LocalSlopes, OfSeveralActivationsAreAboveAllSampledOnesAndCheckedAgain) {
@@ -260,7 +260,7 @@ TEST(LocalSlopes, OfSeveralActivationsAreAboveAllSampledOnesAndCheckedAgain) {
       EXPECT_TRUE(result.accepted) << names << radius << ": " << result.reason;
     }
   }
-  EXPECT_GE(by_program, with_slopes) << "the slopes on the box hardly ever serve";
+  EXPECT_GE(by_program, with_slopes) << "the slopes on the box hardly ever improve a bound";
 }
 
 /// A chain of single neurons behind weights w_k has derivatives in prod |w_k| [prod a_k, prod b_k], where [a_k, b_k]
@@ -294,7 +294,7 @@ TEST(LocalSlopes, OfAChainOfSingleNeuronsLieBetweenTheProductsOfLeastAndGreatest
     EXPECT_LE(bound.upper.value(), greatest * (1 + 1e-6));
     ++tried;
   }
-  EXPECT_GE(tried, 5) << "too few chains rise";
+  EXPECT_GE(tried, 5) << "too few chains are increasing";
 }
 
 TEST(LocalSlopes, ComeCloserToTheSteepestOneAsTheBoxShrinks) {

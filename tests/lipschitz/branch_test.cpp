@@ -97,7 +97,7 @@ TEST(LocalBound, IsAboveEverySampledSlopeAndNoMoreThanTheGlobalBound) {
     }
   }
   std::printf("closest slope over bound: %.4f\n", closest);
-  EXPECT_GT(closest, 0.9) << "the samples do not come near the bounds: they test nothing";
+  EXPECT_GT(closest, 0.9) << "the samples are not close to the bounds: the test shows nothing";
 }
 
 TEST(LocalBound, MoreBoxesNeverGiveAWorseBound) {
@@ -110,7 +110,7 @@ TEST(LocalBound, MoreBoxesNeverGiveAWorseBound) {
     EXPECT_LE(bound, before * (1 + 1e-6)) << nodes << " boxes";
     before = bound;
   }
-  EXPECT_LT(before, 0.99 * first) << "halving never helped: the test shows nothing";
+  EXPECT_LT(before, 0.99 * first) << "halving never improved the bound: the test shows nothing";
 }
 
 TEST(LocalBound, IsTheSlopeWhereTheBoxDecidesEveryNeuron) {
@@ -197,7 +197,7 @@ TEST(LocalBound, SteepCentresHaveTheSlopesThatDifferencesShow) {
       }
     }
   }
-  EXPECT_GT(closest, 0.99) << "no direction came near the steepest";
+  EXPECT_GT(closest, 0.99) << "no direction came close to the steepest";
 }
 
 TEST(LocalBound, SurvivesNetworksThatNeverChange) {
@@ -249,7 +249,7 @@ TEST(NeuronBounds, ContainWhatEveryNeuronTakesInTheBox) {
       }
     }
   }
-  EXPECT_LT(tightest, 0.01) << "no sample came near a bound";
+  EXPECT_LT(tightest, 0.01) << "no sample came close to a bound";
 }
 
 struct Proved {
@@ -290,7 +290,7 @@ TEST(TreeProof, IsRefusedWhereWordsOrMultipliersAreMissingOrWrong) {
   EXPECT_TRUE(refused(""));
   EXPECT_TRUE(refused(tree.substr(0, tree.rfind(' '))));
   EXPECT_TRUE(refused(tree + " t0"));
-  EXPECT_TRUE(refused("t0")) << "the root's multipliers prove the whole box: the tree gained nothing";
+  EXPECT_TRUE(refused("t0")) << "the root's multipliers prove the whole box: the tree improved nothing";
   EXPECT_TRUE(refused("s7 t0 t0"));
   EXPECT_TRUE(refused("t99999"));
   for (const char* const text : {"s", "t", "x0", "s-1", "s0t0", "t99999999999999999999999", " ", "s0 "})

@@ -155,7 +155,7 @@ TEST(Claims, JointBlockBoundHoldsForEveryPairOfPoints) {
     ASSERT_LE(std::sqrt(df), allowed * (1 + 1e-12));
     closest = std::max(closest, std::sqrt(df) / allowed);
   }
-  EXPECT_GT(closest, 0.2) << "the samples do not come near the bound";
+  EXPECT_GT(closest, 0.2) << "the samples are not close to the bound";
 }
 
 TEST(Claims, TwoNeighboursMatchTheDirectJointComputation) {

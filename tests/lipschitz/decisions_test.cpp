@@ -93,7 +93,7 @@ TEST(Decisions, AreTrueAtEveryPointOfTheBoxThatASearchFinds) {
   }
   std::printf("%d decisions, nearest value to zero %.2g\n", decisions, nearest);
   EXPECT_GT(decisions, 50);
-  EXPECT_GT(nearest, -0.02) << "no point came near: the search tests nothing";
+  EXPECT_GT(nearest, -0.02) << "no point came close to a bound: the search tests nothing";
 }
 
 TEST(Decisions, LeaveNoNeuronOpenThatIsDecidedWithoutThem) {
@@ -213,7 +213,7 @@ TEST(Decisions, OfATreeAreRefusedOnceTheyAreChangedOrMisplaced) {
     }
     std::printf("%d decisions flipped; %d needed\n", flipped, without);
     EXPECT_GT(flipped, 10);
-    EXPECT_GT(without, 0) << "no part needs what is decided";
+    EXPECT_GT(without, 0) << "no part needs the decisions";
     for (const char* const word :
          {"d", "d9", "d9+", "d+5", "d9x5", "d9+5x", "d999+0", "d-1+0", "d9+9999999999999999"}) {
       check::TreeProof changed = made.proof.tree;

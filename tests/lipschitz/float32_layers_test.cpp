@@ -225,7 +225,7 @@ TEST(LayerErrors, AreNeverExceededAndFormsHoldInEveryLayer) {
       }
     }
   }
-  EXPECT_GT(closest, 0.3) << "the samples do not come near the bounds: they test nothing";
+  EXPECT_GT(closest, 0.3) << "the samples are not close to the bounds: the test shows nothing";
 }
 
 TEST(AffineForms, AreTheValuesAtAPointAndNotFiniteWhereTheBoundsAreNot) {

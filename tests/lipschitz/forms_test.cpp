@@ -81,7 +81,7 @@ TEST(Forms, OfASearchAreRefusedOnceTheyAreSmaller) {
                                        tests::sdp_bound_of(network, kFunction).proof->t, options);
   ASSERT_TRUE(bound.proof.has_value());
   const LocalProof& proof = *bound.proof;
-  ASSERT_GT(proof.tree.forms.size(), 3u) << "the search kept to one form";
+  ASSERT_GT(proof.tree.forms.size(), 3u) << "the search used too few forms";
   const std::vector<double> nothing(12, 0.0);
   const check::LocalFunction f = check::coupled_function(network, kFunction, "all", {}, nothing, nothing);
   const auto accepts = [&](const check::TreeProof& tree) {
@@ -100,7 +100,7 @@ TEST(Forms, OfASearchAreRefusedOnceTheyAreSmaller) {
     refused += accepts(changed) ? 0 : 1;
   }
   EXPECT_GT(used, 3);
-  EXPECT_GT(refused, used / 2) << "rho's multipliers are hardly read";
+  EXPECT_GT(refused, used / 2) << "rho's multipliers are hardly used";
   std::string without;
   for (const char c : proof.tree.tree) without += c == 'q' ? 't' : c;
   check::TreeProof changed = proof.tree;

@@ -74,7 +74,7 @@ TEST(Invariants, BoundsOfSetsAreThoseOfTheirNetworksTimesTheSlopeOfTheMapAndPart
   EXPECT_TRUE(checked.accepted) << checked.reason;
   EXPECT_FALSE(check::check(certificate, without_map(network())).accepted);
   EXPECT_FALSE(check::check(lipschitz::certificate(without_map(network()), plain), network()).accepted)
-      << "bounds of a network of five inputs are none of one that maps six to them";
+      << "bounds of a network of five inputs do not hold for one that maps six inputs to them";
 }
 
 TEST(Invariants, NoSampledSlopeOfASetIsAboveItsBoundAndSomeComeNear) {

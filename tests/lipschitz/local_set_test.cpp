@@ -98,8 +98,8 @@ TEST(CountedNeighbours, BoundIsAboveEverySampledSlope) {
   std::printf("closest slope over bound: %.4f, least over any number: %.4f\n", closest, gain);
   // 0.658 here. It cannot be 1, because the other terms enter as one interval per neuron, whose extremes they do not
   // attain simultaneously.
-  EXPECT_GT(closest, 0.6) << "the samples do not come near the bounds: they test nothing";
-  EXPECT_LT(gain, 0.95) << "a number of neighbours never helped";
+  EXPECT_GT(closest, 0.6) << "the samples are not close to the bounds: the test shows nothing";
+  EXPECT_LT(gain, 0.95) << "stating a number of neighbours never improved a bound";
 }
 
 TEST(CountedNeighbours, WitnessHasNoMoreOfThemThanListed) {
@@ -128,7 +128,7 @@ TEST(RangeProof, HoldsForEverySampleAndIsRefusedWhereItIsNarrower) {
   };
   ASSERT_TRUE(holds(range.least, range.most, range.tree));
   EXPECT_FALSE(holds(range.least, range.most, "t0"))
-      << "the whole box shows the same range: the tree gained nothing";
+      << "the whole box gives the same range: the tree improved nothing";
   for (std::size_t i = 0; i < range.least.size(); ++i) {
     std::vector<double> least = range.least, most = range.most;
     least[i] += 1e-6 * std::abs(least[i]);
@@ -155,7 +155,7 @@ TEST(RangeProof, HoldsForEverySampleAndIsRefusedWhereItIsNarrower) {
       fullest = std::max(fullest, (y - range.least[row]) / (range.most[row] - range.least[row]));
     }
   }
-  EXPECT_GT(fullest, 0.7) << "the range is far wider than what is reached";
+  EXPECT_GT(fullest, 0.7) << "the range is much wider than the attained values";
 }
 
 TEST(Conflicts, OfABoxAreNeverMetByASample) {
@@ -190,7 +190,7 @@ TEST(Conflicts, OfABoxAreNeverMetByASample) {
   }
   std::printf("%zu conflicts, %zu samples near one\n", found, near);
   EXPECT_GT(found, 20u);
-  EXPECT_GT(near, 20u) << "no sample came near: the test shows nothing";
+  EXPECT_GT(near, 20u) << "no sample came close to the bound: the test shows nothing";
 }
 
 TEST(Conflicts, ProveWhatNeuronsAloneDoNotAndOnlyWhereTheyAreShown) {
@@ -264,7 +264,7 @@ TEST(ProjectiveCover, BoundsTheSlopeOfRandomNetworksEverywhere) {
   }
   std::printf("closest slope over bound: %.4f, least over the program: %.4f\n", closest, gain);
   EXPECT_GT(closest, 0.8);
-  EXPECT_LT(gain, 0.98) << "no better than without a cover";
+  EXPECT_LT(gain, 0.98) << "the cover does not improve the bound";
 }
 
 TEST(ProjectiveCover, HasAPointForEveryInputWithTheSameNeurons) {

@@ -140,7 +140,7 @@ TEST(MixedBounds, AreAboveSampledAndAdversarialSlopesAndBelowTheProduct) {
       EXPECT_GE(estimate, 0.8 * sampled) << mixed_words(weights);
     }
   }
-  EXPECT_GT(closest, 0.9) << "the adversary is too weak to mean anything";
+  EXPECT_GT(closest, 0.9) << "the adversary is too weak for a meaningful test";
 }
 
 TEST(MixedBounds, OfOneNeuronPerLayerAreTheProductOfWeightsAndSteepestSlopes) {

@@ -48,7 +48,7 @@ TEST(RhoForm, NoTwoPointsOfRhoAreFurtherApartThanItsFormAllows) {
       ASSERT_LE(moved, allowed * (1 + 1e-9)) << "seed " << seed << ", pair " << pair;
       tightest = std::max(tightest, moved / allowed);
     }
-    EXPECT_GT(tightest, 0.2) << "a form that nothing comes near would hold by itself";
+    EXPECT_GT(tightest, 0.2) << "no pair comes close to the form: the test shows nothing";
   }
 }
 

@@ -83,7 +83,7 @@ TEST(SdpBound, RandomNetworksSlopesStayBelowAndProductStaysAbove) {
     EXPECT_NEAR(upper, bound.optimum.value(), kOptimality * upper) << "round " << round;
     strictly_tighter += upper < 0.99 * product ? 1 : 0;
   }
-  EXPECT_GE(strictly_tighter, 10) << "the networks do not tell the two bounds apart";
+  EXPECT_GE(strictly_tighter, 10) << "the networks do not distinguish the two bounds";
 }
 
 TEST(SdpBound, PermutingNeuronsLeavesTheBoundUnchanged) {
@@ -212,7 +212,8 @@ TEST(SdpBound, RepeatingEveryNeuronLeavesTheBoundUnchangedForLargeNetworksToo) {
   std::mt19937 generator(16);
   const files::Weights net = random_network({3, 12, 10, 2}, generator);
   const files::Weights large = repeated(net, 16);
-  ASSERT_EQ(large.layers[1].outputs + large.layers[0].outputs, 352) << "beyond what minimise() is given";
+  ASSERT_EQ(large.layers[1].outputs + large.layers[0].outputs, 352)
+      << "must be too many neurons for minimise()";
   const double before = proved(sdp_bound_of(plain(net)));
   const lipschitz::SdpBound bound = sdp_bound_of(plain(large));
   EXPECT_EQ(bound.stop, lipschitz::LipSdpStop::kGapReached);

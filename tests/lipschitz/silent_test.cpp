@@ -193,7 +193,7 @@ TEST(Silent, NoValueLeavesTheRangeAndNoStepTheJumpAmongAllCompositions) {
     double plain_jump = 0;
     for (const Stated& one : all_stated(two_kinds({}, with_ground), 3))
       if (one.function.rho_kind() == "small") plain_jump = std::max(plain_jump, one.jump);
-    EXPECT_GT(step, plain_jump) << "the jump of the network that never is silent would have been left";
+    EXPECT_GT(step, plain_jump) << "the step does not exceed the jump of the network that is never silent";
   }
   Network smooth = two_kinds(kSomeSilent);
   tests::set_activation(smooth.phi.at("small"), files::Activation::kTanh);
@@ -209,7 +209,7 @@ TEST(Silent, OfOneKindEveryStepUpToTheNumberOfNeighboursCounts) {
   options.nodes = 200;
   const auto found = lipschitz::ranges(net, cubes(net), {{"small", 1e6}}, options);
   ASSERT_EQ(found.size(), 3u);
-  EXPECT_LT(found[0].jump, 3) << "nobody comes or goes to a pair yet";
+  EXPECT_LT(found[0].jump, 3) << "no second neighbour can enter yet";
   EXPECT_GT(found[0].lower, 0);
   for (const std::size_t n : {1u, 2u}) {
     EXPECT_EQ(found[n].lower, 0) << n;
@@ -226,7 +226,7 @@ TEST(Silent, TheRangeIsNothingButZeroWhereTheNetworkNeverSpeaks) {
     if (one.function != "set:small:small" || one.neighbours != 1) continue;
     EXPECT_EQ(one.lower, 0);
     EXPECT_EQ(one.upper, 0);
-    EXPECT_GT(one.jump, 4) << "where a second one comes";
+    EXPECT_GT(one.jump, 4) << "a second neighbour may enter";
     ++seen;
   }
   EXPECT_EQ(seen, 2);

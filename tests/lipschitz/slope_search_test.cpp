@@ -48,7 +48,8 @@ testing::AssertionResult proves_its_slope(const SlopeFunction& f, const SlopeWit
                                           const std::vector<int>& block = {}) {
   const double exact = slope(f, witness, block).value();
   if (exact == witness.slope.value()) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "states " << witness.slope.value() << ", the points have " << exact;
+  return testing::AssertionFailure() << "stated slope " << witness.slope.value() << ", slope of the points "
+                                     << exact;
 }
 
 void expect_within(const std::vector<float>& x, const Box& box) {
@@ -209,7 +210,7 @@ TEST(SlopeSearch, OnlyTheBlockMoves) {
   for (const std::size_t k : {0u, 2u, 4u}) EXPECT_EQ(found.x[k], found.y[k]);
   EXPECT_GT(found.slope.value(), 0);
   EXPECT_LE(found.slope.value(), 1.01 * all)
-      << "a block is steeper than everything: the search over everything is poor";
+      << "a block is steeper than all inputs together: the search over all inputs is poor";
 }
 
 TEST(SlopeSearch, AKinkOnTheEdgeOfTheBoxIsNoObstacle) {

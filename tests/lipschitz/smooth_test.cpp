@@ -79,7 +79,8 @@ TEST(SmoothBounds, AreAboveEverySampledSlopeAndBelowTheProduct) {
       const double upper = upper_of(found, "network");
       const double sampled = tests::sampled_slope(weights, generator, 1500);
       EXPECT_GE(upper, sampled * (1 - 1e-9)) << function.op;
-      EXPECT_GT(sampled, 0.02 * upper) << function.op << ": the samples are too flat to mean anything";
+      EXPECT_GT(sampled, 0.02 * upper)
+          << function.op << ": the sampled slopes are too small for a meaningful test";
       const double product = found.bounds[0].product.value();
       EXPECT_LT(upper, product) << function.op;
       EXPECT_TRUE(found.bounds[0].lower.witness);
@@ -293,7 +294,8 @@ TEST(SmoothCertificate, StatesTheActivationForFilesThatDoNot) {
     tests::set_activation(*weights, Activation::kRelu);  // the default
     weights->order_source = files::OrderSource::kNames;
   }
-  EXPECT_FALSE(checked(smooth_certificate(), unstated).accepted) << "check() itself takes NET as it is";
+  EXPECT_FALSE(checked(smooth_certificate(), unstated).accepted)
+      << "check() itself does not adopt stated activations";
   const Network adopted = check::with_stated_activations(smooth_certificate(), unstated);
   EXPECT_EQ(adopted.phi.at("default").activation_names(), "tanh");
   EXPECT_TRUE(checked(smooth_certificate(), adopted).accepted);
