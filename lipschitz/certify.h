@@ -38,8 +38,8 @@ enum class UpperMethod {
 struct CertifyOptions : ClaimOptions {
   UpperMethod method = UpperMethod::kAuto;
   std::optional<files::GammaStatement> gamma;  ///< overrides what network.toml states
-  BranchOptions branch;                        ///< per claim; `known` and `cancelled` are taken from here
-  LowerBoundOptions lower;                     ///< its `cancelled` is taken from here below
+  BranchOptions branch;                        ///< per claim; certify() sets `known` and `cancelled`
+  LowerBoundOptions lower;                     ///< per claim; certify() sets `cancelled`
   int jobs = 0;  ///< threads; 0: all. Results do not depend on it, unless `seconds` is set.
   /// Wall-clock limit for the whole certification, divided among its tasks; 0: no limit. The work that is always done
   /// may exceed it: the spectral norms and layer-wise bounds at the start, and one exact proof per bound at the end.
@@ -59,10 +59,13 @@ struct CertifiedLayer {
 
 struct CertifiedBound : Claim {
   bool has_witness = true;  ///< false for functions of invariants, which get no lower bound
-  bool is_relu = true;      ///< all activations are ReLU and `has_witness`; otherwise there is no branch and bound
-  bool has_slopes = true;   ///< all activations act entry by entry; false if a layer is sorted: only the product bound
-  bool has_local_slopes = false;  ///< there is a box and an activation other than ReLU, with possibly smaller slopes
-  bool is_monotone = true;        ///< false: the layer-wise bound is the product of norms
+  bool is_relu =
+      true;  ///< all activations are ReLU and `has_witness`; otherwise there is no branch and bound
+  bool has_slopes =
+      true;  ///< all activations act entry by entry; false if a layer is sorted: only the product bound
+  bool has_local_slopes =
+      false;  ///< there is a box and an activation other than ReLU, with possibly smaller slopes
+  bool is_monotone = true;  ///< false: the layer-wise bound is the product of norms
   UpperBound upper{0};
   UpperMethod method = UpperMethod::kProduct;
   std::optional<UpperProof> proof;  ///< set if method is kEclipseFast, kSdp or kLocalSdp

@@ -66,7 +66,7 @@ class SampledFunction {
   void add_other(const files::FunctionId& part, std::mt19937_64& generator);
   Eigen::VectorXd evaluated(const files::FunctionId& part, const Eigen::VectorXd& x) const;
   Eigen::VectorXd term(const files::FunctionId& part, Eigen::VectorXd x) const;
-  /// (f(x + h d) - f(x - h d)) / (2 h) for d in the block, in units of the scale.
+  /// Returns (f(x + h d) - f(x - h d)) / (2 h) for d in the block, in units of the scale.
   Eigen::VectorXd quotient(const Eigen::VectorXd& x, const Eigen::VectorXd& direction) const;
   /// Returns the width of the box or the clamp along input k, or 1.
   double width(Eigen::Index k) const;

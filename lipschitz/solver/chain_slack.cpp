@@ -63,7 +63,7 @@ MatrixXd ChainSlack::diagonal_block(const VectorXd& y, std::size_t k) const {
 
 namespace {
 
-/// L_k with D_k = L_k L_k', and B_k = M_k L_{k-1}^-T; for block 0 only if it is not a multiple of M_1.
+/// L_k with D_k = L_k L_k', and B_k = M_k L_{k-1}^-T. lower[0] and half[1] are empty if D_0 = rho I.
 struct Elimination {
   std::vector<MatrixXd> lower, half;
 };

@@ -11,7 +11,7 @@ namespace swarmcert::lipschitz {
 
 /// S(y) = C + y_0 A_0 + sum_{i >= 1} y_i A_i, symmetric, with A_0 = diag(I, 0) over the inputs and
 /// A_i = -(a_i e_i' + e_i a_i'), where e_i selects variable inputs() + i - 1: the form of LipSDP-Neuron and of its
-/// restriction to a box. Implementations may use the pattern of A.
+/// restriction to a box. Implementations may exploit the sparsity pattern of A.
 class RankTwoInequality {
  public:
   virtual ~RankTwoInequality() = default;

@@ -238,7 +238,7 @@ TEST(SdpBound, WideInputsAreReduced) {
 
 TEST(SdpBound, CoversTheNetworkThatTheLipSdpNetworkVariantGetsWrong) {
   // f(x) = 0.847 relu(1.506 x + 1) - 1.176 relu(1.071 x - 10) has slope 1.27613 at 0; the "network" variant of LipSDP
-  // claims 0.3686 for it (the project's reference measurements, trap 1).
+  // claims 0.3686 for it (the project's reference measurements).
   const files::Weights net = tests::weights(
       {tests::layer(2, 1, {1.50591384, 1.0709144}), tests::layer(1, 2, {0.84741233, -1.17624551})});
   const double upper = proved(sdp_bound_of(plain(net)));
