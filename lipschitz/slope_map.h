@@ -29,8 +29,8 @@ struct SlopeCell {
   Box box;                ///< range of the moving input
   UpperBound upper{0};    ///< |f(x) - f(y)| <= upper |x - y| for all x and y in `box`
   bool is_local = false;  ///< `upper` was proved for this cell and is smaller than the global bound
-  UpperMethod method = UpperMethod::kBranch;  ///< method of a local bound: kBranch, kLocalSdp or kLocalProduct
-  FoundSlope lower;  ///< lower bound from two points of the cell; other neighbours are in their boxes
+  UpperMethod method = UpperMethod::kBranch;  ///< of a local bound: kBranch, kLocalSdp or kLocalProduct
+  FoundSlope lower;  ///< from two points of the cell; other neighbours are in their boxes
 };
 
 struct SlopeMap {
