@@ -59,13 +59,10 @@ struct CertifiedLayer {
 
 struct CertifiedBound : Claim {
   bool has_witness = true;  ///< false for functions of invariants, which get no lower bound
-  bool is_relu =
-      true;  ///< all activations are ReLU and `has_witness`; otherwise there is no branch and bound
-  bool has_slopes =
-      true;  ///< all activations act entry by entry; false if a layer is sorted: only the product bound
-  bool has_local_slopes =
-      false;  ///< there is a box and an activation other than ReLU, with possibly smaller slopes
-  bool is_monotone = true;  ///< false: the layer-wise bound is the product of norms
+  bool is_relu = true;      ///< all activations are ReLU and `has_witness`; else no branch and bound
+  bool has_slopes = true;   ///< activations act entry by entry; false: a layer sorts, product bound only
+  bool has_local_slopes = false;  ///< a box, and an activation other than ReLU: slopes may be smaller there
+  bool is_monotone = true;        ///< false: the layer-wise bound is the product of norms
   UpperBound upper{0};
   UpperMethod method = UpperMethod::kProduct;
   std::optional<UpperProof> proof;  ///< set if method is kEclipseFast, kSdp or kLocalSdp

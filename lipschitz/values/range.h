@@ -26,7 +26,8 @@ struct Attained {
 struct CertifiedRange {
   files::FunctionId function;  ///< "network" or "set:<phi kind>:<rho kind>"
   int output = 0;              ///< index of the output
-  int neighbours_at_most = 0;  ///< of the kind, each in its box; 0 for a plain network
+  /// Largest number of neighbours of the kind, each anywhere in its box; 0 for a plain network.
+  int neighbours_at_most = 0;
   double lower = 0, upper = 0;
   Attained least, greatest;  ///< lower <= least.value, greatest.value <= upper
   /// Bound on the change when a neighbour anywhere in its box enters or leaves while the others stay, as at a distance
