@@ -8,10 +8,10 @@
 namespace swarmcert::logs {
 namespace {
 
-/// Of the system of satellite navigation: its start, and by how much it is ahead of UTC since 2017.
+/// Start of GPS time, and its lead over UTC since 2017.
 constexpr double kReceiverEpoch_s = 315964800, kLeap_s = 18, kWeek_s = 604800;
 
-/// Time since 1970 of each record of a topic of a receiver; 0 where it had none. Empty for other topics.
+/// Returns the time since 1970 of each record of a receiver topic, 0 where it had none; empty for other topics.
 std::vector<double> receiver_times_s(const RawTopic& topic) {
   std::vector<double> times_s;
   if (const RawColumn* const utc = topic.find("time_utc_usec")) {

@@ -1,4 +1,4 @@
-/// @file Clocks that several vehicles share.
+/// @file Absolute time of logs, which relates the clocks of several vehicles.
 #pragma once
 
 #include <utility>
@@ -8,14 +8,14 @@
 
 namespace swarmcert::logs {
 
-/// Clocks beyond it, in seconds, count from 1970, or from a receiver's epoch.
+/// Clocks above this value (in seconds) count from 1970 or from the epoch of a satellite receiver.
 inline constexpr double kAbsoluteClock_s = 1e8;
 
-/// What a satellite receiver says must be added to the log's clock to get seconds since 1970: PX4's
-/// vehicle_gps_position and sensor_gps, ArduPilot's GPS. 0 where no receiver had the time.
+/// Returns the offset that turns the log's clock into seconds since 1970, as a satellite receiver reports it: PX4's
+/// vehicle_gps_position and sensor_gps, ArduPilot's GPS. Returns 0 if no receiver had the time.
 double receiver_offset_s(const RawLog& log);
 
-/// First and last time of a log, in seconds since 1970; {0, 0} where its clock is not absolute.
+/// Returns the first and last time of a log in seconds since 1970; {0, 0} if its clock is not absolute.
 Interval absolute_span_s(const RawLog& log);
 
 }  // namespace swarmcert::logs

@@ -1,4 +1,4 @@
-/// @file Constants of angles and of missing values, shared by what gives columns a meaning.
+/// @file Constants for angles and missing values, shared by the sources that interpret columns.
 #pragma once
 
 #include <limits>
@@ -8,7 +8,7 @@ namespace swarmcert::logs {
 inline constexpr double kPi = 3.14159265358979323846;
 /// One degree in radians.
 inline constexpr double kDegree_rad = kPi / 180;
-/// A value that the log does not have.
+/// Marks a value that the log does not have.
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace swarmcert::logs

@@ -10,10 +10,10 @@
 namespace swarmcert::logs {
 namespace {
 
-constexpr double kBelieved = 0.4;  ///< correlation from which a sign or a unit counts as seen
+constexpr double kBelieved = 0.4;  ///< correlation above which a sign or a unit is considered established
 
-/// The firmware's packed quaternion: two bits name the largest component, which is positive; the others have a sign
-/// and nine bits each, from the last component down to the first.
+/// Unpacks the firmware's quaternion: two bits identify the largest component, which is positive; each of the others
+/// has a sign and nine bits, from the last component down to the first.
 Attitude unpacked(double packed) {
   auto bits = static_cast<std::uint32_t>(packed);
   const std::uint32_t largest = bits >> 30;
@@ -48,12 +48,13 @@ void make_room(SignalTable& table) {
   for (int k = 0; k < 4; ++k) table[kAttitude + k].assign(table.size(), 0);
 }
 
-/// Which of x, y, z, w and w, x, y, z makes the thrust axis follow the lateral acceleration, or, at rest, upright.
+/// Decides between the orders x, y, z, w and w, x, y, z: the thrust axis must follow the lateral acceleration or, at
+/// rest, be upright.
 void settle_order(Draft& draft) {
   const Carried* const carried = draft.recognition.find(kAttitude);
   if (carried == nullptr || carried->ask != Ask::kQuaternion || !draft.asks_physics) return;
   SignalTable& t = draft.table;
-  double last_is_w = 0, first_is_w = 0;  // cosine of the tilt, summed
+  double last_is_w = 0, first_is_w = 0;  // sum of the cosines of the tilt
   for (std::size_t i = 0; i < t.size(); ++i) {
     const double a = t[kAttitude][i], b = t[kAttitude + 1][i], c = t[kAttitude + 2][i];
     last_is_w += 1 - 2 * (a * a + b * b);
@@ -67,7 +68,7 @@ void settle_order(Draft& draft) {
                          w_first ? "w, x, y, z" : "x, y, z, w"));
 }
 
-/// Acceleration in W turned by -yaw: forward and to the left.
+/// Acceleration in W rotated by -yaw: forward and left components.
 struct Lateral {
   std::vector<double> forward, left;
 };
@@ -94,8 +95,8 @@ double largest(const std::vector<double>& values) {
   return found;
 }
 
-/// Degrees or radians, and the signs of roll and pitch: a positive pitch accelerates forward by g, a positive roll to
-/// the right.
+/// Decides between degrees and radians, and the signs of roll and pitch: positive pitch accelerates forward by g per
+/// radian, positive roll to the right.
 void settle_angles(Draft& draft) {
   const Carried& carried = *draft.recognition.find(kEuler);
   SignalTable& t = draft.table;
@@ -139,7 +140,7 @@ void settle_angles(Draft& draft) {
   }
 }
 
-/// The thrust axis along acceleration + g, turned by the yaw.
+/// Derives the attitude whose thrust axis is along acceleration + g and whose yaw is the given one.
 void derive_from_acceleration(Draft& draft) {
   SignalTable& t = draft.table;
   make_room(t);
@@ -149,7 +150,7 @@ void derive_from_acceleration(Draft& draft) {
     double ax = lateral ? draft.acceleration_m_s2[0][i] : 0, ay = lateral ? draft.acceleration_m_s2[1][i] : 0;
     double az = draft.acceleration_m_s2[2].empty() ? 0 : draft.acceleration_m_s2[2][i];
     if (!std::isfinite(ax + ay + az)) ax = ay = az = 0;
-    // In free fall there is no thrust whose axis could be seen.
+    // In free fall there is no thrust whose axis could be determined.
     const double up = std::max(kGravity_m_s2 + az, 0.2 * kGravity_m_s2);
     const double forward = std::cos(yaw) * ax + std::sin(yaw) * ay,
                  left = -std::sin(yaw) * ax + std::cos(yaw) * ay;
@@ -158,7 +159,7 @@ void derive_from_acceleration(Draft& draft) {
   }
 }
 
-/// Rates of the attitude in B, about its own axes: 2 q* dq/dt.
+/// Returns the rates of the attitude in B: 2 q* dq/dt.
 std::array<std::vector<double>, 3> attitude_rates(const SignalTable& t) {
   std::array<std::vector<double>, 3> rates;
   for (auto& axis : rates) axis.assign(t.size(), std::nan(""));
@@ -200,7 +201,7 @@ void settle_rates(Draft& draft) {
       weight += line.correlation;
     }
     if (weight > 0) {
-      // Of the scales by which units in use differ, the one that fits best.
+      // Choose the scale that fits best among the ratios of common units.
       const double ratio = weighted / weight;
       double best = 1;
       for (const double scale : {1 / kDegree_rad, kDegree_rad, 1000.0}) {

@@ -1,4 +1,4 @@
-/// @file A few bytes of a stream at a time, with little-endian numbers.
+/// @file A sliding window over a byte stream, and little-endian numbers.
 #pragma once
 
 #include <cstdint>
@@ -8,22 +8,23 @@
 
 namespace swarmcert::logs {
 
-/// Reads ahead only as far as asked. Offsets count from where the stream stood at construction.
+/// Reads a stream no further ahead than requested. Offsets count from the stream position at construction.
 class ByteWindow {
  public:
   explicit ByteWindow(std::istream& in) : in_(in) {}
 
-  /// The next `size` bytes without consuming them, or nullptr if the stream ends before. Valid until the next call.
+  /// Returns the next `size` bytes without consuming them, or nullptr if the stream ends first. Valid until the next
+  /// call.
   const unsigned char* peek(std::size_t size) {
     fill(size);
     return available() >= size ? buffer_.data() + begin_ : nullptr;
   }
-  /// Bytes that are left, but at most `limit`.
+  /// Returns the number of bytes left, but at most `limit`.
   std::size_t left(std::size_t limit) {
     fill(limit);
     return available() < limit ? available() : limit;
   }
-  /// Precondition: `size` bytes were peeked.
+  /// Precondition: `size` bytes have been peeked.
   void skip(std::size_t size) {
     begin_ += size;
     offset_ += size;
@@ -51,7 +52,7 @@ class ByteWindow {
   std::size_t begin_ = 0, end_ = 0, offset_ = 0;
 };
 
-/// The little-endian number of type `Number` at `bytes`.
+/// Returns the little-endian number of type `Number` at `bytes`.
 template <typename Number>
 Number little_endian(const unsigned char* bytes) {
   unsigned char ordered[sizeof(Number)];
@@ -70,7 +71,7 @@ struct BinaryVariable {
   std::size_t offset;  ///< within the record
 };
 
-/// Bytes of a variable of `type`; 0 if the type is unknown.
+/// Returns the size of a variable of `type` in bytes; 0 if the type is unknown.
 inline std::size_t size_of(char type) {
   switch (type) {
     case 'b':

@@ -1,4 +1,4 @@
-/// @file Records of a file with one clock as the one topic of a RawLog.
+/// @file Collects the records of a file with a single clock into one topic of a RawLog.
 #pragma once
 
 #include "analysis/logs/recognition.h"
@@ -6,17 +6,17 @@
 
 namespace swarmcert::logs {
 
-/// The column that is a clock by its name; -1 if none is.
+/// Returns the column whose name says that it is a clock; -1 if there is none.
 int clock_by_name(const RawTopic& topic);
 
-/// Seconds per unit of a clock, from its median step: the largest of the usual units that gives a rate which flight
-/// logs have.
+/// Returns the seconds per unit of a clock, judged by its median step: the largest common unit that gives a plausible
+/// logging rate.
 double seconds_per_unit(const std::vector<double>& clock);
 
-/// Collects records; the unit of the time column is decided at the end, from its steps.
+/// Collects records. The unit of the time column is decided at the end, from its steps.
 class Collector : public RecordSink {
  public:
-  /// @param log gets one topic. It and `map` must outlive this.
+  /// @param log receives one topic. `log` and `map` must outlive this object.
   Collector(RawLog& log, const SignalMap& map) : log_(log), map_(map) {}
 
   /// @throws files::InputError if no column carries the time.
@@ -33,7 +33,7 @@ class Collector : public RecordSink {
   const SignalMap& map_;
   std::vector<char> needs_;
   std::size_t time_ = 0;
-  double scale_s_ = 0;  ///< of the time column; 0: decided from its steps
+  double scale_s_ = 0;  ///< seconds per unit of the time column; 0: decided from its steps
 };
 
 }  // namespace swarmcert::logs

@@ -25,7 +25,7 @@ double mean_of(const Numbers& values) {
   return count == 0 ? std::nan("") : sum / static_cast<double>(count);
 }
 
-/// The slope of `values` over about `span_s` around each record.
+/// Returns the slope of `values` over about `span_s` around each record.
 Numbers slope_of(const Numbers& time_s, const Numbers& values, double span_s) {
   const std::size_t n = values.size();
   Numbers slope(n, std::nan(""));
@@ -39,7 +39,7 @@ Numbers slope_of(const Numbers& time_s, const Numbers& values, double span_s) {
   return slope;
 }
 
-/// The factor among `units` that is nearest to `size`, if it is within 30 %; nullptr otherwise.
+/// Returns the factor among `units` closest to `size` if it is within 30 %; nullptr otherwise.
 struct UnitSize {
   const char* name;
   double per_si;
@@ -79,7 +79,7 @@ class Guesser {
 
  private:
   static constexpr double kSlope_s = 0.05;
-  static constexpr char kConstant = 1;  ///< or without numbers: says nothing by itself
+  static constexpr char kConstant = 1;  ///< constant or without numbers: carries no information
   static constexpr char kTaken = 2;
 
   bool wants(const std::string& signal) const {
@@ -87,7 +87,7 @@ class Guesser {
   }
   const Numbers& values(std::size_t c) const { return topic_.columns[c].values; }
   std::size_t size() const { return topic_.columns.size(); }
-  /// `count` columns from `first` on that nothing has claimed.
+  /// Returns true if the `count` columns starting at `first` are not claimed yet.
   bool free(std::size_t first, std::size_t count) const {
     if (first + count > size()) return false;
     return std::all_of(taken_.begin() + static_cast<std::ptrdiff_t>(first),
@@ -104,7 +104,7 @@ class Guesser {
     for (std::size_t k = 0; k < 3; ++k) claim(signal + "_" + "xyz"[k], first + k, unit, frame, evidence);
   }
 
-  /// sqrt of the sum of squares of `count` columns, record by record.
+  /// Returns, per record, the square root of the sum of squares of `count` columns.
   Numbers norm(std::size_t first, std::size_t count) const {
     Numbers norms(topic_.time_s.size(), 0);
     for (std::size_t c = first; c < first + count; ++c)
@@ -115,7 +115,7 @@ class Guesser {
 
   void quaternion() {
     for (std::size_t c = 0; c + 4 <= size(); ++c) {
-      // A constant component is no reason against a quaternion: a vehicle may keep its yaw.
+      // A constant component does not rule out a quaternion: a vehicle may hold its yaw.
       const bool has_numbers = std::all_of(taken_.begin() + static_cast<std::ptrdiff_t>(c),
                                            taken_.begin() + static_cast<std::ptrdiff_t>(c + 4),
                                            [](char taken) { return taken != kTaken; });
@@ -139,8 +139,8 @@ class Guesser {
     }
   }
 
-  /// Slope of the lateral acceleration over what a thrust axis with quaternion_ would give, times the unit; 0 without
-  /// one.
+  /// Slope of the lateral acceleration over the one predicted from the thrust axis of quaternion_, times the unit; 0
+  /// without a quaternion.
   double tilt_correlation(std::size_t velocity) const {
     if (!has_quaternion_) return 0;
     const Numbers acceleration = slope_of(topic_.time_s, values(velocity), 0.1);
@@ -177,7 +177,7 @@ class Guesser {
     const Pair& best = *std::max_element(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
       return a.tilt + a.correlation < b.tilt + b.correlation;
     });
-    // Rooms are some metres wide and indoor flights some metres per second fast.
+    // Rooms are a few metres wide, and indoor flights reach a few metres per second.
     const bool mm = quantile_of(norm(best.velocity, 3), 0.95) > 60;
     const bool position_mm = mm ? best.factor > 0.03 : best.factor > 30;
     const std::string evidence = fmt::format("its derivative is {}, correlation {:.3f}",
@@ -190,7 +190,8 @@ class Guesser {
     has_velocity_ = true;
   }
 
-  /// Roll and pitch are, for small angles, minus the acceleration along y and the acceleration along x, over gravity.
+  /// For small angles, roll and pitch are minus the acceleration along y and the acceleration along x, divided by
+  /// gravity.
   void angles() {
     if (!has_velocity_) return;
     static const std::vector<UnitSize> units = {
@@ -227,7 +228,7 @@ class Guesser {
     for (std::size_t k = 0; k < 4; ++k) dq[k] = slope_of(topic_.time_s, values(quaternion_[k]), kSlope_s);
     for (std::size_t i = 0; i < n; ++i) {
       const auto q = [&](std::size_t k) { return values(quaternion_[k])[i]; };
-      // omega = 2 q* dq/dt, the vector part.
+      // Vector part of omega = 2 q* dq/dt.
       for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t a = (k + 1) % 3, b = (k + 2) % 3;
         omega[k].push_back(2 * (q(3) * dq[k][i] - q(k) * dq[3][i] - q(a) * dq[b][i] + q(b) * dq[a][i]));
@@ -317,7 +318,7 @@ int guess_clock(const RawTopic& topic) {
     for (std::size_t i = 1; i < values.size(); ++i) steps.push_back(values[i] - values[i - 1]);
     const double step = median(steps);
     if (steps.size() < 10 || !(step > 0) || !(quantile_of(steps, 0.01) > 0)) continue;
-    // Equal steps of one count records; a clock has another unit, or some spread.
+    // A constant step of exactly one means a record counter; a clock has another unit or some jitter.
     double spread = (quantile_of(steps, 0.9) - quantile_of(steps, 0.1)) / step;
     if (step == 1 && spread == 0) spread = 1;
     if (spread > 1 || spread >= least) continue;

@@ -1,4 +1,4 @@
-/// @file What the columns of a table may mean, judged by their values alone.
+/// @file Guesses what the columns of a table mean from their values alone.
 #pragma once
 
 #include <string>
@@ -8,23 +8,23 @@
 
 namespace swarmcert::logs {
 
-/// A line of a columns.toml that values suggest.
+/// A line of columns.toml, suggested by the values of a column.
 struct ColumnGuess {
-  std::string signal;  ///< as columns.toml names it, e.g. "velocity_x"
+  std::string signal;  ///< name as in columns.toml, e.g. "velocity_x"
   std::size_t column = 0;
   std::string unit;
   const char* frame = nullptr;  ///< nullptr: the signal has none
   std::string evidence;
 };
 
-/// The column that is a clock: one that rises with nearly every record, by nearly the same step, preferably not by one
-/// per record. -1 if none does.
+/// Returns the column that looks like a clock: it rises by nearly the same step with nearly every record, preferably by
+/// something other than one per record. Returns -1 if there is none.
 int guess_clock(const RawTopic& topic);
 
-/// Quaternions by their norm, positions by velocities that are their derivative, angles by the lateral acceleration,
-/// rates by the quaternion, specific force by its size, motors as four numbers of one range, a battery by its range and
-/// its fall. Groups stand in neighbouring columns. Only signals that are not in `known` are guessed, of columns that
-/// are not `taken`. Precondition: topic.time_s is set.
+/// Guesses signals from values: quaternions by their norm, positions by velocities that are their derivatives, angles
+/// by the lateral acceleration, rates by the quaternion, specific force by its magnitude, motors as four columns with a
+/// common range, the battery by its range and decline. The columns of a group must be adjacent. Guesses only signals
+/// that are not in `known`, from columns that are not `taken`. Precondition: topic.time_s is set.
 std::vector<ColumnGuess> guess_columns(const RawTopic& topic, std::vector<char> taken,
                                        const std::vector<std::string>& known);
 

@@ -7,7 +7,7 @@
 namespace swarmcert::logs {
 namespace {
 
-/// `pattern` with '#' replaced by each of `words`.
+/// Returns `pattern` with '#' replaced by each of `words`.
 std::vector<std::string> each(const std::string& pattern, const std::vector<std::string>& words) {
   std::vector<std::string> names;
   for (const std::string& word : words) {
@@ -27,7 +27,7 @@ std::vector<std::string> euler(const std::string& pattern) { return each(pattern
 
 using Table = std::vector<NamedColumns>;
 
-/// The names of columns.toml, in SI units: what message_frames.h writes.
+/// The names of columns.toml, in SI units, as produced by message_frames.h.
 void add_own(Table& t) {
   t.push_back({kPosition, axes("position.#"), "m"});
   t.push_back({kVelocity, axes("velocity.#"), "m/s"});
@@ -46,7 +46,7 @@ void add_own(Table& t) {
   t.push_back({kThrustCommand, {"thrust.command.normalised"}, "1"});
 }
 
-/// The CSV of the published flights. Its "a" is a specific force in the world.
+/// The CSV files of the published flights. Their "a" is a specific force in the world frame.
 void add_published(Table& t) {
   t.push_back({kPosition, axes("#[m]"), "m"});
   t.push_back({kVelocity, axes("v#[m/s]"), "m/s"});
@@ -59,7 +59,7 @@ void add_published(Table& t) {
   t.push_back({kTorque, axes("torque#[Nm]"), "N m"});
 }
 
-/// Crazyflie: log variables of the firmware.
+/// Log variables of the Crazyflie firmware.
 void add_crazyflie(Table& t) {
   t.push_back({kPosition, axes("stateestimatez.#"), "mm", 1, 1000});
   t.push_back({kPosition, axes("stateestimate.#"), "m"});
@@ -70,7 +70,7 @@ void add_crazyflie(Table& t) {
   t.push_back({kPosition, axes("ext.pos.#"), "m"});
   t.push_back({kVelocity, axes("stateestimatez.v#"), "mm/s", 1, 1000});
   t.push_back({kVelocity, axes("stateestimate.v#"), "m/s"});
-  // kalman.stateP* is a velocity in the body frame: with kalman.state* the velocity is derived from the position.
+  // kalman.stateP* is a velocity in the body frame, so for kalman.state* the velocity is derived from the position.
   t.push_back({kForceWorld, axes("stateestimatez.a#"), "mm/s^2", 1, 1000});
   t.push_back({kForceBody, axes("acc.#"), "g", kGravity_m_s2, 1});
   t.push_back({kAttitude, quaternion("stateestimate.q#"), "1"});
@@ -78,7 +78,7 @@ void add_crazyflie(Table& t) {
   t.push_back({kAttitude, each("kalman.q#", {"1", "2", "3", "0"}), "1"});
   t.push_back({kAttitude, quaternion("locsrv.q#"), "1"});
   t.push_back({kEuler, axes("ctrllee.rpy#"), "rad"});
-  // The firmware's legacy convention: degrees, and a positive pitch raises the nose.
+  // The firmware's legacy convention: degrees, and positive pitch raises the nose.
   for (const char* group : {"stateestimate.#", "stabilizer.#"})
     t.push_back({kEuler, euler(group), "deg", kDegree_rad, 1, Ask::kLegacyPitch});
   t.push_back({kRates, each("stateestimatez.rate#", {"roll", "pitch", "yaw"}), "mrad/s", 1, 1000});
@@ -104,11 +104,11 @@ void add_crazyflie(Table& t) {
   for (const char* name : {"ctrlmel.cmd.thrust", "controller.cmd.thrust", "controller.actuatorthrust",
                            "ctrllee.thrust", "stabilizer.thrust"})
     t.push_back({kThrustCommand, {name}, "1"});
-  // Accelerations of the estimate last: they are derivatives that the estimator has filtered in its own way.
+  // Accelerations of the estimate come last, because they are derivatives filtered by the estimator.
   t.push_back({kAccelerationWorld, axes("stateestimate.a#"), "g", kGravity_m_s2, 1});
 }
 
-/// CSV as people write it. The first name of a group is what the tool itself would write.
+/// Hand-made CSV files. The first name of each group is the one this tool would write.
 void add_generic(Table& t) {
   for (const char* group :
        {"position.#", "pos.#", "p#", "p.#", "pose.position.#", "pose.pose.position.#", "odom.position.#",
@@ -198,7 +198,7 @@ std::string plain_name(const std::string& column) {
     }
     in_word = is_word(c);
   }
-  // Array elements keep their index: q[0] is "q.0".
+  // Array elements keep their index: q[0] becomes "q.0".
   const std::size_t bracket = column.find('[', 1);
   if (bracket != std::string::npos && bracket + 1 < column.size() &&
       std::isdigit(static_cast<unsigned char>(column[bracket + 1])) != 0)

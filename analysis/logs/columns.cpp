@@ -16,7 +16,7 @@ struct Unit {
   double multiply, divide;
 };
 
-/// What a columns.toml may name.
+/// A signal that columns.toml may name.
 struct NamedSignal {
   int signal;
   std::vector<Unit> units;
@@ -31,7 +31,7 @@ std::map<std::string, NamedSignal> named_signals() {
       named[name + parts[k]] = {first + static_cast<int>(k), units, may_be_body};
   };
   const std::vector<std::string> axes = {"_x", "_y", "_z"}, motors = {"_1", "_2", "_3", "_4"};
-  // A minus stands for columns of the opposite sign: of frames whose z points down.
+  // A minus in the unit marks columns of opposite sign, as in frames whose z axis points down.
   const auto of_both_signs = [&](std::vector<Unit> units) {
     static const std::map<std::string, const char*> negative = {
         {"1", "-1"},           {"m", "-m"},         {"mm", "-mm"},         {"m/s", "-m/s"},
@@ -87,7 +87,7 @@ SignalMap parse_columns(const std::string& text, const std::string& path) {
   for (const auto& [name, unused] : named) known.push_back(name);
   root.allow_only(known);
   SignalMap map;
-  std::set<bool> frames;  // of the specific force: true where it is the body's
+  std::set<bool> frames;  // of the specific force: true for the body frame
   for (const std::string& name : root.keys()) {
     if (name == "schema") continue;
     const files::TomlTable table = root.table(name);

@@ -20,7 +20,7 @@ namespace {
 
 struct UnitGuess {
   const char* name;
-  double per_si;  ///< stored number of one SI unit
+  double per_si;  ///< stored value of one SI unit
 };
 
 struct SignalWords {
@@ -75,7 +75,7 @@ const std::vector<SignalWords>& signal_words() {
   return all;
 }
 
-/// The interpreted signal of one sample; NaN where Log does not keep it.
+/// Returns the interpreted signal of one sample; NaN if Log does not keep it.
 double interpreted(const Log& log, std::size_t i, int signal) {
   const Sample& s = log.samples[i];
   const auto part = [&](int first) { return static_cast<std::size_t>(signal - first); };
@@ -96,12 +96,12 @@ double interpreted(const Log& log, std::size_t i, int signal) {
   return std::nan("");
 }
 
-/// The unit whose size is nearest to the slope of the stored numbers over the interpreted ones.
+/// Returns the unit whose size is closest to the slope of the stored over the interpreted numbers.
 const UnitGuess& unit_of(const SignalWords& words, double slope) {
   const UnitGuess* best = &words.units[0];
   double nearest = INFINITY;
   for (const UnitGuess& unit : words.units) {
-    const double distance = std::abs(std::log(slope / unit.per_si));  // NaN where the signs differ
+    const double distance = std::abs(std::log(slope / unit.per_si));  // NaN if the signs differ
     if (distance < nearest) {
       nearest = distance;
       best = &unit;
@@ -110,7 +110,8 @@ const UnitGuess& unit_of(const SignalWords& words, double slope) {
   return *best;
 }
 
-/// Where Log keeps no copy, the unit that the name's factor stands for, corrected by the size of the values.
+/// Fallback if Log keeps no copy of the signal: the unit implied by the name's factor, corrected by the size of the
+/// values.
 double slope_by_name(const Carried& carried, const std::vector<double>& stored) {
   const double largest = std::max(quantile_of(stored, 1), -quantile_of(stored, 0));
   if (carried.signal == kDuty || carried.signal == kRequested) return largest > 1.5 ? 65536 : 1;
@@ -128,7 +129,7 @@ std::string time_unit(const RawTopic& topic, const RawColumn& column) {
   return "s";
 }
 
-/// Every column of a table as numbers, whatever it means.
+/// Collects every column of a table as numbers, whatever it means.
 class TableSink : public RecordSink {
  public:
   explicit TableSink(RawTopic& topic) : topic_(topic) {}
@@ -144,14 +145,15 @@ class TableSink : public RecordSink {
   RawTopic& topic_;
 };
 
-/// A CSV as a log, with what was found about its clock.
+/// A CSV file as a log, with the findings about its clock.
 struct DraftTable {
   RawLog raw;
   std::size_t clock = 0;
   bool clock_is_guessed = false;
 };
 
-/// @throws files::InputError where no column can be a clock.
+/// Reads a table.
+/// @throws files::InputError if no column can be a clock.
 DraftTable read_table(const std::string& path) {
   DraftTable table;
   table.raw.path = path;
@@ -183,7 +185,7 @@ DraftTable read_table(const std::string& path) {
   return table;
 }
 
-/// What the names leave open is interpreted where they say enough; otherwise the log stays empty.
+/// Interprets the log as far as the names allow; otherwise returns an empty log.
 Log interpreted_where_possible(const RawLog& raw) {
   try {
     return interpret(raw, known_columns());
@@ -209,7 +211,7 @@ struct Writer {
   }
 };
 
-/// Guesses from values for what names do not say, then what only the user can know.
+/// Adds guesses from values for what the names leave open, then what only the user can know.
 void add_guesses(const RawTopic& topic, Writer& writer) {
   std::vector<char> taken;
   for (const RawColumn& column : topic.columns)
@@ -259,14 +261,14 @@ std::string columns_draft(const std::string& path) {
   for (const SignalWords& words : signal_words()) {
     for (const Carried& carried : recognition.groups) {
       const int offset = words.signal - carried.signal;
-      // roll, pitch and yaw are names of their own within one group
+      // Within a group of angles, roll, pitch and yaw have their own names.
       const bool is_angle = carried.signal == kEuler && offset >= 0 && offset < 3;
       if (offset != 0 && !is_angle) continue;
       for (std::size_t k = 0; k < words.parts.size(); ++k) {
         const std::size_t at = k + static_cast<std::size_t>(offset);
         if (at >= carried.size() || carried.columns[at] < 0) continue;
         const RawColumn& column = topic.columns[static_cast<std::size_t>(carried.columns[at])];
-        // Samples and stored records differ where some were dropped: matched by their times.
+        // Some stored records may have been dropped, so samples are matched by their times.
         std::vector<double> stored, taken;
         std::size_t record = 0;
         for (std::size_t i = 0; i < log.samples.size(); ++i) {
@@ -278,7 +280,7 @@ std::string columns_draft(const std::string& path) {
         if (log.samples.empty()) stored = column.values;
         const Line line = line_through(taken, stored);
         const bool compared = line.count > 10 && std::abs(line.correlation) > 0.5;
-        if (words.signal == kForceBody && !compared) continue;  // neither frame nor gravity could be settled
+        if (words.signal == kForceBody && !compared) continue;  // frame and gravity are undecided
         const UnitGuess& unit = unit_of(words, compared ? line.slope : slope_by_name(carried, stored));
         const std::string evidence =
             compared ? fmt::format("{:.4g} per SI unit, correlation {:.3f}", line.slope, line.correlation)

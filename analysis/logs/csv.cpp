@@ -15,7 +15,8 @@ namespace {
 
 constexpr std::size_t kLongestLine_bytes = std::size_t{1} << 16;
 
-/// The next line without its end; false at the end of the file. Longer lines are cut: they are damage.
+/// Reads the next line without its line end; returns false at the end of the file. Overlong lines are truncated and
+/// count as damage.
 bool next_line(std::istream& in, std::string& line, bool& complete) {
   line.clear();
   complete = false;
@@ -33,7 +34,7 @@ bool next_line(std::istream& in, std::string& line, bool& complete) {
   return any;
 }
 
-/// The number that `text` starts with, which is taken off it.
+/// Consumes the number at the start of `text`.
 template <typename Number>
 bool take_number(std::string_view& text, Number& number) {
   const auto [next, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -47,14 +48,15 @@ bool take(std::string_view& text, std::string_view any_of) {
   return true;
 }
 
-/// Days from 1970-01-01 to a day of the Gregorian calendar: years start in March, so that the leap day is their last.
+/// Returns the days from 1970-01-01 to a Gregorian date. Years start in March so that the leap day comes last.
 std::int64_t days_since_1970(std::int64_t year, int month, int day) {
   year -= month <= 2 ? 1 : 0;
   const std::int64_t march_based = (month + 9) % 12;
   return 365 * year + year / 4 - year / 100 + year / 400 + (153 * march_based + 2) / 5 + day - 719469;
 }
 
-/// "12:34:56.7": seconds of the day; "2026-03-02T12:34:56.7", with "Z" or "+01:00" behind it: seconds since 1970.
+/// Parses a time of day, "12:34:56.7", as seconds since midnight, and a date, "2026-03-02T12:34:56.7" with an optional
+/// "Z" or "+01:00", as seconds since 1970.
 std::optional<double> date_or_time_s(std::string_view text) {
   int year = 0, month = 0, day = 0, hour = 0, minute = 0, offset_hour = 0, offset_minute = 0;
   double second = 0, days_s = 0;
@@ -82,8 +84,9 @@ std::optional<double> date_or_time_s(std::string_view text) {
   return text.empty() ? std::optional(days_s + 3600.0 * hour + 60.0 * minute + second) : std::nullopt;
 }
 
-/// The cell's number, without blanks and quotes around it; NaN for an empty cell. Returns false for anything else.
-/// @param decimal_comma commas that stand for decimal points
+/// Parses the number of a cell, ignoring blanks and quotes around it; an empty cell gives NaN. Returns false for
+/// anything else.
+/// @param decimal_comma commas are decimal points
 bool parse_cell(std::string_view cell, bool decimal_comma, double& value) {
   cell = files::without_blanks(cell);
   value = std::numeric_limits<double>::quiet_NaN();
@@ -106,8 +109,8 @@ bool parse_cell(std::string_view cell, bool decimal_comma, double& value) {
   return time_s.has_value();
 }
 
-/// What is wrong with `line`, if it does not have exactly values.size() cells, each a number or empty where the sink
-/// needs it: the column of the cell that is no number, or none.
+/// A fault of a line that does not have exactly values.size() cells, each a number or empty where the sink needs it.
+/// States the column of the offending cell, or none.
 struct LineFault {
   std::size_t column;
   std::string_view cell;
@@ -126,10 +129,10 @@ std::optional<LineFault> parse_line(std::string_view line, char separator, const
   return std::nullopt;
 }
 
-/// The line that names the columns. Lines of comment may stand before it, and it may itself start with "#".
+/// The line with the column names. Comment lines may precede it, and it may itself start with "#".
 class Header {
  public:
-  /// @return false if `in` has no line
+  /// @return false if `in` has no header line
   bool read(std::istream& in) {
     std::string comment;
     bool complete = false;
@@ -148,8 +151,8 @@ class Header {
   }
 
   std::string line;
-  std::optional<std::string> first_record;  ///< read already, behind a header that is a comment
-  std::size_t lines = 0;                    ///< read
+  std::optional<std::string> first_record;  ///< already read, after a header that is a comment
+  std::size_t lines = 0;                    ///< lines read so far
 };
 
 }  // namespace

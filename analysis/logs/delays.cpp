@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kLongest_s = 0.15, kBelievedDelay = 0.5;
 
-/// Correlation of a(t) with b(t + lag records).
+/// Returns the correlation of a(t) with b(t + lag records).
 double correlation_at(const SignalTable& t, double step_s, const std::vector<double>& a,
                       const std::vector<double>& b, int lag) {
   std::vector<double> x, y;
@@ -16,14 +16,14 @@ double correlation_at(const SignalTable& t, double step_s, const std::vector<dou
   for (int i = std::max(0, -lag); i < n - std::max(0, lag); ++i) {
     const auto at = static_cast<std::size_t>(i), other = static_cast<std::size_t>(i + lag);
     const double apart_s = 1e-6 * (t.time_us[other] - t.time_us[at]);
-    if (std::abs(apart_s - lag * step_s) > step_s) continue;  // a gap lies between
+    if (std::abs(apart_s - lag * step_s) > step_s) continue;  // there is a gap in between
     x.push_back(a[at]);
     y.push_back(b[other]);
   }
   return line_through(x, y).correlation;
 }
 
-/// Changes over 60 ms, so that slow drifts do not decide.
+/// Returns the changes over 60 ms, which suppresses slow drifts.
 std::vector<double> changes(const SignalTable& t, const std::vector<double>& series) {
   const double step_s = t.step_s();
   const auto half = static_cast<std::size_t>(std::max(1.0, std::round(0.03 / step_s)));
@@ -56,7 +56,7 @@ void estimate_delays(Draft& draft) {
       }
     }
     if (highest < kBelievedDelay || best == -most || best == most) return;
-    // The vertex of the parabola through the three largest.
+    // Vertex of the parabola through the maximum and its two neighbours.
     const auto at = static_cast<std::size_t>(best + most);
     const double left = all[at - 1], right = all[at + 1], curvature = left - 2 * highest + right;
     const double shift = curvature < 0 ? 0.5 * (left - right) / curvature : 0;

@@ -11,14 +11,14 @@
 namespace swarmcert::logs {
 namespace {
 
-constexpr double kIdleShare = 0.3;  // of the thrust that is common in a log
+constexpr double kIdleShare = 0.3;  // of the typical thrust of a log
 constexpr double kAboveStanding_m = 0.03;
 constexpr double kShortestFlight_s = 0.5, kShortestPause_s = 0.3, kLongestTakeoff_s = 3;
 constexpr double kNoThrustHeight_m = 0.15;
 
 double seconds(const Log& log, std::size_t i) { return 1e-6 * log.samples[i].time_us; }
 
-/// In a unit of its own; empty where the log has none.
+/// Returns the thrust in the log's own unit; empty if the log has none.
 std::vector<double> thrust_of(const Log& log) {
   std::vector<double> thrust;
   if (log.signals.thrust == ThrustSource::kNone) return thrust;
@@ -30,7 +30,7 @@ std::vector<double> thrust_of(const Log& log) {
 
 double speed(const Sample& s) { return std::hypot(s.velocity_m_s[0], s.velocity_m_s[1], s.velocity_m_s[2]); }
 
-/// Turns runs of `value` that last less than `shortest_s` round; not those at the ends of the log.
+/// Inverts runs of `value` that are shorter than `shortest_s`, except at the ends of the log.
 void drop_short_runs(const Log& log, std::vector<char>& flags, char value, double shortest_s, bool at_ends) {
   std::size_t start = 0;
   for (std::size_t i = 1; i <= flags.size(); ++i) {
@@ -44,7 +44,7 @@ void drop_short_runs(const Log& log, std::vector<char>& flags, char value, doubl
   }
 }
 
-/// Splits a stretch in the air into takeoff, flight and landing.
+/// Splits an airborne stretch into takeoff, flight and landing.
 void add_flight(const Log& log, std::size_t first, std::size_t end, std::vector<Phase>& phases) {
   const double t0 = seconds(log, first), t1 = seconds(log, end - 1);
   double start = t0, stop = t1;
@@ -83,7 +83,7 @@ void add_phases(const Log& log, const std::vector<char>& air, FlightStory& story
   }
 }
 
-/// One event for every run of records for which `holds`, runs nearer than 0.3 s taken together.
+/// Adds one event per run of records for which `holds` is true; runs less than 0.3 s apart are merged.
 template <typename Holds>
 void add_runs(const Log& log, const std::string& kind, double shortest_s, const std::string& what,
               const Holds& holds, std::vector<LogEvent>& events) {
@@ -141,7 +141,7 @@ void add_events(const Log& log, const std::vector<char>& air, FlightStory& story
                    [](const LogEvent& a, const LogEvent& b) { return a.time_s < b.time_s; });
 }
 
-/// The lines to log for a signal, in the language of the log's own firmware.
+/// Returns the configuration lines that log a signal, in the syntax of the firmware that wrote the log.
 std::string lines_for(const Log& log, const std::string& signal) {
   struct Lines {
     const char *signal, *crazyflie, *px4, *other;
@@ -230,7 +230,7 @@ std::vector<char> airborne(const Log& log) {
   for (std::size_t i = 0; i < n && !thrust.empty(); ++i) idle[i] = !(thrust[i] > kIdleShare * common) ? 1 : 0;
   if (!thrust.empty() && !(common > 0)) idle.assign(n, 1);
   if (thrust.empty() && log.signals.position && n > 0) {
-    // Without a thrust, the vehicle flies while it is clearly above the lowest place at which it was still.
+    // Without thrust, the vehicle is considered airborne while it is clearly above the lowest heights of the log.
     std::vector<double> heights;
     for (const Sample& s : log.samples) heights.push_back(s.position_m[2]);
     const double low = quantile_of(heights, 0.02);

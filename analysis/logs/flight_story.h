@@ -1,4 +1,4 @@
-/// @file What happened in a log, and what it should have logged: phases, events, battery, missing signals.
+/// @file Summary of a log: phases, events, battery, and signals that are missing.
 #pragma once
 
 #include <string>
@@ -10,33 +10,35 @@ namespace swarmcert::logs {
 
 struct Phase {
   std::string name;               ///< ground, takeoff, flight, landing
-  double start_s = 0, end_s = 0;  ///< of the log's clock
+  double start_s = 0, end_s = 0;  ///< on the log's clock
 };
 
-/// A signal that would let more be judged.
+/// A missing signal that would allow a further judgement.
 struct MissingSignal {
   std::string signal;
   std::string needed_for;  ///< what it would make possible
-  std::string log_this;    ///< lines of the vehicle's own logging configuration
+  std::string log_this;    ///< lines for the vehicle's logging configuration
 };
 
 struct FlightStory {
   std::vector<Phase> phases;
-  std::vector<LogEvent> events;  ///< in order of time
+  std::vector<LogEvent> events;  ///< in chronological order
   std::vector<MissingSignal> missing;
-  double air_s = 0;                                                     ///< in the air
-  std::string no_flight;                                                ///< why this is no flight; else empty
+  double air_s = 0;       ///< time in the air
+  std::string no_flight;  ///< why the log is not a flight; empty if it is
   double battery_first_V = 0, battery_last_V = 0, battery_least_V = 0;  ///< in the air; 0: not logged
 };
 
 FlightStory tell(const Log& log);
 
-/// The height at which a vehicle stands with idle rotors, per record: where it stood last or stands next, whichever is
-/// nearer in time; NaN where it never does. Estimates of the height drift, and there are tables.
+/// Returns, for each record, the height at which the vehicle last stood or next stands with idle rotors, whichever is
+/// nearer in time; NaN if it never does. The reference varies because height estimates drift and vehicles also land on
+/// tables.
 std::vector<double> standing_heights_m(const std::vector<double>& time_s, const std::vector<double>& height_m,
                                        const std::vector<double>& speed_m_s, const std::vector<char>& idle);
 
-/// Per record: in the air. By the thrust and by the height above where the vehicle stood with idle rotors.
+/// Returns whether the vehicle is airborne at each record, judged by the thrust and by the height above its last or
+/// next resting place.
 std::vector<char> airborne(const Log& log);
 
 }  // namespace swarmcert::logs

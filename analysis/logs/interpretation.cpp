@@ -18,16 +18,15 @@ namespace {
 
 using Source = SignalInfo::Source;
 
-/// "cf1" of "/cf1/pose"; empty for topics without a name space.
+/// Returns "cf1" for "/cf1/pose"; empty for topics without a namespace.
 std::string name_space(const std::string& topic) {
   const std::size_t end = topic.find('/', 1);
   return topic.empty() || topic[0] != '/' || end == std::string::npos ? "" : topic.substr(1, end - 1);
 }
 
-/// A bag may hold several vehicles, "/cf1/pose" beside "/cf2/pose": of these, only the topics of the first are kept.
+/// If a bag holds several vehicles, "/cf1/pose" and "/cf2/pose", keeps only the topics of the first one.
 void keep_one_vehicle(RawLog& raw, Log& log) {
-  std::map<std::string, std::vector<std::string>>
-      spaces;  // by the rest of the topic's name, in the order of the file
+  std::map<std::string, std::vector<std::string>> spaces;  // by the rest of the topic's name, in file order
   for (const RawTopic& topic : raw.topics) {
     const std::string space = name_space(topic.name);
     if (space.empty()) continue;
@@ -56,7 +55,7 @@ void keep_one_vehicle(RawLog& raw, Log& log) {
                                "; one file of each vehicle makes them one flight");
 }
 
-/// A signal of the table or, where it has none, `otherwise`.
+/// Returns a signal of the table, or `otherwise` if the table does not have it.
 double signal_value(const SignalTable& table, int signal, std::size_t record, double otherwise) {
   return table.has(signal) ? table[signal][record] : otherwise;
 }
@@ -100,8 +99,8 @@ void refuse_without_motion(const Draft& draft) {
                            "log it, or say in a columns.toml (--columns) which column does"});
 }
 
-/// Clocks that count from 1970 start at zero; what was taken off stands in Log::epoch_s. Others keep their start, and a
-/// receiver may know when that was.
+/// Makes clocks that count from 1970 start at zero and stores the offset in Log::epoch_s. Other clocks keep their
+/// start; a receiver may know its absolute time.
 void take_epoch_off(const RawLog& raw, SignalTable& table, Log& log) {
   if (table.time_us.empty()) return;
   if (table.time_us.front() * 1e-6 < kAbsoluteClock_s) {
@@ -113,7 +112,7 @@ void take_epoch_off(const RawLog& raw, SignalTable& table, Log& log) {
   for (LogEvent& event : log.events) event.time_s -= log.epoch_s;
 }
 
-/// Events that last to the end of the log get its end.
+/// Ends events that last to the end of the log there.
 void end_events(const SignalTable& table, Log& log) {
   for (LogEvent& event : log.events) {
     if (std::isinf(event.duration_s) && table.size() > 0)
@@ -182,7 +181,7 @@ void Draft::add_measured(const std::string& name, int signal) const {
   const bool is_four = signal == kAttitude || signal == kDuty || signal == kMotorForce ||
                        signal == kRequested || signal == kRotorSpeed;
   const int width = signal == kMotorCommand ? 8 : is_four ? 4 : 3;
-  // A columns.toml names every axis by itself.
+  // A columns.toml assigns each axis separately.
   for (const Carried& carried : recognition.groups) {
     const bool belongs = carried.signal == signal ||
                          (recognition.groups.size() > 1 && carried.size() == 1 && carried.signal > signal &&
@@ -219,7 +218,7 @@ void settle_judgement(Draft& draft) {
   signals.targets = t.has_group(kTargetPosition, 3) && t.has_group(kTargetVelocity, 3);
   signals.commands = t.has_group(kMotorForce, 4) && t.has(kThrust) && t.has_group(kTorque, 3);
   signals.rates = t.has_group(kRates, 3);
-  // Torques need the thrust of each rotor; their dynamics alias below the rate of the attitude loop.
+  // Torques need the thrust of each rotor, and their dynamics are aliased below the rate of the attitude loop.
   const bool each_rotor = t.has_group(kDuty, 4) || t.has_group(kRotorSpeed, 4) ||
                           t.has_group(kRequested, 4) || signals.motor_commands > 0;
   signals.torque = !each_rotor                                                 ? TorqueUse::kNone
@@ -247,7 +246,7 @@ Log interpret(RawLog raw, const SignalMap& map) {
   add_landed(raw, log);
   take_epoch_off(raw, draft.table, log);
   for (RawTopic& topic : raw.topics) {
-    for (RawColumn& column : topic.columns) column.values = {};  // they stand in the table now
+    for (RawColumn& column : topic.columns) column.values = {};  // already copied to the table
   }
   derive_kinematics(draft);
   settle_attitude(draft);

@@ -1,5 +1,5 @@
-/// @file From columns to signals: units, frames and signs that names do not settle are decided from the data, and
-/// signals that nobody logged are derived from others.
+/// @file From columns to signals. Units, frames and signs that names leave open are decided from the data; signals that
+///   were not logged are derived from others.
 #pragma once
 
 #include <string>
@@ -9,47 +9,49 @@
 
 namespace swarmcert::logs {
 
-/// A log on its way from columns to samples. The stages below are called in their order; each notes what it decided
-/// in Log::interpretation and where signals come from in Log::sources.
+/// A log between columns and samples. The stages below are called in this order; each notes its decisions in
+/// Log::interpretation and the origin of the signals in Log::sources.
 struct Draft {
   const RawLog& raw;
   Recognition recognition;
   SignalTable table;
   Log& log;
-  /// Acceleration in W without gravity, smoothed; empty where neither velocity nor position carries the axis.
+  /// Smoothed acceleration in W without gravity; empty for an axis that has neither velocity nor position.
   std::array<std::vector<double>, 3> acceleration_m_s2;
-  bool asks_physics = true;             ///< false where a columns.toml says what columns are
-  bool has_forward_right_down = false;  ///< the body's axes are those: the quaternion is still to be turned
+  bool asks_physics = true;             ///< decide from the data; false if a columns.toml states the meaning
+  bool has_forward_right_down = false;  ///< of the body axes; the quaternion must still be converted
 
   bool is_measured(int signal) const { return recognition.find(signal) != nullptr; }
   void note(const std::string& words) const { log.interpretation.push_back(words); }
   void add(const std::string& name, SignalInfo::Source source, const std::string& from,
            const std::string& unit, double noise = std::numeric_limits<double>::quiet_NaN()) const;
-  /// Adds a group that columns carry.
+  /// Adds a group of signals that columns carry.
   void add_measured(const std::string& name, int signal) const;
 };
 
-/// Velocity where only a position is logged; the smoothed acceleration, and its noise.
+/// Derives the velocity if only a position is logged, and the smoothed acceleration with its noise.
 void derive_kinematics(Draft& draft);
 
-/// Attitude: packed or plain quaternions, else Euler angles with the signs that fit the lateral acceleration, else the
-/// thrust axis along acceleration + g and the yaw where there is one. Then the unit of the rates.
+/// Determines the attitude: from packed or plain quaternions, else from Euler angles with the signs that fit the
+/// lateral acceleration, else from the thrust axis along acceleration + g and the yaw if available. Then decides the
+/// unit of the rates.
 void settle_attitude(Draft& draft);
 
-/// Specific force in W: accelerometer (unit, frame and gravity decided from the data), else from the acceleration.
+/// Determines the specific force in W: from the accelerometer (unit, frame and gravity are decided from the data), else
+/// from the acceleration.
 void settle_specific_force(Draft& draft);
 
-/// Duty, battery and total thrust.
+/// Determines duty, battery voltage and total thrust.
 void settle_thrust(Draft& draft);
 
-/// Which axes can be judged, and what is missing for the others.
+/// Determines the axes along which a force can be judged, and what is missing for the others.
 void settle_judgement(Draft& draft);
 
-/// Delays between columns that show the same movement.
+/// Estimates the delays between columns that show the same motion.
 void estimate_delays(Draft& draft);
 
-/// The log that `raw` holds.
-/// @throws files::InputError if it has no time, or nothing that shows a movement; or if `map` names a missing column.
+/// Interprets `raw` as a log.
+/// @throws files::InputError if it has no time or nothing that shows motion, or if `map` names a missing column.
 Log interpret(RawLog raw, const SignalMap& map);
 
 }  // namespace swarmcert::logs

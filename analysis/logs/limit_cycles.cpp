@@ -13,16 +13,18 @@ namespace {
 
 constexpr double kLeastTilt_rad = 0.1, kLeast_hz = 1, kSamePeriod = 0.3;
 constexpr std::size_t kLeastPeriods = 4;
-/// Half of the rate that kLeastTilt_rad needs at kLeast_hz: smaller movements about zero are no half period.
+/// Half the rate amplitude of a kLeastTilt_rad oscillation at kLeast_hz; smaller excursions are not counted as half
+/// periods.
 constexpr double kLeastRate_rad_s = 0.5 * kLeastTilt_rad * 2 * kPi * kLeast_hz;
 
 struct Period {
   double start_s = 0, length_s = 0;
   double tilt_rad = 0;   ///< amplitude of the angle
-  bool follows = false;  ///< the one before, without a pause
+  bool follows = false;  ///< directly follows the previous period
 };
 
-/// Records from `first` to `end` minus their mean over 1 s about each: what is slower than kLeast_hz falls out.
+/// Returns the records from `first` to `end` minus their running mean over 1 s, which removes everything slower than
+/// kLeast_hz.
 std::vector<double> fast_part(const Log& log, std::size_t first, std::size_t end, std::size_t axis) {
   const auto time_s = [&](std::size_t i) { return 1e-6 * log.samples[i].time_us; };
   std::vector<double> fast;
@@ -37,7 +39,7 @@ std::vector<double> fast_part(const Log& log, std::size_t first, std::size_t end
   return fast;
 }
 
-/// From one crossing of zero upwards to the next, after an excursion to either side.
+/// A period lasts from one upward zero crossing to the next, with an excursion to either side.
 void add_periods(const Log& log, std::size_t first, std::size_t end, std::size_t axis,
                  std::vector<Period>& periods) {
   const std::vector<double> rate = fast_part(log, first, end, axis);
@@ -60,7 +62,7 @@ void add_periods(const Log& log, std::size_t first, std::size_t end, std::size_t
   }
 }
 
-/// The periods from `first` on that belong to one oscillation.
+/// Returns the end of the run of periods, starting at `first`, that belong to one oscillation.
 std::size_t end_of_run(const std::vector<Period>& periods, std::size_t first) {
   std::vector<double> lengths_s;
   std::size_t end = first;

@@ -1,4 +1,4 @@
-/// @file Oscillations of a vehicle that nobody commanded.
+/// @file Detects uncommanded oscillations of a vehicle.
 #pragma once
 
 #include <vector>
@@ -7,11 +7,11 @@
 
 namespace swarmcert::logs {
 
-/// Limit cycles of roll or pitch in flight. Four or more periods in a row, each tilting the thrust axis by at least 0.1
-/// rad (which accelerates sideways by a tenth of g) and each as long as the others within 30 %, faster than 1 Hz: a
-/// loop damped by a tenth or more would have lost nine tenths of its amplitude by then, and no trajectory is that
-/// regular.
-/// @param air per record: in the air.
+/// Finds limit cycles of roll or pitch in flight: four or more consecutive periods faster than 1 Hz, each tilting the
+/// thrust axis by at least 0.1 rad (a lateral acceleration of a tenth of g), with durations that agree within 30 %. A
+/// loop with a damping ratio of 0.1 or more would have lost nine tenths of its amplitude by then, and no trajectory is
+/// that regular.
+/// @param air whether the vehicle is airborne, per record
 std::vector<LogEvent> limit_cycles(const Log& log, const std::vector<char>& air);
 
 }  // namespace swarmcert::logs

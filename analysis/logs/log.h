@@ -1,4 +1,4 @@
-/// @file One vehicle's flight log in SI units, whatever file format it came from.
+/// @file The flight log of one vehicle in SI units, independent of the file format.
 #pragma once
 
 #include <array>
@@ -12,53 +12,53 @@ namespace swarmcert::logs {
 
 using Vector = std::array<double, 3>;
 
-/// Standard gravity as the authors' code rounds it, m/s^2; also what turns newton into gram-force here.
+/// Standard gravity as rounded in the authors' code, m/s^2; also used to convert newton to gram-force.
 inline constexpr double kGravity_m_s2 = 9.81;
 
-/// Two records further apart than this are not neighbours in time: filters restart, nothing is interpolated between. In
-/// logs slower than 50 Hz it is two and a half steps instead.
+/// Records further apart than this are not neighbours in time: filters restart and nothing is interpolated between
+/// them. In logs slower than 50 Hz the limit is two and a half steps instead.
 inline constexpr double kLongestGap_s = 0.030;
 
-/// A unit quaternion that turns B into W. Wherever it stands as four numbers, their order is that of xyzw(), which is
-/// also that of Eigen::Quaterniond::coeffs() and of the simulated state.
+/// A unit quaternion that rotates B into W. As four numbers its order is always that of xyzw(), which is also the order
+/// of Eigen::Quaterniond::coeffs() and of the simulated state.
 struct Attitude {
   double x = 0, y = 0, z = 0, w = 1;
 
   std::array<double, 4> xyzw() const { return {x, y, z, w}; }
-  /// Row by row.
+  /// Returns the rotation matrix by rows.
   std::array<Vector, 3> rotation() const;
 };
 
-/// One record. Frames: W world, z up; B body, x forward, y left, z up.
+/// One record. Frames: W is the world with z up; B is the body with x forward, y left, z up.
 struct Sample {
   double time_us = 0;     ///< on the vehicle's own clock, which starts with the log; strictly increasing
   Vector position_m{};    ///< W
   Vector velocity_m_s{};  ///< W
-  Vector specific_force_m_s2{};  ///< W; what an accelerometer feels: +9.81 in z at rest
+  Vector specific_force_m_s2{};  ///< W; what an accelerometer measures: +9.81 in z at rest
   Attitude attitude;
   Vector rates_rad_s{};          ///< B
   std::array<double, 4> duty{};  ///< PWM/65536 per motor, in [0, 1]
   double battery_V = 0;
-  Vector target_position_m{}, target_velocity_m_s{};  ///< W; NaN where the log has none
-  std::array<double, 4> motor_force_N{};  ///< what the controller asked of each motor; unsaturated
+  Vector target_position_m{}, target_velocity_m_s{};  ///< W; NaN if the log has none
+  std::array<double, 4> motor_force_N{};              ///< commanded by the controller, unsaturated
   double thrust_command_N = 0;
   Vector torque_command_Nm{};  ///< B
-  /// Total thrust where it does not come from the duties: Signals::thrust says in what unit.
+  /// Total thrust if it does not come from the duties; Signals::thrust states its unit.
   double given_thrust = 0;
   /// Normalised command of each of Signals::motor_commands motors, 0 .. 1.
   std::array<float, 8> motor_command{};
-  bool restarts = false;  ///< first record, or more than kLongestGap_s after the one before
+  bool restarts = false;  ///< first record, or more than kLongestGap_s after the previous one
 };
 
-/// Where the total thrust of a log comes from.
+/// Source of the total thrust of a log.
 enum class ThrustSource {
   kNone,
   kDuty,          ///< Sample::duty and battery_V, through the model's thrust map
-  kForce,         ///< Sample::given_thrust is a force in newton that the controller asked for
-  kHoverMultiple  ///< Sample::given_thrust is in multiples of the thrust at which this log hovers
+  kForce,         ///< Sample::given_thrust is the commanded force in newton
+  kHoverMultiple  ///< Sample::given_thrust is in multiples of the hover thrust of this log
 };
 
-/// Where the specific force of a log comes from.
+/// Source of the specific force of a log.
 enum class ForceSource {
   kNone,
   kAccelerometer,  ///< measured
@@ -66,24 +66,23 @@ enum class ForceSource {
   kPosition        ///< curvature of the position over a window
 };
 
-/// Whether the vehicle says that it was armed.
+/// Whether the vehicle reports that it was armed.
 enum class Armed { kUnknown, kNever, kYes };
 
-/// What can be said of the torques of a log.
+/// How the torques of a log can be used.
 enum class TorqueUse {
   kNone,
-  kMean,    ///< their mean in slow flight, where it should vanish
-  kDynamic  ///< at every moment
+  kMean,    ///< only their mean in slow flight, where it should vanish
+  kDynamic  ///< at each instant
 };
 
 /// Which optional groups of signals a log has.
 struct Signals {
   bool force = false;                ///< a force residual can be formed along at least one axis
-  std::string force_lacks;           ///< which signals are missing for that, in words; empty where `force`
+  std::string force_lacks;           ///< the signals missing for that, in words; empty if `force`
   std::array<bool, 3> force_axes{};  ///< axes of W along which a force can be judged
   ThrustSource thrust = ThrustSource::kNone;
-  int motor_commands =
-      0;  ///< motors whose normalised commands gave `thrust`; 0: it comes from something else
+  int motor_commands = 0;  ///< motors whose normalised commands gave `thrust`; 0: it has another source
   ForceSource specific_force = ForceSource::kNone;
   TorqueUse torque = TorqueUse::kNone;
   bool position = false;  ///< all three axes
@@ -93,44 +92,44 @@ struct Signals {
   bool rates = false;
 };
 
-/// What was wrong with a file, and what was done about it: nothing here is silently repaired.
+/// Damage found in a file and how it was handled; nothing is repaired silently.
 struct LogHealth {
-  std::size_t blocks = 0;          ///< checksummed blocks that were sound (old binary format only)
-  std::size_t damaged_blocks = 0;  ///< places where a checksum failed or nothing sensible could be read
+  std::size_t blocks = 0;          ///< valid checksummed blocks (old binary format only)
+  std::size_t damaged_blocks = 0;  ///< places where a checksum failed or no valid data could be read
   std::size_t skipped_bytes = 0;   ///< at these places, and after the last whole record
   bool truncated = false;          ///< the file ends inside a block, a record or a line
   bool checksum_failed = false;    ///< of the whole file (binary versions 1 and 2 only); records are kept
   std::size_t records = 0;         ///< records kept
-  std::size_t damaged_lines = 0;   ///< CSV lines that are not as many numbers as the header has columns
+  std::size_t damaged_lines = 0;   ///< CSV lines that do not have one number per column of the header
   std::size_t not_finite = 0;      ///< records dropped because a needed value is NaN or infinite
-  std::size_t clock_jumps = 0;     ///< records dropped because their time does not follow the one before
-  std::size_t gaps = 0;            ///< pauses over kLongestGap_s
+  std::size_t clock_jumps = 0;     ///< records dropped because their time does not follow the previous one
+  std::size_t gaps = 0;            ///< pauses longer than kLongestGap_s
   double longest_gap_s = 0;
 };
 
-/// What a log says of one signal.
+/// How a log provides one signal.
 struct SignalInfo {
   enum class Source { kMeasured, kDerived, kMissing };
   std::string name;  ///< "velocity", "specific_force", ...
   Source source = Source::kMissing;
-  std::string from;    ///< columns, or what it is derived from and how
-  std::string unit;    ///< of the columns as stored; of the derived signal
-  double rate_hz = 0;  ///< of the records that carry it
+  std::string from;    ///< columns, or how it is derived
+  std::string unit;    ///< of the stored columns; of the derived signal
+  double rate_hz = 0;  ///< of the records that contain it
   double noise =
       std::numeric_limits<double>::quiet_NaN();  ///< standard deviation, in SI units; NaN: not estimated
 };
 
-/// Something that happened in a log.
+/// An event in a log.
 struct LogEvent {
   std::string kind;  ///< impact, dropout, wrap, saturation, limit cycle
   double time_s = 0, duration_s = 0;
   std::string what;
 };
 
-/// How much earlier one signal shows a movement than another.
+/// The delay of one signal relative to another that shows the same motion.
 struct SignalDelay {
   std::string signal, against;
-  double delay_s = 0;  ///< positive: `signal` is late
+  double delay_s = 0;  ///< positive: `signal` lags
   double correlation = 0;
 };
 
@@ -138,20 +137,20 @@ struct Log {
   std::string path;
   std::string format;  ///< "usd", "usd version 1", "usd version 2", "csv", "ulog", ...
   Signals signals;
-  std::vector<SignalInfo> sources;  ///< of every signal that is known, also of those that are missing
+  std::vector<SignalInfo> sources;  ///< of all known signals, including missing ones
   std::vector<SignalDelay> delays;
   std::vector<LogEvent> events;  ///< of single columns: wraps and saturation of integers
   std::vector<std::string>
       interpretation;  ///< what was decided from the data rather than from names, and why
-  /// Mean command of a motor that carries the weight, where Signals::thrust is kHoverMultiple; else NaN.
+  /// Mean command of a motor while it carries the weight, if Signals::thrust is kHoverMultiple; else NaN.
   double hover_command = std::numeric_limits<double>::quiet_NaN();
-  /// The thrust of a motor grows with this power of its command, 1 or 2; where Signals::motor_commands is not 0.
+  /// Motor thrust is proportional to this power of the command, 1 or 2; used if Signals::motor_commands is not 0.
   int motor_power = 1;
   std::map<std::string, double>
-      parameters;       ///< of the vehicle, as the log starts, by their names in the file
+      parameters;       ///< of the vehicle at the start of the log, by their names in the file
   double window_s = 0;  ///< of the derivative behind a derived specific force
   Armed armed = Armed::kUnknown;
-  double epoch_s = 0;  ///< plus Sample::time_us is the time since 1970; 0: not known
+  double epoch_s = 0;  ///< plus Sample::time_us is the time since 1970; 0: unknown
   LogHealth health;
   std::vector<std::string> channels;  ///< as the file names them
   std::vector<Sample> samples;

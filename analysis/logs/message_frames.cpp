@@ -13,7 +13,7 @@
 namespace swarmcert::logs {
 namespace {
 
-/// "vehicle_local_position" of a topic of that name, or of the type px4_msgs/msg/VehicleLocalPosition.
+/// Returns "vehicle_local_position" for a topic of that name or of the type px4_msgs/msg/VehicleLocalPosition.
 std::string message_of(const RawTopic& topic) {
   const std::size_t slash = topic.type.rfind('/');
   if (topic.type.rfind("px4_msgs", 0) != 0 || slash == std::string::npos) return topic.name;
@@ -25,12 +25,12 @@ std::string message_of(const RawTopic& topic) {
   return name;
 }
 
-/// Copies of columns of one topic under other names.
+/// Copies columns of a topic under other names.
 class Renamer {
  public:
   explicit Renamer(RawTopic& topic) : topic_(topic) {}
 
-  /// False where the topic has no column `from`.
+  /// Returns false if the topic has no column `from`.
   bool add(const std::string& from, const std::string& to, double factor) {
     const RawColumn* const column = topic_.find(from);
     if (column == nullptr || topic_.find(to) != nullptr) return false;
@@ -40,7 +40,8 @@ class Renamer {
     return true;
   }
 
-  /// The first of `patterns` ('#' stands for an axis' name) whose three columns are there, as (x, -y, -z).
+  /// Adds the first of `patterns` ('#' stands for the name of an axis) for which all three columns exist, as (x, -y,
+  /// -z).
   void add_vector(const std::vector<std::string>& patterns, const std::vector<std::string>& axes,
                   const std::string& to, double factor = 1) {
     const char* const kAxes[] = {"_x", "_y", "_z"};
@@ -72,8 +73,8 @@ void add_quaternion(RawTopic& topic) {
   renamer.add("q[0]", "attitude_w", 1);
 }
 
-/// Motor commands from columns of servo signals in microseconds: those that are driven, from the first on. A value
-/// below 900 or so means that the output is off.
+/// Adds motor commands from columns of servo signals in microseconds: the consecutive outputs in use, from the first
+/// on. Values below about 900 mean that the output is off.
 void add_servo_outputs(RawTopic& topic, const std::string& pattern, int first) {
   int motor = 0;
   for (int k = first; k < first + 8; ++k) {
@@ -87,8 +88,8 @@ void add_servo_outputs(RawTopic& topic, const std::string& pattern, int first) {
   }
 }
 
-/// ArduPilot's outputs by motor: SERVOn_FUNCTION 33 to 40 is motor 1 to 8; empty where the parameters name no three
-/// motors.
+/// Returns ArduPilot's output of each motor (SERVOn_FUNCTION 33 to 40 is motor 1 to 8); empty if the parameters assign
+/// fewer than three motors.
 std::vector<int> outputs_of_motors(const std::map<std::string, double>& parameters) {
   constexpr int kFirstMotor = 33, kMost = 8, kOutputs = 16;
   std::vector<int> outputs(kMost, 0);
@@ -102,11 +103,11 @@ std::vector<int> outputs_of_motors(const std::map<std::string, double>& paramete
   return outputs.size() < 3 ? std::vector<int>() : outputs;
 }
 
-/// Motor commands between MOT_PWM_MIN and MOT_PWM_MAX, 1000 and 2000 us where these are not set.
+/// Scales outputs to motor commands by MOT_PWM_MIN and MOT_PWM_MAX; 1000 and 2000 us if these are not set.
 void add_ardupilot_outputs(RawTopic& topic, const std::map<std::string, double>& parameters) {
   const std::vector<int> outputs = outputs_of_motors(parameters);
   for (const int output : outputs) {
-    if (topic.find("C" + std::to_string(output)) == nullptr) return;  // RCO2 carries it, at times of its own
+    if (topic.find("C" + std::to_string(output)) == nullptr) return;  // it is in RCO2, with separate times
   }
   if (outputs.empty()) return add_servo_outputs(topic, "C#", 1);
   const auto limit_us = [&](const char* name, double otherwise) {
@@ -124,7 +125,7 @@ void add_ardupilot_outputs(RawTopic& topic, const std::map<std::string, double>&
   }
 }
 
-/// Normalised motor commands; NaN where a motor is not used.
+/// Adds normalised motor commands; NaN for unused motors.
 void add_motors(RawTopic& topic) {
   for (int k = 0; k < 8; ++k) {
     const RawColumn* const column = topic.find("control[" + std::to_string(k) + "]");
@@ -192,7 +193,7 @@ void add_ardupilot(RawTopic& topic, const std::map<std::string, double>& paramet
   }
 }
 
-/// Whether no column but the clocks ever changes.
+/// Returns true if no column other than the clocks ever changes.
 bool is_constant(const RawTopic& topic) {
   return std::all_of(topic.columns.begin(), topic.columns.end(), [](const RawColumn& column) {
     return column.name.find("timestamp") != std::string::npos ||
@@ -202,7 +203,7 @@ bool is_constant(const RawTopic& topic) {
   });
 }
 
-/// Whether any topic of that name has a record whose `column` holds `holds`; nothing where there is no such column.
+/// Returns whether `holds` is true for any value of `column` in topics of that name; unknown without such a column.
 Armed any_record(const RawLog& log, const std::string& message, const std::string& column,
                  const std::function<bool(double)>& holds) {
   Armed armed = Armed::kUnknown;
@@ -218,8 +219,8 @@ Armed any_record(const RawLog& log, const std::string& message, const std::strin
 }  // namespace
 
 void add_own_names(RawLog& log) {
-  // The first instance of a message is the one in use; others would be taken where the first lacks a column. One that
-  // says the same from end to end is none: a battery that is not there, outputs without motors.
+  // Use the first instance of each message; otherwise other instances would fill in columns that the first one lacks.
+  // Constant instances are skipped: they belong to a missing battery or to outputs without motors.
   std::map<std::string, std::pair<bool, int>> first;  // whether it is constant, and its number
   for (const RawTopic& topic : log.topics) {
     const std::pair<bool, int> instance = {is_constant(topic), topic.instance};
@@ -233,7 +234,7 @@ void add_own_names(RawLog& log) {
     if (is_ardupilot)
       add_ardupilot(topic, log.parameters);
     else if (message == "actuator_outputs" && first.count("actuator_motors") != 0)
-      continue;  // the same commands after their scaling to servo signals
+      continue;  // the same commands, scaled to servo signals
     else if (log.format == "ulog" || topic.type.rfind("px4_msgs", 0) == 0)
       add_px4(topic, message);
   }
@@ -248,7 +249,7 @@ void add_landed(const RawLog& raw, Log& log) {
       std::size_t end = i;
       while (end < n && landed->values[end] != 0) ++end;
       const double start_s = topic.time_s[i];
-      // What it said last holds to the end of the log.
+      // The last state holds until the end of the log.
       const double end_s = end < n ? topic.time_s[end] : INFINITY;
       if (end > i) log.events.push_back({"landed", start_s, end_s - start_s, "the land detector says so"});
       i = std::max(end, i + 1);

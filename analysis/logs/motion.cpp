@@ -12,14 +12,15 @@ namespace {
 
 using Source = SignalInfo::Source;
 
-/// Standard deviation of the noise of a derived acceleration: what the smoother leaves of a column is held to be its
-/// noise, and goes through the smoother's weights. Correlated noise of an estimator counts as its runs last.
-/// @param smooth local_derivative() number 0.
+/// Returns the standard deviation of the noise of a derived acceleration: the residual of the smoother is taken as the
+/// noise of the column and propagated through the weights of the smoother. The autocorrelation of an estimator's noise
+/// is included.
+/// @param smooth local_derivative() with derivative 0.
 double noise_of_slope(const SignalTable& t, const std::vector<double>& column,
                       const std::vector<double>& smooth, double window_s, int derivative) {
   std::vector<double> left(column.size());
   for (std::size_t i = 0; i < column.size(); ++i) left[i] = column[i] - smooth[i];
-  // A vehicle that stands shows less noise than one that flies.
+  // A vehicle at rest shows less noise than a flying one.
   constexpr double kMoving_m_s = 0.03;
   std::vector<double> sizes;
   for (std::size_t i = 0; i < left.size(); ++i) {
@@ -31,7 +32,7 @@ double noise_of_slope(const SignalTable& t, const std::vector<double>& column,
     sizes.push_back(std::abs(left[i]));
   }
   const double typical =
-      median(sizes) / 0.6745;  // 0.6745: median of the size of a normal variable of unit deviation
+      median(sizes) / 0.6745;  // 0.6745: median absolute value of a standard normal variable
   double squares = 0, products = 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < column.size(); ++i) {
@@ -46,7 +47,8 @@ double noise_of_slope(const SignalTable& t, const std::vector<double>& column,
   const double sigma = std::sqrt(squares / static_cast<double>(count));
   const double rho = squares > 0 ? std::min(std::max(products / squares, 0.0), 0.95) : 0;
   const double runs = (1 + rho) / (1 - rho), n = std::max(window_s / step_s, 3.0);
-  // Variance of a fitted slope over n even steps: 12 sigma^2 / (n w^2); of a second derivative: 720 sigma^2 / (n w^4).
+  // Variance of a fitted slope over n uniform steps: 12 sigma^2 / (n w^2); of a second derivative: 720 sigma^2 / (n
+  // w^4).
   return derivative == 1 ? sigma * std::sqrt(12 * runs / n) / window_s
                          : sigma * std::sqrt(720 * runs / n) / (window_s * window_s);
 }
@@ -68,8 +70,8 @@ Vector rotated(const SignalTable& t, std::size_t i, const Vector& body) {
   return world;
 }
 
-/// How far `force` (specific force in W, per axis) is from acceleration + g: root mean square over axes and records of
-/// what remains after the mean.
+/// Returns the distance of `force` (specific force in W, per axis) from acceleration + g: the root mean square over
+/// axes and records after subtracting the mean.
 double misfit(const Draft& draft, const std::array<std::vector<double>, 3>& force) {
   double squares = 0;
   int axes = 0;
@@ -100,7 +102,7 @@ std::array<std::vector<double>, 3> as_world(const SignalTable& t, int signal, do
   return world;
 }
 
-/// The median size of the vector says whether gravity is in it and in which unit; the acceleration says in which frame.
+/// The median norm shows the unit and whether gravity is included; the acceleration shows the frame.
 void settle_accelerometer(Draft& draft) {
   const Carried& carried = *draft.recognition.find(kForceBody);
   SignalTable& t = draft.table;
@@ -149,7 +151,7 @@ void settle_accelerometer(Draft& draft) {
   for (int k = 0; k < 3; ++k) t[kForceWorld + k] = world[static_cast<std::size_t>(k)];
 }
 
-/// The derivative of the position against the velocity says where one of them is in millimetres or centimetres, unless
+/// Compares the derivative of the position with the velocity to detect millimetres or centimetres in either, unless
 /// their names state a unit.
 void settle_lengths(Draft& draft) {
   SignalTable& t = draft.table;
@@ -186,7 +188,7 @@ void settle_lengths(Draft& draft) {
   }
 }
 
-/// North, east, down to z up. Beside such names the axes of the body are forward, right and down.
+/// Converts north, east, down to z up. With such names the body axes are forward, right and down.
 void settle_north_east_down(Draft& draft) {
   const Carried* const position = draft.recognition.find(kPosition);
   const Carried* const velocity = draft.recognition.find(kVelocity);
@@ -203,8 +205,8 @@ void settle_north_east_down(Draft& draft) {
   draft.note(names + ": north, east, down; the body's axes are taken as forward, right, down");
 }
 
-/// nav_msgs/Odometry states velocities along the axes of the body, but Crazyswarm2 and motion capture write those of
-/// the world into it, and into TwistStamped. The derivative of the position says which.
+/// nav_msgs/Odometry specifies velocities in the body frame, but Crazyswarm2 and motion capture write world-frame
+/// velocities into it and into TwistStamped. The derivative of the position shows which it is.
 void settle_velocity_frame(Draft& draft) {
   const Carried* const carried = draft.recognition.find(kVelocity);
   if (carried == nullptr || carried->ask != Ask::kVelocityFrame || !draft.asks_physics) return;
@@ -331,7 +333,8 @@ void settle_specific_force(Draft& draft) {
     draft.add("specific_force", Source::kMissing, "", "m/s^2");
     return;
   }
-  // Two independent measurements: their difference is the noise of the derived one, as far as it is not the sensor's.
+  // Two independent measurements: their difference is attributed to the noise of the derived one, because the sensor's
+  // is smaller.
   const std::array<std::vector<double>, 3> force = {t[kForceWorld], t[kForceWorld + 1], t[kForceWorld + 2]};
   std::vector<double> differences;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -348,7 +351,7 @@ void settle_specific_force(Draft& draft) {
   }
   if (differences.size() < 100) return;
   for (SignalInfo& info : draft.log.sources) {
-    // 0.6745: median of the size of a normal variable of unit deviation
+    // 0.6745: median absolute value of a standard normal variable.
     if (info.name == "acceleration") info.noise = median(differences) / 0.6745;
   }
 }

@@ -15,7 +15,7 @@ Vector difference(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] 
 
 bool is_near(double value, double expected) { return std::abs(value - expected) < 0.15 * std::abs(expected); }
 
-/// Between records that are neighbours in time, and between those that are not.
+/// Checks the steps between records and the records dropped by their time.
 void check_time(const Log& log, std::vector<Doubt>& doubts) {
   constexpr double kShortest_s = 1e-4, kLongest_s = 0.5, kFewRecords = 20;
   const auto& samples = log.samples;
@@ -45,7 +45,7 @@ void check_time(const Log& log, std::vector<Doubt>& doubts) {
                     true});
 }
 
-/// What a mean of `g` times gravity stands for.
+/// Returns the probable cause of a mean of `g` times gravity.
 std::string force_guess(double g) {
   if (is_near(g, 1 / kGravity_m_s2)) return "the column is probably in g, not in m/s^2";
   if (is_near(g, kGravity_m_s2)) return "the column is probably in m/s^2, not in g";
@@ -119,7 +119,7 @@ void check_battery(const Log& log, std::vector<Doubt>& doubts) {
                     true});
 }
 
-/// Calls `use` for stretches of at least `least_s` without a gap: first and last index.
+/// Calls `use` with the first and last index of stretches of at least `least_s` without a gap.
 void for_each_stretch(const Log& log, double least_s,
                       const std::function<void(std::size_t, std::size_t)>& use) {
   std::size_t first = 0;
@@ -153,7 +153,7 @@ void check_height(const Log& log, std::vector<Doubt>& doubts) {
        false});
 }
 
-/// How far a vehicle moves by its positions, over how far by its velocities.
+/// Compares how far a vehicle moves according to its positions and according to its velocities.
 void check_velocity(const Log& log, std::vector<Doubt>& doubts) {
   constexpr double kStretch_s = 0.2, kLeastMove_m = 0.01, kDoubt = 2, kRefusal = 30;
   double by_position = 0, by_velocity = 0, count = 0;
@@ -184,7 +184,7 @@ void check_velocity(const Log& log, std::vector<Doubt>& doubts) {
        ratio > kRefusal || ratio < 1 / kRefusal});
 }
 
-/// How far a vehicle turns by its rates, over how far by its attitudes.
+/// Compares how far a vehicle turns according to its rates and according to its attitudes.
 void check_rates(const Log& log, std::vector<Doubt>& doubts) {
   constexpr double kStretch_s = 0.05, kLeastTurn_rad = 0.01, kLargestTurn_rad = 1, kDoubt = 10;
   double by_attitude = 0, by_rate = 0, count = 0;
@@ -199,7 +199,7 @@ void check_rates(const Log& log, std::vector<Doubt>& doubts) {
         turned[k] +=
             0.5 * step_s(log, i) * (log.samples[i].rates_rad_s[k] + log.samples[i - 1].rates_rad_s[k]);
     }
-    if (angle_rad > kLargestTurn_rad) return;  // a tumble; the sum of rates is no angle there
+    if (angle_rad > kLargestTurn_rad) return;  // a tumble, where the integral of rates is not an angle
     by_attitude += angle_rad * angle_rad;
     by_rate += dot(turned, turned);
     count += 1;
@@ -215,7 +215,8 @@ void check_rates(const Log& log, std::vector<Doubt>& doubts) {
                     false});
 }
 
-/// Records in which the specific force leaps beyond what rotors can do: collisions, touch-down, wrapped integers.
+/// Finds records in which the specific force jumps by more than rotors can produce: collisions, touch-down, wrapped
+/// integers.
 void check_leaps(const Log& log, std::vector<Doubt>& doubts) {
   constexpr double kLargest_m_s2 = 2.5 * kGravity_m_s2, kLeap_m_s2 = 1 * kGravity_m_s2;
   std::size_t count = 0;

@@ -1,7 +1,7 @@
-/// @file Numbers of a log that no flight has: signals in another unit, sensors that failed, impacts.
+/// @file Detects values that no flight has: wrong units, failed sensors, impacts.
 ///
-/// Every rule compares a log with physics or with itself, never with a model of the vehicle: at rest and in flight an
-/// accelerometer feels 1 g in the mean, positions are the integral of velocities, attitudes that of rates.
+/// Each rule compares a log with physics or with itself, never with a model of the vehicle: at rest and in flight an
+/// accelerometer measures 1 g on average, positions are the integral of velocities, attitudes that of rates.
 #pragma once
 
 #include <string>
@@ -14,12 +14,12 @@ namespace swarmcert::logs {
 /// A reason not to trust a signal.
 struct Doubt {
   std::string signal;          ///< "time", "position", "specific_force", "rate", "duty", "battery", "thrust"
-  double value = 0;            ///< what was found, in the unit that `words` name
+  double value = 0;            ///< the value found, in the unit stated in `words`
   std::string words;           ///< what is wrong and what was probably meant
-  bool refuses_force = false;  ///< no force residual of this log means anything
+  bool refuses_force = false;  ///< no force residual of this log is meaningful
 };
 
-/// What is implausible in `log`; empty for a log that can be trusted as far as it can be judged. Cost: a pass.
+/// Returns what is implausible in `log`; empty if everything that can be judged is plausible. Cost: one pass.
 std::vector<Doubt> doubts_of(const Log& log);
 
 }  // namespace swarmcert::logs

@@ -20,8 +20,8 @@ namespace {
 
 enum class Format { kUsd, kUsdEvents, kCsv, kUnknown };
 
-/// By the first bytes. An old binary log starts with a number of variables and "name(type),", which may look like
-/// text: its header has no line end before its checksum.
+/// Returns the format by the first bytes. An old binary log starts with the number of variables and "name(type),",
+/// which may look like text, but its header has no line end before its checksum.
 Format kind_of(std::istream& in) {
   char head[80] = {};
   in.read(head, sizeof head);
@@ -64,11 +64,11 @@ std::string other_formats() {
   throw files::InputError({path, "offset 0", "", "", what, hint});
 }
 
-/// Micro-SD logs and CSV are streams of records; formats/formats.h knows the others.
+/// Micro-SD logs and CSV files are streams of records; formats/formats.h handles the other formats.
 RawLog raw_of(std::istream& in, const std::string& path, const SignalMap& map) {
   const std::string head = format_head(in);
-  // The header of an old micro-SD log names variables as a CSV does. What a columns.toml says counts, whoever wrote the
-  // CSV.
+  // The header of an old micro-SD log names variables like a CSV header. A columns.toml takes precedence, whoever wrote
+  // the CSV.
   const Format kind = kind_of(in);
   const bool is_usd = kind == Format::kUsd || kind == Format::kUsdEvents;
   if (!is_usd && format_of(head) != nullptr && (map.empty() || kind != Format::kCsv))
@@ -113,7 +113,7 @@ Log read_log(const std::string& path, const SignalMap& map) {
     std::ifstream in = open_log(path);
     raw = raw_of(in, path, map);
   }
-  // What a columns.toml says counts: its columns keep the names that the log itself gives.
+  // With a columns.toml, columns keep the names given in the log, because the file refers to those.
   const std::vector<std::string> named = map.empty() ? name_variables(raw) : std::vector<std::string>{};
   try {
     Log log = interpret(std::move(raw), map);
@@ -139,7 +139,7 @@ bool looks_like_log(const std::string& path) {
 
 namespace {
 
-/// The first `bytes` of a file, and as many of its end, each without a line that is cut.
+/// Returns the first `bytes` of a file and the same number at its end, each without partial lines.
 std::pair<std::string, std::string> ends_of(const std::string& path, std::streamoff bytes) {
   std::ifstream in(path, std::ios::binary);
   in.seekg(0, std::ios::end);

@@ -10,8 +10,8 @@
 namespace swarmcert::logs {
 namespace {
 
-/// The columns of one topic by every name that they answer to. The table of names is long: one pass over the columns
-/// replaces a comparison of each column with each name.
+/// The columns of one topic, indexed by all names under which they can be found. The table of names is long, so one
+/// pass over the columns replaces comparing every column with every name.
 class ColumnIndex {
  public:
   explicit ColumnIndex(const RawTopic& topic) {
@@ -23,7 +23,7 @@ class ColumnIndex {
     }
   }
 
-  /// One index per name; -1 where the topic has no such column. The first column of a name counts.
+  /// Returns one index per name; -1 if the topic has no such column. The first column with a name is used.
   std::vector<int> columns_called(const std::vector<std::string>& names) const {
     std::vector<int> columns;
     for (const std::string& name : names) {
@@ -39,7 +39,7 @@ class ColumnIndex {
   Names exact_, plain_;
 };
 
-/// A length whose column states a smaller unit in brackets, "X (mm)", "vx [cm/s]".
+/// Handles a length whose column states a smaller unit in brackets, "X (mm)", "vx [cm/s]".
 void take_stated_unit(const RawTopic& topic, Carried& carried) {
   if ((carried.unit != "m" && carried.unit != "m/s") || carried.multiply != 1 || carried.divide != 1) return;
   for (const int c : carried.columns) {
@@ -58,8 +58,8 @@ void take_stated_unit(const RawTopic& topic, Carried& carried) {
   }
 }
 
-/// Which signals need all of their columns: a vertical velocity is worth having, half a quaternion is not.
-/// "north" and "east" belong to north, east, down as well as to east, north, up.
+/// Returns false for groups that need all their columns: a vertical velocity alone is useful, half a quaternion is not.
+/// "north" and "east" occur in both north, east, down and east, north, up.
 bool may_be_partial(const NamedColumns& row) {
   if (row.ask == Ask::kNorthEastDown || row.ask == Ask::kEastNorthUp) return false;
   const int signal = row.signal;
@@ -67,7 +67,7 @@ bool may_be_partial(const NamedColumns& row) {
          signal == kTargetVelocity;
 }
 
-/// Columns that hold no number are none.
+/// Ignores columns without any number.
 void drop_empty_columns(const RawTopic& topic, Carried& carried) {
   if (topic.time_s.empty()) return;
   for (int& c : carried.columns) {
@@ -88,7 +88,7 @@ bool is_dead(const RawTopic& topic, const Carried& carried) {
   return !any;
 }
 
-/// Motors stand still in a log of the ground: their zeros say something. So do positions at the origin.
+/// Motors are at rest in a log on the ground, so their zeros are valid. So are setpoints at the origin.
 bool may_be_zero(int signal) {
   return signal == kDuty || signal == kRequested || signal == kMotorCommand || signal == kThrust ||
          signal == kThrustCommand || signal == kTorque || signal == kMotorForce ||
@@ -108,7 +108,7 @@ bool is_unit_quaternion(const RawTopic& topic, const Carried& carried) {
   return 2 * unit >= topic.time_s.size();
 }
 
-/// What a topic of set points calls a position is one that is wanted.
+/// A position in a topic of setpoints is a desired one.
 bool is_wish(const RawTopic& topic, int signal) {
   const bool may_be = signal == kTargetPosition || signal == kTargetVelocity || signal == kMotorCommand ||
                       signal == kThrustCommand || signal == kThrust || signal == kTorque ||
@@ -187,7 +187,7 @@ Recognition recognise(const RawLog& log, const SignalMap& map) {
     recognise_by_names(log, found);
   else
     recognise_by_map(log, map, found);
-  // Angles that a quaternion makes superfluous must not cost records where they are missing.
+  // Angles that are redundant beside a quaternion must not cost records where they are missing.
   if (map.empty() && (found.find(kAttitude) != nullptr || found.find(kPackedAttitude) != nullptr)) {
     found.groups.erase(std::remove_if(found.groups.begin(), found.groups.end(),
                                       [](const Carried& carried) { return carried.signal == kEuler; }),
@@ -211,7 +211,7 @@ Carried time_column(const RawTopic& topic, const SignalMap& map) {
       return time;
     }
   }
-  // A value in "time[ms]" of the published CSV is microseconds.
+  // "time[ms]" of the published CSV files is in microseconds.
   for (const char* const name : {"tick", "time_us", "time[ms]"}) {
     for (std::size_t c = 0; c < topic.columns.size(); ++c) {
       if (topic.columns[c].name != name) continue;

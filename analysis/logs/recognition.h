@@ -1,4 +1,4 @@
-/// @file Which columns of a log carry which signals.
+/// @file Finds the columns of a log that carry known signals.
 #pragma once
 
 #include <cstddef>
@@ -10,9 +10,9 @@
 
 namespace swarmcert::logs {
 
-/// A group of signals that columns of one topic carry.
+/// A group of signals carried by columns of one topic.
 struct Carried {
-  int signal = 0;            ///< the first of the group
+  int signal = 0;            ///< the first signal of the group
   std::size_t topic = 0;     ///< index into RawLog::topics
   std::vector<int> columns;  ///< index into RawTopic::columns, one per signal of the group; -1: missing
   std::string unit;
@@ -25,21 +25,21 @@ struct Carried {
 struct Recognition {
   std::vector<Carried> groups;        ///< at most one per first signal
   std::size_t clock = 0;              ///< the topic whose records become samples
-  std::vector<std::string> rejected;  ///< groups whose names are known and whose values are dead, in words
+  std::vector<std::string> rejected;  ///< groups with known names but dead values, in words
 
   const Carried* find(int signal) const;
 };
 
-/// Recognises columns by name, or by `map` where it is not empty. Groups that are dead (nothing but zeros or NaN,
-/// quaternions without unit norm) are passed over.
+/// Recognises columns by name, or by `map` if it is not empty. Dead groups (only zeros or NaN, quaternions without unit
+/// norm) are ignored.
 /// @throws files::InputError if `map` names a column that no topic has.
 Recognition recognise(const RawLog& log, const SignalMap& map);
 
-/// The column that holds the times of a topic in microseconds, with its scale; columns = {-1} if none does: then
-/// RawTopic::time_s counts.
+/// Returns the column with the times of a topic and its scale to microseconds; columns = {-1} if there is none, in
+/// which case RawTopic::time_s is used.
 Carried time_column(const RawTopic& topic, const SignalMap& map);
 
-/// "ctrlLee.rpyx, ctrlLee.rpyy, ctrlLee.rpyz"
+/// Returns the names of the columns, e.g. "ctrlLee.rpyx, ctrlLee.rpyy, ctrlLee.rpyz".
 std::string names_of(const RawLog& log, const Carried& carried);
 
 }  // namespace swarmcert::logs

@@ -28,8 +28,8 @@ double median_step(const std::vector<double>& times) {
   return median_of(std::move(steps));
 }
 
-/// Undoes the wraps of a position in 16-bit integers: neighbours that differ by almost the whole range. (Velocities and
-/// accelerations may jump that far in a crash.) Values that stay at the ends of the range are named.
+/// Undoes wraps of positions stored as 16-bit integers, where neighbours differ by almost the whole range. (Velocities
+/// and accelerations may jump that far in a crash.) Values that stay at the ends of the range are reported.
 std::vector<double> without_wraps(const RawColumn& column, const std::vector<double>& time_s,
                                   bool is_position, std::vector<LogEvent>& events) {
   constexpr double kJump = 0.9 * kInt16Range;
@@ -58,7 +58,7 @@ std::vector<double> without_wraps(const RawColumn& column, const std::vector<dou
   return values;
 }
 
-/// Angles without jumps of a whole turn, so that they can be interpolated.
+/// Removes jumps of a whole turn from angles, so that they can be interpolated.
 void unwrap(std::vector<double>& angles, double turn) {
   for (std::size_t i = 1; i < angles.size(); ++i) {
     const double turns = std::round((angles[i] - angles[i - 1]) / turn);
@@ -66,7 +66,7 @@ void unwrap(std::vector<double>& angles, double turn) {
   }
 }
 
-/// Quaternions q and -q turn alike: signs by which neighbours are near, so that they can be averaged.
+/// q and -q are the same rotation: chooses signs so that neighbours are close and can be averaged.
 std::vector<double> continuous_signs(const RawTopic& topic, const Carried& carried) {
   std::vector<double> signs(topic.time_s.size(), 1);
   for (std::size_t i = 1; i < signs.size(); ++i) {
@@ -84,7 +84,7 @@ struct Series {
   std::vector<double> time_s, values;
 };
 
-/// In order of time, without repeated times and values that are not finite.
+/// Sorts by time and drops repeated times and non-finite values.
 Series in_order(const std::vector<double>& time_s, const std::vector<double>& values) {
   std::vector<std::size_t> order(std::min(time_s.size(), values.size()));
   std::iota(order.begin(), order.end(), 0);
@@ -101,7 +101,7 @@ Series in_order(const std::vector<double>& time_s, const std::vector<double>& va
   return series;
 }
 
-/// The times of a topic in microseconds.
+/// Returns the times of a topic in microseconds.
 std::vector<double> times_us(const RawTopic& topic, const SignalMap& map, bool& wraps) {
   const Carried time = time_column(topic, map);
   std::vector<double> times;
@@ -114,21 +114,21 @@ std::vector<double> times_us(const RawTopic& topic, const SignalMap& map, bool& 
     return times;
   }
   for (const double time_s : topic.time_s) {
-    // Formats store whole microseconds or nanoseconds: what the conversion to seconds cost is given back.
+    // Formats store whole microseconds or nanoseconds: undo the rounding of the conversion to seconds.
     const double time_us = 1e6 * time_s, whole_us = std::nearbyint(time_us);
     times.push_back(std::abs(time_us - whole_us) < 1e-3 ? whole_us : time_us);
   }
   return times;
 }
 
-/// Chooses the records that are kept.
+/// Selects the records that are kept.
 class RecordFilter {
  public:
   RecordFilter(SignalTable& table, LogHealth& health) : table_(table), health_(health) {}
 
   void take(std::size_t record, double time_us, bool is_finite) {
     if (wraps && !kept_.empty()) {
-      // Of all times that a 32-bit tick can mean, the one nearest to the last.
+      // Of all times that a 32-bit tick can mean, take the one closest to the last.
       time_us += kTickRange_us * std::round((table_.time_us.back() - time_us) / kTickRange_us);
     }
     if (!is_finite || !std::isfinite(time_us)) {
@@ -143,7 +143,7 @@ class RecordFilter {
         ++health_.clock_jumps;
       pending_.reset();
     }
-    if (kept_.size() == 1 && time_us <= table_.time_us[0]) {  // the first record was the odd one
+    if (kept_.size() == 1 && time_us <= table_.time_us[0]) {  // the first record was the outlier
       kept_.clear();
       table_.time_us.clear();
       table_.restarts.clear();
@@ -193,7 +193,7 @@ class RecordFilter {
   std::optional<Pending> pending_;
 };
 
-/// Signals without which a record is of no use, where the log has them.
+/// Returns true for signals without which a record is useless, if the log has them.
 bool is_needed(int signal) {
   return signal < kRates || (signal >= kDuty && signal < kTargetPosition) ||
          (signal >= kEuler && signal < kRequested);
@@ -301,7 +301,7 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, cons
       (is_own[k] != 0 ? is_finite : others_know) = false;
     }
     if (!others_know && is_finite)
-      continue;  // another topic has not begun, has ended or has a gap: no damage
+      continue;  // another topic has not begun, has ended or has a gap: not damage
     filter.take(i, clock_us[i], is_finite);
   }
   const std::vector<std::size_t> kept = filter.end();

@@ -1,4 +1,4 @@
-/// @file All signals of a log on one clock, in SI units: what samples are made from.
+/// @file All signals of a log on one clock in SI units, from which samples are made.
 #pragma once
 
 #include <array>
@@ -8,10 +8,10 @@
 
 namespace swarmcert::logs {
 
-/// One column per Signal, each with one value per record, or empty where no column of the log carries it.
+/// One column per Signal with one value per record; empty if no column of the log carries the signal.
 struct SignalTable {
   std::vector<double> time_us;  ///< strictly increasing
-  std::vector<char> restarts;   ///< first record, or a pause of more than longest_gap_s(step) before it
+  std::vector<char> restarts;   ///< first record, or after a pause longer than longest_gap_s(step)
   std::array<std::vector<double>, kNumSignals> values;
 
   std::size_t size() const { return time_us.size(); }
@@ -27,33 +27,32 @@ struct SignalTable {
   Vector three(int first, std::size_t record) const {
     return {(*this)[first][record], (*this)[first + 1][record], (*this)[first + 2][record]};
   }
-  /// From the four columns from kAttitude on.
+  /// Returns the attitude from the four columns starting at kAttitude.
   Attitude attitude(std::size_t record) const {
     const Vector xyz = three(kAttitude, record);
     return {xyz[0], xyz[1], xyz[2], (*this)[kAttitude + 3][record]};
   }
-  /// y and z of a group change their signs: between axes forward, right, down and forward, left, up.
+  /// Negates y and z of a group: converts between the axes forward, right, down and forward, left, up.
   void turn_half_about_x(int first);
-  /// Median step between records, in seconds; 0 with fewer than two. Goes through all records.
+  /// Returns the median step between records in seconds; 0 if there are fewer than two. Goes through all records.
   double step_s() const;
 };
 
-/// Brings the recognised columns onto the clock of `recognition.clock`: units as the names say, wraps of 16-bit
-/// integers undone, other topics averaged where they are faster and interpolated where they are not. Records whose
-/// signals are not finite or whose time does not follow are dropped and counted in `health`: a time must be later than
-/// the last one; one that is over ten seconds later counts only if the next record follows it. The 32-bit tick may
-/// wrap.
-/// @param events  gets the wraps and the saturation of 16-bit integers.
+/// Brings the recognised columns onto the clock of `recognition.clock`: units are converted as named, wraps of 16-bit
+/// integers are undone, faster topics are averaged and slower ones interpolated. Records with non-finite signals or
+/// with invalid times are dropped and counted in `health`: a time must be later than the previous one, and a step of
+/// more than ten seconds is accepted only if the next record confirms it. The 32-bit tick may wrap.
+/// @param events  receives the wraps and saturations of 16-bit integers
 SignalTable signal_table(const RawLog& log, const Recognition& recognition, const SignalMap& map,
                          LogHealth& health, std::vector<LogEvent>& events);
 
-/// Records further apart are not neighbours in time, in a log of that median step: kLongestGap_s, and two and a half
-/// steps of slow logs.
+/// Returns the longest step between neighbouring records in a log with this median step: kLongestGap_s, or two and a
+/// half steps in slow logs.
 double longest_gap_s(double step_s);
 
-/// The values of `series` at `times_s`: means over a step of the target where the series is faster than it, linear
-/// interpolation elsewhere, NaN across gaps. Both clocks ascend.
-/// @param hold  values are kept across gaps and beyond the ends, as for a battery's voltage.
+/// Resamples `series` at `times_s`: means over a target step where the series is faster, linear interpolation
+/// elsewhere, NaN across gaps. Both clocks must ascend.
+/// @param hold  keep values across gaps and beyond the ends, e.g. for a battery voltage
 std::vector<double> resampled(const std::vector<double>& from_s, const std::vector<double>& series,
                               const std::vector<double>& times_s, bool hold);
 

@@ -1,4 +1,4 @@
-/// @file Which columns of a file carry which signal, in which unit and frame.
+/// @file Assignment of columns to signals, with units and frames.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace swarmcert::logs {
 
-/// The signals a column can carry. X stands for the first of a group whose others follow.
+/// The signals a column can carry. In a group, the enumerator is the first signal and the others follow it.
 enum Signal : int {
   kTime = 0,                ///< us
   kPosition = 1,            ///< m, W
@@ -27,10 +27,10 @@ enum Signal : int {
   kThrust = 39,      ///< N
   kTorque = 40,      ///< N m
   kEuler = 43,  ///< roll, pitch, yaw in rad: R = Rz(yaw) Ry(pitch) Rx(roll); any of the three may be missing
-  kRequested = 46,      ///< thrust asked of each motor before the battery is compensated, over its full scale
+  kRequested = 46,      ///< thrust requested of each motor before battery compensation, over its full scale
   kRotorSpeed = 50,     ///< of each rotor, in any unit
   kMotorCommand = 54,   ///< normalised command of each of up to eight motors, 0 .. 1
-  kThrustCommand = 62,  ///< collective thrust in a unit of the controller's own
+  kThrustCommand = 62,  ///< collective thrust in the controller's own unit
   kNumSignals = 63
 };
 
@@ -42,14 +42,14 @@ struct SignalSource {
   std::string unit;  ///< of the column
 };
 
-/// What a user says of columns. Empty: columns are recognised by their names (column_names.h).
+/// The user's meaning of the columns. If empty, columns are recognised by name (column_names.h).
 using SignalMap = std::vector<SignalSource>;
 
-/// The empty map.
+/// Returns the empty map.
 const SignalMap& known_columns();
 
-/// columns.toml: one table per signal, `[position_x] column = "x_mm", unit = "mm", frame = "world"`.
-/// @throws files::InputError with line, key and hint; signals, units and frames get a did-you-mean.
+/// Reads a columns.toml: one table per signal, `[position_x] column = "x_mm", unit = "mm", frame = "world"`.
+/// @throws files::InputError with line, key and hint; misspelt signals, units and frames get a suggestion.
 SignalMap read_columns(const std::string& path);
 SignalMap parse_columns(const std::string& text, const std::string& path);
 

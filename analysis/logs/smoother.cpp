@@ -9,7 +9,7 @@
 namespace swarmcert::logs {
 namespace {
 
-/// The normal equations of a polynomial in tau, of which the solver reads the lower triangle.
+/// The normal equations of a polynomial in tau; the solver reads only the lower triangle.
 template <int Degree>
 struct NormalEquations {
   using Matrix = Eigen::Matrix<double, Degree + 1, Degree + 1>;
@@ -18,11 +18,11 @@ struct NormalEquations {
   Vector right = Vector::Zero();
   int count = 0;
 
-  /// Of the finite ones of values[first] to values[end - 1].
-  /// @param from, half of tau = (t - from) / half
+  /// Adds the finite ones among values[first] to values[end - 1].
+  /// @param from, half tau = (t - from) / half
   void add(const std::vector<double>& times, const std::vector<double>& values, std::size_t first,
            std::size_t end, double from, double half) {
-    // Plain arrays and known loops: the sums stay in registers.
+    // Plain arrays and fixed loop counts keep the sums in registers.
     double sums[Degree + 1][Degree + 1] = {}, products[Degree + 1] = {}, powers[Degree + 1] = {1};
     for (std::size_t k = first; k < end; ++k) {
       if (!std::isfinite(values[k])) continue;

@@ -8,21 +8,21 @@
 
 namespace swarmcert::logs {
 
-/// Windows of the derived signals: where the noise of known collections falls to 1 % of the weight and below.
+/// Windows of the derived signals, at which the noise of known collections falls to 1 % of the weight or less.
 inline constexpr double kVelocityWindow_s = 0.10, kPositionWindow_s = 0.16;
 
-/// The windows of a log of that median step: at least four steps.
+/// Window widths for a log with this median step: at least four steps for the velocity and six for the position.
 inline double velocity_window_s(double step_s) { return std::max(kVelocityWindow_s, 4.01 * step_s); }
 inline double position_window_s(double step_s) { return std::max(kPositionWindow_s, 6.01 * step_s); }
 
-/// A derivative of `series` at every record: a polynomial fitted by least squares to the records within half a window,
-/// never across a gap. At the ends of a stretch the window is one-sided. NaN where a stretch is too short.
-/// @param degree     1 to 3.
-/// @param derivative 0 to degree.
+/// Returns a derivative of `series` at each record from a polynomial fitted by least squares to the records within half
+/// a window, never across a gap. At the ends of a stretch the window is one-sided. NaN if a stretch is too short.
+/// @param degree     1 to 3
+/// @param derivative 0 to degree
 std::vector<double> local_derivative(const SignalTable& table, const std::vector<double>& series,
                                      double window_s, int degree, int derivative);
 
-/// Several derivatives of the same polynomials, in this order.
+/// Returns several derivatives of the same polynomials, in this order.
 std::vector<std::vector<double>> local_derivatives(const SignalTable& table,
                                                    const std::vector<double>& series, double window_s,
                                                    int degree, const std::vector<int>& derivatives);

@@ -1,4 +1,4 @@
-/// @file Robust numbers of series with gaps in them.
+/// @file Robust statistics of series with gaps.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace swarmcert::logs {
 
-/// Quantile of the finite values; NaN if there are none.
+/// Returns a quantile of the finite values; NaN if there are none.
 inline double quantile_of(std::vector<double> values, double share) {
   values.erase(std::remove_if(values.begin(), values.end(), [](double x) { return !std::isfinite(x); }),
                values.end());
@@ -19,7 +19,7 @@ inline double quantile_of(std::vector<double> values, double share) {
 
 inline double median(const std::vector<double>& values) { return quantile_of(values, 0.5); }
 
-/// y = slope x + offset by least squares over the records where both are finite.
+/// The least squares line y = slope x + offset through the records where both values are finite.
 struct Line {
   double slope = 0, offset = 0, correlation = 0, rms = 0;
   std::size_t count = 0;

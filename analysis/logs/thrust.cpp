@@ -12,13 +12,14 @@ namespace {
 using Source = SignalInfo::Source;
 constexpr int kFour = 4, kEight = 8;
 
-/// What the controller wants of the rotors, or what they do, as powers of the stored values.
+/// Rotor commands or rotor states, as powers of the stored values.
 struct Rotors {
   int first = 0, count = 0;
   std::string from;
 };
 
-/// Specific force along the thrust axis over g, per record: what thrust over weight should be.
+/// Returns the specific force along the thrust axis divided by g for each record, which thrust over weight should
+/// equal.
 std::vector<double> load_factor(const Draft& draft) {
   const SignalTable& t = draft.table;
   std::vector<double> load(t.size(), std::nan(""));
@@ -40,7 +41,7 @@ std::vector<double> sum_of_powers(const SignalTable& t, const Rotors& rotors, do
   return sum;
 }
 
-/// Records in which the rotors carry the vehicle: thrust above a third of what is common at its upper end.
+/// Returns the records in which the rotors carry the vehicle: thrust above a third of its upper quantile.
 std::vector<char> carrying(const std::vector<double>& thrust) {
   const double high = quantile_of(thrust, 0.9);
   std::vector<char> flies;
@@ -49,7 +50,7 @@ std::vector<char> carrying(const std::vector<double>& thrust) {
 }
 
 struct Scale {
-  double hover = 0;    ///< thrust in its own unit over load factor, median
+  double hover = 0;    ///< median of thrust (in its own unit) over load factor
   double scatter = 0;  ///< robust relative deviation of that ratio
 };
 
@@ -72,7 +73,8 @@ Scale scale_of(const std::vector<double>& thrust, const std::vector<double>& loa
   return scale;
 }
 
-/// Thrust in multiples of the hover thrust, linear or quadratic in the command, whichever follows the load closer.
+/// Sets the thrust in multiples of the hover thrust, linear or quadratic in the command, whichever follows the load
+/// factor more closely.
 void set_hover_multiple(Draft& draft, const Rotors& rotors, bool squares_only, const std::string& what) {
   SignalTable& t = draft.table;
   const std::vector<double> load = load_factor(draft);
@@ -103,7 +105,7 @@ void set_hover_multiple(Draft& draft, const Rotors& rotors, bool squares_only, c
                          of_square.scatter));
 }
 
-/// Duty cycles of a column of unknown scale; false where they are microseconds of a servo signal, which say no duty.
+/// Determines the scale of duty columns; returns false for microseconds of a servo signal, which do not give a duty.
 bool settle_duty_scale(Draft& draft) {
   const Carried* const carried = draft.recognition.find(kDuty);
   SignalTable& t = draft.table;
@@ -144,8 +146,8 @@ void settle_battery(Draft& draft) {
   draft.add("battery", Source::kMissing, "", "V");
 }
 
-/// "motor.m1" is the requested thrust in some firmware and the applied duty in other: the one that follows the load
-/// while the battery sags is what it is.
+/// "motor.m1" is the requested thrust in some firmware versions and the applied duty in others: decided by which of the
+/// two follows the load factor while the battery voltage drops.
 bool is_requested(Draft& draft) {
   const Carried& carried = *draft.recognition.find(kRequested);
   SignalTable& t = draft.table;
@@ -154,7 +156,7 @@ bool is_requested(Draft& draft) {
   const std::vector<double> load = load_factor(draft);
   const std::vector<double> requested = sum_of_powers(t, {kRequested, kFour, ""}, 1);
   std::vector<double> applied(t.size(), 0);
-  // Thrust of a brushed motor grows about with the 1.5th power of its mean voltage.
+  // The thrust of a brushed motor is roughly proportional to its mean voltage to the power 1.5.
   for (int k = 0; k < kFour; ++k) {
     for (std::size_t i = 0; i < t.size(); ++i)
       applied[i] += std::pow(std::max(t[kRequested + k][i], 0.0) * t[kBattery][i], 1.5);
@@ -177,7 +179,8 @@ void derive_duty(Draft& draft, const std::string& from) {
   draft.add("duty", Source::kDerived, from + " and battery: the firmware's battery compensation", "1");
 }
 
-/// The voltage at which the firmware's compensation turns the request into the duty: that of the sum over the rotors.
+/// Derives the battery voltage at which the firmware's compensation turns the sum of the requests into the sum of the
+/// duties.
 void derive_battery(Draft& draft) {
   SignalTable& t = draft.table;
   std::vector<double>& battery = t[kBattery];
@@ -202,7 +205,7 @@ void derive_battery(Draft& draft) {
   }
 }
 
-/// Replaces speeds of rotors that are halved or drop out by the mean of the others, and names these rotors.
+/// Replaces rotor speeds that are halved or drop out by the mean of the others, and reports these rotors.
 void replace_broken_rotor_speeds(Draft& draft) {
   SignalTable& t = draft.table;
   std::array<double, kFour> middle{};

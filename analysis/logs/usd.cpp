@@ -39,7 +39,7 @@ struct UsdHeader {
   }
 };
 
-/// "name(type)" ended by `end`. The name may not hold control characters.
+/// Reads "name(type)", terminated by `end`. The name must not contain control characters.
 void read_token(ByteWindow& window, const std::string& path, char end, std::uint32_t* sum,
                 UsdHeader& header) {
   const std::size_t start = window.offset();
@@ -66,12 +66,12 @@ void decode(const UsdHeader& header, const unsigned char* record, double* values
     values[i] = value_of(header.variables[i].type, record + header.variables[i].offset);
 }
 
-/// Looks for sound blocks of the old format.
+/// Finds valid blocks of the old format.
 class Blocks {
  public:
   Blocks(ByteWindow& window, const UsdHeader& header) : window_(window), header_(header) {}
 
-  /// Bytes of the sound block that starts here; 0 if none does.
+  /// Returns the size in bytes of the valid block that starts here; 0 if there is none.
   std::size_t sound_block() {
     const unsigned char* const count = window_.peek(1);
     if (count == nullptr) return 0;
@@ -79,12 +79,12 @@ class Blocks {
     const unsigned char* const block = window_.peek(body + kChecksum_bytes);
     if (block == nullptr) return 0;
     work_bytes_ += body;
-    // The flown writers store NOT CRC-32.
+    // The writers in use store NOT CRC-32.
     return little_endian<std::uint32_t>(block + body) == ~checksum(block, body) ? body + kChecksum_bytes : 0;
   }
 
-  /// True if a block may start here after damage: not empty, and its first time soon after `last`. Spares a checksum
-  /// at almost every byte; an empty block's checksum would be five bytes that chance produces.
+  /// Returns true if a block may start here after damage: it is not empty and its first time is soon after `last`. This
+  /// avoids computing a checksum at almost every byte; an empty block is only five bytes, which occur by chance.
   bool may_start(std::uint32_t last) {
     const unsigned char* const bytes = window_.peek(1 + header_.record_bytes);
     if (bytes == nullptr || *bytes == 0) return false;
@@ -124,7 +124,7 @@ void read_usd(std::istream& in, const std::string& path, RecordSink& sink, LogHe
   std::vector<double> values(num_variables);
   std::uint32_t last_time = 0;
   bool searching = false;
-  // A file made to be hard could ask for a checksum over thousands of bytes at each of its bytes.
+  // Limits the work on malicious files, which could request a checksum over thousands of bytes at each byte.
   constexpr std::size_t kMostSearch_bytes = std::size_t{4} << 30;
   while (window.left(1) == 1) {
     const bool tries = !searching || (blocks.work_bytes() < kMostSearch_bytes && blocks.may_start(last_time));
@@ -249,7 +249,7 @@ class EventReader {
     events_.emplace_back(id, std::move(event));
   }
 
-  /// Index into events_; their number if it is none of them.
+  /// Returns an index into events_; its size if the event is unknown.
   std::size_t event_of(std::size_t id) const {
     std::size_t index = 0;
     while (index < events_.size() && events_[index].first != id) ++index;
@@ -257,13 +257,14 @@ class EventReader {
   }
 
   std::size_t head_bytes() const { return version_ == 1 ? 2 + 4 : 2 + 8; }
-  /// Microseconds.
+  /// Returns the time in microseconds.
   double time_of(const unsigned char* record) const {
     return version_ == 1 ? 1000.0 * little_endian<std::uint32_t>(record + 2)
                          : static_cast<double>(little_endian<std::uint64_t>(record + 2));
   }
 
-  /// Bytes of the record `ahead` bytes from here; 0 if no known event with a sensible time starts there.
+  /// Returns the size in bytes of the record `ahead` bytes from here; 0 if no known event with a plausible time starts
+  /// there.
   std::size_t record_size(std::size_t ahead, double last_time) {
     const unsigned char* const head = window_.peek(ahead + head_bytes());
     if (head == nullptr) return 0;

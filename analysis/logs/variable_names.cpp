@@ -36,7 +36,7 @@ std::string_view before_comment(std::string_view line) {
   return line;
 }
 
-/// The subset of YAML in which crazyflies.yaml is written: nested mappings, lists in brackets and lists of dashes.
+/// Reads the subset of YAML used by crazyflies.yaml: nested mappings, lists in brackets and lists of dashes.
 class YamlReader {
  public:
   explicit YamlReader(CustomTopics& found) : found_(found) {}
@@ -68,7 +68,7 @@ class YamlReader {
     std::string name;
   };
 
-  /// The element `places` behind the first key called `section`; empty where the path has none.
+  /// Returns the element `places` after the first key called `section`; empty if the path has none.
   std::string behind(const std::string& section, std::size_t places) const {
     for (std::size_t i = 0; i + places < path_.size(); ++i)
       if (path_[i].name == section) return path_[i + places].name;
@@ -109,7 +109,7 @@ class YamlReader {
   bool in_brackets_ = false;
 };
 
-/// Path of the crazyflies.yaml that belongs to the log; empty if no such file exists.
+/// Returns the path of the crazyflies.yaml that belongs to the log; empty if there is none.
 fs::path yaml_beside(const std::string& log) {
   std::error_code error;
   const fs::path path = fs::absolute(log, error).lexically_normal();
@@ -125,7 +125,7 @@ bool is_generic(const RawTopic& topic) {
   return topic.type.find("LogDataGeneric") != std::string::npos && topic.find("values[0]") != nullptr;
 }
 
-/// Empty where the names fit, else why they do not.
+/// Returns an empty text if the names fit, else the reason why they do not.
 std::string rename_values(RawTopic& topic, const std::vector<std::string>& variables) {
   if (variables.empty()) return "does not name the values of " + topic.name;
   std::vector<RawColumn*> values;

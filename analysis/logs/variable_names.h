@@ -1,4 +1,4 @@
-/// @file What files beside a log say of its columns: crazyflies.yaml names the values of Crazyswarm2's LogDataGeneric.
+/// @file Column names from files beside a log: crazyflies.yaml names the values of Crazyswarm2's LogDataGeneric.
 #pragma once
 
 #include <map>
@@ -10,7 +10,7 @@
 
 namespace swarmcert::logs {
 
-/// Log variables of the custom topics of a crazyflies.yaml.
+/// Log variables of the custom topics in a crazyflies.yaml.
 struct CustomTopics {
   using Variables =
       std::map<std::string, std::vector<std::string>>;  ///< by topic, in the order of the values
@@ -18,19 +18,18 @@ struct CustomTopics {
   std::map<std::string, std::string> type_of_robot;
   Variables of_all;
 
-  /// The variables of "/<robot>/<topic>": as the robot, else its type, else the section of all robots states them.
-  /// Empty where none does.
+  /// Returns the variables of "/<robot>/<topic>" as defined for the robot, else for its type, else for all robots.
+  /// Empty if not defined.
   std::vector<std::string> variables(const std::string& topic) const;
 };
 
-/// Reads `robots`, `robot_types` and `all` of a crazyflies.yaml, at any depth. Lines that do not fit are passed over:
-/// the file belongs to another program.
+/// Reads `robots`, `robot_types` and `all` of a crazyflies.yaml at any depth. Lines that do not match are ignored,
+/// because the file belongs to another program.
 CustomTopics parse_custom_topics(std::string_view yaml);
 
-/// Renames the columns `values[i]` of LogDataGeneric topics where a crazyflies.yaml beside the log names as many
-/// variables as the topic has values. The file is sought in the folder of the log, the one above, and in `config` below
-/// both.
-/// @return for people: which topics were named, and why others were not. Empty where the log has none of that type.
+/// Renames the columns `values[i]` of LogDataGeneric topics if a crazyflies.yaml beside the log names as many variables
+/// as the topic has values. The file is searched for in the folder of the log, its parent, and `config` below either.
+/// @return which topics were named, and why others were not, in words; empty if the log has no such topic
 std::vector<std::string> name_variables(RawLog& log);
 
 }  // namespace swarmcert::logs

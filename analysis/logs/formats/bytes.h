@@ -1,4 +1,4 @@
-/// @file What the readers of binary logs share: the whole file in memory, numbers of any type and byte order, refusals.
+/// @file Helpers of the binary readers: whole files in memory, numbers of any type and byte order, errors.
 #pragma once
 
 #include <cstddef>
@@ -10,22 +10,23 @@
 
 namespace swarmcert::logs {
 
-/// Largest log that is taken into memory: 2 GiB, hours of everything that a flight controller logs.
+/// Largest log that is read into memory: 2 GiB, i.e. hours of everything a flight controller can log.
 inline constexpr std::size_t kLargestLog_bytes = std::size_t{2} << 30;
-/// Arrays with more elements are no signals of a flight (images, point clouds, memory dumps): they give no columns.
+/// Larger arrays are not flight signals (images, point clouds, memory dumps) and are not turned into columns.
 inline constexpr std::size_t kMostElements = 256;
-/// Columns of one topic.
+/// Largest number of columns of a topic.
 inline constexpr std::size_t kMostColumns = 4096;
 
-/// What is left of the stream.
+/// Returns the rest of the stream.
 /// @throws files::InputError if it cannot be read, is empty, or is larger than kLargestLog_bytes.
 std::string read_all(std::istream& in, const std::string& path);
 
-/// @throws files::InputError, always.
+/// Always throws.
+/// @throws files::InputError with the given parts.
 [[noreturn]] void refuse_at(const std::string& path, std::size_t offset, const std::string& field,
                             const std::string& value, const std::string& what, const std::string& hint);
 
-/// Types of numbers that logs store.
+/// Number types that occur in logs.
 enum class Scalar : unsigned char {
   kInt8,
   kUint8,
@@ -41,10 +42,10 @@ enum class Scalar : unsigned char {
 
 std::size_t size_of(Scalar type);
 
-/// The number at `bytes`, which need not be aligned. Integers beyond 2^53 are rounded.
+/// Returns the number at `bytes`, which need not be aligned. Integers above 2^53 are rounded.
 double value_of(Scalar type, const char* bytes, bool is_big_endian = false);
 
-/// The little-endian integer at `offset` of `bytes`; nothing if it does not lie within.
+/// Returns the little-endian integer at `offset` of `bytes`; nothing if it extends beyond the end.
 template <typename Integer>
 std::optional<Integer> integer_at(std::string_view bytes, std::size_t offset) {
   if (offset > bytes.size() || bytes.size() - offset < sizeof(Integer)) return std::nullopt;
@@ -54,10 +55,10 @@ std::optional<Integer> integer_at(std::string_view bytes, std::size_t offset) {
   return static_cast<Integer>(value);
 }
 
-/// `text` up to its first NUL.
+/// Returns `text` up to its first NUL.
 std::string until_nul(std::string_view text);
 
-/// True for a name as languages and message definitions have them: letter or underscore, then these and digits.
+/// Returns true for an identifier: a letter or underscore, followed by letters, digits and underscores.
 bool is_identifier(std::string_view text, std::size_t longest = 128);
 
 }  // namespace swarmcert::logs

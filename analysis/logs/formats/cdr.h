@@ -1,4 +1,4 @@
-/// @file Serialized messages of ROS 2 (CDR), field by field.
+/// @file Field-by-field decoding of serialized ROS 2 messages (CDR).
 #pragma once
 
 #include <string_view>
@@ -7,10 +7,10 @@
 
 namespace swarmcert::logs {
 
-/// Serialized data: numbers are aligned to their size, counted from behind the four bytes of the head.
+/// A cursor in serialized data. Numbers are aligned to their size, relative to the end of the 4-byte header.
 class CdrCursor {
  public:
-  /// False if the head announces no encoding that is known here.
+  /// Returns false if the header announces an unknown encoding.
   bool begin(std::string_view message) {
     if (message.size() < 4 || message[0] != 0) return false;
     const auto encoding = static_cast<unsigned char>(message[1]);
@@ -45,7 +45,7 @@ class CdrCursor {
     at_ += size;
     return true;
   }
-  /// Over `count` numbers.
+  /// Skips `count` numbers.
   bool skip(Scalar type, std::size_t count) {
     if (count == 0) return true;
     const std::size_t size = size_of(type);

@@ -1,4 +1,4 @@
-/// @file Columns that grow message by message, whatever arrays the messages have.
+/// @file Builds columns message by message; arrays may vary in length.
 #pragma once
 
 #include <fmt/core.h>
@@ -18,8 +18,7 @@ namespace swarmcert::logs {
 inline constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 inline constexpr std::size_t kLongestText_bytes = 4096;
 
-/// Place of a value within messages: a field, or an element of an array. Remembers its column, so that names are made
-/// once.
+/// A field of a message or an element of an array. Caches its column, so that the column's name is built only once.
 struct RosNode {
   const RosNode* parent = nullptr;
   std::string label;  ///< ".x", "[3]"
@@ -34,13 +33,13 @@ struct RosNode {
   }
 };
 
-/// What one message says, before it is known to be sound as a whole.
+/// The values of one message, held back until the whole message has been checked.
 struct RosRecord {
   std::vector<std::pair<RosNode*, double>> numbers;
   std::vector<std::pair<RosNode*, std::string_view>> texts;
 };
 
-/// A RawTopic in the making.
+/// A RawTopic under construction.
 class ColumnTable {
  public:
   ColumnTable(const std::string& name, const std::string& type, RosBudget& budget) : budget_(budget) {
@@ -50,8 +49,8 @@ class ColumnTable {
 
   RosNode* root() { return &root_; }
 
-  /// The child of `parent`; nullptr if that is nullptr or there are too many. @param field name of the child, nullptr
-  /// for an element, whose label is its index
+  /// Returns the child of `parent`; nullptr if `parent` is nullptr or there are too many nodes.
+  /// @param field name of the child; nullptr for an array element, which is labelled with its index
   RosNode* child(RosNode* parent, std::size_t index, const std::string* field) {
     if (parent == nullptr) return nullptr;
     if (parent->children.size() <= index) parent->children.resize(index + 1);
@@ -91,7 +90,8 @@ class ColumnTable {
     limit_values();
   }
 
-  /// @param has_elements some of what the messages say stands in topics of its own: nothing may be left for this one
+  /// Moves the topic to `log`.
+  /// @param has_elements part of the messages went to topics of its own, so this topic may be empty
   void move_to(RawLog& log, bool has_elements) {
     if (!given_up_.empty()) {
       log.skipped.push_back({topic_.name, given_up_, records_});
@@ -108,7 +108,7 @@ class ColumnTable {
  private:
   static constexpr std::size_t kMostPlaces = 4 * kMostColumns;
 
-  /// Its index; beyond the last where there are too many.
+  /// Returns the index of the new column; an out-of-range index if there are too many columns.
   std::size_t new_column(const RosNode& node, std::size_t row) {
     if (topic_.columns.size() >= kMostColumns) {
       has_too_many_columns_ = true;
@@ -118,7 +118,8 @@ class ColumnTable {
     return topic_.columns.size() - 1;
   }
 
-  /// One long message among many short ones would need a value of each column for each of them.
+  /// Bounds the memory: a single long message among many short ones would add many columns, each with a value per
+  /// message.
   void limit_values() {
     constexpr std::size_t kMostMissing = std::size_t{1} << 16;
     constexpr std::size_t kMostPerByte = 8;

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMostBlocks = 256;
 
-/// A name as a head has it: "acc.x[g]", "acc.x (g)".
+/// A name in a header: "acc.x[g]", "acc.x (g)".
 struct HeadCell {
   std::string name, unit;
 };
@@ -51,7 +51,7 @@ bool is_time_name(std::string name) {
   return names.count(name) > 0;
 }
 
-/// `group.name` as the firmware names log variables.
+/// Returns true for `group.name`, the form of the firmware's log variables.
 bool is_log_variable(std::string_view name) {
   const std::size_t dot = name.find('.');
   return dot != std::string_view::npos && is_identifier(name.substr(0, dot)) &&
@@ -65,7 +65,7 @@ std::optional<double> per_second(const std::string& unit) {
   return found == units.end() ? std::nullopt : std::optional<double>(found->second);
 }
 
-/// The unit in which the steps of `times` are those of a log of 0.7 Hz to 2 kHz.
+/// Returns the unit in which the steps of `times` correspond to a log of 0.7 Hz to 2 kHz.
 std::string unit_of_steps(const std::vector<double>& times) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < times.size(); ++i)
@@ -78,7 +78,7 @@ std::string unit_of_steps(const std::vector<double>& times) {
   return *middle < 1.5e6 ? "us" : "ns";
 }
 
-/// Takes the records of one file.
+/// Receives the records of one file.
 class CsvTopic : public RecordSink {
  public:
   void begin(const std::vector<std::string>& names) override {
@@ -98,7 +98,7 @@ class CsvTopic : public RecordSink {
   std::size_t without_time = 0;
 };
 
-/// The block of a file name that cfclient gave: "pose" of "pose-20260131T12-00-59.csv"; empty for other names.
+/// Returns the block in a file name given by cfclient: "pose" for "pose-20260131T12-00-59.csv"; empty for other names.
 std::string block_of(const std::string& name) {
   static const std::regex kPattern("(.+)-[0-9]{8}T[0-9]{2}-[0-9]{2}-[0-9]{2}[.]csv");
   std::smatch match;

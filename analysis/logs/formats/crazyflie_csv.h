@@ -1,4 +1,4 @@
-/// @file CSV of Crazyflie log variables, as cfclient writes it and people with cflib do.
+/// @file CSV files of Crazyflie log variables, as written by cfclient and by cflib scripts.
 #pragma once
 
 #include <iosfwd>
@@ -9,22 +9,22 @@
 
 namespace swarmcert::logs {
 
-/// True if `head` starts with a line of names of which the first is a time ("Timestamp", "time", "tick") and another is
-/// `group.name`, with a unit in brackets or without.
+/// Returns true if `head` starts with a line of names whose first is a time ("Timestamp", "time", "tick") and another
+/// one has the form `group.name`, with or without a unit in brackets.
 bool looks_like_crazyflie_csv(std::string_view head);
 
-/// One topic, "csv", with all columns, that of the time included. Cells that are no numbers are NaN; columns without a
-/// single number are named in `skipped`. The unit of time is the one in the header; without one, the median step
-/// decides: 0.5 to 1500 is ms, as cfclient writes, less is s, more is us, then ns. `texts["time_unit"]` holds it.
-/// @throws files::InputError if the file is empty or its head names a column twice.
+/// Returns one topic, "csv", with all columns including the time. Cells that are not numbers become NaN; columns
+/// without any number are listed in `skipped`. The time unit is taken from the header; without one the median step
+/// decides: below 0.5 is s, 0.5 to 1500 is ms (as cfclient writes), larger steps are us, then ns. `texts["time_unit"]`
+/// holds the result.
+/// @throws files::InputError if the file is empty or its header contains a name twice.
 RawLog read_crazyflie_csv(std::istream& in, const std::string& path);
 
-/// True for a folder in which cfclient recorded: it writes a file `<block>-<date>T<time>.csv` for each block of
-/// variables.
+/// Returns true for a folder recorded by cfclient, which writes a file `<block>-<date>T<time>.csv` for each log block.
 bool looks_like_cfclient_folder(const std::string& path);
 
-/// All files of the folder as one log: a topic for each block, on the one clock that they share, the vehicle's.
-/// @throws files::InputError as read_crazyflie_csv().
+/// Reads all files of the folder as one log, with one topic per block; they share the vehicle's clock.
+/// @throws files::InputError as read_crazyflie_csv() does.
 RawLog read_cfclient_folder(const std::string& path);
 
 }  // namespace swarmcert::logs

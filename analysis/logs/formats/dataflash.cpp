@@ -30,7 +30,7 @@ class DataflashReader {
       refuse_at(path_, 0, "message", "", "is not the definition of a format with which these logs start",
                 "is this an ArduPilot log? Text logs (.log) can be converted to .bin");
     }
-    // Definitions, units and multipliers may stand behind messages that need them.
+    // Definitions, units and multipliers may follow the messages that need them.
     walk([this](std::uint8_t id, std::string_view body) { take_definition(id, body); });
     apply_units();
     log_.health = {};
@@ -41,7 +41,7 @@ class DataflashReader {
   }
 
  private:
-  /// Bytes of the message at `at`; 0 if none of a known format stands there.
+  /// Returns the size in bytes of the message at `at`; 0 if there is none of a known format.
   std::size_t message_size(std::size_t at) const {
     if (bytes_.substr(at, 2) != kDataflashStart || bytes_.size() - at < kDataflashHead_bytes) return 0;
     const auto id = static_cast<std::uint8_t>(bytes_[at + 2]);
@@ -57,7 +57,7 @@ class DataflashReader {
     std::size_t at = 0;
     while (at < bytes_.size()) {
       const std::size_t size = message_size(at);
-      // A message that another follows, or that ends the file within the next one's head.
+      // Accept a message if another one follows, or if the file ends within the next header.
       if (size > 0 && (starts_message(at + size) || bytes_.size() - at - size < kDataflashHead_bytes)) {
         visit(static_cast<std::uint8_t>(bytes_[at + 2]),
               bytes_.substr(at + kDataflashHead_bytes, size - kDataflashHead_bytes));
@@ -68,8 +68,8 @@ class DataflashReader {
     }
   }
 
-  /// Goes to the next byte where a message starts that another follows. @param size of a message at `at` behind which
-  /// no other starts
+  /// Skips to the next byte at which a message starts that is followed by another.
+  /// @param size of a message at `at` that is not followed by another
   std::size_t leave_out(std::size_t at, std::size_t size) {
     const bool is_unknown = size == 0 && bytes_.substr(at, 2) == kDataflashStart &&
                             bytes_.size() - at >= kDataflashHead_bytes &&
@@ -88,7 +88,7 @@ class DataflashReader {
     }
     return next;
   }
-  /// @param counts_unknown behind a message of an unknown format any message counts: several may follow each other
+  /// @param counts_unknown accept any header, because after a message of an unknown format several of them may follow
   bool is_found(std::size_t at, bool counts_unknown) const {
     if (bytes_.substr(at, 2) != kDataflashStart) return false;
     const std::size_t size = message_size(at);
@@ -147,7 +147,7 @@ class DataflashReader {
                                                  text_in(format, body, "MultIds")};
   }
 
-  /// Writes units and multipliers into the fields.
+  /// Assigns units and multipliers to the fields.
   void apply_units() {
     for (std::size_t id = 0; id < formats_.size(); ++id) {
       const auto& [units, multipliers] = unit_ids_[id];
@@ -157,7 +157,7 @@ class DataflashReader {
         const char multiplier = i < multipliers.size() ? multipliers[i] : '-';
         const auto found_unit = units_.find(unit);
         field.is_instance = unit == '#' && field.type.number;
-        // "-": none, "?": not known.
+        // "-" means none, "?" means unknown.
         if (found_unit != units_.end() && unit != '-' && unit != '?' && !field.is_instance)
           field.unit = found_unit->second;
         const auto found = multipliers_.find(multiplier);
@@ -226,7 +226,7 @@ class DataflashReader {
       const double number = value_of(*field.type.number, body.data() + field.offset);
       if (number >= 0 && number < 256) instance = static_cast<int>(number);
     }
-    // Two ids of one name are one topic only if they have the same fields.
+    // Two ids with the same name form one topic only if they have the same fields.
     const auto [found, is_new] = topics_.emplace(std::pair{id, instance}, log_.topics.size());
     if (!is_new) return log_.topics[found->second];
     RawTopic topic;
@@ -274,7 +274,7 @@ class DataflashReader {
       unit_ids_;  ///< units and multipliers of a format's fields
   std::map<char, std::string> units_;
   std::map<char, double> multipliers_;
-  std::map<std::pair<std::uint8_t, int>, std::size_t> topics_;  ///< in log_.topics
+  std::map<std::pair<std::uint8_t, int>, std::size_t> topics_;  ///< index in log_.topics
   std::map<std::string, std::uint8_t> names_;
   std::map<std::uint8_t, std::size_t> unknown_ids_;
   std::map<std::string, std::size_t> contradictory_, without_time_;

@@ -1,4 +1,4 @@
-/// @file Formats of messages as an ArduPilot log defines them.
+/// @file Message formats as defined by an ArduPilot log.
 #pragma once
 
 #include <optional>
@@ -9,14 +9,14 @@
 
 namespace swarmcert::logs {
 
-inline constexpr std::size_t kDataflashHead_bytes = 3;  ///< of every message: two fixed bytes and the format
+inline constexpr std::size_t kDataflashHead_bytes = 3;  ///< of each message: two fixed bytes and the format
 
-/// How a field's type is stored; the types are single letters.
+/// How a field type, a single letter, is stored.
 struct FieldType {
-  std::optional<Scalar> number;  ///< else text, or a float of 16 bits
+  std::optional<Scalar> number;  ///< empty: text or a 16-bit float
   std::size_t bytes = 0;
   std::size_t count = 1;
-  double scale = 1;  ///< of what is stored
+  double scale = 1;  ///< factor for the stored value
   bool is_text = false;
 };
 
@@ -24,14 +24,14 @@ struct DataflashField {
   std::string name;
   char letter;
   FieldType type;
-  std::size_t offset;  ///< in the message, behind its head
+  std::size_t offset;  ///< from the end of the message's header
   std::string unit;
   bool is_instance = false;
 };
 struct DataflashFormat {
   std::string name, definition;
-  std::size_t bytes = 0;               ///< of a message with its head
-  std::vector<DataflashField> fields;  ///< empty if the definition contradicts itself
+  std::size_t bytes = 0;               ///< of a message including its header
+  std::vector<DataflashField> fields;  ///< empty if the definition is inconsistent
 
   const DataflashField* find(const std::string& field) const {
     for (const DataflashField& candidate : fields)
@@ -40,11 +40,12 @@ struct DataflashFormat {
   }
 };
 
-/// Fields from letters ("QBff") and names ("TimeUS,I,AccX,AccY"); empty if they do not fit each other and `bytes`.
+/// Parses field types ("QBff") and names ("TimeUS,I,AccX,AccY"). Returns nothing if they disagree with each other or
+/// `bytes`.
 std::vector<DataflashField> parse_fields(const std::string& letters, const std::string& names,
                                          std::size_t bytes);
 
-/// The number at `bytes` in IEEE 754 binary16.
+/// Returns the IEEE 754 binary16 number at `bytes`.
 double half_float(const char* bytes);
 
 }  // namespace swarmcert::logs

@@ -15,7 +15,7 @@ Decompressed decompress_zstd(std::string_view compressed, std::size_t limit) {
   Decompressed result;
   const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
   if (!context) return result;
-  // The frame's head asks for the memory of its window: 2^23 is what level 19 needs.
+  // A frame's header requests the memory of its window; level 19 needs 2^23.
   constexpr int kLargestWindow_log2 = 24;
   ZSTD_DCtx_setParameter(context.get(), ZSTD_d_windowLogMax, kLargestWindow_log2);
   const std::unique_ptr<char[]> buffer(new char[kBuffer_bytes]);

@@ -1,4 +1,4 @@
-/// @file Compressed parts of logs.
+/// @file Decompression of parts of logs.
 #pragma once
 
 #include <cstddef>
@@ -10,18 +10,19 @@ namespace swarmcert::logs {
 enum class Compression { kNone, kZstd, kLz4 };
 
 struct Decompressed {
-  std::string bytes;          ///< what could be decompressed; the beginning only where `is_whole` is false
+  std::string bytes;          ///< decompressed bytes; only the beginning if not `is_whole`
   bool is_whole = false;      ///< the frame ends where `compressed` ends, without an error
-  bool is_too_large = false;  ///< stopped because more than the limit would have come
+  bool is_too_large = false;  ///< stopped at the limit
 };
 
-/// Decompresses one frame (several in a row for zstd and lz4).
+/// Decompresses one frame (or several consecutive frames for zstd and lz4).
 Decompressed decompress(Compression compression, std::string_view compressed, std::size_t limit_bytes);
 
-/// True if the magic number of zstd starts `bytes`.
+/// Returns true if `bytes` starts with the magic number of zstd.
 bool looks_like_zstd(std::string_view bytes);
 
-/// How much a log of `file_bytes` may decompress to: flights repeat themselves, bombs do so beyond measure.
+/// Returns the largest decompressed size accepted for a log of `file_bytes`. It allows the redundancy of flight data
+/// but stops decompression bombs.
 std::size_t decompression_limit(std::size_t file_bytes);
 
 }  // namespace swarmcert::logs

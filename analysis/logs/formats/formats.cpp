@@ -8,8 +8,8 @@
 
 namespace swarmcert::logs {
 
-/// Every format: its name for messages, and the stem of its functions and of its source: <stem>.cpp defines
-/// looks_like_<stem>() and read_<stem>(). Formats are tried in this order.
+/// All formats, in the order in which they are tried: the name for messages, and the stem of the source and its
+/// functions. <stem>.cpp defines looks_like_<stem>() and read_<stem>().
 #define SWARMCERT_LOG_FORMATS(FORMAT)        \
   FORMAT("PX4 ULog", ulog)                   \
   FORMAT("rosbag2 in MCAP", mcap)            \

@@ -22,8 +22,8 @@ struct McapSchema {
   std::string name, encoding;
   std::string_view text;
   bool is_parsed = false;
-  std::shared_ptr<const RosLayout> layout;  ///< once it is parsed
-  std::string fault;                        ///< why there is no layout then
+  std::shared_ptr<const RosLayout> layout;  ///< set once it has been parsed
+  std::string fault;                        ///< why there is no layout after parsing
 };
 struct McapChannel {
   std::uint16_t schema = 0;
@@ -41,7 +41,7 @@ class McapReader {
     if (!looks_like_mcap(bytes_))
       refuse_at(path_, 0, "magic number", "", "is not that of an MCAP file", "is this a rosbag?");
     const std::vector<std::size_t> records = find_records();
-    // Definitions first: where the chunk that has them is damaged, the summary at the end of the file repeats them.
+    // Definitions first: if the chunk that holds them is damaged, the summary at the end of the file repeats them.
     for (const std::size_t at : records) take_definition(*mcap_record_at(bytes_, at));
     for (const std::size_t at : records) take_top(at);
     if (cut_chunk_) take_chunk(*cut_chunk_, *cut_offset_);
@@ -50,7 +50,7 @@ class McapReader {
   }
 
  private:
-  /// Offsets of the sound records outside chunks; counts damage.
+  /// Returns the offsets of the valid records outside chunks and counts damage.
   std::vector<std::size_t> find_records() {
     std::vector<std::size_t> found;
     std::size_t at = kMcapMagic.size();
@@ -68,11 +68,11 @@ class McapReader {
       if (next < bytes_.size()) ++log_.health.damaged_blocks;
       at = next;
     }
-    log_.health.truncated = true;  // a whole file ends with the magic number
+    log_.health.truncated = true;  // a complete file ends with the magic number
     return found;
   }
 
-  /// The next byte from which two sound records follow each other; the end of the file if there is none.
+  /// Returns the next byte from which two valid records follow each other; the end of the file if there is none.
   std::size_t next_sound(std::size_t at) const {
     for (++at; at < bytes_.size(); ++at) {
       if (bytes_.substr(at) == kMcapMagic) return at;
@@ -86,7 +86,8 @@ class McapReader {
     return bytes_.size();
   }
 
-  /// True if the file ends within the chunk at `at`: two sizes of it agree, and are more than there is.
+  /// Keeps the chunk at `at` if the file ends within it, i.e. if its two stated sizes agree and exceed what is left.
+  /// Returns false otherwise.
   bool keep_cut_chunk(std::size_t at) {
     if (bytes_.size() - at < kMcapHead_bytes || static_cast<unsigned char>(bytes_[at]) != kChunk)
       return false;
@@ -113,7 +114,7 @@ class McapReader {
     schema.encoding = fields.bytes();
     schema.text = fields.bytes();
     if (!fields.is_sound() || id == 0) return;
-    // The text must outlive its chunk; of what is repeated in every chunk, one copy is kept.
+    // The text must outlive its chunk; definitions are repeated in every chunk, so only one copy is kept.
     if (schemas_.count(id) > 0 || schema.text.size() > kLongestDefinition_bytes ||
         schema.name.size() > kLongestMcapName)
       return;
@@ -152,7 +153,7 @@ class McapReader {
         take_metadata(record.content);
         break;
       case kDataEnd: {
-        // The first counts: a file made to be hard could have many.
+        // Only the first one is checked: a malicious file could contain many.
         const std::uint32_t stored = is_past_data_end_ ? 0 : *integer_at<std::uint32_t>(record.content, 0);
         is_past_data_end_ = true;
         if (stored != 0 && stored != mcap_checksum(bytes_.substr(0, at))) log_.health.checksum_failed = true;
@@ -201,7 +202,7 @@ class McapReader {
     take_records(content.bytes, chunk.is_whole);
   }
 
-  /// The records within a chunk.
+  /// Reads the records within a chunk.
   void take_records(std::string_view content, bool is_whole) {
     std::size_t at = 0;
     while (at < content.size()) {

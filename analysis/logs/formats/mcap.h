@@ -9,15 +9,15 @@
 
 namespace swarmcert::logs {
 
-/// True if the magic number of MCAP starts `head`.
+/// Returns true if `head` starts with the magic number of MCAP.
 bool looks_like_mcap(std::string_view head);
 
-/// Topics of ROS 2 messages (encoding "cdr", definitions "ros2msg"), times from the log time of the messages, in
-/// seconds since 1970 or whatever clock the recorder used. Chunks without compression, zstd and lz4. The summary
-/// section is not needed. A chunk whose checksum is wrong is left out and counted; of a chunk that the file cuts short,
-/// what comes before the cut is kept. Topics of other encodings are named in `skipped`. Where records stop making
-/// sense, the reader looks for the next byte from which two sound ones follow each other.
-/// @throws files::InputError if the file is empty or no MCAP.
+/// Reads the topics of ROS 2 messages (encoding "cdr", definitions "ros2msg"). Times are the messages' log times, in
+/// seconds since 1970 or on whatever clock the recorder used. Chunks may be uncompressed or compressed with zstd or
+/// lz4. The summary section is not needed. A chunk with a wrong checksum is skipped and counted; of a truncated chunk,
+/// the part before the cut is kept. Topics with other encodings are listed in `skipped`. If the records become invalid,
+/// the reader searches for the next byte at which two valid records follow each other.
+/// @throws files::InputError if the file is empty or not an MCAP file.
 RawLog read_mcap(std::istream& in, const std::string& path);
 
 }  // namespace swarmcert::logs

@@ -76,7 +76,7 @@ McapChunk chunk_of(std::string_view content) {
 
 std::uint32_t mcap_checksum(std::string_view bytes) {
   uLong sum = 0;
-  constexpr std::size_t kPart_bytes = std::size_t{1} << 30;  // zlib counts in 32 bits
+  constexpr std::size_t kPart_bytes = std::size_t{1} << 30;  // zlib uses 32-bit sizes
   for (std::size_t at = 0; at < bytes.size(); at += kPart_bytes) {
     const std::string_view part = bytes.substr(at, kPart_bytes);
     sum = crc32(sum, reinterpret_cast<const Bytef*>(part.data()), static_cast<uInt>(part.size()));

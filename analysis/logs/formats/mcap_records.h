@@ -10,7 +10,7 @@
 namespace swarmcert::logs {
 
 inline constexpr std::string_view kMcapMagic = "\x89MCAP0\r\n";
-inline constexpr std::size_t kMcapHead_bytes = 9;  ///< of a record: operation code and length
+inline constexpr std::size_t kMcapHead_bytes = 9;  ///< of a record: opcode and length
 
 enum McapCode : unsigned char {
   kHeader = 0x01,
@@ -29,7 +29,7 @@ struct McapRecord {
   std::string_view content;
 };
 
-/// Takes fields off the front of a record; once something is missing, all that follows is empty.
+/// Reads fields from the front of a record; once a field is missing, all later fields are empty.
 class McapFields {
  public:
   explicit McapFields(std::string_view content) : rest_(content) {}
@@ -40,7 +40,7 @@ class McapFields {
     take(sizeof(Integer));
     return value.value_or(0);
   }
-  /// A text behind its length, or bytes behind theirs of type Length.
+  /// Reads a length-prefixed text, or bytes whose length is stored as a `Length`.
   template <typename Length = std::uint32_t>
   std::string_view bytes() {
     return take(number<Length>());
@@ -70,21 +70,22 @@ struct McapChunk {
   std::uint32_t checksum = 0;  ///< 0: none
   std::string_view compression, records;
   std::uint64_t stated_bytes = 0;  ///< of `records`
-  bool is_whole = true;            ///< false where the file ends within it
+  bool is_whole = true;            ///< false if the file ends within it
 };
 
-/// The record that starts at `at`, sound or not; nothing if it does not end within `bytes`.
+/// Returns the record that starts at `at`, valid or not; nothing if it extends beyond `bytes`.
 std::optional<McapRecord> mcap_record_at(std::string_view bytes, std::size_t at);
 
 inline std::size_t size_of(const McapRecord& record) { return kMcapHead_bytes + record.content.size(); }
 
-/// True if the content has the form of its code. Codes of later versions and of programs of their own pass.
+/// Returns true if the content has the form required by its opcode. Opcodes of later versions and private ones are
+/// accepted.
 bool has_form(const McapRecord& record);
 
-/// The chunk in the content of a record, which may be cut short.
+/// Returns the chunk in the content of a record, which may be truncated.
 McapChunk chunk_of(std::string_view content);
 
-/// CRC-32.
+/// Returns the CRC-32 of `bytes`.
 std::uint32_t mcap_checksum(std::string_view bytes);
 
 }  // namespace swarmcert::logs

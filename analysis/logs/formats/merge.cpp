@@ -6,7 +6,7 @@
 namespace swarmcert::logs {
 namespace {
 
-/// Puts the records of `more` behind those of `topic`; columns that only one of them has are NaN in the other.
+/// Appends the records of `more` to `topic`; columns that only one of them has are NaN in the other.
 void append(RawTopic& topic, RawTopic& more) {
   constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
   const std::size_t before = topic.time_s.size();

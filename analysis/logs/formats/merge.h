@@ -1,12 +1,12 @@
-/// @file Logs that lie in several files.
+/// @file Merges logs that are split over several files.
 #pragma once
 
 #include "analysis/logs/raw_log.h"
 
 namespace swarmcert::logs {
 
-/// Adds what `more` holds to `log`. Records of a topic that both have stand behind those of `log`; columns that only
-/// one of them has are NaN in the other. Where texts of one name differ, those of `log` stay.
+/// Appends `more` to `log`. Records of a common topic are appended to those of `log`; columns that only one of the two
+/// has are NaN in the other. If both have a text of the same name, that of `log` is kept.
 void append(RawLog& log, RawLog&& more);
 
 }  // namespace swarmcert::logs

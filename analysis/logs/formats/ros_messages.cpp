@@ -8,8 +8,8 @@ struct BuiltinMessage {
   RosMessageText definition;
 };
 
-// Sources: the interface packages common_interfaces, geometry2, crazyswarm2, motion_capture_tracking and px4_msgs. Of
-// px4_msgs the fields that versions 1.12 to 1.16 of the firmware share.
+// Sources: the interface packages common_interfaces, geometry2, crazyswarm2, motion_capture_tracking and px4_msgs. For
+// px4_msgs, only the fields shared by firmware versions 1.12 to 1.16.
 constexpr BuiltinMessage kBuiltinMessages[] = {
     {"builtin_interfaces/Time", {"int32 sec\nuint32 nanosec\n"}},
     {"builtin_interfaces/Duration", {"int32 sec\nuint32 nanosec\n"}},

@@ -1,4 +1,4 @@
-/// @file Definitions of ROS 2 messages that flights use, for bags that do not carry them.
+/// @file Built-in definitions of common ROS 2 messages, for bags that do not contain them.
 #pragma once
 
 #include <string>
@@ -7,15 +7,15 @@
 
 namespace swarmcert::logs {
 
-/// A definition in the language of `.msg` files.
+/// A definition in the syntax of `.msg` files.
 struct RosMessageText {
   std::string_view text;
-  /// The first fields, which all versions of the message share; what follows them differs and is not read.
+  /// The definition covers only the first fields, which all versions of the message share; the rest is not read.
   bool is_beginning = false;
 };
 
-/// What is known here of `name` ("geometry_msgs/Pose"); empty if nothing. Several: versions of the message that differ
-/// in their numbers' types only; the size of a message says which it is.
+/// Returns the built-in definitions of `name` ("geometry_msgs/Pose"); empty if there is none. Several definitions are
+/// versions of the message that differ only in their number types; the size of a message selects one.
 std::vector<RosMessageText> builtin_ros_definitions(const std::string& name);
 
 }  // namespace swarmcert::logs

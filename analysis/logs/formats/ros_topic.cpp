@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kMostNames = 1024;
 
-/// The text field of `type` that tells its elements apart in an array of them.
+/// Returns the text field of `type` that names the elements of an array of this type.
 std::optional<std::size_t> naming_field(const RosType& type) {
   for (std::size_t i = 0; i < type.fields.size(); ++i) {
     const RosField& field = type.fields[i];
@@ -32,7 +32,7 @@ struct RosTopic::State {
         budget(topic_budget),
         main(name, layout->type, budget) {}
 
-  /// A record of a topic of its own, for an element of a named array.
+  /// A record for the topic of an element of a named array.
   struct NamedRecord {
     ColumnTable* table;
     RosRecord record;
@@ -46,7 +46,7 @@ struct RosTopic::State {
   std::map<std::string, ColumnTable> named;
   std::set<std::string> large_arrays;
   std::size_t version = 0, malformed = 0;
-  // Of the message that is being read.
+  // State of the message being read.
   const RosSchema* schema = nullptr;
   CdrCursor cursor;
   std::vector<NamedRecord> named_records;
@@ -72,7 +72,7 @@ struct RosTopic::State {
     return true;
   }
 
-  /// @param node of the array, nullptr if its elements are not wanted
+  /// @param node of the array, nullptr if its elements are skipped
   bool read_array(const RosField& field, ColumnTable& table, RosNode* node, RosRecord& record) {
     std::size_t count = field.count;
     if (field.array == RosArray::kSequence && !cursor.read_count(count)) return false;
@@ -81,13 +81,13 @@ struct RosTopic::State {
       node = nullptr;
     }
     if (node == nullptr && field.kind == RosKind::kNumber) return cursor.skip(field.number, count);
-    // Every element has a byte at least: a count that the message cannot hold ends with the message.
+    // Each element has at least one byte, so an impossible count stops at the end of the message.
     for (std::size_t i = 0; i < count; ++i)
       if (!read_value(field, table, table.child(node, i, nullptr), record)) return false;
     return true;
   }
 
-  /// @param node of the message, nullptr if it is not wanted
+  /// @param node of the message, nullptr if it is skipped
   bool read_message(std::size_t type, ColumnTable& table, RosNode* node, RosRecord& record) {
     const std::vector<RosField>& fields = schema->types[type].fields;
     for (std::size_t i = 0; i < fields.size(); ++i) {
@@ -134,7 +134,7 @@ struct RosTopic::State {
     return true;
   }
 
-  /// nullptr if there are too many names.
+  /// Returns nullptr if there are too many names.
   ColumnTable* table_of(std::string_view element_name, const std::string& type) {
     const std::string full = name + "[" + std::string(element_name.substr(0, 128)) + "]";
     const auto found = named.find(full);

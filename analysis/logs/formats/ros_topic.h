@@ -1,4 +1,4 @@
-/// @file Messages of one ROS 2 topic as columns.
+/// @file Turns the messages of one ROS 2 topic into columns.
 #pragma once
 
 #include <map>
@@ -13,41 +13,42 @@
 
 namespace swarmcert::logs {
 
-/// What the messages of a topic look like.
+/// Layout of the messages of a topic.
 struct RosLayout {
   std::string type;  ///< long name, for RawTopic
-  /// One, or versions that differ in the types of numbers only: a message is of the one whose size it has.
+  /// One schema, or versions that differ only in their number types; the size of a message selects the version.
   std::vector<RosSchema> versions;
-  bool is_beginning = false;  ///< messages go on behind what the schema describes
+  bool is_beginning = false;  ///< messages continue after what the schema describes
 };
 
-/// The layout of messages of `type`. A definition from the file is preferred to one of ros_messages.h.
-/// @param text the file's definition, empty if it has none. Where there is no layout,
-/// nullptr and why in `fault`.
+/// Returns the layout of messages of `type`, preferably from the file's definition, else from ros_messages.h. Returns
+/// nullptr and sets `fault` if there is none.
+/// @param text the file's definition; empty if it has none
 std::shared_ptr<const RosLayout> ros_layout(const std::string& type, std::string_view text,
                                             std::string& fault);
 
-/// What all topics of a log may need together: compressed files can hold far more than their size lets expect.
+/// Limits the memory of all topics of a log together; compressed files can hold far more than their size suggests.
 struct RosBudget {
-  std::size_t places = std::size_t{1} << 20;  ///< fields and elements of arrays
+  std::size_t places = std::size_t{1} << 20;  ///< fields and array elements
   std::size_t values = std::size_t{1} << 28;  ///< numbers: 2 GiB
 };
 
-/// Turns serialized messages (CDR of both byte orders, versions 1 and 2) into a RawTopic.
+/// Turns serialized messages (CDR in either byte order, versions 1 and 2) into a RawTopic.
 ///
-/// Columns are named `pose.position.x`, `covariance[3]`; a stamp is one column in seconds. Where arrays vary in length,
-/// a column is NaN in messages that lack the element. Arrays over kMostElements are left out. An array of messages that
-/// carry a text `name` or `child_frame_id` (TFMessage, NamedPoseArray) becomes a topic for each name: "/tf[cf1]".
+/// Columns are named `pose.position.x`, `covariance[3]`; a stamp is one column in seconds. If arrays vary in length, a
+/// column is NaN in messages that lack the element. Arrays longer than kMostElements are skipped. An array of messages
+/// that have a text field `name` or `child_frame_id` (TFMessage, NamedPoseArray) becomes one topic per name:
+/// "/tf[cf1]".
 class RosTopic {
  public:
-  /// @param budget must outlive this
+  /// @param budget must outlive this object
   RosTopic(std::string name, std::shared_ptr<const RosLayout> layout, RosBudget& budget);
   ~RosTopic();
   RosTopic(RosTopic&&) noexcept;
 
-  /// False if `message` does not have the form that the layout says; nothing is kept of it then.
+  /// Returns false, and keeps nothing, if `message` does not match the layout.
   bool add(double time_s, std::string_view message);
-  /// Moves what was gathered to `log`, with what was left out.
+  /// Moves the collected columns to `log`, with a list of what was left out.
   void move_to(RawLog& log);
 
  private:
@@ -55,17 +56,17 @@ class RosTopic {
   std::unique_ptr<State> state_;
 };
 
-/// A topic of a file, or why its messages cannot be read.
+/// A topic of a file, or the reason why its messages cannot be read.
 struct FoundTopic {
   std::optional<RosTopic> topic;
   std::string name, fault;
   std::size_t lost = 0;  ///< messages that were not read
 
-  /// Moves what was gathered to `log`, or notes there what was lost and why. `id` stands for an empty name.
+  /// Moves the collected columns to `log`, or notes there what was lost and why. `id` replaces an empty name.
   void move_to(RawLog& log, const std::string& id);
 };
 
-/// Topics of one name become instances 0, 1, ... of it.
+/// Numbers topics of the same name as its instances 0, 1, ...
 void number_instances(RawLog& log);
 
 }  // namespace swarmcert::logs

@@ -33,7 +33,7 @@ std::string_view next_line(std::string_view& text) {
   return line;
 }
 
-/// The next word and what follows it.
+/// Removes and returns the next word; `line` keeps the rest.
 std::string_view next_word(std::string_view& line) {
   const std::string_view kBlank = " \t\r";
   line.remove_prefix(std::min(line.find_first_not_of(kBlank), line.size()));
@@ -44,14 +44,14 @@ std::string_view next_word(std::string_view& line) {
   return word;
 }
 
-/// A field as it is written: its type still by name.
+/// A field as written, before its type name is resolved.
 struct WrittenField {
   RosField field;
   std::string type;  ///< of kMessage
 };
 using WrittenType = std::vector<WrittenField>;
 
-/// "[3]", "[]", "[<=3]" behind a type. False if it is none of them.
+/// Parses "[3]", "[]" or "[<=3]" after a type. Returns false if it is none of them.
 bool parse_array(std::string_view brackets, RosField& field) {
   if (brackets.empty()) return true;
   if (brackets.size() < 2 || brackets.front() != '[' || brackets.back() != ']') return false;
@@ -73,7 +73,7 @@ bool is_type_name(std::string_view name) {
   }
 }
 
-/// @param package of the definition, for types that are named without one
+/// @param package of the definition, for type names without a package
 bool parse_type(std::string_view text, const std::string& package, WrittenField& written) {
   const std::size_t bracket = std::min(text.find('['), text.size());
   if (!parse_array(text.substr(bracket), written.field)) return false;
@@ -89,7 +89,7 @@ bool parse_type(std::string_view text, const std::string& package, WrittenField&
     written.field.number = *number;
     return true;
   }
-  // ROS 1 had these as words of the language.
+  // In ROS 1 these were built-in types.
   if (name == "time") name = "builtin_interfaces/Time";
   if (name == "duration") name = "builtin_interfaces/Duration";
   if (name == "Header") name = "std_msgs/Header";
@@ -103,11 +103,11 @@ bool parse_type(std::string_view text, const std::string& package, WrittenField&
 }
 
 std::string_view without_comment(std::string_view line) {
-  // A "#" within a default text cuts the default only, which is not needed.
+  // A "#" within a default text truncates only the default, which is not needed.
   return line.substr(0, line.find('#'));
 }
 
-/// One line of a definition. Constants give nothing. Returns false if it is no line of a definition.
+/// Parses one line of a definition; constants are ignored. Returns false if the line is invalid.
 bool parse_line(std::string_view line, const std::string& package, WrittenType& type) {
   std::string_view rest = without_comment(line);
   const std::string_view type_word = next_word(rest);
@@ -122,7 +122,7 @@ bool parse_line(std::string_view line, const std::string& package, WrittenType& 
   return true;
 }
 
-/// Gathers the types of a definition and puts them in order.
+/// Collects the types of a definition and orders them.
 class SchemaBuilder {
  public:
   RosDefinition build(const std::string& name, std::string_view text) {
@@ -144,7 +144,7 @@ class SchemaBuilder {
     return false;
   }
 
-  /// All definitions of `text` into written_; the first is `name`.
+  /// Parses all definitions of `text` into written_; the first one is `name`.
   bool parse(std::string name, std::string_view text) {
     WrittenType type;
     while (!text.empty()) {
@@ -175,7 +175,7 @@ class SchemaBuilder {
     return &written_.at(name);
   }
 
-  /// Puts `name` and what it uses into types_; false, with the reason, if that cannot be.
+  /// Adds `name` and the types it uses to types_; returns false and sets the reason if that is impossible.
   bool add(const std::string& name, int depth) {
     if (depth > kDeepestMessage) return fail("its definition is nested too deeply, or contains itself");
     const WrittenType* const written = find(name);
@@ -211,7 +211,7 @@ class SchemaBuilder {
   std::map<std::string, WrittenType> written_;
   std::vector<RosType> types_;
   std::map<std::string, std::size_t> index_of_;
-  std::map<std::size_t, int> heights_;  ///< of the types that are complete
+  std::map<std::size_t, int> heights_;  ///< of the complete types
   std::string fault_;
 };
 

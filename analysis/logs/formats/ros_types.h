@@ -16,7 +16,7 @@ inline constexpr std::size_t kLongestDefinition_bytes = std::size_t{1} << 20;
 enum class RosKind : unsigned char {
   kNumber,
   kText,
-  kStamp,  ///< builtin_interfaces/Time and Duration: seconds and nanoseconds, one number in seconds here
+  kStamp,  ///< builtin_interfaces/Time or Duration; becomes one number in seconds
   kMessage
 };
 enum class RosArray : unsigned char { kNone, kFixed, kSequence };
@@ -35,25 +35,27 @@ struct RosType {
   std::vector<RosField> fields;  ///< never empty: a message without fields is sent as one byte
 };
 
-/// A message type with all types that it uses; types[0] is the message. No type contains itself, and nesting is
-/// limited, so that a decoder may recurse.
+/// A message type with all the types it uses; types[0] is the message itself. No type contains itself and the nesting
+/// depth is limited, so a decoder may recurse.
 struct RosSchema {
   std::vector<RosType> types;
 };
 
-/// What became of a definition: the schema, or why it cannot be used.
+/// Result of parsing a definition: the schema, or why it cannot be used.
 struct RosDefinition {
   std::optional<RosSchema> schema;
   std::string fault;
 };
 
-/// "geometry_msgs/msg/Pose" and "geometry_msgs/Pose" as the latter.
+/// Returns "geometry_msgs/Pose" for both "geometry_msgs/msg/Pose" and "geometry_msgs/Pose".
 std::string short_type_name(std::string_view name);
-/// Both as the former.
+/// Returns "geometry_msgs/msg/Pose" for both.
 std::string long_type_name(std::string_view name);
 
-/// @param name of the message's type. @param text its definition, followed by those that it uses, each after a line of
-///   "=" and a line "MSG: package/Type". Types that the text lacks are taken from ros_messages.h.
+/// Parses a message definition.
+/// @param name type of the message
+/// @param text its definition, followed by the definitions it uses, each after a line of "=" and a line "MSG:
+///   package/Type". Types missing from the text are taken from ros_messages.h.
 RosDefinition parse_ros_definition(const std::string& name, std::string_view text);
 
 }  // namespace swarmcert::logs

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kLargestMetadata_bytes = std::size_t{1} << 20;
 
-/// The names that stand as a list below `relative_file_paths:`, without the folders before them.
+/// Returns the file names listed below `relative_file_paths:`, without their folders.
 std::vector<std::string> listed_files(const std::string& metadata) {
   std::vector<std::string> names;
   std::istringstream lines(metadata);
@@ -44,7 +44,7 @@ std::string metadata_of(const std::string& folder) {
   return files::read_file((fs::path(folder) / "metadata.yaml").string(), kLargestMetadata_bytes);
 }
 
-/// A file of the bag; one that was compressed as a whole is decompressed first.
+/// Reads a file of the bag, decompressing it first if it was compressed as a whole.
 RawLog read_part(const fs::path& path) {
   const std::string extension = path.extension().string();
   if (extension != ".zstd" && extension != ".zst") return read_raw(path.string());

@@ -20,12 +20,12 @@ namespace {
 constexpr std::string_view kSqliteMagic("SQLite format 3\0", 16);
 constexpr std::size_t kMostTopics = std::size_t{1} << 16;
 
-/// A database in memory whose schema nobody trusts.
+/// An in-memory database with an untrusted schema.
 class Database {
  public:
-  /// @param bytes must outlive this; its two bytes that announce a write-ahead log are changed
+  /// @param bytes must outlive this object; the two bytes that announce a write-ahead log are changed
   Database(std::string& bytes, const std::string& path) : path_(path) {
-    // A database that was written with a write-ahead log cannot be opened without one unless it says otherwise.
+    // A database in write-ahead log mode cannot be opened from memory unless its header says otherwise.
     if (bytes.size() > 19) bytes[18] = bytes[19] = 1;
     sqlite3* raw = nullptr;
     const int opened =
@@ -59,7 +59,7 @@ class Database {
   static constexpr int kStep_instructions = 10000;
   static constexpr std::size_t kLeastInstructions = 10'000'000, kInstructionsPerByte = 100;
 
-  /// Damaged pages can form a tree that takes forever to walk.
+  /// Aborts queries on damaged pages, which can form a tree that takes forever to traverse.
   static int stops(void* self) {
     std::size_t& left = static_cast<Database*>(self)->instructions_left_;
     left -= std::min<std::size_t>(left, kStep_instructions);
@@ -71,7 +71,7 @@ class Database {
   std::size_t instructions_left_ = 0;
 };
 
-/// A query of ours, row by row.
+/// The rows of a query.
 class Rows {
  public:
   Rows(const Database& database, const std::string& query) {
@@ -81,7 +81,7 @@ class Rows {
   }
 
   bool is_prepared() const { return statement_ != nullptr; }
-  /// False at the end, and where a row cannot be read.
+  /// Advances to the next row. Returns false at the end and if a row cannot be read.
   bool next() {
     if (!statement_) return false;
     const int result = sqlite3_step(statement_.get());
@@ -90,7 +90,7 @@ class Rows {
   }
   bool is_damaged() const { return is_damaged_; }
   std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
-  /// Valid until the next row.
+  /// The result is valid until the next row.
   std::string_view bytes(int column) const {
     const void* const data = sqlite3_column_blob(statement_.get(), column);
     const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column));
@@ -105,26 +105,26 @@ class Rows {
   bool is_damaged_ = false;
 };
 
-/// Makes a file that was cut short one of whole pages: SQLite would complete the last with zeros. True if it was cut.
+/// Truncates a file to whole pages, because SQLite would pad the last page with zeros. Returns true if it was cut.
 bool cut_to_whole_pages(std::string& bytes) {
   constexpr std::size_t kHead_bytes = 100;
   if (bytes.size() < kHead_bytes) return true;
   const auto page_bytes = static_cast<std::size_t>(value_of(Scalar::kUint16, bytes.data() + 16, true));
-  const std::size_t size = page_bytes == 1 ? 65536 : page_bytes;  // as the format writes 65536
+  const std::size_t size = page_bytes == 1 ? 65536 : page_bytes;  // the format stores 65536 as 1
   const auto pages = static_cast<std::size_t>(value_of(Scalar::kUint32, bytes.data() + 28, true));
   if (size < 512) return false;  // damaged; SQLite refuses it
   const std::size_t whole = bytes.size() / size;
   const bool is_cut = bytes.size() % size != 0 || whole < pages;
   if (!is_cut || whole == 0) return is_cut;
   bytes.resize(whole * size);
-  // SQLite reads nothing of a file with fewer pages than its head says.
+  // SQLite refuses a file with fewer pages than its header states.
   for (std::size_t i = 0; i < 4; ++i) bytes[28 + i] = static_cast<char>(whole >> (24 - 8 * i));
   return is_cut;
 }
 
 class RosbagReader {
  public:
-  /// @param bytes must outlive this
+  /// @param bytes must outlive this object
   RosbagReader(std::string& bytes, const std::string& path)
       : is_cut_(cut_to_whole_pages(bytes)), database_(bytes, path), path_(path) {
     log_.path = path;
@@ -149,7 +149,7 @@ class RosbagReader {
     std::string encoding, text;
   };
 
-  /// True for a table whose rows are stored as they are; views, virtual tables and computed columns could do anything.
+  /// Returns true for an ordinary table. Views, virtual tables and computed columns could execute anything.
   bool is_plain_table(const std::string& name) {
     Rows table(database_, "SELECT rootpage FROM sqlite_schema WHERE type='table' AND name='" + name + "'");
     if (!table.next() || table.integer(0) <= 0) return false;
@@ -177,7 +177,7 @@ class RosbagReader {
     if (rows.is_damaged()) ++log_.health.damaged_blocks;
   }
 
-  /// False once more was read than the file has: its pages refer to each other in circles.
+  /// Returns false once more bytes have been read than the file has, i.e. if its pages form cycles.
   bool take_bytes(std::size_t count) {
     if (count > bytes_left_) return false;
     bytes_left_ -= count;
@@ -222,7 +222,7 @@ class RosbagReader {
   }
 
   void read_messages() {
-    // In the order of the file: sorting would need as much memory again.
+    // In file order: sorting would need the same amount of memory again.
     Rows rows(database_, "SELECT topic_id, timestamp, data FROM messages NOT INDEXED");
     if (!rows.is_prepared()) refuse_columns("messages");
     while (rows.next()) {

@@ -9,18 +9,18 @@
 
 namespace swarmcert::logs {
 
-/// True if `head` starts as every SQLite database does.
+/// Returns true if `head` starts with the header of an SQLite database.
 bool looks_like_rosbag_sqlite(std::string_view head);
 
-/// Topics as read_mcap(). Definitions of messages are taken from the database where it has them (since Iron), else from
-/// ros_messages.h; topics of other types are named in `skipped`. Messages that were compressed one by one with zstd are
-/// read.
+/// Reads topics as read_mcap() does. Message definitions are taken from the database if it has them (since Iron), else
+/// from ros_messages.h; topics of other types are listed in `skipped`. Messages compressed one by one with zstd are
+/// supported.
 ///
-/// The database is read from memory: nothing is written, locked or created, and a journal beside it is not applied;
-/// where one holds messages, `health.truncated` is set and `skipped` names it. Views, triggers, virtual tables and
-/// computed columns are refused, work and sizes are limited by the size of the file. At a damaged page reading ends;
-/// what came before is kept.
-/// @throws files::InputError if the file is empty, no SQLite database, or has no tables of a rosbag.
+/// The database is read from memory: nothing is written, locked or created. A journal beside it is not applied; if it
+/// holds messages, `health.truncated` is set and `skipped` lists it. Views, triggers, virtual tables and computed
+/// columns are refused; work and sizes are limited by the size of the file. Reading stops at a damaged page; everything
+/// before it is kept.
+/// @throws files::InputError if the file is empty, is not an SQLite database, or does not have the tables of a rosbag.
 RawLog read_rosbag_sqlite(std::istream& in, const std::string& path);
 
 }  // namespace swarmcert::logs

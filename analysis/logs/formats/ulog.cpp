@@ -43,12 +43,12 @@ class UlogReader {
   struct Subscription {
     std::string name;
     int instance = 0;
-    std::optional<UlogSize> size;      ///< of a record, once its format is known
-    std::optional<std::size_t> topic;  ///< in topics_, from its first record on
+    std::optional<UlogSize> size;      ///< of a record; set once its format is known
+    std::optional<std::size_t> topic;  ///< index in topics_, set by its first record
   };
   struct Topic {
     UlogLayout layout;
-    std::size_t index;  ///< in log_.topics
+    std::size_t index;  ///< index in log_.topics
   };
 
   void read_file_head() {
@@ -62,8 +62,8 @@ class UlogReader {
     log_.texts["file_timestamp_us"] = std::to_string(*integer_at<std::uint64_t>(bytes_, 8));
   }
 
-  /// Where appended sections start, in rising order.
-  /// @throws files::InputError if the file has features that change how it must be read.
+  /// Returns the offsets of appended sections in ascending order.
+  /// @throws files::InputError if the file uses incompatible features.
   std::vector<std::size_t> read_flags() {
     std::vector<std::size_t> offsets;
     const std::optional<UlogMessage> flags = message_at(kFileHead_bytes, bytes_.size());
@@ -91,7 +91,7 @@ class UlogReader {
     return offsets;
   }
 
-  /// The message that starts at `at` and ends before `end`, sound or not.
+  /// Returns the message that starts at `at` and ends before `end`, valid or not.
   std::optional<UlogMessage> message_at(std::size_t at, std::size_t end) const {
     if (at > end || end - at < kMessageHead_bytes) return std::nullopt;
     const std::size_t size = *integer_at<std::uint16_t>(bytes_, at);
@@ -100,13 +100,13 @@ class UlogReader {
   }
   static std::size_t size_of(const UlogMessage& message) { return kMessageHead_bytes + message.body.size(); }
 
-  /// True if the body has the form of its type; for data, if it is a record of a known topic. Looks at a few bytes
-  /// only.
+  /// Returns true if the body has the form required by its type or, for data, if it is a record of a known topic. Looks
+  /// at only a few bytes.
   bool is_sound(const UlogMessage& message) {
     return message.type == 'D' ? record_size_fits(message.body) : has_form(message);
   }
 
-  /// False where a message that holds text goes over what cannot be text: its size is damaged and would swallow what
+  /// Returns false if the text of a message contains binary bytes: then its size is damaged and it would swallow what
   /// follows. Precondition: is_sound(message).
   bool ends_where_it_says(const UlogMessage& message) {
     std::string_view text;
@@ -115,7 +115,7 @@ class UlogReader {
     if (message.type == 'C') text = message.body.substr(11);
     if (message.type == 'I') return value_size_fits(*keyed_value(message.body));
     if (message.type == 'M') return value_size_fits(*keyed_value(message.body.substr(1)));
-    // A file made to be hard could ask for long looks from each of its bytes.
+    // Limits the work on malicious files, which could request a long scan at each byte.
     if (looked_at_bytes_ > kMostLooks * bytes_.size()) return true;
     looked_at_bytes_ += text.size();
     while (!text.empty() && text.back() == '\0') text.remove_suffix(1);
@@ -134,7 +134,7 @@ class UlogReader {
     return size && body.size() - 2 >= size->smallest && body.size() - 2 <= size->largest;
   }
 
-  /// True if a sound message starts at `at`, and it is a synchronisation message or leads to two more.
+  /// Returns true if a valid message starts at `at` that is a synchronisation message or is followed by two more.
   bool is_resynchronised(std::size_t at, std::size_t end) {
     const std::optional<UlogMessage> message = message_at(at, end);
     if (!message || !is_sound(*message)) return false;
@@ -142,8 +142,8 @@ class UlogReader {
     return message->type == 'S' || (next < end && leads_on(next, end, 2));
   }
 
-  /// True if messages, be they of unknown types or topics, lead from `at` to `sound` sound ones, or end where the
-  /// section ends.
+  /// Returns true if a chain of messages starting at `at`, including unknown types and topics, contains `sound` valid
+  /// ones or reaches the end of the section.
   bool leads_on(std::size_t at, std::size_t end, int sound) {
     constexpr int kMostMessages = 64;
     for (int i = 0; i < kMostMessages && at < end && sound > 0; ++i) {
@@ -171,15 +171,15 @@ class UlogReader {
       std::size_t next = at + 1;
       while (next < end && !is_resynchronised(next, end)) ++next;
       log_.health.skipped_bytes += next - at;
-      // The last message before an appended section, or of a file, was being written when the vehicle stopped.
+      // The last message of a file, or before an appended section, was being written when the vehicle stopped.
       if (next < end || message) ++log_.health.damaged_blocks;
       if (next == end && is_last) log_.health.truncated = true;
       at = next;
     }
   }
 
-  /// True for what a sound file may have and this reader cannot use: messages of later versions, and records whose
-  /// topic or format the file does not define.
+  /// Returns true for messages that are valid but cannot be used: those of later versions, and records whose topic or
+  /// format is not defined in the file.
   bool is_unknown(const UlogMessage& message) const {
     if (message.body.empty()) return false;
     if (message.type != 'D') return kUlogTypes.find(message.type) == std::string_view::npos;
@@ -243,7 +243,7 @@ class UlogReader {
     }
   }
 
-  /// @param continues the text of the last message with this key
+  /// @param continues the text continues the last message with this key
   void take_information(std::string_view body, bool continues, bool is_one_of_several = false) {
     const std::optional<KeyedValue> entry = keyed_value(body);
     if (!entry) {
@@ -270,7 +270,7 @@ class UlogReader {
       log_.parameter_changes.push_back({last_time_s_, entry->name, *value});
   }
 
-  /// Of the defaults of the firmware (bit 0) and of the airframe (bit 1) the latter counts.
+  /// Defaults of the airframe (bit 1) take precedence over those of the firmware (bit 0).
   void take_default(std::string_view body) {
     const std::optional<KeyedValue> entry = keyed_value(body.substr(1));
     const std::optional<double> value = entry ? parameter_of(*entry) : std::nullopt;
@@ -289,9 +289,9 @@ class UlogReader {
     subscriptions_[*integer_at<std::uint16_t>(body, 1)] = subscription;
   }
 
-  /// @param body time stamp and text
+  /// @param body timestamp and text
   void take_line(char level, std::string_view body) {
-    // The level is an ASCII digit in the firmware's logs.
+    // The firmware writes the level as an ASCII digit.
     const int number = level >= '0' && level <= '9' ? level - '0' : static_cast<unsigned char>(level);
     const double time_s = static_cast<double>(*integer_at<std::uint64_t>(body, 0)) / 1e6;
     log_.messages.push_back({time_s, number, until_nul(body.substr(8))});
@@ -364,7 +364,7 @@ class UlogReader {
   UlogFormats formats_;
   std::map<std::uint16_t, Subscription> subscriptions_;
   std::vector<Topic> topics_;
-  std::map<std::pair<std::string, int>, std::size_t> topics_of_;  ///< in topics_
+  std::map<std::pair<std::string, int>, std::size_t> topics_of_;  ///< index in topics_
   std::map<std::string, std::size_t> num_texts_;
   std::map<std::uint16_t, std::size_t> unknown_ids_;
   std::map<std::string, std::size_t> without_format_;

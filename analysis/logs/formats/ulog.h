@@ -1,4 +1,4 @@
-/// @file PX4 ULog (`.ulg`), version 0 and 1 of the file format.
+/// @file PX4 ULog (`.ulg`), file format versions 0 and 1.
 #pragma once
 
 #include <iosfwd>
@@ -9,15 +9,16 @@
 
 namespace swarmcert::logs {
 
-/// True if the magic number of ULog starts `head`.
+/// Returns true if `head` starts with the magic number of ULog.
 bool looks_like_ulog(std::string_view head);
 
-/// Topics by name and instance (multi_id), times from their field `timestamp`. Texts: information messages; several of
-/// one key are `key[0]`, `key[1]`, ... Parameters as the log starts; later settings are parameter_changes.
-/// A topic whose subscription or format the file lost is named in `skipped`. Messages of unknown types are skipped, as
-/// the format demands. Where no sound message follows, the reader looks for the next sound message that leads to
-/// others, and counts the place and the bytes in `health`; sections appended after a crash are read as well.
-/// @throws files::InputError if the file is empty or no ULog, or announces features without which it cannot be read.
+/// Reads a log. Topics are identified by name and instance (multi_id); times come from their field `timestamp`. Texts
+/// are the information messages; several with the same key become `key[0]`, `key[1]`, ... Parameters are those at the
+/// start of the log; later settings become parameter_changes. A topic whose subscription or format is lost is listed in
+/// `skipped`. Messages of unknown types are skipped, as the format requires. If no valid message follows, the reader
+/// searches for the next valid message that is followed by others, and counts the damaged place and the skipped bytes
+/// in `health`. Sections appended after a crash are read as well.
+/// @throws files::InputError if the file is empty or not a ULog file, or requires features that are not supported.
 RawLog read_ulog(std::istream& in, const std::string& path);
 
 }  // namespace swarmcert::logs

@@ -7,7 +7,7 @@
 namespace swarmcert::logs {
 namespace {
 
-/// A record with its head fits into 65535 bytes.
+/// A record including its header is at most 65535 bytes long.
 constexpr std::size_t kLargestRecord_bytes = 65535;
 constexpr int kDeepestUlogNesting = 8;
 
@@ -83,7 +83,7 @@ std::optional<std::size_t> UlogFormats::measure(const std::string& name, int dep
     return format.size;
   }
   format.is_being_measured = true;
-  // Goes on where the last attempt lacked a definition: a file cannot make it start over with every record.
+  // Resumes at the field whose definition was missing before, so that a file cannot force a restart with every record.
   for (; format.next < format.fields.size(); ++format.next) {
     Field& field = format.fields[format.next];
     const std::optional<std::size_t> element = element_size(field, depth);
@@ -96,7 +96,7 @@ std::optional<std::size_t> UlogFormats::measure(const std::string& name, int dep
   format.is_being_measured = false;
   if (format.next < format.fields.size()) return std::nullopt;
   format.is_measured = true;
-  // Fields without a size would cost the file nothing however often they repeat.
+  // Zero-sized fields would take no space in the file however often they are repeated.
   const auto is_empty = [](const Field& field) { return field.element_bytes * field.count == 0; };
   format.fields.erase(std::remove_if(format.fields.begin(), format.fields.end(), is_empty),
                       format.fields.end());
@@ -133,7 +133,7 @@ void UlogFormats::lay_out(const Format& format, const std::string& prefix, std::
     } else if (field.is_text && !field.is_padding()) {
       layout.texts.push_back({name, offset, size});
     } else if (field.is_padding()) {
-      // Says nothing.
+      // Padding carries no data.
     } else if (field.count > kMostElements) {
       layout.large_arrays.push_back(name);
     } else if (!field.is_array) {

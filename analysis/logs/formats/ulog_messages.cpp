@@ -13,7 +13,7 @@ constexpr std::string_view kSyncMagic = "\x2F\x73\x13\x20\x25\x0C\xBB\x12";
 constexpr std::size_t kLongestName = 256;
 constexpr std::size_t kParameter_bytes = 4;
 
-/// Types of information, by their names.
+/// Number types of information messages by name.
 const std::map<std::string, Scalar>& number_types() {
   static const std::map<std::string, Scalar> types = {
       {"int8_t", Scalar::kInt8},     {"uint8_t", Scalar::kUint8},   {"bool", Scalar::kUint8},

@@ -1,4 +1,4 @@
-/// @file Messages of a ULog file that are no records: their forms, keys and values.
+/// @file Messages of a ULog file other than data records: their forms, keys and values.
 #pragma once
 
 #include <optional>
@@ -7,35 +7,35 @@
 
 namespace swarmcert::logs {
 
-/// Types of the messages that are known here.
+/// The message types known to this reader.
 inline constexpr std::string_view kUlogTypes = "ABCDFILMOPQRS";
 
-/// A message: type and body, wherever it stands.
+/// A message: its type and body.
 struct UlogMessage {
   char type;
   std::string_view body;
 };
 
-/// "type name" and the bytes behind, as information and parameters have them.
+/// A key "type name" and the bytes that follow it, as in information and parameter messages.
 struct KeyedValue {
   std::string type, name;
   std::string_view value;
 };
 
-/// Nothing if `body` has no such key.
+/// Splits `body` into key and value; returns nothing if it has no such key.
 std::optional<KeyedValue> keyed_value(std::string_view body);
 
-/// True if the value has as many bytes as its type says; true also for types that are not known here.
+/// Returns true if the value has the size that its type requires, or if the type is unknown.
 bool value_size_fits(const KeyedValue& entry);
 
-/// Nothing if it is neither an int32_t nor a float.
+/// Returns the value of a parameter; nothing if it is neither an int32_t nor a float.
 std::optional<double> parameter_of(const KeyedValue& entry);
 
-/// Information as text: characters as they are, numbers in decimal.
+/// Returns information as text: characters verbatim, numbers in decimal.
 std::string text_of(const KeyedValue& entry);
 
-/// True if the body has the form of its type; false for data ('D'), whose form the file defines, and for unknown types.
-/// Looks at a few bytes only.
+/// Returns true if the body has the form required by its type; false for data ('D'), whose form is defined in the file,
+/// and for unknown types. Looks at only a few bytes.
 bool has_form(const UlogMessage& message);
 
 }  // namespace swarmcert::logs
