@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kFewestOfRegion = 50;
 
-/// RegionErrors::share of `count` records with this bias, where blocks have these squares in sum.
+/// Returns RegionErrors::share of `count` records with this bias; `all_squares_N2` is the total over all blocks.
 double region_share(std::size_t count, double bias_N, double all_squares_N2) {
   return all_squares_N2 > 0 ? static_cast<double>(count) * bias_N * bias_N / all_squares_N2 : 0;
 }
@@ -98,15 +98,15 @@ std::vector<RegionErrors> regions_of_all(const std::vector<TrackPart>& parts, co
       regions.push_back(std::move(region));
     }
   }
-  // Worst: where the model is wrong by most, in the same direction every time. A region of few records with a large
-  // bias comes before one of many records with a small one.
+  // Sort by bias, i.e. by how far the model is consistently wrong in one direction. A region of few records with a
+  // large bias comes before one of many records with a small bias.
   std::stable_sort(regions.begin(), regions.end(), [](const RegionErrors& a, const RegionErrors& b) {
     return a.statistics.bias.total > b.statistics.bias.total;
   });
   return regions;
 }
 
-/// Sets the composition of every track of a flight.
+/// Sets the composition of each track of a flight.
 void name_compositions(const Kinds& kinds, std::vector<TrackPart>& tracks) {
   std::map<char, int> initials;
   for (const std::string& kind : kinds.names) ++initials[kind.empty() ? '?' : kind[0]];

@@ -1,4 +1,4 @@
-/// @file A model against flights: how large the force residual is, of whom, when and where.
+/// @file Compares a model with flights: the force residual by vehicle, flight, time and flight regime.
 #pragma once
 
 #include <array>
@@ -17,28 +17,28 @@
 
 namespace swarmcert::residuals {
 
-/// Errors of one group of records.
+/// Errors of a group of records.
 struct GroupErrors {
   ErrorStatistics statistics;
   std::array<Interval, 4> rmse_interval;  ///< 90 %, of x, y, z, total, from blocks of 2 s
-  Axes nrmse;                             ///< rmse over the vehicles' mean weight
+  Axes nrmse;                             ///< rmse divided by the mean weight of the vehicles
   Eigen::Vector3d low_band_to_floor = Eigen::Vector3d::Zero();  ///< Spectrum::low_band_to_floor()
   Eigen::Vector3d noise_floor_N = Eigen::Vector3d::Zero();
 };
 
 struct Moment {
   std::string flight, vehicle, path;
-  double time_s = 0;                                     ///< of the log's clock
+  double time_s = 0;                                     ///< on the log's clock
   Eigen::Vector3d residual_N = Eigen::Vector3d::Zero();  ///< mean over 0.1 s
 };
 
-/// One vehicle in one flight.
+/// Errors of one vehicle in one flight.
 struct TrackErrors : TrackHead {
   std::string composition;                                               ///< see Comparison::compositions
-  std::array<std::size_t, static_cast<std::size_t>(Cut::kCount)> cut{};  ///< records by what became of them
-  double used_s = 0;                  ///< between used records that follow each other
+  std::array<std::size_t, static_cast<std::size_t>(Cut::kCount)> cut{};  ///< number of records per cut
+  double used_s = 0;                  ///< sum of the steps between consecutive used records
   std::vector<std::string> findings;  ///< what was wrong with the log
-  bool is_sound = true;               ///< nothing in the log is damaged; gaps in time are no damage
+  bool is_sound = true;               ///< nothing in the log is damaged; time gaps are not damage
   GroupErrors errors;
   TrajectoryErrors trajectory;
   TorqueErrors torque;
@@ -48,11 +48,12 @@ struct TrackErrors : TrackHead {
 struct RegionErrors {
   int variable = 0, region = 0;
   std::string words;  ///< "height below 0.08 m: +3.5 gf"
-  double share = 0;   ///< of all squared residual that this region's bias explains
+  double share = 0;   ///< fraction of the total squared residual explained by this region's bias
   ErrorStatistics statistics;
 };
 
-/// Vertical residual over the place of the neighbour that is laterally nearest among those within 1 m in height.
+/// Vertical residual as a function of the relative position of the neighbour that is laterally closest among those
+/// within 1 m in height.
 struct NeighbourMap {
   static constexpr int kLateral = PlaceGrid::kLateral, kHeights = PlaceGrid::kHeights;
   static constexpr double kLateralStep_m = PlaceGrid::kLateralStep_m,
@@ -61,64 +62,64 @@ struct NeighbourMap {
     std::size_t records = 0;
     double sum_N = 0, squares_N2 = 0;
   };
-  /// [height of the neighbour above the vehicle, from kLowest_m up][lateral distance, from 0]
+  /// [height of the neighbour above the vehicle, starting at kLowest_m][lateral distance, starting at 0]
   std::array<std::array<Cell, kLateral>, kHeights> cells{};
 };
 
-/// The second level over all tracks that have it.
+/// Results of the second level (closed-loop simulation) over all tracks that have it.
 struct Trajectories {
-  std::string refused;  ///< why no track has it; else empty
+  std::string refused;  ///< why no track has it; otherwise empty
   std::size_t tracks = 0, diverged = 0;
   double seconds = 0;
   Axes rmse_m, max_m;                    ///< simulated minus measured position, weighted by seconds
-  Axes measured_rms_m, simulated_rms_m;  ///< from the set point
-  /// Largest measured error over the largest replayed one, per track; of tracks that did not diverge.
+  Axes measured_rms_m, simulated_rms_m;  ///< distance from the setpoint
+  /// Ratio of the largest measured error to the largest replayed one, per track, over tracks that did not diverge.
   struct PeakRatio {
     Axes p50, p95, max;
-    Axes coverage;  ///< share of tracks whose replayed peak is at least the measured one
+    Axes coverage;  ///< fraction of tracks whose replayed peak is at least the measured one
     std::size_t tracks = 0;
   } peak_ratio;
 };
 
 struct Comparison {
-  /// 1 for the axes along which every compared track lets a force be judged, 0 for the others: their errors are zero.
+  /// 1 for axes along which a force can be judged in all compared tracks; 0 for the others, whose errors are zero.
   Eigen::Vector3d judged = Eigen::Vector3d::Ones();
   GroupErrors overall;
   std::vector<TrackErrors> tracks;  ///< in order of flights and vehicles
   std::map<std::string, GroupErrors> scenarios, vehicles, kinds;
-  /// By kinds of the neighbours, then of the vehicle, as initials: "SL2S"; "Ge2S" flies alone, over the ground. Kinds
-  /// with one initial are written out: "small+slow2small".
+  /// Errors by the kinds of the neighbours and of the vehicle, written as initials: "SL2S"; "Ge2S" flies alone over the
+  /// ground. If two kinds share an initial, kinds are written out: "small+slow2small".
   std::map<std::string, GroupErrors> compositions;
   std::vector<RegionErrors> regions;  ///< worst first
   std::vector<Moment> moments;        ///< worst first
   LearningError learning_error;
   Trajectories trajectories;
   NeighbourMap neighbours;
-  std::vector<std::string> problems;  ///< logs that could not be read or have no force, and why
+  std::vector<std::string> problems;  ///< logs that could not be read or give no force, and why
 };
 
-/// Shows progress: flights done of all.
+/// Reports progress: number of flights done, out of all flights.
 using Progress = std::function<void(int done, int total)>;
 
-/// gains.toml by kind of vehicle; "" stands for every kind without its own.
+/// gains.toml by kind of vehicle; "" applies to every kind without an entry of its own.
 using GainsOfKinds = std::map<std::string, stability::Gains>;
 
-/// Compares. The result does not depend on `jobs`.
-/// @param gains of the second level, for the kinds that have them.
+/// Compares the models with the flights. The result does not depend on `jobs`.
+/// @param gains for the second level, for the kinds that have them
+/// @param visit if set, is called with each track as loaded and the index of its flight: the tracks of a flight in
+///   order, several flights concurrently. This saves other users of the tracks a pass of their own.
 /// @throws files::InputError if gains cannot be flown at 500 Hz.
-/// @param visit if there is one, is shown each track as loaded, with the index of its flight: the tracks of a flight in
-///   their order, several flights at a time. What else needs the tracks so needs no pass of its own.
 Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, const GainsOfKinds& gains = {},
                    const std::function<void(std::size_t flight, const Track& track)>& visit = nullptr);
 
-/// What a search wants to know of a comparison.
+/// The parts of a comparison that a search needs.
 struct Leftover {
   double rmse_N = 0;                                     ///< of all axes together
-  Eigen::Vector3d low_band_to_floor, noise_floor_N;      ///< as of GroupErrors
+  Eigen::Vector3d low_band_to_floor, noise_floor_N;      ///< as in GroupErrors
   std::array<double, kNumVariables> region_shares = {};  ///< sum of RegionErrors::share, by variable
 };
 
-/// These numbers as compare() gives them for the same inputs, without the rest of its work; shares up to rounding.
+/// Returns the same numbers as compare() for the same inputs (shares up to round-off), without the rest of its work.
 Leftover left_over(const Inputs& inputs, int jobs);
 
 }  // namespace swarmcert::residuals

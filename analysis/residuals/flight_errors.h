@@ -1,4 +1,4 @@
-/// @file The learning error of single flights, from which conformal prediction over flights starts.
+/// @file Learning errors of single flights, the input of conformal prediction over flights.
 #pragma once
 
 #include <optional>
@@ -11,30 +11,30 @@
 
 namespace swarmcert::residuals {
 
-/// Of one error of one vehicle in one flight, axes x, y, z and the vector.
+/// One error of one vehicle in one flight, for the axes x, y, z and the vector.
 struct ErrorOfFlight {
   std::vector<ErrorWindow> windows;
   Eigen::Vector4d bias = Eigen::Vector4d::Zero();  ///< |mean|
 
-  /// Of each number the largest over the windows; there is one at least.
+  /// Returns the largest value of each number over the windows. Precondition: there is at least one window.
   ErrorWindow largest() const;
 };
 
 struct FlightError {
-  std::string path;        ///< of the log
-  ErrorOfFlight force;     ///< in newton
-  ErrorOfFlight velocity;  ///< velocity_error(), in m/s; no windows where the log does not measure it
-  std::vector<PlaceResidual> places;  ///< range of the force residual by place of the neighbour
+  std::string path;                   ///< of the log
+  ErrorOfFlight force;                ///< in newton
+  ErrorOfFlight velocity;             ///< velocity_error() in m/s; no windows if the log does not measure it
+  std::vector<PlaceResidual> places;  ///< range of the force residual by relative position of the neighbour
 };
 
-/// Of a track as Inputs::load() gives it; nothing where its force is not judged, or its log holds no window. The log is
-/// taken from the cache of `inputs`.
+/// Returns the error of a track loaded by Inputs::load(); nothing if its force is not judged or its log contains no
+/// window. The log is taken from the cache of `inputs`.
 std::optional<FlightError> flight_error(const Inputs& inputs, const Track& track);
 
-/// flight_error() of all tracks, in the order of flights.
+/// Returns flight_error() of all tracks, in the order of flights.
 std::vector<FlightError> flight_errors(const Inputs& inputs, int jobs);
 
-/// The velocity's error over all windows of all flights; nothing where no log measures it.
+/// Returns the velocity error over all windows of all flights; nothing if no log measures it.
 std::optional<VelocityError> velocity_error(const std::vector<FlightError>& errors);
 
 }  // namespace swarmcert::residuals

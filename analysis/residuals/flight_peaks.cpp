@@ -8,7 +8,7 @@
 namespace swarmcert::residuals {
 namespace {
 
-/// NaN where the axis has no set point at all.
+/// Returns NaN if the axis has no setpoint at all.
 double peak_along(const Track& track, int axis) {
   double most = std::nan("");
   for (std::size_t i = 0; i < track.targets.size(); ++i) {

@@ -1,4 +1,4 @@
-/// @file The largest tracking error of every vehicle in every flight: what a promise over flights is held against.
+/// @file The largest tracking error of each vehicle in each flight, used to check guarantees over flights.
 #pragma once
 
 #include <array>
@@ -11,11 +11,12 @@ namespace swarmcert::residuals {
 
 struct FlightPeak {
   std::string flight, vehicle, path;  ///< path of the log
-  /// sup |position - set point| over the records that compare uses, m; NaN without a set point along the axis.
+  /// sup |position - setpoint| in m over the records used by compare; NaN without a setpoint along the axis.
   std::array<double, 3> peak_m{};
 };
 
-/// One per vehicle whose force is judged, in the order of flights. The logs are taken from the cache of `inputs`.
+/// Returns one entry per vehicle whose force is judged, in the order of flights. Logs are taken from the cache of
+/// `inputs`.
 std::vector<FlightPeak> flight_peaks(const Inputs& inputs, int jobs);
 
 }  // namespace swarmcert::residuals

@@ -32,7 +32,7 @@ LogName parse_name(const std::string& name) {
   return {match[1], match[2], std::stoi(match[3]), match[4].matched};
 }
 
-/// A file that stands for a flight, and what names it.
+/// A log file and the names it belongs to.
 struct FoundLog {
   std::string path, vehicle, flight, scenario, why;
   int run = 0;
@@ -44,7 +44,8 @@ bool is_table(const fs::path& path) {
   return extension == ".csv" || extension == ".CSV";
 }
 
-/// A CSV in a folder may be a trajectory or a table of results: it is a log if its header names a motion and a time.
+/// Returns true for logs. A CSV in a folder may be a trajectory or a table of results: it is a log if its header names
+/// a time and a motion.
 bool is_log(const std::string& file) {
   if (parse_name(fs::path(file).filename().string()).run >= 0) return true;
   return is_table(file) ? logs::is_flight_table(file) : logs::looks_like_log(file);
@@ -71,7 +72,7 @@ Candidates candidates_below(const std::string& path) {
     }
     return {{path}, {}};
   }
-  // A bag of rosbag2 and a session of cfclient are one log in several files.
+  // A rosbag2 folder and a cfclient session are one log in several files.
   if (logs::looks_like_log(path)) return {{without_slash(path)}, {}};
   std::vector<std::string> files;
   Candidates found;
@@ -95,7 +96,7 @@ std::string folder_of(const std::string& file) {
   return folder.filename().string();
 }
 
-/// "E8" of "E8_log07"; the folder where the name starts with no vehicle.
+/// Returns "E8" for "E8_log07"; the folder if the name does not start with a vehicle.
 std::string vehicle_of(const std::string& file) {
   static const std::regex kPattern("([A-Za-z][A-Za-z0-9]*[0-9])[_-](?:log|flight|run|rep|trial)?[_-]?[0-9]+");
   std::smatch match;
@@ -137,13 +138,13 @@ FoundLog named(const std::string& file, const LogRule& rule) {
   return log;
 }
 
-/// Overlap of two spans of time over the shorter of them.
+/// Returns the overlap of two time spans divided by the shorter of them.
 double overlap(Interval a, Interval b) {
   const double common = std::min(a.upper, b.upper) - std::max(a.lower, b.lower);
   return common / std::min(a.upper - a.lower, b.upper - b.lower);
 }
 
-/// Logs of one folder that were recorded at the same time on a common clock are one flight.
+/// Groups logs of one folder that were recorded at the same time on a common clock into one flight.
 void group_by_clock(std::vector<FoundLog>& logs) {
   constexpr double kAbsolute_s = 1e8;
   std::map<fs::path, int> in_folder;
@@ -176,7 +177,7 @@ void group_by_clock(std::vector<FoundLog>& logs) {
 
 namespace {
 
-/// Whether the end of `path`, with as many folders as `pattern` names, matches it.
+/// Returns true if the last components of `path`, as many as `pattern` has, match it.
 bool is_of(const std::string& pattern, const std::string& path) {
   const auto depth = std::count(pattern.begin(), pattern.end(), '/');
   fs::path tail;
@@ -248,7 +249,7 @@ FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules&
     }
   }
   group_by_clock(logs);
-  // folder, scenario, run, name -> vehicle -> log; a CSV only where there is no binary log
+  // folder, scenario, run, name -> vehicle -> log; a CSV is used only without a binary log
   std::map<std::tuple<std::string, std::string, int, std::string>, std::map<std::string, FoundLog>> flights;
   for (FoundLog& log : logs) {
     const std::string folder = log.why == "flights.toml" ? "" : fs::path(log.path).parent_path().string();

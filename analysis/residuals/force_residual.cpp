@@ -23,7 +23,7 @@ stability::EffectContext context_of(const stability::Model& model, const Kinds& 
   return context;
 }
 
-/// Thrust behind a stage of the signal path: u + gain (stage(u) - u).
+/// Applies a stage of the signal path to the thrust: u + gain (stage(u) - u).
 void pass_stage(const stability::AppliedEffect& stage, Track& track) {
   const auto stream = stage.effect().stream(stage.shape().data());
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
@@ -35,12 +35,13 @@ void pass_stage(const stability::AppliedEffect& stage, Track& track) {
   }
 }
 
-/// The model says what its motors give at the commands of the log, which are those of as many motors.
+/// Returns true if the model describes the thrust of its motors at the commands in the log, and the numbers of motors
+/// agree.
 bool knows_motors(const stability::Model& model, const Track& track) {
   return model.thrust_curve_N && static_cast<std::size_t>(track.motor_commands) == model.num_rotors();
 }
 
-/// Before the model's lags: duties through the thrust map, or what the log says of the thrust.
+/// Returns the thrust before the model's lags: from duties and the thrust map, or from the thrust in the log.
 double commanded_thrust_N(const stability::Model& model, const Track& track, std::size_t record) {
   switch (track.thrust_source) {
     case logs::ThrustSource::kForce:
@@ -62,7 +63,7 @@ double commanded_thrust_N(const stability::Model& model, const Track& track, std
   return thrust_N;
 }
 
-/// rotation * (x, y, z), for one vector or for several side by side. Sums are in the order of Eigen's own product.
+/// Returns rotation * (x, y, z) for one or several vectors at once. Sums are in the same order as in Eigen's product.
 template <typename Numbers>
 void turn(const Eigen::Matrix3d& r, Numbers& x, Numbers& y, Numbers& z) {
   const Numbers turned_x = (r(0, 0) * x + r(0, 1) * y) + r(0, 2) * z;
@@ -72,10 +73,10 @@ void turn(const Eigen::Matrix3d& r, Numbers& x, Numbers& y, Numbers& z) {
   y = turned_y;
 }
 
-/// Turns each column, two at a time. Eigen's own product of the whole needs a copy of all columns.
+/// Rotates each column, two at a time. Eigen's own product of the whole matrix needs a copy of all columns.
 void turn(const Eigen::Matrix3d& rotation, Eigen::Matrix3Xd& vectors) {
   using Two = double __attribute__((vector_size(2 * sizeof(double))));
-  const Eigen::Matrix3d r = rotation;  // no other name leads here, so that it stays in registers
+  const Eigen::Matrix3d r = rotation;  // a local copy cannot be aliased, so it stays in registers
   double* at = vectors.data();
   double* const end = at + vectors.size();
   for (; end - at >= 6; at += 6) {
@@ -116,7 +117,7 @@ AccelerometerFilter::Response AccelerometerFilter::response_to(double step_s) co
   return {step_s, 1 / step_s, c + s, s * (1 / a), 2 * a * s, c - s};
 }
 
-// Clocks count in milliseconds or microseconds: a log has few different steps, and every fit meets them again.
+// Clocks count in milliseconds or microseconds, so a log has few different steps, which recur in every fit.
 const AccelerometerFilter::Response& AccelerometerFilter::known_response(double step_s) {
   std::uint64_t bits = 0;
   std::memcpy(&bits, &step_s, sizeof bits);
@@ -125,7 +126,7 @@ const AccelerometerFilter::Response& AccelerometerFilter::known_response(double 
   return known;
 }
 
-/// Of kCount numbers side by side, which the compiler keeps in registers.
+/// Processes kCount numbers at once, which the compiler keeps in registers.
 template <int kCount>
 void AccelerometerFilter::advance_block(Eigen::Index first, double* values) {
   using Numbers = Eigen::Array<double, kCount, 1>;
@@ -146,7 +147,8 @@ void AccelerometerFilter::advance(double time_s, Eigen::Matrix3Xd& values) {
   } else {
     const double step_s = time_s - time_s_;
     if (step_s != response_.step_s) response_ = known_response(step_s);
-    // One pass over the signals, without temporary matrices and divisions: every record of every fit comes here.
+    // A single pass over the signals without temporary matrices and divisions, because every record of every fit passes
+    // through here.
     constexpr int kBlock = 4;
     Eigen::Index next = 0;
     for (; next + kBlock <= values.size(); next += kBlock) advance_block<kBlock>(next, values.data());

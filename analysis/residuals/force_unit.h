@@ -1,4 +1,4 @@
-/// @file In what forces are shown to people.
+/// @file The unit in which forces are displayed.
 #pragma once
 
 #include <fmt/core.h>
@@ -25,8 +25,8 @@ inline ForceUnit chosen_force_unit(const std::string& name, const stability::Mod
   return model.weight_N() < kHeavy_N ? ForceUnit{"mN", 1e-3} : ForceUnit{"N", 1};
 }
 
-/// Gram-force where every vehicle weighs less than 1 N, the unit of the published networks; else newton. Without a
-/// known mass, the residuals of a model of 1 kg are accelerations.
+/// Returns gram-force, the unit of the published networks, if each vehicle weighs less than 1 N; otherwise newton.
+/// Without a known mass, the model has 1 kg and its residuals are accelerations.
 inline ForceUnit force_unit(const Inputs& inputs) {
   constexpr double kLight_N = 1;
   if (inputs.rules.per_mass) return {"m/s^2", 1};
@@ -35,7 +35,7 @@ inline ForceUnit force_unit(const Inputs& inputs) {
   return light ? ForceUnit{"gf", stability::kGramForce_N} : ForceUnit{};
 }
 
-/// "34.0 g", "2.5 kg"
+/// Formats a mass: "34.0 g", "2.5 kg".
 inline std::string mass_text(double mass_kg) {
   return mass_kg < 1 ? fmt::format("{:.1f} g", 1000 * mass_kg) : fmt::format("{:.4g} kg", mass_kg);
 }

@@ -10,7 +10,7 @@
 namespace swarmcert::residuals {
 namespace {
 
-/// Thousandths, to the nearest: what was read from thousandths comes back as it was.
+/// Rounds to the nearest thousandth, so that values read from thousandths are reproduced exactly.
 std::int16_t nearest_milli(double value) {
   return static_cast<std::int16_t>(std::lround(std::clamp(1000 * value, -32768.0, 32767.0)));
 }

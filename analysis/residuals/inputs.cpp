@@ -42,7 +42,7 @@ void set_network(stability::Model& model, const std::string& network) {
   effects.push_back(std::move(spec));
 }
 
-/// The fleet's models: the first of each kind, and the vehicles' own where they differ from it.
+/// Uses the fleet's models: the first one of each kind, and separate ones for vehicles that differ from it.
 void use_fleet_models(Inputs& inputs, const std::map<std::string, std::string>& flown) {
   std::map<std::string, std::string> of_kind;
   std::set<std::string> named;
@@ -57,7 +57,8 @@ void use_fleet_models(Inputs& inputs, const std::map<std::string, std::string>& 
   }
 }
 
-/// 1 kg, and rotors that are never asked for a force: the log's thrust is in multiples of the weight.
+/// Returns a model of 1 kg whose rotors are never asked for a force, because the log's thrust is in multiples of the
+/// weight.
 stability::Model unit_model() {
   stability::Model model;
   model.kind = "unknown";
@@ -92,7 +93,7 @@ void read_models(const std::vector<std::string>& paths, Inputs& inputs) {
   }
 }
 
-/// The vehicles of the fleet that flew, with their models.
+/// Returns the models of the fleet's vehicles that flew.
 std::map<std::string, std::string> flown_models(const Inputs& inputs) {
   std::map<std::string, std::string> models;
   for (const FlightFiles& flight : inputs.found.flights) {
@@ -104,7 +105,7 @@ std::map<std::string, std::string> flown_models(const Inputs& inputs) {
   return models;
 }
 
-/// The models of single logs, where nothing else names one: the first of each kind stands for it.
+/// Uses the models of single logs if no other models are given: the first of each kind becomes the model of the kind.
 void use_log_models(Inputs& inputs) {
   for (const auto& [path, model] : inputs.log_models) {
     if (inputs.model_of(model.kind) == nullptr) inputs.models.push_back(model);
@@ -112,7 +113,7 @@ void use_log_models(Inputs& inputs) {
   inputs.has_only_log_models = !inputs.models.empty();
 }
 
-/// Where no model is named: those of the fleet, those of single logs or, where that may be, 1 kg.
+/// Chooses models if none is given: those of the fleet, those of single logs or, if allowed, a model of 1 kg.
 void use_other_models(const InputArguments& arguments, const std::map<std::string, std::string>& flown,
                       Inputs& inputs) {
   use_fleet_models(inputs, flown);
@@ -128,7 +129,7 @@ void use_other_models(const InputArguments& arguments, const std::map<std::strin
   inputs.models.push_back(unit_model());
 }
 
-/// The network and the published mass, in every model.
+/// Sets the network and the published mass in each model.
 void complete_models(const InputArguments& arguments, Inputs& inputs) {
   const auto complete = [&](stability::Model& model) {
     if (!arguments.network.empty()) set_network(model, arguments.network);
@@ -199,7 +200,7 @@ stability::Model Inputs::model_for(const Track& track) const {
 }
 
 std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& problems) const {
-  // A vehicle whose kind has no model is a neighbour and nothing else.
+  // A vehicle whose kind has no model serves only as a neighbour.
   Fleet uses = fleet;
   for (auto& [vehicle, use] : uses) {
     if (model_of(use.kind) == nullptr) use.position_only = true;

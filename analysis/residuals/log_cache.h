@@ -1,4 +1,4 @@
-/// @file Logs that were read are kept, so that a command which goes through its flights many times parses each once.
+/// @file Caches logs, so that a command that goes through its flights several times parses each log once.
 #pragma once
 
 #include <list>
@@ -19,21 +19,22 @@ struct CachedLog {
   std::vector<logs::Doubt> doubts;  ///< logs::doubts_of(log)
 };
 
-/// Safe to use from several threads. What was not asked for the longest goes first when the memory is full.
+/// A thread-safe cache of logs. The least recently used logs are evicted when the memory is full.
 class LogCache {
  public:
-  /// Six hours at 100 Hz.
+  /// Corresponds to about six hours at 100 Hz.
   static constexpr std::size_t kMost_bytes = std::size_t{900} << 20;
 
-  /// @param hover_multiples  logs are changed by logs::use_hover_multiples().
+  /// @param hover_multiples  apply logs::use_hover_multiples() to the logs
   explicit LogCache(bool hover_multiples, std::size_t most_bytes = kMost_bytes)
       : hover_multiples_(hover_multiples), most_bytes_(most_bytes) {}
 
-  /// The log, from memory or read. @throws files::InputError as logs::read_log().
+  /// Returns the log from the cache, or reads it.
+  /// @throws files::InputError as logs::read_log() does.
   std::shared_ptr<const CachedLog> log(const std::string& path, const logs::SignalMap& map);
 
   std::size_t held_bytes() const;
-  std::size_t reads() const;  ///< files that were parsed so far
+  std::size_t reads() const;  ///< number of files parsed so far
 
  private:
   struct Entry {
@@ -44,7 +45,7 @@ class LogCache {
   const std::size_t most_bytes_;
   mutable std::mutex mutex_;
   std::map<std::string, Entry> entries_;
-  std::list<std::string> ages_;  ///< paths, the latest used first
+  std::list<std::string> ages_;  ///< paths, most recently used first
   std::size_t held_bytes_ = 0, reads_ = 0;
 };
 

@@ -1,4 +1,4 @@
-/// @file One pass over all tracks of the flights, several flights at a time.
+/// @file One pass over all tracks of all flights, several flights at a time.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 namespace swarmcert::residuals {
 
-/// What add(track, results) appends to `results` for each track, in the order of the flights. Vehicles that are known
-/// by their position only are left out, and problems with logs are not told: compare() does that.
+/// Calls add(track, results) for each track and returns the results in the order of the flights. Position-only vehicles
+/// are skipped, and problems with logs are not reported, because compare() does that.
 template <typename Result, typename Add>
 std::vector<Result> over_tracks(const Inputs& inputs, int jobs, const Add& add) {
   std::vector<std::vector<Result>> parts(inputs.found.flights.size());

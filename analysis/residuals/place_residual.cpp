@@ -24,12 +24,12 @@ std::array<int, 2> place_of(const stability::Instant& now) {
 
 namespace {
 
-/// Adds the records first .. end, which follow one another without a gap.
+/// Adds the records first .. end, which are consecutive and without gaps.
 void add_run(const Track& track, const std::vector<Eigen::Vector3d>& r, std::size_t first, std::size_t end,
              std::map<std::array<int, 2>, PlaceResidual>& cells) {
   const auto time_s = [&track](std::size_t i) { return track.instants[i].time_s; };
   constexpr double kHalf_s = kPlaceMean_s / 2;
-  std::size_t from = first, to = first;  // of the mean
+  std::size_t from = first, to = first;  // range of the mean
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = first; i < end; ++i) {
     while (to < end && time_s(to) <= time_s(i) + kHalf_s) sum += r[to++];

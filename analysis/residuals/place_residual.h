@@ -1,5 +1,5 @@
-/// @file The range of the force residual by where the neighbour is, flight by flight: from it `bound --tube --from`
-/// makes the truth that a tube is proved for.
+/// @file Range of the force residual by relative position of the neighbour, per flight; `bound --tube --from` derives
+///   the truth model of a tube from it.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,29 +10,30 @@
 
 namespace swarmcert::residuals {
 
-/// Cells of the place of a neighbour, seen from the vehicle; which one counts: see place_of().
+/// Grid of the neighbour's position relative to the vehicle; place_of() selects the neighbour.
 struct PlaceGrid {
   static constexpr int kLateral = 12, kHeights = 20;
   static constexpr double kLateralStep_m = 0.05, kHeightStep_m = 0.1, kLowest_m = -1;
 };
 
-/// [height of the neighbour above the vehicle, from kLowest_m up; lateral distance, from 0] of the neighbour that is
-/// laterally nearest among those within the grid's heights; -1, -1 where none is, or that one is too far away.
+/// Returns the cell [height of the neighbour above the vehicle, starting at kLowest_m; lateral distance, starting at 0]
+/// of the laterally closest neighbour among those within the heights of the grid; (-1, -1) if there is none or it is
+/// too far away.
 std::array<int, 2> place_of(const stability::Instant& now);
 
-/// What a flight shows while the neighbour is in one cell.
+/// The residual of a flight while the neighbour is in one cell.
 struct PlaceResidual {
   std::array<int, 2> cell{-1, -1};
   std::size_t records = 0;
   Eigen::Vector3d least_N = Eigen::Vector3d::Zero(), largest_N = Eigen::Vector3d::Zero();
 };
 
-/// Seconds over which the residual is averaged, half of them before a record: a mean without delay, so that a force is
-/// told in the cell in which it acts. It passes what is slower than about 0.44/kPlaceMean_s.
+/// Length in seconds of the centred mean of the residual. Being centred it has no delay, so a force is assigned to the
+/// cell in which it acts. It passes frequencies below about 0.44/kPlaceMean_s.
 inline constexpr double kPlaceMean_s = 0.1;
 
-/// In the order of the cells; records that have no whole mean, next to a gap or a cut, are left out.
-/// @param r residual in newton, one per record.
+/// Returns the residuals ordered by cell. Records without a complete mean (next to a gap or a cut) are skipped.
+/// @param r residual in newton, one per record
 std::vector<PlaceResidual> place_residuals(const Track& track, const std::vector<Eigen::Vector3d>& r);
 
 }  // namespace swarmcert::residuals

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kBefore_s = 0.1, kAfter_s = 0.3;
 
-/// Largest specific force of a flight, in m/s^2.
+/// Returns the largest possible specific force in flight, in m/s^2.
 double largest_specific_force(const stability::Model& model, double battery_V) {
   constexpr double kMargin = 1.25, kLeast_m_s2 = 2 * stability::kGravity_m_s2;
   return std::max(kMargin * model.largest_thrust_N(battery_V) / model.mass_kg, kLeast_m_s2);

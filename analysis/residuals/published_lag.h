@@ -1,11 +1,11 @@
-/// @file The motors' lag in the published networks' labels.
+/// @file The motor lag in the labels of the published networks.
 #pragma once
 
 namespace swarmcert::residuals {
 
-/// Share of the way to the commanded thrust that the thrust goes in one record.
+/// Fraction of the remaining distance to the commanded thrust that is covered per record.
 inline constexpr double kPublishedLagPerRecord = 0.16;
-/// The time constant of that lag at the published logs' 100 Hz: 0.01 s / -log(1 - 0.16), s.
+/// Time constant of that lag at the 100 Hz of the published logs: 0.01 s / -log(1 - 0.16), s.
 inline constexpr double kPublishedLag_s = 0.0573548;
 
 }  // namespace swarmcert::residuals

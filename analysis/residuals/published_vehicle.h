@@ -1,4 +1,4 @@
-/// @file What the published networks and flights take for granted about their two kinds of vehicle.
+/// @file Properties of the two kinds of vehicle of the published networks and flights.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@ namespace swarmcert::residuals {
 
 struct PublishedVehicle {
   const char* kind;
-  double mass_kg;            ///< what the networks' authors weighed; their labels rest on it
-  double standing_height_m;  ///< position of the tracked centre on the ground
+  double mass_kg;            ///< as weighed by the networks' authors, whose labels depend on it
+  double standing_height_m;  ///< of the tracked centre when the vehicle is on the ground
 };
 
-/// Nothing for other kinds.
+/// Returns the properties; nullptr for other kinds.
 inline const PublishedVehicle* published_vehicle(const std::string& kind) {
   static constexpr PublishedVehicle kPublished[] = {{"small", 0.032, 0.07}, {"large", 0.067, 0.085}};
   for (const PublishedVehicle& vehicle : kPublished)

@@ -14,7 +14,7 @@ struct Variable {
   std::vector<double> edges;
 };
 
-/// Of the neighbour that matters most: least lateral distance among those within a height difference of 1 m.
+/// Bins for the most relevant neighbour: the laterally closest one among those within a height difference of 1 m.
 const std::vector<double> kLateral_m = {0, 0.05, 0.1, 0.2, 0.4};
 const std::vector<double> kVertical_m = {0.05, 0.2, 0.3, 0.4, 0.6, 1.0};
 

@@ -1,4 +1,4 @@
-/// @file Regimes of flight: where a residual is looked at separately.
+/// @file Flight regimes in which a residual is evaluated separately.
 #pragma once
 
 #include <cstdint>
@@ -10,17 +10,17 @@
 namespace swarmcert::residuals {
 
 inline constexpr int kNumVariables = 8;
-/// "height", "speed", ...: the variables whose ranges make regions.
+/// Returns the name of a variable whose ranges define regions: "height", "speed", ...
 const char* variable_name(int variable);
 
-/// The region of each variable in which a record lies; -1 where it lies in none.
+/// The region of a record for each variable; -1 if it is in none.
 using RegionIndices = std::int16_t[kNumVariables];
 void regions_of(const stability::Instant& now, double time_in_log_s, RegionIndices indices);
 
 int num_regions(int variable);
-/// "below 0.12 m", "0.1 .. 0.2 m/s", "0.2 .. 0.3 m below a vehicle, 0 .. 0.05 m beside its axis".
+/// Describes a region: "below 0.12 m", "0.1 .. 0.2 m/s", "0.2 .. 0.3 m below a vehicle, 0 .. 0.05 m beside its axis".
 std::string region_name(int variable, int region);
-/// Middle of the region, in the variable's unit; lateral distance for those of neighbours.
+/// Returns the middle of the region in the unit of the variable; for regions of neighbours, of the lateral distance.
 double region_middle(int variable, int region);
 
 }  // namespace swarmcert::residuals

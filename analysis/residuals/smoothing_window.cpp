@@ -7,11 +7,11 @@ namespace {
 
 constexpr int kCapacity = 256;
 
-/// One number per record of a window, on the stack: every record of every fit comes here.
+/// One number per record of a window, on the stack for speed: every record of every fit passes through here.
 using WindowVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCapacity, 1>;
 
-/// Weights whose product with values is the derivative of order `order` (1, 2) of the polynomial of that degree fitted
-/// to them; by the orthogonal polynomials of the times.
+/// Returns the weights whose product with values is the derivative of order `order` (1 or 2) of the least squares
+/// polynomial of the same degree, computed from the orthogonal polynomials of the times.
 WindowVector derivative_weights(const WindowVector& times_s, int order) {
   const WindowVector t = times_s.array() - times_s.mean();
   const double tt = t.squaredNorm();

@@ -1,9 +1,10 @@
-/// @file The weighted mean over a window that a derivative of a logged velocity or position is of the acceleration.
+/// @file The weighted mean of the acceleration over a window that results from differentiating a logged velocity or
+///   position.
 ///
-/// The slope of a straight line fitted to a velocity is a mean of the acceleration with parabolic weights; the
-/// curvature of a parabola fitted to a position is a mean with weights of fourth order. So that both sides of the
-/// balance see the same mean, the model's force is integrated, once or twice, and goes through the same fit. The window
-/// ends at the record: like a filter, it delays both sides by half its length.
+/// The slope of a line fitted to a velocity is a mean of the acceleration with parabolic weights; the curvature of a
+/// parabola fitted to a position is a mean with weights of fourth order. To give both sides of the force balance the
+/// same mean, the model's force is integrated once or twice and passed through the same fit. The window ends at the
+/// current record, so like a filter it delays both sides by half its length.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,21 +14,23 @@
 
 namespace swarmcert::residuals {
 
-/// Power that the weighted mean lets pass at `frequency_hz`; 1 where `source` is no derivative.
+/// Returns the fraction of the power at `frequency_hz` that the weighted mean passes; 1 if `source` is not a
+/// derivative.
 double power_passed(logs::ForceSource source, double length_s, double frequency_hz);
 
 class SmoothingWindow {
  public:
-  /// @param source   kVelocity: first derivative; kPosition: second.
-  /// @param channels signals that pass together, each of three axes.
+  /// @param source   kVelocity: first derivative; kPosition: second derivative
+  /// @param channels number of signals processed together, each with three axes
   SmoothingWindow(logs::ForceSource source, double length_s, int channels);
 
   void restart();
 
-  /// Replaces forces, linear between the records, by their mean over the window. @param values [3 x channels]
+  /// Replaces forces, assumed linear between records, by their mean over the window.
+  /// @param values [3 x channels]
   void average(double time_s, Eigen::Ref<Eigen::Matrix3Xd> values);
-  /// Replaces a velocity or position by its derivative over the window: average() of the acceleration behind it. Zero
-  /// for the first records after a restart.
+  /// Replaces a velocity or position by its derivative over the window, i.e. by average() of the underlying
+  /// acceleration. Zero for the first records after a restart.
   void differentiate(double time_s, Eigen::Ref<Eigen::Matrix3Xd> values);
 
  private:

@@ -53,7 +53,7 @@ ErrorStatistics statistics(const std::vector<Eigen::Vector3f>& r, const std::vec
   const auto fill = [&](double Axes::*axis, auto size_of) {
     std::transform(r.begin(), r.end(), sizes.begin(), size_of);
     result.p95.*axis = quantile(sizes, 0.95);
-    // What is larger lies behind it.
+    // All larger values are after this position.
     const auto tail = sizes.begin() + quantile_place(sizes.size(), 0.95),
                at = sizes.begin() + quantile_place(sizes.size(), 0.999);
     std::nth_element(tail, at, sizes.end());
@@ -91,7 +91,7 @@ void Spectrum::add(const std::vector<Eigen::Vector3d>& residual, double period_s
                    const std::function<double(double)>& passes) {
   static const auto kTables = [] {
     constexpr double kTurn = 2 * 3.14159265358979323846;
-    std::array<std::array<double, kWindow>, 3> tables{};  // cosine, sine, Hann
+    std::array<std::array<double, kWindow>, 3> tables{};  // cosine, sine, Hann window
     for (std::size_t i = 0; i < kWindow; ++i) {
       const double angle = kTurn * static_cast<double>(i) / kWindow;
       tables[0][i] = std::cos(angle);
@@ -126,7 +126,7 @@ void Spectrum::add(const Spectrum& other) {
   period_sum_s_ += other.period_sum_s_;
 }
 
-/// Columns: mean of the low band, median of the high band, unused.
+/// Returns a row per axis with the columns: mean of the low band, median of the high band, unused.
 Eigen::Matrix3d Spectrum::median_and_mean() const {
   Eigen::Matrix3d result = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
   if (windows_ == 0) return result;

@@ -1,11 +1,11 @@
-/// @file Effects that stand in the path of the thrust, before everything that acts on it.
+/// @file Effects that act on the thrust itself, before all other effects.
 #pragma once
 
 #include <string>
 
 namespace swarmcert::residuals {
 
-/// The thrust behind the effect is what the other effects of a model see, a `thrust_ratio` among them.
+/// Returns true for such an effect. The other effects of a model, including `thrust_ratio`, see the thrust after it.
 inline bool is_thrust_stage(const std::string& effect) { return effect == "delay" || effect == "motor_lag"; }
 
 }  // namespace swarmcert::residuals

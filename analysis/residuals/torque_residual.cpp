@@ -12,7 +12,7 @@
 namespace swarmcert::residuals {
 namespace {
 
-/// Why the log does not say the force of each of the model's rotors; empty where it does.
+/// Returns why the log does not give the force of each of the model's rotors; empty if it does.
 std::string why_no_rotor_forces(const stability::Model& model, const Track& track) {
   const bool by_duty = track.thrust_source == logs::ThrustSource::kDuty;
   const std::size_t motors = by_duty ? 4 : static_cast<std::size_t>(track.motor_commands);
@@ -21,7 +21,7 @@ std::string why_no_rotor_forces(const stability::Model& model, const Track& trac
   return fmt::format("the log has {} motors and the model {} rotors", motors, model.num_rotors());
 }
 
-/// Of the rotors at `record`. Precondition: why_no_rotor_forces() is empty.
+/// Returns the torque of the rotors at `record`. Precondition: why_no_rotor_forces() is empty.
 Eigen::Vector3d rotor_torque_Nm(const stability::Model& model,
                                 const std::vector<stability::RotorPlace>& rotors, const Track& track,
                                 std::size_t record) {
@@ -47,7 +47,7 @@ Eigen::Vector3d rotor_torque_Nm(const stability::Model& model,
   return torque;
 }
 
-/// Of the rotors, behind the model's motor lag, and of its effects.
+/// Returns the torque of the rotors, after the model's motor lag, and of its effects.
 std::vector<Eigen::Vector3d> modelled_torque_B_Nm(const stability::Model& model, const Kinds& kinds,
                                                   const Track& track) {
   std::vector<Eigen::Vector3d> torque(track.instants.size());
@@ -159,7 +159,7 @@ std::vector<TorqueBlock> torque_blocks(const stability::Model& model, const Kind
 
 namespace {
 
-/// Means over slow flight, where the torques of the rotors should cancel.
+/// Adds the means over slow flight, where the torques of the rotors should cancel.
 void add_mean(const stability::Model& model, const Track& track, TorqueErrors& errors) {
   if (!why_no_rotor_forces(model, track).empty()) return;
   const std::vector<stability::RotorPlace> rotors = rotor_places(model);

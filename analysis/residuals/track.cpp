@@ -18,13 +18,13 @@ namespace {
 
 constexpr double kCrashTiltCosine = 0.5;  // 60 degrees
 constexpr double kBeforeCrash_s = 0.3;
-constexpr double kLeastDuty = 0.8, kLeastDutyShare = 0.3;  // of the most in a log
+constexpr double kLeastDuty = 0.8, kLeastDutyShare = 0.3;  // of the maximum in a log
 constexpr double kSettle_s = 0.15;
-constexpr double kLeastShare = 0.3;  // of the thrust that is common in a log
+constexpr double kLeastShare = 0.3;  // of the typical thrust in a log
 constexpr double kAboveStanding_m = 0.02, kUsualWithin_m = 0.03;
-constexpr double kClear_m = 0.01;  // of the ground, wherever the vehicle stands
+constexpr double kClear_m = 0.01;  // above the ground, wherever the vehicle stands
 
-/// Where the published vehicles stand; NaN for others, whose logs have to show it.
+/// Returns the standing height of the published vehicles; NaN for others, whose logs must show it.
 double contact_height_m(const std::string& kind) {
   const PublishedVehicle* const published = published_vehicle(kind);
   return published != nullptr ? published->standing_height_m : std::numeric_limits<double>::quiet_NaN();
@@ -32,7 +32,7 @@ double contact_height_m(const std::string& kind) {
 
 Eigen::Vector3d vector(const logs::Vector& v) { return {v[0], v[1], v[2]}; }
 
-/// Times at which the target starts to move after standing still, in seconds of the log's clock.
+/// Returns the times at which the target starts to move after a pause, in seconds on the log's clock.
 std::vector<double> onsets_s(const logs::Log& log) {
   constexpr double kStill_s = 0.3;
   constexpr double kStill_m_s = 1e-6;
@@ -53,7 +53,7 @@ std::vector<double> onsets_s(const logs::Log& log) {
   return onsets;
 }
 
-/// Median difference of onsets that belong together; 0 with no onsets matched.
+/// Returns the median difference between matching onsets; 0 if none match.
 double clock_offset_s(const std::vector<double>& reference, const std::vector<double>& own, int* matched) {
   constexpr double kLargestOffset_s = 0.1;
   std::vector<double> differences;
@@ -72,8 +72,9 @@ struct State {
   Eigen::Vector3d p, v;
 };
 
-/// The state of `log` at `time_s` of its clock, between its records; nothing across a gap or outside of the log.
-/// @param from where the search starts; times ascend from call to call.
+/// Returns the state of `log` at `time_s` on its clock, interpolated between records; nothing across a gap or outside
+/// the log.
+/// @param from where the search starts; times must ascend from call to call
 std::optional<State> state_at(const logs::Log& log, double time_s, bool everywhere, std::size_t& from) {
   const std::vector<logs::Sample>& samples = log.samples;
   if (samples.empty()) return std::nullopt;
@@ -121,7 +122,8 @@ void fill_instants(Track& track, const logs::Log& log) {
   }
 }
 
-/// The specific force of logs without an accelerometer, over the window through which the model's force goes as well.
+/// Derives the specific force of logs without an accelerometer, over the window that is also applied to the model's
+/// force.
 void derive_specific_force(Track& track) {
   if (track.force_source == logs::ForceSource::kAccelerometer) return;
   SmoothingWindow window(track.force_source, track.window_s, 1);
@@ -135,7 +137,7 @@ void derive_specific_force(Track& track) {
   }
 }
 
-/// Whether the vehicle was at places half a metre apart.
+/// Returns true if the vehicle was at positions at least half a metre apart.
 bool has_moved(const Track& track) {
   constexpr double kMoved_m = 0.5;
   Eigen::Vector3d low = Eigen::Vector3d::Constant(INFINITY), high = -low;
@@ -146,7 +148,7 @@ bool has_moved(const Track& track) {
   return !track.instants.empty() && (high - low).maxCoeff() > kMoved_m;
 }
 
-/// Whether the rotors carry next to nothing, per record.
+/// Returns, for each record, whether the rotors carry next to nothing.
 std::vector<char> rotors_idle(const Track& track) {
   std::vector<char> idle(track.instants.size(), 0);
   const bool by_duty = track.thrust_source == logs::ThrustSource::kDuty;
@@ -162,7 +164,7 @@ std::vector<char> rotors_idle(const Track& track) {
     return *place;
   };
   double least = kLeastShare * at(75);
-  // Strong rotors carry with less duty: believed of a vehicle that went somewhere.
+  // Strong rotors need less duty to carry the vehicle; this is assumed only of a vehicle that moved.
   if (by_duty) least = has_moved(track) ? std::min(kLeastDuty, kLeastDutyShare * at(98)) : kLeastDuty;
   for (std::size_t i = 0; i < idle.size(); ++i) idle[i] = thrust[i] < least ? 1 : 0;
   return idle;
@@ -194,7 +196,7 @@ void cut_phases(Track& track, const CutRules& rules) {
     const stability::Instant& now = track.instants[i];
     if (track.restarts[i] != 0)
       settled_s = now.time_s + (derived ? std::max(kSettle_s, 1.5 * track.window_s) : kSettle_s);
-    // A height at which the vehicle stood counts where it is not the usual one within a few centimetres.
+    // The height at which the vehicle stood is used unless it agrees with the usual one within a few centimetres.
     const double usual_m = contact_height_m(track.kind), stood_m = standing_m[i] + kAboveStanding_m;
     const bool is_usual = std::isfinite(usual_m) && !(std::abs(stood_m - usual_m) > kUsualWithin_m);
     const double contact_m = is_usual ? std::max(usual_m, standing_m[i] + kClear_m) : stood_m;
@@ -207,7 +209,7 @@ void cut_phases(Track& track, const CutRules& rules) {
       cut = Cut::kContact;
     else if (!rules.published && now.time_s < settled_s)
       cut = Cut::kSettling;
-    // The window of a derivative must not reach back to the ground.
+    // The window of a derivative must not include the ground.
     if (derived && (cut == Cut::kNotFlying || cut == Cut::kContact))
       settled_s = std::max(settled_s, now.time_s + track.window_s);
   }

@@ -22,7 +22,7 @@ void add_to_map(const stability::Instant& now, double residual_z_N, NeighbourMap
   cell.squares_N2 += residual_z_N * residual_z_N;
 }
 
-/// The largest means over 0.1 s, at least 1 s apart.
+/// Returns the largest means over 0.1 s, at least 1 s apart.
 std::vector<Moment> moments_of(const Track& track, const std::vector<Eigen::Vector3d>& r) {
   constexpr std::size_t kMean = 10;
   std::vector<Moment> found;
@@ -80,7 +80,7 @@ const stability::Gains* gains_of(const GainsOfKinds& gains, const std::string& k
   return nullptr;
 }
 
-/// Sorts the residuals `r`, and `r0` without effects, into points, blocks, the map of neighbours and the series.
+/// Distributes the residuals `r`, and `r0` without effects, over points, blocks, the neighbour map and the series.
 void add_records(const Track& track, const std::vector<Eigen::Vector3d>& r,
                  const std::vector<Eigen::Vector3d>& r0, TrackPart& result) {
   TrackErrors& errors = result.errors;
@@ -109,7 +109,7 @@ void add_records(const Track& track, const std::vector<Eigen::Vector3d>& r,
   }
 }
 
-/// Of a simulation along the track, with the gains of the log or else of the vehicle's kind.
+/// Returns the errors of a simulation along the track, with the gains of the log or else of the vehicle's kind.
 TrajectoryErrors trajectory_errors(const Inputs& inputs, const GainsOfKinds& gains,
                                    const stability::Model& model, Track& track) {
   TrajectoryErrors errors;

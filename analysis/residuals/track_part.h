@@ -1,4 +1,4 @@
-/// @file One track's contribution to a comparison; groups of tracks are sums of these.
+/// @file The contribution of one track to a comparison; groups of tracks are sums of these.
 #pragma once
 
 #include <vector>
@@ -7,13 +7,13 @@
 
 namespace swarmcert::residuals {
 
-/// One used record: residual of the model, of the model without effects, and where it lies.
+/// One used record: residual with and without the model's effects, and its regions.
 struct ResidualPoint {
   Eigen::Vector3f r, r0;
   RegionIndices regions;
 };
 
-/// Sums that groups of tracks share.
+/// Sums that are accumulated over groups of tracks.
 struct Part {
   std::vector<ResidualPoint> points;
   std::vector<BlockSum> blocks;
@@ -21,7 +21,7 @@ struct Part {
   double weight_N = 0;
 };
 
-/// Everything of one track.
+/// All results of one track.
 struct TrackPart {
   TrackErrors errors;
   Part part;
@@ -30,17 +30,18 @@ struct TrackPart {
   NeighbourMap neighbours;
 };
 
-/// Applies the models and evaluates both levels. @param track its thrust is changed.
+/// Applies the models and evaluates both levels.
+/// @param track its thrust is changed
 TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& track);
 
-/// The residual of the model alone: its points, where they lie, blocks and spectrum.
-/// @param track its thrust is changed.
+/// Returns only the residual of the model: its points, regions, blocks and spectrum.
+/// @param track its thrust is changed
 Part residual_part(const Inputs& inputs, Track& track);
 
-/// Errors over all records of `parts`.
+/// Returns the errors over all records of `parts`.
 GroupErrors errors_of(const std::vector<const Part*>& parts);
 
-/// Keeps the worst few, worst first.
+/// Keeps only the worst few moments, worst first.
 void sort_and_shorten(std::vector<Moment>& moments);
 
 }  // namespace swarmcert::residuals

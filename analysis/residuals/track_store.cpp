@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kStretch_s = 20, kShortest_s = 4, kLead_s = 1;
 
-/// Elements `kept`, each of which stands for `width` elements of `values`; nothing where there are none.
+/// Keeps the elements `kept`, each of which stands for `width` consecutive values. Does nothing if `values` is empty.
 template <typename T>
 void keep(std::vector<T>& values, const std::vector<std::size_t>& kept, std::size_t width = 1) {
   if (values.empty()) return;
@@ -23,7 +23,7 @@ void keep(std::vector<T>& values, const std::vector<std::size_t>& kept, std::siz
   values = std::move(few);
 }
 
-/// Lets the records of `track` point to its own neighbours. They do not after a copy.
+/// Makes the records of `track` point to its own neighbours, which is necessary after a copy.
 void own_neighbours(Track& track) {
   if (track.instants.empty()) return;
   const std::size_t width = track.neighbours.size() / track.instants.size();
@@ -37,7 +37,7 @@ std::vector<Track> copies(const std::vector<Track>& tracks) {
   return all;
 }
 
-/// FNV-1a, as a number from 0 to 1: the same on every machine.
+/// Returns an FNV-1a hash as a number from 0 to 1, the same on every machine.
 double number_of(const std::string& text) {
   std::uint32_t hash = 2166136261U;
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
@@ -53,22 +53,22 @@ std::size_t bytes_of(const Track& track) {
          track.given_thrust.size() * sizeof(double);
 }
 
-/// How long the records without a cut last.
+/// Returns the duration of the records without a cut.
 double used_s(const Track& track) {
   const auto used = static_cast<double>(std::count(track.cut.begin(), track.cut.end(), Cut::kNone));
   return used * track.duration_s() / std::max(static_cast<double>(track.instants.size()) - 1, 1.0);
 }
 
-/// Whether an excerpt takes a stretch of this track. Where the share of a track is shorter than the shortest stretch,
-/// only part of the tracks contribute one, so that the expected total is the share. A hash of the flight's and the
-/// vehicle's name decides; the suffix is hashed last, because FNV-1a mixes the last characters poorly.
+/// Returns whether an excerpt takes a stretch of this track. If the share of a track is shorter than the shortest
+/// stretch, only some of the tracks contribute one, so that the expected total is the share. A hash of the names of
+/// flight and vehicle decides; the suffix is hashed last, because FNV-1a mixes the last characters poorly.
 bool takes_part(const Track& track, double share) {
   const double all_s = used_s(track), stretch_s = std::min(kShortest_s, all_s);
   return share * all_s >= stretch_s ||
          number_of(track.flight + "/" + track.vehicle + " takes part") * stretch_s < share * all_s;
 }
 
-/// The stretches of an excerpt, as ranges [first, second) of positions in `used`, the records without a cut.
+/// Returns the stretches of an excerpt as ranges [first, second) of positions in `used`, the records without a cut.
 std::vector<std::pair<std::size_t, std::size_t>> stretches(const Track& track,
                                                            const std::vector<std::size_t>& used,
                                                            double share) {
@@ -140,7 +140,7 @@ TrackStore::Kept TrackStore::loaded(const Load& load) const {
   };
   all.tracks.erase(std::remove_if(all.tracks.begin(), all.tracks.end(), is_left_out), all.tracks.end());
   for (Track& track : all.tracks) {
-    own_neighbours(track);  // erasing has moved it
+    own_neighbours(track);  // erasing has moved the track
     if (!track.position_only) track = excerpt_of(track, share_);
   }
   return all;
@@ -158,7 +158,7 @@ std::vector<Track> TrackStore::tracks(const FlightFiles& flight, const Load& loa
     const auto found = kept_.find(key);
     if (found != kept_.end()) known = &found->second;
   }
-  if (known != nullptr) {  // never erased, never changed
+  if (known != nullptr) {  // never erased or changed
     tell(*known);
     return copies(known->tracks);
   }

@@ -1,4 +1,4 @@
-/// @file Tracks that are kept between passes over the flights, whole or in excerpts.
+/// @file Tracks that are kept between passes over the flights, complete or as excerpts.
 #pragma once
 
 #include <functional>
@@ -11,25 +11,26 @@
 
 namespace swarmcert::residuals {
 
-/// Of the records of `track` that are used about the share `share`, in stretches of at most 20 s and at least 4 s that
-/// are spread over the flight; a track of less than that is whole. Where a stretch lies within its part of the flight
-/// follows from the names of flight and vehicle. Filters and memories restart before it: up to 1 s ahead of each
-/// stretch is kept as well, cut as Cut::kSettling.
+/// Returns an excerpt with about the fraction `share` of the used records of `track`, in stretches of 4 to 20 s spread
+/// over the flight; a track too short for that is kept whole. The position of each stretch within its part of the
+/// flight is derived from the names of flight and vehicle. Because filters and memories restart before a stretch, up to
+/// 1 s ahead of it is kept as well, cut as Cut::kSettling.
 Track excerpt_of(const Track& track, double share);
 
-/// Tracks as load_flight() gives them, without any model, so that passes with other models need not make them anew.
-/// Safe to use from several threads. What does not fit into the memory is made anew each time.
+/// Tracks as loaded by load_flight(), independent of the model, so that passes with other models can reuse them.
+/// Thread-safe. Tracks that do not fit into memory are loaded again each time.
 class TrackStore {
  public:
   static constexpr std::size_t kMost_bytes = std::size_t{256} << 20;
   using Load = std::function<std::vector<Track>(std::vector<std::string>& problems)>;
 
-  /// @param share of the records, see excerpt_of(); 1: all. Of tracks too short to share, only some have a stretch.
+  /// @param share of the records, see excerpt_of(); 1: all. Of tracks too short to be split, only some contribute a
+  ///   stretch.
   explicit TrackStore(double share, std::size_t most_bytes = kMost_bytes)
       : share_(share), most_bytes_(most_bytes) {}
 
-  /// The tracks of `flight`, from memory or from `load`, which must be the same for the same flight. `problems` gets
-  /// what `load` had to say.
+  /// Returns the tracks of `flight` from memory or from `load`, which must give the same result for the same flight.
+  /// `problems` receives the messages of `load`.
   std::vector<Track> tracks(const FlightFiles& flight, const Load& load, std::vector<std::string>& problems);
 
  private:

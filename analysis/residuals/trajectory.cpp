@@ -16,7 +16,7 @@ struct Piece {
   std::size_t first, last;
 };
 
-/// Near its set point and nearly level: a flight that is being saved starts no simulation.
+/// Returns true near the setpoint and nearly level: a simulation must not start while a flight is being recovered.
 bool is_calm(const Track& track, std::size_t i) {
   constexpr double kNear_m = 0.1, kNear_m_s = 0.5, kLevel = 0.94;  // cosine of 20 degrees
   const stability::Instant& now = track.instants[i];
@@ -45,14 +45,15 @@ std::vector<Piece> pieces_of(const Track& track) {
   return pieces;
 }
 
-/// The log's set points between its records; the acceleration is the slope of the velocity over seven records.
+/// The log's setpoints, interpolated between its records; the acceleration is the slope of the velocity over seven
+/// records.
 class LoggedTask : public stability::Task {
  public:
   LoggedTask(const Track& track, Piece piece) : track_(track), piece_(piece) {}
 
   stability::Setpoint at(int vehicle, double time_s) const override {
     stability::Setpoint setpoint;
-    if (vehicle != 0) return setpoint;  // neighbours are moved by hand
+    if (vehicle != 0) return setpoint;  // neighbours are moved manually
     const double now_s = start_s() + time_s;
     while (at_ + 1 < piece_.last && track_.instants[at_ + 1].time_s <= now_s) ++at_;
     while (at_ > piece_.first && track_.instants[at_].time_s > now_s) --at_;
@@ -71,7 +72,7 @@ class LoggedTask : public stability::Task {
   double duration_s() const override { return track_.instants[piece_.last].time_s - start_s(); }
 
   double start_s() const { return track_.instants[piece_.first].time_s; }
-  /// The record at or before the time of the last at().
+  /// Returns the record at or before the time of the last at().
   std::size_t record() const { return at_; }
 
  private:
@@ -121,7 +122,7 @@ void place_neighbours(const Track& track, std::size_t record, double time_s, sta
       x[stability::kPosition + axis] = p[axis];
       x[stability::kVelocity + axis] = other.v_W_m_s[axis];
     }
-    loop.input(j + 1).resting = true;  // keeps it where it is during the period
+    loop.input(j + 1).resting = true;  // keeps it in place during the period
   }
 }
 
@@ -146,14 +147,14 @@ struct Run {
   bool diverged = false;
 };
 
-/// @param residual_N pushes the vehicle, unless nullptr.
+/// @param residual_N force applied to the vehicle; nullptr: none
 void fly_piece(const stability::Model& model, const stability::Gains& gains, const Kinds& kinds,
                const Track& track, Piece piece, const std::vector<Eigen::Vector3d>* residual_N, Run& run) {
   constexpr double kLost_m = 5;
   stability::Swarm swarm = make_swarm(model, kinds, track, piece.first);
   const LoggedTask task(track, piece);
   stability::SampledFlightOptions options;
-  options.ground_m = 0;  // where the log ends in contact, so does the piece
+  options.ground_m = 0;  // the piece ends where the log ends in contact
   const double start_V = track.instants[piece.first].battery_V, end_V = track.instants[piece.last].battery_V;
   options.battery_start_V = start_V;
   options.battery_drop_V_s = std::max(0.0, (start_V - end_V) / task.duration_s());
@@ -167,7 +168,7 @@ void fly_piece(const stability::Model& model, const stability::Gains& gains, con
     place_neighbours(track, record, time_s, loop);
     if (residual_N != nullptr) loop.input(0).disturbance_W_N = (*residual_N)[record];
     loop.step();
-    // Judged once per record, at the first control period that reaches its time.
+    // Judge each record once, at the first control period that reaches its time.
     while (judged < piece.last && track.instants[judged + 1].time_s <= task.start_s() + loop.time_s()) {
       ++judged;
       const double since_s = task.start_s() + loop.time_s() - track.instants[judged].time_s;

@@ -1,9 +1,9 @@
-/// @file The second level of a comparison: the closed loop of model and gains follows the log's set points, among
-/// neighbours that fly as they were logged, and its positions are held against the measured ones.
+/// @file Second level of a comparison: simulates the closed loop of model and gains along the log's setpoints, among
+///   neighbours that fly as logged, and compares its positions with the measured ones.
 ///
-/// A second run also pushes the vehicle with the force residual that the log shows. What it still misses of the
-/// measured peaks is no force of the residual but the loop: gains, estimator, saturation. The ratio of measured to
-/// replayed peaks is the factor by which a bound from residuals has to be widened to hold on these flights.
+/// A second run also applies the logged force residual to the vehicle. Measured peaks that it still misses are caused
+/// not by the residual force but by the loop: gains, estimator, saturation. The ratio of measured to replayed peaks is
+/// the factor by which a bound derived from residuals must be widened to hold on these flights.
 #pragma once
 
 #include <string>
@@ -19,28 +19,28 @@ namespace swarmcert::residuals {
 /// Position errors of one vehicle in one flight, in metres.
 struct TrajectoryErrors {
   static constexpr double kSettle_s =
-      2;  ///< not judged at the start of a piece: the integrator starts at zero
-  static constexpr double kShortest_s = 5;  ///< pieces that are shorter are left out
+      2;  ///< not judged at the start of a piece, because the integrator starts at zero
+  static constexpr double kShortest_s = 5;  ///< shorter pieces are skipped
 
-  std::string refused;    ///< why there is nothing; else empty
-  double seconds = 0;     ///< judged
-  int pieces = 0;         ///< uninterrupted stretches of used records with set points, from a calm moment on
-  bool diverged = false;  ///< turned over, or 5 m away
-  Axes rmse, max;         ///< simulated minus measured position
-  Axes measured_rms, measured_max;    ///< measured position minus set point
-  Axes simulated_rms, simulated_max;  ///< the same in the simulation
-  Axes replayed_max;                  ///< and in the simulation with the residual as force
+  std::string refused;  ///< why there is no result; otherwise empty
+  double seconds = 0;   ///< of judged flight
+  int pieces = 0;  ///< uninterrupted stretches of used records with setpoints, each from a calm instant on
+  bool diverged = false;              ///< the vehicle turned over or was 5 m away
+  Axes rmse, max;                     ///< simulated minus measured position
+  Axes measured_rms, measured_max;    ///< measured position minus setpoint
+  Axes simulated_rms, simulated_max;  ///< the same in simulation
+  Axes replayed_max;                  ///< in simulation with the residual applied as a force
 };
 
-/// `model` with the motor lag and the delay of gains.toml where it names none: what is flown, and whose residual is
-/// replayed. A lag that the loop has may not be in the force as well.
+/// Returns `model` with the motor lag and delay of gains.toml if it has none of its own. It is used both for the
+/// simulation and for the replayed residual, because a lag in the loop must not appear in the force as well.
 stability::Model with_lag(stability::Model model, const stability::Gains& gains);
 
-/// Flies every piece of a track: from the measured state, sampled loop (stability/simulation/sampled_flight.h) without
-/// noise.
-/// @param model      with_lag().
-/// @param residual_N force residual of `model`, one per record.
-/// @param kinds      models of the neighbours are made from it: mass and kind.
+/// Simulates each piece of a track from the measured state, with the sampled loop
+/// (stability/simulation/sampled_flight.h) and without noise.
+/// @param model      result of with_lag()
+/// @param residual_N force residual of `model`, one per record
+/// @param kinds      kinds and masses from which the models of the neighbours are made
 TrajectoryErrors fly_along(const stability::Model& model, const stability::Gains& gains, const Kinds& kinds,
                            const Track& track, const std::vector<Eigen::Vector3d>& residual_N);
 

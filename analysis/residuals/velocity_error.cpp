@@ -16,7 +16,7 @@ bool measures_velocity(const logs::Log& log) {
 }
 
 std::vector<Eigen::Vector3d> velocity_error(const Track& track) {
-  // The slope of a velocity: the difference of both, taken before the fit, has little to average away.
+  // Fitting the difference of position and integrated velocity leaves only a small signal for the window to average.
   SmoothingWindow window(logs::ForceSource::kVelocity, kSlopeWindow_s, 1);
   std::vector<Eigen::Vector3d> errors;
   Eigen::Vector3d flown = Eigen::Vector3d::Zero();
