@@ -8,7 +8,7 @@
 namespace swarmcert::identification {
 namespace {
 
-/// All candidates along a track, block by block.
+/// Adds all candidates along a track, block by block.
 void add_track(const Passes& passes, const ModelledTrack& track, const Grams& grams, const Noise* noise,
                int flight, FlightPart& part) {
   const int number = part.tracks++;

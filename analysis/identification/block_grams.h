@@ -1,8 +1,8 @@
-/// @file Flights condensed to Gram matrices, from which any set of effects is fitted and cross-validated quickly.
+/// @file Condenses flights to Gram matrices, from which any set of effects is fitted and cross-validated quickly.
 ///
-/// Over each block of 2 s, with columns X of all candidates and thetas behind the accelerometer's filter, and the
-/// residual r of the model at hand (three axes stacked, newton): G = X'X, b = X'r, y = r'r. A coefficient vector c
-/// leaves y - 2 c'b + c'Gc.
+/// For each block of 2 s, X holds the columns of all candidates and thetas after the accelerometer's filter, and r is
+/// the residual of the current model (three axes stacked, newton): G = X'X, b = X'r, y = r'r. A coefficient vector c
+/// leaves the squared error y - 2 c'b + c'Gc.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,20 +17,20 @@ namespace swarmcert::identification {
 struct Passes;
 
 struct Block {
-  Eigen::VectorXd gram;  ///< packed upper triangle of G, column by column
+  Eigen::VectorXd gram;  ///< packed upper triangle of G by columns
   Eigen::VectorXd b;
   double y = 0;
   int records = 0;
   int flight = 0;              ///< index into Inputs::found.flights
   int track = 0;               ///< counts the vehicles of all flights
-  Eigen::Matrix3Xd sums = {};  ///< [3 x columns + 1]: of the columns over the records, and of the residual
-  bool follows = false;        ///< directly after the block before it, of the same vehicle
+  Eigen::Matrix3Xd sums = {};  ///< [3 x columns + 1]: of the columns and of the residual, over the records
+  bool follows = false;        ///< directly follows the previous block of the same vehicle
 };
 
-/// Support of one candidate with one theta: where the effect, if it exists, acts.
+/// Support of a candidate with one theta: where the effect would act if it existed.
 struct Support {
   std::size_t records = 0;
-  std::size_t blocks = 0;  ///< with at least a twentieth of their records in support
+  std::size_t blocks = 0;  ///< with at least a twentieth of their records in the support
   int flights = 0;         ///< with such a block
 };
 
@@ -41,30 +41,30 @@ struct Grams {
   int columns = 0;
   std::vector<Block> blocks;
 
-  /// Place of element (i, j) in Block::gram.
+  /// Index of element (i, j) in Block::gram.
   static Eigen::Index packed(int i, int j) {
     return i <= j ? Eigen::Index(j) * (j + 1) / 2 + i : packed(j, i);
   }
 };
 
-/// Effective number of blocks for a candidate's coefficients (Kish): (sum h)^2 / sum h^2 with h the energy of its
-/// columns in each block.
+/// Returns the effective number of blocks for a candidate's coefficients (Kish): (sum h)^2 / sum h^2, where h is the
+/// energy of its columns in each block.
 double telling_blocks(const Grams& grams, std::size_t candidate, std::size_t theta);
 
-/// Rows and columns `columns` of a packed Gram matrix; elements `columns` of a vector.
+/// Selects rows and columns `columns` of a packed Gram matrix, and elements `columns` of a vector.
 Eigen::MatrixXd part_of_gram(const Eigen::VectorXd& packed, const std::vector<int>& columns);
 Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& columns);
 
-/// The columns of `candidates`, without any flight.
+/// Returns the columns of `candidates` without any flight.
 Grams columns_of(std::vector<Candidate> candidates);
 
-/// Whether the columns of a pass are asked for again later on, so that Passes::memory keeps them.
+/// Whether the columns of a pass will be requested again, so that Passes::memory should keep them.
 enum class Kept { kNo, kYes };
 
-/// Condenses flights. The result does not depend on the number of threads.
+/// Condenses the flights. The result does not depend on the number of threads.
 Grams block_grams(const Passes& passes, std::vector<Candidate> candidates, Kept kept = Kept::kNo);
 
-/// As block_grams(), of columns and a residual that are whitened.
+/// Like block_grams() for whitened columns and a whitened residual.
 Grams whitened_grams(const Passes& passes, std::vector<Candidate> candidates, const Noise& noise);
 
 }  // namespace swarmcert::identification

@@ -8,10 +8,10 @@ namespace swarmcert::identification {
 
 namespace {
 
-/// Counts where the effects of a run act, block by block.
+/// Counts per block where the effects of a run act.
 class SupportCount {
  public:
-  /// @param support gets what close() finds; must outlive this.
+  /// @param support receives the results of close(); must outlive this object
   SupportCount(const TrackBlocks& cut, std::vector<Support>& support)
       : cut_(cut), support_(support), records_(support.size()) {}
 
@@ -21,7 +21,7 @@ class SupportCount {
     run.count_support(now, records_);
   }
 
-  /// Ends the block.
+  /// Finishes the block.
   void close() {
     if (current_ < 0) return;
     for (std::size_t s = 0; s < records_.size(); ++s) {

@@ -8,7 +8,7 @@
 namespace swarmcert::identification {
 namespace {
 
-/// Coefficients at their bounds stay there; sets the free ones to the minimum over them.
+/// Keeps coefficients at their bounds fixed and minimises over the free ones.
 void solve_free(const Eigen::MatrixXd& gram, const Eigen::VectorXd& b, const std::vector<int>& state,
                 const std::vector<int>& free, Eigen::VectorXd& c) {
   if (free.empty()) return;

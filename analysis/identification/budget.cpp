@@ -42,15 +42,15 @@ void set_mass(Inputs& inputs, const std::string& kind, double mass_kg) {
   }
 }
 
-/// Vertical error of the vehicles of `kind`; infinite where there are none.
+/// Returns the vertical error of the vehicles of `kind`; infinite if there are none.
 double error_N(const Inputs& inputs, const std::string& kind, int jobs) {
   const BudgetRow row = judged("nominal", inputs, jobs);
   const auto found = row.of.find("kind " + kind);
   return found == row.of.end() ? INFINITY : found->second.rmse.z;
 }
 
-/// Gives each kind that was published the published mass, where it leaves less vertical residual on the flights that
-/// are fitted than its model's.
+/// Assigns the published mass to each published kind for which it gives a smaller vertical residual on the fit flights
+/// than the mass of its model.
 void choose_masses(Inputs& fit, Inputs& test, int jobs) {
   for (const Model& model : std::vector<Model>(fit.models)) {
     const residuals::PublishedVehicle* const published = residuals::published_vehicle(model.kind);
@@ -62,7 +62,7 @@ void choose_masses(Inputs& fit, Inputs& test, int jobs) {
   }
 }
 
-/// Vehicles of `kind` in `inputs`.
+/// Returns the vehicles of `kind` in `inputs`.
 std::set<std::string> vehicles_of(const Inputs& inputs, const std::string& kind) {
   std::set<std::string> names;
   for (const residuals::FlightFiles& flight : inputs.found.flights) {
@@ -90,7 +90,7 @@ std::vector<Stage> all_stages() {
           {"rest", everything, true}};
 }
 
-/// Gives the vehicles of the model's kind in `inputs` the model with what `joint` says of the stage's effects.
+/// Gives the vehicles of the model's kind in `inputs` the model with the fitted values of the stage's effects.
 void apply(const Stage& stage, const KindFit& joint, const Model& model, Inputs& inputs) {
   for (const std::string& vehicle : vehicles_of(inputs, model.kind)) {
     Model own = model;
@@ -102,7 +102,7 @@ void apply(const Stage& stage, const KindFit& joint, const Model& model, Inputs&
   }
 }
 
-/// The model of every kind is the learned force alone, with the mass that the network was trained with.
+/// Makes the model of each kind consist of the learned force alone, with the mass used to train the network.
 Inputs with_network(Inputs inputs, const std::string& network) {
   inputs.rules.published_signals = true;
   for (Model& model : inputs.models) {

@@ -1,8 +1,9 @@
-/// @file The error budget: how the error of flights falls from the nominal model to one with all known effects.
+/// @file The error budget: how the error in flight falls from the nominal model to one with all known effects.
 ///
-/// Rows add up: nominal, motor lag, a constant force per vehicle, ground, downwash, the rest. Coefficients and shapes
-/// are fitted jointly, on flights that the rows are not judged on: once for the rows up to downwash, once with the
-/// rest. Fitted one after the other, an offset would take what belongs to the downwash.
+/// The rows are cumulative: nominal, motor lag, a constant force per vehicle, ground effect, downwash, the rest.
+/// Coefficients and shapes are fitted jointly, on flights that are not used to evaluate the rows: once for the rows up
+/// to downwash and once with the rest. If they were fitted one after the other, an offset would absorb part of the
+/// downwash.
 #pragma once
 
 #include <map>
@@ -23,15 +24,16 @@ struct BudgetRow {
 struct Budget {
   std::vector<BudgetRow> rows;                     ///< the last may be "network"
   std::map<std::string, double> masses_kg;         ///< of the nominal models, by kind
-  std::map<std::string, stability::Model> fitted;  ///< with everything, by vehicle
+  std::map<std::string, stability::Model> fitted;  ///< with all effects, by vehicle
   std::size_t fit_flights = 0, test_flights = 0;
 };
 
-/// @param fit, test Inputs with the same models. Kinds of published vehicles are tried with their model's mass and with
-///                  the published one (published_vehicle()); the one that is better on `fit` is nominal. `test` is
-///                  judged and chooses nothing.
+/// Computes the budget.
+/// @param fit, test Inputs with the same models. For published kinds, both the mass of the model and the published mass
+///   (published_vehicle()) are tried; the one with the smaller error on `fit` is nominal. `test` is only evaluated and
+///   never used for a choice.
 /// @param network   a learned force for one more row, with the authors' masses, thrust lag and unfiltered acceleration,
-///                  on the same records; empty: none.
+///   on the same records; empty: none
 Budget error_budget(const residuals::Inputs& fit, const residuals::Inputs& test, const std::string& network,
                     int jobs, const residuals::Progress& progress);
 

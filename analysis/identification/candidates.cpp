@@ -34,7 +34,7 @@ EffectInfo info_of(const EffectSpec& spec, const std::string& path) {
   return stability::make_effect(spec, {"", {}, path})->info();
 }
 
-/// The candidate is what changes: bounds of the change, and the shape that the model has.
+/// Turns the candidate into a change of `present`: bounds of the change, and the shape in the model.
 void make_change(Candidate& candidate, const EffectSpec& present) {
   const stability::EffectValues values = stability::effect_values(candidate.info, present);
   candidate.thetas = {values.shape};
@@ -48,8 +48,8 @@ void make_change(Candidate& candidate, const EffectSpec& present) {
   }
 }
 
-/// A ceiling that decays over more than half of the heights of a flight acts about equally on all of it: a scale of the
-/// thrust, which differs from flight to flight as their heights do, says the same without one.
+/// Excludes ceilings that decay over more than half of the height range of a flight: they act almost uniformly, so a
+/// thrust scale that differs between flights, as their heights do, explains the same without a ceiling.
 void hold_within_flights(Candidate& ceiling, double height_span_m) {
   constexpr double kDecays = 2;
   for (std::size_t i = 0; i < ceiling.info.shape.size(); ++i) {
@@ -177,7 +177,7 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
   result.info = info_of(result.spec, model.path);
   result.thetas = stability::make_effect(result.spec, {"", {}, model.path})->grid(coverage.range);
   if (result.info.remembers) {
-    // A lag or delay has gain 1. Some freedom lets a coarse grid of times find it.
+    // A lag or delay has gain 1. Some tolerance lets a coarse grid of times find it.
     result.info.linear[0].lower = 1 - kMemoryTolerance;
     result.info.linear[0].upper = 1 + kMemoryTolerance;
   }
@@ -229,11 +229,11 @@ std::vector<Candidate> all_candidates(const stability::Model& model, const Cover
   for (const std::string& name : candidate_names(model)) {
     if (name == kVehicleOffset && coverage.vehicles.size() < 2) continue;
     if (is_taken(name, model)) continue;
-    // Of those that the model has already, what is missing of them.
+    // Effects that the model already has may still need a change.
     if ((needs_scan(name) || name == kPendulum) && find(model, name) == nullptr) continue;
     Candidate next = candidate(name, model, coverage);
     if (next.info.needs_neighbours && coverage.most_neighbours == 0) continue;
-    // Nobody has felt the ground from higher up.
+    // No ground effect is measurable higher up.
     if (name == "ground" && coverage.range.z_min_m > kGroundReach_m) continue;
     if (name == "ceiling") hold_within_flights(next, coverage.height_span_m);
     if (next.thetas.empty()) continue;
@@ -279,8 +279,8 @@ stability::Model with_effects(const stability::Model& model, const std::vector<E
       result.effects.push_back(spec);
       continue;
     }
-    // candidate() kept the shape, or the coefficients were zero: c1 X + c2 X = (c1 + c2) X; the intervals are those of
-    // the addition.
+    // candidate() kept the shape, or the coefficients were zero, so c1 X + c2 X = (c1 + c2) X; the intervals are those
+    // of the change.
     const EffectInfo info = info_of(*known, model.path);
     const stability::EffectValues values = stability::effect_values(info, *known);
     for (std::size_t c = 0; c < info.linear.size(); ++c) {

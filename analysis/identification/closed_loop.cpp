@@ -10,18 +10,19 @@
 namespace swarmcert::identification {
 namespace {
 
-/// Where there are more records, thetas off the grid do not take part in a second selection.
+/// With more records, thetas off the grid are not used in a second selection.
 constexpr std::size_t kManyRecords = 400'000;
 
-/// A lag or delay that takes little away, of which set points, though too weak to tell its size, show nothing and say
-/// less than least squares do by more than chance: thrust answers what disturbs the vehicle, which looks like a lag.
+/// Returns true for a lag or delay that removes little, and for which the setpoints, although too weak to determine its
+/// size, show nothing and significantly less than least squares: the reaction of thrust to disturbances looks like a
+/// lag.
 bool is_unseen_lag(const Refined& refined, const InstrumentedValue& check, double loss) {
   constexpr double kLittle = 0.1, kBeyondChance_z = 2;
   return refined.candidate.info.remembers && loss < kLittle && check.difference_z < -kBeyondChance_z &&
          check.interval.lower <= 0;
 }
 
-/// Index of the first effect that is only the controller's answer to something else; -1 if none.
+/// Returns the index of the first effect that is only an artefact of the controller's reaction; -1 if none.
 int contradicted(const Selection& selection, const Members& members, const std::vector<Refined>& refined,
                  const std::vector<std::vector<InstrumentedValue>>& checks) {
   for (std::size_t i = 0; i < checks.size(); ++i) {
@@ -33,7 +34,8 @@ int contradicted(const Selection& selection, const Members& members, const std::
   return -1;
 }
 
-/// A scale of the thrust beside a constant vertical force, of which set points do not say the same as least squares.
+/// Returns true if a thrust scale is selected beside a constant vertical force and the setpoints do not confirm the
+/// least squares estimate.
 bool has_doubtful_slope(const std::vector<Refined>& refined,
                         const std::vector<std::vector<InstrumentedValue>>& checks) {
   constexpr double kSurely_z = 3;
@@ -52,7 +54,7 @@ bool is_vertical_push(const stability::Parameter& parameter) {
   return name.size() >= kEnd.size() && name.compare(name.size() - kEnd.size(), kEnd.size(), kEnd) == 0;
 }
 
-/// Leaves the constant forces of `candidates` no vertical part.
+/// Removes the vertical component from the constant forces of `candidates`.
 void hold_vertical_push(std::vector<Candidate>& candidates) {
   for (Candidate& candidate : candidates) {
     if (candidate.name != "constant_force") continue;
@@ -62,13 +64,14 @@ void hold_vertical_push(std::vector<Candidate>& candidates) {
   }
 }
 
-/// Thrust answers whatever disturbs the vehicle: what its history seems to do needs another witness.
+/// Returns true for effects of the thrust. Thrust reacts to all disturbances, so effects of its history need
+/// confirmation.
 bool is_of_thrust(const Candidate& candidate) {
   const std::string& name = candidate.name;
   return candidate.info.remembers || is_scale(name) || is_of_load(name) || name == "inflow";
 }
 
-/// The instrument says the same of the effect's coefficient.
+/// Returns true if the instrument confirms the effect's coefficient.
 bool is_confirmed(const std::vector<InstrumentedValue>& check) {
   constexpr double kAlike = 0.25;
   return std::all_of(check.begin(), check.end(), [](const InstrumentedValue& value) {
@@ -152,10 +155,10 @@ Selected select(const Passes& passes, std::vector<Candidate> candidates,
   return result;
 }
 
-/// What of the mean square a scale of the thrust leaves where thrust answers all that is left, against what a constant
-/// force leaves, whichever of the two is true. A disturbance d beside a constant force F makes the thrust
-/// T = m g - F - d; the scale 1 + e that gives F in the mean leaves F + d - e T = (1 + e) d. At least 1: where both
-/// leave the same, the scale stands.
+/// Returns the ratio of the mean square left by a thrust scale to that left by a constant force if the thrust reacts to
+/// the whole remainder; it is the same whichever of the two is true. A disturbance d beside a constant force F makes
+/// the thrust T = m g - F - d; the scale 1 + e that equals F on average leaves F + d - e T = (1 + e) d. At least 1: if
+/// both leave the same, the scale is chosen.
 double feedback_share(const Selected& scale) {
   for (const Refined& effect : scale.refined) {
     if (effect.candidate.name != "thrust_ratio") continue;
@@ -199,7 +202,7 @@ Selected without_slope(const Passes& passes, std::vector<Candidate> candidates,
 
 std::set<std::string> suspects(const Selected& selected) {
   constexpr double kShare = 0.1;
-  // What halves the error is no part of a remainder that is a quarter of it.
+  // An effect that removes three quarters of the mean square is not part of the remaining quarter.
   constexpr double kPlain = 0.75;
   const Selection selection(selected.grams);
   std::set<std::string> names;
@@ -207,7 +210,7 @@ std::set<std::string> suspects(const Selected& selected) {
     const Candidate& candidate = selected.refined[i].candidate;
     const double loss = selection.loss_without(selected.members, i);
     if (loss >= kPlain) continue;
-    // Without set points a lag has no other witness than its size. A scale has its rivals, see without_slope().
+    // Without setpoints a lag can be confirmed only by its size. A scale has its rivals, see without_slope().
     const bool has_check = !selected.checks.empty();
     const bool unconfirmed = is_of_thrust(candidate) &&
                              (has_check ? !is_confirmed(selected.checks[i]) : !candidate.info.remembers);
@@ -238,7 +241,7 @@ std::set<std::string> with_substitutes(std::set<std::string> names, const std::v
 }
 
 std::set<std::string> substitutes_of_scales(const Selected& selected) {
-  constexpr double kAlike = 0.9;  // of the square of the scale's column
+  constexpr double kAlike = 0.9;  // of the squared norm of the scale's column
   const Grams& grams = selected.grams;
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(Eigen::Index(grams.columns) * (grams.columns + 1) / 2);
   for (const Block& block : grams.blocks) sum += block.gram;

@@ -1,5 +1,5 @@
-/// @file Selection under closed-loop bias: removes effects that only the feedback
-/// explains, and groups effects that set points cannot distinguish.
+/// @file Selection under closed-loop bias: removes effects that are artefacts of feedback, and groups effects that
+///   setpoints cannot distinguish.
 #pragma once
 
 #include <set>
@@ -10,62 +10,64 @@
 
 namespace swarmcert::identification {
 
-/// What selection leaves: which effects, with which thetas.
+/// Result of a selection: effects and their thetas.
 struct Selected {
   Grams grams;
   Members members;
-  std::vector<Refined> refined;                        ///< of `members`, in their order
-  std::vector<std::vector<InstrumentedValue>> checks;  ///< likewise; empty where there is no check
-  std::vector<std::string> contradicted;               ///< what the instrument took out
-  /// What could stand in the place of the scale of the thrust, or of the constant force, see without_slope().
+  std::vector<Refined> refined;                        ///< of `members`, in the same order
+  std::vector<std::vector<InstrumentedValue>> checks;  ///< likewise; empty if no check is possible
+  std::vector<std::string> contradicted;               ///< effects removed by the instrument
+  /// Possible alternative to the thrust scale or the constant force, see without_slope().
   std::string instead;
 };
 
-/// Selects on the grid, refines, and selects again with the refined thetas among the others, so that what a coarse
-/// theta left does not count as another effect. Effects that the instrument contradicts are taken out.
-/// @param names where selection begins
+/// Selects on the grid, refines, and selects again with the refined thetas added, so that the error of a coarse theta
+/// is not attributed to another effect. Effects that the instrument contradicts are removed.
+/// @param names effects with which the selection begins
 Selected select(const Passes& passes, std::vector<Candidate> candidates,
                 const std::vector<std::string>& names = {});
 
-/// As select(), with no scale of the thrust beside a constant vertical force.
+/// Like select(), but never combines a thrust scale with a constant vertical force.
 ///
-/// Thrust that answers disturbances gives the force a slope over thrust that is not there, and a constant force beside
-/// it the intercept. Where set points do not confirm that slope, flights tell of a scale of the thrust alone or of a
-/// constant force alone: the one that leaves less, once the thrust's answer is taken off, and the scale, which is one
-/// number, where both leave about the same.
-/// The other is Selected::instead where it explains at least half as much: least squares favour neither fairly.
-/// @param contradicted begins Selected::contradicted.
+/// Thrust that reacts to disturbances creates an apparent slope of the force over the thrust, and a constant force
+/// beside it absorbs the intercept. If setpoints do not confirm the slope, either a thrust scale or a constant force is
+/// selected: the one with the smaller error after the reaction of the thrust is removed, or the scale, which has a
+/// single coefficient, if both errors are about equal.
+/// The other one becomes Selected::instead if it explains at least half as much, because least squares are biased in
+/// both cases.
+/// @param contradicted initial entries of Selected::contradicted
 Selected without_slope(const Passes& passes, std::vector<Candidate> candidates,
                        std::vector<std::string> contradicted);
 
-/// `effects` for instrument(): the gain of a lag is free, because that is what the check is about.
+/// Returns `effects` as candidates for instrument(): the gain of a lag is free, because it is what the check is about.
 std::vector<Candidate> candidates_of(const std::vector<Refined>& effects);
 
-/// thrust_ratio or battery: a scale of the thrust.
+/// Returns true for thrust_ratio and battery, which scale the thrust.
 bool is_scale(const std::string& effect);
 
-/// voltage_sag or thrust_saturation: thrust that is missing where much is asked for.
+/// Returns true for voltage_sag and thrust_saturation, which reduce high thrust.
 bool is_of_load(const std::string& effect);
 
-/// True where `effects` have a constant vertical force.
+/// Returns true if `effects` include a constant vertical force.
 bool has_vertical_push(const std::vector<Refined>& effects);
 
-/// Names of selected effects that are no match for a large unexplained residual, see Diagnosis::suspected.
+/// Returns the names of selected effects that are too small beside a large unexplained residual, see
+/// Diagnosis::suspected.
 std::set<std::string> suspects(const Selected& selected);
 
-/// Names of is_of_load() that set points do not confirm: where flights differ in how much thrust the same weight takes,
-/// whatever makes them differ looks like thrust that is missing where much is asked for.
+/// Returns the names of effects of is_of_load() that setpoints do not confirm: if the thrust needed to carry the weight
+/// differs between flights for any reason, that looks like a loss of high thrust.
 std::set<std::string> unconfirmed_loads(const Selected& selected);
 
-/// `names` with those that would only take the place of one that is too doubtful: for a scale one that follows the
-/// battery, for a lag or delay the others. What is in `selected` is no substitute.
+/// Returns `names` plus those effects that would merely replace a doubtful one: for a scale the one that follows the
+/// battery, for a lag or delay the other lags and delays. Effects in `selected` are not added.
 std::set<std::string> with_substitutes(std::set<std::string> names, const std::vector<Refined>& selected);
 
-/// Takes candidates of these names out.
+/// Removes candidates with these names.
 void erase(std::vector<Candidate>& candidates, const std::set<std::string>& names);
 
-/// Formulas that say what a scale of the thrust beside them says: with an offset, where thrust hardly varies. The
-/// number of the scale would be any that the formula then takes back.
+/// Returns the formulas that, with an offset, are equivalent to a thrust scale beside them because the thrust hardly
+/// varies. The coefficient of the scale would be arbitrary, since the formula could compensate for it.
 std::set<std::string> substitutes_of_scales(const Selected& selected);
 
 }  // namespace swarmcert::identification

@@ -13,7 +13,7 @@
 namespace swarmcert::identification {
 namespace {
 
-/// Names an effect with one theta: equal where the columns are.
+/// Returns a key of an effect with one theta: equal keys have equal columns.
 std::string key_of(const Candidate& candidate, const std::vector<double>& theta) {
   const stability::EffectSpec& spec = candidate.spec;
   std::string key = fmt::format("{}\n{}\n{:a}\n", spec.name, spec.network, candidate.scale);
@@ -25,7 +25,7 @@ std::string key_of(const Candidate& candidate, const std::vector<double>& theta)
   return key;
 }
 
-/// Coefficients of each vehicle of its own are one column each, zero for the others.
+/// Returns the candidate for one vehicle: each of its own coefficients becomes one column, zero for the other vehicles.
 Candidate of_one_vehicle(const Candidate& candidate) {
   Candidate result = candidate;
   if (result.vehicles.empty()) return result;
@@ -34,7 +34,8 @@ Candidate of_one_vehicle(const Candidate& candidate) {
   return result;
 }
 
-/// The block with columns of its kept ones, without the number of its records. @param source which; -1: zero
+/// Returns the block with columns taken from the kept ones, without the number of its records.
+/// @param source index of the kept column; -1: zero
 Block gathered(const KeptBlock& kept, const std::vector<int>& source) {
   const auto n = static_cast<Eigen::Index>(source.size());
   Block block;
@@ -51,7 +52,7 @@ Block gathered(const KeptBlock& kept, const std::vector<int>& source) {
         ++i;
         continue;
       }
-      std::size_t end = i + 1;  // of a run of columns that lie side by side
+      std::size_t end = i + 1;  // of a run of consecutive columns
       while (end <= j && source[end] == source[end - 1] + 1 && source[end] <= source[j]) ++end;
       std::copy(column + source[i], column + source[end - 1] + 1, to + i);
       i = end;
@@ -64,7 +65,8 @@ Block gathered(const KeptBlock& kept, const std::vector<int>& source) {
   return block;
 }
 
-/// Columns side by side. @param source which; -1: zero
+/// Copies columns into a matrix.
+/// @param source index of the column; -1: zero
 Eigen::MatrixXd assembled(Eigen::Index rows, const std::vector<const double*>& columns,
                           const std::vector<int>& source) {
   Eigen::MatrixXd result(rows, static_cast<Eigen::Index>(source.size()));
@@ -93,7 +95,8 @@ KeptTrack kept_track(ModelledTrack track) {
   return kept;
 }
 
-/// Keeps further columns. @param fresh columns_along() the track
+/// Keeps further columns.
+/// @param fresh columns_along() the track
 void append(Eigen::MatrixXd fresh, KeptTrack& track) {
   const Eigen::Index more = fresh.cols();
   for (std::size_t at = 0; at < track.blocks.size(); ++at) {
@@ -139,23 +142,23 @@ std::string text_of(const std::vector<Candidate>& candidates) {
   return text;
 }
 
-/// What is asked for, by candidate and theta, in the order of Grams::support.
+/// The requested columns, by candidate and theta in the order of Grams::support.
 struct ColumnMemory::Request {
   /// An effect with one theta whose columns are not kept.
   struct More {
     std::string key;
     int columns;
-    bool is_new;     ///< to be made in this pass
-    Recent* recent;  ///< where they are, or are to be; null: nowhere
+    bool is_new;     ///< to be computed in this pass
+    Recent* recent;  ///< where they are or will be stored; null: nowhere
   };
   std::vector<std::string> keys;
-  std::vector<int> first;  ///< column among the kept ones, followed by those of `more`
+  std::vector<int> first;  ///< index among the kept columns, followed by those of `more`
   std::vector<More> more;
   int more_columns = 0;
-  Grams fresh;  ///< what is new, in the order of `more`
+  Grams fresh;  ///< new columns, in the order of `more`
   bool keeps = false;
 
-  /// Column among the kept ones and `more` by column of `asked`; -1: zero.
+  /// Returns the index among the kept columns and `more` for each column of `asked`; -1: zero.
   std::vector<int> sources(const Grams& asked, const std::string& vehicle) const {
     std::vector<int> source(static_cast<std::size_t>(asked.columns), -1);
     std::size_t stream = 0;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kBlock_s = 2, kPurge_s = 0.15, kLongestPause_s = 0.5;
 constexpr int kFewestRecords = 40;
-constexpr std::size_t kAtOnce = 32;  ///< records that effects take in a row
+constexpr std::size_t kAtOnce = 32;  ///< records per call to an effect
 
 }  // namespace
 
@@ -69,7 +69,7 @@ void ColumnRun::advance(const stability::Instant* instants, int count) {
       for (int c = 0; c < s.columns; ++c) values.col(s.first + c) = s.scale * (next++)->force_W_N;
     }
   }
-  // Columns of other vehicles' candidates are zero, and stay zero behind the filter.
+  // Columns of candidates of other vehicles are zero and remain zero after the filter.
   for (int i = 0; i < count && filtered_; ++i)
     measured_.apply(instants[i], values_[static_cast<std::size_t>(i)]);
 }

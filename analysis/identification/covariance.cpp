@@ -13,7 +13,7 @@ std::vector<int> every_column(Eigen::Index count) {
   return all;
 }
 
-/// Sum of the blocks' G over `free`, regularised.
+/// Returns the regularised sum of the blocks' G over `free`.
 Eigen::MatrixXd sum_of_grams(const std::vector<Block>& blocks, const std::vector<int>& free,
                              const Eigen::VectorXd& ridge) {
   const auto n = static_cast<Eigen::Index>(free.size());
@@ -54,7 +54,7 @@ Eigen::MatrixXd sandwich(const std::vector<Block>& blocks, const std::vector<int
 }
 
 double long_run_variance(const std::vector<double>& influences, const std::vector<char>& follows) {
-  constexpr double kMostCorrelation = 0.7;  // beyond it, blocks of this length tell nothing of the rest
+  constexpr double kMostCorrelation = 0.7;  // above it, blocks of this length are too short
   constexpr double kFewestPairs = 4;
   double squares = 0, products = 0, pairs = 0;
   for (std::size_t i = 0; i < influences.size(); ++i) {
@@ -75,7 +75,8 @@ Jackknife jackknife(const std::vector<Block>& blocks, const std::vector<int>& fr
   const std::vector<int> all = every_column(c.size());
   const Eigen::MatrixXd sum = sum_of_grams(blocks, free, ridge);
   const Eigen::MatrixXd inverse = sum.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-  // What one block alone determines stays determined by this much of it: without it, it would be infinitely uncertain.
+  // Limits the leverage of a block: without a block that alone determines a coefficient, the coefficient would be
+  // infinitely uncertain.
   constexpr double kOthers = 0.98;
   Eigen::VectorXd weights = Eigen::VectorXd::Zero(n), squared_weights = weights;
   std::vector<std::vector<double>> influences(free.size());

@@ -13,7 +13,7 @@
 namespace swarmcert::identification {
 namespace {
 
-/// Whole flights are left out where there are this many.
+/// With at least this many flights, whole flights are left out.
 constexpr std::size_t kFewestWholeFlights = 5;
 
 }  // namespace
@@ -29,7 +29,7 @@ Members with(Members members, const Member& added) {
 }
 
 CrossValidation::CrossValidation(const Grams& grams) : grams_(grams) {
-  // Random folds, equally many blocks in each.
+  // Random folds with equal numbers of blocks.
   std::mt19937_64 generator(1);
   std::vector<int>& fold = random_.of_block;
   for (std::size_t i = 0; i < grams.blocks.size(); ++i) fold.push_back(static_cast<int>(i % kFolds));
@@ -80,7 +80,8 @@ void CrossValidation::divide(Folds& folds) const {
   }
 }
 
-/// Whole flights, unless an effect was active in one flight only: left out, it could not be learned.
+/// Uses whole flights unless an effect was active in only one flight, because without it the effect could not be
+/// fitted.
 const CrossValidation::Folds& CrossValidation::folds_for(const Members& members) const {
   const bool by_flight = has_flights_ && std::all_of(members.begin(), members.end(), [&](const Member& m) {
                            return support(m).flights >= 2 && candidate(m).vehicles.empty();
@@ -137,7 +138,7 @@ Eigen::MatrixXd CrossValidation::from_model(const Members& members) const {
 
 Eigen::VectorXd CrossValidation::in_model(const Members& members, const Eigen::VectorXd& coefficients) const {
   if (coefficients.size() == 0) return coefficients;
-  // The inverse of I + N with N N = 0: no effect is a scale and a stage.
+  // The inverse of I + N with N N = 0, because no effect is both a scale and a stage.
   const Eigen::MatrixXd to = from_model(members);
   return 2 * coefficients - to * coefficients;
 }

@@ -1,4 +1,4 @@
-/// @file Fits of any set of effects, and their prediction of held-out blocks.
+/// @file Fits of arbitrary sets of effects, and their predictions of held-out blocks.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace swarmcert::identification {
 
-/// An effect with a theta of its grid.
+/// An effect with one theta of its grid.
 struct Member {
   int candidate = 0, theta = 0;
   bool operator==(const Member& other) const { return candidate == other.candidate && theta == other.theta; }
@@ -20,35 +20,38 @@ struct Member {
 };
 using Members = std::vector<Member>;
 
-/// `members` without the one at `index`; with `added` at the end.
+/// Returns `members` without the one at `index`, or with `added` at the end.
 Members without(Members members, std::size_t index);
 Members with(Members members, const Member& added);
 
-/// A fit on all blocks.
+/// A fit to all blocks.
 struct Fit {
   Eigen::VectorXd coefficients;
   Eigen::MatrixXd covariance;  ///< see sandwich()
 };
 
-/// What was predicted once is remembered: the passes of a selection ask for the same again. For one thread at a time.
+/// Fits and cross-validates sets of effects. Predictions are cached, because the passes of a selection request the same
+/// ones again. Not thread-safe.
 class CrossValidation {
  public:
-  /// @param grams must outlive this.
+  /// @param grams must outlive this object
   explicit CrossValidation(const Grams& grams);
 
-  /// Cross-validated mean square of the vector residual, N^2. Infinite if it cannot be fitted.
+  /// Returns the cross-validated mean square of the residual vector, N^2; infinite if the members cannot be fitted.
   double mean_square(const Members& members) const;
-  /// Cross-validated squared error of each block, N^2.
+  /// Returns the cross-validated squared error of each block, N^2.
   std::vector<double> block_errors(const Members& members) const;
-  /// Coefficients of the fits without one fold each.
+  /// Returns the coefficients of the fits that leave out one fold each.
   std::vector<Eigen::VectorXd> fold_coefficients(const Members& members) const;
-  /// Coefficients of the fit on all blocks, within their bounds: factors of the columns. Of a lag or delay beside a
-  /// thrust_ratio c that is its gain plus c, since the ratio acts on the thrust behind it: (1 + c) L T for a gain of 1.
+  /// Returns the coefficients of the fit to all blocks, within their bounds, as factors of the columns. For a lag or
+  /// delay beside a thrust_ratio c the coefficient is its gain plus c, because the ratio acts on the thrust after the
+  /// lag: (1 + c) L T for a gain of 1.
   Eigen::VectorXd coefficients(const Members& members) const;
   Fit fit(const Members& members) const;
-  /// `coefficients` as the model file has them: a lag or delay by its own gain.
+  /// Converts `coefficients` to those of the model file: a lag or delay has its own gain.
   Eigen::VectorXd in_model(const Members& members, const Eigen::VectorXd& coefficients) const;
-  /// Cluster-robust, of the last member, on the scale of one coefficient: comparable whatever its number of columns.
+  /// Returns the cluster-robust Wald statistic of the last member, on the scale of a single coefficient, so that it is
+  /// comparable for any number of columns.
   double wald(const Members& members) const;
 
   const Grams& grams() const { return grams_; }
@@ -58,7 +61,7 @@ class CrossValidation {
   const Support& support(const Member& member) const {
     return grams_.support[static_cast<std::size_t>(member.candidate)][static_cast<std::size_t>(member.theta)];
   }
-  /// True if an effect of the candidate's name is among `members`.
+  /// Returns true if `members` contains an effect with the name of the candidate.
   bool is_present(const Members& members, int candidate) const;
   double records() const { return total_.records; }
 
@@ -69,7 +72,7 @@ class CrossValidation {
     double y = 0;
     double records = 0;
   };
-  /// A way to divide the blocks: at random, or by whole flights.
+  /// A partition of the blocks: at random or by whole flights.
   struct Folds {
     std::vector<int> of_block;
     std::array<Sum, kFolds> inside, outside;
@@ -77,12 +80,12 @@ class CrossValidation {
   const Folds& folds_for(const Members& members) const;
   double mean_square(const Members& members, const Folds& folds) const;
   const std::vector<double>& block_errors(const Members& members, const Folds& folds) const;
-  /// As block_errors(), about the mean residual of each track: what differs from flight to flight, as a trim does,
-  /// takes no part.
+  /// Like block_errors(), after subtracting the mean residual of each track, which excludes differences between flights
+  /// such as trims.
   std::vector<double> trimmed_errors(const Members& members, const Folds& folds) const;
 
  private:
-  /// What a prediction depends on: whether whole flights are left out, and of which effects it is.
+  /// Key of a prediction: whether whole flights are left out, and the effects.
   using Question = std::pair<bool, Members>;
 
   void divide(Folds& folds) const;
@@ -90,7 +93,7 @@ class CrossValidation {
   std::vector<double> made_block_errors(const Members& members, const Folds& folds) const;
   std::vector<int> columns(const Members& members) const;
   Eigen::VectorXd solve(const Sum& sum, const Members& members) const;
-  /// T of c = T c_model: ones on the diagonal, and where a stage of the thrust meets its scale.
+  /// Returns T with c = T c_model: ones on the diagonal, and couplings between a stage of the thrust and its scale.
   Eigen::MatrixXd from_model(const Members& members) const;
 
   const Grams& grams_;

@@ -26,7 +26,7 @@ ThrustScale thrust_scale(const Passes& passes, const Coverage& covered) {
   if (checks.empty()) return scale;
   scale.is_known = true;
   scale.value = checks[0][0];
-  // The model's own ratio counts as well.
+  // The model's own ratio is included.
   const double own = own_thrust_ratio(model);
   scale.value.least_squares += own;
   scale.value.instrument += own;
@@ -34,11 +34,11 @@ ThrustScale thrust_scale(const Passes& passes, const Coverage& covered) {
   return scale;
 }
 
-/// Where set points show a scale of the thrust that least squares have put down to a constant force, that force says
-/// so: thrust that hardly varies looks like one, and thrust that answers disturbances hides the rest.
+/// If setpoints show a thrust scale that least squares attribute to a constant force, reports it with that force:
+/// thrust that hardly varies looks like a constant force, and its reaction to disturbances hides the rest.
 void name_hidden_scale(const stability::Model& model, const ThrustScale& scale,
                        std::vector<Missing>& ranking) {
-  constexpr double kSurely = 2;  // half widths of the 90 % interval
+  constexpr double kSurely = 2;  // half-widths of the 90 % interval
   const Interval& interval = scale.value.interval;
   const double excess = std::abs(scale.value.instrument - own_thrust_ratio(model));
   if (!scale.is_known || excess <= kSurely * (interval.upper - interval.lower) / 2) return;
@@ -52,17 +52,18 @@ void name_hidden_scale(const stability::Model& model, const ThrustScale& scale,
   }
 }
 
-/// Whether a curve of the scan explains as much as a constant share of the thrust, or more: then it is no matter of
-/// scale.
+/// Returns whether a curve of the scan explains at least as much as a constant fraction of the thrust; then the cause
+/// is not a scale.
 bool is_explained_by_curve(const Scan& scan, double rmse_N) {
   return std::any_of(scan.entries.begin(), scan.entries.end(), [&](const ScanEntry& entry) {
     return entry.variable != "thrust" && entry.variable != "body_constant" && entry.rmse_after <= rmse_N;
   });
 }
 
-/// What halves the error is named even where set points do not confirm it: at least as one of a class, with the rivals
-/// that halve it as well. Only scales of the thrust and a constant force are so plain without knowing more.
-/// @param all gives the numbers of what `passes` names
+/// Reports an effect that halves the error even if setpoints do not confirm it: at least as one of a class, with the
+/// rivals that halve the error as well. Only thrust scales and a constant force are simple enough for that without
+/// further evidence.
+/// @param all flights from which the values of the effects found in `passes` are computed
 void name_what_halves(const Passes& all, const Passes& passes, Diagnosis& result) {
   constexpr double kQuarter = 0.25;  // of the mean square
   if (result.suspected.empty() && result.contradicted.empty() && result.scan.entries.empty()) return;
@@ -103,7 +104,7 @@ void name_what_halves(const Passes& all, const Passes& passes, Diagnosis& result
   drop(result.contradicted);
 }
 
-/// What the means of the torques name, unless one rotor may be the cause: that is for the scan to say.
+/// Returns the effects found in the mean torques, unless a single rotor may be the cause, which the scan decides.
 std::vector<stability::EffectSpec> named_balances(const Passes& passes) {
   std::vector<stability::EffectSpec> specs;
   const residuals::Inputs inputs = inputs_with(passes, {});
@@ -115,19 +116,19 @@ std::vector<stability::EffectSpec> named_balances(const Passes& passes) {
   return specs;
 }
 
-/// What the torques and the rotors leave beside what is named.
+/// Scans the remainder of torques and rotors after the effects found.
 void scan_balance(const Passes& passes, Diagnosis& result) {
   std::vector<stability::EffectSpec> specs = specs_of(result.ranking);
   for (stability::EffectSpec& spec : named_balances(passes)) specs.push_back(std::move(spec));
-  // An hour: more say hardly more, and take as long as the force.
+  // One hour. Longer data add little and take as long as the force.
   constexpr Eigen::Index kMostOfBalance = 40'000;
   const ScanSamples left = thinned(scan_samples(passes, specs, ScanQuantity::kBalance), kMostOfBalance);
   result.balance = scan(left, passes.jobs);
   result.balance_formulas = find_formulas(left, result.balance, kMostFormulas, passes.jobs);
 }
 
-/// candidate(), at the place where a scan of what the model leaves beside `others` finds it if that is how it is found;
-/// of a pendulum with the length that suits best.
+/// Returns candidate(), started at the place found by a scan of the remainder beside `others` if the effect requires
+/// one; for a pendulum, with the best length.
 Candidate candidate_to_fit(const Passes& passes, const std::string& name, const Coverage& covered,
                            const std::vector<stability::EffectSpec>& others) {
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
@@ -143,8 +144,8 @@ Candidate candidate_to_fit(const Passes& passes, const std::string& name, const 
   return result;
 }
 
-/// `inputs` for vehicles of `kind` alone, with their tracks kept between the passes: whole, or excerpts of about
-/// `most` of their blocks.
+/// Returns `inputs` restricted to vehicles of `kind`, with their tracks kept between passes: complete, or excerpts of
+/// about `most` of their blocks.
 residuals::Inputs kept_tracks(const residuals::Inputs& inputs, const std::string& kind, std::size_t blocks,
                               std::size_t most) {
   residuals::Inputs result = inputs;

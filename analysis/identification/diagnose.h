@@ -1,4 +1,4 @@
-/// @file Which effect is missing: selection, refinement of shape parameters, check against closed-loop bias, remainder.
+/// @file Finds the missing effects: selection, refinement of shapes, check against closed-loop bias, remainder.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace swarmcert::identification {
 
-/// 1 + ratio, with a constant force beside it, by least squares and by instrument: the controller's answer to
-/// disturbances biases the first.
+/// The factor 1 + ratio, estimated beside a constant force by least squares and by instrumental variables; the reaction
+/// of the controller to disturbances biases the former.
 struct ThrustScale {
   bool is_known = false;
   InstrumentedValue value;
@@ -18,48 +18,48 @@ struct ThrustScale {
 
 struct Diagnosis {
   std::string kind;
-  std::string vehicle;   ///< of which alone the flights are; empty: of all of the kind
-  std::string too_poor;  ///< why there is no answer; empty if there is one
+  std::string vehicle;   ///< if all flights are of a single vehicle; empty: of all vehicles of the kind
+  std::string too_poor;  ///< why no answer is given; empty if there is one
   std::vector<Missing> ranking;
-  std::vector<std::string> contradicted;  ///< selected, but only as the controller's answer to something else
-  /// Selected, but no match for what is left, see explain().
+  std::vector<std::string> contradicted;  ///< selected, but only an artefact of the controller's reaction
+  /// Selected, but too small beside the remainder, see explain().
   std::vector<std::string> suspected;
   std::vector<Detectable> detectable;
   Remainder remainder;
-  Scan scan;                      ///< what the remainder depends on
+  Scan scan;                      ///< the variables on which the remainder depends
   std::vector<Formula> formulas;  ///< for entries of `scan`, best first
-  /// The same of torques and rotors, beside what the means of the torques name. Empty where logs have no rates.
+  /// The same for torques and rotors, beside the effects found in the mean torques. Empty if logs have no rates.
   Scan balance;
   std::vector<Formula> balance_formulas;
   ThrustScale thrust_scale;
   double rmse_before_N = 0, rmse_after_N = 0;  ///< cross-validated
   std::size_t records = 0, blocks = 0;
-  std::size_t searched_blocks = 0;  ///< of `blocks`: where effects were looked for, see kMostSearched
+  std::size_t searched_blocks = 0;  ///< number of `blocks` in which effects were searched, see kMostSearched
   int flights = 0;
   std::vector<std::string> problems;  ///< Coverage::problems
 };
 
-/// Blocks of 2 s that are searched: 17 minutes. Selection was measured on flights of 20 to 300 blocks, and its least
-/// gain of 2 % stands out of 500 as out of ten thousand.
+/// Number of blocks of 2 s that are searched: 17 minutes. The selection was validated on flights with 20 to 300 blocks,
+/// and its smallest gain of 2 % is as significant in 500 blocks as in ten thousand.
 inline constexpr std::size_t kMostSearched = 500;
 
-/// Diagnoses the model of one kind of vehicle on the flights `which`. Of flights of more than `most_searched` blocks,
-/// names, rivals, formulas and detectable sizes come from an excerpt of about as many, stretches of the flights
-/// (residuals::TrackStore); the numbers of the names, their intervals, errors and checks from all of them.
+/// Diagnoses the model of one kind of vehicle on the flights `which`. For flights with more than `most_searched`
+/// blocks, effects, rivals, formulas and detectable sizes are determined from an excerpt of about that many blocks
+/// (residuals::TrackStore); values, intervals, errors and checks of the effects are computed from all blocks.
 Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, const std::vector<int>& which,
                    int jobs, const residuals::Progress& progress, std::size_t most_searched = kMostSearched);
 
-/// As diagnose(), the ranking only.
+/// Like diagnose(), but returns only the ranking.
 std::vector<Missing> missing_effects(const residuals::Inputs& inputs, const std::string& kind,
                                      const std::vector<int>& which, int jobs,
                                      const residuals::Progress& progress);
 
-/// `names` fitted jointly on the flights `which`, in this order, with refined thetas; no test of acceptance.
+/// Fits `names` jointly to the flights `which`, in this order, with refined thetas, without an acceptance test.
 std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::string& kind,
                                  const std::vector<std::string>& names, const std::vector<int>& which,
                                  int jobs, const residuals::Progress& progress);
 
-/// All flights.
+/// Returns the indices of all flights.
 std::vector<int> every_flight(const residuals::Inputs& inputs);
 
 }  // namespace swarmcert::identification

@@ -7,10 +7,10 @@
 namespace swarmcert::identification {
 namespace {
 
-/// Largest share of a rotor's axis that may lie in the body's plane: 10 degrees.
+/// Largest component of a rotor's axis in the plane of the body: 10 degrees.
 constexpr double kMostTilt = 0.17;
 
-/// As the parameters state it; no rotors where they do not, or where a rotor does not push up.
+/// Returns the geometry given by the parameters; no rotors if it is not given or if a rotor does not push upwards.
 DraftedGeometry stated_geometry(const std::map<std::string, double>& parameters, std::size_t motors) {
   DraftedGeometry stated;
   const auto value = [&](std::size_t k, const char* what, double otherwise) {
@@ -28,7 +28,7 @@ DraftedGeometry stated_geometry(const std::map<std::string, double>& parameters,
     stated.torque_per_thrust_m += std::abs(moment_m) / static_cast<double>(motors);
     farthest_m = std::max(farthest_m, std::hypot(stated.rotors.back().x_m, stated.rotors.back().y_m));
   }
-  // Airframes that nobody measured leave all rotors at the centre.
+  // Airframes that have not been measured have all rotors at the centre.
   if (!(farthest_m > 0.01)) return {};
   stated.source = "log parameters CA_ROTOR*";
   return stated;

@@ -1,4 +1,4 @@
-/// @file Where the rotors of a vehicle are, as far as its logs say.
+/// @file Rotor geometry of a vehicle, as far as its logs state it.
 #pragma once
 
 #include <map>
@@ -11,13 +11,14 @@ namespace swarmcert::identification {
 
 struct DraftedGeometry {
   std::vector<stability::RotorPlace> rotors;  ///< in the order of the motors
-  double torque_per_thrust_m = 0;             ///< 0: not stated
+  double torque_per_thrust_m = 0;             ///< 0: unknown
   std::string source;                         ///< the log's parameters, or an assumption
 };
 
-/// `motors` rotors as PX4's control allocation states them (CA_ROTOR*: forward, right and down). Without such
-/// parameters: four in X in the order that PX4 and ArduPilot share, other numbers evenly on a circle, at `arm_m`.
-/// @param motors 3 to 8.
+/// Returns `motors` rotors as given by PX4's control allocation parameters (CA_ROTOR*: forward, right and down).
+/// Without such parameters, assumes four rotors in X configuration in the order shared by PX4 and ArduPilot, or any
+/// other number evenly spaced on a circle, at `arm_m`.
+/// @param motors 3 to 8
 DraftedGeometry geometry_of(const std::map<std::string, double>& parameters, std::size_t motors,
                             double arm_m);
 

@@ -14,8 +14,8 @@
 namespace swarmcert::identification {
 namespace {
 
-/// Names whose shape ended at a bound of its parameters, other than where it starts: what they fit is something else.
-/// Effects of neighbours act where neighbours are, which nothing else does: their shapes may end anywhere.
+/// Returns the effects whose shape ended at a bound other than its start, i.e. that really fit something else. Shapes
+/// of effects of neighbours may end anywhere, because nothing else acts where neighbours are.
 std::set<std::string> out_of_bounds(const Selected& selected) {
   std::set<std::string> names;
   for (const Refined& refined : selected.refined) {
@@ -32,9 +32,10 @@ std::set<std::string> out_of_bounds(const Selected& selected) {
   return names;
 }
 
-/// @param rivals that compete with the names that are always candidates
-/// @param start effects where selection begins
-/// @param refuted names that are no candidates
+/// Selects effects and settles suspects.
+/// @param rivals compete with the candidates that are always included
+/// @param start effects with which the selection begins
+/// @param refuted effects that are not candidates
 Settled settle(const Passes& passes, const Coverage& covered, const std::vector<Candidate>& rivals,
                const std::vector<std::string>& start, const std::set<std::string>& refuted = {}) {
   constexpr int kMostRounds = 8;
@@ -73,7 +74,7 @@ Settled settle(const Passes& passes, const Coverage& covered, const std::vector<
 
 bool is_named(const Missing& missing) { return !is_formula(missing.effect); }
 
-/// Whether a load may be what is missing: something of the weight is.
+/// Returns whether a payload may be missing, i.e. whether part of the weight is.
 bool may_be_load(const Settled& settled) {
   const auto is_of_weight = [](const std::string& name) {
     return is_scale(name) || name == "constant_force";
@@ -86,8 +87,8 @@ bool may_be_load(const Settled& settled) {
                      [&](const Missing& missing) { return is_of_weight(missing.effect); });
 }
 
-/// Puts a load that swings in the place of a scale of the thrust where flights show the swing.
-/// @return the candidate that it was named with, if it was.
+/// Replaces a thrust scale by a swinging load if the flights show it.
+/// @return the candidate that was used, if any
 std::vector<Candidate> name_swinging_load(const Passes& passes, const Coverage& covered, Settled& settled) {
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
   const bool is_in_model = std::any_of(model.effects.begin(), model.effects.end(),
@@ -108,14 +109,15 @@ std::vector<Candidate> name_swinging_load(const Passes& passes, const Coverage& 
   return {*load};
 }
 
-/// What the model leaves without any name.
+/// The remainder of the model without any effects found.
 struct Nominal {
   ScanSamples samples;
   Scan scan;
 };
 
-/// Formulas for what the model leaves, and for what it leaves beside the names: those that may take a name's place.
-/// @param nominal null where nothing has a name
+/// Returns formulas for the remainder of the model, and for the remainder beside the effects found, that may replace an
+/// effect.
+/// @param nominal null if no effect was found
 std::vector<Formula> rivals_of_names(const Passes& passes, const Explained& explained,
                                      const Nominal* nominal) {
   constexpr std::size_t kOfEach = 3;
@@ -151,15 +153,16 @@ bool is_answer_of_thrust(const Missing& missing) {
          missing.effect == "inflow";
 }
 
-/// Mean square that a name takes away, N^2.
+/// Returns the mean square that an effect removes, N^2.
 double taken_N2(const Missing& missing) {
   const Finding& finding = missing.finding;
   return finding.rmse_before_N * finding.rmse_before_N - finding.rmse_after_N * finding.rmse_after_N;
 }
 
-/// Whether a name may be the mean, the edge or a shadow of something else: a force of a place or a moment, which few
-/// vehicles meet, a thrust that depends on the climb, which any force along the velocity looks like, and a share of the
-/// thrust of less than two percent of the weight. Every vehicle has drag and a lag.
+/// Returns whether an effect may be only the mean, the edge or a side effect of something else: a force at a place or
+/// time, which few vehicles meet; thrust that depends on the climb rate, which any force along the velocity resembles;
+/// or a fraction of the thrust below two percent of the weight. Drag and a lag are not suspect, because every vehicle
+/// has them.
 bool may_be_part(const Missing& missing, double weight_N) {
   constexpr double kSmall = 0.02;
   const std::string& effect = missing.effect;
@@ -168,24 +171,24 @@ bool may_be_part(const Missing& missing, double weight_N) {
   return needs_scan(effect) || effect == "ground" || effect == "ceiling" || effect == "inflow";
 }
 
-/// Whether a name is no match for what is left beside it.
+/// Returns whether an effect is too small beside the remainder.
 bool is_doubtful(const Missing& missing, const Explained& explained, double weight_N) {
   constexpr double kMost = 0.5, kOfSameVariable = 0.5, kLittle = 0.1;
   const double taken = taken_N2(missing);
   const Remainder& rest = explained.settled.rest;
-  // Formulas that stood beside the name are what is left again: it may be a part of what they explain.
+  // Formulas selected beside the effect are part of the remainder again; the effect may be part of what they explain.
   if (rest.ratio > kLoudRatio && taken < kLittle * rest.excess_N2) return true;
   if (rest.flag && may_be_part(missing, weight_N) && taken < rest.excess_N2) return true;
   if (explained.scan.entries.empty() || explained.scan.entries[0].share < kMost) return false;
   const ScanEntry& first = explained.scan.entries[0];
   const double left = first.rmse_before * first.rmse_before - first.rmse_after * first.rmse_after;
-  // Where one variable explains most of what is left, thrust and its history answer it.
+  // If one variable explains most of the remainder, thrust and its history react to it.
   if (is_answer_of_thrust(missing) && taken <= left) return true;
-  // A name of this variable that leaves most of what depends on it has the wrong form.
+  // An effect of this variable that leaves most of the dependence on it has the wrong form.
   return points_to(first.variable, missing.effect) && kOfSameVariable * taken < left;
 }
 
-/// Moves names to the suspects, and scans anew what is left.
+/// Moves effects to the suspects and scans the remainder again.
 template <typename IsDropped>
 void drop_names(const Passes& passes, Explained& explained, const IsDropped& is_dropped) {
   std::vector<Missing>& ranking = explained.settled.ranking;
@@ -204,11 +207,11 @@ void drop_doubtful_names(const Passes& passes, Explained& explained) {
              [&](const Missing& missing) { return is_doubtful(missing, explained, weight_N); });
 }
 
-/// Whether a lag or delay takes little away and may as well be none: its interval reaches down to where it ends, or it
-/// was found beside a name or a formula without which what is left, and the thrust answers, dominates, or it takes no
-/// more than the trace of such answers.
+/// Returns whether a lag or delay removes little and may be spurious: its interval reaches its lower bound; or it was
+/// found beside an effect or formula without which the remainder, to which the thrust reacts, dominates; or it removes
+/// no more than such a reaction leaves.
 bool may_be_no_lag(const Missing& missing, const Remainder& rest) {
-  constexpr double kLittle = 0.1;  // of the mean square, or of what is left above the noise
+  constexpr double kLittle = 0.1;  // of the mean square, or of what exceeds the noise
   if (!is_of_library(missing.effect)) return false;
   const stability::EffectInfo& info = stability::effect_info(missing.effect);
   const double before = missing.finding.rmse_before_N;
@@ -218,7 +221,7 @@ bool may_be_no_lag(const Missing& missing, const Remainder& rest) {
   return interval != missing.intervals.end() && interval->second.lower <= info.shape[0].lower;
 }
 
-/// A scale of the thrust that halves the error. Where thrust hardly varies, formulas of anything can say the same.
+/// Returns whether a thrust scale halves the error. If thrust hardly varies, many formulas are equivalent to it.
 bool has_plain_scale(const std::vector<Missing>& ranking) {
   constexpr double kHalf = 0.5;
   return std::any_of(ranking.begin(), ranking.end(), [](const Missing& missing) {
@@ -226,15 +229,15 @@ bool has_plain_scale(const std::vector<Missing>& ranking) {
   });
 }
 
-/// The battery's share vanishes where the battery is full.
+/// The contribution of a battery vanishes when the battery is full.
 bool is_only_thrust_ratio(const std::vector<Missing>& ranking) {
   return std::all_of(ranking.begin(), ranking.end(), [](const Missing& missing) {
     return !is_scale(missing.effect) || missing.effect == "thrust_ratio";
   });
 }
 
-/// A scale of the thrust acts wherever thrust does. Over a variable that explains most of what the model leaves, a
-/// force of one sign that vanishes somewhere, such as at rest, is therefore something else.
+/// A thrust scale acts whenever there is thrust. A force of one sign over a variable that explains most of the
+/// remainder, and that vanishes over some range, for example at rest, is therefore something else.
 bool vanishes_somewhere(const Nominal& nominal) {
   constexpr double kMost = 0.5, kNothing = 0.15;  // of the variance; of the mean
   return std::any_of(nominal.scan.entries.begin(), nominal.scan.entries.end(), [&](const ScanEntry& entry) {
@@ -251,7 +254,7 @@ bool vanishes_somewhere(const Nominal& nominal) {
   });
 }
 
-/// settle() without formulas that only take back what a scale of the thrust says too much.
+/// Like settle(), without formulas that merely compensate an overestimated thrust scale.
 Settled settle_with_formulas(const Passes& passes, const Coverage& covered, std::vector<Candidate> rivals,
                              const std::vector<std::string>& names,
                              const std::set<std::string>& refuted = {}) {
@@ -266,7 +269,8 @@ Settled settle_with_formulas(const Passes& passes, const Coverage& covered, std:
   return result;
 }
 
-/// Whether the force of a name is a curve over this variable of the scan. A ratio beside a battery shifts its line.
+/// Returns whether the force of an effect is a curve over this variable of the scan. A ratio beside a battery shifts
+/// its line.
 bool is_curve_over(const std::string& variable, const std::string& effect, bool has_battery) {
   if (effect == "inflow") return variable == "vz" || variable == "climb";
   if (effect == "ground" || effect == "ceiling") return variable == "z";
@@ -275,9 +279,9 @@ bool is_curve_over(const std::string& variable, const std::string& effect, bool 
   return points_to(variable, effect);
 }
 
-/// Names that may be a part of something else, and beside which what is left still varies with their own variable, by a
-/// tenth of what they take: their form is not that of the flights. Of the whole error, noise and all, that may be
-/// little.
+/// Returns effects that may be part of something else and after which the remainder still varies with their own
+/// variable by at least a tenth of what they remove: their form does not match the flights. Relative to the whole
+/// error, including noise, that may be little.
 std::set<std::string> refuted_names(const Explained& explained, double weight_N) {
   constexpr double kOfTaken = 0.1;
   const std::vector<Missing>& ranking = explained.settled.ranking;
@@ -295,8 +299,9 @@ std::set<std::string> refuted_names(const Explained& explained, double weight_N)
   return names;
 }
 
-/// Thrust that saturates close to hovering throws the vehicle about, and what its set points ask for hardly reaches
-/// beyond the knee: no curve over the thrust is confirmed then. Where anything is left, the effect itself is tried.
+/// Returns whether thrust may saturate. Saturation close to hover makes the vehicle tumble, and its setpoints hardly
+/// reach beyond the knee, so no curve over the thrust can be confirmed. If there is any remainder, the effect itself is
+/// tried.
 bool may_saturate(const Explained& explained, const stability::Model& model,
                   const std::vector<Candidate>& rivals) {
   const auto is_it = [](const auto& one) { return one.name == "thrust_saturation"; };
@@ -304,11 +309,11 @@ bool may_saturate(const Explained& explained, const stability::Model& model,
          std::none_of(rivals.begin(), rivals.end(), is_it);
 }
 
-/// A name stands only if it explains about as much as the best formula would in its place: where formulas win, the
-/// selection is done anew with them among the candidates, and they are what is left. Names that only formulas point to
-/// take part as well.
+/// Accepts an effect only if it explains about as much as the best formula would in its place. If formulas win, the
+/// selection is repeated with them as candidates, and they become part of the remainder. Effects that only formulas
+/// suggest take part as well.
 Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
-  constexpr double kClearlyLess = 0.9, kMuchLess = 0.7;  // of the mean square: names are worth a little
+  constexpr double kClearlyLess = 0.9, kMuchLess = 0.7;  // of the mean square: favours named effects
   Explained result;
   result.settled = settle(passes, covered, {}, {});
   const std::vector<Candidate> loads = name_swinging_load(passes, covered, result.settled);
@@ -356,7 +361,7 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   return accept(std::move(again));
 }
 
-/// Of the names, in their order.
+/// Returns the refined effects in their order.
 std::vector<Refined> refined_of(const Settled& settled) {
   std::vector<Refined> result;
   for (const Missing& missing : settled.ranking) {
@@ -370,7 +375,7 @@ std::vector<Refined> refined_of(const Settled& settled) {
   return result;
 }
 
-/// Checks `refined` against the set points, widens its intervals, and gives `ranking` its numbers.
+/// Checks `refined` against the setpoints, widens its intervals, and stores its values in `ranking`.
 void set_numbers(const Passes& passes, std::vector<Refined>& refined, const Grams& grams,
                  std::vector<Missing>& ranking) {
   const std::vector<std::vector<InstrumentedValue>> checks = instrument(passes, candidates_of(refined));
@@ -381,8 +386,8 @@ void set_numbers(const Passes& passes, std::vector<Refined>& refined, const Gram
   }
 }
 
-/// Lags and delays as the innovations of the residual show them, with the other numbers fitted and checked beside them
-/// as fit_effects() does. What is left is scanned anew where a time moved.
+/// Fits lags and delays to the innovations of the residual, with the other values fitted and checked beside them as in
+/// fit_effects(). If a time changes, the remainder is scanned again.
 void correct_memories(const Passes& passes, Explained& explained) {
   constexpr double kMoved = 0.1;
   std::vector<Missing>& ranking = explained.settled.ranking;
@@ -395,7 +400,7 @@ void correct_memories(const Passes& passes, Explained& explained) {
     is_other = is_other || moved > 0;
     has_moved = has_moved || moved > kMoved * refined[i].theta[0];
   }
-  if (!is_other) return;  // no lag, or white noise: the numbers and their intervals stand
+  if (!is_other) return;  // no lag, or white noise: values and intervals stay
   set_numbers(passes, corrected, explained.settled.selected.grams, ranking);
   for (const Refined& effect : corrected) {
     for (Refined& known : explained.settled.selected.refined) {

@@ -40,7 +40,7 @@ void widen(std::vector<Interval>& spread, const Eigen::VectorXd& values) {
   }
 }
 
-/// `members` with the last on the theta of its grid that suits best: rivals are not refined either.
+/// Returns `members` with the last one at the best theta of its grid, because rivals are not refined either.
 Members on_grid(const Selection& selection, const Members& members) {
   const Candidate& candidate = selection.candidate(members.back());
   const auto count = static_cast<int>(candidate.thetas.size() - candidate.refined_thetas);
@@ -57,7 +57,7 @@ Members on_grid(const Selection& selection, const Members& members) {
   return best;
 }
 
-/// Rivals of the last of `members`: they keep half of its gain, and the data do not prefer it clearly.
+/// Finds rivals of the last of `members`: they keep at least half of its gain, and the data do not clearly prefer it.
 void find_rivals(const Selection& selection, const Members& members, Finding& finding) {
   constexpr double kClearlyBetter_z = 2, kShare = 0.5;
   const Members rest = without(members, members.size() - 1);
@@ -72,7 +72,7 @@ void find_rivals(const Selection& selection, const Members& members, Finding& fi
     const bool explains = rest_square - selection.mean_square(instead) > kShare * (rest_square - full_square);
     if (!explains) continue;
     const Candidate& other = selection.candidate(rival);
-    // A constant force for all and one for each vehicle have one name.
+    // A constant force for all and one per vehicle have the same name.
     const bool is_known = std::any_of(finding.rivals.begin(), finding.rivals.end(),
                                       [&](const Rival& r) { return r.effect == other.name; });
     if (!is_known && paired_z(selection.block_errors(instead), full_errors) < kClearlyBetter_z)

@@ -9,17 +9,17 @@
 
 namespace swarmcert::identification {
 
-/// A candidate that these data cannot tell from a selected effect.
+/// A candidate that these data cannot distinguish from a selected effect.
 struct Rival {
   std::string effect;
-  std::string excitation;  ///< what would show it
+  std::string excitation;  ///< flight that would tell them apart
 };
 
-/// Everything known of a selected effect.
+/// All results for a selected effect.
 struct Finding {
   Member member;
   double rmse_before_N = 0, rmse_after_N = 0;  ///< cross-validated, of the vector
-  Interval drop_interval;  ///< 90 % of the relative fall of the RMSE, by resampling blocks
+  Interval drop_interval;  ///< 90 % interval of the relative fall of the RMSE, by resampling blocks
   double paired_z = 0, wald_z = 0;
   Support support;
   std::vector<Rival> rivals;
@@ -29,7 +29,8 @@ struct Finding {
   std::vector<std::string> confounded_with() const;
 };
 
-/// @param members in the order of their ranking.
+/// Returns the findings.
+/// @param members in ranking order
 std::vector<Finding> findings(const Selection& selection, const Members& members);
 
 }  // namespace swarmcert::identification

@@ -10,8 +10,9 @@ namespace swarmcert::identification {
 namespace {
 
 constexpr int kInjections = 10, kMostMissed = 1;
-constexpr double kResolution = 1.1;  ///< between sizes that are tried last
-/// Blocks are merged down to this many: the size depends on the scatter of the sums, not on how they are cut.
+constexpr double kResolution = 1.1;  ///< ratio of the last sizes tried
+/// Blocks are merged until at most this many are left: the result depends on the scatter of the sums, not on the
+/// division into blocks.
 constexpr std::size_t kMostBlocks = 300;
 
 Eigen::VectorXd packed_part(const Eigen::VectorXd& gram, const std::vector<int>& columns) {
@@ -25,7 +26,7 @@ Eigen::VectorXd packed_part(const Eigen::VectorXd& gram, const std::vector<int>&
   return part;
 }
 
-/// The columns of `members`, each with its one theta, and those of candidate k with all of its thetas, last.
+/// Returns the columns of `members`, each with its theta, followed by those of candidate k with all of its thetas.
 Grams reduced(const Grams& grams, const Members& members, std::size_t k) {
   Grams small;
   std::vector<int> columns;
@@ -72,7 +73,7 @@ Grams reduced(const Grams& grams, const Members& members, std::size_t k) {
   return small;
 }
 
-/// Injects into resampled blocks.
+/// Injects effects into resampled blocks.
 class Injector {
  public:
   Injector(const Grams& grams, const Members& members, std::size_t k)
@@ -80,12 +81,12 @@ class Injector {
     for (int i = 0; i < last_; ++i) members_.push_back({i, 0});
   }
 
-  /// True if at least nine of ten injections of `size` are accepted.
+  /// Returns true if at least nine of ten injections of `size` are accepted.
   bool is_shown(int coefficient, double size, int theta) const {
     int missed = 0;
     std::mt19937_64 generator(1);
     for (int i = 0; i < kInjections; ++i) {
-      // With and against what the flights have already, where the sign is free.
+      // If the sign is free, inject both with and against the present value.
       const stability::Parameter& p =
           base_.candidates.back().info.linear[static_cast<std::size_t>(coefficient)];
       const bool negative = p.upper <= 0 || (p.lower < 0 && i % 2 == 1);
@@ -97,7 +98,7 @@ class Injector {
     return true;
   }
 
-  /// Factor of the column of a lag whose gain is 1, beside the members.
+  /// Returns the factor of the column of a lag with gain 1 beside the members.
   double lag_factor() const {
     if (members_.empty()) return 1;
     const Eigen::VectorXd c = Selection(base_).coefficients(members_);
@@ -113,7 +114,7 @@ class Injector {
     return factor;
   }
 
-  /// Thetas with enough samples, those nearest to the effect's own first.
+  /// Returns thetas with enough samples, those closest to the effect's default first.
   std::vector<int> supported_thetas() const {
     const Thresholds thresholds;
     std::vector<int> thetas;
@@ -135,7 +136,7 @@ class Injector {
     return thetas;
   }
 
-  /// Size at which the column's own energy is `share` of what is left: where a search starts.
+  /// Returns the size at which the energy of the column is `share` of the remainder, to start the search.
   double size_of_share(int coefficient, int theta, double share) const {
     const int column = base_.first_column.back()[static_cast<std::size_t>(theta)] + coefficient;
     double energy = 0, left = 0;
@@ -168,7 +169,8 @@ class Injector {
   Members members_;
 };
 
-/// Nothing where flights seem to show it without any injection: what is left looks like it, and no size can be told.
+/// Returns nothing if the flights appear to show the effect without any injection: the remainder looks like it, so no
+/// size can be determined.
 std::optional<double> smallest_size(const Injector& injector, const stability::Parameter& p, int coefficient,
                                     int theta) {
   constexpr int kMostDoublings = 60;
@@ -204,7 +206,7 @@ std::vector<Detectable> detectable(const Grams& grams, const Members& members) {
     const std::vector<int> thetas = injector.supported_thetas();
     const double never = std::numeric_limits<double>::infinity();
     if (candidate.info.remembers) {
-      // Gain 1 or nothing: the size is the shortest time that shows.
+      // The gain is 1, so the size is the shortest detectable time.
       Detectable entry{
           candidate.info.name, candidate.info.shape[0].name, never, candidate.info.excitation, {}};
       std::vector<int> by_time = thetas;

@@ -18,14 +18,14 @@ using residuals::Track;
 
 constexpr double kQuantile90 = 1.6449;  // two-sided 90 % of the normal distribution
 
-/// Sums of one block.
+/// Sums over a block.
 struct Moments {
   Eigen::MatrixXd zx, xx;
   Eigen::VectorXd zr, xr;
-  bool follows = false;  ///< the block before it, of the same track
+  bool follows = false;  ///< directly follows the previous block of the same track
 };
 
-/// columns * mix, of which most is zero.
+/// Returns columns * mix for a sparse `mix`.
 Eigen::MatrixXd mixed(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& mix) {
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(columns.rows(), mix.cols());
   for (Eigen::Index j = 0; j < mix.cols(); ++j) {
@@ -36,8 +36,9 @@ Eigen::MatrixXd mixed(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& mix
   return sums;
 }
 
-/// @param flown, wanted columns_along() the track as flown and as set points ask for it
-/// @param mix [columns x unknowns]: what is fitted, as sums of columns.
+/// Returns the sums of each block.
+/// @param flown, wanted columns_along() the track as flown and as commanded by setpoints
+/// @param mix [columns x unknowns]: the fitted unknowns as combinations of columns
 std::vector<Moments> moments_of(const ModelledTrack& track, const Eigen::MatrixXd& flown,
                                 const Eigen::MatrixXd& wanted, const Eigen::MatrixXd& mix) {
   const Eigen::MatrixXd x_of_all = mixed(flown, mix), z_of_all = mixed(wanted, mix);
@@ -53,7 +54,7 @@ std::vector<Moments> moments_of(const ModelledTrack& track, const Eigen::MatrixX
   return blocks;
 }
 
-/// estimates(), made anew.
+/// Computes estimates() without the cache.
 std::vector<InstrumentedValue> made_estimates(const Passes& passes, const Grams& columns,
                                               const Eigen::MatrixXd& mix) {
   const Eigen::Index n = mix.cols();
@@ -114,7 +115,7 @@ std::vector<InstrumentedValue> made_estimates(const Passes& passes, const Grams&
   return values;
 }
 
-/// Both estimates of every unknown. Empty where a log has no set points, or nothing moves.
+/// Returns both estimates of each unknown. Empty if a log has no setpoints or nothing moves.
 std::vector<InstrumentedValue> estimates(const Passes& passes, const Grams& columns,
                                          const Eigen::MatrixXd& mix) {
   if (passes.memory == nullptr) return made_estimates(passes, columns, mix);
@@ -126,7 +127,7 @@ std::vector<InstrumentedValue> estimates(const Passes& passes, const Grams& colu
   return known->second;
 }
 
-/// Coefficients in `mix` become those of the model: see scaled_stages().
+/// Converts the coefficients in `mix` to those of the model: see scaled_stages().
 void scale_stages(const std::vector<Candidate>& effects, const Grams& columns, Eigen::MatrixXd& mix) {
   std::vector<const Candidate*> all;
   for (const Candidate& effect : effects) all.push_back(&effect);
@@ -137,16 +138,16 @@ void scale_stages(const std::vector<Candidate>& effects, const Grams& columns, E
   }
 }
 
-/// A shape that is estimated as well: its derivative is a difference of columns.
+/// A shape that is estimated as well; its derivative is a difference of columns.
 struct FreeShape {
   std::size_t effect, index;
-  std::size_t neighbour;  ///< theta of the effect's candidate; the shape itself is the first
+  std::size_t neighbour;  ///< theta index in the effect's candidate; the shape itself is the first
   double width;
 };
 
-constexpr std::ptrdiff_t kHalfWindow = 3;  // of the differences that give accelerations and body rates
+constexpr std::ptrdiff_t kHalfWindow = 3;  // of the differences for accelerations and body rates
 
-/// Roll and pitch rates with which the commanded thrust axis turns.
+/// Sets the roll and pitch rates with which the commanded thrust axis rotates.
 void set_commanded_rates(std::vector<stability::Instant>& wanted) {
   const auto n = static_cast<std::ptrdiff_t>(wanted.size());
   for (std::ptrdiff_t i = 0; i < n; ++i) {
@@ -292,9 +293,9 @@ std::vector<InstrumentedShape> instrument_with_shapes(const Passes& passes,
 
 namespace {
 
-/// Thrust that answers gusts makes a lag look longer, and no filter removes all of it: thrust falls with the velocity
-/// that a gust gives. Where set points say less than least squares, the lag may be as short as they allow, however weak
-/// they are.
+/// The reaction of thrust to gusts makes a lag appear longer, and no filter removes all of it: thrust falls with the
+/// velocity caused by a gust. If setpoints give a smaller value than least squares, the lag may be as short as they
+/// allow, however weak they are.
 void reach_down(Refined& lag, const InstrumentedValue& check) {
   constexpr double kBeyondChance_z = 1;
   if (check.difference_z >= -kBeyondChance_z) return;
@@ -306,7 +307,7 @@ void reach_down(Refined& lag, const InstrumentedValue& check) {
 
 void widen_by_bias(const std::vector<std::vector<InstrumentedValue>>& checks,
                    const std::vector<InstrumentedShape>& with_shapes, std::vector<Refined>& refined) {
-  // By the bias to both sides, and to where the instrument's own interval ends.
+  // Widens by the bias on both sides, and to the ends of the instrument's own interval.
   const auto widen = [](Interval& interval, const InstrumentedValue& check, double scale,
                         const stability::Parameter& parameter) {
     if (!check.is_strong()) return;
@@ -327,7 +328,8 @@ void widen_by_bias(const std::vector<std::vector<InstrumentedValue>>& checks,
       widen(effect.linear_intervals[c], with_shape ? with_shapes[i].coefficients[c] : checks[i][c], 1,
             info.linear[c]);
     }
-    // An error of the shape multiplies the coefficient: what has a sign may be as many times too small as too large.
+    // An error of the shape multiplies the coefficient, so a coefficient of known sign may be too small by the same
+    // factor as too large.
     const bool has_free_shape =
         std::any_of(effect.shape_intervals.begin(), effect.shape_intervals.end(),
                     [](const Interval& interval) { return interval.lower < interval.upper; });

@@ -43,7 +43,7 @@ JointFit KindFit::solve(const std::map<std::string, Sum>& sums, const std::vecto
     y += sum.y;
     ++vehicle;
   }
-  // A column that is nowhere active would make the matrix singular.
+  // Regularise: a column that is never active would make the matrix singular.
   for (Eigen::Index k = 0; k < size; ++k) gram(k, k) += 1e-9 + 1e-9 * gram(k, k);
   Eigen::VectorXd lower = Eigen::VectorXd::Constant(size, -kInfinity);
   Eigen::VectorXd upper = Eigen::VectorXd::Constant(size, kInfinity);
@@ -79,7 +79,7 @@ void KindFit::add(const std::vector<std::string>& names) {
     part.candidate = candidate(name, *inputs_.model_of(kind_), covered_);
     for (const stability::Parameter& p : part.candidate.info.shape) {
       part.shape.push_back(p.value);
-      // The ground's reference height only scales its amplitude.
+      // The reference height of the ground effect only scales its amplitude.
       const bool scales = p.name == "height_reference_m";
       part.step.push_back(scales ? 0 : p.value != 0 ? 0.3 * std::abs(p.value) : 0.15);
     }
@@ -122,7 +122,7 @@ void KindFit::choose(const Grams& grams, const std::map<std::string, Sum>& sums,
   }
   chosen[i] = best;
   fit_ = solve_with(grams, sums, chosen);
-  if (thetas.size() <= 2 * part.shape.size()) return;  // the last pass tries nothing
+  if (thetas.size() <= 2 * part.shape.size()) return;  // the last pass has no trial steps
   part.proposal = thetas[0];
   for (std::size_t k = 0; k < part.shape.size(); ++k) {
     const double up = squares[1 + 2 * k] - squares[0], down = squares[2 + 2 * k] - squares[0];
@@ -130,7 +130,7 @@ void KindFit::choose(const Grams& grams, const std::map<std::string, Sum>& sums,
       part.step[k] /= 2;
       if (up + down > 0) part.proposal[k] += part.step[k] * (down - up) / (up + down);
     } else {
-      // Past the better side: to the vertex of the parabola, at most two steps away.
+      // Move beyond the better side, to the vertex of the parabola, but at most two steps.
       const double bend = up + down, slope = (up - down) / 2;
       const double along = bend > 0 ? std::clamp(-slope / bend, -2.0, 2.0) : (up < down ? 2 : -2);
       part.proposal[k] += along * part.step[k];

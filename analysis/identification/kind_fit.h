@@ -1,5 +1,4 @@
-/// @file Effects with shapes fitted jointly to all flights of one kind of vehicle, each vehicle with an offset of its
-/// own.
+/// @file Joint fit of effects and their shapes to all flights of one kind of vehicle, with an offset for each vehicle.
 #pragma once
 
 #include <map>
@@ -12,11 +11,11 @@
 
 namespace swarmcert::identification {
 
-/// What flights.toml says of `vehicle`; the fallback kind where it says nothing.
+/// Returns the entry of `vehicle` in flights.toml; the fallback kind if there is none.
 residuals::VehicleUse use_of(const residuals::Inputs& inputs, const std::string& vehicle);
 
-/// Shared coefficients of some columns, and a constant force for each vehicle, by least squares within the bounds of
-/// the coefficients; the squared error.
+/// Shared coefficients of some columns and a constant force per vehicle, by least squares within the bounds of the
+/// coefficients, with the squared error.
 struct JointFit {
   Eigen::VectorXd shared;
   std::map<std::string, Eigen::Vector3d> offsets_N;
@@ -25,41 +24,41 @@ struct JointFit {
 
 class KindFit {
  public:
-  /// @param inputs must outlive this.
+  /// @param inputs must outlive this object
   KindFit(const residuals::Inputs& inputs, const std::string& kind, int jobs);
 
-  /// More effects, by name, with the shapes of their own defaults.
+  /// Adds effects by name, with their default shapes.
   void add(const std::vector<std::string>& names);
 
-  /// A search over all shapes at once: each pass through the flights tries one step up and one down in every shape
-  /// parameter, and where the parabolas through the last pass's errors have their vertices; each effect moves to its
-  /// best, and steps that gain nothing are halved.
+  /// Searches over all shapes at once. Each pass through the flights tries a step up and a step down in each shape
+  /// parameter, and the vertices of the parabolas through the errors of the last pass; each effect moves to its best
+  /// shape, and steps without gain are halved.
   void search(int passes, const residuals::Progress& progress);
 
   bool is_empty() const { return covered_.records == 0; }
   const std::map<std::string, Eigen::Vector3d>& offsets_N() const { return fit_.offsets_N; }
-  /// The effects that are in `names`, with values.
+  /// Returns the effects in `names`, with values.
   std::vector<stability::EffectSpec> specs(const std::set<std::string>& names) const;
 
  private:
-  /// Sums of a vehicle's blocks.
+  /// Sums over the blocks of a vehicle.
   struct Sum {
     Eigen::VectorXd gram, b;
     double y = 0;
   };
-  /// One effect of a joint fit, with the shape that it has now.
+  /// An effect of a joint fit with its current shape.
   struct Part {
     Candidate candidate;
     std::vector<double> shape, step;
-    std::vector<double> proposal;  ///< one more theta to try: where the parabolas of all parameters meet
+    std::vector<double> proposal;  ///< an additional theta: the vertices of the parabolas of all parameters
     std::vector<double> coefficients;
   };
 
-  /// The best theta of effect `i` beside the others; where its shape goes next, and how far.
+  /// Chooses the best theta of effect `i` beside the others, and its next direction and step.
   void choose(const Grams& grams, const std::map<std::string, Sum>& sums, std::size_t i,
               std::vector<std::size_t>& chosen);
   void step(bool moves);
-  /// The others are neighbours and nothing else.
+  /// Returns the inputs in which the other vehicles serve only as neighbours.
   residuals::Inputs of_vehicle(const std::string& vehicle) const;
   static JointFit solve(const std::map<std::string, Sum>& sums, const std::vector<int>& columns,
                         int first_offset, const std::vector<stability::Parameter>& bounds);

@@ -19,7 +19,7 @@ using stability::LadderRow;
 
 constexpr double kLeastFall = 0.005;
 
-/// Root mean square of the vector residual of `model` on the flights `which`, in newton.
+/// Returns the root mean square of the residual vector of `model` on the flights `which`, in newton.
 double rmse(residuals::Inputs inputs, const stability::Model& model, const std::vector<int>& which,
             int jobs) {
   inputs.models = {model};
@@ -52,7 +52,7 @@ residuals::Inputs only_flights(residuals::Inputs inputs, const std::vector<int>&
   return inputs;
 }
 
-/// What no model can remove from the flights `which`: the white part of the spectrum.
+/// Returns what no model can explain in the flights `which`: the white part of the spectrum.
 double noise_floor_N(residuals::Inputs inputs, const stability::Model& model, const std::vector<int>& which,
                      int jobs) {
   inputs = only_flights(std::move(inputs), which);
@@ -80,10 +80,10 @@ std::map<std::string, double> values_of(const stability::Model& model) {
   return values;
 }
 
-/// Why the flights are too few to fit or to select; empty if they are not. Flights that test cannot be too few: nothing
-/// depends on them.
-/// @param problems gets those of all flights.
-/// @param is_tested whether the flights to test have a usable record.
+/// Returns why the flights are too few to fit or to select; empty if they are sufficient. Test flights cannot be too
+/// few, because nothing depends on them.
+/// @param problems receives the problems of all flights
+/// @param is_tested receives whether the test flights have a usable record
 std::string too_poor(const residuals::Inputs& inputs, const std::string& kind, const Split& split, int jobs,
                      std::vector<std::string>& problems, bool& is_tested) {
   const auto look = [&](const std::vector<int>& which) {
@@ -101,14 +101,14 @@ std::string too_poor(const residuals::Inputs& inputs, const std::string& kind, c
   return has_select ? "" : "the flights to select have no usable record of kind " + kind;
 }
 
-/// Every model of `inputs`, changed alike.
+/// Applies the same change to each model of `inputs`.
 template <typename Change>
 void change_models(residuals::Inputs& inputs, const Change& change) {
   for (stability::Model& model : inputs.models) change(model);
   for (auto& [vehicle, model] : inputs.vehicle_models) change(model);
 }
 
-/// Formulas that are to be fitted begin anew, with the shape that they have.
+/// Resets the coefficients of formulas that are to be fitted, and keeps their shapes.
 residuals::Inputs with_formulas_off(residuals::Inputs inputs, const std::vector<std::string>& wanted) {
   change_models(inputs, [&](stability::Model& model) {
     for (stability::EffectSpec& spec : model.effects) {
@@ -119,8 +119,8 @@ residuals::Inputs with_formulas_off(residuals::Inputs inputs, const std::vector<
   return inputs;
 }
 
-/// Puts the proposed effect `name` into the models, switched off, under a name that no other effect has; empty where
-/// the scan proposes none.
+/// Adds the proposed effect `name` to the models, switched off and under a unique name, which is returned; empty if the
+/// scan proposes none.
 std::string propose(residuals::Inputs& inputs, const Passes& passes, const std::vector<Missing>& accepted,
                     const std::string& name) {
   std::optional<stability::EffectSpec> found = proposal(passes, specs_of(accepted), name);
@@ -144,7 +144,7 @@ void withdraw(residuals::Inputs& inputs, const std::string& name) {
   });
 }
 
-/// `names` fitted jointly; the factors of the rotors, if they are among them, on top of the others and last.
+/// Fits `names` jointly; factors of the rotors, if among them, are fitted last on top of the others.
 std::vector<Missing> fit_with_rotors(const residuals::Inputs& inputs, const std::string& kind,
                                      std::vector<std::string> names, const std::vector<int>& which, int jobs,
                                      const residuals::Progress& progress) {
@@ -161,7 +161,7 @@ std::vector<Missing> fit_with_rotors(const residuals::Inputs& inputs, const std:
   return fitted;
 }
 
-/// How far the rotors of the flights `which` are from balance under `model`; empty where no flight shows it.
+/// Returns how far the rotors are out of balance in the flights `which` with `model`; empty if no flight shows it.
 std::optional<double> imbalance_N(const residuals::Inputs& inputs, const stability::Model& model,
                                   const std::vector<int>& which, int jobs) {
   const std::vector<RotorLoads> loads = rotor_loads(only_flights(inputs, which), model.kind, jobs);
@@ -169,7 +169,7 @@ std::optional<double> imbalance_N(const residuals::Inputs& inputs, const stabili
   return rotor_imbalance_N(loads, rotor_factors_of(model));
 }
 
-/// One candidate on top of the model of the last accepted row.
+/// A candidate added to the model of the last accepted row.
 struct Trial {
   LadderRow row;
   stability::Model model;
@@ -196,7 +196,7 @@ Split split_flights(const residuals::Inputs& inputs) {
 
 namespace {
 
-/// Tries effects one after the other, and keeps those that lower the error of the selecting flights.
+/// Tries effects one after the other and keeps those that reduce the error on the select flights.
 class Climb {
  public:
   Climb(const residuals::Inputs& inputs, const LadderOptions& options, int jobs,
@@ -237,7 +237,7 @@ class Climb {
     return next;
   }
 
-  /// A row that repeats the best one.
+  /// Adds a row that repeats the best one.
   void refuse(const std::string& effect, const std::string& why) {
     trials_.push_back(best());
     trials_.back().row.effect = effect;
@@ -302,7 +302,7 @@ class Climb {
     return helps;
   }
 
-  /// Into the model file, beside what was fitted last.
+  /// Stores the errors in the model file, with the effect fitted last.
   void note_errors(const Missing& fresh, bool helps, Trial& next) {
     for (const stability::EffectSpec& spec : fresh.specs) {
       for (stability::EffectSpec& effect : next.model.effects) {
@@ -314,7 +314,7 @@ class Climb {
     }
   }
 
-  /// The test flights are looked at once, after everything is decided.
+  /// The test flights are used once, after all decisions.
   void finish() {
     ladder_.any_accepted = best_ > 0;
     ladder_.model = best().model;
@@ -342,7 +342,7 @@ class Climb {
   const residuals::Progress& progress_;
   Ladder& ladder_;
   std::vector<std::string> wanted_, accepted_;
-  residuals::Inputs working_;  ///< with what was proposed
+  residuals::Inputs working_;  ///< with the proposed effects
   std::vector<Trial> trials_;
   std::size_t best_ = 0;  ///< the last accepted trial
 };
@@ -370,7 +370,7 @@ stability::Model undone(const stability::Model& model) {
     throw files::InputError({model.path, "", "ladder", "", "has no effect that 'add' accepted",
                              "only models that 'swarmcert add' wrote can be gone back from"});
   }
-  --last;  // the row to undo; one before it is accepted, because a ladder starts with the nominal model
+  --last;  // the row to undo; an accepted one precedes it, because a ladder starts with the nominal model
   std::size_t to = last;
   while (to > 0 && !rows[to - 1].accepted) --to;
   if (to == 0) {
@@ -385,7 +385,7 @@ stability::Model undone(const stability::Model& model) {
       const auto before = values.find(prefix_of(spec) + name);
       if (before == values.end()) continue;
       present = true;
-      if (value != before->second) spec.fit.interval.clear();  // those of another fit
+      if (value != before->second) spec.fit.interval.clear();  // it belongs to another fit
       value = before->second;
     }
     if (present) result.effects.push_back(std::move(spec));

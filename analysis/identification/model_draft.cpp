@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kDraftBlock_s = 2, kDraftQuantile90 = 1.645;
 
-/// Mean of several estimates with the interval that their scatter gives.
+/// Mean of several estimates, with an interval from their scatter.
 struct DraftEstimate {
   double value = 0, lower = 0, upper = 0;
   std::size_t count = 0;
@@ -37,19 +37,20 @@ DraftEstimate estimate(const std::vector<double>& values) {
   return result;
 }
 
-/// What one log says.
+/// Estimates from one log.
 struct LogFit {
   std::string path;
   logs::ThrustSource thrust = logs::ThrustSource::kNone;
   std::vector<double> mass_kg;  ///< thrust over specific force along the thrust axis, per block of 2 s
   double hover_command = 0, delay_s = NAN;
-  std::size_t motors = 0;  ///< whose commands the log has; 0: it has duties, or a force
+  std::size_t motors = 0;  ///< number of motors with commands; 0: the log has duties or a force
   int motor_power = 1;
-  double least_V = INFINITY, most_V = 0;  ///< of the battery in the air
+  double least_V = INFINITY, most_V = 0;  ///< of the battery in flight
   std::map<std::string, double> parameters;
 };
 
-/// Thrust over specific force along the thrust axis, means over blocks in the air: the mass, if the thrust is right.
+/// Fits thrust over specific force along the thrust axis, as means over blocks in flight: the mass, if the thrust is
+/// right.
 LogFit fit(const logs::Log& log, const stability::Model& base) {
   LogFit result;
   result.path = log.path;
@@ -89,7 +90,7 @@ LogFit fit(const logs::Log& log, const stability::Model& base) {
     load += s.specific_force_m_s2[2] / R[2][2];
   }
   close();
-  // Takeoff and landing stand in the first and the last block.
+  // The first and the last block contain takeoff and landing.
   if (result.mass_kg.size() > 4) {
     result.mass_kg.erase(result.mass_kg.begin());
     result.mass_kg.pop_back();
@@ -103,8 +104,8 @@ double middle(std::vector<double> values) {
   return *at;
 }
 
-/// Bodies of one shape and density: lengths grow with the third root of the mass, inertia with mass times length
-/// squared.
+/// Scales for bodies of the same shape and density: lengths with the cube root of the mass, inertia with mass times
+/// length squared.
 void scale_body(const stability::Model& base, ModelDraft& draft) {
   stability::Model& model = draft.model;
   const double mass = model.mass_kg / base.mass_kg, length = std::cbrt(mass);
@@ -121,7 +122,7 @@ void scale_body(const stability::Model& base, ModelDraft& draft) {
         {fmt::format("inertia_{}_kg_m2", kAxes[k]), model.inertia_kg_m2[k], false, 0, 0, source});
 }
 
-/// The arm that the stated rotors have in place of the assumed one: inertia grows with its square.
+/// Replaces the assumed arm by that of the given rotors; inertia scales with its square.
 void use_stated_arm(ModelDraft& draft) {
   stability::Model& model = draft.model;
   double arm_m = 0;
@@ -141,7 +142,7 @@ void use_stated_arm(ModelDraft& draft) {
   }
 }
 
-/// Rotors and their thrust from logs with the commands of the motors: the weight at the hover command.
+/// Sets the rotors and their thrust from logs with motor commands: the weight at the hover command.
 void set_motors(const LogFit& log, double hover_command, ModelDraft& draft) {
   stability::Model& model = draft.model;
   const DraftedGeometry geometry = geometry_of(log.parameters, log.motors, model.arm_m);
@@ -179,7 +180,7 @@ void set_motors(const LogFit& log, double hover_command, ModelDraft& draft) {
   }
 }
 
-/// A battery of several cells needs its range; a fifth of room below what was flown, a tenth above.
+/// Sets the range of a multi-cell battery: a fifth below the measured voltages and a tenth above.
 void set_battery_range(const std::vector<LogFit>& fits, ModelDraft& draft) {
   double least_V = INFINITY, most_V = 0;
   for (const LogFit& log : fits) {
@@ -194,7 +195,7 @@ void set_battery_range(const std::vector<LogFit>& fits, ModelDraft& draft) {
   draft.parameters.push_back({"battery_range_V.most", range.upper, false, 0, 0, source});
 }
 
-/// Why a log is damaged or implausible; empty where it is neither.
+/// Returns why a log is damaged or implausible; empty if it is neither.
 std::string why_not_trusted(const logs::Log& log) {
   if (!logs::is_sound(log.health)) return "damaged: " + logs::findings(log.health).front();
   for (const logs::Doubt& doubt : logs::doubts_of(log)) {
@@ -241,7 +242,7 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
   draft.model.effects.clear();
   draft.model.ladder.clear();
   const std::vector<LogFit> fits = fits_of(found, map, base, keep, draft);
-  const LogFit* motors = nullptr;  // the first log with commands in place of forces
+  const LogFit* motors = nullptr;  // the first log with commands instead of forces
   std::vector<double> carried_kg, ratios, delays_s, hover;
   for (const LogFit& log : fits) {
     if (std::isfinite(log.delay_s) && log.delay_s >= 0) delays_s.push_back(log.delay_s);
@@ -261,7 +262,7 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
     const auto known = masses_kg.find(log.path);
     const double true_kg = known != masses_kg.end() ? known->second : mass_kg;
     if (true_kg > 0) ratios.push_back(true_kg / of_log_kg);
-    // Of one flight only, its blocks give the scatter.
+    // With a single flight, its blocks give the scatter.
     if (fits.size() == 1)
       carried_kg = log.mass_kg;
     else
@@ -300,7 +301,7 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
     if (motors->motors > 0) {
       set_motors(*motors, command.value, draft);
     } else {
-      // Rotor speeds, or a collective command of any unit: no command of 0 .. 1 of each motor.
+      // The log has rotor speeds or a collective command in any unit, but no commands of 0 .. 1 for each motor.
       const double each_N = draft.model.weight_N() / 4;
       const bool is_share = command.value < 1;
       set_thrust_curve({0, each_N / (is_share ? command.value : 0.5), 0}, draft.model);

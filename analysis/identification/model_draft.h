@@ -1,4 +1,4 @@
-/// @file The best model that logs support before anything is known of the vehicle.
+/// @file Drafts a model of an unknown vehicle from its logs alone.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace swarmcert::identification {
 
-/// One number of a drafted model.
+/// A parameter of a drafted model.
 struct DraftedParameter {
   std::string name;
   double value = 0;
@@ -22,15 +22,16 @@ struct ModelDraft {
   stability::Model model;
   std::vector<DraftedParameter> parameters;
   std::vector<std::string> problems;  ///< logs that could not be used, and why
-  std::size_t flights = 0;            ///< logs that the fits used
+  std::size_t flights = 0;            ///< number of logs used in the fits
 };
 
-/// @param found    the flights.
-/// @param masses_kg  by path, from flights.toml; empty where none is known.
-/// @param mass_kg  of the vehicle; 0: not known. Then the mass is what the thrust carries if the thrust map, or the
-///   controller's own scale, is right; without either, 1 kg.
-/// @param keep  damaged and implausible logs are used all the same.
-/// @param base  gives the thrust map of duties and what no log says, scaled to the mass.
+/// Drafts a model.
+/// @param found    the flights
+/// @param masses_kg  by path, from flights.toml; empty if unknown
+/// @param mass_kg  of the vehicle; 0: unknown. Then the mass is the one carried by the thrust according to the thrust
+///   map or the controller's own scale; without either, 1 kg.
+/// @param keep  use damaged and implausible logs as well
+/// @param base  provides the thrust map of duties and everything that logs do not show, scaled to the mass
 /// @throws files::InputError if no log has a force and a flight.
 ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalMap& map,
                        const std::map<std::string, double>& masses_kg, double mass_kg, bool keep,

@@ -1,4 +1,4 @@
-/// @file What a pass over the flights needs to know, and the tracks that it goes along.
+/// @file Settings of a pass over the flights, and the tracks that it visits.
 #pragma once
 
 #include <functional>
@@ -20,11 +20,11 @@ struct Passes {
   std::size_t records = 0;
   int jobs = 0;
   residuals::Progress progress;
-  /// Of these flights and models; null where every pass makes its columns anew.
+  /// For these flights and models; null: each pass computes its columns again.
   std::shared_ptr<ColumnMemory> memory = nullptr;
 };
 
-/// A track under its model.
+/// A track with its model.
 struct ModelledTrack {
   residuals::Track track;
   stability::Model model;
@@ -32,12 +32,12 @@ struct ModelledTrack {
   TrackBlocks cut;
 };
 
-/// The tracks of vehicles of `kind` in a flight, without those that are known by their position only.
+/// Returns the tracks of vehicles of `kind` in a flight, without position-only ones.
 /// @param flight index into inputs.found.flights
 std::vector<ModelledTrack> modelled_tracks(const residuals::Inputs& inputs, const std::string& kind,
                                            int flight);
 
-/// Calls use(k, track) for each track of passes.flights[k], several flights at a time, then ended(), if there is one.
+/// Calls use(k, track) for each track of passes.flights[k], several flights at a time, then ended(), if set.
 void over_modelled_tracks(const Passes& passes,
                           const std::function<void(std::size_t k, const ModelledTrack& track)>& use,
                           const std::function<void()>& ended = nullptr);

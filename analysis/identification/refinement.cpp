@@ -15,13 +15,13 @@ namespace {
 
 constexpr std::size_t kTooManyToRefine = 400'000;
 constexpr int kMostSteps = 7;
-constexpr int kStepsOfRefit = 2;        ///< from where the fit of an excerpt ended, which is close
-constexpr double kDifference = 0.02;    ///< of a shape's scale, for derivatives
-constexpr double kLargestStep = 0.5;    ///< of a shape's scale
-constexpr double kSettled = 0.01;       ///< of a shape's scale
-constexpr double kSettledErrors = 0.1;  ///< of its standard error, where that is larger
+constexpr int kStepsOfRefit = 2;        ///< starting close, at the result of the excerpt
+constexpr double kDifference = 0.02;    ///< of the scale of a shape, for derivatives
+constexpr double kLargestStep = 0.5;    ///< of the scale of a shape
+constexpr double kSettled = 0.01;       ///< of the scale of a shape
+constexpr double kSettledErrors = 0.1;  ///< of its standard error, if that is larger
 
-/// One number that varies: a coefficient, or a shape of a member.
+/// A number to be fitted: a coefficient or a shape of a member.
 struct Unknown {
   std::size_t member;
   bool is_shape;
@@ -29,12 +29,12 @@ struct Unknown {
   double scale;  ///< of shapes
 };
 
-/// The members at one point of their shapes, with the columns of coefficients and of derivatives.
+/// The members at one set of shapes, with the columns of coefficients and derivatives.
 struct Point {
   std::vector<std::vector<double>> thetas;  ///< by member
   std::vector<Block> blocks;                ///< over the unknowns
   Eigen::MatrixXd gram;
-  Eigen::VectorXd b, coefficients;  ///< coefficients: of the fit with these thetas; 0 for shapes
+  Eigen::VectorXd b, coefficients;  ///< coefficients of the fit with these thetas; 0 for shapes
   double error = 0;                 ///< of that fit
   double equations = 0;
 };
@@ -47,17 +47,17 @@ double scale_of(const stability::Parameter& parameter, double value) {
 
 struct Step {
   std::vector<std::vector<double>> thetas;
-  double size;  ///< of the shape that moves farthest, in what is negligible
+  double size;  ///< of the largest change of a shape, relative to a negligible change
 };
 
-/// Which shapes a refinement may move.
+/// The shapes that a refinement may change.
 enum class Moves { kAll, kMemories, kOthers };
 
 class Refinement {
  public:
   explicit Refinement(const Passes& passes) : passes_(passes) {}
 
-  /// @param noise whitens columns and residual; must outlive this.
+  /// @param noise whitens columns and residual; must outlive this object
   Refinement(const Passes& passes, const Noise& noise) : passes_(passes), noise_(&noise) {}
 
   void add(const Candidate& added, const std::vector<double>& theta, Moves moves) {
@@ -65,7 +65,7 @@ class Refinement {
     Candidate& candidate = candidates_.back();
     const std::vector<std::vector<double>> tried = candidate.thetas;
     const std::size_t index = candidates_.size() - 1;
-    // A lag is a lag: once found, its gain is 1 and its time takes what the free gain had taken.
+    // Once a lag is identified its gain is fixed to 1; the time constant absorbs what the free gain had explained.
     if (candidate.info.remembers) candidate.info.linear[0].lower = candidate.info.linear[0].upper = 1;
     for (std::size_t c = 0; c < candidate.info.linear.size(); ++c) unknowns_.push_back({index, false, c, 0});
     const bool is_free = moves == Moves::kAll || candidate.info.remembers == (moves == Moves::kMemories);
@@ -105,7 +105,7 @@ class Refinement {
     return u.is_shape ? info.shape[u.index] : info.linear[u.index];
   }
 
-  /// One pass over the flights.
+  /// Makes one pass over the flights.
   Point evaluate(const std::vector<std::vector<double>>& thetas) const {
     std::vector<Candidate> around = candidates_;
     const std::vector<double> widths = add_neighbours(thetas, around);
@@ -124,8 +124,8 @@ class Refinement {
     return point;
   }
 
-  /// Gives each member of `around` its shapes, followed by a neighbour per unknown shape, for derivatives.
-  /// @return by unknown: how far away its neighbour is, upwards where there is room; 0 for coefficients.
+  /// Gives each member of `around` its shapes, followed by a neighbour for each unknown shape, for finite differences.
+  /// @return by unknown: distance of its neighbour, upwards if possible; 0 for coefficients
   std::vector<double> add_neighbours(const std::vector<std::vector<double>>& thetas,
                                      std::vector<Candidate>& around) const {
     std::vector<double> widths(unknowns_.size(), 0);
@@ -145,7 +145,7 @@ class Refinement {
     return widths;
   }
 
-  /// The column of unknown k as a sum over the columns of `full`; also sets the point's coefficients.
+  /// Returns the column of unknown k as a combination of the columns of `full`; also sets the point's coefficients.
   Eigen::MatrixXd mixing(const Grams& full, const std::vector<Candidate>& around,
                          const std::vector<double>& widths, const Eigen::VectorXd& c,
                          const Eigen::VectorXd& in_model, Point& point) const {
@@ -182,7 +182,8 @@ class Refinement {
     return mix;
   }
 
-  /// Fills the point's blocks, their sums and the number of equations. @return the sum of the squares to be explained.
+  /// Fills the blocks of the point, their sums and the number of equations.
+  /// @return the sum of squares to be explained
   static double add_blocks(const Grams& full, const Eigen::MatrixXd& mix, Point& point) {
     const Eigen::Index n = mix.cols();
     point.gram = Eigen::MatrixXd::Zero(n, n);
@@ -209,7 +210,7 @@ class Refinement {
     return y;
   }
 
-  /// One over the variance of the pull of each shape towards where it is, in units of the noise.
+  /// Returns the inverse prior variance of each shape about its current value, in units of the noise.
   Eigen::VectorXd ridge(const Point& point) const {
     Eigen::VectorXd pull = Eigen::VectorXd::Zero(point.b.size());
     const double variance = point.error / std::max(point.equations, 1.0);
@@ -220,7 +221,7 @@ class Refinement {
     return pull;
   }
 
-  /// Where Gauss and Newton lead.
+  /// Returns the Gauss-Newton step.
   Step step(const Point& from, double radius) const {
     Eigen::VectorXd lower(from.b.size()), upper = lower;
     for (std::size_t k = 0; k < unknowns_.size(); ++k) {
@@ -252,10 +253,10 @@ class Refinement {
     return next;
   }
 
-  /// Unknowns that are neither held nor at a bound, and that the flights tell something about.
+  /// Returns the unknowns that are neither fixed nor at a bound and on which the flights carry information.
   std::vector<int> free_unknowns(const Point& at, const Eigen::VectorXd& pull) const {
-    // A shape that changes the forces by their rounding only, such as how wakes compose where there is one, is not
-    // known at all: its pull alone would make its interval narrow.
+    // A shape that changes the forces only by round-off, such as the composition of wakes if there is only one, is
+    // entirely unknown: the regularisation alone would make its interval narrow.
     constexpr double kLeastShareOfPull = 1e-6;
     std::vector<int> free;
     for (std::size_t k = 0; k < unknowns_.size(); ++k) {
@@ -301,11 +302,11 @@ class Refinement {
   const Passes& passes_;
   const Noise* noise_ = nullptr;
   std::vector<Candidate> candidates_;
-  std::vector<Unknown> unknowns_;  ///< of each member first the coefficients, then the shapes
+  std::vector<Unknown> unknowns_;  ///< of each member: first the coefficients, then the shapes
   std::vector<std::vector<double>> start_;
 };
 
-/// Of the vertical residual that `refined` leaves.
+/// Returns the noise of the vertical residual beside `refined`.
 Noise noise_beside(const Passes& passes, const std::vector<Refined>& refined) {
   const residuals::Inputs& inputs = passes.inputs;
   std::vector<stability::EffectSpec> specs;
@@ -340,9 +341,9 @@ Noise noise_beside(const Passes& passes, const std::vector<Refined>& refined) {
   return sum.noise();
 }
 
-/// The controller knows the velocity, and with it more of a gust than past residuals tell: part of its answer is still
-/// in the whitened thrust. Simulated flights in gusts of 0.01 and 0.02 N kept 0.2 to 0.6 times what whitening had
-/// removed.
+/// The controller knows the velocity, and thus more about a gust than past residuals show, so part of its reaction is
+/// still in the whitened thrust. In simulated flights with gusts of 0.01 and 0.02 N, 0.2 to 0.6 times what whitening
+/// had removed was left.
 void widen_by_answers(const std::vector<Refined>& by_squares, std::vector<Refined>& whitened) {
   constexpr double kKept = 0.5;
   for (std::size_t i = 0; i < whitened.size(); ++i) {
@@ -357,7 +358,7 @@ void widen_by_answers(const std::vector<Refined>& by_squares, std::vector<Refine
   }
 }
 
-/// Lags and delays from whitened columns, then everything else beside them from the plain ones.
+/// Fits lags and delays to whitened columns, then everything else beside them to the plain ones.
 std::vector<Refined> with_whitened_memories(const Passes& passes, const Noise& noise,
                                             const std::vector<Refined>& refined,
                                             int most_steps = kMostSteps) {
@@ -371,7 +372,7 @@ std::vector<Refined> with_whitened_memories(const Passes& passes, const Noise& n
   for (std::size_t i = 0; i < result.size(); ++i) {
     const std::vector<Interval>& known =
         remembers(i) ? memories[i].shape_intervals : refined[i].shape_intervals;
-    for (std::size_t k = 0; k < known.size(); ++k) {  // a shape that was held here is known as before
+    for (std::size_t k = 0; k < known.size(); ++k) {  // a shape that was fixed here is known as before
       Interval& interval = result[i].shape_intervals[k];
       if (interval.lower == interval.upper) interval = known[k];
     }
@@ -379,7 +380,7 @@ std::vector<Refined> with_whitened_memories(const Passes& passes, const Noise& n
   return result;
 }
 
-/// `refined` with the shapes that were free once more so.
+/// Returns `refined` with the originally free shapes free again.
 std::vector<Refined> freed(std::vector<Refined> refined) {
   for (Refined& effect : refined) {
     for (std::size_t k = 0; k < effect.theta.size(); ++k) {
@@ -424,7 +425,7 @@ std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Memb
 }
 
 std::vector<Refined> with_innovations(const Passes& passes, std::vector<Refined> refined) {
-  constexpr int kMostRounds = 4;  // a wrong lag hides part of the gusts, and with it of their correlation
+  constexpr int kMostRounds = 4;  // a wrong lag hides part of the gusts and thus of their correlation
   constexpr double kSettledNoise = 0.05;
   if (!has_memory(refined) || passes.records > kTooManyToRefine) return refined;
   const std::vector<Refined> by_squares = refined;
@@ -448,7 +449,7 @@ std::vector<Refined> refit(const Passes& all, const Passes& seen, const std::vec
   const Noise noise = has_memory(refined) ? noise_beside(seen, refined) : Noise();
   if (!(noise.forget_s > 0)) return fitted_from(all, refined, kStepsOfRefit);
   std::vector<Refined> whitened = with_whitened_memories(all, noise, refined, kStepsOfRefit);
-  // What whitening moves is known well enough from the excerpt.
+  // The change due to whitening is known well enough from the excerpt.
   std::vector<Refined> by_squares = fitted_from(seen, refined);
   for (std::size_t i = 0; i < whitened.size(); ++i) {
     for (std::size_t k = 0; k < whitened[i].theta.size(); ++k)

@@ -1,4 +1,5 @@
-/// @file Shape parameters off the grid with intervals: Gauss-Newton steps on coefficients and shapes jointly.
+/// @file Refines shape parameters off the grid, with intervals, by Gauss-Newton steps on coefficients and shapes
+///   jointly.
 #pragma once
 
 #include <vector>
@@ -8,25 +9,27 @@
 
 namespace swarmcert::identification {
 
-/// A selected effect with the numbers that fit best.
+/// A selected effect with its best-fitting values.
 struct Refined {
-  Candidate candidate;  ///< its only theta is the best one
+  Candidate candidate;  ///< has a single theta, the best one
   std::vector<double> coefficients, theta;
-  /// 90 %, from the jackknife of coefficients and free shapes together; equal ends where a number was held.
+  /// 90 %, from the jackknife of coefficients and free shapes together; both ends are equal for values held fixed.
   std::vector<Interval> linear_intervals, shape_intervals;
 };
 
-/// Refines `members` of `grams` jointly. Derivatives with respect to shapes are differences of columns; steps are
-/// bounded, and a weak pull towards the start keeps shapes in place about which the flights say nothing. Flights of
-/// more than 400 000 records get one step.
+/// Refines `members` of `grams` jointly. Derivatives with respect to shapes are finite differences of columns. Steps
+/// are bounded, and a weak regularisation towards the start keeps shapes in place on which the flights carry no
+/// information. Flights with more than 400 000 records get a single step.
 std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Members& members);
 
-/// `refined` with the times of lags and delays as the innovations of the residual show them (whitening.h), and
-/// everything else fitted anew beside them; as it is where none is refined, or what is left is white.
+/// Returns `refined` with the times of lags and delays fitted to the innovations of the residual (whitening.h), and
+/// everything else fitted again beside them. Returns `refined` unchanged if it has no lag or delay, or if the remainder
+/// is white.
 std::vector<Refined> with_innovations(const Passes& passes, std::vector<Refined> refined);
 
-/// `found`, as `seen`, an excerpt of the flights of `all`, gave it, fitted to all of them from there: lags and delays
-/// to the innovations again, with intervals that allow for as much of what whitening removes as with_innovations().
+/// Fits `found`, which was found on the excerpt `seen` of the flights of `all`, to all flights, starting from there.
+/// Lags and delays are again fitted to the innovations; their intervals include the same allowance for the effect of
+/// whitening as in with_innovations().
 std::vector<Refined> refit(const Passes& all, const Passes& seen, const std::vector<Refined>& found);
 
 }  // namespace swarmcert::identification

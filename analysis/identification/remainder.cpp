@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kFlagRatio = 3;
 constexpr double kLeastExplained =
-    0.02;  ///< of the squared residual that the means over a variable's regions explain
+    0.02;  ///< of the squared residual explained by the means over a variable's regions
 
 }  // namespace
 

@@ -26,10 +26,9 @@ bool is_supported(const Grams& grams, std::size_t candidate, std::size_t theta, 
   return telling_blocks(grams, candidate, theta) >= static_cast<double>(blocks);
 }
 
-/// Where the voltage falls by little, its effect is a change of scale; where speed or thrust vary by little, every drag
-/// is a linear one; a wake whose neighbours move slowly has no delay; and a load
-/// that never swings is a scale of the thrust. The plain form is what flights show unless
-/// they clearly say more.
+/// If the voltage falls little, its effect is a thrust scale; if speed or thrust vary little, any drag is linear; a
+/// wake of slowly moving neighbours has no delay; and a load that never swings is a thrust scale. The plain form is
+/// used unless the flights clearly show more.
 int Selection::plain_form(int which) const {
   const std::string& name = grams().candidates[static_cast<std::size_t>(which)].name;
   if (name == "battery") return index_of("thrust_ratio");
@@ -46,7 +45,7 @@ int Selection::index_of(const char* name) const {
   return -1;
 }
 
-/// Flights differ in their scale of the thrust, and in their heights: only what changes within flights is a ceiling.
+/// Flights differ in their thrust scale and in their heights, so only changes within flights can show a ceiling.
 bool Selection::is_shown_within_flights(const Members& before, const Member& added) const {
   if (candidate(added).name != "ceiling") return true;
   Members rest = before;
@@ -103,11 +102,11 @@ Member Selection::best_theta(const Members& members, int which) const {
   for (int t = 0; t < thetas; ++t) {
     const Member member{which, t};
     const Members after = with(members, member);
-    // A coarse grid's neighbour may fit better with a gain at its bound, but that is no lag.
+    // A neighbouring theta of a coarse grid may fit better with a gain at its bound, but that is not a lag.
     const bool held = is_held(after);
     if (held && !best_is_held) continue;
     const double square = mean_square(after);
-    // Of thetas that differ by rounding only the first, which is the default.
+    // Of thetas that differ only by round-off, use the first, which is the default.
     if (square < least * (1 - 1e-9) || (best_is_held && !held)) {
       least = square;
       best = member;
@@ -168,7 +167,7 @@ bool Selection::add_one(Members& members) const {
   };
   for (std::size_t i = 0; i < choices.size(); ++i) {
     if (!accepts(choices[i])) continue;
-    // Of what does equally well, the effect with the fewest numbers.
+    // Of equally good effects, choose the one with the fewest parameters.
     const Choice* best = &choices[i];
     for (std::size_t j = i + 1; j < choices.size(); ++j) {
       if (choices[j].share() - choices[i].share() > thresholds_.swap_gain) break;
@@ -262,7 +261,7 @@ Members Selection::select(const std::vector<std::string>& names) const {
 
 Members Selection::ordered(Members members) const {
   constexpr double kLocalShare = 0.25;
-  // A shape without a memory: ground, jets, ...
+  // A shape without memory: ground, jets, ...
   const auto is_local = [&](const Member& m) {
     return !candidate(m).info.shape.empty() && !candidate(m).info.remembers;
   };

@@ -1,75 +1,79 @@
-/// @file Which effects explain a residual: forward selection with swaps and removals, judged by cross-validation.
+/// @file Selects the effects that explain a residual: forward selection with swaps and removals, by cross-validation.
 #pragma once
 
 #include "analysis/identification/cross_validation.h"
 
 namespace swarmcert::identification {
 
-/// When an effect counts as found. Sources: measured on 80 closed-loop simulations and the published flights.
+/// Thresholds at which an effect is considered found. Sources: 80 closed-loop simulations and the published flights.
 struct Thresholds {
-  double gain = 0.02;   ///< least relative fall of the cross-validated mean square
+  double gain = 0.02;   ///< smallest relative reduction of the cross-validated mean square
   double paired_z = 3;  ///< paired over blocks; or
   double wald_z = 3.5;  ///< cluster-robust, together with
   double least_paired_z = 1;
   double swap_gain = 0.003;
-  double removal_share = 0.7;  ///< of `gain`: an effect that loses less than this is removed
+  double removal_share = 0.7;  ///< fraction of `gain`: an effect whose removal costs less is removed
   std::size_t support_records = 100, support_blocks = 5;
-  /// What lowers the mean square of blocks left out by this much was predicted there from elsewhere: fewer will do.
+  /// Fewer blocks are sufficient for an effect that reduces the mean square of held-out blocks by this much, because
+  /// that is a successful prediction.
   double plain_gain = 0.3;
   std::size_t plain_support_blocks = 2;
 };
 
-/// True where the flights show `candidate` with `theta` in at least `blocks` blocks: where the effect counts as acting
-/// (Effect::in_support), or where they carry its coefficient (telling_blocks): over the ground, flights that never come
-/// near the floor see a strong effect from above.
+/// Returns true if the flights show `candidate` with `theta` in at least `blocks` blocks: either blocks in which the
+/// effect acts (Effect::in_support), or blocks that carry its coefficient (telling_blocks()). The latter matter, for
+/// example, for the ground effect, which can be strong in flights that never come near the floor.
 bool is_supported(const Grams& grams, std::size_t candidate, std::size_t theta, std::size_t blocks,
                   const Thresholds& thresholds);
 
-/// The passes over candidates, on top of the fits that judge them.
+/// The passes over candidates, based on the fits of CrossValidation.
 class Selection : public CrossValidation {
  public:
-  /// @param grams must outlive this.
+  /// @param grams must outlive this object
   explicit Selection(const Grams& grams, Thresholds thresholds = {})
       : CrossValidation(grams), thresholds_(thresholds) {}
 
-  /// Forward, swap and backward passes; the effects ordered().
-  /// @param names where to begin: effects that are known already
+  /// Runs forward, swap and backward passes and returns the effects ordered().
+  /// @param names effects to begin with, already known
   Members select(const std::vector<std::string>& names = {}) const;
-  /// One step forward from `members`. Returns false where nothing is left to add.
+  /// Takes one step forward from `members`. Returns false if there is nothing to add.
   bool add_one(Members& members) const;
-  /// Drops effects that have become needless.
+  /// Removes effects that have become unnecessary.
   void prune(Members& members) const;
-  /// In the order in which they lower the error most; but one that acts in some places only comes before those that act
-  /// everywhere, which a wrong calibration looks like, where it lowers the error by a quarter as much.
+  /// Sorts the effects by how much they reduce the error. An effect that acts only in some places comes before those
+  /// that act everywhere, which can be an artefact of a wrong calibration, if it reduces the error by at least a
+  /// quarter as much.
   Members ordered(Members members) const;
-  /// The theta of `candidate` that suits best beside `members`.
+  /// Returns the best theta of `candidate` beside `members`.
   Member best_theta(const Members& members, int candidate) const;
-  /// True where the data show that `added` belongs to `before`.
+  /// Returns true if the data support adding `added` to `before`.
   bool is_acceptable(const Members& before, const Member& added) const;
-  /// What of the cross-validated mean square goes away with the member at `index`: 0.1 for a tenth. Of a lag or delay,
-  /// which has no mean, about the mean of each track.
+  /// Returns the fraction of the cross-validated mean square that the member at `index` removes: 0.1 for a tenth. For a
+  /// lag or delay, which has no mean, the mean of each track is subtracted.
   double loss_without(const Members& members, std::size_t index) const;
-  /// Enough blocks for an answer.
+  /// Returns whether there are enough blocks for an answer.
   bool is_sound() const { return grams().blocks.size() >= kFewestBlocks; }
 
  private:
   bool is_acceptable(const Members& before, const Member& added, double before_square, double after_square,
                      const Folds& folds) const;
   std::vector<double> errors(const Members& members, const Folds& folds, bool trims) const;
-  /// The candidate that `candidate` becomes where what it varies with stays the same; -1 if there is none.
+  /// Returns the candidate to which `candidate` reduces if the quantity that it varies with is constant; -1 if there is
+  /// none.
   int plain_form(int candidate) const;
-  /// Index of the candidate with this name; -1 if no candidate has it.
+  /// Returns the index of the candidate with this name; -1 if there is none.
   int index_of(const char* name) const;
-  /// Of a ceiling: about the mean of each track, beside a scale of the thrust, it lowers the error of blocks left out.
+  /// For a ceiling: returns whether it reduces the error of held-out blocks about the mean of each track, beside a
+  /// thrust scale.
   bool is_shown_within_flights(const Members& before, const Member& added) const;
-  /// Blocks that were left out prefer `after` by two standard errors, and by as much as an effect must gain.
+  /// Returns whether held-out blocks prefer `after` by two standard errors and by the gain required of an effect.
   bool is_clearly_better(const Members& after, const Members& before) const;
-  /// A formula of the scan (scan/formulas.h), which stands for whatever has no name.
+  /// Returns true for a formula of the scan (scan/formulas.h), which represents effects without a name.
   bool is_formula(const Member& member) const;
-  /// A name stands unless the formula explains more by an eighth, or leaves less by a fifth, and blocks that were left
-  /// out prefer it clearly.
+  /// Returns whether a formula replaces a named effect: it explains more by an eighth or leaves less by a fifth, and
+  /// held-out blocks clearly prefer it.
   bool formula_wins(const Members& rest, const Member& formula, const Member& named) const;
-  /// The last member is a lag or delay whose gain is at a bound.
+  /// Returns whether the last member is a lag or delay whose gain is at a bound.
   bool is_held(const Members& members) const;
   bool swap_one(Members& members) const;
   bool remove_one(Members& members) const;

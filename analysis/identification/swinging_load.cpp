@@ -16,14 +16,14 @@ const Members kFixedLoad = {{kRatio, 0}, {kPush, 0}};
 
 double frequency_rad_s(double length_m) { return std::sqrt(stability::kGravity_m_s2 / length_m); }
 
-/// A constant force that is horizontal: the weight is for the other two.
+/// Returns a constant horizontal force; the vertical part is explained by the weight.
 Candidate horizontal_push(const stability::Model& model, const Coverage& covered) {
   Candidate push = candidate("constant_force", model, covered);
   push.info.linear[2].lower = push.info.linear[2].upper = 0;
   return push;
 }
 
-/// How far round `k` of the search moves from the best of the round before.
+/// Range of round `k` of the search about the best result of the previous round.
 struct Zoom {
   double step_rad_s;
   std::vector<double> damping_factors;
@@ -69,19 +69,19 @@ class PendulumSearch {
   }
 
   bool swings() const {
-    constexpr double kMostDamping = 0.5;  // of the frequency: a quarter of what is critical
+    constexpr double kMostDamping = 0.5;  // of the frequency: a quarter of critical damping
     return best()[1] <= kMostDamping * frequency_rad_s(best()[0]);
   }
 
-  /// Of the mean square of blocks left out.
+  /// Returns the reduction of the mean square of held-out blocks.
   double gain() const {
     const Selection selection(grams_);
     if (!selection.is_sound()) return 0;
     return 1 - selection.mean_square(with(kFixedLoad, member_)) / selection.mean_square(kFixedLoad);
   }
 
-  /// Heavy against the vehicle, or most of the weight that a fixed load would have. Recorded flights without a load
-  /// had slow swings of up to 3 % of the vehicle's mass.
+  /// Returns whether the load is heavy compared with the vehicle, or accounts for most of the weight of a rigid load.
+  /// Recorded flights without a load showed slow oscillations of up to 3 % of the vehicle's mass.
   bool is_heavy() const {
     constexpr double kShareOfRatio = 0.5, kShareOfVehicle = 0.1;
     const Selection selection(grams_);
@@ -133,7 +133,8 @@ Candidate best_pendulum(const Passes& passes, const Coverage& covered,
 std::optional<Candidate> visible_pendulum(const Passes& passes, const Coverage& covered,
                                           const std::vector<stability::EffectSpec>& beside) {
   PendulumSearch search(passes, covered, beside);
-  // The grid is damped too much for a resonance, which is seen there all the same: fixed loads gained 0.0001.
+  // The damping of the grid is too high for a resonance, but a resonance is visible all the same; rigid loads gained
+  // 0.0001.
   constexpr double kLeastGain = 0.003;
   if (search.gain() < kLeastGain) return std::nullopt;
   search.zoom();

@@ -1,4 +1,4 @@
-/// @file The length of the string on which a load swings, from the resonance of the horizontal force.
+/// @file Length of the string of a swinging load, from the resonance of the horizontal force.
 #pragma once
 
 #include <optional>
@@ -8,18 +8,19 @@
 
 namespace swarmcert::identification {
 
-/// The effect that this file searches.
+/// The effect that is fitted here.
 inline constexpr char kPendulum[] = "pendulum";
 
-/// The pendulum with the length and damping that suit best beside a scale of the thrust and a constant horizontal
-/// force, with neighbouring shapes for a fit to move to.
-/// @param beside effects that are known already
+/// Returns the pendulum with the best length and damping beside a thrust scale and a constant horizontal force, with
+/// neighbouring shapes for the fit.
+/// @param beside effects that are already known
 Candidate best_pendulum(const Passes& passes, const Coverage& covered,
                         const std::vector<stability::EffectSpec>& beside);
 
-/// best_pendulum() if the flights show that a load swings: beside a scale of the thrust, which is what a fixed payload
-/// looks like, it lowers the error of blocks left out as an effect must (Selection::is_acceptable()); it is damped so
-/// little that it oscillates; and it has a tenth of the vehicle's mass, or its weight explains half of that scale.
+/// Returns best_pendulum() if the flights show a swinging load: beside a thrust scale, which is what a rigid payload
+/// looks like, it reduces the error of held-out blocks as required of an effect (Selection::is_acceptable()); its
+/// damping is low enough to oscillate; and it has at least a tenth of the vehicle's mass, or its weight explains half
+/// of that scale.
 std::optional<Candidate> visible_pendulum(const Passes& passes, const Coverage& covered,
                                           const std::vector<stability::EffectSpec>& beside);
 

@@ -7,7 +7,7 @@
 namespace swarmcert::identification {
 namespace {
 
-/// Why nothing can be said of one kind; empty where something can.
+/// Returns why one kind cannot be judged; empty if it can.
 std::string not_judged(const Diagnosis& diagnosis) {
   if (!diagnosis.too_poor.empty()) return diagnosis.too_poor;
   if (diagnosis.remainder.ratio > 0) return "";
@@ -23,7 +23,7 @@ const char* name(Verdict verdict) {
 }
 
 bool leaves_something(const Diagnosis& diagnosis) {
-  // Torques of blades that flap and of a hull in the wind are in no model.
+  // No model includes the torques of flapping blades or of wind on the hull.
   constexpr double kMostOfTorque = 0.5;
   const auto explains = [](const Scan& scan, double share) {
     return !scan.entries.empty() && scan.entries[0].share >= share;

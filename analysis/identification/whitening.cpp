@@ -18,7 +18,7 @@ void Autocovariance::add(const std::vector<double>& values, const std::vector<ch
 }
 
 Noise Autocovariance::noise() const {
-  constexpr double kLeast = 0.1, kShortest = 0.1, kLongest = 0.99;  // shares left after kStep_s
+  constexpr double kLeast = 0.1, kShortest = 0.1, kLongest = 0.99;  // correlations after kStep_s
   constexpr double kLeastWhite = 0.01;
   if (counts[2] < 1) return {};
   const double c[3] = {sums[0] / counts[0], sums[1] / counts[1], sums[2] / counts[2]};
@@ -28,8 +28,8 @@ Noise Autocovariance::noise() const {
   return {-kStep_s / std::log(left), std::max(c[0] / gusts - 1, kLeastWhite)};
 }
 
-/// The moving average of innovations: the autocovariances of r_t - phi r_(t-1) are s (1 - phi^2) + n (1 + phi^2) and
-/// -phi n for gusts of variance s and white noise of variance n; theta + 1/theta is their ratio.
+/// Computes the moving-average coefficient: the autocovariances of r_t - phi r_(t-1) are s (1 - phi^2) + n (1 + phi^2)
+/// and -phi n for gusts of variance s and white noise of variance n; theta + 1/theta is their ratio.
 void Whitening::tune(double dt_s) {
   if (dt_s == dt_s_) return;
   dt_s_ = dt_s;

@@ -1,11 +1,12 @@
-/// @file Noise of a force residual that is correlated in time, and the filter that makes it white.
+/// @file A model of the time-correlated noise of a force residual, and the filter that whitens it.
 ///
-/// A gust that forgets itself, beside white noise: r = g + w with corr(g(t), g(t + d)) = exp(-d / forget_s). One record
-/// to the next this is an ARMA(1, 1) process with the innovations e_t = r_t - phi r_(t-1) + theta e_(t-1).
+/// The model is a gust with exponential correlation plus white noise: r = g + w with corr(g(t), g(t + d)) = exp(-d /
+/// forget_s). From record to record this is an ARMA(1, 1) process with the innovations e_t = r_t - phi r_(t-1) + theta
+/// e_(t-1).
 ///
-/// Where a controller answers gusts, least squares take the answer for a lag of the thrust. Thrust responds to past
-/// disturbances only, so it is uncorrelated with later innovations: least squares of filtered residuals on filtered
-/// columns are consistent in a closed loop if the noise is of this kind (direct identification: Ljung, System
+/// If a controller reacts to gusts, least squares mistake the reaction for a lag of the thrust. Thrust responds only to
+/// past disturbances, so it is uncorrelated with later innovations: least squares of filtered residuals on filtered
+/// columns are consistent in closed loop if the noise is of this kind (direct identification: Ljung, System
 /// Identification, 1999, 13.4).
 #pragma once
 
@@ -15,29 +16,31 @@
 namespace swarmcert::identification {
 
 struct Noise {
-  double forget_s = 0;     ///< of the gusts
+  double forget_s = 0;     ///< correlation time of the gusts
   double white_share = 0;  ///< variance of the white noise over that of the gusts
 };
 
-/// Sums of products of a residual with itself, a tenth and two tenths of a second later.
+/// Sums of products of a residual with itself, undelayed and delayed by one and two tenths of a second.
 struct Autocovariance {
   static constexpr double kStep_s = 0.1;
   double sums[3] = {};
   double counts[3] = {};
 
-  /// @param values at times `step` records of which make kStep_s; restarts[i] != 0 where record i does not follow.
+  /// @param values with `step` records per kStep_s; restarts[i] != 0: record i does not follow the previous one
   void add(const std::vector<double>& values, const std::vector<char>& restarts, std::size_t step);
-  /// forget_s is 0, and no filter is needed, where the correlation over a tenth of a second is below 0.1.
+  /// Returns the noise; forget_s is 0, and no filter is needed, if the correlation over a tenth of a second is below
+  /// 0.1.
   Noise noise() const;
 };
 
-/// The filter, for many signals side by side.
+/// The whitening filter for many signals at once.
 class Whitening {
  public:
   explicit Whitening(const Noise& noise) : noise_(noise) {}
-  /// @param x       one sample of every signal.
-  /// @param dt_s    since the sample before.
-  /// @param restart nothing is known of the past: the innovation is 0.
+  /// Advances the filter by one sample and returns the innovations.
+  /// @param x       one sample of each signal
+  /// @param dt_s    time since the previous sample
+  /// @param restart the past is unknown: the innovation is 0
   const Eigen::Matrix3Xd& advance(const Eigen::Matrix3Xd& x, double dt_s, bool restart);
 
  private:

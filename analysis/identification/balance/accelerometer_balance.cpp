@@ -14,16 +14,16 @@ namespace {
 using residuals::Track;
 
 constexpr double kMotionBlock_s = 1, kOffset_z = 2;
-/// Accelerometers are filtered, and attitudes come late, by no more than this.
+/// Upper bound on the lag of filtered accelerometers and delayed attitudes.
 constexpr double kLongestLag_s = 0.02;
 constexpr std::size_t kFewestMotionBlocks = 10;
 
-/// Means over a second without a cut.
+/// Means over a second without cuts.
 struct MotionBlock {
   Eigen::Vector3d of_velocity_m_s2, measured_m_s2;
-  /// Vertical part that a lag of the accelerometer behind the attitude adds to the measured mean, per second of lag:
-  /// the body turns meanwhile. Of a filter a' = (a_B - a) / lag, measured = R a = R a_B - lag R a', and R a' = (R a)' -
-  /// omega x (R a), whose first part has no mean.
+  /// Vertical acceleration that a lag of the accelerometer behind the attitude adds to the measured mean, per second of
+  /// lag, because the body rotates meanwhile. For a filter a' = (a_B - a) / lag, measured = R a = R a_B - lag R a', and
+  /// R a' = (R a)' - omega x (R a), whose first part has zero mean.
   double of_lag_m_s3;
 };
 
@@ -32,7 +32,7 @@ double turned_upwards_m_s3(const Track& track, std::size_t i) {
   return (now.R_WB * now.omega_B_rad_s).cross(track.specific_force_m_s2[i]).z();
 }
 
-/// By the trapezoidal rule, over the same time as the mean of the force.
+/// Uses the trapezoidal rule over the same time as the mean of the force.
 double mean_turned_m_s3(const Track& track, const ForceMean& one) {
   double integral_m_s2 = 0;
   for (std::size_t i = one.first + 1; i <= one.last; ++i)
@@ -41,7 +41,7 @@ double mean_turned_m_s3(const Track& track, const ForceMean& one) {
   return integral_m_s2 / (track.instants[one.last].time_s - track.instants[one.first].time_s);
 }
 
-/// @param scale by which the measured force is divided.
+/// @param scale divides the measured force
 std::vector<MotionBlock> motion_blocks(const Track& track, double scale) {
   std::vector<MotionBlock> blocks;
   for (const ForceMean& one : specific_force_means(track, kMotionBlock_s)) {
@@ -53,7 +53,7 @@ std::vector<MotionBlock> motion_blocks(const Track& track, double scale) {
   return blocks;
 }
 
-/// Along the vertical, where gravity shows the scale.
+/// Fits the scale along the vertical, where gravity makes it visible.
 void fit_scale(const std::vector<MotionBlock>& blocks, double mass_kg, AccelerometerBalance& balance) {
   std::vector<double> x, y, gains;
   double offset_m_s2 = 0, of_lag_m_s3 = 0;

@@ -1,7 +1,8 @@
-/// @file The accelerometer against the velocity: a scale error shows without any model of the vehicle.
+/// @file Compares the accelerometer with the velocity, which shows a scale error without any model of the vehicle.
 ///
-/// Over a second the mean specific force is the change of the velocity plus gravity, whatever pushes the vehicle. Means
-/// of blocks of 1 s are regressed on it: y = s x says a scale, y = x + b an offset. In slow flight both say the same.
+/// Over a second the mean specific force equals the change of the velocity plus gravity, whatever forces act on the
+/// vehicle. Means over blocks of 1 s are regressed on it: y = s x indicates a scale, y = x + b an offset. In slow
+/// flight both explain the data equally well.
 #pragma once
 
 #include <string>
@@ -12,7 +13,7 @@
 
 namespace swarmcert::identification {
 
-/// Scale errors below this are those of accelerometers as they are sold, and of the gravity taken for them.
+/// Scale errors below this are normal for commercial accelerometers and for the assumed value of gravity.
 inline constexpr double kOrdinaryScaleError = 0.03;
 
 inline constexpr char kAccelerometerScale[] = "accelerometer_scale";
@@ -21,30 +22,31 @@ struct AccelerometerBalance {
   std::string kind, vehicle;
   int flights = 0;
   std::size_t blocks = 0;
-  MeanFit scale;  ///< measured over what the model says of the sensor; 1: the model is right
-  /// Largest error of `scale` that a lag of the sensor makes while the body turns back and forth.
+  MeanFit scale;  ///< measured over modelled scale; 1: the model is right
+  /// Largest error of `scale` caused by a lag of the sensor while the body rotates back and forth.
   double of_lag = 0;
-  double z = 0;              ///< of the scale over an offset along the vertical, by the squares of the blocks
-  double rmse_before_N = 0;  ///< mean disagreement of the blocks, times the mass
+  double z = 0;              ///< of the scale over a vertical offset, from the squared errors of the blocks
+  double rmse_before_N = 0;  ///< mean discrepancy of the blocks, times the mass
   double rmse_after_N = 0;
   bool is_named = false;
 
-  /// An offset of the accelerometer along the vertical says the same on these flights.
+  /// Returns true if a vertical offset of the accelerometer explains these flights equally well.
   bool may_be_offset() const;
 };
 
-/// What the model's accelerometer_scale effects say of `vehicle`: the product of their scales.
+/// Returns the product of the scales of the model's accelerometer_scale effects for `vehicle`.
 double modelled_accelerometer_scale(const stability::Model& model, const std::string& vehicle);
 
-/// Every vehicle of `kind` whose logs have an accelerometer and a velocity, over all of its flights; fewer than 10
-/// blocks are left out. The model's own accelerometer_scale is taken out. Does not depend on `jobs`.
+/// Returns the balance of each vehicle of `kind` whose logs have an accelerometer and a velocity, over all of its
+/// flights. Vehicles with fewer than 10 blocks are skipped. The model's own accelerometer_scale is removed first. The
+/// result does not depend on `jobs`.
 std::vector<AccelerometerBalance> accelerometer_balances(const residuals::Inputs& inputs,
                                                          const std::string& kind, int jobs);
 
-/// accelerometer_scale with the number of `balance` and its interval, for its vehicle.
+/// Returns the effect accelerometer_scale with the value and interval of `balance`, for its vehicle.
 stability::EffectSpec spec_of(const AccelerometerBalance& balance);
 
-/// "the accelerometer reads 1.080 times what the velocity says (90 %: 1.078 .. 1.082)".
+/// Describes the balance: "the accelerometer reads 1.080 times what the velocity says (90 %: 1.078 .. 1.082)".
 std::string in_words(const AccelerometerBalance& balance);
 
 }  // namespace swarmcert::identification

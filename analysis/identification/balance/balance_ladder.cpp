@@ -24,7 +24,7 @@ residuals::Inputs with_model(residuals::Inputs inputs, const std::vector<stabili
   return inputs;
 }
 
-/// Of the rotors, over all vehicles; 0 where none has ten blocks.
+/// Returns the imbalance of the rotors over all vehicles; 0 if none has ten blocks.
 double imbalance_of(const residuals::Inputs& inputs, int jobs) {
   double squares = 0, blocks = 0;
   for (const TorqueBalance& balance : torque_balances(inputs, inputs.models[0].kind, jobs)) {
@@ -39,7 +39,7 @@ double error_of(const residuals::Inputs& inputs, const std::string& effect, int 
   return residuals::compare(inputs, jobs, [](int, int) {}).overall.statistics.rmse.total;
 }
 
-/// One per vehicle; of a single one it is for all.
+/// Returns one effect per vehicle; that of a single vehicle applies to all.
 std::vector<stability::EffectSpec> fitted_to_means(const residuals::Inputs& inputs, const std::string& effect,
                                                    int jobs) {
   const std::string& kind = inputs.models[0].kind;

@@ -1,4 +1,4 @@
-/// @file Adding what means over a second show to a model: com_offset, torque_bias or accelerometer_scale.
+/// @file Adds effects that are identified from means over a second: com_offset, torque_bias or accelerometer_scale.
 #pragma once
 
 #include <string>
@@ -7,14 +7,14 @@
 
 namespace swarmcert::identification {
 
-/// Whether `effect` is fitted to mean torques (torque_balance.h) and not to the force of a flight.
+/// Returns true if `effect` is fitted to mean torques (torque_balance.h) and not to the force in flight.
 bool is_of_torques(const std::string& effect);
-/// Whether it is fitted to these or to mean accelerations (accelerometer_balance.h).
+/// Returns true if `effect` is fitted to mean torques or to mean accelerations (accelerometer_balance.h).
 bool is_balanced(const std::string& effect);
 
-/// As climb(), for the one effect. Errors of the rows are, of torques, forces by which the rotors are off balance, rms
-/// over blocks of 1 s and rotors; of accelerometer_scale those of the force. Where several vehicles fly each gets an
-/// effect of its own. Precondition: is_balanced(effect).
+/// Like climb() for this single effect. The errors of the rows are, for torques, the forces by which the rotors are out
+/// of balance, rms over blocks of 1 s and rotors; for accelerometer_scale, the errors of the force. If several vehicles
+/// flew, each gets an effect of its own. Precondition: is_balanced(effect).
 Ladder balance_ladder(const residuals::Inputs& inputs, const std::string& effect, bool keep_anyway, int jobs);
 
 }  // namespace swarmcert::identification

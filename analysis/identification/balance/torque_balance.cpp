@@ -18,7 +18,7 @@ using residuals::TorqueBlock;
 constexpr double kTorqueBlock_s = 1;
 constexpr std::size_t kFewestTorqueBlocks = 10;
 
-/// Which of the two explains, and what else would as well.
+/// Decides which of the two explains the data, and lists alternative explanations.
 void decide_torque_cause(double longest_m, double weight_N, TorqueBalance& balance) {
   constexpr double kSurely_z = 2, kDiagonal = 0.5;
   const bool is_constant = balance.z < -kSurely_z;
@@ -63,7 +63,7 @@ void fit_torques(const std::vector<TorqueBlock>& blocks, const stability::Model&
     by_torque += with_torque;
   }
   balance.z = mean_z(gains);
-  // Torques tau_x and tau_y are rotor forces of +- tau_x / (4 l) +- tau_y / (4 l).
+  // Torques tau_x and tau_y correspond to rotor forces +- tau_x / (4 l) +- tau_y / (4 l).
   const double lever_m = model.arm_m * std::sqrt(0.5), count = static_cast<double>(blocks.size());
   balance.rmse_before_N = std::sqrt(before / count) / (4 * lever_m);
   balance.rmse_after_N = std::sqrt(std::min(by_offset, by_torque) / count) / (4 * lever_m);

@@ -1,4 +1,4 @@
-/// @file Blocks of flight, put together by vehicle.
+/// @file Collects blocks of flight by vehicle.
 #pragma once
 
 #include <map>
@@ -17,8 +17,8 @@ struct VehicleBlocks {
   std::vector<Block> blocks;
 };
 
-/// @param blocks_of std::optional<std::vector<Block>>(track): the blocks of a track of this kind; nothing: it does not
-///                  count.
+/// Returns the blocks of each vehicle of this kind.
+/// @param blocks_of std::optional<std::vector<Block>>(track): returns the blocks of a track; nothing: skip the track
 template <typename Block, typename BlocksOf>
 std::map<std::string, VehicleBlocks<Block>> blocks_by_vehicle(const residuals::Inputs& inputs,
                                                               const std::string& kind, int jobs,
@@ -39,8 +39,8 @@ std::map<std::string, VehicleBlocks<Block>> blocks_by_vehicle(const residuals::I
   return vehicles;
 }
 
-/// One balance per vehicle of this kind that has at least `fewest` blocks.
-/// @param fit (blocks, balance): fills in what the blocks say.
+/// Returns one balance per vehicle of this kind with at least `fewest` blocks.
+/// @param fit (blocks, balance): fills in the result for the blocks
 template <typename Balance, typename Block, typename BlocksOf, typename Fit>
 std::vector<Balance> balances_by_vehicle(const residuals::Inputs& inputs, const std::string& kind, int jobs,
                                          std::size_t fewest, const BlocksOf& blocks_of, const Fit& fit) {

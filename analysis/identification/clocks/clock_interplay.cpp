@@ -17,14 +17,14 @@ using Eigen::VectorXd;
 using residuals::Track;
 
 constexpr int kFewestSamples = 200;
-/// Of longer flights only every second, third ... mean is taken.
+/// For longer flights only every second, third, ... mean is used.
 constexpr std::size_t kMostSamples = 4000;
 
 const Knots kLateral_m = {0, 0.08, 0.2, 0.4, 0.7}, kHeight_m = {-0.8, -0.3, 0, 0.2, 0.4, 0.7, 1.2};
 
 Index map_size() { return static_cast<Index>(kLateral_m.size() * kHeight_m.size()); }
 
-/// Where a log has its vehicle; nothing outside of it or in a gap.
+/// Returns the position of a vehicle according to its log; nothing outside the log or in a gap.
 std::optional<Vector3d> place_at(const std::vector<double>& times_s, const std::vector<Vector3d>& p_m,
                                  double time_s) {
   constexpr double kLongestGap_s = 0.1;
@@ -96,7 +96,7 @@ void Interplay::read(const Track& own, const std::vector<Vector3d>& r) {
   }
 }
 
-/// All shifts are judged on the same samples.
+/// Keeps only samples that are known for each shift, so that all shifts are judged on the same samples.
 void Interplay::keep_what_every_shift_knows() {
   const double least_s = -(kClockSteps + kWakeSteps) * kClockStep_s, most_s = kClockSteps * kClockStep_s;
   std::vector<std::size_t> kept;
@@ -125,7 +125,7 @@ const std::vector<SparseRow>& Interplay::rows_at(Path& path, int shift) const {
   Eigen::VectorXf lateral_m(size()), height_m(size());
   for (Index i = 0; i < size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
-    // In a gap between the ends the vehicle counts as far away.
+    // In a gap inside the log the vehicle is treated as far away.
     const Vector3d dp_m = place_at(path.time_s, path.p_m, time_s_[k] + shift * kClockStep_s)
                               .value_or(own_m_[k] + Vector3d(1e3, 0, 0)) -
                           own_m_[k];
@@ -139,7 +139,7 @@ std::vector<Interplay::Sums> Interplay::sums_at(const std::vector<int>& shifts) 
   const Index size_of_all = maps_ * map_size();
   std::vector<Sums> tenths(kClockTenths, {MatrixXd::Zero(size_of_all, size_of_all),
                                           VectorXd::Zero(size_of_all), VectorXd::Zero(size_of_all)});
-  std::vector<std::pair<const std::vector<SparseRow>*, Index>> present;  // rows, and where their map begins
+  std::vector<std::pair<const std::vector<SparseRow>*, Index>> present;  // rows, first column of map
   for (std::size_t j = 0; j < others_.size(); ++j) {
     if (shifts[j] != kAbsent)
       present.emplace_back(&rows_at(others_[j], shifts[j]), others_[j].map * map_size());
@@ -178,8 +178,8 @@ double Interplay::fitted_to(const std::vector<Sums>& tenths, int without) const 
     all.sum += one.sum;
     all.count += one.count;
   }
-  // Hats add up to a constant: a constant force is among the maps. The ridge keeps places that were hardly visited at
-  // zero.
+  // Hat functions add up to a constant, so a constant force is among the maps. The ridge keeps rarely visited positions
+  // at zero.
   all.b -= all.sum / std::max(all.count, 1.0) * all.columns;
   all.gram.diagonal().array() += 1e-2 * all.count / static_cast<double>(map_size());
   return all.b.dot(all.gram.ldlt().solve(all.b));

@@ -17,17 +17,17 @@ namespace {
 
 using residuals::Track;
 
-/// Of what two vehicles explain of each other, that the offset of their clocks has to add. Among n clocks a tie of two
-/// puts these apart by the offset d and, at best, half way to the others, by d / 2 in 2 (n - 2) pairs: of all n (n - 1)
-/// / 2 pairs, d^2 / (n - 1) on average where the loss goes with the square.
+/// Fraction of the mutual explanation of two vehicles that the offset of their clocks must contribute. Among n clocks,
+/// tying two of them separates them by the offset d and at best by half of it, d / 2, from the others in 2 (n - 2)
+/// pairs; averaged over all n (n - 1) / 2 pairs this is d^2 / (n - 1) if the loss is quadratic.
 constexpr double kLeastGain = 0.05;
 constexpr double kLeastZ = 3;
-constexpr double kStudent90 = 1.833;  ///< nine degrees of freedom
+constexpr double kStudent90 = 1.833;  ///< for nine degrees of freedom
 
-/// The vehicles of a flight whose vertical force is judged, and which of them share a clock.
+/// The vehicles of a flight whose vertical force is judged, and the clocks they share.
 struct Clocks {
   std::vector<const Track*> tracks;
-  std::vector<int> of;  ///< each track; 0: that of the first log
+  std::vector<int> of;  ///< clock of each track; 0: that of the first log
   int count = 0;
 
   int logs(int clock) const { return static_cast<int>(std::count(of.begin(), of.end(), clock)); }
@@ -43,14 +43,15 @@ Clocks clocks_of(const std::vector<Track>& tracks) {
     has_first = has_first || is_known;
     clocks.of.push_back(is_known ? 0 : ++clocks.count);
   }
-  // Where nothing is related to the first log, the first vehicle that is judged takes its place.
+  // If nothing is related to the first log, use the first judged vehicle instead.
   if (!has_first)
     for (int& clock : clocks.of) --clock;
   clocks.count += has_first ? 1 : 0;
   return clocks;
 }
 
-/// The most clocks whose vehicles feel one another around a circle, so that delays and offsets are told apart.
+/// Returns the largest set of clocks whose vehicles feel one another in a cycle, so that delays and offsets can be
+/// separated.
 std::vector<int> circle(ClockSearch& search, const ClockSteps& steps, int clocks) {
   const auto count = static_cast<std::size_t>(clocks);
   std::vector<std::vector<char>> reaches(count, std::vector<char>(count, 0));
@@ -72,11 +73,11 @@ std::vector<int> circle(ClockSearch& search, const ClockSteps& steps, int clocks
   return largest;
 }
 
-/// The clocks of `around`: those that more logs share first, of these those in the middle first.
+/// Sorts the clocks of `around`: first those shared by most logs, and among these the middle ones first.
 std::vector<int> from_the_middle(const Clocks& clocks, std::vector<int> around,
                                  const Eigen::VectorXd& offsets_s) {
   const std::vector<int> all = around;
-  // In nanoseconds, so that rounding decides nothing.
+  // Integer nanoseconds, so that round-off does not decide the order.
   const auto away_ns = [&](int clock) {
     double sum_s = 0;
     for (const int other : all) sum_s += std::abs(offsets_s(other) - offsets_s(clock));
@@ -89,7 +90,7 @@ std::vector<int> from_the_middle(const Clocks& clocks, std::vector<int> around,
   return around;
 }
 
-/// The offsets of all clocks without each tenth of the flight.
+/// Returns the offsets of all clocks without each tenth of the flight.
 std::array<Eigen::VectorXd, kClockTenths> left_out(ClockSearch& search, const ClockSteps& steps) {
   std::array<Eigen::VectorXd, kClockTenths> offsets_s;
   for (int t = 0; t < kClockTenths; ++t)
@@ -102,14 +103,14 @@ double jackknife_s(const std::array<Eigen::VectorXd, kClockTenths>& offsets_s, i
   const auto of = [&](const Eigen::VectorXd& one) { return one(clock) - one(reference); };
   for (const Eigen::VectorXd& one : offsets_s) mean += of(one) / kClockTenths;
   for (const Eigen::VectorXd& one : offsets_s) variance += (of(one) - mean) * (of(one) - mean);
-  // Offsets between the steps of the grid are read off a parabola.
+  // Offsets between grid steps are interpolated by a parabola.
   return std::hypot(std::sqrt(variance * (kClockTenths - 1) / kClockTenths), kClockStep_s / 4);
 }
 
 /// A clock that may differ from the reference.
 struct Suspect {
   int clock = 0;
-  double alike_N2 = 0;  ///< what is explained with both clocks alike
+  double alike_N2 = 0;  ///< explained with both clocks equal
 };
 
 std::vector<Suspect> suspects(ClockSearch& search, const ClockSteps& steps, const std::vector<int>& around,
@@ -128,11 +129,11 @@ std::vector<Suspect> suspects(ClockSearch& search, const ClockSteps& steps, cons
   return found;
 }
 
-/// Of a flight whose clocks are estimated.
+/// Estimates for a flight.
 struct Estimate {
   ClockSteps steps;
   Eigen::VectorXd offsets_s;
-  std::array<Eigen::VectorXd, kClockTenths> without_s;  ///< each tenth
+  std::array<Eigen::VectorXd, kClockTenths> without_s;  ///< without each tenth
 };
 
 ClockOffset offset_of(const Clocks& clocks, ClockSearch& search, const Estimate& estimate,
@@ -172,7 +173,7 @@ std::vector<ClockOffset> offsets_of(const Clocks& clocks, ClockSearch search) {
   const std::vector<int> around = circle(search, estimate.steps, clocks.count);
   if (around.size() < 2) return {};
   estimate.offsets_s = search.offsets_s(estimate.steps, -1);
-  // Clocks on both sides of the one in the middle may differ though neither surely differs from it.
+  // Clocks on either side of the middle one may differ from each other even if neither significantly differs from it.
   for (const int reference : from_the_middle(clocks, around, estimate.offsets_s)) {
     std::vector<ClockOffset> result;
     for (const Suspect& suspect : suspects(search, estimate.steps, around, reference, clocks.count)) {
@@ -204,7 +205,7 @@ std::vector<ClockOffset> clock_offsets(const residuals::Inputs& inputs, int jobs
   files::parallel_for(static_cast<int>(count), jobs, [&](int index) {
     const auto i = static_cast<std::size_t>(index);
     if (inputs.found.flights[i].logs.size() < 2) return;
-    std::vector<std::string> problems;  // the diagnosis tells them
+    std::vector<std::string> problems;  // reported by the diagnosis
     const std::vector<Track> tracks = inputs.load(i, problems);
     const Clocks clocks = clocks_of(tracks);
     if (clocks.count > 1) found[i] = offsets_of(clocks, search_of(inputs, clocks));

@@ -1,9 +1,10 @@
-/// @file Offsets of the clocks of the logs of one flight, from how their vehicles disturb each other.
+/// @file Clock offsets between the logs of a flight, estimated from the mutual disturbances of the vehicles.
 ///
-/// A map from the neighbours' places to the vertical force is fitted to each vehicle, for clocks that differ and wakes
-/// that arrive late (`clock_search.h`). A delay shifts all vehicles to the same side, so that it is not taken for a
-/// clock; a clock shifts what its vehicle feels and what it does to others to opposite sides. So a clock is judged only
-/// among vehicles each of which feels another one and is felt, around a circle.
+/// A map from the neighbours' relative positions to the vertical force is fitted to each vehicle, for different clock
+/// offsets and delays of the wakes (`clock_search.h`). A delay shifts all vehicles in the same direction, so it is not
+/// mistaken for a clock offset; a clock offset shifts the disturbances on its vehicle and those caused by it in
+/// opposite directions. Therefore a clock is judged only among vehicles that form a cycle in which each is disturbed by
+/// another one.
 #pragma once
 
 #include <string>
@@ -16,33 +17,33 @@ namespace swarmcert::identification {
 
 struct ClockOffset {
   std::string flight, vehicle, kind, path;
-  std::string against, against_vehicle;  ///< log and vehicle of the clock that it is compared with
-  int logs = 2;                          ///< of the flight whose clocks were judged
-  double offset_s = 0;                   ///< by how much its clock is ahead
-  double correction_s = 0;               ///< offset_s and what is known of the clock already
+  std::string against, against_vehicle;  ///< log and vehicle of the reference clock
+  int logs = 2;                          ///< number of logs of the flight whose clocks were judged
+  double offset_s = 0;                   ///< how far its clock is ahead
+  double correction_s = 0;               ///< offset_s plus what is already known of the clock
   Interval interval;                     ///< 90 %, from the jackknife over tenths of the flight
   double delay_s = 0;                    ///< tau, on the grid of the search
-  /// Of all vertical forces, with the two clocks alike and as they are; maps of their own.
+  /// Of all vertical forces, with equal clocks and with the estimated ones; each with its own maps.
   double rmse_before_N = 0, rmse_after_N = 0;
   int records = 0;  ///< means over kClockSample_s
-  double z = 0;     ///< offset over its standard deviation
+  double z = 0;     ///< offset divided by its standard deviation
 };
 
-/// Of flights of two and more vehicles some of whose clocks nothing else relates: no absolute times, no common starts
-/// of their set points. All clocks of a flight are estimated together, and compared with the one that most logs share,
-/// else with that in the middle, else with the next of which another one surely differs. Empty where the vehicles
-/// hardly disturb each other, one of them feels no other one or none feels it, or no two clocks differ by more than
-/// three standard deviations and by what matters to how the vehicles disturb each other.
+/// Estimates offsets for flights of two or more vehicles whose clocks are not all related by absolute times or common
+/// starts of their setpoints. All clocks of a flight are estimated together and compared with the clock that most logs
+/// share, else with the middle one, else with the next one from which another significantly differs. Returns nothing
+/// for a flight if the vehicles hardly disturb each other, if a vehicle neither feels another one nor is felt, or if no
+/// two clocks differ by more than three standard deviations and by enough to matter for the disturbances.
 std::vector<ClockOffset> clock_offsets(const residuals::Inputs& inputs, int jobs);
 
-/// Lets the logs of `inputs` be read with these offsets.
+/// Makes `inputs` read its logs with these offsets.
 void correct_clocks(const std::vector<ClockOffset>& offsets, residuals::Inputs& inputs);
 
-/// Finds offsets of clocks, and lets the logs of `inputs` be read with them.
+/// Estimates clock offsets and makes `inputs` read its logs with them.
 std::vector<ClockOffset> find_and_correct_clocks(residuals::Inputs& inputs, int jobs);
 
-/// "the clock of cf2_00 is 0.150 s ahead of that of the other log (+0.141 .. +0.158)"; of three logs and more, the log
-/// with the other clock is named.
+/// Describes the offset: "the clock of cf2_00 is 0.150 s ahead of that of the other log (+0.141 .. +0.158)"; with three
+/// or more logs, the log with the other clock is named.
 std::string in_words(const ClockOffset& offset);
 
 }  // namespace swarmcert::identification

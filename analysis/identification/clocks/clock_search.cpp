@@ -12,7 +12,7 @@ namespace swarmcert::identification {
 namespace {
 
 constexpr int kLeastShift = -kClockSteps - kWakeSteps;
-/// Of the variance of a vehicle's vertical force that its neighbours have to explain, divided among them.
+/// Fraction of the variance of a vehicle's vertical force that its neighbours must explain, divided among them.
 constexpr double kLeastInterplay = 0.1;
 
 bool is_on_grid(const ClockSteps& steps) {
@@ -77,7 +77,7 @@ void ClockSearch::measure_pairs() {
   }
 }
 
-/// What pairs of vehicles explain whose clocks have their place already.
+/// Returns what is explained by pairs of vehicles whose clocks have already been placed.
 double ClockSearch::pairs_value(const ClockSteps& steps, const std::vector<char>& placed) const {
   if (!is_on_grid(steps)) return -kInfinity;
   const auto is_placed = [&](std::size_t v) { return placed[static_cast<std::size_t>(clock_of_[v])] != 0; };
@@ -94,7 +94,7 @@ double ClockSearch::pairs_value(const ClockSteps& steps, const std::vector<char>
   return sum;
 }
 
-/// Places the one clock that explains most with those that are placed; `anew`: each of them once more.
+/// Places the clock that explains most together with those already placed; `anew`: places each of them once more.
 void ClockSearch::place_best(ClockSteps& steps, std::vector<char>& placed, const Tie& tie, bool anew) const {
   ClockSteps best = steps;
   int chosen = -1;
@@ -135,7 +135,7 @@ ClockSteps ClockSearch::best(const Tie& tie) {
   for (int round = 0; round < 2 * clocks_; ++round) place_best(steps, placed, tie, true);
   steps = climbed(steps, -1, tie);
   if (tie.first != tie.second) return steps;
-  // One clock at a time ends below the top where two have to move together: also from where each two are alike.
+  // Moving one clock at a time stops below the maximum if two must move together, so also start with each two tied.
   for (int a = 0; a < clocks_; ++a) {
     for (int b = a + 1; b < clocks_; ++b) {
       const ClockSteps other = climbed(best({a, b}), -1);
@@ -156,7 +156,7 @@ ClockSteps ClockSearch::climbed(ClockSteps from, int without, const Tie& tie) {
       for (int o = -kReach; o <= kReach; ++o) {
         for (int delay = -kReach; delay <= kReach; ++delay) {
           ClockSteps tried = here;
-          // The first clock stays: only differences count, and the delay is tried by itself.
+          // The first clock is fixed, because only differences matter; the delay is tried separately.
           tried.clock[static_cast<std::size_t>(k)] += k == 0 ? 0 : o;
           tried.delay += delay;
           hold(tie, tried);
@@ -173,7 +173,7 @@ ClockSteps ClockSearch::climbed(ClockSteps from, int without, const Tie& tie) {
 }
 
 Eigen::VectorXd ClockSearch::offsets_s(const ClockSteps& steps, int without) {
-  // Coordinates: clocks 1 .. , then the delay, unless it is at an end of its range.
+  // Coordinates: clocks 1, 2, ..., then the delay unless it is at an end of its range.
   const bool has_delay = steps.delay > 0 && steps.delay < kWakeSteps;
   const int n = clocks_ - 1 + (has_delay ? 1 : 0);
   const auto at = [&](int i, int di, int j, int dj) {
@@ -193,7 +193,7 @@ Eigen::VectorXd ClockSearch::offsets_s(const ClockSteps& steps, int without) {
   }
   Eigen::VectorXd offsets_s = Eigen::VectorXd::Zero(clocks_);
   for (int k = 1; k < clocks_; ++k) offsets_s(k) = kClockStep_s * steps.clock[static_cast<std::size_t>(k)];
-  if (!slope.allFinite() || !bend.allFinite()) return offsets_s;  // at an end of the grid
+  if (!slope.allFinite() || !bend.allFinite()) return offsets_s;  // at the edge of the grid
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(bend);
   if (!(parts.eigenvalues().maxCoeff() < 0)) return offsets_s;
   const Eigen::VectorXd top = -bend.partialPivLu().solve(slope);

@@ -1,9 +1,9 @@
-/// @file Offsets of several clocks and the delay of wakes that explain most of how vehicles disturb each other.
+/// @file Searches for the clock offsets and the wake delay that best explain how vehicles disturb each other.
 ///
-/// With o_i by how much the clock of vehicle i is ahead and tau the time that a wake takes, the force on i at a reading
-/// of its clock goes with where the log of j has its vehicle at that reading plus o_j - o_i - tau. Sought are the o and
-/// the tau whose maps explain most of all forces together: J(o, tau). Differences of o around a circle of vehicles that
-/// feel one another add up to zero, so that tau is no clock's.
+/// Let o_i be the time by which the clock of vehicle i is ahead and tau the time that a wake takes to arrive. Then the
+/// force on i at a reading of its clock depends on the position of j in its log at that reading plus o_j - o_i - tau.
+/// The search maximises J(o, tau), the part of all forces together that is explained by the maps. Differences of o
+/// around a cycle of vehicles that feel one another add up to zero, so tau cannot be confused with a clock offset.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@
 
 namespace swarmcert::identification {
 
-/// In steps of kClockStep_s.
+/// Offsets and delay in steps of kClockStep_s.
 struct ClockSteps {
   std::vector<int> clock;
   int delay = 0;
@@ -22,23 +22,27 @@ struct ClockSteps {
 
 class ClockSearch {
  public:
-  /// Two clocks that are held equal; {0, 0}: none are.
+  /// Two clocks that are constrained to be equal; {0, 0}: no constraint.
   using Tie = std::pair<int, int>;
 
-  /// @param interplays one per vehicle, each with all others in the same order.
-  /// @param clock_of each vehicle; several vehicles may share one. @param clocks how many there are
+  /// @param interplays one per vehicle, each with all others in the same order
+  /// @param clock_of clock of each vehicle; several vehicles may share one
+  /// @param clocks number of clocks
   ClockSearch(std::vector<Interplay> interplays, std::vector<int> clock_of, int clocks);
 
-  /// J, N^2; minus infinity where two clocks are further apart than the grid. @param without a tenth; -1: none
+  /// Returns J in N^2; minus infinity if two clocks are further apart than the grid allows.
+  /// @param without a tenth to leave out; -1: none
   double value(const ClockSteps& steps, int without = -1);
-  /// From the pairs of vehicles, each by itself, then of all together; without a tie also from the best of each tie.
+  /// Returns the best steps, starting from the pairs of vehicles one by one and then from all together; without a tie,
+  /// also from the best result with each tie.
   ClockSteps best(const Tie& tie = {0, 0});
-  /// The nearest maximum.
+  /// Returns the nearest local maximum.
   ClockSteps climbed(ClockSteps from, int without, const Tie& tie = {0, 0});
-  /// The top of the parabola through the steps around `steps`: offsets of the clocks against the first, s.
+  /// Returns the vertex of the parabola through the steps around `steps`: offsets of the clocks relative to the first
+  /// one, s.
   Eigen::VectorXd offsets_s(const ClockSteps& steps, int without);
 
-  /// Whether what the vehicles of clock `felt` do explains a share of the force on a vehicle of `feels`.
+  /// Returns whether the vehicles of clock `felt` explain part of the force on a vehicle of clock `feels`.
   bool feels(int feels, int felt, const ClockSteps& steps);
   bool is_rich() const;
   int records() const;
@@ -53,7 +57,7 @@ class ClockSearch {
   std::vector<Interplay> interplays_;
   std::vector<int> clock_of_;
   int clocks_;
-  /// [vehicle][other vehicle][shift - the least shift]: explained by that one alone.
+  /// [vehicle][other vehicle][shift - smallest shift]: explained by that other vehicle alone.
   std::vector<std::vector<std::vector<double>>> pairs_;
 };
 

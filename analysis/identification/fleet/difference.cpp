@@ -15,7 +15,7 @@ namespace {
 using residuals::Inputs;
 using stability::EffectSpec;
 
-/// One coefficient in every group of the others.
+/// Values of a coefficient in each group of the others.
 using ScatterOfGroups = std::map<std::string, std::vector<double>>;
 
 std::vector<FlightGroup> groups_of(const residuals::FoundFlights& found, bool by_day) {
@@ -26,7 +26,7 @@ bool is_rich(const Inputs& inputs, const std::string& kind, const FlightGroup& g
   return coverage(inputs, kind, group.flights, jobs).too_poor().empty();
 }
 
-/// A vehicle's own constant force says nothing of another vehicle: all get the mean.
+/// A constant force of one vehicle says nothing about another vehicle, so all get the mean.
 std::vector<EffectSpec> without_vehicles(const std::vector<EffectSpec>& specs) {
   std::vector<EffectSpec> shared;
   EffectSpec mean;
@@ -50,8 +50,8 @@ std::vector<EffectSpec> without_vehicles(const std::vector<EffectSpec>& specs) {
   return shared;
 }
 
-/// The first formula that lasts, where something is left: what happened at some time of the others' flights says
-/// nothing of these. Null if no such formula exists.
+/// Returns the first time-independent formula if there is a remainder: an event in the others' flights says nothing
+/// about these. Null if there is none.
 const Formula* lasting_formula(const Diagnosis& diagnosis) {
   if (!leaves_something(diagnosis)) return nullptr;
   const auto lasting = std::find_if(diagnosis.formulas.begin(), diagnosis.formulas.end(),
@@ -59,7 +59,7 @@ const Formula* lasting_formula(const Diagnosis& diagnosis) {
   return lasting == diagnosis.formulas.end() ? nullptr : &*lasting;
 }
 
-/// What more than half of the groups show, each by itself.
+/// Effects found in more than half of the groups separately.
 struct Common {
   std::vector<std::string> names;  ///< for fit_effects(), in the order of the first group that shows them
   bool has_formula = false;
@@ -87,9 +87,9 @@ Common common_of(const Inputs& others, const std::string& kind, const std::vecto
   return common;
 }
 
-/// What `others` show of `kind`: named effects, and the best formula for what they leave. Numbers that differ from day
-/// to day look like effects where the days are taken together: where there are groups, only what most of them show by
-/// themselves counts, with the numbers of all.
+/// Returns the effects found in `others` for `kind`, and the best formula for their remainder. Values that differ from
+/// day to day look like effects if the days are pooled. If there are groups, only effects found in most of them
+/// separately are used, with values fitted to all.
 std::vector<EffectSpec> baseline(const Inputs& others, const std::string& kind, bool one_vehicle,
                                  const std::vector<FlightGroup>& groups, int jobs,
                                  const residuals::Progress& progress) {
@@ -108,7 +108,7 @@ std::vector<EffectSpec> baseline(const Inputs& others, const std::string& kind, 
   return specs;
 }
 
-/// The model with `spec` at its shape and with coefficients of zero, so that a fit changes the coefficients alone.
+/// Returns the model with `spec` at its shape and with zero coefficients, so that a fit changes only the coefficients.
 stability::Model at_shape(const stability::Model& model, const EffectSpec& spec, const Missing& missing) {
   EffectSpec none = spec;
   for (const std::string& name : missing.coefficients) {
@@ -118,7 +118,7 @@ stability::Model at_shape(const stability::Model& model, const EffectSpec& spec,
   return with_effects(model, {none});
 }
 
-/// The coefficients of `missing` that a fit to each group of the others gives on top of what is held. Empty for lags
+/// Returns the coefficients of `missing` fitted to each group of the others on top of the fixed effects. Empty for lags
 /// and delays, which have no coefficient that could be zero, and for formulas.
 ScatterOfGroups scatter_of(const Inputs& others, const std::string& kind, const Missing& missing,
                            const std::vector<FlightGroup>& groups, int jobs) {
@@ -143,8 +143,8 @@ double deviation(const std::vector<double>& values) {
   return std::sqrt(squares / static_cast<double>(values.size() - 1));
 }
 
-/// Widens the intervals of `missing` by the scatter of `groups`; whether some coefficient is beyond it at 95 %.
-/// The difference of the means of m and n groups has the variance s^2 (1/m + 1/n), besides that of the fit.
+/// Widens the intervals of `missing` by the scatter of `groups` and returns whether a coefficient exceeds it at 95 %.
+/// The difference of the means of m and n groups has the variance s^2 (1/m + 1/n), in addition to that of the fit.
 bool is_beyond(const ScatterOfGroups& scatter, int own_groups, Missing& missing) {
   const double normal = boost::math::quantile(boost::math::normal(), 0.95);
   bool beyond = false, is_known = false;

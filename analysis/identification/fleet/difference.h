@@ -1,9 +1,9 @@
-/// @file What changed: effects of some flights beyond those of others (the healthy vehicle, the last release).
+/// @file Effects of some flights beyond those of others (flights of the healthy vehicle, or the last release).
 ///
-/// Effects that most days, or flights, of the others show by themselves are fitted to all of them and held, and so is
-/// the best formula for what these leave, where most leave something.
-/// What the flights at hand show on top is the difference. It is judged against the scatter of the same numbers between
-/// the days, or flights, of the others: a difference counts if it is larger than they differ among themselves.
+/// Effects found separately in most days (or flights) of the others are fitted to all of them and held fixed; so is the
+/// best formula for the rest, if most of them have a remainder. What the current flights show in addition is the
+/// difference. It is compared with the scatter of the same values between the days (or flights) of the others, and
+/// reported if it is larger than the differences among them.
 #pragma once
 
 #include <string>
@@ -14,25 +14,26 @@
 
 namespace swarmcert::identification {
 
-/// One vehicle against the others.
+/// One vehicle compared with the others.
 struct Difference {
   std::string vehicle;
-  bool against_itself = false;              ///< the others hold flights of this vehicle, and only these count
+  bool against_itself = false;  ///< the others include flights of this vehicle, and only these are used
   std::vector<stability::EffectSpec> held;  ///< fitted to the others
   std::string grouped_by;                   ///< "folder" or "flight"
-  int own_groups = 0, other_groups = 0;     ///< with enough data for a fit
-  /// What differs: intervals of its ranking hold the scatter. The ranking has only what is beyond it.
+  int own_groups = 0, other_groups = 0;     ///< number of groups with enough data for a fit
+  /// The differences; the intervals of its ranking include the scatter. The ranking has only differences beyond the
+  /// scatter.
   Diagnosis diagnosis;
-  std::vector<Missing> within_scatter;  ///< found, but no larger than the others differ among themselves
-  std::string no_scatter;               ///< why the scatter is not known; empty where it is
+  std::vector<Missing> within_scatter;  ///< found, but within the differences among the others
+  std::string no_scatter;               ///< why the scatter is unknown; empty if it is known
 };
 
 /// With at least this many folders among the other flights, each folder (day) is a group; otherwise each flight is one.
 inline constexpr std::size_t kFewestDays = 3;
 
-/// Every vehicle of `kind` in `inputs` against `others`, in order of their names. Vehicles without usable records are
-/// left out. Neither depends on `jobs`.
-/// @param others of the same models.
+/// Compares each vehicle of `kind` in `inputs` with `others`, ordered by name. Vehicles without usable records are
+/// skipped. The result does not depend on `jobs`.
+/// @param others must have the same models
 std::vector<Difference> differences(const residuals::Inputs& inputs, const residuals::Inputs& others,
                                     const std::string& kind, int jobs, const residuals::Progress& progress);
 

@@ -17,7 +17,7 @@ using stability::EffectSpec;
 
 constexpr std::size_t kFewestForOutliers = 5, kFewestForDrift = 5;
 
-/// A number of the table: which parameter of which effect it is.
+/// The effect and parameter from which a value of the table is taken.
 struct NumberSource {
   const char *number, *effect, *parameter;
   double nominal;  ///< added to the parameter
@@ -44,8 +44,9 @@ double error_of(const FlightNumber& number) {
   return (number.interval.upper - number.interval.lower) / (2 * kNormal);
 }
 
-/// A flight shows a number where its interval says more than the bounds of the effect do: the lag where its gain is
-/// that of a lag, and the others where the error is less than a tenth of the weight, or of a speed of 1 m/s.
+/// Returns whether a flight determines a value, i.e. whether its interval is narrower than the bounds of the effect. A
+/// lag also needs the gain of a lag; for the others the error must be less than a tenth of the weight, for drag at a
+/// speed of 1 m/s.
 bool shows(const NumberSource& source, const Missing& fit, const Interval& interval, double weight_N) {
   const double half = (interval.upper - interval.lower) / 2;
   if (!(half > 0) || !std::isfinite(half)) return false;
@@ -73,13 +74,13 @@ FlightNumbers flight_numbers(const std::vector<Missing>& fitted, double weight_N
   return numbers;
 }
 
-/// One vehicle's flights with the models to fit on.
+/// The flights of one vehicle, with the models used for the fit.
 struct Fleet {
-  Inputs bare;      ///< without any of the numbers
-  Inputs with_lag;  ///< with the lag that all flights have in common
+  Inputs bare;      ///< without any of these values
+  Inputs with_lag;  ///< with the lag common to all flights
 };
 
-/// All three where the flight shows a lag, else ratio and drag beside the lag of all flights.
+/// Fits all three values if the flight shows a lag, else ratio and drag beside the common lag.
 FlightNumbers fit_flight(const Fleet& own, const std::string& kind, int flight, double weight_N, int jobs) {
   const auto silent = [](int, int) {};
   FlightNumbers numbers = flight_numbers(
@@ -90,7 +91,7 @@ FlightNumbers fit_flight(const Fleet& own, const std::string& kind, int flight, 
       fit_effects(own.with_lag, kind, {"thrust_ratio", "drag_linear"}, {flight}, jobs, silent), weight_N);
 }
 
-/// The factor of each rotor in one flight of one vehicle, which shows them where it flies slowly.
+/// Adds the factor of each rotor in one flight of a vehicle, if the flight contains slow flight.
 void add_rotors(const Inputs& own, const std::string& kind, const std::string& vehicle, int flight,
                 FlightNumbers& numbers) {
   constexpr double kMostHalfWidth = 0.1;
@@ -108,7 +109,7 @@ void add_rotors(const Inputs& own, const std::string& kind, const std::string& v
   }
 }
 
-/// `number` in the flights that show it.
+/// Returns `number` of the flights that show it.
 std::vector<FlightNumber*> flights_with(std::vector<EachFlight>& flights, const std::string& number) {
   std::vector<FlightNumber*> all;
   for (EachFlight& flight : flights) {
@@ -130,8 +131,8 @@ void mark_outliers(const std::vector<FlightNumber*>& numbers) {
     number->is_outlier = std::abs(number->value - median) > kFar * std::hypot(deviation, error_of(*number));
 }
 
-/// Least squares over the flights that are no outliers. The scatter about the line is the error: flights differ by more
-/// than their own errors say.
+/// Least squares over the flights that are not outliers. The error is the scatter about the line, because flights
+/// differ by more than their own errors.
 Drift drift_of(const std::vector<FlightNumber*>& numbers) {
   Drift drift;
   std::vector<double> at, value;
@@ -165,7 +166,7 @@ Drift drift_of(const std::vector<FlightNumber*>& numbers) {
   return drift;
 }
 
-/// Mean of numbers weighted by their errors and by the scatter between them (DerSimonian and Laird 1986).
+/// Returns the mean of values weighted by their errors and by the scatter between them (DerSimonian and Laird 1986).
 FlightNumber mean_of(const std::vector<FlightNumber>& numbers) {
   FlightNumber mean;
   if (numbers.empty()) return mean;

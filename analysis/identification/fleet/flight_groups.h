@@ -1,4 +1,4 @@
-/// @file Days of flight, and the flights of one vehicle.
+/// @file Groups flights by day, and selects the flights of one vehicle.
 #pragma once
 
 #include <string>
@@ -9,28 +9,27 @@
 
 namespace swarmcert::identification {
 
-/// `inputs` in which every vehicle of `kind` other than `vehicle` is a neighbour and nothing else, with the flights of
-/// `vehicle` alone.
+/// Returns `inputs` with only the flights of `vehicle`, in which all other vehicles of `kind` serve only as neighbours.
 residuals::Inputs of_one_vehicle(const residuals::Inputs& inputs, const std::string& kind,
                                  const std::string& vehicle);
 
-/// `inputs` whose model of `kind` is `model`.
+/// Returns `inputs` with `model` as the model of `kind`.
 residuals::Inputs with_model_of_kind(const residuals::Inputs& inputs, const std::string& kind,
                                      const stability::Model& model);
 
-/// Flights that belong together, as indices into found.flights.
+/// A group of flights, as indices into found.flights.
 struct FlightGroup {
   std::string name;
   std::vector<int> flights;
 };
 
-/// The folder of a flight's first log, which stands for its day.
+/// Returns the folder of a flight's first log, which identifies its day.
 std::string folder_of(const residuals::FlightFiles& flight);
 
-/// One group per folder, in the order of their names.
+/// Returns one group per folder, ordered by name.
 std::vector<FlightGroup> by_folder(const residuals::FoundFlights& found);
 
-/// One group per flight.
+/// Returns one group per flight.
 std::vector<FlightGroup> by_flight(const residuals::FoundFlights& found);
 
 }  // namespace swarmcert::identification

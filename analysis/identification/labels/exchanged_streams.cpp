@@ -18,12 +18,12 @@ constexpr double kTimesBetter = 2;
 
 int block_at(double time_s) { return static_cast<int>(std::floor(time_s / kStreamBlock_s)); }
 
-/// A quantity of a track between its records; calls come in order of time.
+/// Interpolates a quantity of a track between its records; calls must be in order of time.
 class StreamReader {
  public:
   explicit StreamReader(const Track& track) : track_(track) {}
 
-  /// Nothing outside of the track and in its gaps.
+  /// Returns nothing outside the track and in its gaps.
   template <typename Value>
   std::optional<Vector3d> at(double time_s, const Value& value) {
     const auto& instants = track_.instants;
@@ -76,7 +76,7 @@ std::map<int, double> set_point_misfit(const Track& own, const Track& other) {
   return blocks.means();
 }
 
-/// Mean specific force over a stretch of time without a cut.
+/// Mean specific force over a stretch without cuts.
 struct Felt {
   double from_s = 0, to_s = 0;
   Vector3d mean_m_s2;
@@ -109,7 +109,7 @@ std::map<int, double> sensor_misfit(const std::vector<Felt>& felt, const Track& 
 
 struct Comparison {
   double own = 0, other = 0;  ///< mean squares
-  std::vector<double> gains;  ///< by how much the logarithm of the square is lower
+  std::vector<double> gains;  ///< decrease of the logarithm of the square
 };
 
 Comparison comparison(const Misfits& misfits, int own, int other) {
@@ -120,7 +120,7 @@ Comparison comparison(const Misfits& misfits, int own, int other) {
     if (same == of_own.end()) continue;
     result.own += same->second;
     result.other += square;
-    // A few manoeuvres make most of the sum; each block counts alike. No misfit is below a micrometre.
+    // A few manoeuvres dominate the sum, so all blocks are weighted equally. Misfits are clamped to a micrometre.
     constexpr double kFloor = 1e-12;
     result.gains.push_back(std::log((same->second + kFloor) / (square + kFloor)));
   }

@@ -15,19 +15,19 @@ namespace {
 using residuals::Track;
 using What = Mislabelled::What;
 
-/// What one flight shows, before anything is judged.
+/// Evidence in one flight, before any decision.
 struct FlightLabels {
-  std::vector<Mislabelled> logs;  ///< flight, vehicle, kind and path of every log
+  std::vector<Mislabelled> logs;  ///< flight, vehicle, kind and path of each log
   Misfits set_points, sensors;
   std::vector<LogKind> kinds;
 
-  /// Pairs of logs that were compared, in both ways.
+  /// Number of pairs of logs that were compared, in both directions.
   int tried() const { return 2 * set_points.logs * (set_points.logs - 1); }
 };
 
 FlightLabels labels_of(const residuals::Inputs& inputs, std::size_t flight) {
   if (inputs.found.flights[flight].logs.size() < 2 && inputs.models.size() < 2) return {};
-  std::vector<std::string> problems;  // the diagnosis tells them
+  std::vector<std::string> problems;  // reported by the diagnosis
   const std::vector<Track> tracks = inputs.load(flight, problems);
   FlightLabels labels;
   for (const Track& track : tracks) {
@@ -46,7 +46,8 @@ FlightLabels labels_of(const residuals::Inputs& inputs, std::size_t flight) {
   return labels;
 }
 
-/// Log `log` of a flight, whose stream belongs to log `to`. @param fit, as_labelled pairs of `misfits`.
+/// Returns the finding that a stream of log `log` of a flight belongs to log `to`.
+/// @param fit, as_labelled pairs of `misfits`
 Mislabelled stream(const FlightLabels& labels, What what, int log, int to, const Misfits& misfits,
                    std::pair<int, int> fit, std::pair<int, int> as_labelled) {
   Mislabelled found = labels.logs[static_cast<std::size_t>(log)];
@@ -58,7 +59,7 @@ Mislabelled stream(const FlightLabels& labels, What what, int log, int to, const
   return found;
 }
 
-/// Of set points, path and sensors, two that agree with each other outvote the third.
+/// If two of setpoints, path and sensors agree, they outvote the third.
 void judge_streams(const FlightLabels& labels, int tried, std::vector<Mislabelled>& found) {
   if (labels.set_points.logs == 0) return;
   const std::vector<int> set_points = belongs_to(labels.set_points, tried);
@@ -66,7 +67,8 @@ void judge_streams(const FlightLabels& labels, int tried, std::vector<Mislabelle
   for (int log = 0; log < labels.set_points.logs; ++log) {
     const int set_point = set_points[static_cast<std::size_t>(log)];
     const int path = paths[static_cast<std::size_t>(log)];
-    // The path of this vehicle stands in the log `path`, and follows the set points of this log: only paths moved.
+    // The path of this vehicle is in the log `path` and follows the setpoints of this log, so only paths were
+    // exchanged.
     const bool is_path = path != log && set_points[static_cast<std::size_t>(path)] == log;
     const bool is_moved_path = set_point != log && paths[static_cast<std::size_t>(set_point)] == log;
     if (is_path) {
@@ -137,7 +139,7 @@ std::vector<Mislabelled> mislabelled(const residuals::Inputs& inputs, int jobs) 
   std::vector<Mislabelled> found;
   for (const FlightLabels& flight : flights) judge_streams(flight, tried, found);
   for (const WrongKind& wrong : wrong_kinds(kinds)) {
-    const stability::Model* const model = inputs.model_of(wrong.kind);  // none where single logs have models
+    const stability::Model* const model = inputs.model_of(wrong.kind);  // null if only logs have models
     found.push_back(label_of(wrong, model == nullptr ? 0 : model->mass_kg));
   }
   return found;

@@ -1,7 +1,6 @@
-/// @file Logs with the set points, the path, the sensors or the name of another vehicle, and vehicles of another kind.
+/// @file Logs with the setpoints, path, sensors or name of another vehicle, and vehicles of another kind.
 ///
-/// What cannot be seen: the names of two vehicles of one kind whose logs are exchanged whole, and kinds that hover at
-/// about the same duty.
+/// Not detectable: exchanged names of two vehicles of the same kind, and kinds that hover at about the same duty.
 #pragma once
 
 #include <string>
@@ -20,29 +19,29 @@ struct Mislabelled {
     kKind   ///< `vehicle` flies as one of the kind `belongs_to`
   };
   What what = What::kKind;
-  std::string flight, vehicle, kind, path;  ///< of kKind no flight and no path: all flights of the vehicle
+  std::string flight, vehicle, kind, path;  ///< for kKind, no flight and path: all flights of the vehicle
   std::string belongs_to;
-  /// False: a scale of the thrust (another mass, a payload, other motors) explains the flights as well.
+  /// False if a thrust scale (another mass, a payload, other motors) explains the flights equally well.
   bool is_sure = true;
-  /// Root mean square of the misfit as labelled, and as it belongs: m for set points, m/s^2 for everything else; for
-  /// names and kinds along the thrust axis.
+  /// Root mean square of the misfit as labelled and as corrected: m for setpoints, m/s^2 otherwise; along the thrust
+  /// axis for names and kinds.
   double before = 0, after = 0;
-  double mass_kg = 0;  ///< of the model of `vehicle`; 0 where it has none
+  double mass_kg = 0;  ///< of the model of `vehicle`; 0 if it has none
   int blocks = 0, flights = 1;
 };
 
-/// Every flight by itself, except that the kind of a vehicle is judged over all of its flights. By tests over blocks of
-/// 1 s (kinds: 2 s) at 1 % for all that is tried together. Does not depend on `jobs`.
+/// Checks each flight separately, except that the kind of a vehicle is judged over all of its flights. Uses tests over
+/// blocks of 1 s (kinds: 2 s) at 1 % for everything that is tried together. The result does not depend on `jobs`.
 std::vector<Mislabelled> mislabelled(const residuals::Inputs& inputs, int jobs);
 
-/// Lets names and kinds that are sure be read as what they are; a log of which only the kind is known is left out.
+/// Makes `inputs` use the corrected names and kinds that are sure; a log of which only the kind is known is left out.
 void correct_labels(const std::vector<Mislabelled>& found, residuals::Inputs& inputs);
 
-/// Finds what is mislabelled, and corrects what can be.
+/// Finds mislabelled logs and corrects those that can be corrected.
 std::vector<Mislabelled> find_and_correct_labels(residuals::Inputs& inputs, int jobs);
 
-/// "cf51 of swap/00 flew the set points in the log of cf50: 0.050 m from them (RMS), 0.620 m from those in its own
-/// log".
+/// Describes the finding: "cf51 of swap/00 flew the set points in the log of cf50: 0.050 m from them (RMS), 0.620 m
+/// from those in its own log".
 std::string in_words(const Mislabelled& label);
 
 }  // namespace swarmcert::identification

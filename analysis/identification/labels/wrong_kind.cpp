@@ -48,7 +48,7 @@ std::vector<ThrustSums> thrust_sums(const residuals::Inputs& inputs, const stabi
   return sums;
 }
 
-/// What each block leaves under the scale that the blocks of the other parity have.
+/// Returns the residual of each block with the scale fitted to the blocks of the other parity.
 std::vector<double> scaled(const std::vector<ThrustSums>& blocks) {
   std::array<ThrustSums, 2> halves;
   for (std::size_t b = 0; b < blocks.size(); ++b) {
@@ -81,7 +81,7 @@ double mean_of(const std::vector<double>& values) {
   return sum / static_cast<double>(std::max<std::size_t>(values.size(), 1));
 }
 
-/// By a tenth of the mean square at least: what a formula must gain to take the place of a name.
+/// Requires at least a tenth of the mean square, as for a formula that replaces a named effect.
 bool is_clearly_less(const std::vector<double>& less, const std::vector<double>& more, int tried) {
   constexpr double kLeastGainOfCurve = 0.1;
   return mean_of(less) < (1 - kLeastGainOfCurve) * mean_of(more) && surely_positive(minus(more, less), tried);
@@ -91,7 +91,7 @@ void append(const std::vector<double>& from, std::vector<double>& to) {
   to.insert(to.end(), from.begin(), from.end());
 }
 
-/// The trials of all of `logs` under `kind` together; nothing where one of them is not plausible under it.
+/// Pools the trials of all `logs` with `kind`; returns nothing if one of them is not plausible with it.
 std::optional<KindTrial> pooled(const std::vector<const LogKind*>& logs, const std::string& kind) {
   KindTrial all;
   all.kind = kind;
@@ -107,13 +107,13 @@ std::optional<KindTrial> pooled(const std::vector<const LogKind*>& logs, const s
   return all;
 }
 
-/// The other kind as which `logs` fly, if there is one.
+/// Returns the other kind as which `logs` fly, if there is one.
 std::optional<WrongKind> judged(const std::vector<const LogKind*>& logs, int tried) {
   std::optional<WrongKind> best;
   for (const KindTrial& named : logs[0]->trials) {
     const std::optional<KindTrial> trial = pooled(logs, named.kind);
     if (!trial || !surely_positive(minus(trial->own, trial->other), tried)) continue;
-    // The curve of the own map, at another scale, is the better one.
+    // The thrust curve of the own kind fits better at another scale.
     if (is_clearly_less(trial->own_scaled, trial->other_scaled, tried)) continue;
     WrongKind found;
     found.vehicle = logs[0]->vehicle;
@@ -129,7 +129,7 @@ std::optional<WrongKind> judged(const std::vector<const LogKind*>& logs, int tri
   return best;
 }
 
-/// Two vehicles of one flight each of which flies as the other one's kind.
+/// Finds pairs of vehicles of a flight that each fly as the other's kind.
 void pair_up(std::vector<WrongKind>& found) {
   for (auto one = found.begin(); one != found.end(); ++one) {
     if (one->flight.empty() || !one->exchanged_with.empty()) continue;

@@ -1,8 +1,9 @@
-/// @file Vehicles that fly as another kind does: the thrust of their logs under the model of every kind.
+/// @file Detects vehicles that fly like another kind, by evaluating the thrust of their logs with the model of each
+///   kind.
 ///
-/// A wrong kind is a scale of the thrust, (T / m of the one model) / (T / m of the other). It is looked for where the
-/// mean thrust under the own model is far from the weight (`residuals::doubts_of`) and under another model is not:
-/// kinds that hover at the same duty cannot be told apart.
+/// A wrong kind acts like a thrust scale, (T / m of one model) / (T / m of the other). It is considered if the mean
+/// thrust is far from the weight with the vehicle's own model (`residuals::doubts_of`) but not with another one. Kinds
+/// that hover at the same duty cannot be distinguished.
 #pragma once
 
 #include <string>
@@ -12,38 +13,39 @@
 
 namespace swarmcert::identification {
 
-/// A log under the model of another kind. Squares are of the acceleration along the thrust axis that a model leaves, in
-/// (m/s^2)^2, means over blocks of 2 s.
+/// A log evaluated with the model of another kind. Squares are mean squares, over blocks of 2 s, of the residual
+/// acceleration along the thrust axis, in (m/s^2)^2.
 struct KindTrial {
   std::string kind;
-  std::vector<double> own, other;  ///< both models as they are
-  /// Each with a scale of its thrust, which was fitted to every second block and is judged on the others.
+  std::vector<double> own, other;  ///< both models unchanged
+  /// Each model with a thrust scale, fitted to every second block and evaluated on the others.
   std::vector<double> own_scaled, other_scaled;
 };
 
-/// What the thrust of one log says of its label.
+/// The evidence in one log about its label.
 struct LogKind {
   std::string flight, vehicle, kind, path;
-  bool is_plausible = false;  ///< the mean thrust is about the weight
+  bool is_plausible = false;  ///< the mean thrust is close to the weight
   std::vector<KindTrial>
-      trials;  ///< models of other kinds under which it is; empty where it is under its own
+      trials;  ///< models of other kinds with which it is plausible; empty if it is with its own
 };
 
-/// Precondition: `track` is of inputs.load(), and not position only.
+/// Evaluates a track. Precondition: `track` was loaded by inputs.load() and is not position only.
 LogKind kind_of(const residuals::Inputs& inputs, const residuals::Track& track);
 
 /// A vehicle whose logs are those of another kind.
 struct WrongKind {
-  std::string vehicle, kind, is_kind, flight, path;  ///< no flight and no path: in all of its flights
-  /// The vehicle of the same flight that flies as `kind`, where both names fit other flights: they are exchanged.
+  std::string vehicle, kind, is_kind, flight, path;  ///< no flight and path: all of its flights
+  /// The vehicle of the same flight that flies as `kind`, if both names fit in other flights: the names are exchanged.
   std::string exchanged_with;
-  /// No scale of the thrust explains as much: its curve is the other kind's, or names were exchanged.
+  /// No thrust scale explains as much: the thrust curve is that of the other kind, or names were exchanged.
   bool is_sure = false;
-  double before_m_s2 = 0, after_m_s2 = 0;  ///< root mean squares under the model of either kind
+  double before_m_s2 = 0, after_m_s2 = 0;  ///< root mean squares with the models of both kinds
   int blocks = 0, flights = 0;
 };
 
-/// @param logs of all flights. By tests at 1 % for all trials together.
+/// Finds vehicles of the wrong kind, by tests at 1 % for all trials together.
+/// @param logs of all flights
 std::vector<WrongKind> wrong_kinds(const std::vector<LogKind>& logs);
 
 }  // namespace swarmcert::identification

@@ -25,7 +25,7 @@ Eigen::Vector4d over_the_lowest_two(const Eigen::Vector4d& rise) {
   return rise.array() - (sorted[0] + sorted[1]) / 2;
 }
 
-/// Variance of one load between healthy flights, beside what is common to the four.
+/// Variance of one load between healthy flights, without what is common to all four rotors.
 struct Scatter {
   double variance_N2 = 0;
   double freedom = 1;
@@ -33,7 +33,7 @@ struct Scatter {
 
 Scatter scatter_of(const std::vector<RotorLoads>& healthy, double least_rise_N) {
   const auto count = static_cast<double>(healthy.size());
-  // One flight says nothing of how flights differ: what the battery's place does stands for it.
+  // A single flight does not show how flights differ; the effect of the battery's position is used instead.
   if (healthy.size() < 2) return {std::pow(least_rise_N / 2, 2), kRotors - 1};
   const Eigen::Vector4d mean = mean_of(healthy);
   double squares = 0, errors = 0;
@@ -47,7 +47,7 @@ Scatter scatter_of(const std::vector<RotorLoads>& healthy, double least_rise_N) 
 }
 
 void fill_factors(const Scatter& scatter, double flights, RotorBalance& balance) {
-  // A rise is a load less the mean of two others.
+  // A rise is a load minus the mean of two others.
   const double healthy = 1.0 / balance.healthy_flights;
   const double error_N = std::sqrt(1.5 * scatter.variance_N2 * (1 / flights + healthy));
   const double half_N = error_N * boost::math::quantile(boost::math::students_t(scatter.freedom), 0.95);
@@ -74,7 +74,7 @@ RotorBalance rotor_balance(const std::vector<RotorLoads>& own, const std::vector
   balance.rise_N = over_the_lowest_two(balance.load_N - balance.healthy_N);
   const double lever_m = model.arm_m * std::sqrt(0.5);
   const double alone_N = 2 * kBatteryPlay_m / lever_m * balance.load_N.mean();
-  // The battery sits elsewhere in the healthy flights as well.
+  // The battery position varies in the healthy flights as well.
   balance.least_rise_N = alone_N * std::sqrt(1 + 1.0 / balance.healthy_flights);
   fill_factors(scatter_of(healthy, alone_N), balance.flights, balance);
   Eigen::Index first = 0;

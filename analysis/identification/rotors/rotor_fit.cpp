@@ -23,7 +23,7 @@ const stability::EffectSpec* present_in(const stability::Model& model) {
   return found == model.effects.end() ? nullptr : &*found;
 }
 
-/// What with_effects() adds to the effect that the model has, or puts there.
+/// Returns the spec for with_effects(), which is added to the model's effect or becomes a new one.
 stability::EffectSpec spec_for(const stability::Model& model, const RotorFactors& factors) {
   const stability::EffectSpec* const present = present_in(model);
   const RotorFactors before = rotor_factors_of(model);
@@ -52,7 +52,7 @@ RotorFactors rotor_factors(const RotorLoads& flight) {
   for (std::size_t k = 0; k < kRotorCount; ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     const double value = each_N / flight.mean_N[i];
-    // Blocks of 1 s: as many as in the three seconds that a flight has at least.
+    // Blocks of 1 s: as many as in the minimum of three seconds per flight.
     const double half = value * student_95(2) * flight.error_N[i] / flight.mean_N[i];
     factors[k] = {value, {value - half, value + half}};
   }
@@ -64,7 +64,7 @@ RotorFactors rotor_factors(const std::vector<RotorLoads>& flights, const std::ve
   const auto count = static_cast<double>(flights.size());
   std::vector<Eigen::Vector4d> of_flight;
   Eigen::Vector4d mean = Eigen::Vector4d::Zero(), squares = Eigen::Vector4d::Zero();
-  // Flights that repeat each other exactly say less than their scatter: each is known only to its own standard error.
+  // Flights that agree exactly understate the uncertainty: each is known only to within its own standard error.
   Eigen::Vector4d within_squares = Eigen::Vector4d::Zero();
   for (std::size_t f = 0; f < flights.size(); ++f) {
     const Eigen::Vector4d& mapped_N = flights[f].mean_N;

@@ -1,8 +1,8 @@
-/// @file Factors of the four rotors from slow flight, as the effect `rotor_thrust` has them.
+/// @file Factors of the four rotors from slow flight, as used by the effect `rotor_thrust`.
 ///
-/// In slow flight the torques cancel, so that the four rotors give the same force each, whatever the map says of their
-/// duties: f_k = total / 4, and rotor_k = total / 4 / mapped_k. A centre of mass that sits elsewhere looks the same, as
-/// in rotor_balance.h: the factors are those of rotors about a centre of mass in the middle.
+/// In slow flight the torques cancel, so the four rotors give equal forces, whatever the thrust map predicts from their
+/// duties: f_k = total / 4, and rotor_k = total / 4 / mapped_k. An offset centre of mass looks the same, as in
+/// rotor_balance.h: the factors assume a centre of mass in the middle.
 #pragma once
 
 #include <array>
@@ -14,24 +14,25 @@ namespace swarmcert::identification {
 
 using RotorFactors = std::array<RotorFactor, 4>;
 
-/// Of one flight, beside a scale that all rotors share: total = sum of mapped_k. The intervals are of this flight, from
-/// the scatter of its blocks.
+/// Returns the factors of one flight relative to a scale shared by all rotors: total = sum of mapped_k. The intervals
+/// are for this flight, from the scatter of its blocks.
 RotorFactors rotor_factors(const RotorLoads& flight);
 
-/// Of several flights, not empty. `scale` is what the sum of the true forces is of the sum of the mapped ones, per
-/// flight in their order. Intervals hold the scatter between the flights; of one flight, what the battery's place does.
+/// Returns the factors of one or more flights. `scale` is the sum of the true forces divided by the sum of the mapped
+/// forces, per flight in the same order. The intervals include the scatter between flights; for a single flight, the
+/// effect of the battery's position.
 RotorFactors rotor_factors(const std::vector<RotorLoads>& flights, const std::vector<double>& scale,
                            const stability::Model& model);
 
-/// Root mean square over flights and rotors of how far f_k = factor_k mapped_k is from total / 4.
+/// Returns the root mean square over flights and rotors of f_k - total / 4 with f_k = factor_k mapped_k.
 double rotor_imbalance_N(const std::vector<RotorLoads>& flights, const RotorFactors& factors);
 
-/// rotor_thrust for the model of `kind`, fitted to the flights `which`. The true forces carry the weight, less what the
-/// model's own thrust_ratio gives. Empty where no flight has three seconds of slow flight with four duties.
+/// Returns rotor_thrust for the model of `kind`, fitted to the flights `which`. The true forces carry the weight,
+/// reduced by the model's own thrust_ratio. Empty if no flight has three seconds of slow flight with four duties.
 std::vector<Missing> fit_rotors(const residuals::Inputs& inputs, const std::string& kind,
                                 const std::vector<int>& which, int jobs);
 
-/// The factors that `model` has; 1 where it has none.
+/// Returns the factors in `model`; 1 if it has none.
 RotorFactors rotor_factors_of(const stability::Model& model);
 
 }  // namespace swarmcert::identification

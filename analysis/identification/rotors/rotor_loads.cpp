@@ -10,7 +10,7 @@ namespace {
 
 using residuals::Track;
 
-/// Means of blocks, and how they scatter.
+/// Computes means over blocks and their scatter.
 void summarize(const std::vector<Eigen::Vector4d>& blocks, RotorLoads& loads) {
   const auto count = static_cast<double>(blocks.size());
   for (const Eigen::Vector4d& block : blocks) loads.mean_N += block / count;

@@ -1,4 +1,4 @@
-/// @file What each rotor of a vehicle gives in slow flight, as the thrust map has it.
+/// @file The thrust of each rotor in slow flight according to the thrust map.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,8 +9,8 @@
 
 namespace swarmcert::identification {
 
-/// Means over the records of one flight in which the vehicle neither climbs nor sinks, well above the ground. There the
-/// torques cancel, so that the differences between rotors are those of the vehicle.
+/// Means over the records of a flight in which the vehicle neither climbs nor descends, well above the ground. There
+/// the torques cancel, so differences between rotors are properties of the vehicle.
 struct RotorLoads {
   std::string flight, vehicle;
   std::size_t records = 0;
@@ -18,12 +18,13 @@ struct RotorLoads {
   Eigen::Vector4d error_N = Eigen::Vector4d::Zero();  ///< standard errors, from blocks of 1 s
 };
 
-/// Records count below this vertical speed and at least this high above the lowest record.
+/// Records are used below this vertical speed and at least this high above the lowest record.
 inline constexpr double kMostClimb_m_s = 0.08, kLeastRise_m = 0.3;
-/// Flights with less slow flight than this are left out.
+/// Flights with less slow flight are skipped.
 inline constexpr double kLeastSlowFlight_s = 3;
 
-/// Of every flight of vehicles of `kind` whose log has a duty of each motor and the battery. Does not depend on `jobs`.
+/// Returns the loads of each flight of vehicles of `kind` whose log has the duty of each motor and the battery voltage.
+/// The result does not depend on `jobs`.
 std::vector<RotorLoads> rotor_loads(const residuals::Inputs& inputs, const std::string& kind, int jobs);
 
 }  // namespace swarmcert::identification

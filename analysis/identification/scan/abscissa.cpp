@@ -12,7 +12,7 @@ std::vector<Abscissa> abscissas(const ScanSamples& samples) {
     if (!info.in_world && !info.in_body) continue;
     std::vector<int> knots = {4, 8, 16};
     if (variable == ScanVariable::kTime || variable == ScanVariable::kBattery) knots = {4, 8};
-    // Torques turn the vehicle, and no set point of the heading tells what was meant.
+    // Torques rotate the vehicle, and there are no setpoints of the heading for comparison.
     const bool is_turned = samples.quantity == ScanQuantity::kBalance && variable == ScanVariable::kRateZ;
     all.push_back(
         {info.name, {variable}, 0, info.is_answer || is_turned, info.in_world, info.in_body, knots});
@@ -28,7 +28,7 @@ std::vector<Abscissa> abscissas(const ScanSamples& samples) {
     for (int lag = 0; lag < NeighbourPlaces::kLags; ++lag) {
       for (const auto v :
            {ScanVariable::kNeighbourVx, ScanVariable::kNeighbourVy, ScanVariable::kNeighbourVz}) {
-        // Now, and minus the vehicle's, they are among the variables above.
+        // The current relative values are among the variables above.
         if (lag > 0) all.push_back({scan_variable(v).name, {v}, lag, false, true, false, {8}});
         all.push_back({scan_variable(v).name, {v}, lag, false, true, false, {8}, true});
       }
@@ -39,7 +39,7 @@ std::vector<Abscissa> abscissas(const ScanSamples& samples) {
 
 namespace {
 
-/// Of neighbours nearer than 0.8 m along each axis; further ones count as at the edge.
+/// For neighbours within 0.8 m along each axis; those further away are clamped to the edge.
 Knots knots_nearby(int count) {
   constexpr double kReach_m = 0.8;
   Knots knots;
@@ -52,7 +52,7 @@ Knots knots_nearby(int count) {
 Curve curve_over(const ScanSamples& samples, const Abscissa& abscissa, int knots) {
   Curve curve;
   if (abscissa.variables.empty()) {
-    // Nearer than 0.7 m to the side and 1.2 m in height; further ones count as at the edge.
+    // Within 0.7 m laterally and 1.2 m in height; those further away are clamped to the edge.
     const auto lateral_m = samples.neighbours.lateral_m.col(abscissa.lag);
     const auto height_m = samples.neighbours.height_m.col(abscissa.lag);
     Knots lateral, height;

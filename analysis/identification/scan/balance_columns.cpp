@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kBalancedRotors = 4;
 constexpr Eigen::Index kBalanceColumns = 7;
 
-/// From (force along b3, torque) to rotors.
+/// Returns the matrix from (force along b3, torque) to rotor forces.
 Eigen::Matrix4d inverse_mixing(const stability::Model& model,
                                const std::vector<stability::RotorPlace>& rotors) {
   Eigen::Matrix4d mixing;

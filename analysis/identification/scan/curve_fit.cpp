@@ -112,7 +112,7 @@ std::vector<SparseRow> hat_rows(const Eigen::Ref<const Eigen::VectorXf>& a, cons
 
 CurveFit::CurveFit(const std::vector<SparseRow>& rows, int columns, const Chunks& chunks)
     : rows_(rows), chunks_(chunks), columns_(columns) {
-  // A weak pull towards the constant keeps knots without samples in place: as much as two samples would.
+  // A weak regularisation towards the constant, worth two samples, determines knots without samples.
   constexpr double kPull = 2;
   const int size = columns + 1;
   std::array<Eigen::MatrixXd, Chunks::kFolds> inside;
@@ -181,10 +181,10 @@ Columns CurveFit::predictions(const std::vector<SparseRow>& rows) const {
 }
 
 Eigen::MatrixXd CurveFit::errors_of_flipped(const Columns& targets, const Eigen::MatrixXd& signs) const {
-  // |t - X b|^2 = |t|^2 - 2 b' X' t + b' X' X b for each fold, where signs change X' t alone, chunk by chunk.
+  // |t - X b|^2 = |t|^2 - 2 b' X' t + b' X' X b for each fold; flipped signs change only X' t, chunk by chunk.
   const auto draws = static_cast<std::size_t>(signs.rows());
   const Eigen::Index size = columns_ + 1, m = targets.cols();
-  std::vector<std::array<RowMajorXd, Chunks::kFolds>> products(draws);  // X' t of each draw and fold
+  std::vector<std::array<RowMajorXd, Chunks::kFolds>> products(draws);  // X' t for each draw and fold
   for (auto& of_draw : products) of_draw.fill(RowMajorXd::Zero(size, m));
   RowMajorXd of_chunk = RowMajorXd::Zero(size, m);
   Eigen::RowVectorXd values, squares = Eigen::RowVectorXd::Zero(m);

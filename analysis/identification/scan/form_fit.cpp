@@ -32,7 +32,7 @@ std::vector<std::vector<double>> combinations(const Form& form) {
   return all;
 }
 
-/// The most promising combinations of starts, by some of the samples.
+/// Returns the most promising combinations of starts, judged on a subset of the samples.
 std::vector<std::vector<double>> best_starts(const Form& form, const FormData& data) {
   constexpr Eigen::Index kEnough = 600;
   constexpr std::size_t kTaken = 5;
@@ -57,7 +57,7 @@ double first_step(const FormParameter& parameter, double value) {
   const std::vector<double>& starts = parameter.starts;
   if (parameter.lower == parameter.upper) return 0;
   if (starts.size() < 2) return 0.3 * std::abs(value);
-  // Half of the distance between starts there.
+  // Half the distance between starts there.
   double gap = kInfinity;
   for (std::size_t k = 1; k < starts.size(); ++k) {
     if (value <= starts[k] || k + 1 == starts.size()) {
@@ -73,7 +73,7 @@ FormFit improved(const Form& form, const FormData& data, FormFit best) {
   std::vector<double> steps;
   for (std::size_t k = 0; k < form.shape.size(); ++k)
     steps.push_back(first_step(form.shape[k], best.theta[k]));
-  // The error only falls: what was tried once is never better later.
+  // The error only decreases, so a rejected theta is never better later.
   std::set<std::vector<double>> tried = {best.theta};
   int halved = 0;
   for (int round = 0; round < kMostRounds && halved < kHalvings; ++round) {
@@ -106,7 +106,7 @@ FormFit fit_coefficients(const Form& form, const FormData& data, const std::vect
   Eigen::Matrix3d gram = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   double squares = 0;
-  // Values first, sums then: these stay in registers.
+  // First values, then sums, which stay in registers.
   constexpr Eigen::Index kMany = 128;
   Eigen::Matrix<double, 3, kMany> rows = Eigen::Matrix<double, 3, kMany>::Zero();
   for (Eigen::Index first = 0; first < data.target.size(); first += kMany) {

@@ -34,7 +34,7 @@ double square(double x) { return x * x; }
 
 Form decay(const FormRange& range, bool upwards) {
   const double from = upwards ? range.lower : range.upper;
-  // The place where the force is its coefficient only scales it.
+  // The reference position, at which the force equals its coefficient, only scales the coefficient.
   FormParameter reference = {"from", FormUnit::kVariable, from, from, {from}};
   Form form;
   form.name = upwards ? "decay" : "growth";
@@ -78,7 +78,7 @@ Form step(const FormRange& range, int places, bool above) {
           {above ? "({0} > {a})" : "({0} < {a})"}};
 }
 
-/// The product of a form over the first and one over the second variable, each of one function.
+/// Returns the product of a form over the first and a form over the second variable, each with one function.
 Form product(const Form& first, const Form& second) {
   Form form;
   form.name = first.name + "_" + second.name;
@@ -107,7 +107,7 @@ Form product(const Form& first, const Form& second) {
   return form;
 }
 
-/// Edges along either variable, and a strip along one that ends at an edge along the other.
+/// Adds edges along either variable, and strips along one variable that end at an edge along the other.
 void add_edges(const FormRange& x, const FormRange& y, std::vector<Form>& forms) {
   const Form across_x = gaussian(x, 7, {0.1, 0.3}), across_y = gaussian(y, 7, {0.1, 0.3});
   for (const bool above_x : {true, false}) {
@@ -118,7 +118,7 @@ void add_edges(const FormRange& x, const FormRange& y, std::vector<Form>& forms)
   }
 }
 
-/// Units of the coefficients: newton over the variable's unit to these powers.
+/// Sets the units of the coefficients: newton over the variable's unit to these powers.
 std::vector<Form> with_powers(std::vector<Form> forms) {
   for (Form& form : forms) {
     const std::string& name = form.name;

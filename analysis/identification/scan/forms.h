@@ -1,4 +1,4 @@
-/// @file Physical forms that a force may have over one variable, or over a place.
+/// @file Physical forms of a force over one variable or over a position.
 #pragma once
 
 #include <array>
@@ -8,14 +8,14 @@
 
 namespace swarmcert::identification {
 
-/// Where values lie: for starts and bounds of parameters.
+/// Range of the values, for starts and bounds of parameters.
 struct FormRange {
   double lower = 0, upper = 1;
   double span() const { return upper - lower; }
 };
 
-/// What a parameter of a form is measured in.
-enum class FormUnit { kVariable, kInverse, kNone };  ///< the variable's unit, one over it, or a pure number
+/// Unit of a parameter of a form.
+enum class FormUnit { kVariable, kInverse, kNone };  ///< the variable's unit, its inverse, or none
 
 struct FormParameter {
   std::string name;  ///< "width"; the unit is appended
@@ -24,31 +24,33 @@ struct FormParameter {
   std::vector<double> starts;
 };
 
-/// g_1(v; theta), ..., g_m(v; theta): a force is sum a_k g_k + c.
+/// Functions g_1(v; theta), ..., g_m(v; theta) of a force sum a_k g_k + c.
 struct Form {
   std::string name;  ///< "gaussian"
-  int inputs = 1;    ///< 1, or 2 for places
+  int inputs = 1;    ///< 1, or 2 for positions
   std::vector<FormParameter> shape;
-  /// Values of the m functions. @param v [inputs], theta [shape.size()], to [m]
+  /// Evaluates the m functions.
+  /// @param v [inputs], theta [shape.size()], to [m]
   std::function<void(const double* v, const double* theta, double* to)> values;
   /// The functions as text, with {0}, {1} for variables and kShapeLetters for shape parameters in their order.
   std::vector<std::string> texts;
-  int powers[2] = {0, 0};  ///< of the variable in each function: units of the coefficients
+  int powers[2] = {0, 0};  ///< of the variable in each function; determines the units of the coefficients
   bool has_offset = true;
-  bool is_product = false;  ///< of forms of one variable each
+  bool is_product = false;  ///< product of forms of one variable each
 };
 
 inline constexpr int kMostFormFunctions = 2;
 inline constexpr const char* kShapeLetters[] = {"{a}", "{b}", "{c}", "{d}"};
 
-/// Puts `to` wherever `from` stands.
+/// Replaces each `from` in `text` by `to`.
 void replace_all(std::string& text, const std::string& from, const std::string& to);
 
-/// All forms of one variable. @param range of its values; `has_origin` where zero is a physical one, as of velocities.
+/// Returns all forms of one variable.
+/// @param range of its values; `has_origin`: zero is physically meaningful, as for velocities
 std::vector<Form> forms_over(const FormRange& range, bool has_origin);
-/// All forms over a place in the plane. Parameters of one variable begin with x_ or y_.
+/// Returns all forms over a position in the plane. The parameters of each variable begin with x_ or y_.
 std::vector<Form> forms_over_place(const FormRange& x, const FormRange& y);
-/// All forms over a place in a vertical section, whose second variable is called y here too.
+/// Returns all forms over a position in a vertical section, whose second variable is also called y.
 std::vector<Form> forms_over_section(const FormRange& along, const FormRange& height);
 
 }  // namespace swarmcert::identification

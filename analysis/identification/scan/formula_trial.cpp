@@ -65,7 +65,7 @@ void add_shapes(const FormulaTrial& trial, const std::string& unit, stability::E
     spec.expression.bounds[name] = {std::min(parameter.lower, value), std::max(parameter.upper, value)};
     for (std::string& text : texts) replace_all(text, kShapeLetters[k], name);
     if (parameter.lower == parameter.upper) continue;
-    // What identification tries around it; the step also says how far it may be off where it is near zero.
+    // Range tried by identification; the step also covers parameters close to zero.
     const double step = std::max(0.2 * std::abs(value), 0.02 * (parameter.upper - parameter.lower));
     std::vector<double>& grid = spec.expression.grid[name];
     for (const double tried : {value - step, value, value + step})

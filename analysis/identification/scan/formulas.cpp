@@ -18,12 +18,12 @@ namespace {
 
 constexpr Eigen::Index kSamplesOfFit = 3000;
 constexpr const char* kBodyConstant = "body_constant";
-/// What a form may be multiplied with.
+/// Factors by which a form may be multiplied.
 constexpr ScanVariable kFactors[] = {ScanVariable::kThrust, ScanVariable::kX,    ScanVariable::kY,
                                      ScanVariable::kZ,      ScanVariable::kVx,   ScanVariable::kVy,
                                      ScanVariable::kVz,     ScanVariable::kSpeed};
 
-/// Velocities and rates: zero means that nothing moves, so forms may depend on the sign or the absolute value.
+/// True for velocities and rates: zero means no motion, so forms may depend on the sign or the absolute value.
 bool has_origin(ScanVariable v) {
   using V = ScanVariable;
   constexpr V kSuch[] = {V::kVx,    V::kVy,    V::kVz,    V::kBodyVx, V::kBodyVy,
@@ -79,7 +79,7 @@ bool is_of_neighbours(const ScanEntry& entry) {
   return !entry.variables.empty() && entry.variables[0] == ScanVariable::kNeighbourX;
 }
 
-/// Forms over a vertical section, with parameters named after its axes.
+/// Returns forms over a vertical section, with parameters named after its axes.
 std::vector<Form> forms_of_section(const ScanEntry& entry, const EntryData& data) {
   std::vector<Form> forms =
       forms_over_section(range_of(data.few.inputs.col(0)), range_of(data.few.inputs.col(1)));
@@ -100,7 +100,7 @@ std::vector<Form> forms_of(const ScanEntry& entry, const EntryData& data) {
     return forms_of_section(entry, data);
   if (entry.variables.size() == 2) {
     forms = forms_over_place(range_of(data.few.inputs.col(0)), range_of(data.few.inputs.col(1)));
-    // Neighbours far away do nothing.
+    // Neighbours far away must have no effect.
     const auto reaches_far = [](const Form& form) {
       return form.name == "plane" || form.name == "beyond" || form.is_product;
     };
@@ -120,7 +120,7 @@ std::vector<Form> forms_of(const ScanEntry& entry, const EntryData& data) {
   return forms;
 }
 
-/// The best form of an entry, with or without a factor.
+/// Returns the best form of an entry, with or without a factor.
 FormulaTrial best_trial(const ScanSamples& samples, const ScanEntry& entry, EntryData& data) {
   std::vector<FormulaTrial> trials;
   for (Form& form : forms_of(entry, data)) {
@@ -154,7 +154,7 @@ FormulaTrial best_trial(const ScanSamples& samples, const ScanEntry& entry, Entr
   return best;
 }
 
-/// Formulas over several variables count the same samples: those of the one that takes the fewest for independent.
+/// Makes formulas over different variables comparable by using the smallest number of independent samples for all.
 void count_alike(const std::vector<FormulaTrial>& trials, std::vector<Formula>& formulas) {
   double least = kInfinity;
   for (const FormulaTrial& trial : trials)
@@ -169,7 +169,7 @@ const ScanColumn& column_of_entry(const ScanSamples& samples, int column) {
   return scan_columns(samples.quantity)[static_cast<std::size_t>(column)];
 }
 
-/// Vertical forces act along the world's axis or along the thrust, whichever leaves less.
+/// Returns the column: vertical forces act along the world's axis or along the thrust, whichever leaves less.
 int column_of(const ScanSamples& samples, const ScanEntry& entry, const EntryData& data,
               const FormulaTrial& trial) {
   constexpr int kVertical = 2, kThrust = 5;
@@ -212,7 +212,7 @@ stability::EffectSpec spec_of(const ScanEntry& entry, const char* target, const 
     if (trial.factor != ScanVariable::kCount) of += std::string("_per_") + scan_variable(trial.factor).unit;
     add(letters[k], text, trial.fit.coefficients[static_cast<Eigen::Index>(k)], of);
   }
-  // Beside neighbours it is what acts without them.
+  // With neighbours, the constant is what acts without them.
   spec.expression.per_neighbour = is_of_neighbours(entry);
   if (trial.form.has_offset && !spec.expression.per_neighbour)
     add("offset", "", trial.fit.coefficients[trial.fit.coefficients.size() - 1], entry.unit);
@@ -224,9 +224,9 @@ stability::EffectSpec spec_of(const ScanEntry& entry, const char* target, const 
   return spec;
 }
 
-/// A constant along each axis of the body.
+/// Returns a constant along each axis of the body.
 Formula body_constant(const ScanSamples& samples, const ScanEntry& entry) {
-  constexpr double kIndependent = 0.2;  // of the samples
+  constexpr double kIndependent = 0.2;  // fraction of the samples
   const double independent = std::max(kIndependent * static_cast<double>(samples.size()), 4.0);
   Formula formula;
   formula.form = "constant";

@@ -1,8 +1,8 @@
-/// @file Formulas for what is left: a small search over physical forms, judged by their description length.
+/// @file Formulas for the remainder: a small search over physical forms, scored by description length.
 ///
-/// A formula costs half the logarithm of the number of independent samples for each of its numbers, and saves half that
-/// number times the logarithm of the fall of the error (Schwarz 1978). How many samples are independent follows from
-/// the correlation of what the best formula leaves from one sample to the next.
+/// Each parameter of a formula costs half the logarithm of the number of independent samples; the formula saves half
+/// that number times the logarithm of the reduction of the error (Schwarz 1978). The number of independent samples
+/// follows from the correlation between consecutive residuals of the best formula.
 #pragma once
 
 #include <string>
@@ -17,25 +17,26 @@ namespace swarmcert::identification {
 struct Formula {
   std::string form, variable;    ///< "gaussian", "xy"
   stability::EffectSpec effect;  ///< with its numbers
-  double saved_bits = 0;         ///< against a constant
-  double share = 0;              ///< as ScanEntry::share, on the samples of the fit
-  std::size_t entry = 0;         ///< of Scan::entries
+  double saved_bits = 0;         ///< compared with a constant
+  double share = 0;              ///< like ScanEntry::share, on the samples of the fit
+  std::size_t entry = 0;         ///< index in Scan::entries
 };
 
-/// For the first `most_entries` of `scan` that formulas can express, the best formula each; by saved_bits, best first.
+/// Returns the best formula for each of the first `most_entries` of `scan` that formulas can express, sorted by
+/// saved_bits.
 std::vector<Formula> find_formulas(const ScanSamples& samples, const Scan& scan, std::size_t most_entries,
                                    int jobs);
 
-/// `formula` as a candidate of a selection: its shape where it is.
+/// Returns `formula` as a candidate of a selection, starting at its shape.
 Candidate candidate_of(const Formula& formula, const stability::Model& model);
 
-/// [[effect]] with [effect.expression], as a model file has it.
+/// Returns [[effect]] with [effect.expression], as in a model file.
 std::string to_toml(const Formula& formula);
 
-/// So many are looked for where somebody asks for formulas.
+/// Number of formulas that are searched on request.
 inline constexpr std::size_t kMostFormulas = 8;
 
-/// Names of effects that find_formulas() makes begin so.
+/// Prefix of the names of effects created by find_formulas().
 inline constexpr char kFormulaPrefix[] = "formula_";
 bool is_formula(const std::string& effect);
 

@@ -8,9 +8,9 @@ namespace swarmcert::identification {
 namespace {
 
 constexpr double kHalfTurn = 3.141592653589793;
-constexpr double kReach = 0.3;  ///< metres
+constexpr double kReach = 0.3;  ///< in metres
 
-/// A formula's parameter whose name begins with `word`, its unit aside.
+/// Returns the parameter of a formula whose name, without its unit, begins with `word`.
 std::optional<double> number_of(const Formula& formula, const std::string& word) {
   for (const auto& [name, value] : formula.effect.parameters) {
     if (name == word || name.rfind(word + "_", 0) == 0) return value;
@@ -18,7 +18,7 @@ std::optional<double> number_of(const Formula& formula, const std::string& word)
   return std::nullopt;
 }
 
-/// The first of `words` that the formula has.
+/// Returns the first of `words` that the formula has.
 std::optional<double> first_of(const Formula& formula, const std::vector<std::string>& words) {
   for (const std::string& word : words) {
     if (const auto number = number_of(formula, word)) return number;
@@ -38,15 +38,15 @@ bool is_horizontal(const Formula& formula) {
   return acts_along(formula, {"force_x_N", "force_y_N", "force_b1_N", "force_b2_N"});
 }
 
-/// Takes part in the fit of an effect whose other coefficients stay zero.
+/// Excludes all coefficients other than `free` from the fit.
 void hold_others(Candidate& candidate, const std::vector<std::string>& free) {
   for (stability::Parameter& p : candidate.info.linear) {
     if (std::find(free.begin(), free.end(), p.name) == free.end()) p.lower = p.upper = 0;
   }
 }
 
-/// The shape parameters `free` may move from where they are by about kReach, if they are near zero; the others are
-/// held.
+/// Lets the shape parameters `free` move from their current values, by about kReach if they are near zero; fixes the
+/// others.
 void free_shape(Candidate& candidate, const std::vector<std::string>& free) {
   for (std::size_t i = 0; i < candidate.info.shape.size(); ++i) {
     stability::Parameter& p = candidate.info.shape[i];
@@ -65,7 +65,7 @@ std::vector<Candidate> steps_in_time(const Formula& formula, Candidate candidate
   candidate.thetas.clear();
   for (const double off_s : {-0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4})
     candidate.thetas.push_back({std::max(*at_s + off_s, 0.0)});
-  // A jump has no derivative with respect to its time: the best of these is it.
+  // A jump has no derivative with respect to its time, so the best of these times is kept.
   candidate.info.shape[0].lower = candidate.info.shape[0].upper = *at_s;
   return {std::move(candidate)};
 }
@@ -101,13 +101,13 @@ std::vector<Candidate> thermals(const Formula& formula, Candidate candidate) {
   return {std::move(candidate)};
 }
 
-/// Where a place that a formula has may lie: half the flown range beyond both of its ends (forms.cpp).
+/// Range for a position from a formula: half the flown range beyond both of its ends (forms.cpp).
 struct FlownRange {
   double lower_m, upper_m, at_m;
   double span_m() const { return upper_m - lower_m; }
 };
 
-/// Of the formula's first place; of a decay that has none, its end of the range and a length.
+/// Returns the range for the formula's first position; for a decay without one, its end of the range plus a length.
 std::optional<FlownRange> range_of_place(const Formula& formula) {
   for (const auto& [name, bounds] : formula.effect.expression.bounds) {
     const bool is_place = name == "centre_m" || name == "middle_m" || name == "at_m" || name == "from_m";
@@ -123,8 +123,8 @@ std::optional<FlownRange> range_of_place(const Formula& formula) {
   return FlownRange{*from_m, *from_m + span_m, *from_m};
 }
 
-/// A force along x that stands out at one end of the flown range of x, and likewise y. Beyond the wall nothing flies:
-/// it is at that end, or where the formula has its place.
+/// Returns walls for a force along x that is concentrated at one end of the flown range of x, and likewise for y.
+/// Nothing flies beyond a wall: it is at that end, or where the formula has its position.
 std::vector<Candidate> walls(const Formula& formula, Candidate candidate) {
   const bool is_x = formula.variable == "x";
   const auto range = range_of_place(formula);
@@ -143,7 +143,7 @@ std::vector<Candidate> walls(const Formula& formula, Candidate candidate) {
   return {std::move(candidate)};
 }
 
-/// Anchors below the middle of the flown range, which the fit then moves.
+/// Returns tethers anchored below the middle of the flown range, which the fit then moves.
 std::vector<Candidate> tethers(const Formula& formula, Candidate candidate) {
   const auto range = range_of_place(formula);
   const double middle_m = range ? 0.5 * (range->lower_m + range->upper_m) : 0;
@@ -172,7 +172,7 @@ std::vector<Candidate> on_its_grid(const Formula& formula, Candidate candidate) 
   return {std::move(candidate)};
 }
 
-/// Also from where the formula's force over the thrust sets in, which may be close to hovering.
+/// Also starts at the thrust above which the formula's force acts, which may be close to hover.
 void start_at_knee(const Formula& formula, double weight_N, Candidate& candidate) {
   const auto from_N = number_of(formula, "from");
   if (formula.variable != "thrust" || formula.form != "above" || !from_N) return;
@@ -180,7 +180,7 @@ void start_at_knee(const Formula& formula, double weight_N, Candidate& candidate
   candidate.thetas.push_back({std::max(*from_N / weight_N, lowest)});
 }
 
-/// An effect with the variables that point to it.
+/// An effect and the variables that suggest it.
 struct NamedForm {
   const char* effect;
   std::vector<std::string> variables;

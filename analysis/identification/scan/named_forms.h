@@ -1,8 +1,9 @@
-/// @file Effects of the registry that formulas of the scan point to.
+/// @file Effects of the registry suggested by formulas of the scan.
 ///
-/// A thermal, a wall or a dropped payload has a place or a time that no grid of a few values finds, and many candidates
-/// raise the number of false claims. So these effects are candidates only where the scan, which is guarded against
-/// accidents, has found their variable, with the place that its formula found. They then compete with that formula.
+/// A thermal, a wall or a dropped payload has a place or time that no coarse grid covers, and many candidates would
+/// increase the number of false claims. These effects are therefore candidates only if the scan, which is protected
+/// against chance findings, has found their variable; they start at the place found by its formula and then compete
+/// with that formula.
 #pragma once
 
 #include <string>
@@ -13,14 +14,14 @@
 
 namespace swarmcert::identification {
 
-/// True for effects that are candidates by named_forms() only.
+/// Returns true for effects that are candidates only through named_forms().
 bool needs_scan(const std::string& effect);
 
-/// True if formulas over this variable of the scan make `effect` a candidate.
+/// Returns true if formulas over this variable of the scan make `effect` a candidate.
 bool points_to(const std::string& variable, const std::string& effect);
 
-/// Candidates that `formulas` point to, in their order, each effect once for every formula that points to it with
-/// another shape. Effects that `model` has are left out.
+/// Returns the candidates suggested by `formulas`, in their order; each effect once for every formula that suggests it
+/// with another shape. Effects that `model` has are skipped.
 std::vector<Candidate> named_forms(const std::vector<Formula>& formulas, const stability::Model& model,
                                    const Coverage& coverage);
 

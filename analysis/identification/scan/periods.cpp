@@ -13,10 +13,10 @@ constexpr double kPiece_s = 100, kFastest_hz = 2;
 constexpr int kMostFrequencies = 400, kDraws = 20;
 constexpr Eigen::Index kManySamples_ = 20'000;
 
-/// Samples in pieces within which a phase is kept.
+/// Samples in pieces, each with one phase.
 struct Pieces {
-  std::vector<Eigen::Index> rows;  ///< of ScanSamples
-  std::vector<int> of_row, first;  ///< piece of each; where pieces begin, with the end
+  std::vector<Eigen::Index> rows;  ///< row of ScanSamples
+  std::vector<int> of_row, first;  ///< piece of each row; first row of each piece, and the end
   double longest_s = 0;
 };
 
@@ -45,7 +45,7 @@ Pieces pieces_of(const ScanSamples& samples) {
   return pieces;
 }
 
-using Draws = std::vector<Eigen::Matrix3Xf>;  ///< [3 x rows] each: the remainder, then with signs drawn
+using Draws = std::vector<Eigen::Matrix3Xf>;  ///< [3 x rows] each: the remainder, then random signs
 
 Draws draws_of(const ScanSamples& samples, const Pieces& pieces, const Chunks& chunks) {
   const auto n = static_cast<Eigen::Index>(pieces.rows.size());
@@ -63,7 +63,7 @@ Draws draws_of(const ScanSamples& samples, const Pieces& pieces, const Chunks& c
   return draws;
 }
 
-/// Share of the mean square that a sine of this frequency holds, by draw and axis.
+/// Returns the fraction of the mean square explained by a sine of this frequency, by draw and axis.
 Eigen::Matrix3Xd powers_at(double frequency_hz, const ScanSamples& samples, const Pieces& pieces,
                            const Draws& draws) {
   Eigen::Matrix3Xd powers = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(draws.size()));
@@ -86,7 +86,7 @@ Eigen::Matrix3Xd powers_at(double frequency_hz, const ScanSamples& samples, cons
   return powers;
 }
 
-/// The share on chunks left out, of a sine with a phase for each piece.
+/// Returns the share on held-out chunks of a sine with a separate phase for each piece.
 double judged_share(double frequency_hz, int axis, const ScanSamples& samples, const Pieces& pieces,
                     const Chunks& chunks, const Eigen::Matrix3Xf& remainder) {
   double before = 0, after = 0;

@@ -1,4 +1,4 @@
-/// @file What repeats in time, whatever its phase.
+/// @file Periodic components of the remainder, whatever their phase.
 #pragma once
 
 #include "analysis/identification/scan/curve_fit.h"
@@ -6,10 +6,10 @@
 
 namespace swarmcert::identification {
 
-/// Of forces. Adds an entry for each component of the remainder in the world that holds a sine of one frequency, with a
-/// phase for each piece of at most 100 s; beside a slower dependence on time, it takes that entry's place where it
-/// explains more. Frequencies up to 2 Hz, half a cycle per piece apart. A sine counts if its power exceeds the largest
-/// of what draws of the chunks' signs leave by three standard deviations; its share is that of chunks left out.
+/// Adds an entry for each world component of the force remainder that contains a sine of one frequency, with a separate
+/// phase for each piece of at most 100 s. It replaces the entry for a slower dependence on time if it explains more.
+/// Frequencies go up to 2 Hz, in steps of half a cycle per piece. A sine is reported if its power exceeds the largest
+/// power under random signs of the chunks by three standard deviations; its share is evaluated on held-out chunks.
 void add_periods(const ScanSamples& samples, const Chunks& chunks, Scan& scan);
 
 }  // namespace swarmcert::identification

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kRamps = 7;
 
-/// K of "formula:K".
+/// Returns K of "formula:K".
 std::size_t place_of_name(const std::string& name) {
   const std::size_t colon = name.find(':');
   return colon == std::string::npos ? 1 : std::strtoul(name.c_str() + colon + 1, nullptr, 10);
@@ -22,7 +22,7 @@ std::size_t place_of_name(const std::string& name) {
 
 double ramp(double value, double from, double step) { return std::clamp((value - from) / step, 0.0, 1.0); }
 
-/// Least squares of offset and ramps; all of them of one sign where that leaves hardly more.
+/// Fits offset and ramps by least squares; with ramps of a single sign if that is hardly worse.
 Eigen::VectorXd ramps_of(const ScanSamples& samples, const ScanEntry& entry, const Knots& knots,
                          bool& is_monotone) {
   constexpr double kHardlyMore = 1.01;

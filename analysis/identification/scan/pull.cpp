@@ -10,10 +10,10 @@ namespace {
 
 constexpr Eigen::Index kSamplesOfPull = 3000;
 
-/// The distance that a form takes, and what the force along it counts horizontally.
+/// The distance used by a form, and the horizontal component of the force along it.
 struct PullLaw {
   const char* distance;   ///< in formulas
-  const char* direction;  ///< what dx and dy are divided by
+  const char* direction;  ///< divisor of dx and dy
   bool is_central;
 };
 constexpr PullLaw kPullLaws[] = {{"sqrt(dx^2 + dy^2)", "max(sqrt(dx^2 + dy^2), 0.001)", false},
@@ -51,7 +51,7 @@ EntryData pull_data(const ScanSamples& samples, bool is_central) {
   return data;
 }
 
-/// Those that vanish far away, where the samples say nothing; without a constant.
+/// Returns forms that vanish at large distances, where there are no samples, without a constant.
 std::vector<Form> vanishing_forms(const FormRange& distance) {
   std::vector<Form> forms = forms_over(distance, false);
   forms.erase(std::remove_if(forms.begin(), forms.end(),
@@ -97,7 +97,7 @@ Pull find_pull(const ScanSamples& samples) {
       trial.fit = fit_form(form, data.few);
       trial.form = std::move(form);
       if (!std::isfinite(trial.fit.mean_square)) continue;
-      // The same for all forms, or what leaves more correlated errors would count for less.
+      // The same number for all forms; otherwise a form with more correlated residuals would be penalised less.
       if (independent == 0) independent = independent_samples(data, trial);
       trial.saved_bits = saved_bits(data.mean_square, trial, independent);
       if (!(trial.saved_bits > best.saved_bits)) continue;

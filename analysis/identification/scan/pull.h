@@ -1,4 +1,4 @@
-/// @file Formulas for forces that draw vehicles towards each other, or apart.
+/// @file Formulas for attractive or repulsive forces between vehicles.
 #pragma once
 
 #include <string>
@@ -8,20 +8,20 @@
 
 namespace swarmcert::identification {
 
-/// A horizontal force towards every neighbour that falls with its distance, as an effect with per_neighbour: either
-/// f(r) along the horizontal direction, r the horizontal distance, or the horizontal part of f(d) along the line
-/// between the vehicles, d their distance.
+/// A horizontal force towards each neighbour that decreases with distance, as an effect with per_neighbour: either f(r)
+/// along the horizontal direction, where r is the horizontal distance, or the horizontal part of f(d) along the line
+/// between the vehicles, where d is their distance.
 struct Pull {
   std::string form;              ///< "decay"
   stability::EffectSpec effect;  ///< with its numbers, without a name
-  double saved_bits = 0;         ///< against no force
-  double explained_N2 = 0;       ///< what it takes off the mean square
+  double saved_bits = 0;         ///< compared with no force
+  double explained_N2 = 0;       ///< reduction of the mean square
 };
 
-/// Whether the entry is about such a force.
+/// Returns whether the entry describes such a force.
 bool is_pull(const ScanSamples& samples, const ScanEntry& entry);
 
-/// The best of the forms that vanish far away, fitted to the nearest neighbour.
+/// Returns the best form that vanishes at large distances, fitted to the nearest neighbour.
 Pull find_pull(const ScanSamples& samples);
 
 }  // namespace swarmcert::identification

@@ -42,7 +42,7 @@ struct TrackSamples {
   std::vector<std::array<float, NeighbourPlaces::kLags>> lateral_m, height_m;
   std::vector<std::array<float, std::size_t{3} * NeighbourPlaces::kLags>> velocity_m_s;
   std::vector<Eigen::Vector2f>
-      toward;  ///< unit vector to the nearest neighbour, horizontally; zero where there is none
+      toward;  ///< horizontal unit vector to the nearest neighbour; zero if there is none
   std::vector<int> block;
   int blocks = 0;
   double squares_N2 = 0;
@@ -51,7 +51,7 @@ struct TrackSamples {
 
 double heading_of(const Eigen::Matrix3d& R) { return std::atan2(R(1, 0), R(0, 0)); }
 
-/// Velocity of the air that a constant force beside a linear drag stands for; NaN where there is no such pair.
+/// Returns the wind velocity implied by a constant force and a linear drag; NaN without such a pair.
 Eigen::Vector3d wind_of(const stability::Model& model) {
   Eigen::Vector3d force_N = Eigen::Vector3d::Zero();
   double drag_N_s_m = 0;
@@ -88,7 +88,7 @@ void set_motion(const Instant& now, Values& to) {
   at(to, V::kTime) = now.time_s;
 }
 
-/// Laterally nearest to a place among those within kHeightOfNeighbours_m of it in height; null without any.
+/// Returns the laterally nearest neighbour among those within kHeightOfNeighbours_m in height; null if there is none.
 const stability::Neighbour* nearest_neighbour(const Instant& then, const Eigen::Vector3d& to_W_m) {
   const stability::Neighbour* nearest = nullptr;
   double least_m = std::numeric_limits<double>::infinity();
@@ -115,7 +115,7 @@ void set_neighbour(const Instant& now, Values& to) {
   at(to, V::kNeighbourVz) = dv_m_s.z();
 }
 
-/// What is left of the force at each record, [6 x records].
+/// Returns the residual force at each record, [6 x records].
 Eigen::MatrixXd force_columns(const stability::Model& model, const residuals::Inputs& inputs,
                               const Track& track) {
   const auto left_N = residuals::force_residual(model, inputs.kinds, inputs.rules, track);
@@ -186,7 +186,7 @@ class TrackSampler {
     for (const V v :
          {V::kHeading, V::kTime, V::kBattery, V::kSetpointX, V::kSetpointY, V::kSetpointZ, V::kRateZ})
       at(commanded, v) = std::numeric_limits<double>::quiet_NaN();
-    // The attitude controller answers every rate with a torque: what set points ask for is no witness of a torque.
+    // The attitude controller reacts to every rate with a torque, so setpoints cannot confirm a torque.
     if (quantity_ == ScanQuantity::kBalance)
       at(commanded, V::kRateX) = at(commanded, V::kRateY) = std::numeric_limits<double>::quiet_NaN();
     for (std::size_t v = 0; v < values.size(); ++v) {
@@ -222,7 +222,7 @@ class TrackSampler {
     sum_.residual = Eigen::VectorXd::Zero(residual_.rows());
   }
 
-  /// Relative to where the vehicle is at record `i`: where neighbours were some time ago.
+  /// Adds the past positions of neighbours relative to the vehicle's position at record `i`.
   void add_neighbours(std::size_t i) {
     std::array<float, NeighbourPlaces::kLags> lateral_m, height_m;
     std::array<float, std::size_t{3} * NeighbourPlaces::kLags> velocity_m_s;
@@ -266,7 +266,7 @@ class TrackSampler {
   TrackSamples result_;
 };
 
-/// The commanded thrust is of the model's mass: what asks for more or less altogether is no variation.
+/// The commanded thrust depends on the model's mass, so differences of the means are removed.
 void align_means(std::vector<Values>& commanded, const std::vector<Values>& values) {
   using V = ScanVariable;
   for (const V v : {V::kThrust, V::kDuty1, V::kDuty2, V::kDuty3, V::kDuty4}) {
@@ -278,7 +278,7 @@ void align_means(std::vector<Values>& commanded, const std::vector<Values>& valu
   }
 }
 
-/// Residuals about the mean of their track.
+/// Subtracts the mean of the track from its residuals.
 void remove_trim(TrackSamples& track) {
   if (track.residual.empty()) return;
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(track.residual[0].size());
@@ -348,7 +348,7 @@ const std::vector<ScanColumn>& scan_columns(ScanQuantity quantity) {
 }
 
 const ScanVariableInfo& scan_variable(ScanVariable variable) {
-  // Places of neighbours are a map. Formulas over their velocities would not vanish where they are far away.
+  // Neighbour positions are scanned as a map. Formulas over their velocities would not vanish far away.
   static const std::array<ScanVariableInfo, static_cast<std::size_t>(kNumScanVariables)> all = {{
       {"x", "x", "m", false, true, true},
       {"y", "y", "m", false, true, true},

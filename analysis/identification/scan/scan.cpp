@@ -13,8 +13,8 @@ namespace swarmcert::identification {
 namespace {
 
 constexpr double kScanQuantile90 = 1.6449;  // two-sided 90 % of the normal distribution
-constexpr double kLeastShare = 0.02;        // smaller ones are of no use, accident or not
-constexpr int kFlips = 20;                  // draws of the chunks' signs
+constexpr double kLeastShare = 0.02;        // smaller ones are irrelevant even if significant
+constexpr int kFlips = 20;                  // number of random sign draws
 constexpr Eigen::Index kManySamples = 40'000;
 
 bool is_offered(const Abscissa& abscissa, const ScanColumn& column) {
@@ -22,16 +22,16 @@ bool is_offered(const Abscissa& abscissa, const ScanColumn& column) {
   return column.frame[0] == 'w' ? abscissa.in_world : abscissa.in_body;
 }
 
-/// What is judged: the remainder about its mean, and its errors without any curve.
+/// The quantity being judged: the remainder about its mean, and its errors without any curve.
 struct Judged {
   const ScanSamples& samples;
   Chunks chunks;
   Columns targets;             ///< [samples x columns]
   Eigen::MatrixXd none;        ///< [chunks x columns]: errors of the constant alone
-  Eigen::VectorXd totals;      ///< what shares are of, for each column: see ScanEntry::share
-  Eigen::MatrixXd body_total;  ///< [chunks x 3]: errors of a constant along the body's axes; of forces
+  Eigen::VectorXd totals;      ///< denominators of the shares of each column: see ScanEntry::share
+  Eigen::MatrixXd body_total;  ///< [chunks x 3]: errors of a constant along the body axes, for forces
 
-  /// A vector of the world along the body's axes, sample by sample.
+  /// Returns a world vector along the body axes, sample by sample.
   Columns turned(const Eigen::RowVector3f& of_world) const {
     Columns result(samples.size(), 3);
     for (int axis = 0; axis < 3; ++axis)
@@ -55,7 +55,7 @@ struct Judged {
 
  private:
   void prefer_constants() {
-    // Along the body's axes a constant is one of the body or one of the world, whichever leaves less.
+    // Along the body axes a constant is constant in the body or in the world, whichever leaves less.
     const Eigen::MatrixXd of_world =
         chunk_errors(targets.middleCols(3, 3), turned(targets.leftCols(3).colwise().mean()), chunks);
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -63,20 +63,20 @@ struct Judged {
     }
     body_total =
         chunk_errors(targets.middleCols(3, 3), mean_predictions(targets.middleCols(3, 3), chunks), chunks);
-    // A constant pull of neighbours is a part of the curve.
+    // A constant pull of neighbours is part of the curve.
     const Columns pull = targets.col(kTowardColumn);
     none.col(kTowardColumn) = chunk_errors(pull, Columns::Zero(pull.rows(), 1), chunks);
   }
 };
 
-/// Shares of the columns that a curve explains.
+/// Returns the shares of the columns explained by a curve.
 Eigen::VectorXd shares_of(const Judged& judged, CurveFit& fit) {
   fit.fit(judged.targets);
   const Eigen::MatrixXd errors = chunk_errors(judged.targets, fit.predictions(), judged.chunks);
   return (judged.none - errors).colwise().sum().transpose().cwiseQuotient(judged.totals);
 }
 
-/// The number of knots that explains most, for one component.
+/// The best number of knots for one component.
 struct Best {
   double share = -1;
   int knots = 0;
@@ -101,7 +101,7 @@ BestOfColumns best_curves(const Judged& judged, const Abscissa& abscissa) {
   return best;
 }
 
-/// 1 or -1 for each draw and chunk.
+/// Returns 1 or -1 for each draw and chunk.
 Eigen::MatrixXd drawn_signs(const Chunks& chunks) {
   Eigen::MatrixXd signs(kFlips, chunks.count());
   for (Eigen::Index d = 0; d < kFlips; ++d) {
@@ -111,7 +111,7 @@ Eigen::MatrixXd drawn_signs(const Chunks& chunks) {
   return signs;
 }
 
-/// `targets` with the sign of each chunk.
+/// Returns `targets` multiplied by the sign of each chunk.
 Columns flipped(const Columns& targets, const Chunks& chunks, const Eigen::RowVectorXd& signs) {
   Columns result = targets;
   for (Eigen::Index i = 0; i < result.rows(); ++i)
@@ -119,7 +119,7 @@ Columns flipped(const Columns& targets, const Chunks& chunks, const Eigen::RowVe
   return result;
 }
 
-/// What the largest share is by accident, over draws of signs.
+/// Statistics of the largest share under random signs.
 struct Accidents {
   double mean = 0, deviation = 0;
 };
@@ -164,7 +164,7 @@ Accidents accidental_share(const ScanSamples& all, const std::vector<Abscissa>& 
   return {mean, std::sqrt(std::max(squares / kFlips - mean * mean, 0.0))};
 }
 
-/// The share from which on a curve is reported.
+/// Returns the smallest share that is reported.
 double least_share_of(const Accidents& accidents, Judges judges) {
   constexpr double kHalf = 0.5;
   const double sure = accidents.mean + 3 * accidents.deviation;
@@ -186,7 +186,7 @@ Interval resampled(const Eigen::VectorXd& gains, const std::vector<int>& group, 
   return {residuals::quantile(shares, 0.05), residuals::quantile(shares, 0.95)};
 }
 
-/// 90 % interval of a share: flights are resampled where there are five, else chunks.
+/// Returns the 90 % interval of a share by resampling flights if there are at least five, else chunks.
 Interval share_interval(const Judged& judged, const Eigen::VectorXd& gains, double total) {
   constexpr int kFewestFlights = 5;
   if (judged.samples.flights >= kFewestFlights)
@@ -196,7 +196,7 @@ Interval share_interval(const Judged& judged, const Eigen::VectorXd& gains, doub
   return resampled(gains, each, judged.chunks.count(), total);
 }
 
-/// Slope of the remainder over the curve f(v), with the instrument f(v as commanded).
+/// Returns the slope of the remainder over the curve f(v), with the instrument f(v as commanded).
 InstrumentedValue slope_of(const Judged& judged, int column, const Columns& curve, const Columns& commanded) {
   const Columns constant = mean_predictions(judged.targets.col(column), judged.chunks);
   const double mean_p = curve.mean(), mean_q = commanded.mean();
@@ -222,10 +222,10 @@ InstrumentedValue slope_of(const Judged& judged, int column, const Columns& curv
   return slope;
 }
 
-/// How much of a curve counts: an answer of the controller only what set points confirm, a motion all of it unless
-/// they clearly say less.
+/// Returns the fraction of a curve that counts: for the controller's reaction only what setpoints confirm, for a motion
+/// all of it unless setpoints clearly give less.
 double counted_slope(const ScanEntry& entry, bool is_answer) {
-  constexpr double kStrong = 0.5;  // half width of the interval
+  constexpr double kStrong = 0.5;  // half-width of the interval
   const bool is_strong =
       entry.is_checked && entry.slope.interval.upper - entry.slope.interval.lower < 2 * kStrong;
   if (is_answer) return is_strong ? std::clamp(entry.slope.instrument, 0.0, 1.0) : 0;
@@ -238,7 +238,7 @@ void set_curve(const CurveFit& fit, const Curve& curve, int component, ScanEntry
   const double constant = all[all.size() - 1];
   const std::size_t width = curve.knots.size() == 2 ? curve.knots[1].size() : 1;
   for (int k = 0; k < curve.columns; ++k) {
-    if (count[k] < 1) continue;  // nothing was flown there
+    if (count[k] < 1) continue;  // no samples there
     CurvePoint point;
     const auto at = static_cast<std::size_t>(k);
     point.at = width == 1 ? std::vector<double>{curve.knots[0][at]}
@@ -301,7 +301,7 @@ void set_errors(const Judged& judged, ScanEntry& entry) {
   const double before = judged.samples.quantity == ScanQuantity::kForce
                             ? judged.samples.mean_square_N2
                             : column.squaredNorm() / static_cast<double>(column.size());
-  // A curve holds the mean of its component as well; of a pull the share counts it.
+  // A curve includes the mean of its component; for a pull the share includes it.
   const bool is_pull = entry.frame == "neighbour";
   const double mean = is_pull ? 0.0 : static_cast<double>(column.mean());
   const double explained =
@@ -310,7 +310,7 @@ void set_errors(const Judged& judged, ScanEntry& entry) {
   entry.rmse_after = std::sqrt(std::max(before - explained, 0.0));
 }
 
-/// A constant along the body's axes, beside a constant along the world's.
+/// Adds a constant along the body axes, beside a constant along the world axes.
 void add_body_constant(const Judged& judged, double least, std::vector<ScanEntry>& entries) {
   const double body = judged.body_total.sum();
   ScanEntry entry;
@@ -328,7 +328,7 @@ void add_body_constant(const Judged& judged, double least, std::vector<ScanEntry
   entries.push_back(std::move(entry));
 }
 
-/// Of neighbours at several lags, with and without the vehicle's own velocity, only the one that explains most.
+/// Keeps, of the entries of neighbours at several lags, relative or absolute, only the one that explains most.
 void keep_best_lags(std::vector<ScanEntry>& entries) {
   std::vector<ScanEntry> kept;
   for (ScanEntry& entry : entries) {
@@ -344,7 +344,7 @@ void keep_best_lags(std::vector<ScanEntry>& entries) {
   entries = std::move(kept);
 }
 
-/// Over one variable: torques that a single rotor explains are its own.
+/// For each variable, replaces torques that a single rotor explains by that rotor.
 void prefer_rotor(std::vector<ScanEntry>& entries) {
   constexpr double kLeastOfTorque = 0.5;
   const auto is_rotor = [](const ScanEntry& entry) { return entry.quantity == "rotor_force"; };
@@ -358,8 +358,9 @@ void prefer_rotor(std::vector<ScanEntry>& entries) {
                 entries.end());
 }
 
-/// Best first. What vehicles do comes before what they were asked to do, before how neighbours move, and before the
-/// duties of rotors, where both explain about as much; a rotor's own duty comes before anything else of the thrust.
+/// Sorts the entries, best first. If several explain about as much, the motion of the vehicle comes before its
+/// setpoints, the motion of neighbours and the duties of rotors; a rotor's own duty comes before other variables of the
+/// thrust.
 void sort_entries(std::vector<ScanEntry>& entries) {
   constexpr double kAlike = 0.95;
   const auto weight = [](const ScanEntry& entry) {
@@ -375,9 +376,9 @@ void sort_entries(std::vector<ScanEntry>& entries) {
                    [&](const ScanEntry& a, const ScanEntry& b) { return weight(a) > weight(b); });
 }
 
-/// Of forces the better of the world's and the body's axis; of the rest all, but rotors only where they stand out.
+/// Returns the better of the world and body axes for forces; otherwise all columns, but rotors only if they stand out.
 std::vector<std::size_t> judged_columns(ScanQuantity quantity, const BestOfColumns& best) {
-  constexpr double kBodyBetter = 1.05;  // the world's axes, unless the body's explain more by so much
+  constexpr double kBodyBetter = 1.05;  // factor by which the body axes must be better than the world axes
   constexpr double kMostOfOthers = 0.5;
   constexpr std::size_t kAxes = 3;
   std::vector<std::size_t> columns;
@@ -417,7 +418,7 @@ Scan scan(const ScanSamples& samples, int jobs, Judges judges) {
     for (const std::size_t k : judged_columns(samples.quantity, best)) {
       if (best[k].share < result.least_share) continue;
       ScanEntry entry = entry_of(judged, abscissa, static_cast<int>(k), best[k].knots);
-      // What a few flights or chunks carry alone is none of all flights.
+      // A result carried by only a few flights or chunks is not general.
       if (entry.share >= result.least_share && entry.share_interval.lower > 0)
         found[static_cast<std::size_t>(a)].push_back(std::move(entry));
     }

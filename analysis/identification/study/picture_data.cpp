@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kPictureBlock_s = 2;
 
-/// Residuals of one track that were not cut, under several models.
+/// Residuals of the uncut records of a track with several models.
 struct Records {
   std::vector<Eigen::Vector2f> place_m;
   std::vector<int> block;
@@ -82,7 +82,8 @@ RoomMap room_map(const Records& records, std::size_t before, std::size_t after) 
   return map;
 }
 
-/// One bin of an effect's curve. The error is that of the mean over blocks, since records within a block are alike.
+/// Returns one bin of an effect's curve. The error is that of the mean over blocks, because records within a block are
+/// correlated.
 EffectCurve::Point point_of(const std::vector<std::size_t>& bin, const std::vector<double>& predicted_N,
                             const std::vector<double>& measured_N, const std::vector<int>& block) {
   EffectCurve::Point point;
@@ -130,7 +131,7 @@ EffectCurve effect_curve(const Records& records, const std::string& effect, std:
     predicted_N[i] = measured_N[i] - static_cast<double>(records.residual_N[with][i][axis]);
   }
   const auto [least, most] = std::minmax_element(predicted_N.begin(), predicted_N.end());
-  if (!(*most > *least)) return curve;  // an effect that acts alike everywhere has no curve
+  if (!(*most > *least)) return curve;  // an effect that is constant has no curve
   std::vector<std::vector<std::size_t>> bins(kBins);
   for (std::size_t i = 0; i < count; ++i) {
     const double place = (predicted_N[i] - *least) / (*most - *least);

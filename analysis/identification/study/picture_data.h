@@ -1,4 +1,4 @@
-/// @file What the pictures of a study show: residuals over the room before and after, and each effect as measured.
+/// @file Data for the figures of a study: residuals over the room before and after, and each effect as measured.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace swarmcert::identification {
 
-/// Mean vertical residual over the horizontal place of the vehicle, cell by cell.
+/// Mean vertical residual over the horizontal position of the vehicle, on a grid.
 struct RoomMap {
   static constexpr int kCells = 16;  ///< along x and along y
   double lower_m[2] = {0, 0}, step_m[2] = {0, 0};
@@ -17,11 +17,11 @@ struct RoomMap {
     std::size_t records = 0;
     double before_N = 0, after_N = 0;  ///< means
   };
-  std::vector<Cell> cells;  ///< [kCells * kCells], x fastest; empty where nothing flew
+  std::vector<Cell> cells;  ///< [kCells * kCells], x fastest; empty without flight
 };
 
-/// One effect held against flights: what is measured where the model with all other effects predicts nothing of it,
-/// over what the effect itself predicts. Points of an effect that describes the flights lie on the diagonal.
+/// An effect compared with flights: the residual of the model with all other effects, over the prediction of this
+/// effect. If the effect describes the flights, the points lie on the diagonal.
 struct EffectCurve {
   std::string effect;
   char axis = 'z';  ///< the world axis in which the effect varies most
@@ -30,15 +30,15 @@ struct EffectCurve {
     double error_N = 0;                      ///< standard error of measured_N over blocks of 2 s
     std::size_t records = 0;
   };
-  std::vector<Point> points;  ///< in order of predicted_N
+  std::vector<Point> points;  ///< sorted by predicted_N
 };
 
 struct PictureData {
   RoomMap room;
-  std::vector<EffectCurve> effects;  ///< of the fitted model's effects that exert a force, in its order
+  std::vector<EffectCurve> effects;  ///< for effects of the fitted model that exert a force, in their order
 };
 
-/// @param before, after models of the same kind of vehicle; vehicles of other kinds are left out.
+/// @param before, after models of the same kind of vehicle; vehicles of other kinds are ignored
 PictureData picture_data(const residuals::Inputs& inputs, const stability::Model& before,
                          const stability::Model& after);
 

@@ -9,10 +9,10 @@ namespace swarmcert::identification {
 namespace {
 
 constexpr std::size_t kMostFlights = 4;
-constexpr std::size_t kMostRows = 1500;  // of a vehicle
+constexpr std::size_t kMostRows = 1500;  // per vehicle
 constexpr double kShortestStep_s = 0.1;
 
-/// Indices of flights: those with the worst moments first, no flight twice.
+/// Returns indices of flights without repetition: those with the worst moments first.
 std::vector<std::size_t> chosen_flights(const residuals::Inputs& inputs,
                                         const std::vector<residuals::Moment>& worst) {
   std::vector<std::size_t> chosen;
@@ -71,7 +71,7 @@ std::vector<ReplayFlight> replay_data(const residuals::Inputs& inputs, const sta
                                       const std::vector<residuals::Moment>& worst) {
   std::vector<ReplayFlight> replay;
   for (const std::size_t flight : chosen_flights(inputs, worst)) {
-    std::vector<std::string> problems;  // known from the comparison
+    std::vector<std::string> problems;  // already reported by the comparison
     ReplayFlight shown{inputs.found.flights[flight].name, {}};
     for (const residuals::Track& track : inputs.load(flight, problems)) {
       if (!track.has_height || track.instants.empty()) continue;

@@ -1,4 +1,4 @@
-/// @file Flights in space, with the residual force on every vehicle before and after effects were added.
+/// @file Flights in space, with the residual force on each vehicle before and after effects were added.
 #pragma once
 
 #include <array>
@@ -13,8 +13,8 @@ namespace swarmcert::identification {
 
 struct ReplayVehicle {
   std::string name;
-  /// Time of the flight in s; position in W in m; residual force in W in newton under the given model; the same under
-  /// the fitted model. Forces are NaN where a record was cut.
+  /// Time in flight, s; position in W, m; residual force in W in newton with the given model; the same with the fitted
+  /// model. Forces are NaN at cut records.
   std::vector<std::array<float, 10>> rows;
 };
 
@@ -23,8 +23,9 @@ struct ReplayFlight {
   std::vector<ReplayVehicle> vehicles;
 };
 
-/// The flights of `worst` in its order, then others, as many as a page can hold, at no more than ten rows per second.
-/// @param before, after models of the same kind of vehicle; vehicles of other kinds have positions only.
+/// Returns the flights of `worst` in this order, then others, as many as fit on a page, with at most ten rows per
+/// second.
+/// @param before, after models of the same kind of vehicle; vehicles of other kinds have only positions
 std::vector<ReplayFlight> replay_data(const residuals::Inputs& inputs, const stability::Model& before,
                                       const stability::Model& after,
                                       const std::vector<residuals::Moment>& worst);

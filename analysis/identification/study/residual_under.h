@@ -1,4 +1,4 @@
-/// @file The residual of a track under another model than the one that it was loaded with.
+/// @file The residual of a track with a model other than the one with which it was loaded.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace swarmcert::identification {
 
-/// r in newton in W, one per record of `track`, also of records that are cut; see force_residual().
+/// Returns r in newton in W, one per record of `track` including cut ones; see force_residual().
 inline std::vector<Eigen::Vector3d> residual_under(const stability::Model& model,
                                                    const residuals::Inputs& inputs, residuals::Track track) {
   residuals::apply_model(model, inputs.kinds, inputs.rules, track);

@@ -1,5 +1,4 @@
-/// @file The whole question in one call: where a model fails, what it is missing, and how far adding it lowers the
-/// error.
+/// @file A complete study: where a model fails, what it is missing, and by how much adding it reduces the error.
 #pragma once
 
 #include <functional>
@@ -14,24 +13,24 @@
 
 namespace swarmcert::identification {
 
-/// Errors of one model on all flights, and on those that nothing was fitted to.
+/// Errors of a model on all flights, and on those not used for any fit.
 struct StudyErrors {
   residuals::Comparison all, test;
 };
 
 struct Study {
-  Diagnosis diagnosis;  ///< of the given model, on the flights that are not for the test
+  Diagnosis diagnosis;  ///< of the given model, on all flights except the test flights
   Ladder ladder;        ///< effects added one by one; ladder.model is the fitted model
   StudyErrors before, after;
   PictureData pictures;
-  std::vector<ReplayFlight> replay;  ///< flights with the worst moments under the given model first
+  std::vector<ReplayFlight> replay;  ///< flights with the worst moments of the given model first
 };
 
-/// Shows progress: steps done of all, and what is being done.
+/// Reports progress: number of steps done, out of all steps, and the current activity.
 using StudyProgress = std::function<void(int done, int total, const std::string& what)>;
 
-/// Studies inputs' only model. The test flights are scored, and decide nothing.
-/// @param split which flights are for what; split_flights() if not given.
+/// Studies the only model of `inputs`. The test flights are scored and decide nothing.
+/// @param split use of each flight; split_flights() if not given
 /// @throws std::invalid_argument unless `inputs` has exactly one model.
 Study study(const residuals::Inputs& inputs, const std::optional<Split>& split, int jobs,
             const StudyProgress& progress);

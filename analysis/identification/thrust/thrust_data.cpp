@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kFullPwm = 65536;
 
-/// A header's cell: its name without unit, in lower case, and the unit, which may be empty.
+/// A header cell: the name without unit, in lower case, and the unit, which may be empty.
 struct Column {
   std::string name, unit, as_written;
 };
@@ -26,7 +26,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-/// One spelling per unit; empty if `unit` is none that is known.
+/// Returns the canonical spelling of a unit; empty if `unit` is unknown.
 std::string known_unit(const std::string& unit) {
   if (unit == "gf" || unit == "g" || unit == "gram" || unit == "grams") return "gf";
   if (unit == "n" || unit == "newton") return "N";
@@ -115,7 +115,7 @@ class Reader {
     }
   }
 
-  /// Columns of one signal: one, or with `several` those whose names end in 1 to 4.
+  /// Returns the columns of one signal: one or, with `several`, those whose names end in 1 to 4.
   std::vector<std::size_t> find(const std::vector<std::string>& names, const std::string& signal,
                                 const std::vector<std::string>& units, SignalSource& source,
                                 bool several) const {
@@ -199,7 +199,7 @@ class Reader {
     data_.samples.push_back(sample);
   }
 
-  /// Counts unless the header says otherwise; a table whose largest value is 1 or less can only be ratios.
+  /// Counts unless the header says otherwise; a table whose largest value is at most 1 must be ratios.
   void settle_pwm_unit() {
     double largest = 0;
     for (const ThrustSample& sample : data_.samples) largest = std::max(largest, sample.p);

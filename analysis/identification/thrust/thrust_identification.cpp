@@ -34,7 +34,7 @@ Row linear_row(double x, double y) {
   return row;
 }
 
-/// A least-squares problem and where its polynomial will be used.
+/// A least squares problem, and the range where its polynomial will be used.
 struct Problem {
   std::vector<std::string> names;
   std::vector<Row> rows;
@@ -44,7 +44,7 @@ struct Problem {
   double scale = 0;  ///< largest measured value of the fitted quantity
 };
 
-/// Fits without asking whether the experiment was rich enough.
+/// Fits without checking the excitation.
 struct Solution {
   PolynomialFit fit;
   Eigen::VectorXd values;
@@ -109,7 +109,7 @@ Solution solve(const Problem& problem, double confidence) {
   return s;
 }
 
-/// What the experiment lacks for any fit; empty if nothing.
+/// Returns what the experiment lacks for any fit; empty if nothing.
 std::string poor_excitation(const ThrustIdentification& range) {
   const double volts = (range.largest_v - range.smallest_v) * controller::kReferenceVoltage_V;
   if (range.largest_p - range.smallest_p < kSmallestPwmSpan) {
@@ -123,7 +123,7 @@ std::string poor_excitation(const ThrustIdentification& range) {
   return "";
 }
 
-/// Rows of ramps that reach full PWM, with the largest thrust of their ramp as target.
+/// Returns the rows of ramps that reach full PWM, with the largest thrust of their ramp as target.
 Problem ramps_to_full_pwm(const ThrustData& data, int& ramps) {
   Problem problem{{"e00", "e10", "e01"}, {}, {}, {}, "largest thrust of each ramp to full PWM", "gf", 0};
   ramps = 0;
@@ -146,7 +146,7 @@ Problem ramps_to_full_pwm(const ThrustData& data, int& ramps) {
   return problem;
 }
 
-/// e00 = c00 + c10 + c20, e01 = c01 + c11, with the intervals that the covariance of c gives.
+/// Returns e00 = c00 + c10 + c20, e01 = c01 + c11, with intervals from the covariance of c.
 PolynomialFit at_full_pwm(const Solution& thrust, double largest_p) {
   PolynomialFit fit;
   fit.method = "thrust polynomial at full PWM, without sag";

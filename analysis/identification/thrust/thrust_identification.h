@@ -1,4 +1,4 @@
-/// @file The calibration polynomials of controller/battery.h, fitted to load-cell data.
+/// @file Fits the calibration polynomials of controller/battery.h to load-cell data.
 #pragma once
 
 #include <string>
@@ -8,27 +8,27 @@
 
 namespace swarmcert::analysis {
 
-/// A fitted number and the ends of its confidence interval.
+/// A fitted value with its confidence interval.
 struct Coefficient {
   std::string name;  ///< as in controller/battery.h, e.g. "c10"
   double value = 0, lower = 0, upper = 0;
 };
 
-/// One polynomial, fitted by least squares.
+/// A polynomial fitted by least squares.
 ///
-/// The intervals are Student's, for errors that are independent, of equal variance and in the fitted quantity only.
-/// Rows of a slow ramp are not independent: their intervals are too narrow.
+/// The intervals are Student's and assume independent errors of equal variance, in the fitted quantity only. Rows of a
+/// slow ramp are not independent, so their intervals are too narrow.
 struct PolynomialFit {
   bool determined = false;
-  std::string why_not;                    ///< what the data lack; empty if determined
+  std::string why_not;                    ///< what is missing in the data; empty if determined
   std::vector<Coefficient> coefficients;  ///< empty unless determined
-  std::string method;                     ///< what was fitted to what
+  std::string method;                     ///< which quantity was fitted to which data
   std::string unit;                       ///< of the fitted quantity and of the two numbers below
   int samples = 0;
   double residual_rms = 0;
   double largest_residual = 0;
-  /// Largest half-width of the confidence interval of the polynomial's value, over the corners of PWM as measured
-  /// and a battery from empty to full.
+  /// Largest half-width of the confidence interval of the polynomial's value, over the corners of the measured PWM
+  /// range and a battery from empty to full.
   double largest_uncertainty = 0;
 };
 
@@ -42,14 +42,14 @@ struct ThrustIdentification {
 
 /// Fits the three polynomials.
 ///
-/// Data determine a polynomial if its columns are independent (smallest singular value of the columns, scaled to
-/// norm 1, above 1e-6), if PWM spans 0.2 and the battery 0.1 V at least, and if the fit is not uncertain by more than
-/// a tenth of the largest measured value where it will be used.
+/// The data determine a polynomial if its columns are independent (smallest singular value of the columns, scaled to
+/// norm 1, above 1e-6), if PWM spans at least 0.2 and the battery at least 0.1 V, and if the uncertainty of the fit
+/// where it will be used is at most a tenth of the largest measured value.
 ///
-/// Largest thrust: where at least three ramps reach 98 % PWM (rows with the same `run`, or without that column rows in
+/// Maximum thrust: if at least three ramps reach 98 % PWM (rows with the same `run` or, without that column, rows in
 /// which PWM does not fall), the largest thrust of each ramp is fitted to p and v of the ramp's rows, so that e10
-/// says how much the battery will still sag. Otherwise it is the thrust polynomial at p = 1, and e10 is 0.
-/// @param confidence of the intervals, between 0 and 1.
+/// describes the remaining sag of the battery. Otherwise it is the thrust polynomial at p = 1, and e10 is 0.
+/// @param confidence of the intervals, between 0 and 1
 ThrustIdentification identify_thrust(const ThrustData& data, double confidence);
 
 }  // namespace swarmcert::analysis
