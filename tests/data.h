@@ -1,4 +1,4 @@
-/// @file Where tests find recorded data that the project does not ship.
+/// @file Locations of recorded data that is not part of the project.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,14 +15,14 @@ inline std::string data_path(const std::string& relative) {
 
 inline bool data_is_present() { return std::filesystem::exists(SWARMCERT_DATA_DIR); }
 
-/// Path below the source tree.
+/// Returns a path below the source tree.
 inline std::string source_path(const std::string& relative) {
   return std::string(SWARMCERT_SOURCE_DIR) + "/" + relative;
 }
 
 }  // namespace swarmcert::tests
 
-/// Skips the test, saying so, where the recorded data is absent; a failure with -DSWARMCERT_REQUIRE_DATA=ON.
+/// Skips the test with a message if the recorded data is missing; fails with -DSWARMCERT_REQUIRE_DATA=ON.
 #define SWARMCERT_NEEDS_DATA()                                                               \
   do {                                                                                       \
     if (!swarmcert::tests::data_is_present()) {                                              \

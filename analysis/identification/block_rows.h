@@ -9,8 +9,8 @@
 
 namespace swarmcert::identification {
 
-/// Runs the columns of `grams` along `modelled` and calls add(block, rows) at the end of each block, where `rows` is [3
-/// x records, columns + 1] with the residual last.
+/// Runs the columns of `grams` along `modelled` and calls add(block, rows) at the end of each block, where `rows` is
+/// [3 x records, columns + 1] with the residual last.
 /// @param noise   if not null, columns and residual are whitened
 /// @param support by candidate and theta; the support in the track is added
 void run_blocks(const residuals::Inputs& inputs, const ModelledTrack& modelled, const Grams& grams,

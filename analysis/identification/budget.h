@@ -2,8 +2,7 @@
 ///
 /// The rows are cumulative: nominal, motor lag, a constant force per vehicle, ground effect, downwash, the rest.
 /// Coefficients and shapes are fitted jointly, on flights that are not used to evaluate the rows: once for the rows up
-/// to downwash and once with the rest. If they were fitted one after the other, an offset would absorb part of the
-/// downwash.
+/// to downwash and once with the rest. Fitted one after the other, an offset would absorb part of the downwash.
 #pragma once
 
 #include <map>

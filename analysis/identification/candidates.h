@@ -61,8 +61,7 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
 /// Returns true if an effect of this name cannot be fitted to the force in flight: it acts as a torque or is a network.
 bool is_written_by_hand(const std::string& name);
 
-/// Fitted to the loads of the rotors in slow flight (rotors/rotor_fit.h), because the force in flight shows only their
-/// sum.
+/// Fitted to the loads of the rotors in slow flight (rotors/rotor_fit.h), as the force in flight shows only their sum.
 inline constexpr char kRotorThrust[] = "rotor_thrust";
 
 /// Returns the names that candidate() accepts for `model`.

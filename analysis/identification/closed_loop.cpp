@@ -14,8 +14,7 @@ namespace {
 constexpr std::size_t kManyRecords = 400'000;
 
 /// Returns true for a lag or delay that removes little, and for which the setpoints, although too weak to determine its
-/// size, show nothing and significantly less than least squares: the reaction of thrust to disturbances looks like a
-/// lag.
+/// size, show nothing and significantly less than least squares: thrust that reacts to disturbances looks like a lag.
 bool is_unseen_lag(const Refined& refined, const InstrumentedValue& check, double loss) {
   constexpr double kLittle = 0.1, kBeyondChance_z = 2;
   return refined.candidate.info.remembers && loss < kLittle && check.difference_z < -kBeyondChance_z &&

@@ -1,5 +1,4 @@
-/// @file Selection under closed-loop bias: removes effects that are artefacts of feedback, and groups effects that
-///   setpoints cannot distinguish.
+/// @file Selection under closed-loop bias: removes artefacts of feedback, groups indistinguishable effects.
 #pragma once
 
 #include <set>
@@ -32,9 +31,8 @@ Selected select(const Passes& passes, std::vector<Candidate> candidates,
 /// Thrust that reacts to disturbances creates an apparent slope of the force over the thrust, and a constant force
 /// beside it absorbs the intercept. If setpoints do not confirm the slope, either a thrust scale or a constant force is
 /// selected: the one with the smaller error after the reaction of the thrust is removed, or the scale, which has a
-/// single coefficient, if both errors are about equal.
-/// The other one becomes Selected::instead if it explains at least half as much, because least squares are biased in
-/// both cases.
+/// single coefficient, if both errors are about equal. The other one becomes Selected::instead if it explains at least
+/// half as much, as least squares are biased in both cases.
 /// @param contradicted initial entries of Selected::contradicted
 Selected without_slope(const Passes& passes, std::vector<Candidate> candidates,
                        std::vector<std::string> contradicted);

@@ -80,8 +80,7 @@ void CrossValidation::divide(Folds& folds) const {
   }
 }
 
-/// Uses whole flights unless an effect was active in only one flight, because without it the effect could not be
-/// fitted.
+/// Uses whole flights unless an effect was active in only one flight, which is then needed for the fit.
 const CrossValidation::Folds& CrossValidation::folds_for(const Members& members) const {
   const bool by_flight = has_flights_ && std::all_of(members.begin(), members.end(), [&](const Member& m) {
                            return support(m).flights >= 2 && candidate(m).vehicles.empty();

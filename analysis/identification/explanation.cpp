@@ -115,8 +115,7 @@ struct Nominal {
   Scan scan;
 };
 
-/// Returns formulas for the remainder of the model, and for the remainder beside the effects found, that may replace an
-/// effect.
+/// Returns formulas for the remainder of the model, and for that beside the effects found, that may replace effects.
 /// @param nominal null if no effect was found
 std::vector<Formula> rivals_of_names(const Passes& passes, const Explained& explained,
                                      const Nominal* nominal) {
@@ -161,8 +160,7 @@ double taken_N2(const Missing& missing) {
 
 /// Returns whether an effect may be only the mean, the edge or a side effect of something else: a force at a place or
 /// time, which few vehicles meet; thrust that depends on the climb rate, which any force along the velocity resembles;
-/// or a fraction of the thrust below two percent of the weight. Drag and a lag are not suspect, because every vehicle
-/// has them.
+/// or a fraction of the thrust below two percent of the weight. Drag and a lag are not suspect: every vehicle has them.
 bool may_be_part(const Missing& missing, double weight_N) {
   constexpr double kSmall = 0.02;
   const std::string& effect = missing.effect;
@@ -270,7 +268,7 @@ Settled settle_with_formulas(const Passes& passes, const Coverage& covered, std:
 }
 
 /// Returns whether the force of an effect is a curve over this variable of the scan. A ratio beside a battery shifts
-/// its line.
+/// it.
 bool is_curve_over(const std::string& variable, const std::string& effect, bool has_battery) {
   if (effect == "inflow") return variable == "vz" || variable == "climb";
   if (effect == "ground" || effect == "ceiling") return variable == "z";
@@ -300,8 +298,7 @@ std::set<std::string> refuted_names(const Explained& explained, double weight_N)
 }
 
 /// Returns whether thrust may saturate. Saturation close to hover makes the vehicle tumble, and its setpoints hardly
-/// reach beyond the knee, so no curve over the thrust can be confirmed. If there is any remainder, the effect itself is
-/// tried.
+/// reach beyond the knee, so no curve over the thrust can be confirmed. With any remainder, the effect itself is tried.
 bool may_saturate(const Explained& explained, const stability::Model& model,
                   const std::vector<Candidate>& rivals) {
   const auto is_it = [](const auto& one) { return one.name == "thrust_saturation"; };

@@ -23,8 +23,8 @@ struct Finding {
   double paired_z = 0, wald_z = 0;
   Support support;
   std::vector<Rival> rivals;
-  std::vector<Interval>
-      model_form;  ///< of each coefficient: spread over fits without a fold, and with a rival added
+  /// Range of each coefficient over fits without a fold, and with a rival added.
+  std::vector<Interval> model_form;
 
   std::vector<std::string> confounded_with() const;
 };

@@ -252,8 +252,8 @@ class Climb {
       name = propose(working_, passes, ladder_.fitted, asked);
       if (name.empty())
         return refuse(asked,
-                      fmt::format("what is left of the {} flights for fitting varies surely with no variable "
-                                  "that a {} could express; more flights may show one",
+                      fmt::format("the remainder of the {} flights to fit does not vary significantly with "
+                                  "any variable that a {} could express; more flights may show one",
                                   ladder_.split.fit.size(), asked));
     }
     std::vector<std::string> names = accepted_;
@@ -297,7 +297,7 @@ class Climb {
     if (!before_N)
       next.row.note = "the select flights have no slow flight with the duty of each motor";
     else if (!helps)
-      next.row.note = fmt::format("rotors of the select flights are {:.5f} N, then {:.5f} N off balance",
+      next.row.note = fmt::format("the rotor imbalance of the select flights goes from {:.5f} to {:.5f} N",
                                   *before_N, *after_N);
     return helps;
   }
@@ -322,7 +322,7 @@ class Climb {
       if (effect.fit.is_empty()) continue;
       effect.fit.test_looks = ladder_.test_looks;
       if (!ladder_.split.by_flight && effect.fit.note.empty())
-        effect.fit.note = "fewer than three flights: selected and tested on the fit's";
+        effect.fit.note = "fewer than three flights: selected and tested on the flights to fit";
     }
     const double floor_N = noise_floor_N(inputs_, ladder_.model, ladder_.split.test, jobs_);
     for (Trial& t : trials_) {
@@ -368,7 +368,7 @@ stability::Model undone(const stability::Model& model) {
   while (last > 0 && (!rows[last - 1].accepted || rows[last - 1].effect == "nominal")) --last;
   if (last == 0) {
     throw files::InputError({model.path, "", "ladder", "", "has no effect that 'add' accepted",
-                             "only models that 'swarmcert add' wrote can be gone back from"});
+                             "only models written by 'swarmcert add' can be undone"});
   }
   --last;  // the row to undo; an accepted one precedes it, because a ladder starts with the nominal model
   std::size_t to = last;

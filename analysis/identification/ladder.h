@@ -34,8 +34,8 @@ struct Ladder {
 
 struct LadderOptions {
   bool automatic = true;
-  std::vector<std::string>
-      effects;  ///< in this order unless automatic; may include formulas and shapes, see is_proposal()
+  /// Effects to try, in this order unless automatic; may include formulas and shapes, see is_proposal().
+  std::vector<std::string> effects;
   bool keep_anyway = false;
   std::optional<Split> split;  ///< split_flights() if not given
 };

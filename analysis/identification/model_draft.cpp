@@ -49,8 +49,7 @@ struct LogFit {
   std::map<std::string, double> parameters;
 };
 
-/// Fits thrust over specific force along the thrust axis, as means over blocks in flight: the mass, if the thrust is
-/// right.
+/// Fits thrust over specific force along the thrust axis, in means over blocks: the mass, if the thrust is right.
 LogFit fit(const logs::Log& log, const stability::Model& base) {
   LogFit result;
   result.path = log.path;
@@ -190,7 +189,7 @@ void set_battery_range(const std::vector<LogFit>& fits, ModelDraft& draft) {
   auto& range = draft.model.battery_range_V;
   if (!(most_V > 0) || (least_V >= range.lower && most_V <= range.upper)) return;
   range = {0.8 * least_V, 1.1 * most_V};
-  const std::string source = "log: what was flown, with room for a fifth less and a tenth more";
+  const std::string source = "log: measured range, extended by a fifth below and a tenth above";
   draft.parameters.push_back({"battery_range_V.least", range.lower, false, 0, 0, source});
   draft.parameters.push_back({"battery_range_V.most", range.upper, false, 0, 0, source});
 }
@@ -272,7 +271,7 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
   if (carried_kg.empty() && hover.empty()) {
     throw files::InputError(
         {found.flights[0].logs[0].second, "", "thrust", "", "no log here has a force and a flight",
-         draft.problems.empty() ? "'swarmcert inspect' says what a log lacks" : draft.problems[0]});
+         draft.problems.empty() ? "'swarmcert inspect' reports what a log lacks" : draft.problems[0]});
   }
   const DraftEstimate carried = estimate(carried_kg), ratio = estimate(ratios);
   stability::Model& model = draft.model;
@@ -284,10 +283,9 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
                                 mass_kg > 0 ? "stated (--mass)" : "flights.toml, mean of the logs"});
   } else if (carried.count > 0) {
     model.mass_kg = carried.value;
-    draft.parameters.push_back(
-        {"mass_kg", carried.value, true, carried.lower, carried.upper,
-         "fit: what the thrust carries, if its scale is right; mass, payload and thrust scale "
-         "cannot be told apart"});
+    draft.parameters.push_back({"mass_kg", carried.value, true, carried.lower, carried.upper,
+                                "fit: mass carried by the thrust, if its scale is right; mass, payload and "
+                                "thrust scale cannot be distinguished"});
   } else {
     model.mass_kg = 1;
     draft.parameters.push_back(
@@ -306,8 +304,9 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
       const bool is_share = command.value < 1;
       set_thrust_curve({0, each_N / (is_share ? command.value : 0.5), 0}, draft.model);
       draft.parameters.push_back({"thrust_curve.force_N[1]", (*draft.model.thrust_curve_N)[1], false, 0, 0,
-                                  is_share ? "assumption: four rotors, force proportional to the command"
-                                           : "assumption: four rotors that give twice the weight"});
+                                  is_share
+                                      ? "assumption: four rotors, force proportional to the command"
+                                      : "assumption: four rotors with a total thrust of twice the weight"});
     }
   } else {
     const char* const kKeys[] = {"c00", "c10", "c01", "c20", "c11"};
@@ -327,7 +326,7 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
     effect.fit.note = "drafted from hovering thrust";
     model.effects.push_back(effect);
     draft.parameters.push_back({"thrust_ratio.ratio", ratio.value, ratio.count > 1, ratio.lower, ratio.upper,
-                                "fit: mass over what the thrust carries"});
+                                "fit: mass divided by the mass carried by the thrust"});
   }
   if (!delays_s.empty()) {
     const DraftEstimate delay = estimate(delays_s);

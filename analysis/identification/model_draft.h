@@ -13,8 +13,8 @@ struct DraftedParameter {
   std::string name;
   double value = 0;
   bool has_interval = false;
-  double lower = 0,
-         upper = 0;    ///< 90 %, from the scatter between flights, or between blocks of 2 s of one flight
+  /// 90 % interval, from the scatter between flights, or between blocks of 2 s of one flight.
+  double lower = 0, upper = 0;
   std::string source;  ///< log parameter, fit, or assumption, in words
 };
 

@@ -1,5 +1,4 @@
-/// @file Refines shape parameters off the grid, with intervals, by Gauss-Newton steps on coefficients and shapes
-///   jointly.
+/// @file Refines shape parameters off the grid, with intervals, by joint Gauss-Newton steps on coefficients and shapes.
 #pragma once
 
 #include <vector>
@@ -23,8 +22,8 @@ struct Refined {
 std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Members& members);
 
 /// Returns `refined` with the times of lags and delays fitted to the innovations of the residual (whitening.h), and
-/// everything else fitted again beside them. Returns `refined` unchanged if it has no lag or delay, or if the remainder
-/// is white.
+/// everything else fitted again beside them. Returns `refined` unchanged without a lag or delay, or if the remainder is
+/// white.
 std::vector<Refined> with_innovations(const Passes& passes, std::vector<Refined> refined);
 
 /// Fits `found`, which was found on the excerpt `seen` of the flights of `all`, to all flights, starting from there.

@@ -58,8 +58,7 @@ class Selection : public CrossValidation {
   bool is_acceptable(const Members& before, const Member& added, double before_square, double after_square,
                      const Folds& folds) const;
   std::vector<double> errors(const Members& members, const Folds& folds, bool trims) const;
-  /// Returns the candidate to which `candidate` reduces if the quantity that it varies with is constant; -1 if there is
-  /// none.
+  /// Returns the candidate to which `candidate` reduces if the quantity it varies with is constant; -1: none.
   int plain_form(int candidate) const;
   /// Returns the index of the candidate with this name; -1 if there is none.
   int index_of(const char* name) const;

@@ -1,8 +1,8 @@
 /// @file A model of the time-correlated noise of a force residual, and the filter that whitens it.
 ///
-/// The model is a gust with exponential correlation plus white noise: r = g + w with corr(g(t), g(t + d)) = exp(-d /
-/// forget_s). From record to record this is an ARMA(1, 1) process with the innovations e_t = r_t - phi r_(t-1) + theta
-/// e_(t-1).
+/// The model is a gust with exponential correlation plus white noise: r = g + w with
+/// corr(g(t), g(t + d)) = exp(-d / forget_s). From record to record this is an ARMA(1, 1) process with the innovations
+/// e_t = r_t - phi r_(t-1) + theta e_(t-1).
 ///
 /// If a controller reacts to gusts, least squares mistake the reaction for a lag of the thrust. Thrust responds only to
 /// past disturbances, so it is uncorrelated with later innovations: least squares of filtered residuals on filtered
@@ -28,8 +28,7 @@ struct Autocovariance {
 
   /// @param values with `step` records per kStep_s; restarts[i] != 0: record i does not follow the previous one
   void add(const std::vector<double>& values, const std::vector<char>& restarts, std::size_t step);
-  /// Returns the noise; forget_s is 0, and no filter is needed, if the correlation over a tenth of a second is below
-  /// 0.1.
+  /// Returns the noise. forget_s is 0, and no filter is needed, if the correlation over 0.1 s is below 0.1.
   Noise noise() const;
 };
 

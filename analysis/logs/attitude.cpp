@@ -134,7 +134,7 @@ void settle_angles(Draft& draft) {
                            k == 0 ? "roll" : "pitch",
                            k == 0 ? (line.slope < 0 ? "to the right" : "to the left")
                                   : (line.slope < 0 ? "backward" : "forward"),
-                           line.slope, line.correlation, agrees ? "" : "; its sign is turned"));
+                           line.slope, line.correlation, agrees ? "" : "; its sign is inverted"));
     if (agrees) continue;
     for (double& angle : t[kEuler + k]) angle = -angle;
   }

@@ -13,8 +13,7 @@ class ByteWindow {
  public:
   explicit ByteWindow(std::istream& in) : in_(in) {}
 
-  /// Returns the next `size` bytes without consuming them, or nullptr if the stream ends first. Valid until the next
-  /// call.
+  /// Returns the next `size` bytes without consuming them, nullptr if the stream ends first. Valid until the next call.
   const unsigned char* peek(std::size_t size) {
     fill(size);
     return available() >= size ? buffer_.data() + begin_ : nullptr;

@@ -46,7 +46,7 @@ void Collector::begin(const std::vector<std::string>& names) {
     clock = clock_by_name(topic);
   if (clock < 0) {
     throw files::InputError({log_.path, "line 1", "time", "", "no column carries it",
-                             "log it, or say in a columns.toml (--columns) which column does"});
+                             "log it, or name its column in a columns.toml (--columns)"});
   }
   time_ = static_cast<std::size_t>(clock);
   needs_.assign(names.size(), 0);

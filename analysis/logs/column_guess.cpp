@@ -190,8 +190,7 @@ class Guesser {
     has_velocity_ = true;
   }
 
-  /// For small angles, roll and pitch are minus the acceleration along y and the acceleration along x, divided by
-  /// gravity.
+  /// For small angles, roll and pitch are -a_y / g and a_x / g.
   void angles() {
     if (!has_velocity_) return;
     static const std::vector<UnitSize> units = {
@@ -214,7 +213,7 @@ class Guesser {
             fmt::format("follows a_x / g, correlation {:.3f}", pitch.correlation));
       if (c + 2 < size() && taken_[c + 2] == 0)
         claim("yaw", c + 2, std::abs(roll_unit->per_si) > 2 ? "deg" : "rad", nullptr,
-              "it stands behind roll and pitch");
+              "it follows roll and pitch");
       return;
     }
   }
@@ -276,7 +275,7 @@ class Guesser {
       if (low < 0 || (!is_pwm && !is_share) || largest_mean > 1.5 * least_mean) continue;
       for (std::size_t k = 0; k < 4; ++k)
         claim(fmt::format("duty_{}", k + 1), c + k, is_pwm ? "PWM" : "1", nullptr,
-              "four of one range; requested_1 .. 4 if they are requests before the battery is compensated");
+              "four with a common range; requested_1 .. 4 if they are requests before battery compensation");
       return;
     }
   }

@@ -34,12 +34,11 @@ struct NamedColumns {
   Ask ask = Ask::kNothing;
 };
 
-/// Returns the table, in order of preference: if several rows give the same signal, the first one present in the file
-/// is used.
+/// Returns the table, in order of preference: if several rows give the same signal, the first one in the file is used.
 const std::vector<NamedColumns>& column_names();
 
-/// Returns the name in lower case, without a unit in brackets, with each run of non-alphanumeric characters replaced by
-/// a dot.
+/// Returns the name in lower case, without a unit in brackets, with each run of other characters than letters and
+/// digits replaced by a dot.
 std::string plain_name(const std::string& column);
 
 /// Returns the names under which a column with the plain name `column` is looked up: the name itself and the name

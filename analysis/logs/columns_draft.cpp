@@ -173,7 +173,7 @@ DraftTable read_table(const std::string& path) {
   }
   const int clock = guess_clock(all);
   if (clock < 0) {
-    throw files::InputError({path, "", "time", "", "no column is a clock, by its name or by its values",
+    throw files::InputError({path, "", "time", "", "no column looks like a clock, by name or values",
                              "a clock rises with every record by nearly the same step: log it"});
   }
   table.clock = static_cast<std::size_t>(clock);

@@ -162,7 +162,7 @@ std::optional<files::InputFault> read_csv(std::istream& in, const std::string& p
   Header header;
   if (!header.read(in)) {
     throw files::InputError(
-        {path, "line 1", "", "", "the file is empty", "the recording failed; leave it out"});
+        {path, "line 1", "", "", "the file is empty", "the recording failed; exclude this file"});
   }
   const char separator = files::csv_separator(header.line, ',');
   const std::vector<std::string_view> cells = files::csv_cells(header.line, separator);
@@ -191,14 +191,13 @@ std::optional<files::InputFault> read_csv(std::istream& in, const std::string& p
       ++health.damaged_lines;
       if (damage) return;
       const bool is_cell = fault->column < names.size();
-      damage = files::InputFault{
-          path,
-          "line " + std::to_string(number),
-          is_cell ? names[fault->column] : "cells",
-          is_cell ? files::in_quotes(std::string(fault->cell)) : "",
-          is_cell ? "is no number" : "are not as many as the header names",
-          "times may be seconds, or dates like 2026-03-02T12:34:56.7; numbers have a point, or a "
-          "comma where another sign separates cells"};
+      damage = files::InputFault{path,
+                                 "line " + std::to_string(number),
+                                 is_cell ? names[fault->column] : "cells",
+                                 is_cell ? files::in_quotes(std::string(fault->cell)) : "",
+                                 is_cell ? "is no number" : "do not match the number of names in the header",
+                                 "times may be seconds, or dates like 2026-03-02T12:34:56.7; numbers have a "
+                                 "decimal point, or a decimal comma if commas do not separate cells"};
     }
   };
   if (header.first_record) {

@@ -177,11 +177,11 @@ void add_missing(const Log& log, FlightStory& story) {
   };
   if (s.thrust == ThrustSource::kNone) {
     add("duty", "any force");
-    add("battery", "the thrust of the duties");
+    add("battery", "thrust from the duties");
   }
   if (s.thrust == ThrustSource::kForce) {
-    add("duty", "thrust that does not rest on the controller's own scale; mean torques");
-    add("battery", "the thrust of the duties; the effect of the battery");
+    add("duty", "thrust independent of the controller's own scale; mean torques");
+    add("battery", "thrust from the duties; the effect of the battery");
   }
   const bool has_battery = std::any_of(log.sources.begin(), log.sources.end(), [](const SignalInfo& info) {
     return info.name == "battery" && info.source != SignalInfo::Source::kMissing;
@@ -190,13 +190,13 @@ void add_missing(const Log& log, FlightStory& story) {
     add("battery", "a thrust in newton instead of multiples of the hover thrust");
   if (!s.attitude) add("attitude", "lateral forces");
   if (!s.position) add("position", "effects of height and of neighbours");
-  if (s.specific_force == ForceSource::kNone) add("velocity", "any force, where there is no accelerometer");
+  if (s.specific_force == ForceSource::kNone) add("velocity", "any force, if there is no accelerometer");
   if (s.specific_force == ForceSource::kPosition)
     add("velocity", "forces within 100 ms and at a quarter of the noise");
   if (s.specific_force != ForceSource::kAccelerometer)
     add("specific_force", "forces faster than the window of the derivative");
   if (s.torque != TorqueUse::kDynamic) add("rates", "torques beyond their mean in slow flight");
-  if (!s.targets) add("target", "the closed loop against the flight");
+  if (!s.targets) add("target", "comparison of the closed loop with the flight");
 }
 
 }  // namespace

@@ -32,8 +32,7 @@ struct FlightStory {
 FlightStory tell(const Log& log);
 
 /// Returns, for each record, the height at which the vehicle last stood or next stands with idle rotors, whichever is
-/// nearer in time; NaN if it never does. The reference varies because height estimates drift and vehicles also land on
-/// tables.
+/// nearer in time; NaN if it never does. It varies because height estimates drift and vehicles also land on tables.
 std::vector<double> standing_heights_m(const std::vector<double>& time_s, const std::vector<double>& height_m,
                                        const std::vector<double>& speed_m_s, const std::vector<char>& idle);
 

@@ -51,8 +51,8 @@ void keep_one_vehicle(RawLog& raw, Log& log) {
   raw.topics.erase(std::remove_if(raw.topics.begin(), raw.topics.end(), is_other), raw.topics.end());
   std::string names;
   for (const std::string& other : others) names += (names.empty() ? "" : ", ") + other;
-  log.interpretation.push_back("the file holds several vehicles: " + first + " is taken, not " + names +
-                               "; one file of each vehicle makes them one flight");
+  log.interpretation.push_back("the file contains several vehicles: " + first + " is used, not " + names +
+                               "; one file per vehicle makes them one flight");
 }
 
 /// Returns a signal of the table, or `otherwise` if the table does not have it.
@@ -96,7 +96,7 @@ void refuse_without_motion(const Draft& draft) {
   }
   throw files::InputError({draft.raw.path, "", "position", "",
                            "no column carries it, nor a velocity or an acceleration",
-                           "log it, or say in a columns.toml (--columns) which column does"});
+                           "log it, or name its column in a columns.toml (--columns)"});
 }
 
 /// Makes clocks that count from 1970 start at zero and stores the offset in Log::epoch_s. Other clocks keep their

@@ -1,5 +1,7 @@
-/// @file From columns to signals. Units, frames and signs that names leave open are decided from the data; signals that
-///   were not logged are derived from others.
+/// @file Interprets columns as signals.
+///
+/// Units, frames and signs that names leave open are decided from the data; signals that were not logged are derived
+/// from others.
 #pragma once
 
 #include <string>

@@ -13,8 +13,7 @@ namespace {
 
 constexpr double kLeastTilt_rad = 0.1, kLeast_hz = 1, kSamePeriod = 0.3;
 constexpr std::size_t kLeastPeriods = 4;
-/// Half the rate amplitude of a kLeastTilt_rad oscillation at kLeast_hz; smaller excursions are not counted as half
-/// periods.
+/// Half the rate amplitude of a kLeastTilt_rad oscillation at kLeast_hz; smaller excursions are ignored.
 constexpr double kLeastRate_rad_s = 0.5 * kLeastTilt_rad * 2 * kPi * kLeast_hz;
 
 struct Period {
@@ -23,7 +22,7 @@ struct Period {
   bool follows = false;  ///< directly follows the previous period
 };
 
-/// Returns the records from `first` to `end` minus their running mean over 1 s, which removes everything slower than
+/// Returns the records from `first` to `end` minus their running mean over 1 s, which removes what is slower than
 /// kLeast_hz.
 std::vector<double> fast_part(const Log& log, std::size_t first, std::size_t end, std::size_t axis) {
   const auto time_s = [&](std::size_t i) { return 1e-6 * log.samples[i].time_us; };

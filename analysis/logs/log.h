@@ -115,8 +115,8 @@ struct SignalInfo {
   std::string from;    ///< columns, or how it is derived
   std::string unit;    ///< of the stored columns; of the derived signal
   double rate_hz = 0;  ///< of the records that contain it
-  double noise =
-      std::numeric_limits<double>::quiet_NaN();  ///< standard deviation, in SI units; NaN: not estimated
+  /// Standard deviation, in SI units; NaN: not estimated.
+  double noise = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// An event in a log.
@@ -140,14 +140,14 @@ struct Log {
   std::vector<SignalInfo> sources;  ///< of all known signals, including missing ones
   std::vector<SignalDelay> delays;
   std::vector<LogEvent> events;  ///< of single columns: wraps and saturation of integers
-  std::vector<std::string>
-      interpretation;  ///< what was decided from the data rather than from names, and why
+  /// What was decided from the data rather than from names, and why.
+  std::vector<std::string> interpretation;
   /// Mean command of a motor while it carries the weight, if Signals::thrust is kHoverMultiple; else NaN.
   double hover_command = std::numeric_limits<double>::quiet_NaN();
   /// Motor thrust is proportional to this power of the command, 1 or 2; used if Signals::motor_commands is not 0.
   int motor_power = 1;
-  std::map<std::string, double>
-      parameters;       ///< of the vehicle at the start of the log, by their names in the file
+  /// Parameters of the vehicle at the start of the log, by their names in the file.
+  std::map<std::string, double> parameters;
   double window_s = 0;  ///< of the derivative behind a derived specific force
   Armed armed = Armed::kUnknown;
   double epoch_s = 0;  ///< plus Sample::time_us is the time since 1970; 0: unknown

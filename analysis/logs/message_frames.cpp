@@ -40,8 +40,7 @@ class Renamer {
     return true;
   }
 
-  /// Adds the first of `patterns` ('#' stands for the name of an axis) for which all three columns exist, as (x, -y,
-  /// -z).
+  /// Adds the first of `patterns` ('#' stands for an axis) for which all three columns exist, as (x, -y, -z).
   void add_vector(const std::vector<std::string>& patterns, const std::vector<std::string>& axes,
                   const std::string& to, double factor = 1) {
     const char* const kAxes[] = {"_x", "_y", "_z"};
@@ -251,7 +250,8 @@ void add_landed(const RawLog& raw, Log& log) {
       const double start_s = topic.time_s[i];
       // The last state holds until the end of the log.
       const double end_s = end < n ? topic.time_s[end] : INFINITY;
-      if (end > i) log.events.push_back({"landed", start_s, end_s - start_s, "the land detector says so"});
+      if (end > i)
+        log.events.push_back({"landed", start_s, end_s - start_s, "reported by the land detector"});
       i = std::max(end, i + 1);
     }
     return;

@@ -13,8 +13,8 @@ namespace {
 using Source = SignalInfo::Source;
 
 /// Returns the standard deviation of the noise of a derived acceleration: the residual of the smoother is taken as the
-/// noise of the column and propagated through the weights of the smoother. The autocorrelation of an estimator's noise
-/// is included.
+/// noise of the column and propagated through the weights of the smoother. The autocorrelation of the noise is
+/// included.
 /// @param smooth local_derivative() with derivative 0.
 double noise_of_slope(const SignalTable& t, const std::vector<double>& column,
                       const std::vector<double>& smooth, double window_s, int derivative) {
@@ -47,8 +47,8 @@ double noise_of_slope(const SignalTable& t, const std::vector<double>& column,
   const double sigma = std::sqrt(squares / static_cast<double>(count));
   const double rho = squares > 0 ? std::min(std::max(products / squares, 0.0), 0.95) : 0;
   const double runs = (1 + rho) / (1 - rho), n = std::max(window_s / step_s, 3.0);
-  // Variance of a fitted slope over n uniform steps: 12 sigma^2 / (n w^2); of a second derivative: 720 sigma^2 / (n
-  // w^4).
+  // Variance over n uniform steps: of a fitted slope 12 sigma^2 / (n w^2),
+  // of a second derivative 720 sigma^2 / (n w^4).
   return derivative == 1 ? sigma * std::sqrt(12 * runs / n) / window_s
                          : sigma * std::sqrt(720 * runs / n) / (window_s * window_s);
 }
@@ -181,7 +181,7 @@ void settle_lengths(Draft& draft) {
     for (int k = 0; k < 3; ++k) {
       for (double& value : t[first + k]) value /= unit;
     }
-    draft.note(fmt::format("{}: read as {}{}; the position moves {:.4g} times as far as the velocity says",
+    draft.note(fmt::format("{}: read as {}{}; the position moves {:.4g} times as far as the velocity implies",
                            names_of(draft.raw, carried), unit == 1000 ? "mm" : "cm",
                            small_position ? "" : "/s", line.slope));
     return;
@@ -213,8 +213,9 @@ void settle_velocity_frame(Draft& draft) {
   SignalTable& t = draft.table;
   const std::string names = names_of(draft.raw, *carried);
   if (!t.has_group(kVelocity, 3) || !t.has_group(kPosition, 3) || !t.has_group(kAttitude, 4)) {
-    draft.note(names +
-               ": taken along the axes of the world; without position and quaternion nothing can tell");
+    draft.note(
+        names +
+        ": assumed along the axes of the world, which cannot be checked without position and quaternion");
     return;
   }
   std::array<std::vector<double>, 3> slope, turned;
@@ -333,8 +334,7 @@ void settle_specific_force(Draft& draft) {
     draft.add("specific_force", Source::kMissing, "", "m/s^2");
     return;
   }
-  // Two independent measurements: their difference is attributed to the noise of the derived one, because the sensor's
-  // is smaller.
+  // Two independent measurements: their difference is the noise of the derived one, apart from the sensor's.
   const std::array<std::vector<double>, 3> force = {t[kForceWorld], t[kForceWorld + 1], t[kForceWorld + 2]};
   std::vector<double> differences;
   for (std::size_t k = 0; k < 3; ++k) {

@@ -40,8 +40,8 @@ void check_time(const Log& log, std::vector<Doubt>& doubts) {
   if (step_s >= kShortest_s && step_s <= kLongest_s) return;
   doubts.push_back({"time", step_s,
                     fmt::format("time: records are {:.3g} s apart; {}", step_s,
-                                step_s > kLongest_s ? "milliseconds declared as seconds, probably"
-                                                    : "seconds declared as milliseconds, probably"),
+                                step_s > kLongest_s ? "probably milliseconds declared as seconds"
+                                                    : "probably seconds declared as milliseconds"),
                     true});
 }
 
@@ -66,8 +66,9 @@ void check_specific_force(const Log& log, std::vector<Doubt>& doubts) {
   if (std::abs(g - 1) <= kDoubt) return;
   doubts.push_back(
       {"specific_force", mean_m_s2,
-       fmt::format("specific_force: {:.3g} m/s^2 upwards in the mean, where rest and flight have 9.81; {}",
-                   mean_m_s2, force_guess(g)),
+       fmt::format(
+           "specific_force: {:.3g} m/s^2 upwards on average instead of the 9.81 of rest and flight; {}",
+           mean_m_s2, force_guess(g)),
        std::abs(g - 1) > kRefusal});
 }
 
@@ -89,19 +90,18 @@ void check_duty(const Log& log, std::vector<Doubt>& doubts) {
   if (outside > 0) {
     const char* const guess = largest > 2000  ? "counts of 0 .. 65535 were probably meant: unit = \"PWM\""
                               : largest > 101 ? "pulse lengths or counts of another range were probably meant"
-                              : largest > 1.5 ? "percent were probably meant: divide by 100"
-                                              : "a share of full power lies between 0 and 1";
+                              : largest > 1.5 ? "percent was probably meant: divide by 100"
+                                              : "a fraction of full power is between 0 and 1";
     doubts.push_back({"duty", largest > 1 + kTolerance ? largest : smallest,
                       fmt::format("duty: between {:.4g} and {:.4g}, in {} records outside of 0 .. 1; {}",
                                   smallest, largest, outside, guess),
                       largest > 1.5 || smallest < -0.5});
   } else if (largest < kIdle && norm(difference(high, low)) > kMoves_m) {
-    doubts.push_back(
-        {"duty", largest,
-         fmt::format("duty: never above {:.3g} although the vehicle moves by {:.2f} m; shares of 0 .. 1 "
-                     "or percent declared as PWM, probably",
-                     largest, norm(difference(high, low))),
-         true});
+    doubts.push_back({"duty", largest,
+                      fmt::format("duty: never above {:.3g} although the vehicle moves by {:.2f} m; probably "
+                                  "fractions of 0 .. 1 or percent declared as PWM",
+                                  largest, norm(difference(high, low))),
+                      true});
   }
 }
 
@@ -114,8 +114,8 @@ void check_battery(const Log& log, std::vector<Doubt>& doubts) {
   if (median_V <= kLargest_V && median_V >= kSmallest_V) return;
   doubts.push_back({"battery", median_V,
                     fmt::format("battery: {:.4g} V in the median; {}", median_V,
-                                median_V > kLargest_V ? "millivolt declared as volt, probably"
-                                                      : "volt declared as millivolt, probably"),
+                                median_V > kLargest_V ? "probably millivolt declared as volt"
+                                                      : "probably volt declared as millivolt"),
                     true});
 }
 
@@ -148,7 +148,7 @@ void check_height(const Log& log, std::vector<Doubt>& doubts) {
   doubts.push_back(
       {"position", median_m,
        fmt::format("position: {:.2f} m high in the median and never above {:.2f} m; its z axis probably "
-                   "points down, then a columns.toml turns it: unit = \"-m\" for y and z",
+                   "points down; if so, invert it in a columns.toml: unit = \"-m\" for y and z",
                    median_m, highest_m),
        false});
 }
@@ -180,7 +180,7 @@ void check_velocity(const Log& log, std::vector<Doubt>& doubts) {
                               : "units or frames of position, velocity or time differ";
   doubts.push_back(
       {"position", ratio,
-       fmt::format("position: moves {:.3g} times as far as the velocities say; {}, probably", ratio, guess),
+       fmt::format("position: moves {:.3g} times as far as the velocities imply; probably {}", ratio, guess),
        ratio > kRefusal || ratio < 1 / kRefusal});
 }
 
@@ -208,15 +208,14 @@ void check_rates(const Log& log, std::vector<Doubt>& doubts) {
   const double ratio = std::sqrt(by_rate / by_attitude);
   if (!(ratio > kDoubt) && !(ratio < 1 / kDoubt)) return;
   doubts.push_back({"rate", ratio,
-                    fmt::format("rate: turns {:.3g} times as far as the attitudes say; {}", ratio,
-                                is_near(ratio, 57.3)     ? "deg/s declared as rad/s, probably"
-                                : is_near(ratio, 0.0175) ? "rad/s declared as deg/s, probably"
+                    fmt::format("rate: turns {:.3g} times as far as the attitudes imply; {}", ratio,
+                                is_near(ratio, 57.3)     ? "probably deg/s declared as rad/s"
+                                : is_near(ratio, 0.0175) ? "probably rad/s declared as deg/s"
                                                          : "the unit or the sensor is wrong"),
                     false});
 }
 
-/// Finds records in which the specific force jumps by more than rotors can produce: collisions, touch-down, wrapped
-/// integers.
+/// Finds jumps of the specific force that rotors cannot produce: collisions, touch-down, wrapped integers.
 void check_leaps(const Log& log, std::vector<Doubt>& doubts) {
   constexpr double kLargest_m_s2 = 2.5 * kGravity_m_s2, kLeap_m_s2 = 1 * kGravity_m_s2;
   std::size_t count = 0;
@@ -231,12 +230,11 @@ void check_leaps(const Log& log, std::vector<Doubt>& doubts) {
     worst_s = 1e-6 * log.samples[i].time_us;
   }
   if (count == 0) return;
-  doubts.push_back(
-      {"specific_force", worst_m_s2,
-       fmt::format("specific_force: {} records leap beyond 2.5 g, the worst to {:.1f} m/s^2 at {:.2f} s; an "
-                   "impact, or an integer that wrapped",
-                   count, worst_m_s2, worst_s),
-       false});
+  doubts.push_back({"specific_force", worst_m_s2,
+                    fmt::format("specific_force: {} records jump beyond 2.5 g, the worst to {:.1f} m/s^2 at "
+                                "{:.2f} s; an impact, or an integer that wrapped",
+                                count, worst_m_s2, worst_s),
+                    false});
 }
 
 }  // namespace

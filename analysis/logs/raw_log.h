@@ -1,5 +1,6 @@
-/// @file A log file as stored in its format: topics with their own clocks, and parameters. Readers of multi-topic
-///   formats fill it; columns are interpreted later, in one place for all formats.
+/// @file A log file as stored in its format: topics with their own clocks, and parameters.
+///
+/// Readers of multi-topic formats fill it; columns are interpreted later, in one place for all formats.
 #pragma once
 
 #include <map>
@@ -65,8 +66,8 @@ struct RawLog {
   std::string path;
   std::string format;  ///< e.g. "ulog", "mcap", "rosbag2 sqlite", "ardupilot"
   std::vector<RawTopic> topics;
-  std::map<std::string, double>
-      parameters;  ///< of the vehicle at the start of the log, by their names in the file
+  /// Parameters of the vehicle at the start of the log, by their names in the file.
+  std::map<std::string, double> parameters;
   std::map<std::string, double> default_parameters;  ///< if the file states them
   std::vector<RawParameterChange> parameter_changes;
   std::vector<RawMessage> messages;

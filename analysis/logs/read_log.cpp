@@ -50,10 +50,10 @@ std::string other_formats() {
 }
 
 [[noreturn]] void refuse_unknown(const std::string& head, const std::string& path) {
-  std::string what = "is not a flight log", hint = "known are micro-SD logs, CSV" + other_formats();
+  std::string what = "is not a flight log", hint = "supported are micro-SD logs, CSV" + other_formats();
   if (head.empty()) {
     what = "the file is empty";
-    hint = "the recording failed; leave it out";
+    hint = "the recording failed; exclude this file";
   } else if (head.compare(0, 2, "\x1F\x8B") == 0) {
     what = "is compressed";
     hint = "unpack it with gunzip";
@@ -67,8 +67,7 @@ std::string other_formats() {
 /// Micro-SD logs and CSV files are streams of records; formats/formats.h handles the other formats.
 RawLog raw_of(std::istream& in, const std::string& path, const SignalMap& map) {
   const std::string head = format_head(in);
-  // The header of an old micro-SD log names variables like a CSV header. A columns.toml takes precedence, whoever wrote
-  // the CSV.
+  // The header of an old micro-SD log names variables like a CSV header. A columns.toml always takes precedence.
   const Format kind = kind_of(in);
   const bool is_usd = kind == Format::kUsd || kind == Format::kUsdEvents;
   if (!is_usd && format_of(head) != nullptr && (map.empty() || kind != Format::kCsv))
@@ -244,9 +243,9 @@ std::vector<std::string> findings(const LogHealth& health) {
   };
   add(health.damaged_blocks, "damaged places skipped");
   add(health.skipped_bytes, "bytes skipped there");
-  add(health.damaged_lines, "lines that are not as many numbers as the header names");
+  add(health.damaged_lines, "lines whose number of values differs from the header");
   add(health.not_finite, "records with values that are not finite");
-  add(health.clock_jumps, "records whose time does not follow the one before");
+  add(health.clock_jumps, "records whose time does not follow the previous one");
   if (health.gaps > 0) {
     found.push_back(
         fmt::format("{} gaps over 30 ms, the longest {:.3f} s", health.gaps, health.longest_gap_s));

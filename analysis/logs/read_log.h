@@ -24,8 +24,7 @@ Log parse_log(std::istream& in, const std::string& path, const SignalMap& map = 
 /// Returns true if the file is named like a log or a CSV file, or starts like a micro-SD log.
 bool looks_like_log(const std::string& path);
 
-/// Returns true if the header of a CSV file names a time and a position, velocity or acceleration; false if it cannot
-/// be read.
+/// Returns true if a CSV file can be read and its header names a time and a position, velocity or acceleration.
 bool is_flight_table(const std::string& path);
 
 /// Returns the first and last time of a CSV file on its own clock, in seconds, from its first lines and its end; {0, 0}

@@ -138,7 +138,7 @@ void recognise_by_names(const RawLog& log, Recognition& found) {
       if (!log.topics[t].time_s.empty() && ((is_dead(log.topics[t], carried) && !may_be_zero(row.signal)) ||
                                             (is_quaternion && !is_unit_quaternion(log.topics[t], carried)))) {
         found.rejected.push_back(names_of(log, carried) +
-                                 (is_quaternion ? ": no unit quaternions" : ": nothing but zeros"));
+                                 (is_quaternion ? ": no unit quaternions" : ": only zeros"));
         continue;
       }
       take_stated_unit(log.topics[t], carried);

@@ -51,7 +51,8 @@ std::vector<double> without_wraps(const RawColumn& column, const std::vector<dou
     }
     const bool full = now == kInt16Range / 2 - 1 || now == -kInt16Range / 2;
     if (full && now == last && ++saturated <= kMostEvents)
-      events.push_back({"saturation", time_s[i], 0, column.name + ": a 16-bit integer at its end"});
+      events.push_back(
+          {"saturation", time_s[i], 0, column.name + ": a 16-bit integer at the limit of its range"});
     last = now;
     values[i] = now + turns * kInt16Range;
   }

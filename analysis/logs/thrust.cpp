@@ -18,8 +18,7 @@ struct Rotors {
   std::string from;
 };
 
-/// Returns the specific force along the thrust axis divided by g for each record, which thrust over weight should
-/// equal.
+/// Returns, per record, the specific force along the thrust axis over g, which thrust over weight should equal.
 std::vector<double> load_factor(const Draft& draft) {
   const SignalTable& t = draft.table;
   std::vector<double> load(t.size(), std::nan(""));
@@ -179,8 +178,7 @@ void derive_duty(Draft& draft, const std::string& from) {
   draft.add("duty", Source::kDerived, from + " and battery: the firmware's battery compensation", "1");
 }
 
-/// Derives the battery voltage at which the firmware's compensation turns the sum of the requests into the sum of the
-/// duties.
+/// Derives the battery voltage at which the firmware's compensation turns the total request into the total duty.
 void derive_battery(Draft& draft) {
   SignalTable& t = draft.table;
   std::vector<double>& battery = t[kBattery];

@@ -29,7 +29,7 @@ struct UsdHeader {
   void add(const std::string& path, std::size_t offset, const std::string& name, char type) {
     if (size_of(type) == 0) {
       refuse(path, offset, name, files::in_quotes(std::string(1, type)), "is not a known type",
-             "known are b B h H i I f");
+             "supported are b B h H i I f");
     }
     if (std::find(names.begin(), names.end(), name) != names.end())
       refuse(path, offset, name, "", "is named twice", "log each variable once");
@@ -106,7 +106,8 @@ class Blocks {
 void read_usd(std::istream& in, const std::string& path, RecordSink& sink, LogHealth& health) {
   ByteWindow window(in);
   const unsigned char* const first = window.peek(1);
-  if (first == nullptr) refuse(path, 0, "", "", "the file is empty", "the recording failed; leave it out");
+  if (first == nullptr)
+    refuse(path, 0, "", "", "the file is empty", "the recording failed; exclude this file");
   const std::size_t num_variables = *first;
   if (num_variables == 0) refuse(path, 0, "number of variables", "0", "no variable was logged", "");
   std::uint32_t sum = checksum(first, 1);
@@ -165,7 +166,7 @@ class EventReader {
     const unsigned char* const head = peek(5, "header");
     version_ = little_endian<std::uint16_t>(head + 1);
     if (version_ != 1 && version_ != 2)
-      refuse(path_, 1, "version", std::to_string(version_), "is not known", "known are 1 and 2");
+      refuse(path_, 1, "version", std::to_string(version_), "is not known", "supported are 1 and 2");
     const std::size_t num_events = little_endian<std::uint16_t>(head + 3);
     sum(head, 5);
     for (std::size_t i = 0; i < num_events; ++i) read_event();
@@ -224,13 +225,13 @@ class EventReader {
 
   void read_event() {
     if (window_.offset() > kLargestHeader_bytes)
-      refuse(path_, window_.offset(), "header", "", "is longer than any that the firmware writes", "");
+      refuse(path_, window_.offset(), "header", "", "is longer than the firmware allows", "");
     const std::size_t id = little_endian<std::uint16_t>(peek(2, "event"));
     sum(peek(2, "event"), 2);
     const std::size_t size = window_.left(kLongestName_bytes);
     const unsigned char* const name = peek(size, "event");
     const auto* const end = static_cast<const unsigned char*>(std::memchr(name, 0, size));
-    if (end == nullptr) refuse(path_, window_.offset(), "event", "", "its name has no end", "");
+    if (end == nullptr) refuse(path_, window_.offset(), "event", "", "its name is not terminated", "");
     Event event;
     event.name.assign(name, end);
     sum(name, static_cast<std::size_t>(end - name) + 1);
@@ -240,7 +241,7 @@ class EventReader {
       const std::size_t before = window_.offset();
       read_token(window_, path_, '\0', &checksum_, event.header);
       if (window_.offset() > kLargestHeader_bytes) {
-        refuse(path_, before, "header", "", "is longer than any that the firmware writes", "");
+        refuse(path_, before, "header", "", "is longer than the firmware allows", "");
       }
     }
     for (const auto& [other, unused] : events_) {
@@ -263,8 +264,7 @@ class EventReader {
                          : static_cast<double>(little_endian<std::uint64_t>(record + 2));
   }
 
-  /// Returns the size in bytes of the record `ahead` bytes from here; 0 if no known event with a plausible time starts
-  /// there.
+  /// Returns the size in bytes of the record `ahead` bytes from here; 0 without a known event and plausible time.
   std::size_t record_size(std::size_t ahead, double last_time) {
     const unsigned char* const head = window_.peek(ahead + head_bytes());
     if (head == nullptr) return 0;

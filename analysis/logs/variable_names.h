@@ -12,8 +12,8 @@ namespace swarmcert::logs {
 
 /// Log variables of the custom topics in a crazyflies.yaml.
 struct CustomTopics {
-  using Variables =
-      std::map<std::string, std::vector<std::string>>;  ///< by topic, in the order of the values
+  /// Variables by topic, in the order of the values.
+  using Variables = std::map<std::string, std::vector<std::string>>;
   std::map<std::string, Variables> of_robot, of_type;
   std::map<std::string, std::string> type_of_robot;
   Variables of_all;

@@ -15,8 +15,7 @@ struct FlightPeak {
   std::array<double, 3> peak_m{};
 };
 
-/// Returns one entry per vehicle whose force is judged, in the order of flights. Logs are taken from the cache of
-/// `inputs`.
+/// Returns one entry per vehicle whose force is judged, in the order of flights. Uses the log cache of `inputs`.
 std::vector<FlightPeak> flight_peaks(const Inputs& inputs, int jobs);
 
 }  // namespace swarmcert::residuals

@@ -65,10 +65,9 @@ Candidates candidates_below(const std::string& path) {
     throw files::InputError({path, "", "", "", "does not exist", "name files or folders of flights"});
   if (!fs::is_directory(path)) {
     if (!is_table(path) && !is_log(path)) {
-      throw files::InputError(
-          {path, "", "", "", "is not a flight log",
-           "'swarmcert inspect' says what is in it; known are micro-SD logs, PX4 ULog, MCAP, "
-           "rosbag2, ArduPilot and CSV"});
+      throw files::InputError({path, "", "", "", "is not a flight log",
+                               "'swarmcert inspect' reports what is in it; supported are micro-SD logs, PX4 "
+                               "ULog, MCAP, rosbag2, ArduPilot and CSV"});
     }
     return {{path}, {}};
   }
@@ -243,7 +242,7 @@ FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules&
       if (!seen.insert(file).second) continue;
       const LogRule rule = rule_for(rules, file);
       if (rule.use == LogRule::Use::kNone)
-        result.left_out.push_back(file + ": flights.toml leaves it out");
+        result.left_out.push_back(file + ": excluded by flights.toml");
       else
         logs.push_back(named(file, rule));
     }
@@ -260,7 +259,7 @@ FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules&
       result.skipped.push_back(log.path);
     } else if (log.why == "flights.toml") {
       throw files::InputError({log.path, "", "log.vehicle", log.vehicle,
-                               "is the vehicle of " + chosen.path + " in the same flight as well",
+                               "is the vehicle of " + chosen.path + " in the same flight, too",
                                "give the two logs different vehicles in flights.toml"});
     } else {
       result.skipped.push_back(log.csv ? log.path : chosen.path);
@@ -282,7 +281,7 @@ FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules&
   }
   if (result.flights.empty()) {
     throw files::InputError({paths.empty() ? "" : paths[0], "", "", "", "there is no flight log here",
-                             "'swarmcert inspect FILE' says what a file is"});
+                             "'swarmcert inspect FILE' identifies a file"});
   }
   return result;
 }

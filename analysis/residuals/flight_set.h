@@ -16,8 +16,7 @@ struct FlightFiles {
   int run = 0;
   std::vector<std::pair<std::string, std::string>> logs;  ///< vehicle ("cf50") and path, in order of vehicles
   std::string why;                                        ///< why these files form one flight
-  /// By path of a log: how far its clock is ahead of the first log's clock, if that was determined from the flight
-  /// itself.
+  /// By path of a log: how far its clock is ahead of the first log's clock, if found from the flight itself.
   std::map<std::string, double> clock_offsets_s;
   std::set<std::string> position_only;  ///< paths of logs that flights.toml marks as position only
 };

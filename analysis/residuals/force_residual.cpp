@@ -35,8 +35,7 @@ void pass_stage(const stability::AppliedEffect& stage, Track& track) {
   }
 }
 
-/// Returns true if the model describes the thrust of its motors at the commands in the log, and the numbers of motors
-/// agree.
+/// Returns true if the model gives the thrust of its motors at logged commands, and the numbers of motors agree.
 bool knows_motors(const stability::Model& model, const Track& track) {
   return model.thrust_curve_N && static_cast<std::size_t>(track.motor_commands) == model.num_rotors();
 }

@@ -1,4 +1,5 @@
 /// @file Force residual of a model in flight: r = m a_sf - R (h * R' (T b3 + f_a)), per record, in W.
+///
 /// If the specific force is a derivative of the velocity or the position, h is the weighted mean over the same window
 /// as that derivative, taken in W. T is the command of the thrust map after the model's delay and motor lag; f_a is the
 /// sum of its effects; h is the two-pole low-pass of the accelerometer. It acts in the body frame, as in the sensor;
@@ -68,8 +69,7 @@ void apply_model(const stability::Model& model, const Kinds& kinds, const CutRul
 std::vector<Eigen::Vector3d> force_residual(const stability::Model& model, const Kinds& kinds,
                                             const CutRules& rules, const Track& track);
 
-/// Cuts records with |f_a,z| >= 50 gf if the rules require it. Here f_a is the whole force not explained by the nominal
-/// model.
+/// Cuts records with |f_a,z| >= 50 gf if the rules require it. Here f_a is the total force beyond the nominal model.
 void cut_large_forces(const stability::Model& model, const CutRules& rules, Track& track);
 
 }  // namespace swarmcert::residuals

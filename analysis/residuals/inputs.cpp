@@ -57,8 +57,7 @@ void use_fleet_models(Inputs& inputs, const std::map<std::string, std::string>& 
   }
 }
 
-/// Returns a model of 1 kg whose rotors are never asked for a force, because the log's thrust is in multiples of the
-/// weight.
+/// Returns a model of 1 kg whose rotors are never asked for a force, as the log's thrust is in multiples of the weight.
 stability::Model unit_model() {
   stability::Model model;
   model.kind = "unknown";
@@ -214,7 +213,7 @@ std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& pro
   for (Track& track : loaded) {
     if (track.position_only) continue;
     if (has_only_log_models && log_models.count(track.path) == 0) {
-      problems.push_back(track.path + ": no model: none is named, and flights.toml gives this log none");
+      problems.push_back(track.path + ": no model is named, and flights.toml gives none for this log");
       track.position_only = true;
       continue;
     }

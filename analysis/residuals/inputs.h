@@ -33,8 +33,7 @@ struct InputArguments {
 /// that model.
 struct Inputs {
   std::vector<stability::Model> models;  ///< one per kind
-  /// If the fleet assigns different models to vehicles of one kind: those that differ from the kind's model, by
-  /// vehicle.
+  /// If the fleet assigns several models to vehicles of one kind: those that differ from the kind's, by vehicle.
   std::map<std::string, stability::Model> vehicle_models;
   Kinds kinds;
   Fleet fleet;

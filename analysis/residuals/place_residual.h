@@ -1,5 +1,6 @@
-/// @file Range of the force residual by relative position of the neighbour, per flight; `bound --tube --from` derives
-///   the truth model of a tube from it.
+/// @file Range of the force residual by relative position of the neighbour, per flight.
+///
+/// `bound --tube --from` derives the truth model of a tube from it.
 #pragma once
 
 #include <Eigen/Core>

@@ -49,8 +49,8 @@ std::vector<logs::Doubt> doubts_of(const stability::Model& model, const Track& t
   if (ratio >= kLeastThrust && ratio <= kLargestThrust) return doubts;
   doubts.push_back(
       {"thrust", ratio,
-       fmt::format("thrust: the model gives {:.3g} times the weight in the mean, where flight needs 1; "
-                   "mass_kg, the thrust polynomial, duty or battery is wrong, or a payload is flown",
+       fmt::format("thrust: the model gives {:.3g} times the weight on average, but flight needs 1; mass_kg, "
+                   "the thrust polynomial, duty or battery is wrong, or a payload is flown",
                    ratio),
        false});
   return doubts;

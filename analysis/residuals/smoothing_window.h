@@ -1,5 +1,4 @@
-/// @file The weighted mean of the acceleration over a window that results from differentiating a logged velocity or
-///   position.
+/// @file The weighted mean of the acceleration over a window implied by differentiating a logged velocity or position.
 ///
 /// The slope of a line fitted to a velocity is a mean of the acceleration with parabolic weights; the curvature of a
 /// parabola fitted to a position is a mean with weights of fourth order. To give both sides of the force balance the
@@ -14,8 +13,7 @@
 
 namespace swarmcert::residuals {
 
-/// Returns the fraction of the power at `frequency_hz` that the weighted mean passes; 1 if `source` is not a
-/// derivative.
+/// Returns the fraction of the power at `frequency_hz` passed by the mean; 1 if `source` is not a derivative.
 double power_passed(logs::ForceSource source, double length_s, double frequency_hz);
 
 class SmoothingWindow {

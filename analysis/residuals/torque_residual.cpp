@@ -113,9 +113,8 @@ TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds
     steps_s.push_back(track.instants[i].time_s - track.instants[i - 1].time_s);
   residual.rate_hz = 1 / quantile(steps_s, 0.5);
   if (residual.rate_hz < TorqueResidual::kLeastRate_hz) {
-    residual.refused =
-        fmt::format("logs at {:.0f} Hz alias what the attitude loop does: torques need {:.0f} Hz",
-                    residual.rate_hz, TorqueResidual::kLeastRate_hz);
+    residual.refused = fmt::format("logs at {:.0f} Hz alias the attitude loop: torques need {:.0f} Hz",
+                                   residual.rate_hz, TorqueResidual::kLeastRate_hz);
     return residual;
   }
   residual.torque_B_Nm = torque_records(model, kinds, track);

@@ -18,8 +18,8 @@ struct TorqueResidual {
 
   std::string refused;  ///< why there is none; otherwise empty
   double rate_hz = 0;   ///< of the log; 0 if it is empty
-  std::vector<Eigen::Vector3d>
-      torque_B_Nm;  ///< one per record, NaN where omega' is unknown; empty if refused
+  /// Residual torque, one per record; NaN where omega' is unknown. Empty if refused.
+  std::vector<Eigen::Vector3d> torque_B_Nm;
 };
 
 /// Returns the torque residual. tau_u are the forces of the rotors at their positions, from duties and the thrust map

@@ -72,8 +72,7 @@ struct State {
   Eigen::Vector3d p, v;
 };
 
-/// Returns the state of `log` at `time_s` on its clock, interpolated between records; nothing across a gap or outside
-/// the log.
+/// Returns the state of `log` at `time_s` on its clock, interpolated; nothing across a gap or outside the log.
 /// @param from where the search starts; times must ascend from call to call
 std::optional<State> state_at(const logs::Log& log, double time_s, bool everywhere, std::size_t& from) {
   const std::vector<logs::Sample>& samples = log.samples;
@@ -122,8 +121,7 @@ void fill_instants(Track& track, const logs::Log& log) {
   }
 }
 
-/// Derives the specific force of logs without an accelerometer, over the window that is also applied to the model's
-/// force.
+/// Derives the specific force of logs without an accelerometer, over the window also applied to the model's force.
 void derive_specific_force(Track& track) {
   if (track.force_source == logs::ForceSource::kAccelerometer) return;
   SmoothingWindow window(track.force_source, track.window_s, 1);
@@ -258,16 +256,16 @@ const char* rule(Cut cut) {
   static const char* const kRules[] = {
       "everything else",
       "from 0.3 s before the thrust axis is more than 60 degrees from the vertical, to the end of the log",
-      "the duties add up to less than 0.8, or to less than 0.3 of the most where that is less and the "
-      "vehicle moved; other thrust is less than 0.3 of what is common: rotors off or idle, outside the "
+      "the duties add up to less than 0.8, or to less than 0.3 of their maximum if that is smaller and the "
+      "vehicle moved; other thrust is less than 0.3 of its typical value: rotors off or idle, outside the "
       "calibration",
       "at or below 2 cm above the height at which the vehicle stood with idle rotors (kind small: 0.07 m, "
       "large: 0.085 m)",
-      "within 0.15 s after the start and after a gap of more than 30 ms: filters have no past",
+      "within 0.15 s after the start and after a gap of more than 30 ms: filters are settling",
       "the position of a neighbour is unknown: its log has a gap, has not begun or has ended",
       "published filter only: |f_a,z| of 50 gf or more",
-      "from 0.1 s before to 0.3 s after a record that no flight has: a specific force beyond 1.25 times what "
-      "the rotors give at full duty (at least 2 g), or a jump of position or velocity"};
+      "from 0.1 s before to 0.3 s after an impossible record: a specific force beyond 1.25 times what the "
+      "rotors give at full duty (at least 2 g), or a jump of position or velocity"};
   return kRules[static_cast<int>(cut)];
 }
 
@@ -305,7 +303,7 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
     if (log.armed == logs::Armed::kNever)
       problems.push_back(path + ": no flight: never armed");
     else if (!log.signals.force && !only_neighbour)
-      problems.push_back(path + ": only a neighbour: the log lacks " + log.signals.force_lacks);
+      problems.push_back(path + ": used only as a neighbour: the log lacks " + log.signals.force_lacks);
     track.doubts = read->doubts;
     for (const logs::Doubt& doubt : track.doubts) {
       if (!doubt.refuses_force || track.position_only || rules.keep) continue;

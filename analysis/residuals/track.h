@@ -1,5 +1,4 @@
-/// @file The track of one vehicle in a flight, on the flight's clock, with its neighbours and with cuts outside of
-///   flight.
+/// @file The track of one vehicle in a flight, on the flight's clock, with its neighbours and with cuts.
 #pragma once
 
 #include <Eigen/Core>

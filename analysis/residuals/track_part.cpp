@@ -206,7 +206,7 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
   errors.errors = errors_of({&result.part});
   if (inputs.rules.per_mass)
     errors.torque.refused =
-        "no model says where the rotors are: name one ('swarmcert model draft' writes it)";
+        "no model gives the rotor positions: name one ('swarmcert model draft' writes it)";
   else
     errors.torque = torque_errors(model, inputs.kinds, track);
   errors.trajectory = trajectory_errors(inputs, gains, model, track);

@@ -45,8 +45,7 @@ std::vector<Piece> pieces_of(const Track& track) {
   return pieces;
 }
 
-/// The log's setpoints, interpolated between its records; the acceleration is the slope of the velocity over seven
-/// records.
+/// The log's setpoints, interpolated between its records; the acceleration is a slope over seven records.
 class LoggedTask : public stability::Task {
  public:
   LoggedTask(const Track& track, Piece piece) : track_(track), piece_(piece) {}

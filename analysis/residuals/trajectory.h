@@ -1,5 +1,7 @@
-/// @file Second level of a comparison: simulates the closed loop of model and gains along the log's setpoints, among
-///   neighbours that fly as logged, and compares its positions with the measured ones.
+/// @file Second level of a comparison: compares a closed-loop simulation along the log's setpoints with the flight.
+///
+/// The closed loop of model and gains flies among neighbours that fly as logged; its positions are compared with the
+/// measured ones.
 ///
 /// A second run also applies the logged force residual to the vehicle. Measured peaks that it still misses are caused
 /// not by the residual force but by the loop: gains, estimator, saturation. The ratio of measured to replayed peaks is
@@ -18,8 +20,8 @@ namespace swarmcert::residuals {
 
 /// Position errors of one vehicle in one flight, in metres.
 struct TrajectoryErrors {
-  static constexpr double kSettle_s =
-      2;  ///< not judged at the start of a piece, because the integrator starts at zero
+  /// Not judged at the start of a piece, because the integrator starts at zero.
+  static constexpr double kSettle_s = 2;
   static constexpr double kShortest_s = 5;  ///< shorter pieces are skipped
 
   std::string refused;  ///< why there is no result; otherwise empty

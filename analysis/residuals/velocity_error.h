@@ -1,5 +1,6 @@
-/// @file Difference between the estimated velocity of a flight and the slope of its estimated position, i.e. the error
-///   that the controller saw through Kd; used by `bound --from`.
+/// @file Difference between the estimated velocity of a flight and the slope of its estimated position.
+///
+/// This is the error that the controller saw through Kd; `bound --from` uses it.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +12,7 @@
 
 namespace swarmcert::residuals {
 
-/// Both velocities are means over windows of this length, so errors above about 4 Hz are attenuated.
+/// Both velocities are means over windows of this length, so errors above about 4 Hz are not visible.
 inline constexpr double kSlopeWindow_s = 0.15;
 
 /// Returns true if a log contains both position and velocity as estimated on board, neither derived from the other.

@@ -181,7 +181,7 @@ TEST(Plausibility, LogsInAnotherUnitAreRefusedWithTheOneThatWasMeant) {
       {"m/s^2 as g", force, 1, {{"specific_force", "g"}}, "specific_force", "probably in m/s^2, not in g"},
       {"without gravity", {"az"}, 1, {}, "specific_force", "without gravity", -9.81},
       {"z downwards", force, -1, {}, "specific_force", "z axis probably points down"},
-      {"duty in percent", duty, 100, {}, "duty", "percent were probably meant"},
+      {"duty in percent", duty, 100, {}, "duty", "percent was probably meant"},
       {"duty in counts", duty, 65536, {}, "duty", "unit = \"PWM\""},
       {"shares as counts", duty, 1, {{"duty", "PWM"}}, "duty", "declared as PWM"},
       {"mV as V", {"vbat"}, 1000, {}, "battery", "millivolt declared as volt"},

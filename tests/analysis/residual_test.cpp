@@ -317,8 +317,7 @@ TEST(TorqueResidual, IsGivenWhereTheLogIsAsFastAsTheLoopAndRefusedWhereItAliases
   EXPECT_NEAR(torque["bias"]["y"].get<double>(), 1.5e-4, 0.2e-4);
   EXPECT_NEAR(torque["bias"]["x"].get<double>(), 0, 0.2e-4);
   const files::Json slow = compare("slow.toml", "slow");
-  EXPECT_EQ(slow["torque"]["refused"],
-            "logs at 100 Hz alias what the attitude loop does: torques need 400 Hz");
+  EXPECT_EQ(slow["torque"]["refused"], "logs at 100 Hz alias the attitude loop: torques need 400 Hz");
 }
 
 /// RMS of the vertical residual in a row of a budget, N.

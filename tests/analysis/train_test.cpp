@@ -227,7 +227,7 @@ TEST_F(TrainVectors, AlsoLearnsTheWholeForceAndTheTorqueWhichModelsThenHave) {
 TEST_F(Train, RefusesTorquesOfLogsThatAreTooSlow) {
   const Outcome outcome = execute(train("--quantity torque --epochs 1 -o out"));
   EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_NE(outcome.output.find("logs at 100 Hz alias what the attitude loop does: torques need 400 Hz"),
+  EXPECT_NE(outcome.output.find("logs at 100 Hz alias the attitude loop: torques need 400 Hz"),
             std::string::npos)
       << outcome.output;
 }

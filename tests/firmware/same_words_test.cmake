@@ -1,4 +1,4 @@
-# Host and microcontroller give the same words.
+# Host and microcontroller give the same output words.
 cmake_minimum_required(VERSION 3.25)
 include(${CMAKE_CURRENT_LIST_DIR}/common.cmake)
 run_image(${images}/workload.elf ${SCRATCH}/target_words.bin)

@@ -31,7 +31,8 @@ TEST(Conformal, NineGroupsAreNeededForNineInTen) {
 }
 
 TEST(Conformal, FlightsOfOneGroupWeighAsOne) {
-  // 19 groups as above; the largest one flew a hundred times with scores that would shift a count of flights.
+  // 19 groups as above; the largest one flew a hundred times, which would shift a threshold based on the count of
+  // flights.
   std::vector<FlightScore> scores;
   for (int k = 1; k <= 18; ++k) scores.push_back({std::to_string(k), static_cast<double>(k)});
   for (int k = 0; k < 100; ++k) scores.push_back({"many", 1000.0 + k});
@@ -50,8 +51,8 @@ TEST(Conformal, BetaQuantilesAreThoseOfKnownDistributions) {
   EXPECT_NEAR(beta_quantile(1, 5, 0.05), 1 - std::pow(0.95, 0.2), 1e-12);
 }
 
-/// The promise itself: over many calibrations with a skewed distribution a further group is covered as often as
-/// promised, and the coverage of single calibrations lies in the stated interval nine times in ten.
+/// The guarantee itself: over many calibrations with a skewed distribution, a further group is covered as often as
+/// stated, and the coverage of single calibrations is within the stated interval nine times out of ten.
 TEST(Conformal, CoversFurtherFlightsAsOftenAsItPromises) {
   std::mt19937_64 random(7);
   std::lognormal_distribution<double> score(0, 1.5);
@@ -66,7 +67,7 @@ TEST(Conformal, CoversFurtherFlightsAsOftenAsItPromises) {
     const double coverage = 0.5 * std::erfc(-std::log(result.threshold) / 1.5 / std::sqrt(2.0));
     inside += coverage >= result.coverage_90.lower && coverage <= result.coverage_90.upper ? 1 : 0;
   }
-  // k/(n + 1) = 28/31 in the mean; standard deviation 0.005.
+  // k/(n + 1) = 28/31 on average; standard deviation 0.005.
   EXPECT_NEAR(static_cast<double>(covered) / kRepeats, 28.0 / 31, 0.02);
   EXPECT_NEAR(static_cast<double>(inside) / kRepeats, 0.9, 0.02);
 }

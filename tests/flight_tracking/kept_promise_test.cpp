@@ -29,7 +29,7 @@ std::string bound_file(const tests::TempFolder& folder, const Json& coverage) {
 TEST(KeptPromise, CountsFlightsAndLeavesThoseOutThatItWasMadeFrom) {
   const tests::TempFolder folder;
   std::vector<residuals::FlightPeak> peaks;
-  // 20 flights; the last two exceed 0.1 m along z, one of two vehicles in the last.
+  // 20 flights; the last two exceed 0.1 m along z, one of them for only one of its two vehicles.
   for (int k = 0; k < 20; ++k) {
     const std::string name = "flight" + std::to_string(k);
     write(folder / name, name);
@@ -50,7 +50,7 @@ TEST(KeptPromise, CountsFlightsAndLeavesThoseOutThatItWasMadeFrom) {
   EXPECT_NEAR(kept.axes[2].interval_90.upper, 0.9819, 1e-4);
   EXPECT_NEAR(kept.axes[0].interval_90.lower, std::pow(0.05, 0.05), 1e-9);
   EXPECT_EQ(kept.axes[0].interval_90.upper, 1);
-  // One log of a flight is enough to leave all of it out.
+  // A single log of a flight is enough to exclude the whole flight.
   promise.made_from = {files::sha256("second"), files::sha256("flight0")};
   kept = kept_promise(promise, peaks);
   EXPECT_EQ(kept.used.size(), 2u);

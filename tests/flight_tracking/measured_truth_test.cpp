@@ -1,5 +1,5 @@
-// A truth that flights measured: further flights keep its ranges as often as it says, and its cells are those in which
-// flights are judged.
+// A truth measured in flight: further flights stay within its ranges as often as stated, and its cells are those in
+// which flights are judged.
 #include "analysis/tracking/measured_truth.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using files::Json;
 
 constexpr int kLaterals = 4;
 
-/// A force of its own in each cell, a constant of each flight, and noise of every record.
+/// A separate force in each cell, a constant per flight, and noise per record.
 Json residual_of_a_flight(files::Random& random, int records) {
   const double constant_N[3] = {0.002 * random.bell(), 0.002 * random.bell(), 0.004 * random.bell()};
   Json cells = Json::array();
@@ -85,10 +85,10 @@ TEST(MeasuredTruth, FurtherFlightsKeepAllItsRangesAsOftenAsItPromises) {
     width_N += (far.upper - far.lower) / 2 / campaigns;
     for (int i = 0; i < further; ++i) kept += keeps(residual_of_a_flight(random, 20), truth.envelope) ? 1 : 0;
   }
-  // Of 20 flights the 19th: 19/21 = 0.905 on the average; +-0.024 is three standard errors of 120 Beta(19, 2) draws and
-  // what 40 flights of each add.
+  // The 19th of 20 flights: 19/21 = 0.905 on average; +-0.024 is three standard errors of 120 Beta(19, 2) draws plus
+  // the contribution of 40 flights each.
   EXPECT_NEAR(kept / double(campaigns * further), 19.0 / 21, 0.024);
-  // At most twice what holds for one flight in ten at the worst of the axes alone: 1.64 constants and 2.6 noises.
+  // At most twice the range of nine in ten single flights for the worst axis: 1.64 constants and 2.6 noises.
   EXPECT_LT(width_N, 2 * (1.64 * 0.004 + 2.6 * 0.004));
 }
 
@@ -127,7 +127,7 @@ TEST(MeasuredTruth, TooFewFlightsAreRefusedWithTheNumberNeeded) {
   EXPECT_NE(what("large").find("at least 14"), std::string::npos) << "flights of another kind of vehicle";
 }
 
-/// The cell of residuals::place_of() as the envelope counts cells.
+/// Returns the cell of residuals::place_of() in the numbering of the envelope.
 std::size_t cell_at(const ResidualEnvelope& envelope, const std::vector<Eigen::Vector3d>& places) {
   std::vector<stability::Neighbour> neighbours(places.size());
   for (std::size_t i = 0; i < places.size(); ++i) neighbours[i].dp_W_m = places[i];

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Peaks 2 first + 0.5 second, times e^(noise), of gains that make the parts.
+/// Peaks 2 first + 0.5 second, times e^(noise), from gains that determine the parts.
 std::vector<FlownPeak> synthetic(int groups, double noise, unsigned seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> part(0.01, 0.1);

@@ -1,5 +1,5 @@
-/// parse_json() on any text: InputError, or a document that survives writing and reading. parse_hex_float() on any
-/// text: std::invalid_argument, or a number that survives both.
+/// Calls parse_json() with arbitrary text: InputError, or a document that survives a write and read. Calls
+/// parse_hex_float() with arbitrary text: std::invalid_argument, or a number that survives both.
 #include <cstdint>
 #include <cstdlib>
 #include <stdexcept>

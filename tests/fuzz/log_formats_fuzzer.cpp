@@ -1,4 +1,4 @@
-/// parse_raw() on any bytes: InputError, or a log that keeps the rules of RawLog.
+/// Calls parse_raw() with arbitrary bytes: InputError, or a log that satisfies the invariants of RawLog.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-/// parse_log() on any bytes: InputError, or samples that keep the invariants of Log.
+/// Calls parse_log() with arbitrary bytes: InputError, or samples that satisfy the invariants of Log.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>

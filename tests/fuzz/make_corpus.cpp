@@ -1,4 +1,4 @@
-/// make_corpus OUT [DATA]: seed files for the fuzz targets below OUT; the published networks of DATA join them.
+/// make_corpus OUT [DATA]: writes seed files for the fuzz targets below OUT, including the published networks in DATA.
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -28,7 +28,7 @@ class Corpus {
     fs::create_directories(folder_);
   }
 
-  /// `bytes`, and a few copies of it with one byte changed, one cut short and one with a piece repeated.
+  /// Adds `bytes`, and copies of it with one byte changed, truncated, and with a piece repeated.
   void add(const std::string& bytes) {
     write(bytes);
     for (int i = 0; i < 4 && !bytes.empty(); ++i) {
@@ -66,7 +66,7 @@ void add_samples(Corpus& corpus) {
   corpus.add(zip({{"inputs.npy", inputs}, {"outputs.npy", outputs}}));
 }
 
-/// The first byte is the fuzz target's choice of key.
+/// The first byte selects the key in the fuzz target.
 std::string with_key(char choice, const std::string& bytes) { return choice + bytes; }
 
 void add_weights(Corpus& corpus, const std::string& data) {

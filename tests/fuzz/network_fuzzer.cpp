@@ -1,4 +1,4 @@
-/// parse_network() on any text: InputError, or a network that keeps the invariant of Network.
+/// Calls parse_network() with arbitrary text: InputError, or a network that satisfies the invariant of Network.
 #include <cstdint>
 #include <cstdlib>
 

@@ -1,4 +1,4 @@
-/// parse_samples() and parse_npy() on any bytes: InputError, or as many finite numbers as are stated.
+/// Calls parse_samples() and parse_npy() with arbitrary bytes: InputError, or the stated number of finite numbers.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>

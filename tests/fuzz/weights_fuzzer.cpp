@@ -1,4 +1,4 @@
-/// parse_weights() on any bytes: InputError, or a network that keeps the invariant of Weights.
+/// Calls parse_weights() with arbitrary bytes: InputError, or a network that satisfies the invariant of Weights.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -47,7 +47,7 @@ void check_round_trip(const Weights& weights) {
 
 }  // namespace
 
-/// The first byte chooses the --key, so that nested checkpoints are reached as well.
+/// The first byte selects --key, so that nested checkpoints are reached as well.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   static const char* const kKeys[] = {"", "model", "model.net"};

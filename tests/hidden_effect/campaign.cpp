@@ -138,7 +138,7 @@ std::optional<Answer> ask_once(const std::vector<Hidden>& hidden, Program progra
   if (text != nullptr && !std::filesystem::exists(path)) {
     const std::optional<files::Shard> shard = files::shard_of(text);
     if (!shard) throw std::invalid_argument("SWARMCERT_CAMPAIGN_SHARD is not I/N: " + std::string(text));
-    std::uint32_t number = 0;  // of the run, the same in every process
+    std::uint32_t number = 0;  // of the run, the same in each process
     for (const char letter : name) number = 31 * number + static_cast<unsigned char>(letter);
     if (!shard->has(number)) return std::nullopt;
   }

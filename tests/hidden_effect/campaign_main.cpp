@@ -1,4 +1,4 @@
-/// Runs the campaigns of hidden effects and prints every answer and the shares: singles, pairs, singles in gusts,
+/// Runs the campaigns of hidden effects and prints each answer and the success rates: singles, pairs, singles in gusts,
 /// foreign forces, nulls.
 ///   hidden_effect_campaign [singles|pairs|disturbed|foreign|null] [first seed] [seeds] [program]
 #include <fmt/core.h>

@@ -1,4 +1,4 @@
-/// diagnose --against and --each: flights of the foreign simulator held against one another.
+/// diagnose --against and --each on flights of the foreign simulator.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ constexpr double kDrag_N_s_m = 0.02, kLag_s = 0.06, kFleetFlight_s = 30;
 
 class FlightsOfAFleet : public testing::Test {
  protected:
-  /// `folder`/cf1_<run> with a thrust of `factor` times the model's, drag and a lag.
+  /// Simulates `folder`/cf1_<run> with `factor` times the model's thrust, drag and a lag.
   void fly_at(const std::string& folder, int run, double factor, double drag = kDrag_N_s_m,
               double duration_s = kFleetFlight_s) {
     Truth truth;
@@ -56,7 +56,7 @@ TEST_F(FlightsOfAFleet, AgainstHealthyFlightsShowOnlyWhatChanged) {
   EXPECT_EQ(change["effect"], "thrust_ratio");
   EXPECT_EQ(change["vehicle"], "cf1");
   const files::Json& interval = change["parameters"]["ratio"]["interval_90"];
-  const double change_of_ratio = 1 + (0.88 - 0.95);  // as a factor, of the thrust that the model commands
+  const double change_of_ratio = 1 + (0.88 - 0.95);  // as a factor of the thrust commanded by the model
   EXPECT_LE(interval[0].get<double>(), change_of_ratio);
   EXPECT_GE(interval[1].get<double>(), change_of_ratio);
   const files::Json& vehicle = json["against"]["vehicles"][0];
@@ -67,7 +67,7 @@ TEST_F(FlightsOfAFleet, AgainstHealthyFlightsShowOnlyWhatChanged) {
 }
 
 TEST_F(FlightsOfAFleet, AChangeWithinTheScatterOfDaysIsNone) {
-  // Together these days look like a force that falls with the thrust, which none of them shows by itself.
+  // Pooled, these days look like a force that falls with the thrust, which none of them shows separately.
   const double days[] = {0.9, 0.95, 1.0};
   for (int run = 0; run < 3; ++run) fly_at(fmt::format("day_{}", run), run, days[run]);
   fly_at("today", 3, 0.92);

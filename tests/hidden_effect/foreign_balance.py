@@ -1,7 +1,7 @@
-"""Torques and weak rotors of foreign form: `diagnose` finds the axis or the rotor, and the variable.
+"""Torques and weak rotors without a form in the registry: `diagnose` finds the axis or the rotor, and the variable.
 
 Usage: foreign_balance.py TOOL MODEL FOLDER [--effects NAME,...] [--seeds FROM:TO] [--nothing N]
-Prints a line per case; exits 1 where the first torque or rotor in remainder[] is another one, or where flights without
+Prints a line per case; exits with 1 if the first torque or rotor in remainder[] is a wrong one, or if flights without
 any effect have one.
 """
 
@@ -18,11 +18,11 @@ FLIGHTS = 3
 
 
 def loses_above(rotor, force_N, share):
-    """One rotor gives less of what is asked for above a force."""
+    """One rotor gives only part of the commanded force above a threshold."""
     return lambda s, k, f: f - share * max(0.0, f - force_N) if k == rotor - 1 else f
 
 
-# variables: any of which is right; axis: of the first entry; slope: the true slope of the curve over the variable.
+# variables: any of these is correct; axis: of the first entry; slope: the true slope of the curve over the variable.
 BALANCES = {
     "roll of speed": dict(torque=lambda s: (3e-4 * s.speed, 0.0, 0.0), axis="roll", variables={"speed"}, slope=3e-4),
     "pitch of height": dict(torque=lambda s: (0.0, 4e-4 * s.p[2], 0.0), axis="pitch", variables={"z"}, slope=4e-4),
@@ -33,7 +33,7 @@ BALANCES = {
 
 
 def slope_of(curve):
-    """Least squares over the inner knots."""
+    """Returns the least squares slope over the inner knots."""
     points = [(p["at"][0], p.get("torque_Nm", p.get("force_N"))) for p in curve[1:-1]]
     x0 = sum(x for x, _ in points) / len(points)
     y0 = sum(y for _, y in points) / len(points)

@@ -1,7 +1,7 @@
-"""Flies hidden effects of foreign form, asks the tool, and judges its answers.
+"""Simulates hidden effects without a form in the registry, runs the tool, and judges its answers.
 
 Usage: foreign_campaign.py TOOL MODEL FOLDER [--effects NAME,...] [--seeds FROM:TO] [--nothing N] [--add]
-Prints a line per case and a summary; exits 1 where a share falls short of what is asked for.
+Prints a line per case and a summary; exits with 1 if a success rate is below its limit.
 """
 
 import argparse
@@ -30,7 +30,7 @@ def model_with_lag(path, folder, extra="", name="model.toml"):
 
 
 def argument_parser():
-    """The arguments that every campaign takes."""
+    """Returns the parser of the arguments common to all campaigns."""
     parser = argparse.ArgumentParser()
     parser.add_argument("tool")
     parser.add_argument("model")
@@ -78,7 +78,7 @@ def case(options, name, effect, seed):
 
 
 def held_out(options, folder, flights, model, effect):
-    """Errors on the test flight: of the formula that was found, and of the true one with its true numbers."""
+    """Returns the errors on the test flight of the formula found, and of the true formula with its true values."""
     new = os.path.join(folder, "new.toml")
     added = asked(options.tool, ["add", "formula", "--model", model, flights, "-o", new],
                   os.path.join(folder, "add.json"))

@@ -1,10 +1,10 @@
-"""Vehicles disturb one another; the logs' clocks differ, and no start of a set point tells by how much.
+"""Vehicles disturb one another; the clocks of their logs differ, and no common start of a setpoint shows by how much.
 
 Usage: foreign_clocks.py TOOL MODEL FOLDER [--seeds FROM:TO] [--fleets]
-Exits 1 where an offset is not found within its interval (widened by half, as the test is of few cases), or one is
-claimed where there is none or only a wake that arrives late, or a lag of the thrust is named, which no flight has.
---fleets: three and four vehicles with random clocks, instead of two. --add: also whether `add` and `study` read three
-logs with their clocks corrected: a fitted wake then leaves as little as where clocks agree.
+Exits with 1 if an offset is not found within its interval (widened by half, because there are few cases), if one is
+claimed although there is none or only a delayed wake, or if a lag of the thrust is reported, which no flight has.
+--fleets: three and four vehicles with random clocks instead of two. --add: also checks that `add` and `study` read
+three logs with corrected clocks: a fitted wake then leaves as little as with equal clocks.
 """
 
 import json
@@ -18,25 +18,25 @@ from foreign_campaign import argument_parser, asked, model_with_lag  # noqa: E40
 from foreign_names import is_inside, late_wake  # noqa: E402
 from foreign_simulator import fly  # noqa: E402
 
-# By how much the second clock is ahead, and how late wakes arrive, s.
+# How far the second clock is ahead, and the delay of wakes, s.
 CASES = [(0.15, 0.0), (-0.1, 0.0), (0.2, 0.15), (0.0, 0.2), (0.0, 0.0)]
-# Flights that begin in mid air: seed, when the logs begin, s. Thrust that answers the wakes looks like a lag.
+# Flights that begin in the air: seed, start of the logs, s. Thrust that reacts to wakes looks like a lag.
 MID_AIR = [(922, 5.0), (929, 6.0)]
-# Fleets where two clocks lie on both sides of the one in the middle, or late wakes looked like a small delay: seed,
-# from which their clocks are drawn (None: all alike), vehicles, how late wakes arrive, s.
+# Fleets in which two clocks are on either side of the middle one, or in which delayed wakes looked like a small delay:
+# seed from which the clocks are drawn (None: all equal), vehicles, delay of the wakes, s.
 FLEETS = [(215, 204, 4, 0.15), (113, None, 3, 0.2)]
 LAGS = {"delay", "motor_lag", "sensor_delay"}
-LEAST_OFFSET_S = 0.06  # below it the interval may hold zero
+LEAST_OFFSET_S = 0.06  # below this the interval may contain zero
 
 
 def right_offset(entry, ahead_s):
-    """Whether the interval holds the offset against the clock that the entry names."""
+    """Returns whether the interval contains the offset relative to the clock named in the entry."""
     offset_s = ahead_s[entry["vehicle"]] - ahead_s[entry["against"]]
     return is_inside(entry["parameters"]["offset_s"], offset_s, 1.5)
 
 
 def missed(found, ahead_s):
-    """Vehicles whose clock differs from that in the middle, beyond what an interval may hold, and is not found."""
+    """Returns vehicles whose clock differs detectably from the middle one and is not found."""
     middle = found[0]["against"] if found else sorted(ahead_s, key=ahead_s.get)[(len(ahead_s) - 1) // 2]
     named = [entry["vehicle"] for entry in found]
     return [v for v in ahead_s if v not in named and abs(ahead_s[v] - ahead_s[middle]) >= LEAST_OFFSET_S]
@@ -63,7 +63,7 @@ def case(options, seed, clocks_s, delay_s, from_s=4.0):
 
 
 def random_clocks(seed, vehicles, largest_s=0.2):
-    """The differences lie within what is searched."""
+    """Draws clocks whose differences are within the range of the search."""
     rng = random.Random(seed)
     return tuple(rng.uniform(-largest_s / 2, largest_s / 2) for _ in range(vehicles))
 
@@ -77,7 +77,8 @@ def fleets(options, seed):
 
 
 def added(options, name, seed, clocks_s):
-    """What `add` finds of the clocks, and what the fitted wake leaves; offsets that `study` finds."""
+    """Returns the clock offsets found by `add`, the remainder after the fitted wake, and the offsets found by
+    `study`."""
     folder = os.path.join(options.folder, name)
     shutil.rmtree(folder, ignore_errors=True)
     os.makedirs(folder)

@@ -1,9 +1,9 @@
-"""Whether intervals of 90 % hold the truth in nine of ten cases: thrust ratio, drag and motor lag, fitted together to
-flights of the foreign simulator, from still air to gusts as large as the effects.
+"""Checks that 90 % intervals contain the truth in nine of ten cases: thrust ratio, drag and motor lag, fitted together
+to flights of the foreign simulator, from still air to gusts as large as the effects.
 
 Usage: foreign_coverage.py TOOL MODEL FOLDER [--cases N] [--gusts N,N,...] [--first-seed N]
-Prints the held share of each parameter and gust. Exits 1 where all of the quiet flights are outside of LEAST_OF_ALL ..
-MOST_OF_ALL, or a parameter is held in less than LEAST_HELD of the quiet or of the loud ones.
+Prints the coverage of each parameter and gust. Exits with 1 if the coverage over all quiet flights is outside
+LEAST_OF_ALL .. MOST_OF_ALL, or if that of a parameter is below LEAST_HELD for the quiet or for the loud ones.
 """
 
 import argparse
@@ -20,13 +20,13 @@ from foreign_simulator import ROTOR_LAG_S, STEP_S, fly  # noqa: E402
 
 TRUTHS = {"ratio": 0.95, "drag_N_s_m": 0.02, "tau_s": ROTOR_LAG_S}
 EFFECTS = "thrust_ratio,drag_linear,motor_lag"
-GUST_S = 1.0  # after which a gust has forgotten itself
+GUST_S = 1.0  # correlation time of the gusts
 MOST_OF_QUIET_N = 0.005
 LEAST_HELD, LEAST_OF_ALL, MOST_OF_ALL = 0.8, 0.85, 0.98
 
 
 def gusty_drag(gust_N, seed):
-    """Linear drag and a Gauss-Markov force along each axis."""
+    """Returns linear drag plus a Gauss-Markov force along each axis."""
     rng = random.Random(seed)
     keep = math.exp(-STEP_S / GUST_S)
     gust = [gust_N * rng.gauss(0, 1) for _ in range(3)]

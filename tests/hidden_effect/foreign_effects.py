@@ -1,7 +1,8 @@
-"""Hidden effects that no effect of the tool's registry has the form of, with what a right answer is.
+"""Hidden effects whose forms are not in the tool's registry, with the correct answers.
 
-Each: force, torque or rotor as foreign_simulator.fly() takes them; `variables`, any of which is right; `names`, effects
-that may be named (what is of the same kind); `formula`, the true form as [effect.expression] with its true numbers.
+Each entry has force, torque or rotor as accepted by foreign_simulator.fly(); `variables`, any of which is correct;
+`names`, effects of the same kind that may be reported; `formula`, the true form as [effect.expression] with its true
+values.
 """
 
 import math
@@ -20,7 +21,7 @@ def expression(target, text, **parameters):
 
 
 def pull(law, **parameters):
-    """A horizontal force towards every neighbour."""
+    """A horizontal force towards each neighbour."""
     text = expression("force_x_N", law.format("dx"), **parameters)
     return text + f'force_y_N = "{law.format("dy")}"\nper_neighbour = true\n'
 
@@ -163,7 +164,7 @@ def suction(a=0.03, reach=0.3):
 
 
 def upwash(a=0.03, ahead=0.3, width=0.25):
-    """A lift beside every neighbour, on one side of it."""
+    """A lift on one side of each neighbour."""
     def force(s):
         places = [other(0.0) for other in s.others]
         return (0, 0, sum(a * math.exp(-((p[0] - s.p[0] - ahead) ** 2 + (p[1] - s.p[1]) ** 2) / (2 * width * width))
@@ -180,7 +181,7 @@ def cells_curve(full=4.15, bend=0.9):
 
 
 def late_draft(k=0.03, delay=0.3):
-    """Along the motion that every neighbour had some time ago."""
+    """A force along the past velocity of each neighbour."""
     def force(s):
         return (0, k * sum((other(delay)[1] - other(delay + 0.02)[1]) / 0.02 - s.v[1] for other in s.others), 0)
     return force

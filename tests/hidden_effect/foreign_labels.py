@@ -1,8 +1,8 @@
-"""Logs of two vehicles with the set points, the path, the sensors or the name of the other one, and wrong kinds.
+"""Logs of two vehicles with the setpoints, path, sensors or name of the other one, and wrong kinds.
 
 Usage: foreign_labels.py TOOL MODEL FOLDER [--effects CASE,...] [--seeds FROM:TO]
-Exits 1 where something mislabelled is not found, is found in another log or as something else, or where a scale of the
-thrust would explain it as well and no rival is named; and where anything is found in flights that are labelled well.
+Exits with 1 if a mislabelled stream is not found, is found in another log or as something else, or if a thrust scale
+would explain it equally well and no rival is listed; and if anything is found in correctly labelled flights.
 """
 
 import json
@@ -23,8 +23,8 @@ SET_POINTS = [name for name in VARIABLES if name.startswith("ctrltarget")]
 PATH = [f"stateEstimateZ.{axis}(h)" for axis in ("x", "y", "z", "vx", "vy", "vz")]
 SENSORS = [name for name in VARIABLES
            if name.startswith(("stateEstimateZ.a", "stateEstimateZ.q", "stateEstimateZ.rate", "pwm", "pm"))]
-# The other kind hovers at another duty: its mass, and its map in gram-force. One has the curve of the light vehicle's
-# map, at another scale; one depends on the duty alone.
+# The other kind hovers at another duty: its mass, and its thrust map in gram-force. One has the curve of the light
+# vehicle's map at another scale; one depends only on the duty.
 HEAVY_KG = 0.05
 MAP = {name.lower(): getattr(light, name) for name in ("C00", "C10", "C01", "C20", "C11")}
 SCALED_MAP = {name: 2.6 * value for name, value in MAP.items()}
@@ -59,7 +59,7 @@ def write(path, records):
 
 
 def exchange(flights, run, names):
-    """The columns `names` of the logs of both vehicles."""
+    """Returns the columns `names` of the logs of both vehicles."""
     paths = [os.path.join(flights, f"cf{k}_{run:02d}") for k in (1, 2)]
     first, second = (read(path) for path in paths)
     for one, other in zip(first, second):
@@ -77,7 +77,7 @@ def exchange_names(flights, run):
 
 
 def make_heavy(flights, run, thrust_map):
-    """The second vehicle, of the same motion, with more mass and rotors of this map."""
+    """Makes the second vehicle, with the same motion, heavier, with rotors of this map."""
     path = os.path.join(flights, f"cf2_{run:02d}")
     records = read(path)
     battery = VARIABLES.index("pm.vbatMV(H)")
@@ -90,7 +90,7 @@ def make_heavy(flights, run, thrust_map):
 
 
 def heavy_model(model, folder, thrust_map):
-    """As `model`, of the kind "heavy"."""
+    """Like `model`, for the kind "heavy"."""
     with open(model) as file:
         lines = file.read().split("\n")
     for i, line in enumerate(lines):
@@ -117,7 +117,7 @@ def fleet(folder, model_of):
 
 
 def two_kinds(options, folder, wrong, thrust_map):
-    """`wrong`: vehicles whose kind flights.toml has wrong."""
+    """`wrong`: vehicles with a wrong kind in flights.toml."""
     small = model_with_lag(options.model, folder)
     heavy = heavy_model(small, folder, thrust_map)
     models = {"cf1": small, "cf2": heavy}
@@ -140,7 +140,7 @@ def names_of_one_kind(options, folder, flights):
 
 
 def kinds(names_of_runs=(), wrong=(), thrust_map=None, stronger=1.0):
-    """`stronger`: by how much more the rotors give than the map of the model says."""
+    """`stronger`: ratio of the rotor thrust to the map of the model."""
     of_model = thrust_map or SCALED_MAP
 
     def prepare(options, folder, flights):
@@ -152,21 +152,21 @@ def kinds(names_of_runs=(), wrong=(), thrust_map=None, stronger=1.0):
     return prepare
 
 
-# How flights are made wrong; found: vehicle, to whom it belongs, a word of the statement; flights in which; rivals.
+# How flights are corrupted; found: vehicle, owner of the stream, a word of the finding; affected flights; rivals.
 CASES = {
     "set points": dict(prepare=streams(SET_POINTS, [1]),
                        found=[("cf1", "cf2", "set points"), ("cf2", "cf1", "set points")]),
     "path": dict(prepare=streams(PATH, [1]), found=[("cf1", "cf2", "path in"), ("cf2", "cf1", "path in")]),
     "sensors": dict(prepare=streams(SENSORS, [1]), found=[("cf1", "cf2", "sensors"), ("cf2", "cf1", "sensors")]),
-    "names of one kind": dict(prepare=names_of_one_kind, found=[]),  # nothing shows it
+    "names of one kind": dict(prepare=names_of_one_kind, found=[]),  # not detectable
     "names of two kinds": dict(prepare=kinds(names_of_runs=[1]),
                                found=[("cf1", "cf2", "log of"), ("cf2", "cf1", "log of")], no_names=["thrust_ratio"]),
     "kind": dict(prepare=kinds(wrong=["cf1"]), found=[("cf1", "small", "flies as")], rivals=["thrust_ratio"]),
-    # Without wakes the curve shows that no scale explains it.
+    # Without wakes the curve shows that no scale can explain it.
     "kind of another curve": dict(calm=True, prepare=kinds(wrong=["cf2"], thrust_map=OTHER_MAP),
                                   found=[("cf2", "heavy", "flies as")], no_names=["thrust_ratio"]),
     "two kinds labelled well": dict(prepare=kinds(), found=[]),
-    # Not of the other kind: rotors that give a third more than their model says.
+    # Not the other kind: rotors that give a third more than in their model.
     "stronger rotors": dict(prepare=kinds(stronger=1.35), found=[], names=["thrust_ratio"]),
 }
 

@@ -1,9 +1,9 @@
-"""Effects of the registry, flown by the foreign simulator: `diagnose` names them first, with values inside their
+"""Effects of the registry in flights of the foreign simulator: `diagnose` ranks them first, with values inside their
 intervals.
 
 Usage: foreign_names.py TOOL MODEL FOLDER [--effects NAME,...]
-Prints a line per case; exits 1 where a name is not first, a value is outside, or a flight without the effect has the
-name.
+Prints a line per case; exits with 1 if an effect is not ranked first, a value is outside its interval, or the effect is
+reported for a flight without it.
 """
 
 import json
@@ -18,7 +18,7 @@ from foreign_effects import saturation  # noqa: E402
 from foreign_simulator import GRAVITY, MASS_KG, fly  # noqa: E402
 
 FLIGHTS = 3
-# from intervals of 90 % to 99 %: every value lies inside of 99 %, and of all so many inside of 90 %
+# from 90 % to 99 % intervals: every value must be inside 99 %, and this many inside 90 %
 WIDER = 2.576 / 1.645
 LEAST_HELD = 0.8
 
@@ -55,8 +55,8 @@ def tether(k, anchor, slack):
     return force
 
 
-# truth: as foreign_simulator.fly() takes it; effect: its name in the registry, if it is not the case's; values:
-# parameters that flights show; rivals: what must or must not be one.
+# truth: as accepted by foreign_simulator.fly(); effect: its name in the registry, if different from the case's; values:
+# observable parameters; rivals: effects that must or must not be one.
 NAMED = {
     "com_offset": dict(truth=dict(torque=com_offset(0.004, -0.002)), values={"offset_x_m": 0.004, "offset_y_m": -0.002},
                        not_rivals=["torque_bias"], is_added=True),
@@ -111,7 +111,7 @@ def diagnosed(options, name, case):
     for run in range(case.get("flights", FLIGHTS)):
         fly(truth, 5, flights, run, case.get("vehicles", 1))
     model = model_with_lag(options.model, folder)
-    if case.get("is_added"):  # what `add` writes must lower the error of flights held out, and leave nothing to name
+    if case.get("is_added"):  # the result of `add` must reduce the error on held-out flights, and leave nothing to find
         fitted = os.path.join(folder, "fitted.toml")
         added = asked(options.tool, ["add", name, "--model", model, flights, "-o", fitted],
                       os.path.join(folder, "add.json"))

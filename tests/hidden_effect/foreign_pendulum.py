@@ -1,9 +1,9 @@
-"""A load on a string, flown by the foreign simulator: `diagnose` names it first, `add pendulum` writes it; a load that
-is fixed, and no load, are never one.
+"""A load on a string in flights of the foreign simulator: `diagnose` ranks it first, `add pendulum` fits it; it is
+never reported for a rigid load or without a load.
 
 Usage: foreign_pendulum.py TOOL MODEL FOLDER [--effects LENGTH,...]
-Prints a line per case; exits 1 where a name is another one, a number is outside, or the error of flights held out is
-more than 1.2 times that of the true load.
+Prints a line per case; exits with 1 if another effect is reported, a value is outside its interval, or the error on
+held-out flights is more than 1.2 times that of the true load.
 """
 
 import json
@@ -17,10 +17,10 @@ from foreign_campaign import argument_parser, asked, model_with_lag  # noqa: E40
 from foreign_simulator import GRAVITY, MASS_KG, STEP_S, fly  # noqa: E402
 
 FLIGHTS = 4
-SPEED = 1.4  # of the paths: without turns near its period a load does not swing
+SPEED = 1.4  # of the paths: a load swings only if turns are close to its period
 LOADS = [dict(mass_kg=0.006, length_m=0.35, damping_1_s=0.25), dict(mass_kg=0.004, length_m=0.2, damping_1_s=0.5),
          dict(mass_kg=0.010, length_m=0.6, damping_1_s=0.15)]
-WIDER = 2.576 / 1.645  # from intervals of 90 % to 99 %
+WIDER = 2.576 / 1.645  # from 90 % to 99 % intervals
 
 
 def dot(a, b):
@@ -28,8 +28,8 @@ def dot(a, b):
 
 
 def hanging(mass_kg, length_m, damping_1_s):
-    """The full pendulum: a mass point on a taut string of fixed length with friction against its swing, at any angle.
-    The tension follows from the string's length and from the masses at both of its ends."""
+    """The full pendulum: a point mass on a taut string of fixed length with friction against its swing, at any angle.
+    The tension follows from the length of the string and from the masses at its two ends."""
     def force(s):
         r, dr = s.memory.setdefault("load", ([0.0, 0.0, -length_m], [0.0, 0.0, 0.0]))
         n = [x / length_m for x in r]
@@ -53,7 +53,7 @@ def hanging(mass_kg, length_m, damping_1_s):
 
 
 def fixed(mass_kg):
-    """A rigid load takes its share of the thrust."""
+    """A rigid load takes up part of the thrust."""
     share = mass_kg / (MASS_KG + mass_kg)
     return lambda s: tuple(-share * s.thrust * s.R[i][2] for i in range(3))
 
@@ -91,7 +91,7 @@ def faults_of(load, ranking, held):
 
 
 def faults_of_add(options, folder, flights, model, load):
-    """Errors on the flight held out: of what `add` fitted, and of the true load."""
+    """Returns the errors on the held-out flight of the load fitted by `add`, and of the true load."""
     added = asked(options.tool, ["add", "pendulum", "--model", model, flights, "-o", os.path.join(folder, "new.toml")],
                   os.path.join(folder, "add.json"))
     before, after = added["ladder"][0]["test_rmse"], added["ladder"][-1]["test_rmse"]

@@ -1,8 +1,8 @@
-"""A quadrotor simulator for tests of `diagnose` and `add`, in plain Python: it shares no code with the tool.
+"""A quadrotor simulator for tests of `diagnose` and `add` in plain Python, which shares no code with the tool.
 
-Rigid body with four rotors of first order, position and attitude control at 500 Hz, forces and torques as any Python
-function of the state. Sensors: an accelerometer behind a two-pole low-pass of 30 Hz in the body's frame, noise, a clock
-that is skewed and late, and the quantisation of the log's integers. Logs are binary "old uSD" files.
+Rigid body with four first-order rotors, position and attitude control at 500 Hz, forces and torques as any Python
+function of the state. Sensors: an accelerometer with a two-pole low-pass of 30 Hz in the body frame, noise, a clock
+with skew and offset, and the quantisation of the log's integers. Logs are binary "old uSD" files.
 """
 
 import math
@@ -38,7 +38,7 @@ def duty_for(force_N, battery_V):
 
 
 class Wave:
-    """A sum of three sines of size at most 1, with derivatives."""
+    """A sum of three sines with amplitude at most 1, and its derivatives."""
 
     def __init__(self, rng, lowest_hz, highest_hz):
         self.parts = [(size, 2 * math.pi * rng.uniform(lowest_hz, highest_hz), rng.uniform(0, 2 * math.pi))
@@ -55,7 +55,7 @@ class Wave:
 
 
 class Path:
-    """Set points: waves around a centre, which begin after a second of standing still."""
+    """Setpoints: waves around a centre, which begin after a second at rest."""
 
     def __init__(self, rng, centre, reach, fastest_hz, yaw_reach):
         self.centre, self.reach = centre, reach
@@ -75,7 +75,7 @@ class Path:
 
 
 class State:
-    """What hidden effects may depend on: the truth, not what sensors say."""
+    """The variables on which hidden effects may depend: the truth, not sensor values."""
 
     def __init__(self, p):
         self.t = 0.0
@@ -86,7 +86,7 @@ class State:
         self.battery = 4.15
         self.R = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
         self.others = []  # positions of the other vehicles, now and in the past: others[j](seconds ago)
-        self.memory = {}  # of effects that remember; `a` of the last step
+        self.memory = {}  # of effects with memory; `a` is that of the last step
         self.a = [0.0, 0.0, 0.0]
 
     @property
@@ -120,7 +120,7 @@ class Sensors:
         self.records = []
 
     def feel(self, specific_B):
-        """Two poles of a Butterworth low-pass at 30 Hz, in four sub-steps."""
+        """A two-pole Butterworth low-pass at 30 Hz, in four sub-steps."""
         if self.y is None:
             self.y = list(specific_B)
         w, h = 2 * math.pi * 30, STEP_S / 4
@@ -163,7 +163,7 @@ def milli(value):
 
 
 def compressed(q):
-    """The firmware's 32-bit quaternion: which part is largest, then sign and nine bits of each of the others."""
+    """The firmware's 32-bit quaternion: index of the largest component, then sign and nine bits of each other one."""
     parts = [q[1], q[2], q[3], q[0]]
     largest = max(range(4), key=lambda i: abs(parts[i]))
     negate = parts[largest] < 0
@@ -194,7 +194,7 @@ class Vehicle:
         self.past = []
 
     def control(self, target):
-        """PID on the position, PD on the attitude, mixed to four rotors."""
+        """PID control of the position, PD control of the attitude, mixed to four rotors."""
         s = self.state
         p, v, a, yaw = target
         noise = self.sensors.rng.gauss
@@ -208,7 +208,7 @@ class Vehicle:
         self.commanded_N = max(0.1, min(0.55, sum(wanted[i] * b3[i] for i in range(3))))
         length = math.sqrt(sum(x * x for x in wanted))
         in_body = s.to_body([x / length for x in wanted])
-        error = [-in_body[1], in_body[0], wrapped(yaw - s.heading)]  # rotation from b3 to the wanted axis
+        error = [-in_body[1], in_body[0], wrapped(yaw - s.heading)]  # rotation from b3 to the desired axis
         torque = [INERTIA[0] * (400 * error[0] - 30 * s.w[0]), INERTIA[1] * (400 * error[1] - 30 * s.w[1]),
                   INERTIA[2] * (60 * error[2] - 15 * s.w[2])]
         f, x, y, z = (self.commanded_N / 4, torque[0] / (4 * ARM_M), torque[1] / (4 * ARM_M),
@@ -260,17 +260,17 @@ def wrapped(angle):
 
 
 def fly(truth, seed, folder, run=0, vehicles=1, duration_s=30.0):
-    """Flies and writes folder/cf<1 ...>_<run>. `truth`: force(state) in the world, torque(state) in the body, both in
-    SI units; rotor(state, index, thrust_N), what a rotor gives; discharge_V_s; accelerometer_scale; clocks_s, by how
-    much each log's clock is ahead; from_s, when the logs begin; apart_m, how far the others' paths are to the side.
-    Returns how far each log's clock is ahead in truth, s."""
+    """Simulates a flight and writes folder/cf<1 ...>_<run>. `truth`: force(state) in the world, torque(state) in the
+    body, both in SI units; rotor(state, index, thrust_N), what a rotor gives; discharge_V_s; accelerometer_scale;
+    clocks_s, by how much each log's clock is ahead; from_s, when the logs begin; apart_m, how far the others' paths are
+    to the side. Returns how far the clock of each log is truly ahead, s."""
     rng = random.Random(seed * 1000 + run)
     scale = truth.get("speed", 1.0)
     fleet = []
     first = Path(rng, (0.0, 0.0, 0.9), (0.8, 0.8, 0.5), 0.28 * scale, truth.get("yaw_reach", 2.0))
     for k in range(vehicles):
         path = first
-        if k > 0:  # dances around the first, below and above it
+        if k > 0:  # moves around the first one, below and above it
             path = Path(rng, (0.0, 0.0, 0.9), (0.8, 0.8, 0.55), 0.28 * scale, 1.0)
             path.waves[0], path.waves[1] = first.waves[0], first.waves[1]
             path = Around(path, Wave(rng, 0.1, 0.4), Wave(rng, 0.1, 0.4), truth.get("apart_m", 0.0))
@@ -295,7 +295,7 @@ def fly(truth, seed, folder, run=0, vehicles=1, duration_s=30.0):
 
 
 class Around:
-    """A path with two more waves to the sides, about a centre that is apart in x."""
+    """A path with two more lateral waves, about a centre that is offset in x."""
 
     def __init__(self, path, x, y, apart_m):
         self.path, self.more, self.apart_m = path, (x, y), apart_m

@@ -1,6 +1,5 @@
-/// Flights of a vehicle with an effect that the model does not know: compare, diagnose, add, compare again, by the
-/// command line. Truths come from a simulator of its own (other_simulator.h); a few from the library's, which users
-/// have.
+/// Flights of a vehicle with an effect missing from the model: compare, diagnose, add, and compare again on the command
+/// line. Most truths come from a separate simulator (other_simulator.h), a few from the library's, which users have.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -19,14 +18,14 @@
 namespace swarmcert::tests {
 namespace {
 
-/// A folder in which commands of the tool are run.
+/// A folder in which commands of the tool run.
 class Loop {
  public:
   explicit Loop(const ScratchFolder& folder) : folder_(folder) {
     nominal_ = read_text(source_path("stability/models/crazyflie-small.toml"));
     write_text(folder_ / "known.toml", nominal_ + kLag);
   }
-  /// Flies the library's own simulation with `effects` for 40 s on random walks, as flight `run`.
+  /// Runs the library's own simulation with `effects` for 40 s of random walks, as flight `run`.
   void fly(const std::string& effects, int seed, int run = 0, int vehicles = 2) {
     write_text(folder_ / "truth.toml", nominal_ + kLag + effects);
     demand(fmt::format(
@@ -60,12 +59,12 @@ double total_rmse(const files::Json& comparison) {
   return comparison["overall"]["rmse"]["total"].get<double>();
 }
 
-/// Counts of a campaign, printed with their intervals.
+/// Counts of a campaign, printed with their confidence intervals.
 struct Tally {
   int runs = 0, first = 0, exact = 0, found = 0, flagged = 0, named_nothing = 0, claimed_falsely = 0,
       valued = 0, right = 0, covered = 0;
-  int planned = 0;  ///< runs of the whole sweep
-  int missing = 0;  ///< of these, what other shards have still to fly
+  int planned = 0;  ///< runs of the complete sweep
+  int missing = 0;  ///< runs left to other shards
 
   void add(const Answer& answer) {
     ++runs;
@@ -108,7 +107,7 @@ Tally campaign(const std::vector<std::vector<Hidden>>& cases, Program program, s
   return tally;
 }
 
-/// Shares mean nothing before the whole sweep has been flown: a part of it, or none, is no pass.
+/// Success rates mean nothing before the complete sweep has been simulated: a partial or empty one must not pass.
 #define SWARMCERT_NEEDS_ALL_RUNS(tally)                                      \
   do {                                                                       \
     ASSERT_GT((tally).planned, 0);                                           \
@@ -128,7 +127,7 @@ std::vector<std::vector<Hidden>> nothing() {
   return {{{"nothing, alone", {}, {}, {}, 1}}, {{"nothing, two", {}, {}, {}, 2}}};
 }
 
-/// Another one with every commit: campaigns cannot be tuned to it.
+/// Changes with each commit, so that campaigns cannot be tuned to it.
 std::uint64_t seed_of_commit() {
   const Outcome outcome = run_shell("git -C '" + source_path("") + "' rev-parse HEAD", ".");
   return outcome.exit_code == 0 ? std::strtoull(outcome.output.substr(0, 8).c_str(), nullptr, 16) : 1;
@@ -189,8 +188,8 @@ TEST(HiddenEffect, OfTheLibrarysSimulationIsFoundAddedAndTheErrorFalls) {
   }
 }
 
-/// Three flights, because the goals of one walk of 40 s need not lie low: of the seeds 3 .. 6 two show the ground
-/// alone.
+/// Three flights, because the goals of a single walk of 40 s need not be low: of the seeds 3 .. 6 only two show the
+/// ground effect alone.
 TEST(HiddenEffect, GroundShowsOnSimulatedRandomWalks) {
   const ScratchFolder folder;
   Loop loop(folder);
@@ -219,7 +218,7 @@ TEST(HiddenEffect, AFormulaOfTheModelFileIsACandidate) {
   EXPECT_TRUE(loop.run("diagnose new.toml flights", "diagnose")["ranking"].empty());
 }
 
-/// Coefficients and shapes of a formula start from the model's values, and do not stay there.
+/// Coefficients and shapes of a formula start from the model's values but do not stay there.
 TEST(HiddenEffect, AFormulaWithValuesIsFittedAnew) {
   const ScratchFolder folder;
   Loop loop(folder);
@@ -237,7 +236,7 @@ TEST(HiddenEffect, AFormulaWithValuesIsFittedAnew) {
   }
 }
 
-/// What has no name is fitted by its formula, and by a curve, on flights that the fit has not seen.
+/// An effect without a name is fitted by its formula and by a curve, and evaluated on held-out flights.
 TEST(HiddenEffect, WithoutANameIsAddedAsAFormulaAndAsAShape) {
   const ScratchFolder folder;
   Loop loop(folder);
@@ -257,7 +256,7 @@ TEST(HiddenEffect, WithoutANameIsAddedAsAFormulaAndAsAShape) {
     const double before = ladder[0]["test_rmse"], after = ladder[1]["test_rmse"], floor = 0.0065;
     EXPECT_GT(before, 2 * floor) << "the truth is worth adding";
     EXPECT_LT(after, 0.6 * before) << what;
-    // What was added is part of the model that simulates.
+    // The added effect is part of the simulated model.
     loop.demand("swarmcert simulate hover -q --force --vehicles 1 --duration 3 --model new.toml --gains " +
                 source_path("controller/gains/crazyflie-small.toml") + " -o flown");
   }
@@ -280,7 +279,7 @@ TEST(HiddenEffect, OffsetsThatDifferByVehicleAreFoundByVehicle) {
   EXPECT_TRUE(loop.run("diagnose new.toml flights", "diagnose")["ranking"].empty());
 }
 
-/// A gust moves the vehicle over the ground: the controller's answer bends amplitude and decay alike.
+/// A gust moves the vehicle over the ground: the controller's reaction biases amplitude and decay alike.
 TEST(HiddenEffect, IntervalsOfTheGroundHoldItsAmplitudeUnderAGust) {
   constexpr int kFlights = 20;
   constexpr double kAmplitude = 0.16;
@@ -310,8 +309,9 @@ TEST(HiddenEffect, IntervalsOfTheGroundHoldItsAmplitudeUnderAGust) {
   EXPECT_GE(held, 0.8 * kFlights) << share(held, kFlights);
 }
 
-/// Thrust that answers a gust gives the force a slope over thrust; beside a constant force that fits, and set points
-/// say that it is not there. What is left is one push upwards or downwards, by which of three causes nobody can tell.
+/// Thrust that reacts to a gust gives the force an apparent slope over thrust; with a constant force beside it the fit
+/// is good, but setpoints contradict the slope. What is left is one upward or downward force with three possible causes
+/// that cannot be distinguished.
 TEST(HiddenEffect, AMassInAStrongGustIsNamedAsAClass) {
   const ScratchFolder folder;
   Loop loop(folder);
@@ -336,7 +336,7 @@ TEST(HiddenEffect, AMassInAStrongGustIsNamedAsAClass) {
   EXPECT_GE(named, 2);
 }
 
-/// Injected into recorded flights, most of a payload looks like the vehicles' own constant offsets.
+/// Injected into recorded flights, most of a payload looks like the constant offsets of the vehicles.
 TEST(HiddenEffect, APayloadInRecordedFlightsIsNamedAtLeastAsARival) {
   SWARMCERT_NEEDS_DATA();
   const ScratchFolder folder;
@@ -360,7 +360,7 @@ TEST(HiddenEffect, APayloadInRecordedFlightsIsNamedAtLeastAsARival) {
   }
 }
 
-/// Never near the floor, where the effect counts as acting: its amplitude is defined at 0.06 m.
+/// The flights never come near the floor, where the effect counts as acting: its amplitude is defined at 0.06 m.
 TEST(HiddenEffect, GroundIsFoundByFlightsThatStayAboveIt) {
   const ScratchFolder folder;
   Loop loop(folder);
@@ -454,7 +454,8 @@ TEST(HiddenEffect, CampaignOfFalseClaims_slow) {
     const Tally tally = campaign(nothing(), program, seed, 30);
     count(tally, tally.runs - tally.named_nothing);
   }
-  // Effects that slow flights and hovering do not show: another name is a false claim, silence is none.
+  // Effects that slow flights and hovering do not show: reporting another effect is a false claim, reporting none is
+  // correct.
   for (const Program program : {Program::kSlow, Program::kHover}) {
     const Tally tally = campaign(each(single_effects()), program, seed, 4);
     count(tally, tally.claimed_falsely);
@@ -466,7 +467,7 @@ TEST(HiddenEffect, CampaignOfFalseClaims_slow) {
   EXPECT_LE(all.flagged, 0.05 * all.runs);
 }
 
-/// This program again, as the last of so many shards that none of its runs are its own.
+/// Runs this program again as the last of so many shards that it has no runs of its own.
 TEST(HiddenEffect, NoSweepPassesWithoutItsRuns) {
   const ScratchFolder folder;
   const std::string sweeps =

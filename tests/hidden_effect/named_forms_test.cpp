@@ -1,5 +1,5 @@
-/// Effects of the registry that a scan points to, hidden in flights of the foreign simulator: diagnose names them, and
-/// their true values lie in the intervals.
+/// Effects of the registry suggested by a scan, hidden in flights of the foreign simulator: diagnose reports them, and
+/// their true values are within the intervals.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 
 constexpr double kWeight_N = 0.034 * 9.81, kRotorLag_s = 0.06;
 
-/// What is hidden, and numbers of it that flights show.
+/// The hidden effect and its values that are observable in these flights.
 struct NamedTruth {
   std::string effect;
   std::function<Vector3d(const Moment&)> force_N;
@@ -101,7 +101,7 @@ TEST_P(NamedForm, IsNamedAloneWithItsValuesInTheirIntervals) {
   for (const auto& [parameter, value] : hidden.values) {
     const files::Json& fitted = named["parameters"][parameter];
     ASSERT_TRUE(fitted.contains("interval_90")) << parameter << named.dump(1);
-    // Of eight intervals of 90 % one misses; these are of 99 %.
+    // One of eight 90 % intervals is expected to miss, so 99 % intervals are used.
     const double lower = fitted["interval_90"][0], upper = fitted["interval_90"][1];
     const double more = 0.5 * (upper - lower) * (2.576 / 1.645 - 1);
     EXPECT_LE(lower - more, value) << parameter;

@@ -50,7 +50,7 @@ class Noise {
   std::normal_distribution<double> bell_;
 };
 
-/// Sums of sines with random frequencies and phases; a wave of size at most 1.
+/// Sums of sines with random frequencies and phases; the amplitude is at most 1.
 struct Wave {
   struct Part {
     double size, omega_rad_s, phase;
@@ -61,7 +61,7 @@ struct Wave {
     for (const double size : {0.5, 0.3, 0.2})
       parts.push_back({size, 2 * kPi * noise.uniform(lowest_hz, highest_hz), noise.uniform(0, 2 * kPi)});
   }
-  /// Value and first two derivatives.
+  /// Returns the value and the first two derivatives.
   std::array<double, 3> at(double t) const {
     std::array<double, 3> sum{};
     for (const Part& part : parts) {
@@ -78,8 +78,8 @@ struct Target {
   Vector3d p, v, a;
 };
 
-/// One vehicle's path: each axis is a centre and a few waves. All stand still for a second, then start together, as
-/// the published flights do: that is how clocks are found.
+/// The path of one vehicle: each axis has a centre and a few waves. All vehicles stand still for a second and then
+/// start together, like the published flights, so that clock offsets can be found.
 struct Path {
   struct Part {
     int axis;
@@ -88,7 +88,7 @@ struct Path {
   };
   Vector3d centre;
   std::vector<Part> parts;
-  double rise_1_s = 0;  ///< of z, besides the waves
+  double rise_1_s = 0;  ///< of z, in addition to the waves
 
   Target at(double t) const {
     const double since = std::max(t - 1, 0.0);
@@ -121,7 +121,7 @@ std::vector<Path> paths_of(const FlightPlan& plan, Noise& noise) {
         const double start = noise.uniform(0, 2 * kPi), rise_1_s = noise.uniform(0.9, 1.3);
         paths.push_back({{0, 0, start}, waves({0.7, 0.7, 1}, 0.1, 0.3), rise_1_s});
         if (i == 0) break;
-        // Sideways it dances around the first one, so that they pass below and above each other.
+        // Laterally it moves around the first one, so that they pass below and above each other.
         std::vector<Path::Part>& parts = paths.back().parts;
         parts[0].wave = paths[0].parts[0].wave;
         parts[1].wave = paths[0].parts[1].wave;
@@ -139,8 +139,8 @@ std::vector<Path> paths_of(const FlightPlan& plan, Noise& noise) {
   return paths;
 }
 
-/// Heights of the rich program: up and down between both ends, each time at another speed, so that both are visited.
-/// On input z is a wave that goes on rising; on output a height.
+/// Heights of the rich program: up and down between both limits at varying speeds, so that both are reached. On input z
+/// is a wave that keeps rising; on output it is a height.
 void fold_height(const FlightPlan& plan, Target& target) {
   if (plan.program != Program::kRich) return;
   constexpr double kHighest_m = 1;
@@ -151,7 +151,7 @@ void fold_height(const FlightPlan& plan, Target& target) {
   target.a.z() = half * (std::cos(angle) * rate * rate + std::sin(angle) * change);
 }
 
-/// Two poles of a Butterworth low-pass at 30 Hz, by its own differential equation in small steps.
+/// A two-pole Butterworth low-pass at 30 Hz, integrated in small steps.
 struct Accelerometer {
   Vector3d y = Vector3d::Zero(), dy = Vector3d::Zero();
   bool filled = false;
@@ -200,8 +200,8 @@ Vector3d hidden_force(const Truth& truth, const std::vector<Vehicle>& all, std::
   return truth.force_N(now);
 }
 
-/// Position control, on what an estimator with slowly varying errors says: sets the command and returns the desired
-/// thrust axis.
+/// Position control based on an estimator with slowly varying errors: sets the command and returns the desired thrust
+/// axis.
 Vector3d control(Vehicle& vehicle, const Target& target, Noise& noise) {
   const double decay = std::exp(-kControlEvery * kStep_s / 0.02), fresh = std::sqrt(1 - decay * decay);
   for (int axis = 0; axis < 3; ++axis) {
@@ -278,7 +278,7 @@ void fly(const Truth& truth, const FlightPlan& plan, const std::string& folder, 
       Vehicle& it = vehicles[i];
       const Target target = target_of(i, time_s);
       if (k % kControlEvery == 0) wanted_axis[i] = control(it, target, noise);
-      // A cell with inner resistance that empties within a few minutes.
+      // A cell with internal resistance that is empty after a few minutes.
       it.spent_J += it.command_N * kStep_s;
       it.battery_V = 4.15 - 0.012 * it.spent_J - 0.35 * it.command_N;
       const double mapped_N = 4 * rotor_gf(it.duty, it.battery_V / 4.2) * kG_m_s2 / 1000;
@@ -304,7 +304,7 @@ void fly(const Truth& truth, const FlightPlan& plan, const std::string& folder, 
         it.p.z() = kFloor_m;
         it.v.z() = std::max(it.v.z(), 0.0);
       }
-      // Attitude: rates that turn b3 onto its wanted direction and keep the heading, behind 25 ms.
+      // Attitude: rates that rotate b3 to its desired direction and hold the heading, with a lag of 25 ms.
       const Vector3d axis_W = b3.cross(wanted_axis[i]);
       Vector3d rates = 12 * (it.q.conjugate() * axis_W);
       rates.z() = -4 * std::atan2(it.q.toRotationMatrix()(1, 0), it.q.toRotationMatrix()(0, 0));

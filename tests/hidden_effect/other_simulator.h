@@ -1,8 +1,8 @@
-/// @file A multirotor simulator that shares no equation with stability/: truths for tests of identification.
+/// @file A multirotor simulator that shares no equations with stability/, as ground truth for tests of identification.
 ///
 /// Point-mass translation, attitude that follows its command through a rate loop, rotors of first or second order,
-/// forces as any C++ function. Semi-implicit Euler at 1 kHz: accurate to far less than the sensors' noise. Only the
-/// bytes of the log come from the library (stability/simulation/flight_log.h), because the format is tested elsewhere.
+/// forces as any C++ function. Semi-implicit Euler at 1 kHz, with errors far below the sensor noise. Only the bytes of
+/// the log come from the library (stability/simulation/flight_log.h), because the format is tested elsewhere.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,12 +13,12 @@
 
 namespace swarmcert::tests {
 
-/// What a hidden force may depend on.
+/// The variables on which a hidden force may depend.
 struct Moment {
   double time_s = 0;
   Eigen::Vector3d p_m, v_m_s;
-  Eigen::Vector3d b1, b2, b3;  ///< axes of the body, in the world
-  double thrust_N = 0;         ///< behind the rotors' lag
+  Eigen::Vector3d b1, b2, b3;  ///< body axes, in the world
+  double thrust_N = 0;         ///< after the rotor lag
   double battery_V = 4.2;
   struct Other {
     Eigen::Vector3d dp_m;  ///< its position minus ours
@@ -27,17 +27,17 @@ struct Moment {
   std::vector<Other> others;
 };
 
-/// How the vehicles differ from what the model file says.
+/// Differences between the vehicles and the model file.
 struct Truth {
   double mass_factor = 1;
   double thrust_factor = 1;
   double battery_1_V = 0;   ///< relative thrust per volt above 4.2 V
   double motor_lag_s = 0;   ///< first pole
-  double motor_lag2_s = 0;  ///< second pole: with both, a motor of second order
+  double motor_lag2_s = 0;  ///< second pole: with both, a second-order motor
   double command_delay_s = 0;
   double sensor_delay_s = 0;
-  Eigen::Vector3d imu_bias_m_s2 = Eigen::Vector3d::Zero();  ///< in the body
-  double gust_N = 0;  ///< standard deviation per axis of a force of first order
+  Eigen::Vector3d imu_bias_m_s2 = Eigen::Vector3d::Zero();  ///< in the body frame
+  double gust_N = 0;  ///< standard deviation per axis of a first-order process
   double gust_time_s = 0.5;
   std::function<Eigen::Vector3d(const Moment&)> force_N;  ///< empty: none
 };
@@ -56,7 +56,7 @@ struct FlightPlan {
   double lowest_m = 0.085;  ///< of the rich program
 };
 
-/// Flies and writes `folder`/cf<1 ...>_<run>.
+/// Simulates a flight and writes `folder`/cf<1 ...>_<run>.
 void fly(const Truth& truth, const FlightPlan& plan, const std::string& folder, int run = 0);
 
 }  // namespace swarmcert::tests

@@ -1,4 +1,4 @@
-/// A weak rotor, flown in simulation: `add` fits the factors of the rotors, and `diagnose --each` shows them.
+/// A weak rotor in simulation: `add` fits the rotor factors, and `diagnose --each` shows them.
 #include <gtest/gtest.h>
 
 #include <string>

@@ -1,4 +1,4 @@
-/// A lag of the motors beside a scale of the thrust: the motors' thrust is scaled after it has lagged.
+/// A motor lag beside a thrust scale: the thrust of the motors is scaled after the lag.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kScaledLag_s = 0.07, kFactor = 0.72;
 
-/// Two flights of motors that give 0.72 of what the model says, and with a lag.
+/// Simulates two flights of motors that give 0.72 of the modelled thrust, with a lag.
 void fly_worn_motors(const std::string& folder) {
   Truth truth;
   truth.thrust_factor = kFactor;
@@ -23,7 +23,7 @@ void fly_worn_motors(const std::string& folder) {
     fly(truth, {Program::kRich, 1, 40, static_cast<std::uint64_t>(900 + run)}, folder, run);
 }
 
-/// The intervals of 90 % hold both numbers; a lag of the thrust that the model says would be 0.72 of 70 ms.
+/// The 90 % intervals contain both values; a lag of the modelled thrust would be 0.72 of 70 ms.
 void expect_both(const files::Json& effects) {
   int seen = 0;
   for (const files::Json& entry : effects) {
@@ -50,7 +50,7 @@ TEST(ScaledLag, IsFittedWithTheScaleBesideIt) {
   expect_both(files::read_json(folder / "result.json", "swarmcert/diagnose/1")["ranking"]);
 }
 
-/// The model's own ratio acts on the thrust behind the lag as one that is fitted does.
+/// The model's own ratio acts on the thrust after the lag, like a fitted one.
 TEST(ScaledLag, IsFittedBehindTheModelsOwnScale) {
   const ScratchFolder folder;
   fly_worn_motors(folder / "flights");

@@ -21,14 +21,14 @@ Vector3d multirotor_ground(const Moment& now, double radius_m) {
   return now.thrust_N * (1 / (1 - loss) - 1) * now.b3;
 }
 
-/// Gain at the floor and a dip above it, as published flights show.
+/// Gain at the floor and a dip above it, as in published flights.
 Vector3d ground_with_dip(const Moment& now) {
   const double h = now.p_m.z() - 0.06;
   const double bump = (now.p_m.z() - 0.19) / 0.04;
   return now.thrust_N * (0.2 * std::exp(-h / 0.04) - 0.01 * std::exp(-bump * bump / 2)) * now.b3;
 }
 
-/// Each of the upper vehicle's rotors blows by itself.
+/// Each rotor of the upper vehicle has a separate jet.
 Vector3d jet_per_rotor(const Moment& now) {
   double sum_N = 0;
   for (const Moment::Other& other : now.others) {
@@ -71,8 +71,8 @@ Vector3d jet_gaussian(const Moment& now, double amplitude_N) {
   return {0, 0, -sum_N};
 }
 
-/// Wide rotors under a ceiling at 1.25 m: 1 / (1 - a (R / gap)^2), Sanchez-Cuevas's measured form. Steeper ones pull
-/// the vehicle up faster than its controller lets go.
+/// Wide rotors below a ceiling at 1.25 m: 1 / (1 - a (R / gap)^2), the form measured by Sanchez-Cuevas. With steeper
+/// ones the ceiling effect overpowers the controller.
 Vector3d rational_ceiling(const Moment& now) {
   const double gap_m = std::max(1.25 - now.p_m.z(), 0.2);
   return now.thrust_N * (1 / (1 - 0.8 * std::pow(0.1 / gap_m, 2)) - 1) * now.b3;
@@ -126,7 +126,7 @@ Truth together(const Truth& a, const Truth& b) {
 std::vector<Hidden> single_effects() {
   const std::set<std::string> constant = {"constant_force"};
   std::vector<Hidden> all = {
-      // What is too heavy by a twentieth seems to have a twentieth less thrust.
+      // A mass that is too large by a twentieth looks like a twentieth less thrust.
       valued(signals("mass", [](Truth& t) { t.mass_factor = 1.05; }, {"thrust_ratio"}), "ratio",
              1 / 1.05 - 1),
       valued(signals("thrust", [](Truth& t) { t.thrust_factor = 1.08; }, {"thrust_ratio"}), "ratio", 0.08),

@@ -1,4 +1,4 @@
-/// @file What hidden effects there are: truths of the library's form and of others.
+/// @file The hidden effects: truths of the library's form and of other forms.
 #pragma once
 
 #include <set>
@@ -9,33 +9,33 @@
 
 namespace swarmcert::tests {
 
-/// Time constant of the rotors wherever a truth has a lag.
+/// Time constant of the rotors for all truths with a lag.
 inline constexpr double kUsualLag_s = 0.06;
 
-/// One hidden effect, or none.
+/// A hidden effect, or none.
 struct Hidden {
   std::string name;
   Truth truth;
-  std::set<std::string> answers;  ///< names that are right, any of them
+  std::set<std::string> answers;  ///< correct names, any of them
   std::set<std::string> allowed =
-      {};  ///< may be named besides: what the library's form leaves of another form
+      {};  ///< may also be reported: what the library's form leaves of another form
   int vehicles = 1;
-  bool is_foreign = false;  ///< gust, or a force outside the library: must be flagged as unexplained
-  /// Same-form truths: the parameter and its true value.
+  bool is_foreign = false;  ///< gust or force outside the library: must be flagged as unexplained
+  /// For truths of the library's form: the parameter and its true value.
   std::string parameter = {};
   double value = 0;
   double tolerance = 0.1;
 };
 
-/// At least ten single effects, of the library's form and of others.
+/// Returns at least ten single effects of the library's form and of other forms.
 std::vector<Hidden> single_effects();
-/// Gusts and forces that no effect of the library has.
+/// Returns gusts and forces that no effect of the library describes.
 std::vector<Hidden> foreign_forces();
-/// Single effects in a gust: both must be said.
+/// Returns single effects in a gust: both must be reported.
 std::vector<std::vector<Hidden>> disturbed();
-/// Pairs of `single_effects()` at once.
+/// Returns pairs of `single_effects()`.
 std::vector<std::vector<Hidden>> pairs();
-/// Both truths at once.
+/// Returns a truth with both effects.
 Truth together(const Truth& a, const Truth& b);
 
 }  // namespace swarmcert::tests

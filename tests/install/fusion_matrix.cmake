@@ -1,4 +1,5 @@
-# guarded.cpp under every compiler, optimisation level and contraction flag: always the bits that main.cpp expects.
+# Builds guarded.cpp with every compiler, optimisation level and contraction flag: always the bits that main.cpp
+# expects.
 #   cmake -DSCRATCH=... -DSOURCE=... -DCOMPILER=... -P fusion_matrix.cmake
 cmake_minimum_required(VERSION 3.25)
 

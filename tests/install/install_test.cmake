@@ -1,4 +1,4 @@
-# Installs the build into a scratch prefix and builds what users would build on it.
+# Installs the build to a scratch prefix and builds user projects with it.
 #   cmake -DBUILD=... -DSCRATCH=... -DCOMPILER=... -DFLAGS=... -DOBJDUMP=... -P install_test.cmake
 cmake_minimum_required(VERSION 3.25)
 
@@ -17,7 +17,7 @@ set(configure ${CMAKE_COMMAND} -G Ninja -DCMAKE_PREFIX_PATH=${prefix} -DCMAKE_CX
 file(REMOVE_RECURSE ${SCRATCH})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix} --strip)
 
-# Programs that ship do not say where they were built.
+# Shipped programs do not contain the path of the build.
 cmake_path(SET source_folder NORMALIZE ${CMAKE_CURRENT_LIST_DIR}/../..)
 string(REGEX REPLACE "/$" "" source_folder "${source_folder}")
 string(REGEX REPLACE "([][+.*?()^$|\\\\])" "\\\\\\1" pattern "${source_folder}")
@@ -32,14 +32,14 @@ foreach(program IN LISTS programs)
   endif()
 endforeach()
 
-# Compilers that tune for some processors fuse no sums; tuned for this one they do.
+# Compilers that tune for certain processors do not fuse sums; when tuning for this one they do.
 cmake_host_system_information(RESULT processor QUERY OS_PLATFORM)
 set(fusing "-O2 -march=native -ffp-contract=fast")
 if(processor STREQUAL "x86_64")
   string(APPEND fusing " -mtune=haswell")
 endif()
 
-# The evaluator needs no package, and no flag of its user changes its bits.
+# The evaluator needs no other package, and no compiler flag of its user changes its bits.
 run(${configure} -S ${CMAKE_CURRENT_LIST_DIR}/consumer -B ${SCRATCH}/consumer
     "-DCMAKE_CXX_FLAGS=${FLAGS} ${fusing}"
     -DCMAKE_DISABLE_FIND_PACKAGE_PkgConfig=ON -DCMAKE_DISABLE_FIND_PACKAGE_nlohmann_json=ON
@@ -49,7 +49,7 @@ run(${CMAKE_COMMAND} --build ${SCRATCH}/consumer)
 run(${SCRATCH}/consumer/consumer --expect-fused)
 message("${output}")
 
-# The instruction itself: fused multiply-adds on x86-64 and aarch64.
+# Checks for the instructions themselves: fused multiply-adds on x86-64 and aarch64.
 if(OBJDUMP)
   set(fused "[ \t](vfn?m(add|sub)[0-9a-z]*|fn?m(add|sub)|fml[as])[ \t]")
   foreach(symbol guarded_evaluate_f32 guarded_evaluate_f64 unguarded_multiply_add)

@@ -1,6 +1,6 @@
-# What a package of the tool holds, and that it works from there.
+# Checks the contents of the package of the tool, and that it works from there.
 #   cmake -DBUILD=... -DSCRATCH=... -DVERSION=... [-DDEB=ON] [-DPYTHON=python3] -P package_test.cmake
-# DEB=ON makes the packages themselves with cpack, otherwise the components are installed as cpack would. PYTHON: the Python
+# DEB=ON builds the packages with cpack, otherwise the components are installed as cpack would do. PYTHON: the Python
 # package is part of the build.
 cmake_minimum_required(VERSION 3.25)
 
@@ -22,7 +22,7 @@ if(DEB)
   file(GLOB packages ${SCRATCH}/packages/*.deb)
   run(dpkg --print-architecture)
   string(STRIP "${output}" architecture)
-  # The proved checker, where there is OCaml to build it: a package that needs nothing but GMP and the C library.
+  # The proved checker, if OCaml is available to build it: a package that needs only GMP and the C library.
   set(checker ${SCRATCH}/packages/swarmcert-check-proved_${VERSION}_${architecture}.deb)
   if(checker IN_LIST packages)
     list(REMOVE_ITEM packages ${checker})
@@ -59,8 +59,8 @@ if(DEB)
   string(REGEX MATCH "Depends: ([^\n]*)" depends "${output}")
   string(REGEX REPLACE ", " ";" depends "${CMAKE_MATCH_1}")
   list(LENGTH depends count)
-  # Shared libraries only, no -dev package, no plotting, no solver of the size of a distribution. Three of them read
-  # compressed and SQLite logs.
+  # Only shared libraries, no -dev package, no plotting, no large solver. Three
+  # of them read compressed and SQLite logs.
   if(count GREATER 15 OR depends MATCHES "-dev|gnuplot")
     message(FATAL_ERROR "${count} dependencies: ${depends}")
   endif()
@@ -108,11 +108,11 @@ foreach(page swarmcert swarmcert-certify)
   if(help2man)
     run(gzip -dc ${root}/usr/share/man/man1/${page}.1.gz)
     if(NOT output MATCHES " ${VERSION}\"")
-      message(FATAL_ERROR "${page}.1 is of another version")
+      message(FATAL_ERROR "${page}.1 has a different version")
     endif()
   endif()
 endforeach()
-# Bundled files are found beside the tool: the demo names where it read them.
+# Bundled files are found beside the tool: the demo prints where it read them.
 run(${root}/usr/bin/swarmcert demo -q -o ${SCRATCH}/demo)
 if(NOT output MATCHES "${root}/usr/share/swarmcert/networks/demo/network.toml")
   message(FATAL_ERROR "the packaged tool reads its networks elsewhere:\n${output}")

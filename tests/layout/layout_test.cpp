@@ -1,4 +1,4 @@
-// The layout of the source tree: which folder may include which, and that every folder explains itself.
+// The layout of the source tree: allowed includes between folders, and a README in each folder.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,8 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// One library, or several folders that form one: what they may include besides themselves. A folder that is not listed
-/// belongs to its nearest listed parent.
+/// A library, or several folders that form one, and what they may include besides themselves. A folder that is not
+/// listed belongs to its nearest listed parent.
 struct Layer {
   std::string folder;
   std::vector<std::string> may_include;
@@ -25,7 +25,7 @@ struct Layer {
 
 const std::vector<Layer>& layers() {
   static const std::vector<Layer> all = {
-      // From the bottom up. A layer may include layers above it in this list only; the first test checks that.
+      // From the bottom up. A layer may include only layers above it in this list; the first test checks that.
       {"nn", {}},
       {"nn/base", {}},
       {"nn/weights", {"nn", "nn/base"}},
@@ -130,7 +130,7 @@ const std::vector<Layer>& layers() {
   return all;
 }
 
-/// The layer of a folder: the longest listed path that it is or lies in; "" if none.
+/// Returns the layer of a folder: the longest listed path that contains it; "" if there is none.
 std::string layer_of(const std::string& folder) {
   std::string found;
   for (const Layer& layer : layers()) {
@@ -140,7 +140,7 @@ std::string layer_of(const std::string& folder) {
   return found;
 }
 
-/// Paths of the files in these folders with one of these endings, relative to the source tree, in order.
+/// Returns the sorted paths, relative to the source tree, of the files in these folders with one of these extensions.
 std::vector<std::string> files_in(const std::vector<std::string>& folders,
                                   const std::set<std::string>& endings) {
   std::vector<std::string> found;
@@ -158,7 +158,7 @@ std::vector<std::string> product_sources() {
   return files_in({"nn", "controller", "lipschitz", "stability", "analysis"}, {".h", ".cpp", ".inc"});
 }
 
-/// What `source` includes with quotation marks, by path from the source tree.
+/// Returns what `source` includes with quotation marks, as paths from the source tree.
 std::vector<std::string> includes(const std::string& source) {
   std::ifstream in(fs::path(SWARMCERT_SOURCE_DIR) / source);
   std::vector<std::string> found;
@@ -219,7 +219,7 @@ TEST(Layout, ACommandIncludesNoOtherCommandButThoseListed) {
   }
 }
 
-/// The headers that CMake installs, by path from the source tree.
+/// Returns the headers installed by CMake, as paths from the source tree.
 std::set<std::string> installed_headers() {
   std::set<std::string> found;
   for (const char* top : {"nn", "controller", "lipschitz", "stability"}) {
@@ -263,7 +263,7 @@ TEST(Layout, EveryInstalledHeaderIsIncludedByATest) {
     EXPECT_EQ(included.count(header), 1U) << header << ": users have it, and no test uses it directly";
 }
 
-/// The sources of each library, by path from the source tree.
+/// Returns the sources of each library, as paths from the source tree.
 std::map<std::string, std::vector<std::string>> library_sources() {
   std::map<std::string, std::vector<std::string>> found;
   for (const std::string& list : files_in({"nn", "lipschitz", "stability", "analysis"}, {".txt"})) {
@@ -281,7 +281,7 @@ std::map<std::string, std::vector<std::string>> library_sources() {
   return found;
 }
 
-/// Constants and types that a source defines in its unnamed namespaces.
+/// Returns constants and types that a source defines in its unnamed namespaces.
 std::vector<std::string> unnamed_names(const std::string& source) {
   std::ifstream in(fs::path(SWARMCERT_SOURCE_DIR) / source);
   std::vector<std::string> found;
@@ -319,8 +319,8 @@ TEST(Layout, ConstantsAndTypesInUnnamedNamespacesHaveNamesOfTheirOwnInALibrary) 
   EXPECT_GT(seen, 500U);
 }
 
-/// The README of every folder that holds one of `sources` is at most a page long and names each of them, by its name
-/// without the ending.
+/// Expects that the README of each folder with one of `sources` is at most a page long and names each of them, without
+/// its extension.
 /// @return the number of folders
 std::size_t expect_readmes_that_name(const std::vector<std::string>& sources) {
   std::map<fs::path, std::string> readmes;

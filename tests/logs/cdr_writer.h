@@ -1,4 +1,4 @@
-/// @file Serialized ROS 2 messages (CDR) byte by byte.
+/// @file Writes serialized ROS 2 messages (CDR) byte by byte.
 #pragma once
 
 #include <algorithm>
@@ -48,7 +48,7 @@ class CdrWriter {
   std::string data_;
 };
 
-/// geometry_msgs/PoseStamped at x, y, z.
+/// Returns a geometry_msgs/PoseStamped at x, y, z.
 inline std::string cdr_pose(double x, double y, double z, bool is_big_endian = false) {
   return CdrWriter(is_big_endian).header(5, 250'000'000, "world").doubles(x, y, z, 0, 0, 0, 1).message();
 }

@@ -1,4 +1,4 @@
-/// columns.toml drafted for tables whose columns have meaningless names.
+/// Drafts of columns.toml for tables with meaningless column names.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kDegreesPerRadian = 180 / 3.14159265358979323846;
 
-/// A vehicle that swings in a room, its thrust axis along acceleration + g, with yaw 0.
+/// A vehicle that oscillates in a room, with its thrust axis along acceleration + g and yaw 0.
 struct Flight {
   double x, y, z, vx, vy, vz, roll, pitch;
   explicit Flight(double t) {

@@ -24,7 +24,7 @@ logs::RawLog csv_of(const std::string& text) {
   return log;
 }
 
-/// What cfclient writes: integers, floats as Python prints them.
+/// A file as written by cfclient: integers, and floats as Python prints them.
 std::string cfclient_csv(int first, int last) {
   std::string text = "Timestamp,stabilizer.roll,pm.vbat,motor.m1\n";
   for (int k = first; k < last; ++k)

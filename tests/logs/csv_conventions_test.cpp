@@ -1,4 +1,4 @@
-/// CSV as other programs and countries write it: separators, decimal commas, dates, comments, axes that point down.
+/// CSV conventions of other programs and countries: separators, decimal commas, dates, comments, downward axes.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ logs::Log convention(const std::string& text, const std::string& columns = "") {
                          : logs::parse_log(in, "flight.csv", logs::parse_columns(columns, "columns.toml"));
 }
 
-/// Records of a position and a velocity each 10 ms: time as `clock` writes it, x = 0.25 k.
+/// Records of a position and a velocity every 10 ms: time formatted by `clock`, x = 0.25 k.
 template <typename Clock>
 std::string positions(const Clock& clock, char separator = ',', char point = '.', int count = 60) {
   std::string text;
@@ -74,7 +74,7 @@ TEST(CsvConventions, DatesAndTimesOfTheDayAreClocks) {
   expect_positions(
       convention(head + positions([](int k) { return fmt::format("10:15:{:05.2f}", 7 + 0.01 * k); })),
       "time of the day");
-  // The last day of February of leap years: 2000-02-29 is day 11016.
+  // 29 February of a leap year: 2000-02-29 is day 11016.
   const logs::Log leap =
       convention(head + positions([](int k) { return fmt::format("2000-02-29T00:00:{:05.2f}", 0.01 * k); }));
   EXPECT_EQ(leap.epoch_s, 11016.0 * 86400);
@@ -107,7 +107,7 @@ TEST(CsvConventions, ATableOfWhichNoLineCanBeReadIsRefusedWithTheFirstOfThem) {
   EXPECT_EQ(refusal_of_csv("t,px,py,pz\nnoon,1,2,3\n1,2,3,oops\n").substr(0, 45),
             "flight.csv: line 2: t = \"noon\": is no number;");
   EXPECT_EQ(refusal_of_csv("# a\n# t,px,py,pz\n1,2,3\n2,3,4\n").substr(0, 62),
-            "flight.csv: line 3: cells: are not as many as the header names");
+            "flight.csv: line 3: cells: do not match the number of names in the header");
   EXPECT_NE(refusal_of_csv("time,px,py,pz\n2026-13-02T10:15:07,1,2,3\n").find("is no number"),
             std::string::npos);
   EXPECT_NE(refusal_of_csv(std::string("\x1F\x8B\x08\x00", 4)).find("is compressed; unpack it"),
@@ -131,7 +131,7 @@ TEST(CsvConventions, AColumnWithoutAnyNumberIsMissingAndCostsNoRecord) {
   }
 }
 
-/// A climb by 1 m with the nose 30 degrees to the left: z up, and the same with z down.
+/// A climb by 1 m with the nose 30 degrees to the left, with z up or z down.
 std::string climb(bool down, const std::string& head) {
   std::string text = head;
   const double yaw = 0.5235987755982988, s = down ? -1 : 1;
@@ -161,7 +161,7 @@ TEST(CsvConventions, NorthEastDownIsTurnedUpWhereNamesSayIt) {
   const std::string rest = ",q0,q1,q2,q3,ax,ay,az,m1,m2,m3,m4,vbat\n";
   const logs::Log ned = convention(climb(true, "t,north,east,down,vn,ve,vd" + rest));
   expect_climb(ned);
-  // The accelerometer's z points down as well; y is 0.1 to the right.
+  // The accelerometer's z also points down; y is 0.1 to the right.
   EXPECT_NEAR(ned.samples[100].specific_force_m_s2[2], 9.80665 + 0.5, 1e-5);
   expect_climb(convention(climb(false, "t,east,north,up,ve,vn,vu" + rest)));
 }

@@ -143,7 +143,7 @@ TEST(Dataflash, FindsItsWayAfterDamageAndCountsIt) {
   const logs::RawLog log = dataflash_of(dataflash_definitions() + dataflash_counts(0, 10) +
                                         std::string(333, '\xA3') + dataflash_counts(10, 20));
   EXPECT_EQ(log.health.damaged_blocks, 1u);
-  // The message before the damage cannot be told from one with a wrong length.
+  // The message before the damage cannot be distinguished from one with a wrong length.
   EXPECT_EQ(counts_in_dataflash(log), joined(range(0, 9), range(10, 20)));
   EXPECT_EQ(log.health.skipped_bytes, 333u + dataflash_counts(0, 1).size());
 }
@@ -163,7 +163,7 @@ TEST(Dataflash, EndingAnywhereKeepsTheWholeMessages) {
 TEST(Dataflash, RefusesWhatItCannotRead) {
   EXPECT_TRUE(refuses([] { dataflash_of(""); }, {"flight.bin", "the file is empty"}));
   EXPECT_TRUE(refuses([] { dataflash_of("\xA3\x95\x05 something"); },
-                      {"offset 0", "definition of a format", "ArduPilot"}));
+                      {"offset 0", "format definition", "ArduPilot"}));
 }
 
 TEST(Dataflash, EveryDamagedByteGivesALogOrARefusal) {

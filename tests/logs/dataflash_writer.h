@@ -1,4 +1,4 @@
-/// @file ArduPilot dataflash logs byte by byte, so that tests can damage them.
+/// @file Writes ArduPilot dataflash logs byte by byte, so that tests can damage them.
 #pragma once
 
 #include <cstdint>
@@ -46,7 +46,7 @@ inline std::string dataflash_parameter(const std::string& name, float value, flo
   return dataflash_message(
       203, bytes_of(std::uint64_t{2'000'000}) + fixed_text(name, 16) + bytes_of(value) + bytes_of(standard));
 }
-/// Counts as float, one each 10 ms from 1 s on.
+/// Returns counts as floats, one every 10 ms starting at 1 s.
 inline std::string dataflash_counts(int first, int last) {
   std::string bytes;
   for (int k = first; k < last; ++k)

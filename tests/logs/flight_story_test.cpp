@@ -1,4 +1,4 @@
-/// Events of flights, and clocks that vehicles share.
+/// Events in flights, and clocks shared by several vehicles.
 #include "analysis/logs/flight_story.h"
 
 #include <fmt/core.h>
@@ -19,7 +19,7 @@
 namespace swarmcert::tests {
 namespace {
 
-/// A log of 12 s at 250 Hz in the air whose roll angle is `roll(t)`.
+/// Returns a log of 12 s in flight at 250 Hz with the roll angle `roll(t)`.
 logs::Log rolling(const std::function<double(double)>& roll_rad) {
   logs::Log log;
   log.signals.rates = true;
@@ -60,11 +60,11 @@ TEST(LimitCycles, DampedOscillationsManoeuvresAndVibrationAreNone) {
                 return t < 2 ? 0
                              : 0.3 * std::exp(-0.1 * kTwoPi * 2 * (t - 2)) * std::sin(kTwoPi * 2 * (t - 2));
               }).empty());
-  // A slalom of 0.4 rad at 0.4 Hz: what a trajectory asks for.
+  // A slalom of 0.4 rad at 0.4 Hz, as a trajectory may command.
   EXPECT_TRUE(cycles_of([](double t) { return 0.4 * std::sin(kTwoPi * 0.4 * t); }).empty());
   // 0.02 rad at 20 Hz, whose rate is 2.5 rad/s.
   EXPECT_TRUE(cycles_of([](double t) { return 0.02 * std::sin(kTwoPi * 20 * t); }).empty());
-  // One period of another length in four.
+  // One period in four has a different length.
   EXPECT_TRUE(cycles_of([](double t) {
                 return 0.15 * std::sin(kTwoPi * 2 * t + 2.5 * std::sin(kTwoPi * 0.5 * t));
               }).empty());
@@ -72,8 +72,8 @@ TEST(LimitCycles, DampedOscillationsManoeuvresAndVibrationAreNone) {
 
 TEST(LimitCycles, OfTheFlightsThatOscillateAreFoundAndOfTheirRepetitionNot) {
   SWARMCERT_NEEDS_DATA();
-  // Named by independent scripts: 29, 76, 113, 119 and 146 oscillate, 113_2 with the same gains does not. 26, 78 and
-  // 129 do as well: four and more equal periods of 6 degrees or more, in hover and at the end of the trajectory.
+  // According to independent scripts, 29, 76, 113, 119 and 146 oscillate, and 113_2 with the same gains does not. So do
+  // 26, 78 and 129, with four or more equal periods of at least 6 degrees, in hover and at the end of the trajectory.
   std::set<std::string> cycling;
   std::size_t flights = 0;
   for (const auto& entry :
@@ -103,13 +103,13 @@ logs::RawLog with_receiver(const std::string& topic, const std::vector<std::stri
 }
 
 TEST(AbsoluteTime, ComesFromTheReceiversOfPx4AndArduPilot) {
-  // 0 where the receiver has no time yet; the vehicle's clock started 1772419700 s after 1970.
+  // 0 while the receiver has no time yet; the vehicle's clock started 1772419700 s after 1970.
   const logs::RawLog px4 = with_receiver("vehicle_gps_position", {"time_utc_usec"},
                                          {{10, 0}, {20, 1772419720e6}, {30, 1772419730e6}});
   EXPECT_NEAR(logs::receiver_offset_s(px4), 1772419700, 1e-3);
   EXPECT_NEAR(logs::absolute_span_s(px4).lower, 1772419710, 1e-3);
   EXPECT_NEAR(logs::absolute_span_s(px4).upper, 1772419730, 1e-3);
-  // 2026-03-02 02:48:40 UTC is 96538 s into week 2408 of the receivers, whose clock is 18 s ahead.
+  // 2026-03-02 02:48:40 UTC is 96538 s into GPS week 2408; GPS time is 18 s ahead.
   const logs::RawLog ardupilot =
       with_receiver("GPS", {"GWk", "GMS"}, {{20, 2408, 96538e3}, {21, 2408, 96539e3}});
   EXPECT_NEAR(logs::receiver_offset_s(ardupilot), 1772419720 - 20, 1e-3);
@@ -118,8 +118,8 @@ TEST(AbsoluteTime, ComesFromTheReceiversOfPx4AndArduPilot) {
 
 TEST(Collections, DerivedAccelerationReachesTheNoiseFloorsOfCalmFlight) {
   SWARMCERT_NEEDS_DATA();
-  // Floors of independent scripts for a velocity over 100 ms, m/s^2: calm flight with motion capture 0.02, others as
-  // flown.
+  // Noise floors of a velocity over 100 ms according to independent scripts, m/s^2: calm flight with motion capture
+  // 0.02, others as flown.
   const std::pair<const char*, double> floors_m_s2[] = {
       {"crazyswarm2-tools/logs", 0.02}, {"crazypad", 0.13}, {"nanobench", 0.09}};
   for (const auto& [folder, floor_m_s2] : floors_m_s2) {

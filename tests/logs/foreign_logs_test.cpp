@@ -1,5 +1,5 @@
-/// Logs as other programs write them: a bag that was written by none of ours, ArduPilot's messages as its releases
-/// define them, and velocities whose frame no name tells.
+/// Logs as written by other programs: a bag from another writer, ArduPilot messages as defined by its releases, and
+/// velocities whose frame no name states.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@
 namespace swarmcert::tests {
 namespace {
 
-/// The column as a function of the message's number.
+/// Expects the column to be a function of the message's number.
 void expect_column(const logs::RawLog& log, const std::string& topic, const std::string& column,
                    const std::function<double(int)>& value) {
   const std::vector<double> values = values_in(log, topic, column);
@@ -28,7 +28,7 @@ void expect_column(const logs::RawLog& log, const std::string& topic, const std:
     EXPECT_EQ(values[static_cast<std::size_t>(k)], value(k)) << topic << " " << column << " " << k;
 }
 
-/// The numbers are those that the generator of this file wrote, and that a reader of other authors finds in it.
+/// The numbers are those written by the generator of this file, and found in it by another reader.
 TEST(ForeignLogs, ABagOfAnotherWriterGivesItsNumbers) {
   const logs::RawLog log = logs::read_raw(source_path("tests/logs/data/reference_sqlite.db3"));
   EXPECT_EQ(broken_rule(log), "");
@@ -46,7 +46,7 @@ TEST(ForeignLogs, ABagOfAnotherWriterGivesItsNumbers) {
   expect_column(log, "/cf1/pose", "pose.orientation.w", [](int) { return 0.8; });
   EXPECT_EQ(topic_of(log, "/cf1/pose").texts.at("header.frame_id"), "world");
   EXPECT_NEAR(topic_of(log, "/cf1/pose").time_s[3], 1700000000.153456789, 1e-6);
-  // Texts of 3, 6, 9 and 3 characters stand before these numbers.
+  // These numbers follow texts of 3, 6, 9 and 3 characters.
   expect_column(log, "/cf1/odom", "pose.pose.position.z", [](int k) { return 3.0 * k; });
   expect_column(log, "/cf1/odom", "pose.pose.orientation.y", [](int) { return -0.5; });
   expect_column(log, "/cf1/odom", "twist.twist.linear.x", [](int k) { return k / 8.0; });
@@ -61,7 +61,7 @@ TEST(ForeignLogs, ABagOfAnotherWriterGivesItsNumbers) {
   EXPECT_EQ(values_in(log, "/tf[cf2]", "transform.translation.y"), (std::vector<double>{1, 1}));
 }
 
-/// An angular velocity is no velocity, and an orientation that an IMU does not fill in is not the vehicle's.
+/// An angular velocity is not a velocity, and an orientation that an IMU leaves empty is not the attitude.
 TEST(ForeignLogs, SignalsOfABagComeFromTheMessagesThatCarryThem) {
   const logs::Log log = logs::read_log(source_path("tests/logs/data/reference_sqlite.db3"));
   std::map<std::string, std::string> from;
@@ -72,7 +72,8 @@ TEST(ForeignLogs, SignalsOfABagComeFromTheMessagesThatCarryThem) {
   EXPECT_EQ(from["battery"], "/cf1/battery: voltage");
 }
 
-/// A vehicle that moves sideways with its nose turned by 1 rad; velocities along the axes of `body` or of the world.
+/// A vehicle that moves sideways with its nose turned by 1 rad, with velocities along the axes of the `body` or of the
+/// world.
 logs::Log turned_flight(bool body, bool has_position = true) {
   std::string text = "t,pose.orientation.x,pose.orientation.y,pose.orientation.z,pose.orientation.w";
   text += ",twist.linear.x,twist.linear.y,twist.linear.z";
@@ -105,7 +106,7 @@ TEST(ForeignLogs, TheFrameOfATwistFollowsFromThePositions) {
 TEST(ForeignLogs, ATwistWithoutPositionsIsTakenInTheWorldAndSaysSo) {
   const logs::Log log = turned_flight(true, false);
   ASSERT_FALSE(log.interpretation.empty());
-  EXPECT_NE(log.interpretation[0].find("nothing can tell"), std::string::npos) << log.interpretation[0];
+  EXPECT_NE(log.interpretation[0].find("cannot be checked"), std::string::npos) << log.interpretation[0];
 }
 
 /// A topic of a PX4 log at 50 Hz for 4 s; `value` gives column c at record k.
@@ -122,7 +123,7 @@ logs::RawTopic px4_topic(const std::string& name, int instance, const std::vecto
   return topic;
 }
 
-/// A battery that is not there and outputs without motors come first, as on boards with two power ports and an IO chip.
+/// An absent battery and outputs without motors come first, as on boards with two power ports and an IO chip.
 TEST(ForeignLogs, OfSeveralInstancesTheFirstThatChangesIsInUse) {
   logs::RawLog raw;
   raw.path = "flight.ulg";
@@ -148,7 +149,7 @@ TEST(ForeignLogs, OfSeveralInstancesTheFirstThatChangesIsInUse) {
   EXPECT_NEAR(log.samples[100].position_m[2], 1.5, 1e-12);
 }
 
-/// Formats, units and multipliers as ArduPilot's releases from 4.1 on define them (libraries/*/LogStructure.h).
+/// Formats, units and multipliers as defined by ArduPilot since release 4.1 (libraries/*/LogStructure.h).
 std::string ardupilot_definitions() {
   return dataflash_definitions() +
          dataflash_format(20, 56, "XKF1", "QBccCfffffffccce",
@@ -177,8 +178,8 @@ std::string floats(std::initializer_list<double> values) {
   return bytes;
 }
 
-/// North 0.3 sin 3 t, down -1 - 0.1 sin 2 t, at 100 Hz for 4 s, with a second estimator core and a second IMU that give
-/// nonsense; motors 1 to 4 on outputs 9 to 12, between 1100 and 1900 us.
+/// North 0.3 sin 3 t, down -1 - 0.1 sin 2 t, at 100 Hz for 4 s, with invalid values from a second estimator core and a
+/// second IMU; motors 1 to 4 on outputs 9 to 12, between 1100 and 1900 us.
 std::string ardupilot_flight(bool states_outputs) {
   std::string log = ardupilot_definitions();
   for (int n = 1; n <= 4 && states_outputs; ++n)

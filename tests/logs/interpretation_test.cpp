@@ -1,5 +1,5 @@
-/// From columns to signals: units, frames and signs that the data decide, signals that are derived, and the flights of
-/// several collections.
+/// From columns to signals: units, frames and signs decided from the data, derived signals, and the flights of several
+/// collections.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// A vehicle that swings sideways: x = 0.3 sin 3 t, y = 0.2 sin 2 t, z = 1, its thrust axis along acceleration + g.
+/// A vehicle that oscillates: x = 0.3 sin 3 t, y = 0.2 sin 2 t, z = 1, with its thrust axis along acceleration + g.
 struct Swing {
   double t, x, y, vx, vy, ax, ay, roll, pitch;
 
@@ -46,7 +46,7 @@ struct Swing {
   double load() const { return std::sqrt(ax * ax + ay * ay + logs::kGravity_m_s2 * logs::kGravity_m_s2); }
 };
 
-/// CSV of the swing at 100 Hz for 8 s; `cells` gives what follows position and velocity.
+/// Returns a CSV of the oscillation at 100 Hz for 8 s; `cells` gives the columns after position and velocity.
 logs::Log swing(
     const std::string& names, const std::function<std::string(const Swing&)>& cells,
     const std::function<std::string(double)>& clock = [](double t) { return fmt::format("{:.4f}", t); }) {
@@ -69,7 +69,7 @@ const logs::SignalInfo& signal(const logs::Log& log, const std::string& name) {
   return none;
 }
 
-/// Largest distance of the thrust axis from that of the swing, over the middle of the log.
+/// Returns the largest error of the thrust axis over the middle of the log.
 double axis_error(const logs::Log& log) {
   double largest = 0;
   for (std::size_t i = 50; i + 50 < log.samples.size(); ++i) {
@@ -277,7 +277,7 @@ TEST(FlightStory, SplitsALogIntoGroundTakeoffFlightAndLanding) {
   std::string text = "t,px,py,pz,vx,vy,vz,m1,m2,m3,m4,vbat\n";
   for (int k = 0; k < 1500; ++k) {
     const double t = 0.01 * k;
-    // On a table of 0.4 m until 3 s, up to 1.4 m within 1 s, down again from 10 to 11 s.
+    // Stands on a table 0.4 m high until 3 s, climbs to 1.4 m within 1 s, and descends from 10 to 11 s.
     const double up = std::clamp(t - 3, 0.0, 1.0) - std::clamp(t - 10, 0.0, 1.0);
     const double speed = (t > 3 && t < 4) ? 1 : (t > 10 && t < 11) ? -1 : 0;
     const bool flies = t > 3 && t < 11;
@@ -318,7 +318,8 @@ std::vector<std::string> logs_of(const std::string& folder, std::size_t most) {
   return chosen;
 }
 
-/// Share of the samples of CrazyPAD logs whose applied duty is within 20 counts of what request and battery give.
+/// Returns the fraction of the samples of CrazyPAD logs whose applied duty is within 20 counts of the one computed from
+/// request and battery voltage.
 double share_within_20_counts(std::size_t most) {
   std::size_t all = 0, near = 0;
   for (const std::string& path : logs_of("crazypad", most)) {
@@ -351,14 +352,15 @@ TEST(Collections, DutyFollowsFromRequestAndBatteryWithin20CountsInEveryLog_slow)
   EXPECT_GE(share_within_20_counts(1000), 0.99);
 }
 
-/// Opens logs of every collection without renaming one, and checks what can be judged.
+/// Opens logs of each collection under their own names, and checks what can be judged.
 void check_collections(std::size_t most) {
   struct Collection {
     const char* folder;
     std::array<bool, 3> axes;
     logs::ThrustSource thrust;
     logs::TorqueUse torque;
-    double noise_m_s2;  ///< 1.3 times the floor of the derived acceleration that independent scripts found
+    /// 1.3 times the noise floor of the derived acceleration found by independent scripts.
+    double noise_m_s2;
   };
   const Collection collections[] = {
       {"crazypad", {false, false, true}, logs::ThrustSource::kDuty, logs::TorqueUse::kMean, 1.3 * 0.13},
@@ -396,7 +398,7 @@ TEST(Collections, AllOpenWithTheAxesThatTheirColumnsCarry_slow) {
 
 TEST(Collections, TheSimulatedPx4FlightHoversAtTheCommandThatItsEstimatorFinds) {
   SWARMCERT_NEEDS_DATA();
-  // Its own estimator says 0.488.
+  // The vehicle's own estimator gives 0.488.
   const logs::Log log = logs::read_log(data_path("collections/px4/sample_px4_events.ulg"));
   EXPECT_GE(log.hover_command, 0.47);
   EXPECT_LE(log.hover_command, 0.51);

@@ -1,5 +1,5 @@
-/// Traps of real logs, each in a flight of its own: integers at their ends, angles and counters that wrap, groups at
-/// different rates, heads before a gap, several hops, delays, rotor speeds, commanded forces.
+/// Pitfalls of real logs, each in its own flight: saturated integers, wrapping angles and counters, groups at different
+/// rates, headers before a gap, several hops, delays, rotor speeds, commanded forces.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ bool says(const logs::Log& log, const std::string& words) {
                      [&](const std::string& line) { return line.find(words) != std::string::npos; });
 }
 
-/// Up and down by 0.1 m about a height of 1 m, with the load that this takes in units of the weight.
+/// Vertical oscillation of 0.1 m about a height of 1 m, with the required thrust in units of the weight.
 struct Bob {
   double z, vz, load;
   explicit Bob(double t)
@@ -108,7 +108,7 @@ TEST(LogTraps, AHeadBeforeAGapDoesNotBendTheFirstAcceleration) {
     return fmt::format("{0:.3f},0,0,{1:.5f},0,0,{2:.5f},{3:.5f},{3:.5f},{3:.5f},{3:.5f},3.9\n", t, z, bob.vz,
                        0.6 * std::sqrt(bob.load));
   };
-  for (int k = 0; k < 4; ++k) text += line(0.01 * k, 0);  // before the pause the vehicle stood elsewhere
+  for (int k = 0; k < 4; ++k) text += line(0.01 * k, 0);  // before the pause the vehicle was elsewhere
   for (int k = 0; k < 800; ++k) text += line(1.2 + 0.01 * k, Bob(1.2 + 0.01 * k).z);
   const logs::Log log = parse_text(text);
   EXPECT_EQ(log.health.gaps, 1u);

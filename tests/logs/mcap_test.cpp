@@ -21,7 +21,7 @@ logs::RawLog mcap_of(const std::string& bytes) {
   return logs::read_mcap(in, "bag.mcap");
 }
 
-/// x of the poses that arrived: their numbers.
+/// Returns x of the poses that were read: their numbers.
 std::vector<double> poses_in_mcap(const logs::RawLog& log) {
   return values_in(log, "/cf1/pose", "pose.position.x");
 }
@@ -46,7 +46,7 @@ TEST(Mcap, GivesMessagesInAndOutsideChunks) {
   EXPECT_FALSE(log.health.truncated || log.health.checksum_failed);
 }
 
-/// The numbers are those that the generator of these files wrote.
+/// The numbers are those written by the generator of these files.
 TEST(Mcap, ReadsWhatTheReferenceWriterWrote) {
   for (const char* const name : {"reference_zstd.mcap", "reference_lz4.mcap"}) {
     const logs::RawLog log = logs::read_raw(source_path(std::string("tests/logs/data/") + name));
@@ -93,7 +93,7 @@ TEST(Mcap, AChunkThatFailsItsChecksumIsLeftOut) {
 }
 
 TEST(Mcap, DefinitionsOfADamagedChunkAreTakenFromElsewhere) {
-  // The definitions stand in the first chunk, which is damaged, and in the summary.
+  // The definitions are in the first chunk, which is damaged, and in the summary.
   std::string first = mcap_chunk(mcap_pose_definitions() + mcap_poses(0, 5));
   first[first.size() - 1] ^= 1;
   const logs::RawLog log = mcap_of(mcap_magic() + mcap_header() + first + mcap_chunk(mcap_poses(5, 9)) +
@@ -170,8 +170,7 @@ TEST(Mcap, ChannelsOfOneTopicAreInstances) {
 TEST(Mcap, SizesOfChunksAreNotBelieved) {
   const std::string records = mcap_poses(0, 4);
   std::string large = mcap_chunk(records);
-  large.replace(9 + 16, 8,
-                bytes_of(~std::uint64_t{0}));  // the size that it claims to have without compression
+  large.replace(9 + 16, 8, bytes_of(~std::uint64_t{0}));  // the stated uncompressed size
   const logs::RawLog log = mcap_of(pose_file(large + mcap_poses(4, 6)));
   EXPECT_EQ(poses_in_mcap(log), range(4, 6));
   EXPECT_EQ(log.health.damaged_blocks, 1u);

@@ -1,4 +1,4 @@
-/// @file MCAP files byte by byte, so that tests can damage them.
+/// @file Writes MCAP files byte by byte, so that tests can damage them.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,8 @@ inline std::string mcap_chunk(const std::string& records, const std::string& com
                                bytes_of(static_cast<std::uint64_t>(compressed.size())) + compressed);
 }
 inline std::string mcap_chunk(const std::string& records) { return mcap_chunk(records, "", records); }
-/// From the end of the data to the end of the file. @param data all before
+/// Returns everything from the end of the data to the end of the file.
+/// @param data everything before it
 inline std::string mcap_end(const std::string& data) {
   return mcap_record(0x0F, bytes_of(crc32_of(data))) + mcap_record(0x02, std::string(20, '\0')) +
          mcap_magic();
@@ -46,14 +47,14 @@ inline std::string mcap_end(const std::string& data) {
 inline std::string mcap_pose_definitions() {
   return mcap_schema(1, "geometry_msgs/msg/PoseStamped", pose_definition()) + mcap_channel(1, 1, "/cf1/pose");
 }
-/// Poses whose x counts them, one each 10 ms from 1 s on.
+/// Returns poses whose x counts them, one every 10 ms starting at 1 s.
 inline std::string mcap_poses(int first, int last) {
   std::string records;
   for (int k = first; k < last; ++k)
     records += mcap_message(1, 1'000'000'000 + 10'000'000 * static_cast<std::uint64_t>(k), cdr_pose(k, 2, 3));
   return records;
 }
-/// Twenty poses: four outside chunks, the others in two.
+/// Returns twenty poses: four outside chunks, the others in two chunks.
 inline std::string small_mcap() {
   const std::string data = mcap_magic() + mcap_header() + mcap_pose_definitions() + mcap_poses(0, 4) +
                            mcap_chunk(mcap_pose_definitions() + mcap_poses(4, 12)) +

@@ -1,4 +1,4 @@
-/// @file What holds for every RawLog, whatever the file was.
+/// @file Invariants of each RawLog, whatever the file was.
 #pragma once
 
 #include <cmath>
@@ -9,7 +9,7 @@
 
 namespace swarmcert::tests {
 
-/// The first rule that `log` breaks, in words; empty if it keeps them all.
+/// Describes the first invariant that `log` violates; empty if it satisfies them all.
 inline std::string broken_rule(const logs::RawLog& log) {
   if (log.format.empty()) return "the format has no name";
   std::set<std::pair<std::string, int>> names;

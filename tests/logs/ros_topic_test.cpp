@@ -12,7 +12,7 @@
 namespace swarmcert::tests {
 namespace {
 
-/// A topic "/t" of `type` with `messages` at 0, 1, 2, ... seconds; `definition` may be empty.
+/// Returns a topic "/t" of `type` with `messages` at 0, 1, 2, ... seconds; `definition` may be empty.
 logs::RawLog messages_of(const std::string& type, const std::string& definition,
                          const std::vector<std::string>& messages) {
   logs::RawLog log;

@@ -24,7 +24,7 @@ logs::RawLog rosbag_of(const std::string& bytes, const std::string& path = "bag.
   return logs::read_rosbag_sqlite(in, path);
 }
 
-/// x of the poses that arrived: their numbers.
+/// Returns x of the poses that were read: their numbers.
 std::vector<double> poses_in_rosbag(const logs::RawLog& log) {
   return values_in(log, "/cf1/pose", "pose.position.x");
 }
@@ -35,7 +35,7 @@ std::string zstd_of(const std::string& bytes) {
   return compressed;
 }
 
-/// A folder of its own for each test, removed afterwards.
+/// A separate folder for each test, removed afterwards.
 class RosbagFolder : public testing::Test {
  protected:
   void SetUp() override {
@@ -104,7 +104,7 @@ TEST(RosbagSqlite, ReadsMessagesThatWereCompressedOneByOne) {
 
 TEST(RosbagSqlite, ReadsADatabaseThatWasWrittenWithAWriteAheadLog) {
   std::string bytes = small_rosbag();
-  bytes[18] = bytes[19] = 2;  // as the header of such a database says
+  bytes[18] = bytes[19] = 2;  // as in the header of such a database
   EXPECT_EQ(poses_in_rosbag(rosbag_of(bytes)), range(0, 20));
 }
 
@@ -141,7 +141,7 @@ TEST(RosbagSqlite, RefusesSchemasThatCouldDoAnything) {
   const std::string topic = rosbag_topic(1, "/cf1/pose", "geometry_msgs/msg/PoseStamped");
   const std::string tables = rosbag_tables();
   const std::string drop = "DROP TABLE messages;";
-  // A view that never ends.
+  // An endless view.
   EXPECT_TRUE(refuses(
       [&] {
         rosbag_of(sqlite_bytes(
@@ -150,7 +150,7 @@ TEST(RosbagSqlite, RefusesSchemasThatCouldDoAnything) {
             "SELECT i AS id, 1 AS topic_id, i AS timestamp, x'00' AS data FROM n;"));
       },
       {"\"messages\"", "is missing or cannot be read"}));
-  // Columns that make large values at each row.
+  // Computed columns that produce a large value for each row.
   EXPECT_TRUE(refuses(
       [&] {
         rosbag_of(

@@ -1,4 +1,4 @@
-/// @file rosbag2 databases in memory.
+/// @file Creates rosbag2 databases in memory.
 #pragma once
 
 #include <sqlite3.h>
@@ -10,7 +10,7 @@
 
 namespace swarmcert::tests {
 
-/// The bytes of the database that `statements` make.
+/// Returns the bytes of the database created by `statements`.
 inline std::string sqlite_bytes(const std::string& statements) {
   sqlite3* database = nullptr;
   sqlite3_open(":memory:", &database);
@@ -34,7 +34,7 @@ inline std::string hex_literal(const std::string& bytes) {
   return text + "'";
 }
 
-/// Pages of 512 bytes, so that small files have several.
+/// Uses pages of 512 bytes, so that small files have several.
 inline std::string rosbag_tables() {
   return "PRAGMA page_size=512;CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT "
          "NULL, serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);CREATE TABLE "
@@ -50,7 +50,7 @@ inline std::string rosbag_message(int topic, long time_ns, const std::string& da
   return "INSERT INTO messages(topic_id,timestamp,data) VALUES(" + std::to_string(topic) + "," +
          std::to_string(time_ns) + "," + hex_literal(data) + ");";
 }
-/// Poses whose x counts them, one each 10 ms from 1 s on.
+/// Returns poses whose x counts them, one every 10 ms starting at 1 s.
 inline std::string rosbag_poses(int first, int last) {
   std::string statements;
   for (int k = first; k < last; ++k)

@@ -1,4 +1,4 @@
-/// @file Looking into a RawLog.
+/// @file Access to the topics of a RawLog.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 
 namespace swarmcert::tests {
 
-/// The topic; an empty one, and a failure, if there is none. Valid as long as `log`.
+/// Returns the topic; if there is none, an empty one and a test failure. Valid as long as `log`.
 inline const logs::RawTopic& topic_of(const logs::RawLog& log, const std::string& name, int instance = 0) {
   for (const logs::RawTopic& candidate : log.topics)
     if (candidate.name == name && candidate.instance == instance) return candidate;
@@ -24,7 +24,7 @@ inline std::vector<double> values_of(const logs::RawTopic& topic, const std::str
   return found == nullptr ? std::vector<double>{} : found->values;
 }
 
-/// As values_of(), of a log's first topic of that name; empty if there is none.
+/// Like values_of() for the log's first topic of that name; empty if there is none.
 inline std::vector<double> values_in(const logs::RawLog& log, const std::string& topic,
                                      const std::string& column) {
   for (const logs::RawTopic& candidate : log.topics)
@@ -38,7 +38,7 @@ inline std::vector<std::string> column_names(const logs::RawTopic& topic) {
   return names;
 }
 
-/// first, first + 1, ..., last - 1.
+/// Returns first, first + 1, ..., last - 1.
 inline std::vector<double> range(int first, int last) {
   std::vector<double> numbers;
   for (int k = first; k < last; ++k) numbers.push_back(k);

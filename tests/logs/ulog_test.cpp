@@ -19,7 +19,7 @@ logs::RawLog ulog_of(const std::string& bytes) {
   return logs::read_ulog(in, "flight.ulg");
 }
 
-/// The numbers of the topic "count" that arrived.
+/// Returns the numbers of the topic "count" that were read.
 std::vector<double> counts_in_ulog(const logs::RawLog& log) { return values_in(log, "count", "number"); }
 
 std::string count_log(const std::string& data) { return ulog_head() + ulog_count_definitions() + data; }
@@ -117,7 +117,7 @@ TEST(Ulog, SkipsMessagesOfUnknownTypesAndNamesThem) {
 }
 
 TEST(Ulog, NamesTopicsWhoseDefinitionIsLost) {
-  // Records of id 9 have no subscription, those of id 8 a format that uses an unknown one.
+  // Records with id 9 have no subscription; those with id 8 have a format that uses an undefined one.
   std::string data;
   for (int k = 0; k < 10; ++k) {
     data += ulog_counts(k, k + 1) + ulog_record(9, 1, "some bytes") + ulog_record(9, 2, "some bytes") +
@@ -145,13 +145,13 @@ TEST(Ulog, AFormatMayComeAfterTheOneThatUsesIt) {
 TEST(Ulog, FindsItsWayAfterDamageAndCountsIt) {
   const std::string head = count_log("");
   const std::size_t record_bytes = ulog_counts(0, 1).size();
-  for (std::size_t byte = 0; byte < 3; ++byte) {  // of the message's head: size and type
+  for (std::size_t byte = 0; byte < 3; ++byte) {  // of the message header: size and type
     std::string bytes = head + ulog_counts(0, 20);
     bytes[head.size() + 10 * record_bytes + byte] ^= 0x55;
     const logs::RawLog log = ulog_of(bytes);
     EXPECT_EQ(counts_in_ulog(log), joined(range(0, 10), range(11, 20))) << byte;
     EXPECT_FALSE(log.health.truncated) << byte;
-    if (byte == 2) continue;  // the type: nobody can tell damage from a later version
+    if (byte == 2) continue;  // the type: damage cannot be distinguished from a later version
     EXPECT_EQ(log.health.damaged_blocks, 1u) << byte;
     EXPECT_EQ(log.health.skipped_bytes, record_bytes) << byte;
   }
@@ -179,7 +179,7 @@ TEST(Ulog, EndingAnywhereKeepsTheWholeRecords) {
 }
 
 TEST(Ulog, ReadsSectionsThatWereAppendedAfterACrash) {
-  // The vehicle stopped within the fifth record; what it kept in memory was appended after the next start.
+  // The vehicle stopped within the fifth record; the data still in memory was appended after the next start.
   const std::string definitions = ulog_count_definitions();
   const std::string cut = ulog_counts(0, 4) + ulog_counts(4, 5).substr(0, 9);
   const std::size_t flags_bytes = ulog_flags(0, 0).size();
@@ -209,7 +209,7 @@ TEST(Ulog, RefusesWhatItCannotRead) {
   EXPECT_TRUE(refuses([] { ulog_of("ULag\x01\x12\x35 and more"); }, {"offset 0", "magic number", "PX4"}));
   EXPECT_TRUE(
       refuses([] { ulog_of(ulog_head().substr(0, 12)); }, {"offset 12", "ends inside", "copy it again"}));
-  EXPECT_TRUE(refuses([] { ulog_of(ulog_head(9)); }, {"offset 7", "version = 9", "known are 0 and 1"}));
+  EXPECT_TRUE(refuses([] { ulog_of(ulog_head(9)); }, {"offset 7", "version = 9", "supported are 0 and 1"}));
   EXPECT_TRUE(refuses([] { ulog_of(ulog_head() + ulog_flags(0, 0x42)); },
                       {"offset 27", "incompatible flags = 0x42", "feature", "convert"}));
 }
@@ -277,7 +277,7 @@ TEST(Ulog, IsRecognisedByContent) {
   EXPECT_EQ(logs::parse_raw(in, "x").format, "ulog");
 }
 
-/// Counts and values as the reference reader @foxglove/ulog 2.1 gives them.
+/// Counts and values according to the reference reader @foxglove/ulog 2.1.
 TEST(Ulog, ReadsTheRecordedLogsAsTheReferenceReaderDoes) {
   SWARMCERT_NEEDS_DATA();
   const logs::RawLog log = logs::read_raw(data_path("collections/px4/sample.ulg"));

@@ -1,4 +1,4 @@
-/// @file ULog files byte by byte, so that tests can damage them.
+/// @file Writes ULog files byte by byte, so that tests can damage them.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace swarmcert::tests {
 
-/// A message of `type`: size, type, body.
+/// Returns a message of `type`: size, type, body.
 inline std::string ulog_message(char type, const std::string& body) {
   return bytes_of(static_cast<std::uint16_t>(body.size())) + type + body;
 }
@@ -28,7 +28,7 @@ inline std::string ulog_flags(std::uint8_t compatible, std::uint8_t incompatible
 
 inline std::string ulog_format(const std::string& definition) { return ulog_message('F', definition); }
 
-/// Information, parameter ('P'): key "type name" and value.
+/// Returns an information or parameter ('P') message: key "type name" and value.
 inline std::string ulog_keyed(char type, const std::string& key, const std::string& value) {
   return ulog_message(type, static_cast<char>(key.size()) + key + value);
 }
@@ -37,12 +37,12 @@ inline std::string ulog_subscription(std::uint16_t id, const std::string& topic,
   return ulog_message('A', static_cast<char>(instance) + bytes_of(id) + topic);
 }
 
-/// @param fields what follows the time stamp
+/// @param fields what follows the timestamp
 inline std::string ulog_record(std::uint16_t id, std::uint64_t time_us, const std::string& fields) {
   return ulog_message('D', bytes_of(id) + bytes_of(time_us) + fields);
 }
 
-/// Records of the topic "count" (id 7): `number` as float, one each 10 ms from 1 s on.
+/// Returns records of the topic "count" (id 7): `number` as float, one every 10 ms starting at 1 s.
 inline std::string ulog_counts(int first, int last) {
   std::string bytes;
   for (int k = first; k < last; ++k)
@@ -55,7 +55,7 @@ inline std::string ulog_count_definitions() {
   return ulog_format("count:uint64_t timestamp;float number;") + ulog_subscription(7, "count");
 }
 
-/// Twenty counts, between them what else a log has.
+/// Returns twenty counts, with the other elements of a log between them.
 inline std::string small_ulog() {
   return ulog_head() + ulog_flags(0, 0) + ulog_format("count:uint64_t timestamp;float number;") +
          ulog_format("part:int16_t[2] pair;uint8_t[2] _padding0;char[4] word;") +

@@ -1,4 +1,4 @@
-/// Names of columns: the table of signals, the list of formats, and crazyflies.yaml beside a bag of Crazyswarm2.
+/// Column names: the table of signals, the list of formats, and crazyflies.yaml beside a bag of Crazyswarm2.
 #include "analysis/logs/variable_names.h"
 
 #include <fmt/core.h>
@@ -22,7 +22,7 @@ namespace swarmcert::tests {
 namespace {
 
 TEST(ColumnNames, EveryRowOfTheTableIsASignalByItself) {
-  // A signal name is one line of the table: nothing else has to know it.
+  // A signal name is one line of the table and is not needed elsewhere.
   std::size_t rows = 0;
   for (const logs::NamedColumns& row : logs::column_names()) {
     logs::RawLog log;
@@ -118,7 +118,7 @@ TEST(CrazyfliesYaml, LinesOfAnyOtherFileAreHarmless) {
     logs::parse_custom_topics(text);
 }
 
-/// A bag of one topic of LogDataGeneric with six values: a vehicle that climbs by 0.5 m/s.
+/// Returns a bag with one LogDataGeneric topic of six values, from a vehicle that climbs at 0.5 m/s.
 std::string generic_bag(const std::string& topic) {
   std::string statements =
       rosbag_tables() + rosbag_topic(1, topic, "crazyflie_interfaces/msg/LogDataGeneric");

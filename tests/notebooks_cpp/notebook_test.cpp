@@ -107,7 +107,7 @@ TEST(Notebook, EveryCommittedOneHasTheFieldsOfItsFormat) {
       for (const Json& output : cell["outputs"]) {
         if (output["output_type"] == "stream") continue;
         ++plots;
-        // The guides in C++ draw with the library's own display, which has a text beside the picture.
+        // The guides in C++ use the library's own display, which stores a text beside the figure.
         const bool is_python = notebook["metadata"]["language_info"]["name"] == "python";
         for (const char* kind : {"image/png", "image/svg+xml", "text/plain"})
           EXPECT_TRUE(output["data"].contains(kind) || (is_python && kind != std::string("image/png")))

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""The proved checker on networks with other activations than ReLU. A smooth certificate is made of two of ReLU
-networks: with slopes in [0, b], the matrix inequality is that of the ReLU network whose later matrices are multiplied
-by b.
+"""The proved checker on networks with activations other than ReLU. A smooth certificate is derived from two
+certificates of ReLU networks: with slopes in [0, b], the matrix inequality is that of the ReLU network whose later
+matrices are multiplied by b.
 
     activations_test.py SWARMCERT SOURCE_DIR 0 CHECKER
 """
@@ -46,7 +46,7 @@ def refused(certificate, net, reason):
 
 
 def layers(sizes, generator):
-    """Weights are powers of two, so that they stay exact when they are multiplied by a slope."""
+    """Weights are powers of two, so that products with a slope are exact."""
     def number():
         return generator.choice((-1, 1)) * 2.0 ** generator.randrange(-3, 1)
     return [([[number() for _ in range(n)] for _ in range(m)], [number() for _ in range(m)])
@@ -71,7 +71,7 @@ def folded(network, b):
 
 
 def certify(net, *options, rounds=0):
-    """Without lower bounds, unless rounds of their search are asked for."""
+    """Without lower bounds, unless search rounds are requested."""
     path = Path(net).parent / "certificate.json"
     done = run(SWARMCERT, "certify", net, *options, "--nodes", rounds, "-q", "--force", "-o", path)
     assert done.returncode == 0, done
@@ -84,7 +84,7 @@ def networks_of(function):
 
 
 def with_activations(certificate, ops):
-    """The chains state these, by part; what only ReLU networks may state is left out."""
+    """Sets the activations of the chains, by part; statements that only ReLU networks may have are omitted."""
     changed = copy.deepcopy(certificate)
     for part, entry in changed["network"]["weights"].items():
         for step in entry["chain"]:
@@ -148,7 +148,8 @@ def the_inequality_is_that_of_the_activation(folder, generator):
 
 
 def functions_that_are_not_monotone_have_an_inequality_of_their_own(folder, generator):
-    """Accepted as certified, and nothing better: neither a smaller bound nor a function whose slopes reach further."""
+    """Accepted as certified, and nothing stronger: neither a smaller bound nor a function with a larger range of
+    slopes."""
     net = folder / "bent.safetensors"
     net.write_bytes(safetensors(layers([3, 4, 3, 2], generator)))
     for op in "silu", "gelu":
@@ -206,11 +207,11 @@ def refuses_what_only_relu_has(folder, generator):
     assert check(certificate, net, "--activation", "mish").returncode == 2
     mixed = copy.deepcopy(certificate)
     next(s for s in mixed["network"]["weights"]["network"]["chain"] if s["op"] == "tanh")["op"] = "sigmoid"
-    refused(mixed, net, "the factor does not show")  # it claims something of another network
+    refused(mixed, net, "the factor does not show")  # it makes a claim about another network
 
 
 def products_count_the_activations(folder, generator):
-    """Of a network with three layers the product holds the largest slope twice."""
+    """For a network with three layers the product contains the largest slope twice."""
     network = layers([3, 4, 3, 2], generator)
     net = folder / "product.safetensors"
     net.write_bytes(safetensors(network))
@@ -229,7 +230,7 @@ def products_count_the_activations(folder, generator):
 
 
 def sorting_layers_have_products_only(folder, generator):
-    """MaxMin and GroupSort: certificates as written, and changed ones, are decided alike by the three checkers."""
+    """MaxMin and GroupSort: the three checkers agree on certificates as written and on changed ones."""
     net = folder / "sorting.safetensors"
     net.write_bytes(safetensors(layers([3, 4, 8, 2], generator)))
     relu, decided, accepted = certify(net, "--method", "sdp"), 0, 0
@@ -261,7 +262,7 @@ def sorting_layers_have_products_only(folder, generator):
             decided += 1
             accepted += done.returncode == 0
             assert done.returncode in (0, 1) and "not checked" not in done.stdout.replace("0 not checked", ""), done
-    # Any of the four is accepted for any other: the file does not say which it is, and the bound is that of each.
+    # Each of the four is accepted for any other: the file does not state which it is, and the bound is the same.
     assert (decided, accepted) == (len(ops) * len(changes), len(ops) * (1 + len(ops))), (decided, accepted)
     for op in "groupsort:3", "maxmin", "groupsort:65":
         assert check(certificate, net, "--activation", op).returncode in (2, 3)
@@ -270,7 +271,7 @@ def sorting_layers_have_products_only(folder, generator):
 
 
 def decided_alike(certificate, net, *options):
-    """The exit code of all three."""
+    """Returns the exit code of all three."""
     done = check(certificate, net, *options)
     checked = net.parent / "checked.json"
     others = [run(SWARMCERT, "check", checked, net, *options).returncode,
@@ -281,8 +282,8 @@ def decided_alike(certificate, net, *options):
 
 
 def several_activations_in_one_network(folder, generator):
-    """Accepted with each activation where it is; with another one anywhere, with two exchanged, with one less, and with
-    a smaller claim the three checkers decide alike."""
+    """Accepted with each activation in its place. With another one anywhere, with two exchanged, with one missing, and
+    with a smaller claim the three checkers agree."""
     net = folder / "several.safetensors"
     net.write_bytes(safetensors(layers([3, 4, 6, 2], generator)))
     decided = accepted = 0
@@ -316,7 +317,7 @@ def several_activations_in_one_network(folder, generator):
         assert decided_alike(product, net) == 0
         with_upper(product["bounds"][0], math.nextafter(upper, 0))
         assert decided_alike(product, net) == 1
-    assert accepted < decided / 2, (accepted, decided)  # those of a smaller slope, where the file does not say which
+    assert accepted < decided / 2, (accepted, decided)  # those with a smaller slope, if the file does not state which
 
 
 def onnx_files_state_each_activation(folder, generator):
@@ -335,7 +336,7 @@ PARTS = {"phi:small": [6, 3, 2], "phi:large": [6, 2, 3, 2], "phi:ground": [4, 3,
 
 
 def network_toml(folder, networks, ops):
-    """`ops`: what it states of activations, by part."""
+    """`ops`: its stated activations, by part."""
     folder.mkdir(exist_ok=True)
     text = 'schema = "swarmcert/network/1"\n[input]\nclamp = { lower = [-1,-1,-1,-2,-2,-2], upper = [1,1,1,2,2,2] }\n'
     for part, network in networks.items():
@@ -349,7 +350,7 @@ def network_toml(folder, networks, ops):
 
 
 def each_part_has_its_own_activation(folder, generator):
-    """Blocks, scales, sums and laws of a network.toml, where some parts state their activation and some do not."""
+    """Blocks, scales, sums and laws of a network.toml, in which only some parts state their activation."""
     ops = {"phi:small": "tanh", "phi:large": "sigmoid", "phi:ground": "selu", "rho:small": "sigmoid"}
     networks = {part: layers(sizes, generator) for part, sizes in PARTS.items()}
     stored = network_toml(folder / "stored", networks, {})
@@ -371,7 +372,7 @@ def each_part_has_its_own_activation(folder, generator):
         assert word in done.stdout, done.stdout[:1000]
     for part, other in ("phi:small", "relu"), ("phi:large", "tanh"), ("rho:small", "elu"):
         refused(with_op(certificate, part, other), net, f"network.weights.{part}.chain is not the one of this network")
-    # Where nothing states it, other activations make other claims, which the proofs do not show.
+    # Without a stated activation, other activations make other claims, which the proofs do not show.
     net = network_toml(folder / "stored", networks, {})
     certificate["network"]["description_sha256"] = hashlib.sha256(net.read_bytes()).hexdigest()
     assert check(with_op(certificate, "phi:small", "elu"), net).returncode == 0
@@ -395,8 +396,8 @@ def with_op(certificate, part, op):
 
 
 def sums_with_smooth_terms_have_lower_bounds(folder, generator):
-    """Terms of several activations, those that stand still as well, the ground and rho: accepted as found, and not a
-    step more by any checker."""
+    """Terms of several activations, including constant ones, the ground and rho: accepted as found, and no checker
+    accepts a step more."""
     networks = {part: layers(sizes, generator) for part, sizes in PARTS.items()}
     ops = {"phi:small": "silu", "phi:large": "softplus", "phi:ground": "tanh", "rho:small": "selu"}
     net = network_toml(folder / "smooth", networks, ops)
@@ -427,7 +428,7 @@ FUNCTIONS = {"tanh": math.tanh, "sigmoid": lambda t: 1 / (1 + math.exp(-t)),
 
 
 def values_of_activations_are_those_of_the_functions(folder, generator):
-    """The slope between f(t) and f(u) of one neuron: all but 2^-40 of it is accepted, and 2^-40 more is not."""
+    """The slope between f(t) and f(u) of one neuron: less 2^-40 it is accepted, plus 2^-40 it is not."""
     net, decided_by_all = folder / "value.safetensors", 0
     net.write_bytes(safetensors([([[1.0]], [0.0]), ([[1.0]], [0.0])]))
     points = [(-1.2784, -1.2785), (0.0, 2.0 ** -20), (-3.0, 0.5), (-40.0, 2.0), (1.5, 190.0), (-1000.0, -0.75)]
@@ -442,7 +443,7 @@ def values_of_activations_are_those_of_the_functions(folder, generator):
             slope = abs(function(t) - function(u)) / abs(t - u)
             with_upper(bound, 2.0)
             bound["upper_method"], bound["proof"] = "product", None
-            tolerance = 2.0 ** -40 + 2.0 ** -50 / abs(function(t) - function(u))  # of the functions of Python
+            tolerance = 2.0 ** -40 + 2.0 ** -50 / abs(function(t) - function(u))  # error of the functions of Python
             for factor, code in (1 - tolerance, 0), (1 + tolerance, 1):
                 with_lower(bound, factor * slope)
                 if generator.random() < 0.25:
@@ -454,7 +455,7 @@ def values_of_activations_are_those_of_the_functions(folder, generator):
 
 
 def products_of_slopes_on_a_box_are_decided_alike(folder, generator):
-    """As certified; of a network, not a step less by any checker; of sums, with laws that rest on them."""
+    """As certified; for a network, no checker accepts a step less; for sums, with the laws that depend on them."""
     net, box, tried = folder / "local.safetensors", folder / "local.toml", 0
     net.write_bytes(safetensors(layers([3, 6, 4, 2], generator)))
     box.write_text('schema = "swarmcert/box/1"\nlower = [1.9, -1.1, 1.4]\nupper = [2.1, -0.9, 1.5]\n')
@@ -505,7 +506,7 @@ def inequalities_of_slopes_on_a_box_are_decided_alike(folder, generator):
         bound["proof"]["rho"] = (0.99 * float.fromhex(bound["proof"]["rho"])).hex()
         assert decided(certificate, net) == 1, ops
     network = layers([3, 6, 4, 2], generator)
-    for row in network[1][0]:  # of both signs, so that over a wide box no neuron of ReLU is decided
+    for row in network[1][0]:  # of both signs, so that over a wide box no ReLU neuron is decided
         row[:2] = [abs(row[0]), -abs(row[1])]
     net.write_bytes(safetensors(network))
     box.write_text('schema = "swarmcert/box/1"\nlower = [-9, -9, -9]\nupper = [9, 9, 9]\n')
@@ -535,7 +536,7 @@ def inequalities_of_slopes_on_a_box_are_decided_alike(folder, generator):
 
 
 def changed_inequalities(certificate, generator):
-    """One number of the proof, an end of the box, or the activations changed; none claims less than before."""
+    """Changes one number of the proof, an end of the box, or the activations; none of these claims less than before."""
     def copy_and_bound():
         changed = copy.deepcopy(certificate)
         return changed, changed["bounds"][0]
@@ -570,7 +571,7 @@ def changed_inequalities(certificate, generator):
 
 def values_over_a_box_are_decided_alike(folder, generator):
     """Ranges as certified, with one end of a layer or of the range moved to the next double, and over another box.
-    Boxes reach over minima, kinks and saturation, and down to points."""
+    Boxes include minima, kinks and saturation, and shrink to points."""
     net, box, codes = folder / "range.safetensors", folder / "range.toml", Counter()
     net.write_bytes(safetensors(layers([3, 6, 4, 2], generator)))
     boxes = ([-1, -0.5, 0.25], [1, 0.5, 0.5]), ([-40, 0, -3], [90, 0, 1000]), ([0.25, -0.125, 2], [0.25, -0.125, 2])
@@ -598,7 +599,7 @@ def values_over_a_box_are_decided_alike(folder, generator):
 
 
 def witnesses_of_any_activation_are_decided_alike(folder, generator):
-    """As found, at other points, and with other claims."""
+    """Lower bounds as found, at other points, and with other claims."""
     net, codes = folder / "witness.safetensors", Counter()
     net.write_bytes(safetensors(layers([3, 4, 8, 2], generator)))
     for ops in "tanh", "silu", "softplus,elu", "groupsort:4", "maxmin:halves", "maxmin:pairs,selu", "gelu":
@@ -631,7 +632,7 @@ def onnx_files_state_their_activation(folder, generator):
         relu["network"]["weights"]["network"]["sha256"] = hashlib.sha256(net.read_bytes()).hexdigest()
         refused(relu, net, f"chain is not the one of this network: fc1 - {'ELU' if op == 'elu' else op} - fc2")
         done = check(with_activations(relu, {"network": op}), net)
-        if op == "sigmoid":  # as the file says, so that the proof is of another matrix
+        if op == "sigmoid":  # as the file states, so that the proof belongs to another matrix
             assert done.returncode == 1 and "the factor does not show" in done.stdout, done
         else:
             assert done.returncode == 0, done
@@ -659,7 +660,7 @@ def onnx_files_state_their_activation(folder, generator):
 
 
 def decided(certificate, net):
-    """The exit code of the three checkers, which must agree."""
+    """Returns the exit code of the three checkers, which must agree."""
     done = check(certificate, net)
     path = Path(net).parent / "checked.json"
     others = [run(SWARMCERT, "check", path, net),
@@ -669,8 +670,8 @@ def decided(certificate, net):
 
 
 def onnx_files_state_what_they_sort(folder, generator):
-    """MaxMin and GroupSort as groups of nodes: what certify writes is accepted by all; other chains, weights and
-    smaller bounds are refused by all; groups that compute something else cannot be read by any."""
+    """MaxMin and GroupSort as groups of nodes: the certificates of certify are accepted by all; other chains, weights
+    and smaller bounds are refused by all; groups that compute something else cannot be read by any."""
     network = weight_files.layers([3, 4, 8, 2], generator)
     net = folder / "sorting.onnx"
     ops = "maxmin:halves", "maxmin:pairs", "groupsort:2", "groupsort:4", "descending:4"

@@ -1,5 +1,5 @@
-/// The checker of `swarmcert check` on many certificates of one NET, in one process: their names on standard input, one
-/// in a line; for each the exit code that the command would have, a tab and the reason.
+/// The checker of `swarmcert check` for many certificates of one NET in a single process. Reads their names from
+/// standard input, one per line, and prints for each the exit code of the command, a tab and the reason.
 ///   check_many NET [A,B,C] | check_many PHI RHO --pair
 #include <iostream>
 #include <sstream>

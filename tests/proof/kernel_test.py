@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""coqc accepts in its kernel what `swarmcert-check-proved --coq` writes, and refuses it after any number is changed.
+"""The kernel of coqc accepts the output of `swarmcert-check-proved --coq`, and refuses it after any number is changed.
 
     kernel_test.py SWARMCERT SOURCE_DIR 0 CHECKER COQC THEORY
 """

@@ -1,5 +1,5 @@
-# Every proof of the theory is complete and adds no axiom of its own; and every file of it is looked at by Assumptions.v, or
-# used by one that is.
+# Every proof of the theory is complete and adds no axiom; and every file of it is examined by Assumptions.v or used by
+# one that is.
 #   cmake -DTHEORY=... -P nothing_admitted_test.cmake
 cmake_minimum_required(VERSION 3.25)
 

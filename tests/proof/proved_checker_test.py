@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Three checkers on the same certificates: the proved one, the one of the tool, and the second one in Python. Whatever
-certify writes without a box is accepted by all, with nothing left unchecked; mutations of every field are decided
-alike; malformed files are refused by each.
+"""Three checkers on the same certificates: the proved one, the one of the tool, and the second one in Python.
+Everything that certify writes without a box is accepted by all, with nothing left unchecked; the checkers agree on
+mutations of each field; malformed files are refused by all.
 
     proved_checker_test.py SWARMCERT SOURCE_DIR MUTATIONS CHECKER CHECK_MANY
     MUTATIONS: 0, one for every kind of field
@@ -24,7 +24,7 @@ import check_certificate as second  # noqa: E402
 import check_certificate_test as common  # noqa: E402
 import weight_files  # noqa: E402
 
-SECONDS = 60  # until a checker counts as hung; the times themselves are printed
+SECONDS = 60  # until a checker is considered hung; the actual times are printed
 
 
 def run(command):
@@ -41,7 +41,7 @@ def proved(certificate, net):
 
 
 class Server:
-    """A checker that decides many certificates of one NET in one process."""
+    """A checker that decides many certificates of one NET in a single process."""
 
     def __init__(self, command):
         self.process = subprocess.Popen(list(map(str, command)), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
@@ -59,7 +59,7 @@ class Server:
         print(path, file=self.process.stdin, flush=True)
 
     def answer(self):
-        """Exit code and reason."""
+        """Returns exit code and reason."""
         ready, _, _ = select.select([self.process.stdout], [], [], SECONDS)
         if not ready:
             self.process.kill()
@@ -88,7 +88,7 @@ def kinds(folder, generator):
     samples = folder / "square.json"
     samples.write_text(common.recorded(second.Network(**arguments(ordered)).parts["network"], generator))
     (folder / "plane.toml").write_text('schema = "swarmcert/box/1"\nlower = [-1, 0.5]\nupper = [1, 0.75]\n')
-    clamped = folder / "clamped.toml"  # the neighbours' inputs are all bounded by the clamp, and there is no ground
+    clamped = folder / "clamped.toml"  # the clamp bounds all inputs of the neighbours, and there is no ground
     text = hetero[0].read_text()
     clamped.write_text(text.replace('[phi.ground]\nweights = "ground.safetensors"\n', ""))
     float32 = ["--as", "float32"]
@@ -141,12 +141,12 @@ def arguments(net):
 
 
 def is_beyond(name):
-    """Whether some of what is proved is beyond the proved checker."""
+    """Returns whether some of the proofs are beyond the proved checker."""
     return name == "rotation invariants"
 
 
 def decided_alike(code, accepted, second_accepts, by_parts):
-    """`by_parts`: some of its claims are beyond the proved checker, which then never accepts."""
+    """`by_parts`: some claims are beyond the proved checker, which then never accepts."""
     if accepted != second_accepts:
         return False
     if code == 4:
@@ -155,7 +155,7 @@ def decided_alike(code, accepted, second_accepts, by_parts):
 
 
 def mutate(name, net, certificate, folder, generator, count):
-    """Mutates every kind of field, then random ones until there are `count`; a row of the table."""
+    """Mutates each kind of field, then random ones until there are `count`; returns a row of the table."""
     by_parts = is_beyond(name)
     paths = list(common.leaves(certificate))
     by_pattern = {}
@@ -178,7 +178,7 @@ def mutate(name, net, certificate, folder, generator, count):
             three.ask(path)
             if "as" in mutation.get("network", {}) and mutation["network"]["as"] != certificate["network"]["as"]:
                 network = second.Network(**arguments(net))  # the second checker rounds it in place
-            # the second checker takes what no file states from a certificate
+            # the second checker takes values that no file states from the certificate
             for part, weights in network.parts.items():
                 weights.activations, count = stated[part]
                 del weights.layers[count:]
@@ -197,7 +197,7 @@ def mutate(name, net, certificate, folder, generator, count):
 
 
 def layer_by_layer(certificate, net, folder):
-    """The method that takes the place of sdp where its search is cut short is proved by the same inequality."""
+    """The method that replaces sdp if its search is cut short is proved by the same inequality."""
     changed = json.loads(json.dumps(certificate).replace('"upper_method": "sdp"', '"upper_method": "eclipse_fast"'))
     assert changed != certificate
     changed["content_sha256"] = second.content_sha256(changed)
@@ -208,7 +208,7 @@ def layer_by_layer(certificate, net, folder):
 
 
 def a_smaller_bound(certificate, net, folder):
-    """Of a proof by parts of a box: refused by all at the same word of the tree."""
+    """A changed proof by parts of a box is refused by all at the same word of the tree."""
     changed = json.loads(json.dumps(certificate))
     bound = changed["bounds"][0]
     assert len(bound["proof"]["tree"].split()) > 10
@@ -225,8 +225,8 @@ def a_smaller_bound(certificate, net, folder):
 
 
 def laws_in_a_box(folder, pair):
-    """A law that rests on bounds in a box for any number of neighbours: accepted by all; one that claims less, or holds
-    outside of the box, is refused by all."""
+    """A law based on bounds in a box for any number of neighbours is accepted by all; one that claims a smaller bound,
+    or validity outside the box, is refused by all."""
     path = folder / "laws.json"
     run([common.SWARMCERT, "certify", *pair, "--neighbours", "2", "--domain", folder / "part.toml",
          "--method", "branch", "--nodes", "1", "-q", "-o", path])
@@ -249,8 +249,8 @@ def laws_in_a_box(folder, pair):
 
 
 def among_neighbours(certificate, net, folder):
-    """Bounds for a number of neighbours, and laws: what claims a little more is refused by all; so is a form or a range
-    of the others that is too small, another number of neighbours, and a leaf where no form is in force."""
+    """Bounds for a number of neighbours, and laws: slightly stronger claims are refused by all; so are a form or a
+    range of the others that is too small, another number of neighbours, and a leaf without a valid form."""
     def refused(change, *words):
         changed = json.loads(json.dumps(certificate))
         change(changed)
@@ -301,13 +301,13 @@ def among_neighbours(certificate, net, folder):
             upper = math.nextafter(law["upper"], 0)
             law.update(upper=upper, upper_hex=upper.hex())
         refused(less, "less than the law gives")
-    without = json.loads(json.dumps(certificate))  # laws that rest on the bounds for any number alone are larger
+    without = json.loads(json.dumps(certificate))  # laws based only on the bounds for any number are larger
     without["bounds"] = [b for k, b in enumerate(certificate["bounds"]) if k not in places]
     refused(lambda changed: changed.update(bounds=without["bounds"]), "less than the law gives")
 
 
 def short_scale(certificate, net, folder):
-    """Of a product of norms as well, whose proof does not look at single inputs."""
+    """Also for a product of norms, whose proof does not use single inputs."""
     bound = next(b for b in certificate["bounds"] if b["scale"])
     bound.update(scale=bound["scale"][:-1], upper_method="product", proof=None, lower=None, lower_hex=None,
                  lower_witness=None, upper=2.0 ** 90, upper_hex="0x1p+90")
@@ -320,7 +320,7 @@ def short_scale(certificate, net, folder):
 
 
 def values_are_tight(certificate, net, folder):
-    """Each bound of values that is a unit in the last place smaller is refused by all, for its own reason."""
+    """Each bound on values is refused by all, for its own reason, if it is reduced by a unit in the last place."""
     entry, ends = certificate["values"][-1], [("lower", False), ("upper", True)]
     if entry["float32_error"] is not None:
         assert entry["float32_error"] > 0
@@ -342,7 +342,7 @@ def values_are_tight(certificate, net, folder):
 
 
 def refused_one_unit_less(certificate, net, folder, path, down):
-    """Of the first number of a list."""
+    """Changes the first number of a list."""
     changed = json.loads(json.dumps(certificate))
     place = changed["values"][-1]
     for key in path[:-1]:
@@ -365,7 +365,7 @@ def refused_by_all(changed, net, folder, what):
 
 
 def malformed(certificate, net, folder):
-    """Files that no checker may accept or stumble over."""
+    """Files that no checker may accept or crash on."""
     text = json.dumps(certificate)
     bound = next(k for k, b in enumerate(certificate["bounds"]) if b["upper_method"] == "sdp")
 
@@ -437,7 +437,7 @@ def malformed(certificate, net, folder):
 
 
 def every_format(folder, generator):
-    """Each checker reads the same weights from every format of weight files."""
+    """Each checker reads the same weights from all formats of weight files."""
     network = weight_files.layers([3, 4, 3, 2], generator)
     files = {"zip.pth": weight_files.pth_zip(network), "legacy.pth": weight_files.pth_legacy(network),
              "net.onnx": weight_files.onnx(network), "net.c": weight_files.c_source(network)}
@@ -479,7 +479,7 @@ def main():
             if is_beyond(name):
                 assert three.returncode == 4 and three.stdout.startswith("not checked: bound"), three
                 assert "accepted" not in three.stdout, three
-            else:  # the proved one is exact where the first uses double
+            else:  # the proved one is exact, the first uses double
                 in_double = ", those by parts of boxes in double with every rounding accounted for"
                 assert three.returncode == 0 and three.stdout == one.stdout.replace(in_double, ""), f"{one} {three}"
             if name == "parts of a box":

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Networks that are silent in some compositions, decided alike by three checkers, each for the reason at hand: the
-statement names the compositions, lower bounds have no witness among them, ranges hold the 0 (and nothing else, where
+"""Networks that are silent in some compositions: three checkers agree, each for the correct reason. The
+statement names the compositions, lower bounds have no witness among them, ranges contain 0 (and nothing else if
 there is no other composition), and jumps cover the steps to and from them.
 
     silence_test.py SWARMCERT SOURCE_DIR 0 CHECKER [COQC THEORY]
@@ -27,7 +27,7 @@ def run(*command):
 
 
 def decided(certificate, net):
-    """The reasons of all three, "" where one accepts."""
+    """Returns the reasons of all three, "" for one that accepts."""
     certificate["content_sha256"] = second.content_sha256(certificate)
     path = net.parent / "checked.json"
     path.write_text(json.dumps(certificate))
@@ -42,7 +42,7 @@ def decided(certificate, net):
 
 
 def refused(certificate, net, *words):
-    """`words`: of the reasons of the first and the proved checker, and of the second one."""
+    """`words`: parts of the reasons of the first and the proved checker, and of the second one."""
     one, three, two = decided(certificate, net)
     assert words[0] in one and words[0] in three and words[-1] in two, f"{words}: {one!r} {three!r} {two!r}"
 
@@ -62,7 +62,7 @@ def with_values(certificate, function, **fields):
 
 
 def network(folder, name, silent):
-    """The one of heterogeneous(), whose value is near 100: a step to a 0 is the largest jump."""
+    """The network of heterogeneous() with a value near 100: a step to 0 is the largest jump."""
     data = (folder / "rho.safetensors").read_bytes()
     (folder / "high.safetensors").write_bytes(data[:-8] + pack("<d", 100.0))  # the last bias
     net = folder / name
@@ -123,11 +123,11 @@ def ranges_and_jumps(folder):
                 "less than the step to neighbours among", "less than the step to a 0")
     refused(with_values(certificate, "set:small:small", lower=["0x1p-1000"]), net,
             "lacks the 0 of neighbours", "lacks a 0")
-    # Among large neighbours alone there is no 0, only the values near 100.
+    # With only large neighbours there is no 0, only values near 100.
     accepted(with_values(certificate, "set:large:small", lower=["-0x1p+8"]), net)
     lower = {entry["function"]: float.fromhex(entry["lower"][0]) for entry in certificate["values"]}
     assert lower["set:large:small"] > 50 and lower["set:small:small"] == 0, lower
-    # The other kind has no box: nothing is known of the steps beside it.
+    # The other kind has no box, so nothing is known about the steps beside it.
     changed = json.loads(json.dumps(certificate))
     changed["values"] = [entry for entry in changed["values"] if entry["function"] == "set:small:small"]
     accepted(changed, net)
@@ -139,7 +139,7 @@ def ranges_and_jumps(folder):
 
 
 def always_silent(folder):
-    """Up to one neighbour of its kind: the range is 0."""
+    """With up to one neighbour of its kind the range is 0."""
     net = network(folder, "always.toml", [">small", "small>small"])
     certificate = certify(net, "--domain", folder / "box.toml", "--neighbours", "1")
     zero = {"lower": ["0x0p+0"], "upper": ["0x0p+0"]}
@@ -162,7 +162,7 @@ def descriptions(folder):
 
 
 def smooth_neighbours(folder):
-    """Beside neighbours with tanh or GELU the step is proved as well, and a smaller one refused by all."""
+    """Beside neighbours with tanh or GELU the step is proved as well, and all refuse a smaller one."""
     for activation in "tanh", "gelu":
         net = network(folder, "beside.toml", ["large+small>small"])
         stated = f'"large.safetensors"\nactivation = "{activation}"'
@@ -191,7 +191,7 @@ def kernel(net, certificate, coqc, theory):
     for head, mantissa, exponent in steps[:1]:
         false = text.replace(f"{head}({mantissa},{exponent}).", f"{head}({int(mantissa) - 1},{exponent}).")
         assert false != text and not accepts(false)
-    # Silent with no neighbour, whose only term is then the ground's, network 0: the range of large ones lacks that 0.
+    # Silent without neighbours, when the only term is the ground's, network 0: the range of large ones lacks that 0.
     others = re.sub(r"claim := Sum_within \[\[.*?\]\] ", "claim := Sum_within [[0%nat]] ", text)
     assert others != text and not accepts(others)
 

@@ -1,4 +1,4 @@
-"""One network in every format of weight files: what PyTorch, ONNX exporters and the authors of networks write."""
+"""One network in all formats of weight files, as written by PyTorch, ONNX exporters and the authors of networks."""
 import io
 import pickle
 import struct
@@ -53,7 +53,7 @@ class Pickler(pickle.Pickler):
 
 
 def torch_modules():
-    """Names that the pickles refer to; torch itself is not needed."""
+    """Names to which the pickles refer; torch itself is not needed."""
     torch, utils = types.ModuleType("torch"), types.ModuleType("torch._utils")
     torch.FloatStorage = type("FloatStorage", (), {"__module__": "torch", "__qualname__": "FloatStorage"})
 
@@ -134,8 +134,8 @@ def node(kind, inputs, outputs, **attributes):
 
 
 def sorting(op, k, current, width, change):
-    """The nodes of one layer that is sorted, as PyTorch exports them, and the name of their result; `change` gives
-    other arguments of single nodes, by their kind."""
+    """Returns the nodes of one sorted layer as exported by PyTorch, and the name of their result; `change` gives other
+    arguments of single nodes, by their kind."""
     def made(kind, inputs, outputs, **attributes):
         inputs, attributes = change.get(kind, lambda i, a: (i, a))(inputs, attributes)
         return node(kind, inputs, outputs, **attributes)
@@ -158,7 +158,7 @@ def sorting(op, k, current, width, change):
 
 def onnx(network, activation="Relu", first=None, attributes=b"", change={}):
     """`activation` by its node, or MaxMin and GroupSort by their name in chains, and "descending:SIZE".
-    `first`: another activation than `activation` behind the first layer."""
+    `first`: activation after the first layer, if different."""
     graph, current = b"", "x"
     for k, (name, rows, biases) in enumerate(network):
         weights = [f"{name}.weight", f"{name}.bias"]
@@ -191,8 +191,8 @@ def onnx(network, activation="Relu", first=None, attributes=b"", change={}):
 # --- C source ------------------------------------------------------------------------------------------------------
 
 def c_source(network):
-    """Matrices as [inputs][outputs]. A literal with f is rounded once, from the decimal: one stands just above the
-    middle between two floats, on which it would fall as a double."""
+    """Matrices as [inputs][outputs]. A literal with f is rounded once, from the decimal: one of them is just above the
+    midpoint between two floats, to which it would be rounded as a double."""
     declared, values = "", ""
     for name, rows, biases in network:
         declared += f"  float {name}_weight[{len(rows[0])}][{len(rows)}];\n  float {name}_bias[{len(rows)}];\n"

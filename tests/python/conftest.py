@@ -1,4 +1,4 @@
-"""Inputs that the tests share."""
+"""Inputs shared by the tests."""
 
 import os
 import pathlib
@@ -19,7 +19,7 @@ COMPOSITE = SOURCE / "controller/gains/composite.toml"
 
 
 def tool(*words, folder=None):
-    """The command line. Returns its exit code."""
+    """Runs the command line and returns its exit code."""
     done = subprocess.run([TOOL, *map(str, words)], cwd=folder, capture_output=True, text=True)
     assert done.returncode in (0, 1, 4), done.stderr
     return done.returncode

@@ -15,7 +15,7 @@ import swarmcert
 
 
 class Tensor:
-    """What is used of torch.Tensor."""
+    """The part of torch.Tensor that is used."""
 
     def __init__(self, array):
         self.array = array
@@ -196,7 +196,7 @@ def test_a_training_loop_leaves_no_file_no_output_and_no_reference(arrays, tmp_p
 
 
 def endless(progress=None):
-    """Branch and bound that nobody waits for."""
+    """Branch and bound that would take too long."""
     return swarmcert.certify(NETWORK, domain=BOX, method="branch", nodes=10**9, progress=progress)
 
 
@@ -245,7 +245,7 @@ def test_other_threads_run_meanwhile():
 
     thread = threading.Thread(target=call)
     thread.start()
-    is_enough.set()  # this thread would not come here if the other one kept the lock
+    is_enough.set()  # not reached if the other thread kept the lock
     thread.join()
     assert len(caught) == 1
 

@@ -1,4 +1,4 @@
-"""Every command in process against the command line, byte by byte."""
+"""Compares each command in process with the command line, byte by byte."""
 
 import ast
 import inspect

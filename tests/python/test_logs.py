@@ -35,7 +35,7 @@ def test_arrays_outlive_what_they_came_from(flights):
         swarmcert.read(flights / "2/cf1_00")
         gc.collect()
     assert np.array_equal(position, copies[0]) and np.array_equal(residual, copies[1])
-    position[0] = 7  # they are the caller's
+    position[0] = 7  # the arrays belong to the caller
     assert swarmcert.read(flights / "1/cf1_00")["position_m"][0, 0] != 7
 
 

@@ -1,4 +1,4 @@
-"""A headless Chromium that loads pages and says what is wrong with them. Python's standard library only."""
+"""A headless Chromium that loads pages and reports faults in them. Uses only Python's standard library."""
 
 import base64
 import json
@@ -155,7 +155,7 @@ document.addEventListener('securitypolicyviolation', e =>
 
 
 def find():
-    """The path of a Chromium, or None."""
+    """Returns the path of a Chromium, or None."""
     for name in ("chromium", "chromium-browser", "google-chrome"):
         if path := shutil.which(name):
             return path
@@ -236,11 +236,11 @@ class Browser:
             self._events.append(self._message())
             if self._events[-1].get("method") == "Page.javascriptDialogOpening":  # the page waits for an answer
                 self._call("Page.handleJavaScriptDialog", accept=True)
-        # A script that has drawn is a frame behind.
+        # Drawings of a script appear one frame later.
         self._evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
     def _heard(self, page):
-        """Faults among the events since the page was asked for."""
+        """Returns faults among the events since the page was requested."""
         url = pathlib.Path(page).resolve().as_uri()
         for event in self._events:
             method, p = event.get("method"), event.get("params", {})
@@ -249,7 +249,7 @@ class Browser:
             elif method == "Runtime.consoleAPICalled" and p["type"] in ("error", "warning", "assert"):
                 yield ["console", str(p["args"])[:200]]
             elif method == "Log.entryAdded" and "GL Driver Message" in p["entry"]["text"]:
-                pass  # of the software renderer's speed, when the check reads the picture back
+                pass  # about the speed of the software renderer, when the check reads the image
             elif method == "Log.entryAdded" and p["entry"]["level"] in ("error", "warning"):
                 kind = "policy" if "Content Security Policy" in p["entry"]["text"] else "console"
                 yield [kind, p["entry"]["text"][:200]]
@@ -261,14 +261,14 @@ class Browser:
                 yield ["injection", p["message"]]
 
     def accessibility(self, page, axe):
-        """What axe (the text of axe.min.js) finds on a page, as [kind, rule, what]."""
+        """Returns the findings of axe (the text of axe.min.js) on a page, as [kind, rule, what]."""
         self._load(page)
         self._evaluate(axe + ";0")
         found = self._evaluate("axe.run().then(all => all.violations.map(v => [v.id, v.nodes[0].html.slice(0, 200)]))")
         return [["accessibility", rule, what] for rule, what in found]
 
     def picture(self, path, width, most_px=4000):
-        """The page that is loaded, from its top, as PNG. Returns the number of bytes."""
+        """Saves the top of the loaded page as PNG. Returns the number of bytes."""
         height = min(most_px, self._evaluate("document.documentElement.scrollHeight"))
         clip = {"x": 0, "y": 0, "width": width, "height": height, "scale": 1}
         shot = self._call("Page.captureScreenshot", format="png", captureBeyondViewport=True, clip=clip)

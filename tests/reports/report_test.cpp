@@ -1,4 +1,4 @@
-/// Reports: what users put into them stays text, in HTML, JSON, SVG, gnuplot and the shell.
+/// Reports: user-supplied text stays text in HTML, JSON, SVG, gnuplot and the shell.
 #include "analysis/report/report.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using tests::read_text;
 using tests::run_shell;
 using tests::ScratchFolder;
 
-/// A string of pieces that mean something to one of the languages of a report.
+/// Returns a string of pieces with a meaning in one of the languages of a report.
 std::string hostile(std::mt19937& generator) {
   static const std::vector<std::string> kPieces = {"<script>",
                                                    "</script>",
@@ -84,7 +84,8 @@ Report report_with(const std::vector<std::string>& text) {
   return report;
 }
 
-/// The names of the page's tags in order, without what is inside of scripts: text may not change them.
+/// Returns the names of the page's tags in order, without the content of scripts. User-supplied text must not change
+/// them.
 std::string skeleton(const std::string& html) {
   std::string result, inside;
   for (std::size_t at = html.find('<'); at != std::string::npos; at = html.find('<', at + 1)) {
@@ -159,7 +160,7 @@ TEST(Report, CommandsAreReadBackByTheShellAsTheSameWords) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "pwned"));
 }
 
-/// What command_to_copy() gives after `words` were parsed by a command with the usual options.
+/// Returns command_to_copy() after a command with the usual options has parsed `words`.
 std::string copied(const std::vector<const char*>& words) {
   CLI::App command;
   std::string path;

@@ -1,10 +1,9 @@
-"""Every command's report, in a browser: reports_test.py TOOL SOURCE_FOLDER SCREENSHOTS [AXE]
+"""Checks the report of each command in a browser: reports_test.py TOOL SOURCE_FOLDER SCREENSHOTS [AXE]
 
-SCREENSHOTS is a folder for pictures of the top of every page at three widths. AXE is axe.min.js of the npm package
-axe-core; without it only names of controls and headings are checked.
+SCREENSHOTS is a folder for images of the top of each page at three widths. AXE is axe.min.js of the npm package
+axe-core; without it only the names of controls and headings are checked.
 
-Ends with 77 (skipped) where there is no Chromium. First a good report is damaged in every way that the browser must
-see.
+Exits with 77 (skipped) without Chromium. First, a good report is damaged in each way that the browser must detect.
 """
 
 import base64
@@ -20,7 +19,7 @@ import tempfile
 
 import browser
 
-# A folder, a subfolder and a prefix of logs, as a hostile uploader would name them. `touch` would leave a file behind.
+# A folder, a subfolder and a prefix of logs with names chosen by an attacker. `touch` would leave a file behind.
 HOSTILE = ["a'b\"c`touch pwned`$(touch pwned)<", "script><script>window.pwned=1<",
            "script><img src=x onerror=alert(1)>"]
 HOSTILE_KIND = "k'\\\"`touch pwned`$(touch pwned)</script><script>window.pwned=1</script><!--]]>\\n"
@@ -48,7 +47,7 @@ class Reports:
 
 
 def network_with_hostile_kinds(r):
-    """The demo's network under a kind whose name is markup, shell and gnuplot at once."""
+    """The demo network with a kind whose name is markup, shell and gnuplot code at once."""
     demo = r.source / "nn/networks/demo"
     text = (demo / "network.toml").read_text()
     kind = f'"{HOSTILE_KIND}"'
@@ -59,7 +58,7 @@ def network_with_hostile_kinds(r):
 
 
 def hostile_policy(r):
-    """A release that passes one check and fails one, whose files have hostile names."""
+    """A release that passes one check and fails one, with hostile file names."""
     demo, flights = r.source / "nn/networks/demo", pathlib.Path(*HOSTILE)
     model = r.source / "stability/models/crazyflie-small.toml"
     gains = r.source / "controller/gains/crazyflie-small.toml"
@@ -95,7 +94,7 @@ def thrust_table(r):
 
 
 def make(r):
-    """A report of every command that has one."""
+    """Creates a report of each command that has one."""
     demo = r.source / "nn/networks/demo"
     model = r.source / "stability/models/crazyflie-small.toml"
     gains = r.source / "controller/gains/crazyflie-small.toml"
@@ -128,7 +127,7 @@ Kd = {{from = 0.5, to = 10, steps = 5}}
                  "--duration", 8, "--seed", run, "--run", run, "-o", r.folder / flights / str(run))
     r.report("compare-hostile", "compare", model, flights)
     r.report("inspect-hostile", "inspect", flights)
-    # The same logs under names with a hostile prefix.
+    # The same logs with a hostile prefix.
     prefixed = r.folder / "pre\nfixed"
     for log in sorted((r.folder / flights).rglob("cf*")):
         target = prefixed / log.parent.name / ("p`touch pwned`'<img src=x onerror=alert(2)>_" + log.name)
@@ -147,7 +146,7 @@ Kd = {{from = 0.5, to = 10, steps = 5}}
 
 
 def refuse_full_folders(r):
-    """A report's folder that is not empty is refused before anything is read: here no input exists."""
+    """A non-empty folder for a report is refused before anything is read: no input exists here."""
     full = r.folder / "full"
     full.mkdir()
     (full / "thesis.txt").write_text("mine")
@@ -165,7 +164,7 @@ def refuse_full_folders(r):
 
 
 def in_drawings(text, change):
-    """The page with the source of every drawing changed."""
+    """Returns the page with the source of each figure changed."""
     def changed(match):
         drawing = base64.b64decode(match.group(1)).decode()
         return "data:image/svg+xml;base64," + base64.b64encode(change(drawing).encode()).decode()
@@ -174,7 +173,7 @@ def in_drawings(text, change):
 
 
 def planted(good):
-    """A good page damaged in one way, with the kind of fault that must be seen."""
+    """Yields a good page damaged in one way, with the kind of fault that must be detected."""
     text = good.read_text()
     policy = re.search(r'<meta http-equiv="Content-Security-Policy"[^>]*>', text).group()
     lax = text.replace(policy, "")

@@ -1,4 +1,4 @@
-// reproduce gains-in-flight, on flights made here and on recorded ones.
+// reproduce gains-in-flight, on generated flights and on recorded ones.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -30,7 +30,7 @@ std::string info_text(double Kp, const std::string& motors = "small motors") {
          three("KI_", 0.01, 0.01, 0.01) + "mass: 0.034\n";
 }
 
-/// A vehicle that follows a swing along x; errors of all axes are `error_m`, along x in proportion to the speed.
+/// A vehicle that oscillates along x; errors of all axes are `error_m`, along x in proportion to the speed.
 std::string log_text(double error_m, double height_mm = 2000) {
   std::string text =
       "time_s,stateEstimateZ.x,stateEstimateZ.y,stateEstimateZ.z,stateEstimateZ.vx,stateEstimateZ.vy,"
@@ -59,7 +59,7 @@ class GainsInFlight : public testing::Test {
     tests::write_text(folder_ / (folder + "/info/info" + name + ".yaml"), info_text(Kp));
     tests::write_text(folder_ / (folder + "/logs/log" + name + more), log_text(error_m));
   }
-  /// `sets` gain sets that flew twice, with errors in proportion to 1/Kp and some scatter.
+  /// Simulates two flights for each of `sets` gain sets, with errors proportional to 1/Kp and some scatter.
   void fly(const std::string& folder, int sets) {
     std::mt19937_64 random(5);
     std::normal_distribution<double> normal;
@@ -97,7 +97,7 @@ TEST_F(GainsInFlight, GainSetsLeftOutStayBelowSharpBoundsAsOftenAsPromised) {
     EXPECT_EQ(axis["flights"], 48);
     EXPECT_EQ(axis["gain_sets"], 24);
     EXPECT_GE(axis["coverage"].get<double>(), 0.8);
-    // Errors range over a factor of six; knowing the gains must be worth something.
+    // Errors vary by a factor of six, so knowing the gains must improve the bound.
     EXPECT_LT(axis["median_ratio"].get<double>(), 0.7 * axis["blind_ratio"].get<double>());
     EXPECT_GT(axis["rank"].get<double>(), 0.9);
   }
@@ -120,7 +120,7 @@ TEST_F(GainsInFlight, AFlightGetsTheSameBoundAloneAsAmongOthers) {
 
 TEST_F(GainsInFlight, AFlightThatAlsoCalibratesIsJudgedWithoutItsGainSet) {
   fly("old", 20);
-  // An error ten times too large must not raise its own bound, nor that of the same gains.
+  // An error ten times too large must raise neither its own bound nor that of the same gains.
   add("old", 103, 5.1, 1, "_3");
   std::filesystem::copy_file(folder_ / "old/logs/log103_3", folder_ / "new/logs/log103_3");
   std::filesystem::copy_file(folder_ / "old/info/info103.yaml", folder_ / "new/info/info103.yaml");
@@ -164,7 +164,7 @@ TEST_F(GainsInFlight, RefusesWhatCannotBeJudged) {
   refused("--calibrate old", "--flights");
   refused("--calibrate old --flights nowhere", "nowhere");
   refused("--calibrate old --flights old/logs", "logs/ and info/");
-  // Nine gain sets promise 90 % of a tenth one, but with one left out eight do not.
+  // Nine gain sets suffice for a 90 % guarantee for a tenth one; the eight left when one is held out do not.
   refused("--calibrate old --flights old", "at least 9");
   EXPECT_EQ(run("--calibrate old --flights old --coverage 0.8").exit_code, 0);
   EXPECT_EQ(run("--calibrate old --flights old --coverage 1.5").exit_code, 2);
@@ -175,13 +175,13 @@ TEST_F(GainsInFlight, RefusesWhatCannotBeJudged) {
   refused("--calibrate old --flights new", "mass = \"heavy\"");
 }
 
-/// On gain sets left out of the recorded collection: sharper than without the gains, with the coverage promised.
+/// On held-out gain sets of the recorded collection: tighter than without the gains, with the stated coverage.
 TEST_F(GainsInFlight, RecordedGainSetsLeftOutAreBoundedSharperThanWithoutTheory) {
   SWARMCERT_NEEDS_DATA();
   const std::string flown = "'" + tests::data_path("collections/crazyswarm2-tools") + "'";
   const Json found = result("--calibrate " + flown + " --flights " + flown);
   ASSERT_EQ(found["axes"].size(), 3u);
-  const double gain_blind[] = {1.6, 2.1, 4.4};  // of an independent study of the whole collection
+  const double gain_blind[] = {1.6, 2.1, 4.4};  // from an independent study of the whole collection
   for (std::size_t k = 0; k < 3; ++k) {
     const Json& axis = found["axes"][k];
     SCOPED_TRACE(axis["axis"]);
@@ -194,7 +194,7 @@ TEST_F(GainsInFlight, RecordedGainSetsLeftOutAreBoundedSharperThanWithoutTheory)
   EXPECT_GE(found["axes"][2]["rank"].get<double>(), 0.7);
 }
 
-/// What tune proposes for x, found from gains that flew, with the attitude gains beside which most others flew.
+/// Returns the proposal of tune for x, starting from gains that flew, with the attitude gains of most other flights.
 Json proposed(const std::string& gains, const std::filesystem::path& folder) {
   tests::write_text(folder / "given.toml", "schema = \"swarmcert/gains/1\"\n[position]\nrate_hz = 500\n" +
                                                gains +
@@ -208,7 +208,7 @@ Json proposed(const std::string& gains, const std::filesystem::path& folder) {
   return files::read_json(folder / "tuned.json", "swarmcert/tune/1")["gains"];
 }
 
-/// From the gains that flew most often, with and without an integrator.
+/// Starting from the gains that flew most often, with and without an integrator.
 TEST_F(GainsInFlight, TuneProposesGainsNextToThoseThatFlewBest) {
   SWARMCERT_NEEDS_DATA();
   const std::string flown = "'" + tests::data_path("collections/crazyswarm2-tools") + "'";

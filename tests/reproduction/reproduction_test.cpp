@@ -30,9 +30,9 @@ class Reproduction : public testing::Test {
   tests::ScratchFolder folder_;
 };
 
-/// One test, because the experiments share flights and networks: each of them would make its own.
+/// A single test, because the experiments share flights and networks that would otherwise be created repeatedly.
 TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
-  // Shards, one after the other; the last call puts them together.
+  // Runs the shards one after the other; the last call merges them.
   EXPECT_NE(reproduce("table -o out --shard 1/2").output.find("Part 1/2 is done"), std::string::npos);
   EXPECT_NE(reproduce("table -o out --shard 2/2").output.find("Part 2/2 is done"), std::string::npos);
   reproduce("table -o out");
@@ -58,7 +58,7 @@ TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
     EXPECT_EQ(condition["two_harms_four"], condition["improvement_trained_with_2_at_4"].get<double>() < 1);
     EXPECT_EQ(condition["saturates"], condition["saturated_share"].get<double>() > 0);
   }
-  for (const int full : {0, 2}) {  // an emptier battery has less thrust
+  for (const int full : {0, 2}) {  // an emptier battery gives less thrust
     EXPECT_LT(claims["conditions"][full]["saturated_share"].get<double>(),
               claims["conditions"][full + 1]["saturated_share"].get<double>());
   }
@@ -120,7 +120,7 @@ TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
     }
   }
 
-  // Made anew elsewhere, the same bytes.
+  // Regenerated elsewhere, the bytes are the same.
   reproduce("intro -o again -j 1");
   EXPECT_EQ(read_text(folder_ / "out/small/flights-0/stage1/network/phi_small.safetensors"),
             read_text(folder_ / "again/small/flights-0/stage1/network/phi_small.safetensors"));

@@ -1,10 +1,9 @@
-/// @file Preloaded into the tool: counts its calls that change files, and lets one of them fail or be its last.
+/// @file Preloaded into the tool: counts its calls that change files, and makes one of them fail or be the last.
 ///
-///   FAULT_LOG   every call is one line here
-///   FAULT_AT    the number of the call, from 1, that goes wrong
-///   FAULT_KIND  kill: the process dies there, of a write when half of it is done; else an errno: the call fails with
-///   it,
-///               a write after its half, and so does every later write
+///   FAULT_LOG   each call is appended here as a line
+///   FAULT_AT    number of the call, starting at 1, that fails
+///   FAULT_KIND  kill: the process dies there, for a write after half of it; else an errno: the call fails with it,
+///               a write after half of it, and so do all later writes
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -23,7 +22,7 @@ namespace {
 
 std::atomic<int> calls{0};
 
-/// Only the tool itself: gnuplot and shells inherit the environment.
+/// Only for the tool itself, because gnuplot and shells inherit the environment.
 bool is_tool() {
   static const bool answer = strcmp(program_invocation_short_name, "swarmcert") == 0;
   return answer;
@@ -36,7 +35,7 @@ const char* setting(const char* name) {
 
 bool kills() { return strcmp(setting("FAULT_KIND"), "kill") == 0; }
 
-/// Counts and notes a call. 0: goes on; 1: this is the one; 2: an earlier one was.
+/// Counts and logs a call. Returns 0 to continue, 1 for the selected call, 2 after it.
 int count(const char* what, const char* path) {
   if (!is_tool() || *setting("FAULT_LOG") == '\0') return 0;
   const int number = ++calls;
@@ -52,7 +51,7 @@ int count(const char* what, const char* path) {
 
 void die() { syscall(SYS_kill, syscall(SYS_getpid), SIGKILL); }
 
-/// True if the call must fail: errno is set.
+/// Returns true and sets errno if the call must fail.
 bool fails(const char* what, const char* path) {
   if (count(what, path) != 1) return false;
   if (kills()) die();
@@ -103,7 +102,7 @@ ssize_t write(int descriptor, const void* bytes, size_t size) {
   if (state == 1) {
     const ssize_t half = real(descriptor, bytes, size / 2);
     if (kills()) die();
-    if (half > 0) return half;  // a disk takes what it can; the next call says that it is full
+    if (half > 0) return half;  // a full disk accepts part of a write; the next call fails
   }
   errno = atoi(setting("FAULT_KIND"));
   return -1;

@@ -1,4 +1,4 @@
-/// @file Sound inputs of every kind, small, for runs of the whole tool.
+/// @file Small valid inputs of every kind, for runs of the whole tool.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,10 +10,10 @@
 
 namespace swarmcert::tests {
 
-/// Copies and makes in `folder`: phi.safetensors, rho.safetensors, network.toml, box.toml, gains.toml, model.toml,
+/// Copies and creates in `folder`: phi.safetensors, rho.safetensors, network.toml, box.toml, gains.toml, model.toml,
 /// grid.toml, flights/<run>/cf<vehicle>_00, log.csv, cert.json (of phi), set.json (of the network), firmware/,
 /// policy.toml of a release that passes with its baseline.json and its bundle/, and swept/, two shards of the grid.
-/// `small`: instead of the demo's networks, such with four neurons a layer, on which every proof takes less than a
+/// `small`: uses networks with four neurons per layer instead of the demo's, for which every proof takes less than a
 /// second.
 inline void make_inputs(const std::filesystem::path& folder, bool small = false) {
   const std::filesystem::path source = SWARMCERT_SOURCE_DIR;

@@ -31,11 +31,11 @@ Contents contents_of(const fs::path& folder) {
 
 bool is_temporary(const std::string& path) { return path.find(".part-") != std::string::npos; }
 
-/// One writing command: everything it writes goes to out/.
+/// A command that writes; all its output goes to out/.
 struct Job {
   const char* name;
   const char* command;
-  int stride;  ///< every which of its calls is interrupted
+  int stride;  ///< every stride-th call is interrupted
 };
 
 const Job kJobs[] = {
@@ -63,7 +63,7 @@ class InterruptedWrite : public testing::TestWithParam<Job> {
  protected:
   void SetUp() override {
     make_inputs(folder_.path());
-    // Plots are not what is tested here.
+    // Plots are not tested here.
     fs::create_directory(folder_.path() / "fake");
     write_text(folder_ / "fake/gnuplot", "#!/bin/sh\nexit 1\n");
     fs::permissions(folder_.path() / "fake/gnuplot", fs::perms::owner_all);
@@ -72,14 +72,14 @@ class InterruptedWrite : public testing::TestWithParam<Job> {
     ASSERT_EQ(whole.exit_code, 0) << whole.output;
     written_ = contents_of(out());
     ASSERT_FALSE(written_.empty());
-    reset();  // folders that exist are not made again
+    reset();  // existing folders are not created again
     ASSERT_EQ(run(0, "kill").exit_code, 0);
     calls_ = static_cast<int>(std::count(log_.begin(), log_.end(), '\n'));
   }
 
   fs::path out() const { return folder_.path() / "out"; }
 
-  /// Old files lie where the command writes.
+  /// Places old files where the command writes.
   void reset() const {
     fs::remove_all(out());
     for (const auto& [path, content] : written_) {
@@ -88,7 +88,7 @@ class InterruptedWrite : public testing::TestWithParam<Job> {
     }
   }
 
-  /// Runs with a fault at call `at`; 0: none.
+  /// Runs with a fault at call `at`; 0: no fault.
   Outcome run(int at, const std::string& kind) {
     fs::remove(folder_.path() / "log");
     const Outcome outcome = run_shell(
@@ -101,7 +101,8 @@ class InterruptedWrite : public testing::TestWithParam<Job> {
     return outcome;
   }
 
-  /// Every file is the old one or the new one. @returns how many temporary files were left.
+  /// Expects each file to be the complete old or the complete new one.
+  /// @returns the number of temporary files left
   int expect_whole_files() const {
     int left = 0;
     for (const auto& [path, content] : contents_of(out())) {

@@ -59,7 +59,7 @@ const Reader kReaders[] = {
     {"bundle/files/set.json", "verify-bundle bundle"},
     {"bundle/files/policy.toml", "verify-bundle bundle"},
     {"thrust.csv", "identify-thrust thrust.csv"},
-    // From here on each takes seconds.
+    // The following ones take seconds each.
     {"policy.toml", kGate},
     {"baseline.json", kGate},
     {"set.json", kGate},
@@ -76,7 +76,7 @@ using Random = std::mt19937_64;
 
 std::size_t below(Random& random, std::size_t limit) { return limit == 0 ? 0 : random() % limit; }
 
-/// A small change that a reader should notice, or survive.
+/// Returns a small mutation that a reader should detect or survive.
 std::string mutated(std::string bytes, Random& random) {
   static const char* const kWords[] = {
       "0",  "-1",   "1e308", "-1e308", "nan",      "inf",      "99999999999999999999", "1e-308", "\"\"", "[]",
@@ -100,7 +100,7 @@ std::string mutated(std::string bytes, Random& random) {
       case 4:
         bytes.insert(at, bytes.substr(below(random, bytes.size() + 1), 1 + below(random, 60)));
         break;
-      default: {  // a number becomes another one
+      default: {  // replaces a number
         const std::size_t begin = bytes.find_first_of("0123456789", at);
         if (begin == std::string::npos) break;
         const std::size_t end = std::min(bytes.find_first_not_of("0123456789.eE+-", begin), bytes.size());
@@ -111,7 +111,7 @@ std::string mutated(std::string bytes, Random& random) {
   return bytes;
 }
 
-/// Goes through the quick readers again and again, and where `all` through those of seconds too, one in each round.
+/// Cycles through the quick readers and, with `all`, through the slow ones too, one per round.
 const Reader& reader_of(int input, bool all) {
   const std::size_t quick = std::size(kReaders) - kReadersOfSeconds;
   const std::size_t round_length = quick + (all ? 1 : 0);
@@ -120,8 +120,8 @@ const Reader& reader_of(int input, bool all) {
   return kReaders[place < quick ? place : quick + round % kReadersOfSeconds];
 }
 
-/// Tries `inputs` mutated files on the quick or on `all` of kReaders; nothing may end but with the exit code of a
-/// verdict or of a bad file, without a word of a sanitizer, or after a minute of processor.
+/// Tries `inputs` mutated files on the quick readers or on `all` of kReaders. Each run must end within a minute of
+/// processor time, with the exit code of a verdict or of an invalid file, and without a sanitizer report.
 void soak(int inputs, bool all, std::uint64_t seed) {
   const ScratchFolder folder;
   make_inputs(folder.path(), true);
@@ -150,7 +150,7 @@ void soak(int inputs, bool all, std::uint64_t seed) {
         run_shell(fmt::format("ulimit -t 60; swarmcert {} -q --jobs 1", reader.command), folder.path());
     write_text(folder / reader.file, sound);
     ++codes[outcome.exit_code];
-    // Usage is right in all of them: exit code 2 would blame the user for the file.
+    // The command line is correct in all runs: exit code 2 would blame the user for the file.
     const bool is_sound = outcome.exit_code >= 0 && outcome.exit_code <= 4 && outcome.exit_code != 2 &&
                           outcome.output.find("Sanitizer") == std::string::npos &&
                           outcome.output.find("runtime error:") == std::string::npos;
@@ -175,7 +175,7 @@ TEST(Soak, MutatedInputsEndWithADocumentedExitCode) {
   soak(3 * static_cast<int>(quick), false, 1);
 }
 
-/// SWARMCERT_SOAK_INPUTS and SWARMCERT_SOAK_SEED change how many and which.
+/// SWARMCERT_SOAK_INPUTS and SWARMCERT_SOAK_SEED set the number and the selection of the mutations.
 TEST(Soak, MutatedInputsOfEveryCommand_slow) {
   const char* inputs = std::getenv("SWARMCERT_SOAK_INPUTS");
   const char* seed = std::getenv("SWARMCERT_SOAK_SEED");

@@ -62,7 +62,7 @@ TEST_F(Unwritable, FoldersWithoutPermissionAreNamed) {
   fs::create_directory(folder_.path() / "locked");
   fs::permissions(folder_.path() / "locked", fs::perms::owner_read | fs::perms::owner_exec |
                                                  fs::perms::others_read | fs::perms::others_exec);
-  // Permissions do not bind root.
+  // Permissions do not restrict root.
   std::string as_user;
   if (geteuid() == 0) {
     as_user = "setpriv --reuid=65534 --regid=65534 --clear-groups ";
@@ -94,7 +94,7 @@ TEST_F(Unwritable, TwoRunsInOneFolderLeaveWholeFilesOfOne) {
     const std::string both = read_text(folder_ / "both/cf1_00");
     EXPECT_TRUE(both == one || both == two);
   }
-  // Without --force the file of the first stays; the second is told.
+  // Without --force the first file stays, and the second process is told so.
   int refused = 0;
   for (int i = 0; i < 8; ++i) {
     fs::remove(folder_ / "cert");

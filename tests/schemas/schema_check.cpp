@@ -27,7 +27,7 @@ std::string text_of(const fs::path& path) {
   return text.str();
 }
 
-/// A result of `model draft` names the same kind as model.toml.
+/// A result of `model draft` has the same kind as model.toml.
 std::string schema_name(const json& document) {
   std::string kind = document["schema"].get<std::string>();
   kind = kind.substr(kind.find('/') + 1);
@@ -35,7 +35,8 @@ std::string schema_name(const json& document) {
   return kind == "model" && document.contains("command_line") ? "model-draft" : kind;
 }
 
-/// Parsed once per process. @return nullptr where there is none of this name.
+/// Parses each schema once per process.
+/// @return nullptr if there is none of this name
 const valijson::Schema* schema_of(const std::string& name) {
   static std::map<std::string, std::unique_ptr<valijson::Schema>> cache;
   const auto found = cache.find(name);

@@ -1,4 +1,4 @@
-/// That the check of results against the schemas sees what it is for. The check itself runs in every test that runs the
+/// Tests that validation against the schemas detects violations. The validation itself runs in every test that runs the
 /// tool (analysis/run.h).
 #include "schemas/schema_check.h"
 

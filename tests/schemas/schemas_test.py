@@ -1,9 +1,9 @@
-"""The JSON Schemas that ship with the tool, against what it prints, writes and reads.
+"""Compares the JSON Schemas that ship with the tool with its output and input files.
 
     schemas_test.py SWARMCERT SOURCE_FOLDER
 
-Runs every command once on small inputs; the C++ tests hold everything else that they run against the same schemas. Exit
-code 77, which ctest takes as skipped, where Debian's python3-jsonschema is missing.
+Runs each command once on small inputs; the C++ tests validate all their other results against the same schemas. Exits
+with 77, which ctest treats as skipped, if Debian's python3-jsonschema is missing.
 """
 
 import json
@@ -63,7 +63,7 @@ def conforms(document, name, source):
 
 
 def objects(schema, place=""):
-    """Every subschema with its place."""
+    """Yields each subschema with its path."""
     if isinstance(schema, dict):
         yield place, schema
         for key, value in schema.items():
@@ -78,7 +78,7 @@ def objects(schema, place=""):
 
 
 def test_schemas_are_valid_and_closed():
-    """Every object lists what it may hold, and every field at the top says what it means."""
+    """Each object lists its allowed fields, and each top-level field has a description."""
     expect(len(names()) >= 35, f"only {len(names())} schemas")
     for name in names():
         schema = read_schema(name)
@@ -96,7 +96,7 @@ def test_schemas_are_valid_and_closed():
             if "properties" not in inner and "object" not in kinds:
                 continue
             if (name, place) == ("schema", "/json_schema"):
-                continue  # a JSON Schema may say anything
+                continue  # a JSON Schema may contain anything
             expect(inner.get("additionalProperties") is not True, f"{name}{place} is open")
             expect("additionalProperties" in inner, f"{name}{place} does not say whether it is closed")
 
@@ -108,11 +108,11 @@ def test_the_command_prints_them():
     run(["schema", "certifi"], codes=(2,))
 
 
-# --- every command's result ---
+# --- results of all commands ---
 
 
 def command_lines():
-    """Of each command one line, in an order in which each finds its inputs."""
+    """Returns one command line per command, in an order in which each finds its inputs."""
     network = "network/network.toml"
     model = str(SOURCE / "stability/models/crazyflie-small.toml")
     truth = str(SOURCE / "stability/models/crazyflie-small-effects.toml")
@@ -157,7 +157,7 @@ def command_lines():
 def write_inputs(folder):
     gains = SOURCE / "controller/gains/crazyflie-small.toml"
     model = SOURCE / "stability/models/crazyflie-small.toml"
-    shutil.copytree(SOURCE / "nn/networks/demo", folder / "network")  # what is bundled lies beside the policy
+    shutil.copytree(SOURCE / "nn/networks/demo", folder / "network")  # the bundled network is beside the policy
     (folder / "grid.toml").write_text(
         f'schema = "swarmcert/grid/1"\ngains = "{gains}"\nmodel = "{model}"\ncompute = ["amplitude", "impulse"]\n'
         'pareto = ["amplitude", "impulse"]\n[axes]\nKp = { from = 5, to = 10, steps = 2 }\n'
@@ -229,7 +229,7 @@ def known_keys(name):
 
 
 def test_the_readers_take_no_key_that_the_schemas_do_not_know():
-    """Keys that a reader lists in allow_only(), by the file of the reader."""
+    """Returns the keys listed in allow_only() of a reader, by its source file."""
     readers = {
         "network": ["nn/weights/network.cpp"],
         "model": ["stability/model.cpp"],
@@ -252,7 +252,7 @@ def test_the_readers_take_no_key_that_the_schemas_do_not_know():
 
 
 def test_the_writers_write_no_field_that_the_schemas_do_not_know():
-    """Fields as they stand in the source of the commands: {"name", value} and json["name"] = value."""
+    """Returns the fields in the source of the commands: {"name", value} and json["name"] = value."""
     known = {"schema"}
     for name in names():
         for _, schema in objects(read_schema(name)):
@@ -267,7 +267,7 @@ def test_the_writers_write_no_field_that_the_schemas_do_not_know():
     fields = {}
     for path in files:
         text = path.read_text()
-        # A text after the name: a list of texts, or a field that some other writer has as well.
+        # A text follows the name: a list of texts, or a field of another writer.
         for field in re.findall(r'\{"(\w+)",\s+[^"\s]', text) + re.findall(r'\["(\w+)"\]\s*=[^=]', text):
             fields[field] = path.name
     expect(len(fields) > 150, f"only {len(fields)} fields found in the source")
@@ -406,8 +406,7 @@ SARIF = {
 
 
 def test_sarif_has_the_published_structure(folder):
-    """SARIF 2.1.0 (OASIS), section 3: the properties that are used here, their types, and which of them are
-    required."""
+    """SARIF 2.1.0 (OASIS), section 3: the properties used here, their types, and which of them are required."""
     counts = []
     for name in ("pass.sarif", "fail.sarif"):
         document = json.loads((folder / name).read_text())

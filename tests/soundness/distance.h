@@ -6,7 +6,7 @@
 
 namespace swarmcert::tests {
 
-/// Rounding of two evaluations in double, relative to the slope, for points at least kLeastDistance apart.
+/// Round-off of two evaluations in double, relative to the slope, for points at least kLeastDistance apart.
 constexpr double kRounding = 1e-7;
 constexpr double kLeastDistance = 1e-4;
 

@@ -1,5 +1,5 @@
-/// No slope inside the box above its bound from branch and bound: random and adversarial pairs of points, for any
-/// number of neighbours and for a stated one, whose others then stay in the box as well.
+/// No slope inside the box exceeds its bound from branch and bound: random and adversarial pairs of points, for any
+/// number of neighbours and for a given number, with the other neighbours inside the box as well.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -47,7 +47,7 @@ class PairsInTheBox {
     block_ = files::block_coordinates(network, bound.function, bound.block);
   }
 
-  /// Slopes over the bound of `pairs` pairs at most, the largest; counts them in `tried`.
+  /// Returns the largest ratio of slope to bound over at most `pairs` pairs, and counts them in `tried`.
   double largest_ratio(long pairs, Random& random, long& tried) const {
     double largest = 0;
     for (long pair = 0; pair < pairs; ++pair) {
@@ -74,7 +74,7 @@ class PairsInTheBox {
     const double spread = std::exp2(random.uniform() * 14 - 14);
     Point x = inside(box, random), y = inside(box, random);
     for (std::size_t k = 0; k < x.size(); ++k) {
-      if (adversarial) {  // near the steepest pair that the search found
+      if (adversarial) {  // near the steepest pair found by the search
         x[k] = bound_.lower.witness->x[k] + spread * (x[k] - bound_.lower.witness->x[k]);
         y[k] = bound_.lower.witness->y[k] + spread * (y[k] - bound_.lower.witness->y[k]);
       } else {

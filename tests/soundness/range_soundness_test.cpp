@@ -1,4 +1,4 @@
-/// No value outside of its range, no jump above its bound, no float32 evaluation further off than its bound.
+/// No value is outside its range, no jump above its bound, and no float32 evaluation error above its bound.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -56,7 +56,7 @@ Proved prove(const Network& network, int neighbours, int nodes) {
           lipschitz::float32_errors(network, domain_of(network), bounds, float32)};
 }
 
-/// A point of the box, sometimes on its border, where extremes like to lie.
+/// Returns a point of the box, sometimes on its boundary, where extremes are likely.
 template <typename Scalar>
 std::vector<Scalar> point(const Box& box, Random& random) {
   std::vector<Scalar> x;
@@ -69,7 +69,7 @@ std::vector<Scalar> point(const Box& box, Random& random) {
   return x;
 }
 
-/// Random neighbours against ranges and errors: f in double, and in float32 by the code that flies.
+/// Compares random neighbours with ranges and errors: f in double, and in float32 by the flight code.
 void try_points(const Network& network, const Proved& proved, const files::FunctionId& function,
                 int neighbours, int samples) {
   const std::vector<files::FunctionId> names = function.parts();
@@ -145,8 +145,8 @@ TEST(RangeSoundness, RandomSetsStayWithinTheirRange) {
   }
 }
 
-/// The largest of sign f that steps of single neighbours find from a random place, the ground's input among them if
-/// there is one.
+/// Returns the largest sign f found by moving single neighbours (and the input of the ground term, if any) from a
+/// random start.
 double climbed_value(const Network& network, int neighbours, double sign, Random& random) {
   const bool has_ground = network.phi.count("ground") == 1;
   const files::Evaluator<double> phi(network.phi.at("large")), rho(network.rho.at("small"));
@@ -194,7 +194,7 @@ TEST(RangeSoundness, NoClimbOverDistinctNeighboursLeavesARangeThatPartsOfTheBoxM
     const auto ranges = lipschitz::ranges(network, domain_of(network), {{"small", 1e9}}, options);
     for (std::size_t n = 1; n <= 3; ++n) {
       const lipschitz::CertifiedRange& range = ranges[n - 1];
-      // The boxes of the inputs were divided, for every form that the bound takes.
+      // The boxes of the inputs were split, for all forms used by the bound.
       EXPECT_LT(range.upper - range.lower, 0.8 * (whole[n - 1].upper - whole[n - 1].lower));
       double least = 1e300, greatest = -1e300;
       for (int climb = 0; climb < 15; ++climb) {
@@ -230,7 +230,7 @@ TEST(RangeSoundness, AClampMakesTheRangeHoldForEveryInput) {
   }
 }
 
-/// An affine network's range is known: sum of |w_k| times half widths.
+/// The range of an affine network is known: sum of |w_k| times half widths.
 TEST(RangeSoundness, AnAffineNetworkHasItsExactRange) {
   const Network network = tests::plain(tests::weights({tests::layer(1, 6, {1, -2, 3, 0.5, 0, -1})}));
   const auto ranges = lipschitz::ranges(network, domain_of(network), {}, {});
@@ -240,7 +240,7 @@ TEST(RangeSoundness, AnAffineNetworkHasItsExactRange) {
   EXPECT_EQ(ranges[0].least.value, -9);
 }
 
-/// A climb goes much further than samples: from the worst of many points, steps that shrink where they fail.
+/// A local search reaches much further than samples: from the worst of many points, with steps that shrink on failure.
 double furthest_off(const Network& network, const files::FunctionId& function, Random& random) {
   const std::vector<files::FunctionId> names = function.parts();
   const auto parts = files::parts(network);

@@ -1,5 +1,5 @@
-/// No slope above its bound: random and adversarial pairs of points over every network at hand, against the proved
-/// bounds of every function, block and law. The closest ratio is printed: it says how hard the test tried.
+/// No slope exceeds its bound: random and adversarial pairs of points on all available networks, against the proved
+/// bounds of each function, block and law. The closest ratio is printed to show how hard the test tried.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ using tests::distance;
 using tests::kLeastDistance;
 using tests::kRounding;
 
-/// One set function, or a network alone, ready to be evaluated at many points.
+/// A set function, or a single network, ready to be evaluated at many points.
 class Function {
  public:
   Function(const Network& network, const files::FunctionId& function) {
@@ -47,11 +47,11 @@ class Function {
 
 struct Tally {
   long tried = 0;
-  double closest = 0;  ///< largest slope over its bound
+  double closest = 0;  ///< largest ratio of slope to bound
 };
 
-/// Pairs for one bound: around random points, and around the steepest pair that the search found, with the other
-/// neighbours where it put them. `sum` of the others is drawn anew in the random case.
+/// Tries pairs for one bound: around random points, and around the steepest pair found by the search, with the other
+/// neighbours where it placed them. In the random case the `sum` of the others is drawn again.
 void try_pairs(const Network& network, const CertifiedBound& bound, const std::vector<int>& block, long pairs,
                std::uint64_t seed, Tally& tally) {
   const Function f(network, bound.function);
@@ -102,7 +102,7 @@ void try_pairs(const Network& network, const CertifiedBound& bound, const std::v
   }
 }
 
-/// The network that ships, random ones of several shapes, and the published ones where they are at hand.
+/// Returns the bundled network, random ones of several shapes, and the published ones if available.
 std::vector<Network> networks() {
   std::vector<Network> result;
   files::NetworkArguments arguments;
@@ -165,7 +165,7 @@ TEST(SlopeSoundness, NoneOfTenMillionSlopesExceedsItsBound_slow) {
   no_slope_exceeds_its_bound(10'000'000, 10, {"position", "velocity"});
 }
 
-/// Several neighbours move at once, and the vehicle itself: against the laws.
+/// Moves several neighbours at once, and the vehicle itself, and compares with the laws.
 TEST(SlopeSoundness, NoMoveOfSeveralNeighboursExceedsItsLaw) {
   std::mt19937 generator(2);
   Network network;
@@ -182,7 +182,7 @@ TEST(SlopeSoundness, NoMoveOfSeveralNeighboursExceedsItsLaw) {
   double closest = 0;
   for (int sample = 0; sample < 100'000; ++sample) {
     const double spread = std::exp2(random.uniform() * 12 - 10);
-    const bool together = sample % 2 == 0;  // own state: every input moves alike
+    const bool together = sample % 2 == 0;  // own state: all inputs move equally
     std::vector<double> common(6);
     for (double& value : common) value = spread * random.symmetric();
     std::vector<double> before(5, 0.0), after(5, 0.0);

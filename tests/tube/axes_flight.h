@@ -1,5 +1,7 @@
-/// @file Flights of the loop that tubes are about: axes apart, first-order lags, predictions a staircase; continuous,
-/// or with a command held over a period of the gains' rate and the firmware's integrator.
+/// @file Flights of the loop assumed by tubes.
+///
+/// Decoupled axes, first-order lags, piecewise constant predictions; continuous, or with a command held over a period
+/// of the gains' rate and the firmware's integrator.
 #pragma once
 
 #include <array>
@@ -16,11 +18,11 @@
 
 namespace swarmcert::tests {
 
-/// Runge-Kutta in steps of a millisecond, of which a period of the loop must be a multiple. When each vehicle predicts
-/// is random; predictions reach the controller late. Errors of the estimates switch between plus and minus their bounds
-/// at random rates, each on its own, or stand still. Where an interval is given, the motors of each vehicle have a
-/// random lag in each flight. Behind one lag, rotors start anywhere between the weight and what the first prediction
-/// asks for. Where a residual is given, it acts beside the truth.
+/// Runge-Kutta with steps of a millisecond, of which the period of the loop must be a multiple. The prediction times of
+/// each vehicle are random; predictions reach the controller late. Errors of the estimates switch between plus and
+/// minus their bounds at random rates, independently, or are constant. If an interval is given, the motors of each
+/// vehicle have a random lag in each flight. With a single lag, rotors start anywhere between the weight and the first
+/// prediction. If a residual is given, it acts in addition to the truth.
 class AxesFlight {
  public:
   /// Called with the time, the vehicle, e and e'.
@@ -75,7 +77,7 @@ class AxesFlight {
           predicted[at] = forces_.learned(forces_.at(state(now, i, t, true), vehicles_ - 1));
           next_s[at] += period_s;
         }
-        // next_s - period_s is when the last prediction was made.
+        // The last prediction was made at next_s - period_s.
         if (t > next_s[at] - period_s + gains_.network_latency_s - kStep_s / 2) acting[at] = predicted[at];
       }
       for (int i = 0; i < vehicles_ && every > 0 && s % every == 0; ++i) {
@@ -118,7 +120,7 @@ class AxesFlight {
 
  private:
   static constexpr double kStep_s = 0.001;
-  /// Per axis: e, e', int e, and what the lags let through so far.
+  /// Per axis: e, e', int e, and the outputs of the lags.
   using Axis = std::array<double, 6>;
   using Vehicle = std::array<Axis, 3>;
   using Loops = std::array<stability::AxisLoop, 3>;
@@ -143,7 +145,7 @@ class AxesFlight {
            (k == 2 ? learned : 0);
   }
 
-  /// A lag of the motors for each vehicle, which gains_ must state to be one at all.
+  /// Draws a motor lag for each vehicle; gains_ must have a lag.
   void draw_lags(files::Random& random) {
     for (Loops& loops : loops_) {
       if (!motor_lag_s_) return;
@@ -156,7 +158,7 @@ class AxesFlight {
     switching_.assign(static_cast<std::size_t>(vehicles_), {});
     for (auto& of_vehicle : switching_) {
       for (Switching& s : of_vehicle) {
-        // From one switch in twenty seconds, which is none, to ten per second.
+        // From one switch in twenty seconds, i.e. practically none, to ten per second.
         s.rate_1_s = 0.05 * std::pow(200.0, between(random, 0, 1));
         s.phase = between(random, 0, 2);
       }
@@ -171,7 +173,7 @@ class AxesFlight {
     return std::fmod(s.rate_1_s * time_s + s.phase, 2) < 1 ? size : -size;
   }
 
-  /// One end of the residual's range along each axis where the vehicle is; ends change at random times.
+  /// Returns one end of the residual's range along each axis at the vehicle's position, switching at random times.
   Eigen::Vector3d residual_at(const std::vector<double>& state, int vehicle, double time_s) const {
     Eigen::Vector3d force = Eigen::Vector3d::Zero();
     if (residual_ == nullptr) return force;
@@ -187,14 +189,14 @@ class AxesFlight {
     return force;
   }
 
-  /// What the law is told of an axis.
+  /// Returns the estimated state of an axis, as seen by the control law.
   Axis estimated(Axis a, int vehicle, std::size_t k, double time_s) const {
     a[0] += estimate_error(vehicle, k, time_s);
     a[1] += estimate_error(vehicle, k + 3, time_s);
     return a;
   }
 
-  /// @param held the command along each axis; null: it follows the state.
+  /// @param held the command along each axis; null: it follows the state
   Vehicle derivative(const Vehicle& x, int vehicle, double time_s, const Eigen::Vector3d& force,
                      double learned, const std::array<double, 3>* held) const {
     Vehicle result{};
@@ -221,7 +223,7 @@ class AxesFlight {
     return result;
   }
 
-  /// @param is_told with the errors of the estimates.
+  /// @param is_told include the errors of the estimates
   std::vector<double> state(const std::vector<Vehicle>& x, int vehicle, double time_s,
                             bool is_told = false) const {
     const auto place = [&](int i, bool is_velocity) {

@@ -1,4 +1,4 @@
-// Kernels of the position loops against the equations as they are written down.
+// Kernels of the position loops compared with the differential equations.
 #include "analysis/tracking/tube/error_loops.h"
 
 #include <gtest/gtest.h>
@@ -63,7 +63,7 @@ TEST(ErrorLoops, WithoutALagTheThrustFollowsAtOnce) {
   EXPECT_TRUE(lag_start(ErrorLoop{}, 0.02).position_m.empty());
 }
 
-/// A loop of `lag_s` that is sampled at 100 Hz, with cells of `slice_s`.
+/// A loop with `lag_s` that is sampled at 100 Hz, with cells of `slice_s`.
 ErrorLoop sampled_loop(double lag_s, double slice_s, int slices) {
   stability::TrackingSetup tracking;
   tracking.plant.mass_kg = Start::kMass_kg;
@@ -85,8 +85,8 @@ TEST(ErrorLoops, RampsBetweenSamplesActAsTheirMeanAndASawtoothThatItsKernelsBoun
     ASSERT_TRUE(loop.has_whole_periods);
     EXPECT_EQ(loop.slope3.has_value(), lag_s > 0);
     EXPECT_FALSE(sampled_loop(lag_s, 0.0125, 4).has_whole_periods);
-    // m e'' = F - the held command behind the lag, where F = (t - t_k)/T s_k N and s_k is the sign that moves the
-    // vehicle furthest at the end: from the kernel's value in a first pass, then flown.
+    // m e'' = F - the lagged held command, where F = (t - t_k)/T s_k N and s_k is the sign that maximises the final
+    // displacement: taken from the kernel's value in a first pass, then simulated.
     const auto answer = [&](const std::vector<double>& signs) {
       double x[4] = {0, 0, 0, 0};  // e, e', int e, thrust of the law
       constexpr int kSteps = 40;

@@ -1,4 +1,4 @@
-// Simulated flights that keep every hypothesis of a tube: none may leave it, and some must come near its edge.
+// Simulated flights that satisfy every hypothesis of a tube: none may leave it, and some must come close to its edge.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,15 +11,15 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// What flights did in a tube.
+/// Statistics of the flights in a tube.
 struct Campaign {
   long looks = 0, outside = 0;
-  double largest_share_z = 0;  ///< of |e_z| in the tube's radius along z
+  double largest_share_z = 0;  ///< largest |e_z| relative to the tube's radius along z
   double nearest = 0;          ///< to the edge of a slice: 1 at the edge
 };
 
-/// Flies the swap of two vehicles with random errors of the estimates, starts of the rotors, times of prediction and
-/// lags of each vehicle's motors in the sampled loop of the gains that flew.
+/// Simulates the swap of two vehicles with random estimation errors, initial rotor states, prediction times and motor
+/// lags of each vehicle, in the sampled loop of the gains that flew.
 Campaign fly_in_tube(int flights, const EstimateErrors& estimates, const std::optional<Interval>& motor_lag_s,
                      const ResidualEnvelope* residual = nullptr) {
   const files::Network network = tests::demo_network();
@@ -47,7 +47,7 @@ Campaign fly_in_tube(int flights, const EstimateErrors& estimates, const std::op
         const double middle = (range.lower + range.upper) / 2;
         ++campaign.looks;
         if (!(e[k] >= range.lower && e[k] <= range.upper)) ++campaign.outside;
-        // What moves by less than a tenth of a millimetre shows rounding alone.
+        // Movements of less than a tenth of a millimetre show only round-off.
         if (range.upper - range.lower > 1e-4)
           campaign.nearest = std::max(campaign.nearest, std::abs(e[k] - middle) / (range.upper - middle));
       }
@@ -62,7 +62,7 @@ constexpr EstimateErrors kWrong{{0.003, 0.003, 0.003}, {0.0005, 0.0005, 0.0005}}
 /// Ten per cent about the authors' identification.
 const Interval kLags_s(0.9 * 0.0575, 1.1 * 0.0575);
 
-/// @param nearest, share_z what the flights have to reach of a slice's half-width, and |e_z| of its radius.
+/// @param nearest, share_z minimum that the flights must reach, of a slice's half-width and of the radius for |e_z|
 void stay_inside(int flights, double nearest, double share_z,
                  const std::optional<Interval>& motor_lag_s = {}) {
   const Campaign campaign = fly_in_tube(flights, kWrong, motor_lag_s);

@@ -1,4 +1,4 @@
-// Bounds of |f_hat - f_a| over a tube against states inside it.
+// Bounds of |f_hat - f_a| over a tube compared with states inside it.
 #include "analysis/tracking/tube/force_bound.h"
 
 #include <gtest/gtest.h>
@@ -22,8 +22,8 @@ Radii some_radii(int vehicles, double position_m, double velocity_m_s) {
   return radii;
 }
 
-/// Random states of every stretch: what the network saw, and where the truth acts a little later.
-/// @returns the largest share of its bound that any state reached.
+/// Random states in each stretch: the inputs of the network, and slightly later the state in which the truth acts.
+/// @returns the largest ratio of error to bound
 double largest_share(const Scene& scene, const files::Network& network, const stability::Model& truth,
                      const Radii& radii, const std::vector<double>& bounds, std::uint64_t seed) {
   Forces forces(network, truth);
@@ -74,12 +74,12 @@ TEST(Enclosure, NoStateOfTheTubeExceedsItsBoundAndSomeComeNear) {
     const double share = largest_share(scene, network, truth, radii, bounds, 5);
     EXPECT_LE(share, 1) << c.vehicles << " " << c.position_m;
     EXPECT_GT(share, 0.4) << "bounds that no state comes near to would hide a fault";
-    // A smaller tube within the one that was prepared: its bounds are smaller, and hold.
+    // A smaller tube within the prepared one: its bounds are smaller and hold.
     const Radii half = radii.scaled(0.5, 0);
     const std::vector<double> smaller = enclosure.sizes(half);
     for (std::size_t s = 0; s < smaller.size(); ++s) ASSERT_LE(smaller[s], bounds[s]);
     EXPECT_LE(largest_share(scene, network, truth, half, smaller, 6), 1);
-    // Half of the bound must fail the same look: the test can tell.
+    // Half of the bound must fail the same check, which shows that the test can detect errors.
     std::vector<double> broken = smaller;
     for (double& x : broken) x *= 0.4;
     EXPECT_GT(largest_share(scene, network, truth, half, broken, 6), 1);

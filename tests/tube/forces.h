@@ -1,4 +1,4 @@
-/// @file Both forces on one vehicle, as the simulator has them.
+/// @file Both forces on one vehicle, as in the simulator.
 #pragma once
 
 #include <memory>
@@ -20,7 +20,7 @@ class Forces {
           spec, stability::EffectContext{truth.kind, {truth.kind}, truth.path}));
     }
   }
-  /// @param x a state as in learned_force.h. What is returned refers to this.
+  /// @param x a state as in learned_force.h; the result refers to it
   stability::Instant at(const std::vector<double>& x, int neighbours) {
     others_.clear();
     for (int n = 0; n < neighbours; ++n) {

@@ -1,4 +1,4 @@
-// The network's linear forms against the force that the simulator flies.
+// Linear bounds of the network compared with the force in the simulator.
 #include "analysis/tracking/tube/learned_force.h"
 
 #include <gtest/gtest.h>
@@ -66,7 +66,7 @@ void expect_enclosed(const files::Network& network, int neighbours, std::uint64_
         ASSERT_LE(-f, forms->lower_row.dot(x) + forms->lower + 1e-13);
       }
     }
-    // Linear forms of a narrow box are near to one another.
+    // The linear bounds over a narrow box are close to each other.
     const double gap =
         (whole.upper_row + whole.lower_row).cwiseAbs().sum() * width +
         std::abs(
@@ -110,7 +110,7 @@ TEST(LearnedForce, LiesBetweenItsFormsWithAGroundOfAnotherDepth) {
   expect_enclosed(network, 2, 13);
 }
 
-// Simulation and models fly it, and a tube, whose neighbours stay the same.
+// Simulation, models and a tube use it if the neighbours stay the same.
 TEST(DeepSetForce, IsZeroInASilentCompositionAlsoOfNeighboursThatFadeAndInATube) {
   files::Network network = tests::demo_network();
   DeepSetForce always(network, "small", {"small"});

@@ -1,4 +1,4 @@
-// Tubes that were proved, against flights; tubes that must not be.
+// Proved tubes compared with flights, and tubes that must not be proved.
 #include "analysis/tracking/tube/local_tube.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ LocalTubeOptions quick() {
   return options;
 }
 
-/// Largest errors per vehicle and axis of one flight of the swap in the declared truth.
+/// Returns the largest errors per vehicle and axis in one flight of the swap with the declared truth.
 std::vector<std::array<double, 4>> flown(const stability::Gains& gains, const stability::Model& truth,
                                          const files::Network& network, int vehicles, double duration_s,
                                          std::uint64_t seed, bool noise) {
@@ -39,7 +39,7 @@ std::vector<std::array<double, 4>> flown(const stability::Gains& gains, const st
   return errors;
 }
 
-/// The declared truth as the loop's lags have it.
+/// Returns the declared truth with the lags of the loop.
 stability::Model truth_for(const stability::Gains& gains) {
   stability::Model truth = tests::truth_model();
   std::vector<stability::EffectSpec> effects;
@@ -52,8 +52,8 @@ stability::Model truth_for(const stability::Gains& gains) {
 
 TEST(LocalTube, HoldsEveryFlightOfItsSwapAndOrdersTheBounds) {
   const files::Network network = tests::demo_network();
-  // Gains that state how fast the vehicle turns, which the simulator has and composite.toml leaves out. Left out of
-  // every tube: that a tilted thrust lifts less, which only the height feels.
+  // Gains that state the vehicle's attitude response, which the simulator includes and composite.toml omits. No tube
+  // includes the reduced lift of a tilted thrust, which affects only the height.
   const double left_out_m[] = {0, 0, 5e-5};
   const stability::TrackingSetup loop = tests::loop_of("firmware-defaults");
   const stability::Model truth = tests::truth_model();
@@ -80,7 +80,7 @@ TEST(LocalTube, HoldsEveryFlightOfItsSwapAndOrdersTheBounds) {
     EXPECT_GE(row->tube.radius_m(2), last) << row->name;
     last = row->tube.radius_m(2);
   }
-  // The bounds of the reference hold the tube's own number from above, up to what proving it costs.
+  // The bound from slices exceeds neither the tube's radius nor, up to round-off, the bound from the amplitude.
   for (const ForceErrorBounds& b : tube.bounds) {
     const double radius_m = tube.tube.radii.position_m[static_cast<std::size_t>(b.vehicle)][2];
     EXPECT_LE(b.by_slices_m, radius_m);
@@ -194,7 +194,7 @@ TEST(LocalTube, WhatWasInterruptedProvesNothing) {
   EXPECT_EQ(tube.why, "interrupted");
 }
 
-/// A force bound that says what it is told to.
+/// A force bound that returns preset values.
 class ToldBound final : public ForceBound {
  public:
   ToldBound(const Scene& scene, double constant_N, double per_metre_N)

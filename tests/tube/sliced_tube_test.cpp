@@ -1,4 +1,4 @@
-// Tubes slice by slice against flights of the loop they are about.
+// Tubes, slice by slice, compared with flights of the loop they describe.
 #include "analysis/tracking/tube/sliced_tube.h"
 
 #include <gtest/gtest.h>
@@ -19,8 +19,7 @@ EnclosureOptions boxes(int count) {
   return options;
 }
 
-/// How often flights were outside their slice, and how near they came to the edge where they were inside: 1 at the
-/// edge.
+/// How often flights were outside their slice, and how close to the edge they came inside it: 1 at the edge.
 struct Seen {
   int looks = 0, outside = 0;
   double nearest = 0;
@@ -39,7 +38,7 @@ Seen fly(const stability::TrackingSetup& loop, const stability::Model& truth, co
     const double middle = (range.lower + range.upper) / 2;
     const double share = std::abs(value - middle) / (range.upper - middle);
     if (value < range.lower || value > range.upper) ++seen.outside;
-    // What moves by less than a tenth of a millimetre shows rounding alone.
+    // Movements of less than a tenth of a millimetre show only round-off.
     if (range.upper - range.lower > 1e-4) seen.nearest = std::max(seen.nearest, share);
   };
   for (int i = 0; i < flights; ++i) {
@@ -104,7 +103,7 @@ TEST(SlicedTube, SampledFlightsThatLeaveTheContinuousTubeStayInTheSampledOne) {
 TEST(SlicedTube, SampledTubesHoldSampledFlightsAndAreLittleWiderThanContinuousOnes) {
   const files::Network network = tests::demo_network();
   const auto task = stability::make_task("swap", {2, 4.5, 0});
-  // At 500 Hz and at 100 Hz, where predictions also rest on states twice as old.
+  // At 500 Hz and at 100 Hz, where predictions also use states twice as old.
   for (const auto& [gains, most] :
        {std::pair("firmware-defaults", 1.08), std::pair("crazyflie-small", 1.35)}) {
     SCOPED_TRACE(gains);

@@ -1,4 +1,4 @@
-// Enclosures of declared truths against the effects that the simulator flies.
+// Enclosures of declared truths compared with the effects in the simulator.
 #include "analysis/tracking/tube/truth_force.h"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ double simulated(const stability::Model& model, const std::vector<Eigen::Vector3
   return sum;
 }
 
-/// Every point of random boxes: inside the value, and inside the mean value form about the middle.
+/// All points of random boxes are inside the enclosure and inside the mean value form about the middle.
 void expect_enclosed(const stability::Model& model, int neighbours, std::uint64_t seed) {
   const TruthForce truth(model, 0.6);
   ASSERT_EQ(truth.refusal(), "");

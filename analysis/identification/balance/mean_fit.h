@@ -11,8 +11,7 @@ struct MeanFit {
 };
 
 /// Fits y = value x by least squares. Scores of neighbouring blocks may be correlated: the variance includes their
-/// products (Newey and West 1987, one lag). Precondition: x and y have the same size of at least two, and x is not all
-/// zero.
+/// products (Newey and West 1987, one lag). Precondition: x and y have the same size, at least two; not all x are zero.
 MeanFit fit_through_origin(const std::vector<double>& x, const std::vector<double>& y);
 
 /// Returns the mean divided by its standard error; 0 if all values are equal.

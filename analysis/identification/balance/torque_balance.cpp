@@ -124,8 +124,9 @@ std::string in_words(const TorqueBalance& balance) {
       "{:.1f} and {:.1f} mm){}{}",
       1e3 * balance.offset_m.x(), 1e3 * balance.offset_m.y(), 1e3 * balance.offset_half_m.x(),
       1e3 * balance.offset_half_m.y(),
-      balance.is_named() ? ""
-                         : fmt::format("; less than {:.1f} mm does not count", 1e3 * balance.least_offset_m),
+      balance.is_named()
+          ? ""
+          : fmt::format("; offsets below {:.1f} mm are not significant", 1e3 * balance.least_offset_m),
       and_rivals());
 }
 

@@ -1,10 +1,9 @@
 /// @file Mean torques of the rotors, which show an offset centre of mass or a constant torque.
 ///
-/// Over a second the torques of the rotors cancel all other torques on the vehicle: tau_a = b, a constant, or tau_a =
-/// -c x T e3, which is proportional to the thrust T. Means over blocks of 1 s are regressed on both. If the thrust
-/// hardly varies, both explain the data equally well and both are reported. A rotor k that gives the fraction rho of
-/// its thrust leaves (rho - 1) f_k r_k x e3, which is also proportional to the thrust, so it is always listed as a
-/// rival.
+/// Over a second the torques of the rotors cancel all other torques on the vehicle: tau_a = b, a constant, or
+/// tau_a = -c x T e3, which is proportional to the thrust T. Means over blocks of 1 s are regressed on both. If the
+/// thrust hardly varies, both explain the data equally well and both are reported. A rotor k that gives the fraction
+/// rho of its thrust leaves (rho - 1) f_k r_k x e3, which is also proportional to the thrust, so it is always a rival.
 ///
 /// A centre of mass is reported only if its offset is larger than the play of a battery (kBatteryPlay_m) and larger
 /// than the apparent offset caused by rotors that differ by kRotorSpread between the sides.
@@ -29,8 +28,7 @@ struct TorqueBalance {
   Eigen::Vector2d offset_m = Eigen::Vector2d::Zero(), torque_Nm = Eigen::Vector2d::Zero();
   Eigen::Vector2d offset_half_m = Eigen::Vector2d::Zero(), torque_half_Nm = Eigen::Vector2d::Zero();
   double least_offset_m = 0;  ///< smallest offset that is reported
-  /// Forces by which the rotors are out of balance, rms over blocks and rotors: as measured, and with the better
-  /// explanation.
+  /// Imbalance of the rotor forces, rms over blocks and rotors: as measured, and with the better explanation.
   double rmse_before_N = 0, rmse_after_N = 0;
   double z = 0;                     ///< of the offset over the torque, from the squared errors of the blocks
   std::string effect;               ///< com_offset, torque_bias, or empty: nothing is reported
@@ -40,8 +38,7 @@ struct TorqueBalance {
 };
 
 /// Returns the balance of each vehicle of `kind` whose logs give the force of each rotor, over all of its flights. The
-/// model's own effects are removed first. Vehicles with fewer than 10 blocks are skipped. The result does not depend on
-/// `jobs`.
+/// model's own effects are removed first. Vehicles with fewer than 10 blocks are skipped. Independent of `jobs`.
 std::vector<TorqueBalance> torque_balances(const residuals::Inputs& inputs, const std::string& kind,
                                            int jobs);
 

@@ -178,8 +178,7 @@ double Interplay::fitted_to(const std::vector<Sums>& tenths, int without) const 
     all.sum += one.sum;
     all.count += one.count;
   }
-  // Hat functions add up to a constant, so a constant force is among the maps. The ridge keeps rarely visited positions
-  // at zero.
+  // Hat functions add up to a constant, so a constant force is among the maps. The ridge keeps rare positions at zero.
   all.b -= all.sum / std::max(all.count, 1.0) * all.columns;
   all.gram.diagonal().array() += 1e-2 * all.count / static_cast<double>(map_size());
   return all.b.dot(all.gram.ldlt().solve(all.b));

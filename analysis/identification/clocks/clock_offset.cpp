@@ -50,8 +50,7 @@ Clocks clocks_of(const std::vector<Track>& tracks) {
   return clocks;
 }
 
-/// Returns the largest set of clocks whose vehicles feel one another in a cycle, so that delays and offsets can be
-/// separated.
+/// Returns the largest set of clocks whose vehicles feel one another in a cycle, which separates delays and offsets.
 std::vector<int> circle(ClockSearch& search, const ClockSteps& steps, int clocks) {
   const auto count = static_cast<std::size_t>(clocks);
   std::vector<std::vector<char>> reaches(count, std::vector<char>(count, 0));

@@ -23,7 +23,7 @@ struct ClockOffset {
   double correction_s = 0;               ///< offset_s plus what is already known of the clock
   Interval interval;                     ///< 90 %, from the jackknife over tenths of the flight
   double delay_s = 0;                    ///< tau, on the grid of the search
-  /// Of all vertical forces, with equal clocks and with the estimated ones; each with its own maps.
+  /// RMSE over all vertical forces, with equal clocks and with the estimated ones, each with its own maps.
   double rmse_before_N = 0, rmse_after_N = 0;
   int records = 0;  ///< means over kClockSample_s
   double z = 0;     ///< offset divided by its standard deviation
@@ -32,8 +32,8 @@ struct ClockOffset {
 /// Estimates offsets for flights of two or more vehicles whose clocks are not all related by absolute times or common
 /// starts of their setpoints. All clocks of a flight are estimated together and compared with the clock that most logs
 /// share, else with the middle one, else with the next one from which another significantly differs. Returns nothing
-/// for a flight if the vehicles hardly disturb each other, if a vehicle neither feels another one nor is felt, or if no
-/// two clocks differ by more than three standard deviations and by enough to matter for the disturbances.
+/// for a flight if the vehicles hardly disturb each other, if one of them feels no other one or is felt by none, or if
+/// no two clocks differ by more than three standard deviations and by enough to matter for the disturbances.
 std::vector<ClockOffset> clock_offsets(const residuals::Inputs& inputs, int jobs);
 
 /// Makes `inputs` read its logs with these offsets.

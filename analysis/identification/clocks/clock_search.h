@@ -38,8 +38,7 @@ class ClockSearch {
   ClockSteps best(const Tie& tie = {0, 0});
   /// Returns the nearest local maximum.
   ClockSteps climbed(ClockSteps from, int without, const Tie& tie = {0, 0});
-  /// Returns the vertex of the parabola through the steps around `steps`: offsets of the clocks relative to the first
-  /// one, s.
+  /// Returns the vertex of the parabola through the steps around `steps`: clock offsets from the first clock, s.
   Eigen::VectorXd offsets_s(const ClockSteps& steps, int without);
 
   /// Returns whether the vehicles of clock `felt` explain part of the force on a vehicle of clock `feels`.

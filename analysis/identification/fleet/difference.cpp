@@ -169,8 +169,8 @@ void judge(const Inputs& others, const std::string& kind, const std::vector<Flig
            Difference& difference) {
   if (groups.size() < 2) {
     difference.no_scatter =
-        "the others have fewer than two flights or days with enough data; intervals hold the error of the "
-        "fit alone";
+        "the others have fewer than two flights or days with enough data; intervals contain only the error "
+        "of the fit";
     return;
   }
   std::vector<Missing> beyond;

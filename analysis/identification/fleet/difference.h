@@ -21,8 +21,7 @@ struct Difference {
   std::vector<stability::EffectSpec> held;  ///< fitted to the others
   std::string grouped_by;                   ///< "folder" or "flight"
   int own_groups = 0, other_groups = 0;     ///< number of groups with enough data for a fit
-  /// The differences; the intervals of its ranking include the scatter. The ranking has only differences beyond the
-  /// scatter.
+  /// The differences. The ranking has only those beyond the scatter, which its intervals include.
   Diagnosis diagnosis;
   std::vector<Missing> within_scatter;  ///< found, but within the differences among the others
   std::string no_scatter;               ///< why the scatter is unknown; empty if it is known

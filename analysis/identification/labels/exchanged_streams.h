@@ -1,8 +1,7 @@
 /// @file Streams in the logs of a flight that belong to other logs: setpoints, paths and sensors.
 ///
 /// A vehicle follows its own setpoints, and its velocity changes as its own accelerometer measures. If the path in a
-/// log matches the setpoints of another log, or its sensors match the path of another log, a stream has been
-/// mislabelled.
+/// log matches the setpoints of another log, or its sensors match the path of another log, a stream is mislabelled.
 #pragma once
 
 #include <map>

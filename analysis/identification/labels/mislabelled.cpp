@@ -67,8 +67,7 @@ void judge_streams(const FlightLabels& labels, int tried, std::vector<Mislabelle
   for (int log = 0; log < labels.set_points.logs; ++log) {
     const int set_point = set_points[static_cast<std::size_t>(log)];
     const int path = paths[static_cast<std::size_t>(log)];
-    // The path of this vehicle is in the log `path` and follows the setpoints of this log, so only paths were
-    // exchanged.
+    // The path of this vehicle is in the log `path` and follows the setpoints of this log, so only paths moved.
     const bool is_path = path != log && set_points[static_cast<std::size_t>(path)] == log;
     const bool is_moved_path = set_point != log && paths[static_cast<std::size_t>(set_point)] == log;
     if (is_path) {

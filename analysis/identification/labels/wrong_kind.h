@@ -1,5 +1,4 @@
-/// @file Detects vehicles that fly like another kind, by evaluating the thrust of their logs with the model of each
-///   kind.
+/// @file Detects vehicles that fly like another kind by evaluating the thrust in their logs with each model.
 ///
 /// A wrong kind acts like a thrust scale, (T / m of one model) / (T / m of the other). It is considered if the mean
 /// thrust is far from the weight with the vehicle's own model (`residuals::doubts_of`) but not with another one. Kinds
@@ -26,8 +25,8 @@ struct KindTrial {
 struct LogKind {
   std::string flight, vehicle, kind, path;
   bool is_plausible = false;  ///< the mean thrust is close to the weight
-  std::vector<KindTrial>
-      trials;  ///< models of other kinds with which it is plausible; empty if it is with its own
+  /// Models of other kinds with which it is plausible; empty if it is with its own.
+  std::vector<KindTrial> trials;
 };
 
 /// Evaluates a track. Precondition: `track` was loaded by inputs.load() and is not position only.

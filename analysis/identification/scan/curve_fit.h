@@ -18,8 +18,8 @@ struct Chunks {
 
   int count() const { return static_cast<int>(flight.size()); }
 };
-/// Returns chunks of two blocks of 2 s, or of one block if there are fewer than 20; folds are flights if there are at
-/// least five.
+/// Returns chunks of two blocks of 2 s, or of one block if there are fewer than 20; folds are flights if there are five
+/// or more.
 Chunks chunks_of(const ScanSamples& samples);
 
 /// Knots of one variable, ascending; curves are constant outside them.
@@ -57,8 +57,7 @@ class CurveFit {
     return coefficients_[static_cast<std::size_t>(fold)];
   }
   /// Returns sums of squared errors [draws x m] of fits to `targets` with flipped signs: chunk c is multiplied by
-  /// signs(d, c). Each sample is predicted by the fit without its fold. Takes one pass over the samples for any number
-  /// of draws.
+  /// signs(d, c). Each sample is predicted by the fit without its fold. Takes a single pass for any number of draws.
   Eigen::MatrixXd errors_of_flipped(const Columns& targets, const Eigen::MatrixXd& signs) const;
   Eigen::VectorXd samples_at_columns() const { return grams_[Chunks::kFolds].diagonal(); }
 

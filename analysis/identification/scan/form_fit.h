@@ -24,8 +24,7 @@ struct FormFit {
 /// Returns the coefficients for this theta.
 FormFit fit_coefficients(const Form& form, const FormData& data, const std::vector<double>& theta);
 
-/// Returns the best theta: the best of the form's starts, improved by steps along each parameter, which are halved if
-/// none helps.
+/// Returns the best theta: the best of the form's starts, improved by steps along each parameter, halved if none helps.
 /// @param start initial theta; empty: all combinations of the form's starts
 FormFit fit_form(const Form& form, const FormData& data, const std::vector<double>& start = {});
 

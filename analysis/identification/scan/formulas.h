@@ -22,8 +22,7 @@ struct Formula {
   std::size_t entry = 0;         ///< index in Scan::entries
 };
 
-/// Returns the best formula for each of the first `most_entries` of `scan` that formulas can express, sorted by
-/// saved_bits.
+/// Returns the best formula for each of the first `most_entries` of `scan` that has one, sorted by saved_bits.
 std::vector<Formula> find_formulas(const ScanSamples& samples, const Scan& scan, std::size_t most_entries,
                                    int jobs);
 

@@ -45,8 +45,7 @@ void hold_others(Candidate& candidate, const std::vector<std::string>& free) {
   }
 }
 
-/// Lets the shape parameters `free` move from their current values, by about kReach if they are near zero; fixes the
-/// others.
+/// Lets the shape parameters `free` move, by about kReach if they are near zero; fixes the others.
 void free_shape(Candidate& candidate, const std::vector<std::string>& free) {
   for (std::size_t i = 0; i < candidate.info.shape.size(); ++i) {
     stability::Parameter& p = candidate.info.shape[i];

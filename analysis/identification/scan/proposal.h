@@ -1,5 +1,4 @@
-/// @file Effects for `add formula` and `add shape`: effects without a name in the registry, found by scanning the
-///   remainder.
+/// @file Effects for `add formula` and `add shape`: effects without a name, found by scanning the remainder.
 #pragma once
 
 #include <optional>
@@ -13,8 +12,8 @@ namespace swarmcert::identification {
 bool is_proposal(const std::string& name);
 
 /// Returns a curve for `entry` if formulas can use its variable: an offset and up to seven ramps between equidistant
-/// knots, f(v) = offset + sum_k r_k clamp((v - v_k) / h, 0, 1). If the fit is monotonic, the bounds of the ramps keep
-/// it so.
+/// knots, f(v) = offset + sum_k r_k clamp((v - v_k) / h, 0, 1). If the fit is monotonic, the bounds of the ramps
+/// enforce it.
 std::optional<stability::EffectSpec> shape_of(const ScanSamples& samples, const ScanEntry& entry);
 
 /// Returns the K-th best formula or shape for what the models of `passes` with `specs` leave. Returns nothing if the

@@ -97,7 +97,7 @@ Pull find_pull(const ScanSamples& samples) {
       trial.fit = fit_form(form, data.few);
       trial.form = std::move(form);
       if (!std::isfinite(trial.fit.mean_square)) continue;
-      // The same number for all forms; otherwise a form with more correlated residuals would be penalised less.
+      // The same number for all forms; otherwise a form with more correlated residuals would count for less.
       if (independent == 0) independent = independent_samples(data, trial);
       trial.saved_bits = saved_bits(data.mean_square, trial, independent);
       if (!(trial.saved_bits > best.saved_bits)) continue;

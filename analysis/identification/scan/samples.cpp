@@ -41,8 +41,8 @@ struct TrackSamples {
   std::vector<std::array<float, 9>> axes;
   std::vector<std::array<float, NeighbourPlaces::kLags>> lateral_m, height_m;
   std::vector<std::array<float, std::size_t{3} * NeighbourPlaces::kLags>> velocity_m_s;
-  std::vector<Eigen::Vector2f>
-      toward;  ///< horizontal unit vector to the nearest neighbour; zero if there is none
+  /// Horizontal unit vector to the nearest neighbour; zero if there is none.
+  std::vector<Eigen::Vector2f> toward;
   std::vector<int> block;
   int blocks = 0;
   double squares_N2 = 0;

@@ -76,15 +76,13 @@ struct ScanVariableInfo {
 };
 const ScanVariableInfo& scan_variable(ScanVariable variable);
 
-/// Relative position and velocity of the laterally nearest neighbour among those within 1.5 m in height, now and up to
-/// 0.5 s ago.
+/// Relative position and velocity of the laterally nearest neighbour within 1.5 m in height, now and up to 0.5 s ago.
 struct NeighbourPlaces {
   static constexpr int kLags = 6;
   static constexpr double kLag_s = 0.1;  ///< between consecutive lags
   /// [samples x kLags]; lateral distance and height above, NaN without such a neighbour.
   Eigen::MatrixXf lateral_m, height_m;
-  /// [samples x 3 kLags], lag by lag: x, y, z of its velocity that long ago minus the vehicle's velocity now; NaN as
-  /// above.
+  /// [samples x 3 kLags], lag by lag: x, y, z of its past velocity minus the vehicle's current velocity; NaN as above.
   Eigen::MatrixXf velocity_m_s;
 
   /// Returns the column of one component; `variable` is kNeighbourVx .. kNeighbourVz.

@@ -359,8 +359,7 @@ void prefer_rotor(std::vector<ScanEntry>& entries) {
 }
 
 /// Sorts the entries, best first. If several explain about as much, the motion of the vehicle comes before its
-/// setpoints, the motion of neighbours and the duties of rotors; a rotor's own duty comes before other variables of the
-/// thrust.
+/// setpoints, the motion of neighbours and the duties of rotors; a rotor's own duty precedes other thrust variables.
 void sort_entries(std::vector<ScanEntry>& entries) {
   constexpr double kAlike = 0.95;
   const auto weight = [](const ScanEntry& entry) {

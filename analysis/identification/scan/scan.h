@@ -42,7 +42,7 @@ struct ScanEntry {
   /// In newton, of the force vector at single records; otherwise of the column in its unit, for means over 0.1 s.
   double rmse_before = 0, rmse_after = 0;
   std::vector<CurvePoint> curve;
-  bool is_checked = false;   ///< set points allow the check against closed-loop bias
+  bool is_checked = false;   ///< setpoints allow the check against closed-loop bias
   InstrumentedValue slope;   ///< beta; 1 if the controller has no influence
   double lag_s = 0;          ///< age of the neighbour's state
   bool over_ground = false;  ///< absolute velocity of a neighbour, not relative to the vehicle

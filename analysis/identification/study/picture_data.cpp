@@ -82,7 +82,7 @@ RoomMap room_map(const Records& records, std::size_t before, std::size_t after) 
   return map;
 }
 
-/// Returns one bin of an effect's curve. The error is that of the mean over blocks, because records within a block are
+/// Returns one bin of an effect's curve. The error is that of the mean over blocks, as records within a block are
 /// correlated.
 EffectCurve::Point point_of(const std::vector<std::size_t>& bin, const std::vector<double>& predicted_N,
                             const std::vector<double>& measured_N, const std::vector<int>& block) {

@@ -23,8 +23,7 @@ struct ReplayFlight {
   std::vector<ReplayVehicle> vehicles;
 };
 
-/// Returns the flights of `worst` in this order, then others, as many as fit on a page, with at most ten rows per
-/// second.
+/// Returns the flights of `worst` in this order, then others, as many as fit on a page, at most ten rows per second.
 /// @param before, after models of the same kind of vehicle; vehicles of other kinds have only positions
 std::vector<ReplayFlight> replay_data(const residuals::Inputs& inputs, const stability::Model& before,
                                       const stability::Model& after,

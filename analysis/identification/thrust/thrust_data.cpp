@@ -130,7 +130,7 @@ class Reader {
     if (found.empty()) {
       std::string there;
       for (const Column& column : columns_) there += (there.empty() ? "" : ", ") + column.as_written;
-      refuse(signal, files::in_quotes(there), "no column of the header is this signal",
+      refuse(signal, files::in_quotes(there), "no column of the header matches this signal",
              fmt::format("name one '{}'", signal == "thrust" ? "thrust_gf" : signal));
     }
     for (const std::size_t i : found) {
@@ -139,12 +139,12 @@ class Reader {
       if (std::find(units.begin(), units.end(), unit) == units.end()) {
         std::string choice;
         for (const std::string& u : units) choice += (choice.empty() ? "" : ", ") + u;
-        refuse(signal, files::in_quotes(column.as_written), "the unit is not one of this signal's", choice);
+        refuse(signal, files::in_quotes(column.as_written), "the unit does not fit this signal", choice);
       }
       if (i != found.front() &&
           (!several || unit != source.unit || column.name == columns_[found.front()].name)) {
         refuse(signal, files::in_quotes(columns_[found.front()].as_written + ", " + column.as_written),
-               "more than one column is this signal", "rename or remove all but one");
+               "more than one column matches this signal", "rename or remove all but one");
       }
       source.column += (source.column.empty() ? "" : ", ") + column.as_written;
       source.unit = unit;
@@ -186,7 +186,7 @@ class Reader {
     if (volts < controller::kLowestVoltage_V || volts > controller::kHighestVoltage_V) {
       refuse(
           columns_[voltage_].as_written, fmt::format("{} V", volts),
-          fmt::format("one cell has {} to {} V", controller::kLowestVoltage_V, controller::kHighestVoltage_V),
+          fmt::format("a cell has {} to {} V", controller::kLowestVoltage_V, controller::kHighestVoltage_V),
           "name the unit in the header, V or mV");
     }
     sample.v = volts / controller::kReferenceVoltage_V;

@@ -96,8 +96,9 @@ Solution solve(const Problem& problem, double confidence) {
     fit.largest_uncertainty = std::max(fit.largest_uncertainty, half);
   }
   if (!(fit.largest_uncertainty <= kLargestUncertainty * problem.scale)) {
-    fit.why_not = fmt::format("too noisy: where it will be used the fit is uncertain by {:.3g} {}, of {:.3g}",
-                              fit.largest_uncertainty, fit.unit, problem.scale);
+    fit.why_not = fmt::format(
+        "too noisy: in its range of use the uncertainty of the fit is {:.3g} {}, compared with {:.3g}",
+        fit.largest_uncertainty, fit.unit, problem.scale);
     return s;
   }
   fit.determined = true;

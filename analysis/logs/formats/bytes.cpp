@@ -36,7 +36,8 @@ std::string read_all(std::istream& in, const std::string& path) {
     chunk_bytes = std::min(2 * chunk_bytes, kLargestChunk_bytes);
   }
   if (in.bad()) refuse_at(path, bytes.size(), "", "", "cannot be read", "check its permissions and the disk");
-  if (bytes.empty()) refuse_at(path, 0, "", "", "the file is empty", "the recording failed; leave it out");
+  if (bytes.empty())
+    refuse_at(path, 0, "", "", "the file is empty", "the recording failed; exclude this file");
   return bytes;
 }
 

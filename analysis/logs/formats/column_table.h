@@ -118,8 +118,7 @@ class ColumnTable {
     return topic_.columns.size() - 1;
   }
 
-  /// Bounds the memory: a single long message among many short ones would add many columns, each with a value per
-  /// message.
+  /// Bounds the memory: one long message among many short ones would add columns with a value for each message.
   void limit_values() {
     constexpr std::size_t kMostMissing = std::size_t{1} << 16;
     constexpr std::size_t kMostPerByte = 8;
@@ -128,7 +127,7 @@ class ColumnTable {
     values_ = values;
     if (values > kMostMissing + kMostPerByte * bytes_)
       given_up_ = "its arrays vary too much in length to be columns";
-    if (more > budget_.values) given_up_ = "the log holds more numbers than memory may";
+    if (more > budget_.values) given_up_ = "the log contains more numbers than the memory limit allows";
     if (given_up_.empty()) {
       budget_.values -= more;
       return;

@@ -27,7 +27,7 @@ class DataflashReader {
 
   RawLog read() {
     if (!looks_like_dataflash(bytes_)) {
-      refuse_at(path_, 0, "message", "", "is not the definition of a format with which these logs start",
+      refuse_at(path_, 0, "message", "", "is not a format definition, with which these logs start",
                 "is this an ArduPilot log? Text logs (.log) can be converted to .bin");
     }
     // Definitions, units and multipliers may follow the messages that need them.
@@ -270,8 +270,8 @@ class DataflashReader {
   const std::string path_;
   RawLog log_;
   std::array<DataflashFormat, 256> formats_;
-  std::array<std::pair<std::string, std::string>, 256>
-      unit_ids_;  ///< units and multipliers of a format's fields
+  /// Units and multipliers of a format's fields.
+  std::array<std::pair<std::string, std::string>, 256> unit_ids_;
   std::map<char, std::string> units_;
   std::map<char, double> multipliers_;
   std::map<std::pair<std::uint8_t, int>, std::size_t> topics_;  ///< index in log_.topics

@@ -40,7 +40,7 @@ struct DataflashFormat {
   }
 };
 
-/// Parses field types ("QBff") and names ("TimeUS,I,AccX,AccY"). Returns nothing if they disagree with each other or
+/// Parses field types ("QBff") and names ("TimeUS,I,AccX,AccY"). Returns nothing if they contradict each other or
 /// `bytes`.
 std::vector<DataflashField> parse_fields(const std::string& letters, const std::string& names,
                                          std::size_t bytes);

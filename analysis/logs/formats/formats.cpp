@@ -29,11 +29,11 @@ namespace {
 [[noreturn]] void refuse_unknown(const std::string& path, bool is_empty) {
   if (is_empty)
     throw files::InputError(
-        {path, "offset 0", "", "", "the file is empty", "the recording failed; leave it out"});
+        {path, "offset 0", "", "", "the file is empty", "the recording failed; exclude this file"});
   std::string known;
   for (const LogFormat& format : log_formats())
     known += (known.empty() ? "" : ", ") + std::string(format.name);
-  throw files::InputError({path, "offset 0", "", "", "is not a flight log", "known are " + known});
+  throw files::InputError({path, "offset 0", "", "", "is not a flight log", "supported are " + known});
 }
 
 }  // namespace

@@ -10,8 +10,7 @@
 
 namespace swarmcert::logs {
 
-/// How a format is recognised and read. `looks_like` decides by the first kFormatHead_bytes of a file, or by all of a
-/// shorter one.
+/// How a format is recognised and read. `looks_like` decides by the first kFormatHead_bytes of a file, or fewer.
 struct LogFormat {
   const char* name;  ///< for messages, e.g. "PX4 ULog"
   bool (*looks_like)(std::string_view head);

@@ -194,7 +194,7 @@ class McapReader {
       ++log_.health.damaged_blocks;
       log_.health.skipped_bytes += chunk.records.size();
       log_.skipped.push_back({fmt::format("chunk at offset {}", at),
-                              content.is_too_large ? "it is larger than it says, or than a flight can be"
+                              content.is_too_large ? "it is larger than stated, or too large for a flight"
                                                    : "its checksum is wrong, or it cannot be decompressed",
                               0});
       return;
@@ -267,7 +267,7 @@ class McapReader {
           {fmt::format("channel {}", id), "the file lost the record that names its topic", lost});
     for (const auto& [name, chunks] : unknown_compressions_)
       log_.skipped.push_back({fmt::format("{} chunks", chunks),
-                              "compression \"" + name + "\" is not known; known are zstd and lz4", 0});
+                              "compression \"" + name + "\" is not known; supported are zstd and lz4", 0});
   }
 
   const std::string_view bytes_;

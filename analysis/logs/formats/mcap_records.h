@@ -78,8 +78,7 @@ std::optional<McapRecord> mcap_record_at(std::string_view bytes, std::size_t at)
 
 inline std::size_t size_of(const McapRecord& record) { return kMcapHead_bytes + record.content.size(); }
 
-/// Returns true if the content has the form required by its opcode. Opcodes of later versions and private ones are
-/// accepted.
+/// Returns true if the content has the form required by its opcode. Accepts unknown and private opcodes.
 bool has_form(const McapRecord& record);
 
 /// Returns the chunk in the content of a record, which may be truncated.

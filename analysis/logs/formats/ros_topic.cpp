@@ -201,8 +201,7 @@ void RosTopic::move_to(RawLog& log) {
         {s.name + "." + array, fmt::format("it has more than {} elements", kMostElements), 0});
   if (s.malformed > 0) {
     log.health.damaged_blocks += s.malformed;
-    log.skipped.push_back(
-        {s.name, "messages do not have the form that the definition of their type says", s.malformed});
+    log.skipped.push_back({s.name, "messages do not match the definition of their type", s.malformed});
   }
 }
 

@@ -13,7 +13,7 @@ namespace swarmcert::logs {
 bool looks_like_rosbag_sqlite(std::string_view head);
 
 /// Reads topics as read_mcap() does. Message definitions are taken from the database if it has them (since Iron), else
-/// from ros_messages.h; topics of other types are listed in `skipped`. Messages compressed one by one with zstd are
+/// from ros_messages.h; topics of other types are listed in `skipped`. Single messages compressed with zstd are
 /// supported.
 ///
 /// The database is read from memory: nothing is written, locked or created. A journal beside it is not applied; if it

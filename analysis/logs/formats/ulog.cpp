@@ -58,7 +58,7 @@ class UlogReader {
       refuse_at(path_, bytes_.size(), "file head", "", "the file ends inside it", files::kCopyAgain);
     const int version = static_cast<unsigned char>(bytes_[7]);
     if (version > 1)
-      refuse_at(path_, 7, "version", std::to_string(version), "is not known", "known are 0 and 1");
+      refuse_at(path_, 7, "version", std::to_string(version), "is not known", "supported are 0 and 1");
     log_.texts["file_timestamp_us"] = std::to_string(*integer_at<std::uint64_t>(bytes_, 8));
   }
 

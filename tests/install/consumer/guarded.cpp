@@ -4,7 +4,7 @@
 
 namespace nn = swarmcert::nn;
 
-// Names of their own, which the disassembler is asked for.
+// Unmangled names, for the disassembler.
 extern "C" {
 [[gnu::noinline]] void guarded_evaluate_f32(const nn::Mlp<float>& f, const float* x, float* y,
                                             float* scratch) {

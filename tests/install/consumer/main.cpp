@@ -1,6 +1,6 @@
-// Prints the bits of the guarded evaluation. Exit 1 if they are not those of an evaluation in which every product
-// and every sum goes through memory; with --expect-fused, also if the unguarded loop gives the same bits, since
-// then this program could not tell the difference.
+// Prints the bits of the guarded evaluation. Exits with 1 if they differ from an evaluation in which each product and
+// sum goes through memory; with --expect-fused, also if the unguarded loop gives the same bits, because then this
+// program could not detect a difference.
 #include <cstdio>
 #include <cstring>
 
@@ -15,7 +15,7 @@ void expect(bool holds, const char* claim) {
   failed = failed || !holds;
 }
 
-/// f(network.input) in the documented order; what passes through `volatile` cannot be fused.
+/// Evaluates f(network.input) in the documented order; values that pass through `volatile` cannot be fused.
 template <typename Scalar>
 Output<Scalar> through_memory(const FixedNetwork<Scalar>& network) {
   Scalar x[kWidest], y[kWidest];
@@ -36,9 +36,9 @@ Output<Scalar> through_memory(const FixedNetwork<Scalar>& network) {
   return output;
 }
 
-/// One neuron: a*a + c with a = 1 + u, c = -(1 + 2u), u the spacing of numbers above 1. Exactly, a*a = 1 + 2u + u^2;
-/// u^2 is less than half the spacing u, so the rounded product is 1 + 2u and the sum is 0.
-/// Fused, the sum is u^2; the two layers that follow multiply by 1/u each, which makes that 1.
+/// One neuron: a*a + c with a = 1 + u, c = -(1 + 2u), where u is the spacing of numbers above 1. Exactly,
+/// a*a = 1 + 2u + u^2; u^2 is less than half the spacing u, so the rounded product is 1 + 2u and the sum is 0. With
+/// fusion, the sum is u^2; the two following layers multiply by 1/u each, which makes it 1.
 template <typename Scalar>
 FixedNetwork<Scalar> cancelling(Scalar u) {
   FixedNetwork<Scalar> network;

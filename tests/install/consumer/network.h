@@ -1,4 +1,4 @@
-/// @file A fixed network for the consumer, and two ways to evaluate it beside the library's.
+/// @file A fixed network for the consumer, and two ways of evaluating it besides the library's.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ struct Output {
   Scalar y[kSizes[kLayers]];
 };
 
-/// Weights, biases and input in [-1, 1), float32 values, the same on every machine.
+/// Weights, biases and input in [-1, 1), float32 values that are the same on every machine.
 template <typename Scalar>
 struct FixedNetwork {
   Scalar weights[kLayers][kWidest * kWidest], biases[kLayers][kWidest], input[kSizes[0]];
@@ -39,7 +39,7 @@ Output<float> guarded(const FixedNetwork<float>& network);
 Output<double> guarded(const FixedNetwork<double>& network);
 bool guarded_is_fused();
 
-/// In unguarded.cpp: the loop that anybody would write, left to the compiler.
+/// In unguarded.cpp: an ordinary loop, left to the compiler.
 Output<float> unguarded(const FixedNetwork<float>& network);
 Output<double> unguarded(const FixedNetwork<double>& network);
 bool has_fused_instructions();
