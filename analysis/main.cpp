@@ -20,8 +20,8 @@
 
 namespace {
 
-/// Descriptors 0 to 2 must be taken: where a caller closed one, the next file opened would get its number, and with it
-/// what is printed.
+/// Opens descriptors 0 to 2 if the caller closed them. Otherwise the next file opened would get one of these
+/// numbers and would receive what the tool prints.
 void hold_standard_streams() {
   int descriptor;
   do descriptor = ::open("/dev/null", O_RDWR);
@@ -29,16 +29,16 @@ void hold_standard_streams() {
   if (descriptor >= 0) ::close(descriptor);
 }
 
-/// Passes over flights free and ask for the same megabytes again and again: given back to the system in between, they
-/// come as pages that have to be cleared first.
+/// Keeps freed memory in the process. Passes over flights allocate and free the same megabytes repeatedly;
+/// memory returned to the system in between would come back as pages that must be zeroed first.
 void keep_freed_memory() {
 #if defined(__GLIBC__)
-  ::mallopt(M_TRIM_THRESHOLD, 256 << 20);  // bytes that may stay free at the end of the heap
-  ::mallopt(M_MMAP_THRESHOLD, 32 << 20);   // bytes from which on a piece has pages of its own
+  ::mallopt(M_TRIM_THRESHOLD, 256 << 20);  // bytes that may stay free at the top of the heap
+  ::mallopt(M_MMAP_THRESHOLD, 32 << 20);   // allocations of at least this size are mapped separately
 #endif
 }
 
-/// If standard output could not be written, a success becomes a failure.
+/// Turns success into failure if standard output could not be written.
 int after_printing(int code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
   fmt::print(stderr, "swarmcert: standard output: cannot be written ({})\n", std::strerror(errno));
@@ -50,7 +50,7 @@ int after_printing(int code) {
 int main(int argc, char** argv) {
   hold_standard_streams();
   keep_freed_memory();
-  std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is an error of writing, with its message
+  std::signal(SIGXFSZ, SIG_IGN);  // exceeding the file size limit is reported as a write error instead
   try {
     return after_printing(swarmcert::analysis::run_command(argc, argv));
   } catch (const swarmcert::files::InputError& error) {
@@ -62,7 +62,7 @@ int main(int argc, char** argv) {
   } catch (const std::filesystem::filesystem_error& error) {
     fmt::print(stderr, "swarmcert: {}: {}\n", error.path1().string(), error.code().message());
     return swarmcert::analysis::kBadInput;
-  } catch (const std::system_error& error) {  // fmt's word for a full disk under standard output
+  } catch (const std::system_error& error) {  // thrown by fmt if the disk below standard output is full
     fmt::print(stderr, "swarmcert: {}\n", error.what());
     return swarmcert::analysis::kBadInput;
   } catch (const std::exception& error) {

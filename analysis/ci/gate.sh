@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# Runs the gate of action.yml; for other continuous integration set what is read here. Exit code: that of swarmcert gate.
+# Runs the gate of action.yml. Other continuous integration systems set the variables below. The exit code is that of
+# swarmcert gate.
 #   GATE_POLICY              policy.toml
-#   GATE_BASELINE            numbers of the last release; empty: none
+#   GATE_BASELINE            values of the last release; empty: none
 #   GATE_OUTPUT              folder for the results; default: gate
-#   GATE_ALLOW_INCONCLUSIVE  true: what is neither proved nor refuted does not fail
-#   GATE_SWARMCERT           the tool; where it is not found, the repository around this script is built
+#   GATE_ALLOW_INCONCLUSIVE  true: inconclusive checks do not fail
+#   GATE_SWARMCERT           the tool; if it is not found, the repository that contains this script is built
 set -uo pipefail
 
 policy=${GATE_POLICY:?name a policy.toml}

@@ -24,7 +24,7 @@ std::vector<std::string> names_of(const CLI::Option& option) {
   return names;
 }
 
-/// The values that an option takes, if it lists them: CLI11 words its type as "TEXT:{auto,sdp}".
+/// Returns the values of an option that has a fixed list of them, which CLI11 writes as "TEXT:{auto,sdp}".
 std::vector<std::string> choices_of(const CLI::Option& option) {
   std::vector<std::string> choices;
   const std::string type = option.get_type_name();
@@ -56,7 +56,7 @@ std::string bash_completion(const CLI::App& app) {
     for (const CLI::Option* option : options_of(*command)) {
       const std::vector<std::string> values = choices_of(*option);
       if (values.empty()) continue;
-      // A positional argument comes after the command or a flag.
+      // A positional argument follows the command or a flag.
       const std::vector<std::string> before =
           option->get_positional() ? std::vector<std::string>{command->get_name()} : names_of(*option);
       for (const std::string& word : before) {

@@ -1,4 +1,4 @@
-/// @file The completion for bash, made from the commands as they are declared.
+/// @file The completion for bash, generated from the declared commands.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -6,8 +6,8 @@
 
 namespace swarmcert::analysis {
 
-/// A script for bash that completes commands, options, and the values of options that have a list of them; files
-/// elsewhere.
+/// Returns a bash script that completes commands, options, and the values of options with a fixed list of values;
+/// everything else completes to file names.
 std::string bash_completion(const CLI::App& app);
 
 }  // namespace swarmcert::analysis

@@ -28,7 +28,7 @@ std::string bundled_folder(const std::string& installed, const std::string& sour
   std::string root;
   if (std::getline(named, root) && fs::exists(fs::path(root) / source, none))
     return (fs::path(root) / source).string();
-  throw files::InputError({shared.string(), "", "", "", "the files that ship with the tool are not there",
+  throw files::InputError({shared.string(), "", "", "", "the files that ship with the tool are missing",
                            "install the whole package, or name your own files"});
 }
 

@@ -1,17 +1,19 @@
-/// @file Where the files that ship with the tool are: networks, models, gains, the published vehicles.
+/// @file Location of the files that ship with the tool: networks, models, gains, the published vehicles.
 #pragma once
 
 #include <string>
 
 namespace swarmcert::analysis {
 
-/// Path of a bundled folder: PREFIX/share/swarmcert/`installed` beside an installed tool (PREFIX/bin/swarmcert), else
-/// `source` in the source tree, which the build names in a file beside the tool that it builds.
-/// @throws files::InputError if the folder is in neither place.
+/// Returns the path of a bundled folder. For an installed tool (PREFIX/bin/swarmcert) that is
+/// PREFIX/share/swarmcert/`installed`; otherwise it is `source` in the source tree, whose path the build
+/// writes to a file next to the tool.
+/// @throws files::InputError if neither folder exists.
 std::string bundled_folder(const std::string& installed, const std::string& source);
 
-/// For a program that is not the tool but brings its files along: `folder` stands for the tool's own in
-/// bundled_folder(), PREFIX/bin or where the build names the sources. To be called before any command runs.
+/// For a program other than the tool that ships the same files: bundled_folder() then uses `folder` in place of the
+/// tool's own folder (PREFIX/bin, or the folder in which the build left the path of the sources). Call it before any
+/// command runs.
 void bundled_files_beside(const std::string& folder);
 
 }  // namespace swarmcert::analysis

@@ -18,7 +18,7 @@ namespace swarmcert::analysis {
 
 namespace {
 
-/// "fc1,fc2" or, with --phi and --rho, "phi=fc1,fc2".
+/// Parses "fc1,fc2" or, with --phi and --rho, "phi=fc1,fc2".
 void add_order(files::NetworkArguments& arguments, const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::string part = equals == std::string::npos ? "" : text.substr(0, equals);
@@ -26,21 +26,21 @@ void add_order(files::NetworkArguments& arguments, const std::string& text) {
   std::vector<std::string>& order = part == "phi"   ? arguments.phi_order
                                     : part == "rho" ? arguments.rho_order
                                                     : arguments.order;
-  if (!order.empty()) throw UsageError("--order " + text + ": an order of these layers was given before");
+  if (!order.empty()) throw UsageError("--order " + text + ": the order of these layers was already given");
   std::istringstream list(names_part ? text.substr(equals + 1) : text);
   for (std::string layer; std::getline(list, layer, ',');) order.push_back(layer);
   if (order.empty()) throw UsageError("--order names no layer: give them as in fc1,fc2,fc3");
 }
 
 constexpr const char* kHalvesOrPairs =
-    "maxmin:halves compares number i with number i of the layer's second half, maxmin:pairs neighbours; the "
-    "larger ones come first";
+    "maxmin:halves compares entry i with entry i of the layer's second half, maxmin:pairs adjacent entries; "
+    "the larger ones come first";
 
 void set_activation(files::NetworkArguments& arguments, const std::string& text) {
   for (const std::string& name : files::listed_activations(text)) {
     if (files::is_activation(name)) continue;
     throw UsageError("--activation " + text + ": " + files::in_quotes(name) +
-                     " is none of those whose slopes are known: " + files::activations() +
+                     " is not an activation with known slopes; these are " + files::activations() +
                      (name == "maxmin" ? std::string("; ") + kHalvesOrPairs + " in both" : ""));
   }
   arguments.activation = text;
@@ -56,7 +56,7 @@ void declare_order(CLI::App& app, files::NetworkArguments& arguments) {
          [&arguments](const std::vector<std::string>& orders) {
            for (const std::string& order : orders) add_order(arguments, order);
          },
-         "Layers in the order of evaluation, where a weight file does not tell it: fc1,fc2,fc3; with --phi "
+         "Layers in the order of evaluation, if the weight file does not store it: fc1,fc2,fc3; with --phi "
          "and --rho phi=fc1,fc2 and rho=fc1,fc2")
       ->allow_extra_args(false);
 }
@@ -64,7 +64,8 @@ void declare_order(CLI::App& app, files::NetworkArguments& arguments) {
 void declare_activation(CLI::App& app, files::NetworkArguments& arguments) {
   app.add_option_function<std::string>(
       "--activation", [&arguments](const std::string& name) { set_activation(arguments, name); },
-      "Between the layers, which a state dict does not tell (default: relu): one name for all, or one for "
+      "Activation between the layers, which a state dict does not store (default: relu): one name for all, "
+      "or one for "
       "each "
       "layer but the last, and one more if it follows the last layer, as in relu,relu,tanh. Others than ReLU "
       "can be certified and checked: " +
@@ -107,14 +108,14 @@ files::Network load_any_net(const files::NetworkArguments& arguments) {
   }
   const bool has_pair = !arguments.phi.empty();
   if (has_pair ? !arguments.order.empty() : !arguments.phi_order.empty() || !arguments.rho_order.empty())
-    throw UsageError(has_pair ? "--order: say of which file: --order phi=fc1,fc2 or rho=fc1,fc2"
+    throw UsageError(has_pair ? "--order: state the file: --order phi=fc1,fc2 or rho=fc1,fc2"
                               : "--order phi=... and rho=... go with --phi and --rho");
   return files::load_any_network(arguments);
 }
 
 namespace {
 
-/// `paths` with each folder, such as a bag of rosbag2, replaced by the files in it.
+/// Returns `paths` with each folder, such as a rosbag2 bag, replaced by the files in it.
 std::vector<std::string> regular_files(const std::vector<std::string>& paths) {
   std::vector<std::string> all;
   for (const std::string& path : paths) {

@@ -16,21 +16,21 @@ namespace swarmcert::analysis {
 /// The exit codes of the command line.
 enum ExitCode : int {
   kDone = 0,          ///< done, or the claim holds
-  kViolated = 1,      ///< a limit that the user gave is violated, or something is refuted or rejected
-  kUsage = 2,         ///< the command line cannot be understood
-  kBadInput = 3,      ///< a file is wrong
+  kViolated = 1,      ///< a limit given by the user is violated, or something is refuted or rejected
+  kUsage = 2,         ///< the command line cannot be parsed
+  kBadInput = 3,      ///< an input file is missing or invalid
   kInconclusive = 4,  ///< neither proved nor refuted
-  kInternal = 70,     ///< a fault of the tool
+  kInternal = 70,     ///< internal error of the tool
 };
 
 /// Options that every command takes.
 struct CommonOptions {
-  std::string json;  ///< where the result goes as JSON; "-": standard output, which silences the text
+  std::string json;  ///< destination of the JSON result; "-": standard output, without text output
   bool force = false;
   bool quiet = false;
   int jobs = 0;
 
-  /// Not where the result goes to standard output, nor under a host.
+  /// False if the JSON result goes to standard output, and under a host.
   bool prints_text() const;
 };
 
@@ -38,50 +38,52 @@ struct CommonOptions {
 struct Command {
   std::string name;
   std::string summary;  ///< one line for the list of commands
-  std::string details;  ///< for its own --help: what it does, an example
-  /// Declares options; returns what to run once they are parsed, which returns an exit code.
+  std::string details;  ///< shown by the command's own --help: what it does, an example
+  /// Declares the options and returns the function to run once they are parsed; that function returns an exit code.
   std::function<std::function<int(const CommonOptions&)>(CLI::App&)> declare;
 };
 
-/// Options that make no sense together, found after parsing: exit code kUsage.
+/// An invalid combination of options, detected after parsing: exit code kUsage.
 struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Declares --order, for weight files that do not tell the order of their layers; part of declare_network().
+/// Declares --order, for weight files that do not store the order of their layers; part of declare_network().
 void declare_order(CLI::App& app, files::NetworkArguments& arguments);
 
-/// Declares --activation, for weight files that do not tell it; part of declare_network(). Unknown names are usage
-/// errors.
+/// Declares --activation, for weight files that do not store it; part of declare_network(). Unknown names are
+/// usage errors.
 void declare_activation(CLI::App& app, files::NetworkArguments& arguments);
 
 /// Declares NET: a positional FILE, or --phi with --rho, --key and --order.
 void declare_network(CLI::App& app, files::NetworkArguments& arguments);
 
-/// Loads NET, whose activation is ReLU and whose inputs are relative states, or takes the host's. @throws UsageError if
-/// nothing was named, or an order for a file that was not; files::InputError as files::load_network() does.
+/// Loads NET, which must have ReLU activations and relative states as inputs, or takes the host's network.
+/// @throws UsageError if no network is named, or if a layer order is given for a file that is not part of the
+///     network; files::InputError as files::load_network() does.
 files::Network load_net(const files::NetworkArguments& arguments);
-/// The same of relative states or invariants: what the evaluator runs (nn/deep_set.h).
+/// The same for inputs that are relative states or invariants, which are what the evaluator supports (nn/deep_set.h).
 files::Network load_evaluated_net(const files::NetworkArguments& arguments);
-/// The same of networks with any activation.
+/// The same for networks with any activation.
 files::Network load_any_net(const files::NetworkArguments& arguments);
 
-/// Head of a result: schema "swarmcert/<command>/1", tool version, sha256 of every input, and the command line
-/// without what may not change the result (--jobs, -q, --force and where output goes). `seed` is null until it is set.
+/// Returns the head of a result: schema "swarmcert/<command>/1", tool version, SHA-256 of every input file,
+/// and the command line without options that cannot change the result (--jobs, -q, --force, output paths).
+/// `seed` is null until it is set.
 files::Json result_head(const std::string& command, const std::vector<std::string>& input_files);
 
-/// Refuses early, before work that would be lost: throws InputError if `path` exists and --force is not given.
+/// Checks an output path before the work begins.
+/// @throws InputError if `path` exists and --force is not given.
 void refuse_to_replace(const CommonOptions& common, const std::string& path);
 
-/// The same for a folder that is to be written into: throws InputError if `folder` is there, is not an empty folder,
-/// and
-/// --force is not given. "" is no folder.
+/// The same for an output folder. An empty string names no folder.
+/// @throws InputError if `folder` exists, is not an empty folder, and --force is not given.
 void refuse_folder(const CommonOptions& common, const std::string& folder);
 
-/// Writes `result` where --json says, if it says, and hands it to the host, if there is one.
+/// Writes `result` to the destination given by --json, if any, and passes it to the host, if there is one.
 void write_result(const CommonOptions& common, const files::Json& result);
 
-/// Files that NET was read from; none where it is a host's.
+/// Returns the files from which NET was read; empty for a network supplied by the host.
 std::vector<std::string> input_files(const files::Network& network);
 
 }  // namespace swarmcert::analysis

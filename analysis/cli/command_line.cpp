@@ -13,7 +13,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// The type name by which --help shows outputs, and by which they are recognised.
+/// The type name that --help shows for outputs, and by which outputs are recognised.
 constexpr const char* kOutput = "OUTPUT";
 
 struct Remembered {
@@ -26,7 +26,7 @@ Remembered& remembered() {
   return line;
 }
 
-/// Names of the options that are not recorded, with their dashes.
+/// Names of the options that are not recorded, including their dashes.
 struct Unrecorded {
   std::set<std::string> flags, with_value;
 
@@ -39,8 +39,8 @@ struct Unrecorded {
     }
   }
 
-  /// Where in a cluster such as "-j2", "-qj2" or "-qofile" the option with a value stands; its size if there are only
-  /// flags in it; npos if `word` is no cluster of unrecorded options.
+  /// Returns the position of the option with a value in a cluster such as "-j2", "-qj2" or "-qofile"; the
+  /// size of `word` if the cluster contains only flags; npos if `word` is not a cluster of unrecorded options.
   std::size_t value_in_cluster(const std::string& word) const {
     if (word.size() < 3 || word[0] != '-' || word[1] == '-') return std::string::npos;
     std::size_t at = 1;

@@ -1,4 +1,4 @@
-/// @file Numbers of things in words.
+/// @file Counts with their noun, singular or plural.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +6,7 @@
 
 namespace swarmcert::analysis {
 
-/// "1 flight", "3 flights": for nouns whose plural ends in s.
+/// Returns "1 flight" or "3 flights"; for nouns whose plural ends in s.
 inline std::string counted(std::size_t number, const char* noun) {
   return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
 }

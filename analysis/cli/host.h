@@ -14,42 +14,42 @@
 
 namespace swarmcert::analysis {
 
-/// What a program gives to one run of a command, and what it gets back. While it is the host of a thread, a command
-/// that this thread runs prints nothing and handles no signal.
+/// What a program passes to one run of a command and what it gets back. While a thread has a host, commands
+/// run by this thread print nothing and install no signal handlers.
 struct Host {
   // --- inputs ---
   std::optional<files::Network> network;   ///< NET, in place of files
-  std::optional<std::string> certificate;  ///< text of the certificate that `check` takes, in place of a file
-  /// Called by the threads of the command, perhaps by several at once. Must not throw.
+  std::optional<std::string> certificate;  ///< text of the certificate that `check` reads, in place of a file
+  /// Called by the command's threads, possibly concurrently. Must not throw.
   std::function<void(int done, int total, const std::string& what)> progress;
 
   // --- while it runs ---
-  /// The host sets both to end the command: those that stop early see `stop`, all others throw Interrupted when they
-  /// next report progress.
+  /// The host sets both flags to end the command. Commands that support early stopping return when they see
+  /// `stop`; all others throw Interrupted at their next progress report.
   std::atomic<bool> stop{false}, interrupted{false};
-  /// The host sets `stop`, and not `interrupted`, at this time of steady_clock, in seconds; 0: never.
+  /// The host sets `stop` but not `interrupted` at this steady_clock time in seconds; 0: never.
   std::atomic<double> deadline_s{0};
 
   // --- outputs ---
-  files::Json result;               ///< what --json would have written
-  std::string certificate_written;  ///< text of the certificate that `certify` made
-  std::vector<std::string> notes;   ///< lines that would have gone to standard error
+  files::Json result;               ///< what --json would write
+  std::string certificate_written;  ///< text of the certificate written by `certify`
+  std::vector<std::string> notes;   ///< lines that would otherwise go to standard error
 };
 
-/// Seconds of steady_clock, as Host::deadline_s counts them.
+/// Current steady_clock time in seconds, the time base of Host::deadline_s.
 inline double steady_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// Thrown by Progress::show() after Host::interrupted was set.
+/// Thrown by Progress::show() once Host::interrupted is set.
 struct Interrupted : std::exception {
   const char* what() const noexcept override { return "interrupted"; }
 };
 
-/// The host of the calling thread; nullptr on the command line.
+/// Returns the host of the calling thread; nullptr on the command line.
 Host* host();
 
-/// Makes `host` that of the calling thread for as long as this lives.
+/// Makes `host` the host of the calling thread for the lifetime of this object.
 class HostScope {
  public:
   explicit HostScope(Host& host);
@@ -58,7 +58,7 @@ class HostScope {
   HostScope& operator=(const HostScope&) = delete;
 };
 
-/// A line for standard error, or for Host::notes.
+/// Writes a line to standard error, or appends it to Host::notes under a host.
 void note(const std::string& line);
 
 }  // namespace swarmcert::analysis

@@ -13,13 +13,14 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// timeout and other parents send the signal to the process and again to its group: one wish, two deliveries.
+/// `timeout` and other parents send a signal to the process and again to its group; signals within this time
+/// count as one.
 constexpr double kOneWish_s = 1;
 
-/// Beyond this a limit is none, and setitimer() might not take it.
+/// Longer time limits count as no limit; setitimer() might reject them.
 constexpr double kLongestLimit_s = 1e8;
 
-std::atomic<bool> interrupted{false};  ///< by a signal or by the time
+std::atomic<bool> interrupted{false};  ///< by a signal or by the time limit
 std::atomic<bool> signalled{false};
 timespec first_interrupt;
 

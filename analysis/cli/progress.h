@@ -1,4 +1,4 @@
-/// @file Progress of long work on standard error.
+/// @file Progress reports of long computations on standard error.
 #pragma once
 
 #include <atomic>
@@ -10,9 +10,8 @@
 
 namespace swarmcert::analysis {
 
-/// Shows how far work is: a bar that redraws itself on a terminal, else a line for every tenth of it. Silent where
-/// `quiet`, and for work that ends within two seconds. Safe to call from several threads. Under a host (host.h) it
-/// informs the host instead.
+/// Shows progress as a redrawn bar on a terminal, otherwise as one line per 10 %. Silent if `quiet`, and for
+/// work that takes less than two seconds. Thread-safe. Under a host (host.h) it reports to the host instead.
 class Progress {
  public:
   explicit Progress(bool quiet);
@@ -20,7 +19,7 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// @throws Interrupted where a host has interrupted the command.
+  /// @throws Interrupted if the host has interrupted the command.
   void show(int done, int total, const std::string& what);
 
  private:
@@ -33,11 +32,12 @@ class Progress {
   bool drawn_ = false;
 };
 
-/// Set by Ctrl-C (SIGINT) or SIGTERM while an instance exists, or once a time has passed; another such signal a second
-/// later ends the process. Under a host, signals are the host's matter: it sets the flag.
+/// Provides a flag that is set by Ctrl-C (SIGINT) or SIGTERM while an instance exists, or after a time limit.
+/// A second signal, at least one second later, ends the process. Under a host, signals are left to the host,
+/// which sets the flag.
 class CancelOnInterrupt {
  public:
-  /// @param seconds wall clock from now on; 0: no limit.
+  /// @param seconds time limit in wall-clock seconds from now; 0: no limit.
   explicit CancelOnInterrupt(double seconds = 0);
   ~CancelOnInterrupt();
   CancelOnInterrupt(const CancelOnInterrupt&) = delete;

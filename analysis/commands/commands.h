@@ -1,4 +1,4 @@
-/// @file The commands of the tool. To add one: its folder, its declaration here, its line in commands.cpp.
+/// @file The commands of the tool. To add a command: its folder, its declaration here, its line in commands.cpp.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace swarmcert::analysis {
 
-/// Every command, in the order in which --help lists them.
+/// Returns all commands in the order in which --help lists them.
 const std::vector<Command>& commands();
 
 Command add_command();

@@ -16,8 +16,8 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// The parser shows an open range with all digits of the largest number: the same in words, or nothing if it is not
-/// one.
+/// Rewrites the parser's message about an open range, which shows all digits of the largest number. Returns an empty
+/// string for other messages.
 std::string explain_range(const CLI::App& scope, const std::string& message) {
   static const std::regex pattern("(-[^:]*): Value (.*) not in range .* to [0-9]{19,}(\\.0*)?");
   std::smatch found;
@@ -33,7 +33,7 @@ std::string explain_range(const CLI::App& scope, const std::string& message) {
   return fmt::format("{} {}: must {}", name, value, is_positive ? "be positive" : "not be negative");
 }
 
-/// What the parser did not understand, with the option or command that was perhaps meant.
+/// Describes what the parser did not understand, with the option or command that was probably meant.
 std::string explain(const CLI::App& app, const CLI::ParseError& error, int argc, const char* const* argv) {
   const auto* extras = dynamic_cast<const CLI::ExtrasError*>(&error);
   const CLI::App* scope = &app;
@@ -73,14 +73,14 @@ std::string explain(const CLI::App& app, const CLI::ParseError& error, int argc,
 void declare_common(CLI::App& app, CommonOptions& common) {
   add_output(app, "--json", common.json, "Write the result as JSON to this file; - for standard output");
   leave_out_of_record(
-      app.add_option("-j,--jobs", common.jobs, "Threads; results do not depend on it (default: all)"))
+      app.add_option("-j,--jobs", common.jobs, "Number of threads; does not affect results (default: all)"))
       ->check(CLI::NonNegativeNumber);
   leave_out_of_record(app.add_flag("--force", common.force, "Replace files that exist"));
   leave_out_of_record(app.add_flag("-q,--quiet", common.quiet, "No progress on standard error"));
 }
 
-/// Range checks let NaN pass, and no option means anything by it; where no number may be negative, the parser makes a
-/// huge one of it.
+/// Range checks accept NaN, which no option supports. Where negative numbers are not allowed, the parser wraps them
+/// to huge numbers.
 void refuse_nan_and_wrapped(const CLI::App& command) {
   for (const CLI::Option* option : command.get_options()) {
     if (option->get_type_name().rfind("UINT", 0) == 0) {
@@ -107,7 +107,7 @@ int run_command(int argc, const char* const* argv) {
   app.footer(
       "Exit codes: 0 done or holds; 1 a limit is violated, or something is refuted or rejected; 2 usage; 3 "
       "bad input;\n"
-      "4 inconclusive; 70 a fault of this tool.  'swarmcert COMMAND --help' shows options and an example.");
+      "4 inconclusive; 70 internal error.  'swarmcert COMMAND --help' shows options and an example.");
   app.add_flag_callback(
       "--bash-completion", [&app] { throw CLI::CallForVersion(bash_completion(app), 0); },
       "Print the completion for bash: source <(swarmcert --bash-completion)");

@@ -16,7 +16,7 @@ extern char** environ;
 namespace swarmcert::firmware {
 namespace {
 
-// Behind the arguments: the stack, then the code that switches the floating-point unit on and to which calls return.
+// Memory above the arguments: the stack, then the code that enables the floating-point unit and to which calls return.
 constexpr std::uint32_t kStackEnd = CortexM::kArguments + CortexM::kArgumentsSize + 8 * 1024;
 constexpr std::uint32_t kCode = kStackEnd + 1024;
 constexpr std::uint32_t kReturn = kCode + 10;
@@ -75,7 +75,7 @@ CortexM::CortexM() {
     ::close(socket_);
     throw NotRun("qemu-system-arm is not installed (apt-get install qemu-system-arm)");
   }
-  // Single registers can be set only after the description of the processor was asked for.
+  // Single registers can be set only after the processor description has been requested.
   request("qXfer:features:read:target.xml:0,ffb");
   request("qXfer:features:read:arm-m-profile.xml:0,ffb");
   need_ok(fmt::format("M{:x},{:x}:{}", kCode, sizeof kSwitchOn - 1,
@@ -112,7 +112,7 @@ char CortexM::next_byte() {
   return received_[taken_++];
 }
 
-/// The contents of the next packet, "$contents#checksum".
+/// Returns the contents of the next packet, "$contents#checksum".
 std::string CortexM::reply() {
   while (next_byte() != '$') {  // acknowledgements
   }
@@ -152,7 +152,7 @@ void CortexM::set_register(int number, std::uint32_t value) {
 std::uint32_t CortexM::get_register(int number) { return word_of(request(fmt::format("p{:x}", number))); }
 
 void CortexM::run_from(std::uint32_t address) {
-  set_register(kStackPointer, kStackEnd - 8);  // the word on the stack, aligned to eight bytes
+  set_register(kStackPointer, kStackEnd - 8);  // the stack argument, aligned to eight bytes
   set_register(kLink, kReturn | 1u);
   set_register(kCounter, address & ~1u);
   set_register(kStatus, kThumb);

@@ -1,4 +1,4 @@
-/// @file A Cortex-M4 of QEMU that calls single functions of a program, through QEMU's interface for debuggers.
+/// @file A QEMU Cortex-M4 that calls single functions of a program through QEMU's debugger interface.
 #pragma once
 
 #include <sys/types.h>
@@ -9,33 +9,35 @@
 
 namespace swarmcert::firmware {
 
-/// QEMU is not installed, ended, does not answer as expected, or a call did not come back.
+/// QEMU is not installed, has ended or does not answer as expected, or a call did not return.
 struct NotRun : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The memory of an STM32F405, without a clock, a device, an operating system, or any access to the host: semihosting
-/// is off, so that a program can do nothing but compute.
+/// A machine with the memory of an STM32F405 but no clock, device, operating system, or access to the host:
+/// semihosting is off, so that a program can only compute.
 class CortexM {
  public:
   static constexpr std::uint32_t kFlash = 0x08000000, kFlashSize = 1024 * 1024;
-  /// QEMU's machine has 64 KiB more RAM than the microcontroller; the last 32 KiB hold a call's stack and arguments.
+  /// QEMU's machine has 64 KiB more RAM than the microcontroller; the last 32 KiB hold the stack and arguments of a
+  /// call.
   static constexpr std::uint32_t kRam = 0x20000000, kRamSize = 160 * 1024;
   static constexpr std::uint32_t kArguments = kRam + kRamSize, kArgumentsSize = 20 * 1024;
 
-  /// Starts qemu-system-arm and switches the floating-point unit on. @throws NotRun
+  /// Starts qemu-system-arm and enables the floating-point unit.
+  /// @throws NotRun
   CortexM();
   ~CortexM();
   CortexM(const CortexM&) = delete;
   CortexM& operator=(const CortexM&) = delete;
 
-  /// @throws NotRun if the range is not in the memories above.
+  /// @throws NotRun if the range is outside the memories above.
   void write(std::uint32_t address, const std::string& bytes);
   std::uint32_t read_word(std::uint32_t address);
 
-  /// Calls the Thumb function at `address` as AAPCS has it, with four words in registers and one on the stack.
+  /// Calls the Thumb function at `address` according to the AAPCS, with four words in registers and one on the stack.
   /// @return r0.
-  /// @throws NotRun after a fault, or if it has not returned after kMostSeconds.
+  /// @throws NotRun after a fault, or if the function has not returned after kMostSeconds.
   std::uint32_t call(std::uint32_t address, const std::uint32_t (&in_registers)[4], std::uint32_t on_stack);
 
   static constexpr int kMostSeconds = 60;

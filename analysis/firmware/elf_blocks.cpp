@@ -10,7 +10,7 @@
 namespace swarmcert::firmware {
 namespace {
 
-/// What one of the two classes of ELF calls its structs.
+/// The names of the structs for each of the two ELF classes.
 struct Elf32 {
   using Header = Elf32_Ehdr;
   using Section = Elf32_Shdr;
@@ -87,14 +87,14 @@ class ElfReader {
 
   void add(const std::string& name, const typename Elf::Section& section, std::uint64_t address,
            std::uint64_t size) {
-    // In object files addresses count from the section's start, as its sh_addr of 0 says.
+    // In object files, addresses count from the start of the section, whose sh_addr is 0.
     if (address < section.sh_addr || address - section.sh_addr > section.sh_size ||
         size > section.sh_size - (address - section.sh_addr))
       refuse(name, "lies outside its section");
     const std::uint64_t offset = section.sh_offset + (address - section.sh_addr);
     need(offset, size, name);
-    // Each byte once in a section and once in a symbol; symbols that claim the same bytes again and again are no
-    // compiler's.
+    // Normally each byte occurs once in a section and once in a symbol; symbols that claim the same bytes many times
+    // do not come from a compiler.
     taken_ += size;
     if (taken_ > 8 * bytes_.size())
       refuse(name, "the symbols overlap: together they are larger than the file");

@@ -67,7 +67,7 @@ ElfImage read_arm_image(const std::string& bytes) {
     } else if (header.e_type == ET_REL) {
       image.why_not = "an object file cannot run before it is linked: name the linked firmware";
     } else if (header.e_type != ET_EXEC) {
-      image.why_not = "it is no program at fixed addresses, as firmware is";
+      image.why_not = "it is not a program at fixed addresses, as firmware is";
     } else {
       read_segments(bytes, header, image);
       read_functions(bytes, header, image);

@@ -1,4 +1,4 @@
-/// @file What of an ELF a Cortex-M microcontroller would have in its memory, and where its functions begin.
+/// @file The memory image that a Cortex-M microcontroller would load from an ELF file, and its function symbols.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 namespace swarmcert::firmware {
 
 struct Segment {
-  std::uint32_t address = 0;       ///< where the program expects it
-  std::uint32_t bytes_in_use = 0;  ///< from `address` on, zeros that the file does not hold included
+  std::uint32_t address = 0;       ///< load address
+  std::uint32_t bytes_in_use = 0;  ///< size from `address`, including zeros that the file does not store
   std::string bytes;
 };
 
@@ -19,12 +19,13 @@ struct FunctionSymbol {
 };
 
 struct ElfImage {
-  std::string why_not;  ///< why the program cannot be loaded and run; empty if it can
+  std::string why_not;  ///< reason why the program cannot be loaded and run; empty if it can
   std::vector<Segment> segments;
-  std::vector<FunctionSymbol> functions;  ///< that have a place in the program
+  std::vector<FunctionSymbol> functions;  ///< functions with an address in the program
 };
 
-/// Reads a linked program for Arm (EM_ARM, ET_EXEC, 32 bit, little-endian). No size or offset in the file is trusted.
+/// Reads a linked program for Arm (EM_ARM, ET_EXEC, 32-bit, little-endian). Sizes and offsets in the file are not
+/// trusted.
 ElfImage read_arm_image(const std::string& bytes);
 
 }  // namespace swarmcert::firmware

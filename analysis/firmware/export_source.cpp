@@ -25,7 +25,7 @@ std::string literal(float value) {
   return files::hex_float(static_cast<double>(value)) + "f";
 }
 
-/// `name` for a comment: a line break in a kind's name would end the comment.
+/// Makes `name` safe for a comment: a line break in the name of a kind would end the comment.
 std::string comment(std::string name) {
   for (char& c : name) {
     if (static_cast<unsigned char>(c) < ' ' || c == '\\') c = '?';
@@ -33,7 +33,7 @@ std::string comment(std::string name) {
   return name;
 }
 
-/// "phi:small" -> "phi_small"; anything a C name cannot hold becomes '_', made unique by a number.
+/// Converts "phi:small" to "phi_small". Characters that C names cannot contain become '_'; a number makes names unique.
 std::map<files::FunctionId, std::string> identifiers(const files::Network& network) {
   std::map<files::FunctionId, std::string> result;
   std::vector<std::string> used;
@@ -49,7 +49,7 @@ std::map<files::FunctionId, std::string> identifiers(const files::Network& netwo
   return result;
 }
 
-/// "{", the numbers in lines of six, "}".
+/// Formats "{", the numbers in lines of six, "}".
 std::string braces(const std::vector<float>& values) {
   std::string text = "{";
   for (std::size_t i = 0; i < values.size(); ++i)
@@ -63,7 +63,7 @@ std::string array(const std::string& declaration, const std::vector<float>& valu
 
 std::vector<float> narrow(const std::vector<double>& values) { return {values.begin(), values.end()}; }
 
-/// The weights as flight code has them.
+/// The weights in the layout of the flight code.
 std::vector<float> in_blocks(const files::Layer& layer) {
   const std::vector<float> rows = narrow(layer.weights);
   std::vector<float> blocks(rows.size());
@@ -111,7 +111,8 @@ std::string golden_source(const std::vector<GoldenVector>& vectors) {
   return text + "};\n";
 }
 
-/// As the exported source computes it: FNV-1a over the words of phi by kind, ground, rho by kind, each in its layout.
+/// Hash as computed by the exported source: FNV-1a over the words of phi by kind, ground, rho by kind, each in its
+/// layout.
 std::uint32_t weights_hash(const files::Network& network) {
   std::uint32_t hash = 2166136261u;
   const auto add = [&](const files::Weights& weights) {
@@ -127,7 +128,7 @@ std::uint32_t weights_hash(const files::Network& network) {
   return hash;
 }
 
-/// True if the inputs are relative position, then relative velocity, as flight code has them.
+/// True if the inputs are relative position, then relative velocity, as in the flight code.
 bool takes_relative_state(const files::Network& network, int inputs) {
   return network.input_order.empty() ? inputs == 6 : network.input_order == files::relative_state();
 }
@@ -145,7 +146,7 @@ constexpr char kHeader[] =
 {parameters}
 #pragma once
 
-#include <nn/deep_set.h>  // by the compiler's search path alone, where another copy of these headers may come first
+#include <nn/deep_set.h>  // found only on the include path, where another copy of these headers may come first
 
 #include <cstdint>
 
@@ -167,12 +168,12 @@ inline constexpr int kOwnKinds = {own_kinds}, kNeighbourKinds = {kinds};
 {own_list}/// Kinds of neighbours:
 {neighbour_list}swarmcert::nn::DeepSet<float> deep_set(int own_kind);
 
-/// Memory for an evaluation with kMostNeighbours. There is one, which the functions below use as well: call them and
-/// it from one task at a time.
+/// Workspace for an evaluation with kMostNeighbours. The functions below share it, so call all of them from one task at
+/// a time.
 const swarmcert::nn::DeepSetWorkspace<float>& workspace();
 
-/// Predicted vertical force f_a_hat on a vehicle, in newton, upwards. Bit for bit the function that was certified,
-/// with its clamp, times the unit's size; the order of the neighbours does not matter.
+/// Predicted vertical force f_a_hat on a vehicle, in newton, positive upward. Bit for bit the certified function with
+/// its clamp, times the size of its unit; the order of the neighbours does not matter.
 /// @param own        [4] -z in m and -v in m/s of the vehicle, in W; read only by networks with a ground term.
 /// @param neighbours inputs and kinds.
 /// @param force_N    0 unless the status is kOk.
@@ -184,10 +185,10 @@ enum class SelfTest : std::uint8_t {{
   kPassed,
   kFusedArithmetic,  ///< built with contraction: add -ffp-contract=off
   kOtherBits,        ///< a golden vector gives other bits: other weights, other code, or a broken build
-  kOtherWeights      ///< the weights in flash are not those that were exported
+  kOtherWeights      ///< the weights in flash differ from the exported ones
 }};
 
-/// Run it at start; keep the feed-forward off unless it passes. `failed`, if not null, is the golden vector at fault.
+/// Run at startup and keep the feedforward off unless it passes. `failed`, if not null, is the failing golden vector.
 SelfTest self_test(int* failed);
 
 }}  // namespace swarmcert_network
@@ -230,7 +231,7 @@ const DeepSetWorkspace<float>& workspace() {
   return memory;
 }
 
-// Neither inlined nor cloned: match runs this function, under this name, in the linked program.
+// Must be neither inlined nor cloned: match runs this function by its name in the linked program.
 #if defined(__GNUC__) && !defined(__clang__)
 [[gnu::noipa, gnu::used]]
 #elif defined(__clang__)
@@ -240,7 +241,7 @@ DeepSetStatus predict_force_z(int own_kind, const float* own, const Neighbour<fl
                               float* force_N) {
   *force_N = 0.0f;
   if (own_kind < 0 || own_kind >= kOwnKinds) return DeepSetStatus::kUnknownKind;
-  float output[8] = {};  // one is used; GCC warns of the evaluator's groups of eight where it sees no more
+  float output[8] = {};  // one is used; with fewer, GCC warns about the evaluator's groups of eight
   const DeepSetStatus status = evaluate(deep_set(own_kind), own, neighbours, num_neighbours, output, workspace());
   if (status == DeepSetStatus::kOk) *force_N = rounded(output[0] * kNewtonPerUnit);
   return status;
@@ -328,7 +329,7 @@ std::string source_text(const files::Network& network, const ExportOptions& opti
       R"(static constexpr DeepSet<float> sets[swarmcert_network::kOwnKinds] = {{
 {sets}}};
 
-// The evaluator trusts these sizes: what does not fit together does not compile.
+// The evaluator trusts these sizes, so sizes that do not fit together must not compile.
 static constexpr bool all_fit_together() {{
   for (const DeepSet<float>& set : sets) {{
     if (!fits_together(set) || set.inputs() != swarmcert_network::kInputs || set.outputs() != 1) return false;
@@ -365,7 +366,7 @@ struct Golden {{
   return text + kEvaluation;
 }
 
-/// What flight code computes for every part, for certify --samples.
+/// Outputs of the flight code for every part, for `certify --samples`.
 std::string samples_text(const files::Network& network, std::uint64_t seed) {
   constexpr int kCount = 64;
   return files::to_text(

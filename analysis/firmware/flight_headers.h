@@ -1,4 +1,4 @@
-/// @file The evaluator's own headers, as text: an export builds alone.
+/// @file The headers of the evaluator as text, so that an export builds on its own.
 #pragma once
 
 namespace swarmcert::firmware {
@@ -8,7 +8,7 @@ struct FlightHeader {
   const char* text;
 };
 
-/// Made at build time from nn/: the same bytes.
+/// Generated at build time from nn/, byte for byte.
 extern const FlightHeader kFlightHeaders[5];
 
 }  // namespace swarmcert::firmware

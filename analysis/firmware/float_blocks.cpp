@@ -13,7 +13,7 @@ namespace {
 
 bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
 
-/// A literal at `at`, without its sign; false if none stands there, or it is no number that a float takes.
+/// Parses an unsigned literal at `at`. Returns false if there is none, or if it is not a number that fits a float.
 bool parse_literal(const std::string& text, std::size_t& at, float& value) {
   const char* first = text.data() + at;
   const char* const last = text.data() + text.size();
@@ -34,7 +34,7 @@ bool parse_literal(const std::string& text, std::size_t& at, float& value) {
   return true;
 }
 
-/// Walks through source text: remembers names before '=' and collects the numbers between braces behind it.
+/// Scans source text: remembers names before '=' and collects the numbers between the braces that follow.
 class SourceScanner {
  public:
   explicit SourceScanner(const std::string& text) : text_(text) {}
@@ -97,7 +97,7 @@ class SourceScanner {
     if (c == '}' && depth_ > 0) --depth_;
   }
 
-  /// Of "float name[4][3] =": the word before the first bracket.
+  /// For "float name[4][3] =": the word before the first bracket.
   std::string name_before_brackets() const {
     std::size_t end = at_;
     while (end > 0 &&

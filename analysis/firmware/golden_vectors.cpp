@@ -12,10 +12,10 @@
 namespace swarmcert::firmware {
 namespace {
 
-/// Own state of the ground's phi; neighbours' states lie in the clamp, or in +-1 m and +-2 m/s where there is none.
+/// Range of the own state for the ground's phi. Neighbours' states lie in the clamp, or in this range if there is none.
 constexpr float kMostPosition_m = 1, kMostVelocity_m_s = 2;
 
-/// The network as the exported source evaluates it.
+/// Evaluates the network as the exported source does.
 class FlightEvaluator {
  public:
   FlightEvaluator(const files::Network& network, int most_neighbours)
@@ -33,7 +33,7 @@ class FlightEvaluator {
     }
   }
 
-  /// Fills in status and force.
+  /// Sets status and force.
   void run(const std::string& rho_kind, GoldenVector& vector) const {
     const std::vector<int> silent = files::silent_counts(network_, rho_kind);
     const nn::DeepSet<float> set{has_ground_ ? &ground_ : nullptr,
@@ -79,7 +79,7 @@ float newton_per_unit(const files::Network& network) {
 
 namespace {
 
-/// Random states of the vehicle and of its neighbours, of random kinds where `kinds` is empty.
+/// Random states of the vehicle and of its neighbours, which have random kinds if `kinds` is empty.
 GoldenVector random_vector(const files::Network& network, int neighbours, std::vector<int> kinds,
                            files::Random& random) {
   const auto within = [&](float range) { return range * static_cast<float>(random.symmetric()); };
@@ -93,7 +93,7 @@ GoldenVector random_vector(const files::Network& network, int neighbours, std::v
   const bool draws_kinds = kinds.empty();
   for (std::vector<float>& input : vector.inputs) {
     for (int i = 0; i < inputs; ++i) {
-      const bool has_clamp = network.clamp && !network.invariants;  // one of invariants limits no state
+      const bool has_clamp = network.clamp && !network.invariants;  // one on invariants limits no state
       const double side =
           !has_clamp ? 0 : std::max(std::abs(network.clamp->lower[i]), std::abs(network.clamp->upper[i]));
       const float range = has_clamp ? static_cast<float>(1.5 * std::min(side, 1e3))
@@ -106,7 +106,7 @@ GoldenVector random_vector(const files::Network& network, int neighbours, std::v
   return vector;
 }
 
-/// The kinds of the neighbours in each silent composition, as indices.
+/// The neighbours' kinds in each silent composition, as indices.
 std::vector<std::vector<int>> silent_kinds(const files::Network& network, const std::string& own) {
   const std::vector<int> counts = files::silent_counts(network, own);
   const std::size_t kinds = files::neighbour_kinds(network).size();

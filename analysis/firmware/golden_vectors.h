@@ -1,4 +1,4 @@
-/// @file Inputs of a network with the outputs that flight code must give for them, bit for bit.
+/// @file Inputs of a network and the outputs that flight code must produce for them, bit for bit.
 #pragma once
 
 #include <cstdint>
@@ -13,20 +13,21 @@ namespace swarmcert::firmware {
 struct GoldenVector {
   int own_kind = 0;                        ///< index into Network::rho
   std::vector<float> own;                  ///< [files::kGroundInputs]
-  std::vector<std::vector<float>> inputs;  ///< of each neighbour
-  std::vector<int> kinds;                  ///< of each neighbour: index into files::neighbour_kinds()
+  std::vector<std::vector<float>> inputs;  ///< one per neighbour
+  std::vector<int> kinds;                  ///< one per neighbour: index into files::neighbour_kinds()
   nn::DeepSetStatus status = nn::DeepSetStatus::kOk;
   float force_N = 0;
 };
 
-/// Newton per unit of the network's output; gram-force unless it states a unit, as published.
+/// Returns newtons per unit of the network's output; gram-force if the network states no unit, as in the published
+/// networks.
 /// @throws files::InputError if the network states a quantity that is not a vertical force.
 float newton_per_unit(const files::Network& network);
 
-/// `count` random vectors for each kind of vehicle, with no neighbours to `most_neighbours`; inputs reach half as far
-/// again as the clamp of states, or +-1 m and +-2 m/s. One more for each composition of at most `most_neighbours`
-/// neighbours in which the network is silent. Expected outputs are computed by the evaluator of the flight code.
-/// Precondition: every weight is a float32; the network is a deep set.
+/// Returns `count` random vectors for each kind of vehicle, with 0 to `most_neighbours` neighbours. Inputs range to
+/// 1.5 times the clamp of states, or +-1 m and +-2 m/s. Adds one vector for each silent composition of at most
+/// `most_neighbours` neighbours. The evaluator of the flight code computes the expected outputs. Precondition: every
+/// weight is a float32; the network is a deep set.
 std::vector<GoldenVector> golden_vectors(const files::Network& network, int count, int most_neighbours,
                                          std::uint64_t seed);
 

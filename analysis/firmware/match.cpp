@@ -29,10 +29,10 @@ float float_of(std::uint32_t bits) {
   return value;
 }
 
-/// Which entry of a matrix, counted row by row, stands at each place of an array.
+/// Index of the matrix entry (row-major) stored at each position of an array.
 using Order = std::vector<std::size_t>;
 
-/// The layouts in which weights are stored: row by row, column by column, nn::Layout::kBlocks.
+/// The layouts in which weights are stored: row-major, column-major, nn::Layout::kBlocks.
 std::vector<Order> orders(const files::Layer& layer) {
   const auto rows = static_cast<std::size_t>(layer.outputs), columns = static_cast<std::size_t>(layer.inputs);
   std::vector<Order> result(3);
@@ -55,11 +55,11 @@ Bits reordered(const Bits& matrix, const Order& order) {
 struct Place {
   const FloatBlock* block = nullptr;
   std::size_t begin = 0;
-  std::size_t equal = 0;  ///< numbers that agree
+  std::size_t equal = 0;  ///< number of equal entries
 };
 
-/// The place in `block` where most numbers agree with `expected`. Only places are tried where one of a few numbers
-/// spread over the array agrees and is not zero, unless all of these are.
+/// Returns the position in `block` where most numbers agree with `expected`. For speed it tries only positions where
+/// one of a few nonzero numbers, spread over the array, agrees; if these are all zero, it tries every position.
 Place best_place(const Bits& expected, const FloatBlock& block) {
   Place best;
   const std::size_t size = expected.size();
@@ -92,12 +92,12 @@ Place best_place(const Bits& expected, const std::vector<FloatBlock>& blocks) {
   return best;
 }
 
-/// Numbers that a linker may put between a matrix and its bias.
+/// Padding in numbers that a linker may insert between a matrix and its bias.
 constexpr std::size_t kPadding = 16;
-/// A run of this many equal numbers is no coincidence.
+/// This many equal consecutive numbers are no coincidence.
 constexpr std::size_t kTelling = 4;
 
-/// The bias that belongs to a matrix found at `matrix`.
+/// Finds the bias that belongs to a matrix found at `matrix`.
 Place bias_place(const Bits& expected, const Place& matrix, std::size_t matrix_size,
                  const std::vector<FloatBlock>& blocks) {
   const auto at = [&](const FloatBlock& block, std::size_t begin) {
@@ -137,7 +137,7 @@ Difference first_difference(const Bits& expected, const Place& place) {
   return difference;
 }
 
-/// Fewer than half of the numbers: not the array, changed, but something else.
+/// If fewer than half of the numbers agree, this is not a modified copy of the array but something else.
 bool resembles(const Place& place, const Bits& expected) {
   return place.block != nullptr && 2 * place.equal >= expected.size();
 }

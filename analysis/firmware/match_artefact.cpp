@@ -42,7 +42,7 @@ bool is_same(const files::Weights& a, const files::Weights& b) {
   return std::equal(a.layers.begin(), a.layers.end(), b.layers.begin(), b.layers.end(), same_layer);
 }
 
-/// Why the source holds anything but the network's weights; empty if it does not.
+/// Returns why the source contains anything other than the network's weights; empty if it does not.
 std::string why_not_pure(const files::Network& network, const std::string& bytes, const std::string& path) {
   try {
     std::map<std::string, files::Weights> found = files::parse_pure_c_source(bytes, path);
@@ -77,11 +77,11 @@ void match_export_files(const files::Network& network, const std::string& path,
   result.first_difference = in_words(*match.first_difference);
 }
 
-/// Counts the weights of the export's source, if it was compared, and names the one that is another.
+/// Counts the weights in the source of the export, if it was compared, and reports the first that differs.
 void add_weights_of_export(const files::Network& network, ArtefactMatch& result) {
   for (const std::string& file : result.files) {
     const std::string bytes = files::read_file(file);
-    if (bytes.find("_layer {") == std::string::npos) continue;  // the headers hold no weights
+    if (bytes.find("_layer {") == std::string::npos) continue;  // the headers contain no weights
     try {
       const MatchResult weights = match(network, blocks_in_source(bytes, file));
       result.arrays = weights.arrays;
@@ -90,7 +90,7 @@ void add_weights_of_export(const files::Network& network, ArtefactMatch& result)
       result.number_difference = weights.first_difference;
       result.first_difference = in_words(*weights.first_difference, file) + "; " + *result.first_difference;
     } catch (const files::InputError&) {
-      return;  // what is left of it holds no arrays: the files differ, as is said already
+      return;  // the remaining text contains no arrays: the files differ, as reported already
     }
   }
 }

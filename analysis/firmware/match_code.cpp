@@ -26,7 +26,7 @@ std::string words_of(const std::vector<std::uint32_t>& words) {
 
 void load(CortexM& target, const ElfImage& image) {
   for (const Segment& segment : image.segments) {
-    // The stack and arguments of the calls must not lie in the program's own memory.
+    // The stack and arguments of the calls must not overlap the program's own memory.
     if (segment.address < CortexM::kRam + CortexM::kRamSize + 32 * 1024 &&
         std::uint64_t{segment.address} + segment.bytes_in_use > CortexM::kRam + CortexM::kRamSize &&
         segment.address >= CortexM::kRam)
@@ -35,7 +35,7 @@ void load(CortexM& target, const ElfImage& image) {
   }
 }
 
-/// Own state, force, neighbours {pointer, kind} and their inputs, from kArguments on.
+/// Addresses from kArguments on: own state, force, neighbours {pointer, kind} and their inputs.
 struct Arguments {
   std::uint32_t own = CortexM::kArguments, force = 0, neighbours = 0;
   std::vector<std::uint32_t> words;
@@ -43,7 +43,7 @@ struct Arguments {
   explicit Arguments(const GoldenVector& vector) {
     for (const float x : vector.own) words.push_back(float_bits(x));
     force = next();
-    words.push_back(float_bits(-1.0f));  // what is not written is found
+    words.push_back(float_bits(-1.0f));  // detects a result that is not written
     neighbours = next();
     const auto count = static_cast<std::uint32_t>(vector.inputs.size());
     std::uint32_t input = neighbours + 8 * count;
@@ -111,7 +111,7 @@ CodeMatch match_code(const files::Network& network, const std::string& bytes, in
     return result;
   }
   if ((found->address & 1u) == 0) {
-    result.why_not = "predict_force_z() is no Thumb code";
+    result.why_not = "predict_force_z() is not Thumb code";
     return result;
   }
   const std::vector<GoldenVector> vectors = golden_vectors(network, kVectorsOfMatch, most_neighbours, 1);

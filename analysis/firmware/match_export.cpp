@@ -32,7 +32,7 @@ std::string with_line_feeds(const std::string& text) {
   return result;
 }
 
-/// The line that holds the byte at `at`, shortened.
+/// The line that contains the byte at `at`, shortened.
 std::string line_at(const std::string& text, std::size_t at) {
   if (at >= text.size()) return "";
   const std::size_t before = at == 0 ? std::string::npos : text.rfind('\n', at - 1);
@@ -54,12 +54,12 @@ std::optional<FileDifference> difference_of(const std::string& file, const std::
   difference.found = line_at(found, at);
   difference.what = at == found.size() ? "the file ends here, the export goes on"
                     : at == expected.size()
-                        ? "the file goes on where the export ends"
+                        ? "the file continues after the end of the export"
                         : fmt::format("is '{}', exported is '{}'", difference.found, difference.expected);
   return difference;
 }
 
-/// The number or word behind `name` in the line of parameters; empty if there is none.
+/// The number or word after `name` in the line of parameters; empty if there is none.
 std::string parameter(const std::string& text, const std::string& name) {
   const std::size_t line = text.find(kParameterLine);
   if (line == std::string::npos) return "";
@@ -78,7 +78,7 @@ void read_number(const std::string& word, Number least, Number most, Number& val
   if (error == std::errc() && end == last && read >= least && read <= most) value = read;
 }
 
-/// The parameters that a file states; what it does not state in a possible form stays as by default, and differs then.
+/// The parameters stated by a file. Missing or malformed ones keep their default, which then shows as a difference.
 ExportOptions stated_parameters(const std::string& text) {
   ExportOptions options;
   read_number(parameter(text, "most_neighbours"), 1, 64, options.most_neighbours);
@@ -89,7 +89,7 @@ ExportOptions stated_parameters(const std::string& text) {
   return options;
 }
 
-/// Which file of an export `path` is: by its name, else by what its first line says.
+/// Identifies which file of an export `path` is: by its name, otherwise by its first line.
 std::string generated_name(const std::string& path, const std::string& bytes) {
   const std::string whole = normal(path);
   for (const std::string& name : generated_names()) {
@@ -127,7 +127,7 @@ std::optional<FileDifference> additional_file(const std::string& folder,
   if (additional.empty()) return std::nullopt;
   const std::string& first = *std::min_element(additional.begin(), additional.end());
   return FileDifference{first, 0, "", "",
-                        "is no file of the export: a compiler may take it in place of a header"};
+                        "is not a file of the export: a compiler may use it in place of a header"};
 }
 
 /// Compares the files of one export.
@@ -167,7 +167,7 @@ class ExportComparison {
     std::string name, path, text;
   };
 
-  /// Of the first file that states any; the evaluator's headers have none.
+  /// Taken from the first file that states any; the headers of the evaluator state none.
   ExportOptions parameters() const {
     for (const Read& read : read_) {
       if (read.text.find(kParameterLine) != std::string::npos) return stated_parameters(read.text);
@@ -217,7 +217,7 @@ ExportMatch match_export(const files::Network& network, const std::string& path,
     const std::string bytes = files::read_file(path);
     named = generated_name(path, bytes);
     comparison.add(named, path, bytes);
-    if (!has_name(path, named)) {  // a copy under another name: nothing lies beside it
+    if (!has_name(path, named)) {  // a copy under another name: no related files next to it
       for (const std::string& name : generated_names())
         if (name != named) comparison.absent(name);
       if (options.needs_all)

@@ -57,7 +57,7 @@ RegressionLimits regression_in(const files::Json& json) {
   return regression;
 }
 
-/// What [regression] allows a row; infinite where there is no such table.
+/// The percentage that [regression] allows a row; infinite if there is no such table.
 double allowed_percent(const RegressionLimits& regression, const std::string& name) {
   if (!regression.most) return std::numeric_limits<double>::infinity();
   const auto own = regression.own.find(name);
@@ -91,7 +91,7 @@ std::vector<std::string> loosened(const Baseline& baseline, const Checks& checks
   for (const auto& [name, limit] : baseline.checks) {
     names.insert(name);
     const auto found = now.find(name);
-    if (not_judged.count(table_of(name)) == 1) continue;  // fails by itself
+    if (not_judged.count(table_of(name)) == 1) continue;  // fails on its own
     std::string what =
         found == now.end() ? name + ": the check was dropped" : loosened_row(name, limit, *found->second);
     if (!what.empty()) all.push_back(std::move(what));

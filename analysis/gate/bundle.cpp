@@ -29,7 +29,7 @@ constexpr char kManifestSchema[] = "swarmcert/manifest/1";
 
 fs::path normal(const std::string& path) { return fs::absolute(path).lexically_normal(); }
 
-/// The deepest folder that holds all of them.
+/// Returns the deepest folder that contains all files.
 fs::path common_folder(const std::vector<EvidenceFile>& files) {
   fs::path common = normal(files.front().path).parent_path();
   for (const EvidenceFile& file : files) {
@@ -65,7 +65,7 @@ Json manifest_of(const std::vector<Entry>& entries, const std::string& policy) {
   return manifest;
 }
 
-/// Removes a folder that was not finished.
+/// Removes an unfinished folder on destruction.
 class Unfinished {
  public:
   explicit Unfinished(fs::path path) : path_(std::move(path)) { fs::create_directories(path_); }
@@ -76,8 +76,8 @@ class Unfinished {
   Unfinished(const Unfinished&) = delete;
   Unfinished& operator=(const Unfinished&) = delete;
   const fs::path& path() const { return path_; }
-  /// Puts the folder where `target` is; what was there is removed. Whoever looks sees all of the old or all of the new
-  /// one.
+  /// Moves the folder to `target` and removes what was there. A concurrent reader sees either the old or the new
+  /// folder completely.
   void move_to(const fs::path& target) {
     const unsigned flags = fs::exists(target) ? RENAME_EXCHANGE : RENAME_NOREPLACE;
     if (::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, target.c_str(), flags) == 0) {
@@ -87,7 +87,7 @@ class Unfinished {
     if (errno != EINVAL && errno != ENOSYS)
       throw InputError({target.string(), "", "", "",
                         fmt::format("cannot be written ({})", std::generic_category().message(errno)), ""});
-    fs::remove_all(target);  // a file system that cannot exchange
+    fs::remove_all(target);  // for file systems that cannot exchange
     fs::rename(path_, target);
     path_.clear();
   }
@@ -117,13 +117,14 @@ std::vector<Entry> read_manifest(const fs::path& folder, std::string& sha256, st
     const fs::path relative(entry.path);
     if (relative.is_absolute() || relative.lexically_normal() != relative || entry.path.empty() ||
         *relative.begin() == "..")
-      reject("manifest.json names " + files::in_quotes(entry.path) + ", which is no path inside the bundle");
+      reject("manifest.json names " + files::in_quotes(entry.path) +
+             ", which is not a path inside the bundle");
     entries.push_back(std::move(entry));
   }
   return entries;
 }
 
-/// The folder holds exactly these files and their folders, as regular files with these hashes.
+/// Verifies that the folder contains exactly these files and their folders, as regular files with these hashes.
 void verify_files(const fs::path& folder, const std::vector<Entry>& entries) {
   std::set<std::string> files = {"manifest.json"}, folders;
   for (const Entry& entry : entries) {
@@ -149,7 +150,7 @@ void verify_files(const fs::path& folder, const std::vector<Entry>& entries) {
   }
 }
 
-/// The policy's files are the ones of the manifest: in the bundle, and under the same roles.
+/// Verifies that the policy refers to the files of the manifest: inside the bundle, and with the same roles.
 void verify_roles(const fs::path& folder, const std::vector<Entry>& entries, const Policy& policy) {
   std::map<std::string, std::string> roles;
   for (const Entry& entry : entries) roles[entry.path] = entry.role;
@@ -171,7 +172,7 @@ void verify_roles(const fs::path& folder, const std::vector<Entry>& entries, con
     reject("the manifest has files that the policy does not name");
 }
 
-/// The independent checker and the match, on the bundle's own files.
+/// Runs the independent checker and the match on the files of the bundle.
 void verify_claims(const Policy& policy, const GateSettings& settings, BundleVerdict& verdict) {
   Evidence evidence(policy, settings);
   const Release& release = policy.release;
@@ -204,10 +205,10 @@ void verify(const fs::path& folder, bool rerun, GateSettings settings, BundleVer
   verify_files(folder, entries);
   verdict.files = entries.size();
   verdict.verified.push_back(
-      fmt::format("{} files with the hashes of the manifest, none missing, none more", entries.size()));
+      fmt::format("{} files with the hashes of the manifest, none missing or additional", entries.size()));
   const std::string result = (folder / "gate.json").string();
   const Json gate_json = files::read_json(result, "swarmcert/gate/1");
-  if (gate_json.value("verdict", "") != "pass") reject("gate.json says that the release did not pass");
+  if (gate_json.value("verdict", "") != "pass") reject("gate.json states that the release did not pass");
   const Policy policy = read_policy((folder / policy_path).string());
   verify_roles(folder, entries, policy);
   verify_claims(policy, settings, verdict);
@@ -226,7 +227,7 @@ std::string write_bundle(const std::string& folder, const Policy& policy, const 
   const fs::path target = normal(folder).has_filename() ? normal(folder) : normal(folder).parent_path();
   if (fs::exists(target) && !overwrite && !(fs::is_directory(target) && fs::is_empty(target)))
     throw InputError({folder, "", "", "", "the folder is not empty", "--force replaces it"});
-  std::map<std::string, std::string> judged;  // what the gate's result says about its inputs
+  std::map<std::string, std::string> judged;  // what the gate's result states about its inputs
   for (const Json& input : gate_json["inputs"])
     judged[normal(input["file"].get<std::string>()).string()] = input["sha256"].get<std::string>();
 

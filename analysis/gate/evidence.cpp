@@ -62,9 +62,9 @@ std::string Evidence::why_not_certified() {
   const files::Json& as = certificate()["network"]["as"];
   const bool is_stored_float32 = is_stored_as_float32(files::load_evaluated_network(release().network));
   if (release().is_float32 && !is_stored_float32 && as != "float32")
-    return "it is about the float64 weights as stored, but float32 flies: certify --as float32";
+    return "it refers to the float64 weights as stored, but float32 is used in flight: certify --as float32";
   if (!release().is_float32 && as == "float32")
-    return "it is about weights rounded to float32, but the policy says that float64 flies";
+    return "it refers to weights rounded to float32, but the policy states that float64 is used in flight";
   return "";
 }
 
@@ -96,7 +96,7 @@ const std::vector<LipschitzBound>& Evidence::bounds() {
   auto bounds = std::make_unique<std::vector<LipschitzBound>>();
   for (const files::Json& bound : certificate()["bounds"]) {
     if (!bound["scale"].empty() || bound.contains("neighbours"))
-      continue;  // of the latter there may be fewer
+      continue;  // bounds for a group do not cover fewer neighbours
     const files::FunctionId function = bound["function"].get<std::string>();
     const auto block = bound["block"].get<std::string>();
     LipschitzBound one{function,
@@ -214,7 +214,7 @@ const residuals::Comparison& Evidence::residual_comparison() {
     try {
       load_comparison(true);
     } catch (const files::InputError&) {
-      load_comparison(false);  // the guard factor's check says what is wrong with the loop
+      load_comparison(false);  // the guard factor's check reports what is wrong with the loop
     }
   }
   if (comparison_) return *comparison_;

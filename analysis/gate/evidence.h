@@ -1,4 +1,4 @@
-/// @file The files of a release, each read once, and what the libraries say about them.
+/// @file The files of a release, each read once, and the library results derived from them.
 #pragma once
 
 #include <functional>
@@ -28,17 +28,17 @@ struct TrackingSetup;
 
 namespace swarmcert::gate {
 
-/// What a check rests on does not hold: the check fails with this reason.
+/// A precondition of a check does not hold: the check fails with this reason.
 struct Unfounded : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A proved Lipschitz bound of one function for one block of inputs, Euclidean norms.
+/// A proved Lipschitz bound of one function with respect to one input block, in Euclidean norms.
 struct LipschitzBound {
   files::FunctionId function;
   std::string block, domain;
   double upper = 0;
-  std::optional<double> lower;  ///< a slope that is attained
+  std::optional<double> lower;  ///< an attained slope
   std::string unit;
 };
 
@@ -47,7 +47,7 @@ struct GateSettings {
   std::string baseline;  ///< file; empty: none
   bool may_lack_baseline = false;
   std::function<void(int done, int total, const std::string& what)> progress;
-  bool updates_baseline = false;  ///< limits may be looser than the baseline's, and are named
+  bool updates_baseline = false;  ///< limits may be looser than in the baseline; they are reported
 };
 
 struct Baseline;
@@ -63,39 +63,41 @@ class Evidence {
   const Release& release() const { return policy_.release; }
   const GateSettings& settings() const { return settings_; }
 
-  /// As it flies: rounded to float32 unless the policy says float64. @throws files::InputError
+  /// Returns the network used in flight: rounded to float32 unless the policy says float64.
+  /// @throws files::InputError
   const files::Network& flown();
   const files::Json& certificate();
   const check::CheckResult& certificate_verdict();
 
-  /// What is proved of the flown network: by the certificate, if the checker accepts it for the flown precision.
-  /// Without a certificate, and where the policy judges a rejected one by itself, the bounds are computed and proved
-  /// here.
-  /// @throws Unfounded if the certificate is rejected and nothing else in the policy says so.
+  /// Returns the proved bounds of the network used in flight. They come from the certificate if the checker accepts
+  /// it for the precision used in flight. Without a certificate, or if the policy has a check of its own that rejects
+  /// the certificate, the bounds are computed and proved here.
+  /// @throws Unfounded if the certificate is rejected and no other check of the policy reports it.
   const std::vector<LipschitzBound>& bounds();
-  /// Bounds for all inputs and all their coordinates, by function; computed where the certificate lacks one.
+  /// Returns bounds over all inputs and all coordinates, by function; computed if the certificate lacks one.
   std::map<files::FunctionId, double> global_bounds();
 
-  /// Why the certificate does not prove anything about what flies; empty if it does.
+  /// Returns why the certificate proves nothing about the network used in flight; empty if it does.
   std::string why_not_certified();
 
-  /// box.toml of the release, else what the clamp lets through. @throws Unfounded if there is neither.
+  /// Returns box.toml of the release, otherwise the set that the clamp lets through.
+  /// @throws Unfounded if there is neither.
   lipschitz::Domain domain();
 
   const stability::TrackingSetup& tracking();
 
-  /// The model against the reference flights; with the closed loop where the policy asks for a guard factor.
+  /// Compares the model with the reference flights; with the closed loop if the policy asks for a guard factor.
   const residuals::Comparison& comparison();
-  /// As comparison(), but without the closed loop where that cannot be flown.
+  /// Like comparison(), but without the closed loop if it cannot be simulated.
   const residuals::Comparison& residual_comparison();
 
-  /// Error of the velocity that the reference flights' law was given; null where no log measures it.
+  /// Error of the velocity estimate used by the control law in the reference flights; null if no log measures it.
   const residuals::VelocityError* velocity_error();
 
-  /// Largest tracking errors of the reference flights, which comparison() has found sound.
+  /// Largest tracking errors of the reference flights, which comparison() must have found valid.
   std::vector<residuals::FlightPeak> flight_peaks();
 
-  /// Values and limits of the last release; nothing where there is no baseline and none is needed.
+  /// Values and limits of the last release; null if there is no baseline and none is required.
   const Baseline* baseline();
 
  private:
@@ -116,14 +118,14 @@ class Evidence {
   std::unique_ptr<Baseline> baseline_;
 };
 
-/// A file that a release rests on, and as what.
+/// A file on which a release depends, with its role.
 struct EvidenceFile {
   std::string role;  ///< "policy", "network", "weights", "certificate", "gains", "model", "log", ...
   std::string path;
 };
 
-/// Every file of the release, those named inside its files too (weights, models of vehicles, networks of models), once
-/// each, in order. Files that cannot be read are listed, what they would name is not.
+/// Returns every file of the release, including files named inside its files (weights, models of vehicles, networks
+/// of models), without duplicates, in order. Unreadable files are listed, but not the files that they would name.
 std::vector<EvidenceFile> evidence_files(const Policy& policy, const std::string& baseline);
 
 }  // namespace swarmcert::gate

@@ -27,7 +27,7 @@ class FileList {
       const files::Network network = files::load_evaluated_network(arguments);
       for (const auto& [name, weights] : files::parts(network)) add("weights", weights->path);
     } catch (const files::InputError&) {
-      return;  // the checks say what is wrong with it
+      return;  // the checks report what is wrong with the file
     }
   }
 
@@ -46,7 +46,7 @@ class FileList {
     }
   }
 
-  /// The whole export that `path` is or belongs to, so that a bundle can be compared again.
+  /// Adds the whole export to which `path` belongs, so that a bundle can be compared again.
   void add_source(const std::string& path) {
     if (path.empty()) return;
     std::error_code ignored;

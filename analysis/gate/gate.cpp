@@ -13,7 +13,7 @@
 namespace swarmcert::gate {
 namespace {
 
-/// Adds the rows of `check`, or one that says why it has none.
+/// Adds the rows of `check`, or a row that states why there are none.
 void run(const PlannedCheck& check, Evidence& evidence, Checks& checks) {
   const std::size_t before = checks.size();
   const auto give_up = [&](const std::string& reason, bool is_bad_input) {
@@ -37,7 +37,8 @@ void run(const PlannedCheck& check, Evidence& evidence, Checks& checks) {
   }
 }
 
-/// No limit is looser than the baseline's and no check of it is missing, unless this release becomes the baseline.
+/// Checks that no limit is looser than in the baseline and that none of its checks is missing, unless this release
+/// becomes the baseline.
 void judge_limits(const Policy& policy, const Baseline& baseline, bool updates_baseline, Checks& checks) {
   Check check = row("regression.limits", policy.release_line);
   for (const PlannedCheck& planned : policy.checks)
@@ -57,7 +58,7 @@ void judge_limits(const Policy& policy, const Baseline& baseline, bool updates_b
   checks.push_back(std::move(check));
 }
 
-/// Every file can be read, whether a check needs it or not.
+/// Checks that every file can be read, whether a check needs it or not.
 void judge_files(const std::vector<EvidenceFile>& files, int line, Checks& checks) {
   for (const EvidenceFile& file : files) {
     try {
@@ -119,7 +120,7 @@ GateResult run_gate(const Policy& policy, const GateSettings& settings) {
       judge_limits(policy, *baseline, settings.updates_baseline, result.checks);
     }
   } catch (const files::InputError& error) {
-    // A baseline that was given and cannot be read fails the release, whether or not regressions are judged.
+    // A baseline that was given but cannot be read fails the release, whether or not regressions are judged.
     const auto says_so = [&](const Check& check) { return check.reason == error.what(); };
     if (std::none_of(result.checks.begin(), result.checks.end(), says_so)) {
       Check failed = row("release", policy.release_line);

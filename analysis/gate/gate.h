@@ -1,4 +1,4 @@
-/// @file Judging a release: every check of a policy, and one verdict.
+/// @file Judges a release: all checks of a policy, and one verdict.
 #pragma once
 
 #include <string>
@@ -10,21 +10,22 @@ namespace swarmcert::gate {
 
 struct GateResult {
   std::string policy;                ///< path as given
-  Checks checks;                     ///< in order of the registry; one table may have several
-  std::vector<std::string> not_run;  ///< what the policy does not ask for
-  std::vector<EvidenceFile> files;   ///< that the release rests on and that exist
+  Checks checks;                     ///< in order of the registry; one table may add several
+  std::vector<std::string> not_run;  ///< checks that the policy does not request
+  std::vector<EvidenceFile> files;   ///< existing files on which the release depends
 
   int count(Verdict verdict) const;
   bool has_bad_input() const;
-  /// Pass: every check passes. Fail: one fails. Else inconclusive.
+  /// kPass if every check passes; kFail if one fails; otherwise kInconclusive.
   Verdict verdict() const;
 };
 
-/// Runs every check. An input that is missing or damaged fails the checks that need it, and the release where no check
-/// does: the row "release" names it.
+/// Runs every check. A missing or damaged input fails the checks that need it. If no check needs it, it fails the
+/// release in a row named "release".
 GateResult run_gate(const Policy& policy, const GateSettings& settings);
 
-/// 0 pass; 3 bad input; 1 otherwise, and 0 instead where all that is wrong is inconclusive and allowed.
+/// Returns 0 for pass, 3 for bad input, and 1 otherwise; 0 if all remaining checks are merely inconclusive and
+/// `allow_inconclusive` is set.
 int exit_code(const GateResult& result, bool allow_inconclusive);
 
 }  // namespace swarmcert::gate

@@ -22,12 +22,12 @@ std::string summary(const GateResult& result) {
   return text;
 }
 
-/// Limit with its sense: "<= 500".
+/// Formats the limit with its direction: "<= 500".
 std::string limit_words(const Check& check) {
   return check.limit ? (check.more_is_worse ? "<= " : ">= ") + number(check.limit) : "-";
 }
 
-/// One line for annotations: what was found, against which limit, why it did not pass, and what shows it.
+/// Returns one line for annotations: the value, its limit, why the check did not pass, and the evidence.
 std::string message(const Check& check) {
   std::string text = fmt::format("{}: {}", check.name, name(check.verdict));
   if (check.value) text += fmt::format(", value {}", number(check.value));

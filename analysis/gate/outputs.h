@@ -1,4 +1,5 @@
-/// @file A gate's result as people and continuous integration read it. Names from files are escaped for each format.
+/// @file The result of a gate in formats for people and continuous integration. Names from files are escaped per
+/// format.
 #pragma once
 
 #include <string>
@@ -8,24 +9,24 @@
 
 namespace swarmcert::gate {
 
-/// A table for terminals.
+/// Returns a table for terminals.
 std::string to_table(const GateResult& result);
 
-/// Adds `verdict`, `checks` and `not_run` to a command's result. Numbers that are not finite are null.
+/// Adds `verdict`, `checks` and `not_run` to the result of a command. Non-finite numbers become null.
 void add_json(const GateResult& result, files::Json& json);
 
-/// JUnit XML, as Jenkins, GitLab and GitHub's test reporters read it: a failed check is a failure, one that is
-/// inconclusive or whose input is bad an error, one that the policy does not ask for is skipped.
+/// Returns JUnit XML as read by Jenkins, GitLab and GitHub's test reporters. A failed check is a failure; a check
+/// that is inconclusive or has bad input is an error; a check that the policy does not request is skipped.
 std::string to_junit(const GateResult& result);
 
-/// SARIF 2.1.0: a rule per kind of check, a result per check that does not pass, at its limit's line of the policy.
-/// Level error; warning for what is inconclusive where that is allowed.
+/// Returns SARIF 2.1.0: a rule per kind of check, and a result per check that does not pass, located at the line of
+/// its limit in the policy. The level is error, or warning for inconclusive checks if these are allowed.
 std::string to_sarif(const GateResult& result, bool allow_inconclusive);
 
-/// GitHub workflow commands: one error or warning per check that does not pass.
+/// Returns GitHub workflow commands: one error or warning per check that does not pass.
 std::string to_github(const GateResult& result, bool allow_inconclusive);
 
-/// GitHub-flavoured Markdown: verdict and table.
+/// Returns GitHub-flavoured Markdown: verdict and table.
 std::string to_markdown(const GateResult& result);
 
 }  // namespace swarmcert::gate

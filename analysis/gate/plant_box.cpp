@@ -16,7 +16,7 @@ namespace {
 
 using namespace stability;  // NOLINT: every name below is of that library
 
-/// What the firmware commands as PID gains, so that the true mass may differ from the one it was told.
+/// Converts the firmware's control law to PID gains, so that the true mass may differ from the nominal one.
 bool as_pid(const TrackingSetup& setup, Gains& gains) {
   PidGains pid{};
   for (int axis = 0; axis < 3; ++axis) {
@@ -33,7 +33,7 @@ bool as_pid(const TrackingSetup& setup, Gains& gains) {
   return true;
 }
 
-/// The points of the box at which bounds are evaluated: its middle, then its corners, each once.
+/// The points of the box at which bounds are evaluated: its centre, then its corners, without duplicates.
 std::vector<std::array<double, 4>> points_of(const UncertainPlant& box) {
   const Interval ranges[] = {box.mass_kg, box.thrust_scale, box.lag_s, box.delay_s};
   std::vector<std::array<double, 4>> points(1);
@@ -46,7 +46,7 @@ std::vector<std::array<double, 4>> points_of(const UncertainPlant& box) {
   return points;
 }
 
-/// What AxisBounds::least() is for one plant: the loop that flies, at all times.
+/// AxisBounds::least() for one plant: the loop used in flight, at all times.
 double nominal_bound(const Gains& gains, const Plant& plant, const DisturbanceSource& source, int axis,
                      Channel channel) {
   const Disturbance& d = source.axis[axis];
@@ -63,7 +63,7 @@ double nominal_bound(const Gains& gains, const Plant& plant, const DisturbanceSo
       .least();
 }
 
-/// Whether an axis has the loop and the force error of the one before it.
+/// Whether an axis has the same loop and force error as the previous one.
 bool repeats(const Gains& pid, const DisturbanceSource& source, int axis) {
   if (axis == 0) return false;
   const auto i = static_cast<std::size_t>(axis);
@@ -94,7 +94,7 @@ void add_reached(const TrackingSetup& setup, const Gains& pid, const UncertainPl
       }
       for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
         const double bound = nominal_bound(gains, plant, source, axis, channel);
-        if (bound <= result.reached_m[i]) continue;  // NaN is taken
+        if (bound <= result.reached_m[i]) continue;  // NaN is stored as well
         result.reached_m[i] = bound;
         result.where[i] = fmt::format(
             "{} channel, {} loop, mass {:.4g} kg, thrust scale {:.4g}, motor lag {:.4g} s, delay {:.4g} s",
@@ -105,7 +105,7 @@ void add_reached(const TrackingSetup& setup, const Gains& pid, const UncertainPl
   }
 }
 
-double times(double gain, double size) { return size == 0 ? 0 : gain * size; }  // no infinity times zero
+double times(double gain, double size) { return size == 0 ? 0 : gain * size; }  // avoids infinity times zero
 
 bool has_clamp(const Gains& pid, int axis) {
   const auto i = static_cast<std::size_t>(axis);
@@ -118,9 +118,10 @@ UncertainNorms norms_over(const Gains& pid, const AxisLoop& loop, const Uncertai
   return uncertain_norms(SampledLoop{loop, 1 / pid.rate_hz, pid.integrator_step_s}, box, channel);
 }
 
-/// What errors of the estimates add, as errors of the command: m Kd n for the velocity, m (Kp n + Ki int n) for the
-/// position, of which the last changes at a rate of at most m Ki |n|.
-/// @param command gains of the loop that answers them. @param told gains and mass as the firmware has them.
+/// Bound of the estimation errors, treated as errors of the command: m Kd n for the velocity, m (Kp n + Ki int n) for
+/// the position, where the integral term changes at a rate of at most m Ki |n|.
+/// @param command gains from the command to the tracking error.
+/// @param told gains and mass as used by the firmware.
 double of_estimates(const Gains& pid, const AxisLoop& told, const UncertainPlant& box,
                     const DisturbanceSource& source, int axis, const UncertainNorms& command) {
   const double period_share = pid.rate_hz > 0 ? pid.integrator_step_s * pid.rate_hz : 1;
@@ -131,7 +132,7 @@ double of_estimates(const Gains& pid, const AxisLoop& told, const UncertainPlant
                     times(command.rate.upper, told.Ki * period_share * position));
 }
 
-/// Largest bound of one axis and channel in the box.
+/// Largest bound of one axis and channel over the box.
 double enclosed(const TrackingSetup& setup, const Gains& pid, const UncertainPlant& box,
                 const DisturbanceSource& source, int axis, Channel channel) {
   Plant told = setup.plant;
@@ -150,7 +151,7 @@ double enclosed(const TrackingSetup& setup, const Gains& pid, const UncertainPla
   const auto estimates_m = [&](const AxisLoop& of, const UncertainNorms& command) {
     return has_estimates ? of_estimates(pid, of, box, source, axis, command) : 0;
   };
-  // The bias is a step; a measured amplitude or impulse contains it.
+  // The bias acts as a step; a measured amplitude or impulse contains it.
   const double step_m = times(norms.edge.upper, bias);
   double with_bias = times(norms.amplitude.upper, d.amplitude_N);
   if (d.passes == 1) with_bias = std::min(with_bias, times(norms.impulse.upper, d.impulse_N_s));
@@ -159,8 +160,8 @@ double enclosed(const TrackingSetup& setup, const Gains& pid, const UncertainPla
   if (d.passes == 1) least = std::min(least, times(norms.edge.upper, d.variation_N) + step_m);
   if (has_estimates) least += estimates_m(loop, of_command(loop, norms));
   if (!has_clamp(pid, axis)) return least;
-  // int e answers to f as e does to its integral: |int e| <= |h|_1 sup|f|, of a bias as well. What the integral makes
-  // of errors of the estimates is not enclosed.
+  // int e responds to f as e responds to the integral of f: |int e| <= |h|_1 sup|f|, also for a bias. The
+  // contribution of estimation errors to the integral is not enclosed.
   const double limit_m_s = pid.integrator_limit_m_s[static_cast<std::size_t>(axis)];
   const double bias_beside = source.classes_contain_bias ? 0 : bias;
   if (!has_estimates && times(norms.rate.upper, d.amplitude_N + bias_beside) <= limit_m_s) return least;

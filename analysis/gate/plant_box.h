@@ -10,20 +10,20 @@
 
 namespace swarmcert::gate {
 
-/// Tracking bounds of the loop that flies, the sampled one where gains.toml has a rate, per axis.
+/// Tracking bounds per axis of the loop used in flight, which is the sampled loop if gains.toml states a rate.
 struct BoxBound {
-  bool is_enclosed = false;  ///< whether `enclosed_m` holds everywhere in the box
-  /// Largest bound at the corners and the middle of the box, both channels, what float32 costs included. NaN: an axis
-  /// has no loop of its own.
+  bool is_enclosed = false;  ///< whether `enclosed_m` holds in the whole box
+  /// Largest bound at the corners and the centre of the box, for both channels, including float32 errors. NaN if an
+  /// axis is coupled.
   double reached_m[3] = {0, 0, 0};
-  double enclosed_m[3] = {0, 0, 0};  ///< no plant of the box has a larger bound; infinite: not proved stable
-  std::string where[3];              ///< of `reached_m`
+  double enclosed_m[3] = {0, 0, 0};  ///< no plant in the box has a larger bound; infinite: not proved stable
+  std::string where[3];              ///< location of `reached_m`
 };
 
-/// Bounds for `source` over the box. Enclosed by uncertain_norms(): the smallest of the bounds by rate, by amplitude
-/// and, for a single pass, by edges and by impulse; where an integrator's clamp may act, that of the loop without
-/// integral, which holds whether it acts or not (ClampBounds). Sampled loops with a clamp have no enclosure, only
-/// corners.
+/// Bounds for `source` over the box. The enclosure by uncertain_norms() is the smallest of the bounds by rate, by
+/// amplitude and, for a single pass, by edges and by impulse. If the clamp of an integrator may act, it is the bound
+/// of the loop without integral action, which holds whether the clamp acts or not (ClampBounds). Sampled loops with a
+/// clamp have no enclosure, only corner values.
 BoxBound bound_over(const stability::TrackingSetup& setup, const stability::UncertainPlant& box,
                     const stability::DisturbanceSource& source);
 

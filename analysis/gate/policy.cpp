@@ -15,21 +15,21 @@ using files::TomlTable;
 
 constexpr char kSchema[] = "swarmcert/policy/1";
 
-/// Of the policy's folder, unless it is absolute.
+/// Resolves `path` relative to the folder of the policy, unless it is absolute.
 std::string resolve(const std::string& policy, const std::string& path) {
   return (std::filesystem::path(policy).parent_path() / path).lexically_normal().string();
 }
 
-/// The order of layers under `key`, for a file that the policy must name.
+/// Reads the layer order under `key`, for a file that the policy must name.
 std::vector<std::string> read_order(const TomlTable& table, const char* key, bool has_file) {
   if (!table.has(key)) return {};
-  if (!has_file) table.refuse(key, "", "is of a file that is not named here");
+  if (!has_file) table.refuse(key, "", "belongs to a file that is not named here");
   std::vector<std::string> layers = table.texts(key);
   if (layers.empty()) table.refuse(key, "[]", "names no layer");
   return layers;
 }
 
-/// Flights, and how many logs they are.
+/// Reads the flights and the number of their logs.
 void read_recordings(const TomlTable& table, const std::string& policy, Release& release) {
   if (!table.has("flights")) return;
   const std::vector<std::string> words =
@@ -38,7 +38,7 @@ void read_recordings(const TomlTable& table, const std::string& policy, Release&
   for (const std::string& word : words) release.flights.push_back(resolve(policy, word));
   if (!table.has("logs"))
     table.refuse("logs", "", "is missing",
-                 "say how many logs the flights are, so that none is lost unnoticed");
+                 "state how many logs the flights are, so that a missing one is noticed");
   const double logs = table.number("logs");
   if (!(logs >= 1 && logs <= 1e6) || logs != std::floor(logs))
     table.refuse("logs", "", "must be a whole number from 1 on");
@@ -67,7 +67,7 @@ Release read_release(const TomlTable& table, const std::string& policy) {
   if (release.network.phi.empty() != release.network.rho.empty())
     table.refuse(release.network.phi.empty() ? "rho" : "phi", "", "needs both phi and rho");
   if (!release.network.phi.empty() && !release.network.file.empty())
-    table.refuse("network", "", "stands beside phi and rho", "name one or the other");
+    table.refuse("network", "", "conflicts with phi and rho", "name one or the other");
   if (table.has("precision")) release.is_float32 = table.choice("precision", {"float32", "float64"}) == 0;
   release.certificate = file("certificate");
   release.box = file("box");

@@ -8,7 +8,7 @@
 namespace swarmcert::gate {
 namespace {
 
-/// Bytes of the UTF-8 sequence (RFC 3629) that starts at `at`; 0 if there is none.
+/// Returns the number of bytes of the UTF-8 sequence (RFC 3629) that starts at `at`; 0 if there is none.
 std::size_t sequence(const std::string& text, std::size_t at) {
   const auto byte = [&](std::size_t i) -> unsigned {
     return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0u;
@@ -28,7 +28,7 @@ std::size_t sequence(const std::string& text, std::size_t at) {
   return is_sound ? size : 0;
 }
 
-/// Every character through `escape`, which says what stands for it; nullptr: itself.
+/// Replaces every character by the result of `escape`; nullptr keeps the character.
 template <class Escape>
 std::string escaped(const std::string& text, const Escape& escape) {
   std::string result;

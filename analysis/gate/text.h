@@ -1,4 +1,4 @@
-/// @file Escaping of untrusted text per format, and numbers as all formats show them.
+/// @file Escaping of untrusted text per format, and the number format shared by all outputs.
 #pragma once
 
 #include <optional>
@@ -6,22 +6,22 @@
 
 namespace swarmcert::gate {
 
-/// Valid UTF-8 without control characters: whatever else becomes "?".
+/// Returns valid UTF-8 without control characters; everything else becomes "?".
 std::string printable(const std::string& text);
 
-/// printable(), for XML text and attributes in double quotes.
+/// Applies printable() and escapes for XML text and double-quoted attributes.
 std::string xml(const std::string& text);
 
-/// printable(), for a cell of a Markdown table: no markup, no HTML.
+/// Applies printable() and escapes for a cell of a Markdown table: no markup, no HTML.
 std::string markdown(const std::string& text);
 
-/// For the message of a GitHub workflow command; `is_property`: for the value of one of its properties.
+/// Escapes for the message of a GitHub workflow command or, if `is_property`, for the value of one of its properties.
 std::string github(const std::string& text, bool is_property);
 
-/// A path as URI reference (RFC 3986): relative, or file:// for an absolute one.
+/// Returns a path as a URI reference (RFC 3986): relative, or file:// for an absolute path.
 std::string uri(const std::string& path);
 
-/// Six digits; "-" for nothing, "not finite" otherwise.
+/// Formats six digits; "-" if empty, "not finite" if not finite.
 std::string number(const std::optional<double>& value);
 
 }  // namespace swarmcert::gate

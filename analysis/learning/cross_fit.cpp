@@ -15,7 +15,7 @@
 namespace swarmcert::learning {
 namespace {
 
-/// The fold of each flight that does not test, assigned in turn, in the order of the tracks.
+/// Returns the fold of each flight other than test flights, assigned in turn in the order of the tracks.
 std::map<std::string, int> folds_of_flights(const LearningData& data, int folds) {
   std::map<std::string, int> result;
   for (const TrackSamples& track : data.tracks) {
@@ -28,7 +28,7 @@ std::map<std::string, int> folds_of_flights(const LearningData& data, int folds)
   return result;
 }
 
-/// Leaves fold k out of the flights that are fitted, for it to select, its samples with weight 1; none for k < 0.
+/// Moves fold k from the fitted to the selecting flights and sets the weight of its samples to 1; none for k < 0.
 void leave_out(const std::map<std::string, int>& folds, int k, LearningData& data) {
   for (TrackSamples& track : data.tracks) {
     if (track.use == Use::kTest) continue;
@@ -38,7 +38,7 @@ void leave_out(const std::map<std::string, int>& folds, int k, LearningData& dat
   balance(data);
 }
 
-/// The mean over the networks of the errors of each epoch that all of them ran.
+/// Mean errors over the networks for each epoch that all of them ran.
 std::vector<Epoch> mean_epochs(const std::vector<Run>& runs) {
   std::vector<Epoch> mean = runs.front().epochs;
   for (const Run& run : runs) mean.resize(std::min(mean.size(), run.epochs.size()));
@@ -52,7 +52,7 @@ std::vector<Epoch> mean_epochs(const std::vector<Run>& runs) {
   return mean;
 }
 
-/// The mean of the networks, which keeps what they keep.
+/// Returns the mean of the networks, which keeps the limits that they keep.
 Run mean_run(const std::vector<Run>& runs, const RunOptions& options, LearningData& data) {
   std::vector<training::Vector> members;
   for (const Run& run : runs) members.push_back(run.theta);

@@ -24,20 +24,20 @@ using residuals::Track;
 constexpr int kNeighbourInputs = nn::kRelativeState;
 constexpr double kBlock_s = 2, kPurge_s = 0.15;
 
-/// Samples of one track before the kinds of all flights are known.
+/// Samples of one track, before the kinds in all flights are known.
 struct RawTrack {
   TrackSamples about;
   std::string kind;
   std::vector<double> time_s;
-  std::vector<Eigen::Vector3f> target;    ///< only z of kForceZ
+  std::vector<Eigen::Vector3f> target;    ///< only z if the target is kForceZ
   std::vector<std::array<float, 4>> own;  ///< -z, -v
   std::vector<std::size_t> first = {0};
   std::vector<int> neighbour_kind;  ///< index into Kinds::names
   std::vector<std::array<float, kNeighbourInputs>> neighbour;
 };
 
-/// What the model leaves along the track, in SI units, along the axes of the world; empty and a problem where there is
-/// none.
+/// Residual of the model along the track, in SI units and world axes. If there is none, returns an empty vector and
+/// adds a problem.
 std::vector<Eigen::Vector3d> left_by_model(const Track& track, const residuals::Inputs& inputs, Target target,
                                            std::vector<std::string>& problems) {
   const stability::Model model = inputs.model_for(track);
@@ -75,7 +75,7 @@ RawTrack raw_samples(const Track& track, const residuals::Inputs& inputs, Target
   return raw;
 }
 
-/// All flights of `inputs`, in their order.
+/// Loads all flights of `inputs` in their order.
 std::vector<std::vector<RawTrack>> load(const residuals::Inputs& inputs, Target target, int jobs,
                                         const std::function<void()>& flight_done,
                                         std::vector<std::string>& problems) {
@@ -95,7 +95,7 @@ std::vector<std::vector<RawTrack>> load(const residuals::Inputs& inputs, Target 
   return flights;
 }
 
-/// Whether the flights to fit must select and test as well.
+/// Whether flights of the fit must provide the selecting and the test samples.
 struct HeldBack {
   bool select, test;
 
@@ -112,7 +112,7 @@ struct HeldBack {
   }
 };
 
-/// Which networks there are: a phi per kind that was ever a neighbour, a rho per kind whose force is known.
+/// Returns the layout: a phi per kind that occurs as a neighbour, a rho per kind whose force is known.
 training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vector<std::string>& kinds,
                            const NetworkSizes& sizes, Target target) {
   std::set<std::string> neighbours, own;
@@ -146,7 +146,7 @@ training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vecto
   return training::Layout(std::move(parts));
 }
 
-/// Records from `from` on that have as many neighbours of each kind as it has; ends before `to` or there.
+/// Returns the end, at most `to`, of the records from `from` on with the same number of neighbours of each kind.
 std::size_t same_neighbours(const RawTrack& raw, std::size_t from, std::size_t to) {
   const auto begin = [&raw](std::size_t i) {
     return raw.neighbour_kind.begin() + static_cast<long>(raw.first[i]);
@@ -156,7 +156,7 @@ std::size_t same_neighbours(const RawTrack& raw, std::size_t from, std::size_t t
   return end;
 }
 
-/// Records of one composition.
+/// Appends records of one composition.
 void append_alike(LearningData& data, const RawTrack& raw, const std::vector<std::string>& kinds,
                   std::size_t from, std::size_t to, Use use) {
   TrackSamples about = raw.about;
@@ -196,7 +196,7 @@ void append(LearningData& data, const RawTrack& raw, const std::vector<std::stri
   }
 }
 
-/// All of a track, its blocks of 2 s in turn fitted, selecting and testing.
+/// Appends a whole track, with its blocks of 2 s used in turn for fitting, selecting and testing.
 void append_blocks(LearningData& data, const RawTrack& raw, const std::vector<std::string>& kinds,
                    HeldBack held_back) {
   const std::size_t count = raw.time_s.size();
@@ -265,7 +265,8 @@ void balance(LearningData& data) {
 
 namespace {
 
-/// The tracks of the flights that are fitted, wholly or in blocks. @throws InputError where they teach nothing.
+/// Returns the tracks of the fitted flights, whole or in blocks.
+/// @throws InputError if nothing can be learned from them.
 std::vector<RawTrack> fitted_tracks(const std::vector<std::vector<RawTrack>>& flights,
                                     const HeldBack& held_back, const residuals::Inputs& inputs,
                                     const LearningData& data) {
@@ -288,7 +289,7 @@ std::vector<RawTrack> fitted_tracks(const std::vector<std::vector<RawTrack>>& fl
   return fitted;
 }
 
-/// Appends a track of kinds that the network has; of others, the reason why it is left out.
+/// Appends a track if the network has its kinds; otherwise records why it is left out.
 void append_if_known(LearningData& data, const RawTrack& track, const std::vector<std::string>& kinds,
                      Use use) {
   const auto has_phi = [&](int kind) { return data.layout.find(files::FunctionId::phi(kinds[kind])) >= 0; };
@@ -324,8 +325,8 @@ LearningData load_learning_data(const LearningFlights& named, const NetworkSizes
     progress(++done, total);
   };
   const std::vector<std::vector<RawTrack>> flights = load(inputs, target, jobs, flight_done, data.problems);
-  // What a flight is for follows from its place among all that were named, never from what is in it: else a damaged
-  // flight that tests would change which others are fitted.
+  // The use of a flight depends on its position in the list of named flights, never on its contents: otherwise a
+  // damaged test flight would change which flights are fitted.
   const HeldBack held_back = {named.select == nullptr, named.test == nullptr};
   const std::size_t needed = 1 + (held_back.select ? 1 : 0) + (held_back.test ? 1 : 0);
   data.split_by_blocks =

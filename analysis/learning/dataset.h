@@ -11,11 +11,11 @@
 
 namespace swarmcert::learning {
 
-/// What a sample may be used for.
+/// Permitted use of a sample.
 enum class Use { kFit, kSelect, kTest };
 const char* name(Use use);
 
-/// What the networks learn of the wrench that the vehicle's model leaves.
+/// The part of the wrench left by the vehicle's model that the networks learn.
 enum class Target {
   kForceZ,  ///< the force along the world's z
   kForce,   ///< the force along the world's x, y, z
@@ -25,7 +25,7 @@ enum class Target {
 /// How targets are stored and written.
 struct TargetInfo {
   const char* quantity;  ///< as in network.toml
-  const char* unit;      ///< likewise
+  const char* unit;      ///< as in network.toml
   const char* words;
   int components;
   double SI_per_unit;
@@ -37,18 +37,18 @@ struct NetworkSizes {
   std::vector<int> phi = {25, 40, 40};
   std::vector<int> rho = {40, 40, 40};
   int features = 40;
-  bool ground = true;       ///< a phi of the vehicle's own height and velocity, always in the sum
-  bool invariants = false;  ///< every phi sees invariants under turns about the vertical (nn/invariants.h)
+  bool ground = true;       ///< a phi for the vehicle's own height and velocity, always in the sum
+  bool invariants = false;  ///< every phi receives invariants under rotation about z (nn/invariants.h)
 };
 
-/// Samples of one vehicle in one flight, with as many neighbours of each kind throughout.
+/// Samples of one vehicle in one flight with a constant number of neighbours of each kind.
 struct TrackSamples {
   std::string flight, scenario, vehicle;
   std::string composition;  ///< files::composition_name(): "small+small>small"
   Use use = Use::kFit;
   Eigen::Index begin = 0, end = 0;
 
-  /// Tracks of one group count the same together as those of any other: "21_swap_ss small>small".
+  /// Group of the track, "21_swap_ss small>small". All groups have the same total weight.
   std::string group() const { return scenario + " " + composition; }
 };
 
@@ -58,50 +58,50 @@ struct LearningData {
   training::Layout layout;  ///< parts "phi:<kind>", with "phi:ground", and "rho:<kind>"
   training::Dataset samples;
   std::vector<TrackSamples> tracks;
-  bool split_by_blocks = false;  ///< blocks of flights that are fitted judge: scores are too good
+  bool split_by_blocks = false;  ///< fitted flights also select and test by blocks: scores are optimistic
   std::vector<std::string> problems;
 
   std::vector<Eigen::Index> indices(Use use) const;
 };
 
-/// What phi sees of a neighbour's relative state, and the ground's phi of the vehicle's own: the state, or its
-/// invariants as nn/deep_set.h computes them.
+/// Returns the input of phi for a neighbour's relative state, and of the ground's phi for the vehicle's own state:
+/// the state itself, or its invariants as computed by nn/deep_set.h.
 /// @param state [nn::kRelativeState] and [nn::kOwnState].
 std::vector<float> seen_of_neighbour(const std::vector<float>& state, bool invariants);
 std::vector<float> seen_of_own(const std::vector<float>& state, bool invariants);
 
-/// Sets the weights of the samples to fit: every group weighs the same in total, and all together as many as there are
-/// samples. Others keep theirs.
+/// Sets the weights of the samples to fit: every group has the same total weight, and the weights sum to the number
+/// of samples. Other samples keep their weights.
 void balance(LearningData& data);
 
-/// Shows progress: flights done of all.
+/// Progress callback: number of flights done, and total.
 using Progress = std::function<void(int done, int total)>;
 
 /// How samples are held back from the fit.
 enum class SplitBy {
-  kAuto,     ///< by flights; by blocks where there are fewer than three
-  kFlights,  ///< as wholes: neighbouring records of one flight are nearly the same
-  kBlocks,   ///< blocks of 2 s of every flight, without the 0.15 s at both ends
+  kAuto,     ///< by flights; by blocks if there are fewer than three flights
+  kFlights,  ///< whole flights, because neighbouring records of one flight are nearly equal
+  kBlocks,   ///< blocks of 2 s of every flight, without 0.15 s at both ends
 };
 
-/// Flights by what they are for. Pointers may be null but for `fit`.
+/// Flights by use. Only `fit` must not be null.
 struct LearningFlights {
   const residuals::Inputs* fit;
-  const residuals::Inputs* select = nullptr;  ///< decide when training ends
-  const residuals::Inputs* test = nullptr;    ///< decide nothing
+  const residuals::Inputs* select = nullptr;  ///< determine when training ends
+  const residuals::Inputs* test = nullptr;    ///< influence nothing
 };
 
-/// Loads flights. The target of a sample is what the vehicle's model leaves of the force or torque; inputs are relative
-/// positions and velocities of the neighbours in the world frame (paper, section V-B), and own (-z, -v) for the ground;
-/// or, as `sizes` says, invariants of them, as the evaluator computes them in float32.
-/// Among the samples to fit, every group, which is a scenario and a composition of kinds, gets the same total weight:
-/// ten flights of one task say no more of another than one does. The others have weight 1.
+/// Loads flights as samples. The target of a sample is the force or torque that the vehicle's model leaves; inputs are
+/// relative positions and velocities of the neighbours in the world frame (paper, section V-B), and the own (-z, -v)
+/// for the ground; or, if `sizes` says so, invariants of these, computed in float32 as the evaluator does.
+/// Among the samples to fit, every group (a scenario and a composition of kinds) has the same total weight, because ten
+/// flights of one task say no more about another task than one flight does. Other samples have weight 1.
 ///
-/// What `select` and `test` do not name is held back from `fit`: of every five flights, in order of names and runs, the
-/// third selects and the fifth tests; of three or four flights the last two do. By blocks: of every five blocks of a
-/// flight, likewise. Which networks there are, and what is fitted, does not depend on the records that test.
-/// @throws files::InputError if no record to fit of a vehicle with a model is left, or none has a neighbour;
-///   std::invalid_argument for invariants with another target than the vertical force.
+/// If `select` or `test` is null, samples are held back from `fit`: of every five flights, in order of names and runs,
+/// the third selects and the fifth tests; of three or four flights the last two do. With blocks, the same holds for
+/// every five blocks of a flight. The set of networks and the fitted data do not depend on the test records.
+/// @throws files::InputError if no record to fit of a vehicle with a model remains, or none has a neighbour;
+///   std::invalid_argument for invariants with a target other than the vertical force.
 LearningData load_learning_data(const LearningFlights& flights, const NetworkSizes& sizes, SplitBy split,
                                 int jobs, const Progress& progress, Target target = Target::kForceZ);
 

@@ -16,7 +16,7 @@
 namespace swarmcert::learning {
 namespace {
 
-/// Storing the scaled weights in float32 moves the bound by about 2^-24 of it.
+/// Rounding the scaled weights to float32 changes the bound by about 2^-24 of it.
 constexpr double kScalingHeadroom = 0x1p-20;
 constexpr int kMostScalings = 8;
 

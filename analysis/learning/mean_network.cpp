@@ -11,7 +11,7 @@ namespace {
 using Eigen::Index;
 using training::Part;
 
-/// Writes layer `layer` of part `part` of member k into its place in `theta`.
+/// Copies layer `layer` of part `part` of member k to its position in `theta`.
 void place(const training::Layout& one, const training::Vector& member, const training::Layout& wide,
            int part, int layer, Index k, Index members, training::Vector& theta) {
   const auto from = one.weights(member, part, layer);

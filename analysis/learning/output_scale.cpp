@@ -9,15 +9,15 @@
 namespace swarmcert::learning {
 namespace {
 
-/// Rounding of scaled weights to float32 must not lead across the limit.
+/// Margin so that rounding of scaled weights to float32 does not cross the limit.
 constexpr double kBelowTheLimit = 1 - 1e-4;
 
-/// Sums over the samples of one composition, y the target and f the network's output.
+/// Sums over the samples of one composition; y is the target, f the output of the network.
 struct Products {
   double yy = 0, yf = 0, ff = 0;
   double samples = 0;
 
-  /// f helps at smaller scales than this.
+  /// f helps at scales below this.
   double limit() const { return kBelowTheLimit * 2 * yf / ff; }
   SupportedErrors errors(double scale) const {
     const double left = yy - 2 * scale * yf + scale * scale * ff;
@@ -44,8 +44,8 @@ std::map<std::string, Products> products_of(const LearningData& data, const trai
 
 std::string kind_of(const std::string& composition) { return composition.substr(composition.rfind('>') + 1); }
 
-/// Where sum_c min(0, mean |y - s f|^2 - mean |y|^2) is least. At any s those that f helps are the ones with the
-/// largest limits, so that each set of these is tried at its best scale.
+/// Minimises sum_c min(0, mean |y - s f|^2 - mean |y|^2) over s. At any s, f helps in the compositions with the
+/// largest limits, so each such set is tried at its best scale.
 double best_scale(std::vector<Products> compositions) {
   std::sort(compositions.begin(), compositions.end(),
             [](const Products& a, const Products& b) { return a.limit() > b.limit(); });
@@ -92,7 +92,7 @@ OutputSupport output_support(const LearningData& data, const training::Matrix& u
   for (const auto& [composition, products] : all) {
     const auto found = support.scales.find(kind_of(composition));
     const double scale = found == support.scales.end() ? 1 : found->second;
-    // A scale of 0 helps nowhere, and does not where the output is 0 by itself.
+    // A scale of 0 never helps, unless the output is 0 anyway.
     const bool helps = products.ff == 0 || (scale > 0 && scale <= products.limit());
     const bool speaks = helps || may == Support::kAsTrained;
     support.left[composition] = products.errors(speaks ? scale : 0);

@@ -9,11 +9,11 @@
 namespace swarmcert::learning {
 namespace {
 
-/// Rounding a 40 x 40 layer to float32 moves its norm by up to 40 * 2^-24 of it: one or two tries suffice.
+/// Rounding a 40 x 40 layer to float32 changes its norm by at most 40 * 2^-24 relatively, so one or two tries suffice.
 constexpr int kMostTries = 40;
 constexpr double kHeadroom = 0x1p-24;
 
-/// Scales the part's layers that are not proved to keep gamma; true once all are.
+/// Scales the layers of the part that are not proved to keep gamma. Returns true once all are proved.
 bool improve(const training::Layout& layout, const files::GammaStatement& gamma, int part, int tries,
              training::Vector& theta) {
   const int layers = layout.parts()[static_cast<std::size_t>(part)].layers();

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kRecordedSamples = 64;  ///< of each part
+constexpr int kRecordedSamples = 64;  ///< number per part
 constexpr char kSamplesFile[] = "samples.json";
 
 std::string file_of(const files::FunctionId& part) {
@@ -27,7 +27,7 @@ std::string network_toml(const LearningData& data, const files::GammaStatement& 
                          const std::vector<std::string>& silent) {
   std::string text = "schema = \"swarmcert/network/1\"\n";
   if (!silent.empty())
-    text += fmt::format("# Of these vehicles among these neighbours there is no network.\nsilent = {}\n",
+    text += fmt::format("# Compositions (neighbours > vehicle) without a network.\nsilent = {}\n",
                         files::Json(silent).dump());
   text += fmt::format(
       "output = {{ quantity = \"{}\", unit = \"{}\" }}\n"
@@ -44,7 +44,8 @@ std::string network_toml(const LearningData& data, const files::GammaStatement& 
   return text;
 }
 
-/// What the trainer's own arithmetic gives, so that a reader can show that the files hold the network that was trained.
+/// Writes outputs computed with the trainer's own arithmetic, so that a reader can verify that the files contain the
+/// trained network.
 void write_samples(const training::Layout& layout, const training::Vector& theta,
                    const files::Network& network, const std::string& path) {
   const files::PartOutput output = [&](const std::string& part, const std::vector<float>& input) {
@@ -75,7 +76,7 @@ files::Network write_network(const LearningData& data, const training::Vector& t
 
 namespace {
 
-/// Residuals of the published signals contain the lag of those signals, so it replaces every lag of the model.
+/// Residuals of the published signals include the lag of those signals, so it replaces every lag of the model.
 void set_published_lag(stability::Model& model) {
   auto& effects = model.effects;
   effects.erase(std::remove_if(effects.begin(), effects.end(),

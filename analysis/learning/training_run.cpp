@@ -21,14 +21,14 @@ using training::Vector;
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Everything a run needs to go on.
+/// The state from which a run can be resumed.
 struct State {
   Vector trainer, best;
-  std::vector<double> shares;  ///< of the layers' limits, per part
+  std::vector<double> shares;  ///< factors on the limits of the layers, per part
   std::vector<Epoch> epochs;
 };
 
-/// Of the data and of every option that the bits depend on: a run may only be taken up by the same one.
+/// Hash of the data and of every option on which the bits depend; only an identical run may resume from a checkpoint.
 std::string fingerprint(const LearningData& data, const RunOptions& options) {
   const auto bytes = [](const auto& v) {
     return std::string(reinterpret_cast<const char*>(v.data()), v.size() * sizeof(v[0]));
@@ -89,7 +89,7 @@ State read_checkpoint(const std::string& key, const std::string& path) {
   return state;
 }
 
-/// Samples that are predicted at a time: few enough for the cache, many enough for matrix products.
+/// Samples per prediction batch: small enough for the cache, large enough for matrix products.
 constexpr std::size_t kPredicted = 4096;
 
 void set_targets(const training::Matrix& targets, Use use, LearningData& data) {

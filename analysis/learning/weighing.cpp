@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Index;
 
-/// Neighbouring records have nearly the same error; weights need no more than its size.
+/// Neighbouring records have nearly the same error, and weights need only its magnitude.
 constexpr int kStride = 8;
 
 }  // namespace
@@ -38,7 +38,7 @@ double mean_rmse(const LearningData& data, const training::Vector& theta, Use us
 
 std::vector<float> weights_by(Weighing weighing, const LearningData& data, const training::Vector& theta,
                               int jobs) {
-  std::vector<float> weights = data.samples.weight;  // groups count the same
+  std::vector<float> weights = data.samples.weight;  // equal total weight per group
   if (weighing == Weighing::kGroups) return weights;
   const std::map<std::string, double> errors = errors_by_group(data, theta, Use::kFit, kStride, jobs);
   double inverse = 0;

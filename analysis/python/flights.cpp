@@ -25,7 +25,7 @@ py::array_t<double> column(const Items& items, const Get& get) {
   return result;
 }
 
-/// `get` returns something with width entries.
+/// @param get returns an object with kWidth entries.
 template <std::size_t kWidth, typename Items, typename Get>
 py::array_t<double> columns_of(const Items& items, const Get& get) {
   py::array_t<double> result({static_cast<py::ssize_t>(items.size()), static_cast<py::ssize_t>(kWidth)});

@@ -16,7 +16,7 @@ namespace py = pybind11;
 namespace swarmcert::python {
 namespace {
 
-/// Raises `swarmcert.NAME`, which Python code defines.
+/// Raises `swarmcert.NAME`, which is defined in Python code.
 void raise(const char* name, const py::args& arguments) {
   const py::object type = py::module_::import("swarmcert._errors").attr(name);
   PyErr_SetObject(type.ptr(), type(*arguments).ptr());
@@ -37,7 +37,7 @@ void translate(std::exception_ptr pointer) {
   }
 }
 
-/// By command, the options that it declares, without dashes, and whether each takes a value.
+/// Returns the declared options by command, without dashes, and whether each takes a value.
 py::dict options() {
   py::dict result;
   for (const analysis::Command& command : analysis::commands()) {

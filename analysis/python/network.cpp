@@ -16,7 +16,7 @@ namespace {
 
 using Parts = std::map<std::string, files::Weights>;
 
-/// Anything else than the floating-point types of numpy is refused by files::assemble(), which names the type.
+/// Returns the precision; files::assemble() rejects all other numpy types with a message that names the type.
 std::optional<files::Precision> precision_of(const py::array& array) {
   if (py::isinstance<py::array_t<float>>(array)) return files::Precision::kFloat32;
   if (py::isinstance<py::array_t<double>>(array)) return files::Precision::kFloat64;
@@ -74,7 +74,7 @@ files::Network network_of(const py::dict& source) {
             throw files::InputError({"", "", "weights", files::in_quotes(path),
                                      "is not among the given arrays", "give them under this name"});
           if (!order.empty())
-            throw files::InputError({"", "", "order", "", "stands in the description of a network in memory",
+            throw files::InputError({"", "", "order", "", "is part of the description of a network in memory",
                                      "give it as order="});
           return found->second;
         });
@@ -98,7 +98,7 @@ files::Network network_of(const py::dict& source) {
 std::string save_network(const py::dict& source, const std::string& folder, bool overwrite) {
   namespace fs = std::filesystem;
   files::require_relu(network_of(source),
-                      "files are written of ReLU networks");  // what cannot be loaded is refused as well
+                      "files are written of ReLU networks");  // also rejects networks that cannot be loaded
   const auto description = source["description"].cast<std::string>();
   std::string last;
   for (const auto& [name, weights] : parts_of(source)) {

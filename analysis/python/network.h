@@ -1,4 +1,4 @@
-/// @file Networks from arrays in memory.
+/// @file Networks built from arrays in memory.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -9,18 +9,18 @@
 
 namespace swarmcert::python {
 
-/// A network from a dict with
+/// Builds a network from a dict with
 ///   "parts":       {name: {"tensors": [(name, array), ...], "order": [layer, ...], "is_chain": bool}},
-///   "description": text of a network.toml whose `weights` are the names of parts; "" for one plain network under the
-///   name
-///                  "network", or a pair under "phi" and "rho".
-/// Arrays are float16 (a float32 network then), float32 or float64 of one or two dimensions, C-contiguous. `is_chain`
-/// states that they are listed in the order of evaluation with ReLU between the layers. Hashes are those of the
-/// safetensors files that save_network() writes.
+///   "description": text of a network.toml whose `weights` are the names of parts; "" for one plain network with the
+///                  name "network", or a pair with the names "phi" and "rho".
+/// Arrays are float16 (giving a float32 network), float32 or float64, with one or two dimensions, C-contiguous.
+/// `is_chain` states that the tensors are listed in the order of evaluation with ReLU between the layers. Hashes are
+/// those of the safetensors files that save_network() writes.
 /// @throws files::InputError as the readers of weight files do.
 files::Network network_of(const pybind11::dict& source);
 
-/// Writes parts as safetensors, and the description as network.toml, into an existing folder. @return the path to load.
+/// Writes parts as safetensors, and the description as network.toml, into an existing folder.
+/// @return the path to load.
 std::string save_network(const pybind11::dict& source, const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::python

@@ -19,16 +19,16 @@ using analysis::Host;
 
 constexpr std::chrono::milliseconds kTick{20};
 
-/// Where the command's threads and the caller's meet.
+/// State shared by the threads of the command and the calling thread.
 struct Shared {
   std::mutex mutex;
   std::condition_variable changed;
   bool has_ended = false;
-  int done = 0, total = 0;  ///< total 0: nothing new
+  int done = 0, total = 0;  ///< total is 0 if there is no new report
   std::string what;
 };
 
-/// The command on a thread of its own; ends it where the caller leaves early.
+/// Runs the command on its own thread; ends it if the caller leaves early.
 class Worker {
  public:
   Worker(Host& host, Shared& shared, std::vector<std::string> words)
@@ -71,7 +71,8 @@ class Worker {
   std::thread thread_;
 };
 
-/// One tick: waits, without the interpreter's lock, and takes what is new. @return whether the command has ended.
+/// One tick: waits without the interpreter lock and takes new progress reports.
+/// @return whether the command has ended.
 bool wait(Shared& shared, Host& host, int& done, int& total, std::string& what) {
   const py::gil_scoped_release release;
   std::unique_lock<std::mutex> lock(shared.mutex);

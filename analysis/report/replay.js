@@ -3,7 +3,7 @@
   'use strict';
   var box = document.getElementById('replay');
   var data = JSON.parse(document.getElementById('replay-data').textContent);
-  // Columns of a row: time, place (3), force before (3), force after (3).
+  // Columns of a row: time, position (3), force before (3), force after (3).
   var PLACE = 1, BEFORE = 4, AFTER = 7;
   var TRAIL_S = 4;
   function page(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
@@ -74,7 +74,7 @@
     });
     return around;
   }
-  /// 95 % of the forces before are shorter than a quarter of the room.
+  /// 95 % of the forces before are drawn shorter than a quarter of the room.
   function scale(flight) {
     var sizes = [];
     flight.vehicles.forEach(function (vehicle) {
@@ -119,7 +119,7 @@
     resize();
     at(low);
   }
-  /// The last row not later than `time`, or -1.
+  /// The last row at or before `time`, or -1.
   function rowAt(rows, time) {
     var first = 0, last = rows.length;
     while (first < last) {

@@ -26,20 +26,20 @@ std::string base64(const unsigned char* bytes, std::size_t size) {
   return text;
 }
 
-/// The source "'sha256-...'" by which a policy admits exactly this script or style.
+/// Returns the source "'sha256-...'" by which a content security policy admits exactly this script or style.
 std::string policy_source(std::string_view text) {
   unsigned char digest[SHA256_DIGEST_LENGTH];
   SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest);
   return "'sha256-" + base64(digest, sizeof digest) + "'";
 }
 
-/// A drawing as the address of an image: browsers run no script of images and load nothing for them.
+/// Returns a drawing as the address of an image: browsers do not run scripts in images and load nothing for them.
 std::string image_address(const std::string& svg) {
   return "data:image/svg+xml;base64," +
          base64(reinterpret_cast<const unsigned char*>(svg.data()), svg.size());
 }
 
-/// Numbers with their units stand to the right.
+/// Whether a cell is a number, possibly with a unit; such cells are right-aligned.
 bool is_number(const std::string& cell) {
   return !cell.empty() && cell.find_first_not_of("0123456789.+-eE %") == std::string::npos;
 }
@@ -58,7 +58,7 @@ void Report::paragraph(const std::string& text) { body_.push_back("<p>" + html_t
 
 void Report::table(const std::vector<std::string>& header,
                    const std::vector<std::vector<std::string>>& rows) {
-  // Wide tables scroll by themselves, with keys too.
+  // Wide tables scroll on their own, also by keyboard.
   std::string html = fmt::format(
       "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"table {}\"><table><thead><tr>",
       ++tables_);
@@ -93,7 +93,7 @@ void Report::bars(const std::string& name, const std::vector<Bar>& bars, const s
   }
   figure(name, data,
          fmt::format(
-             // The names of the bars take half of a narrow drawing: its label stands below all of it.
+             // The names of the bars take half of a narrow drawing: the axis label goes below all of it.
              "if (exists('narrow')) {{ set xtics {3:g}; set bmargin 4; "
              "set label 1 {0} at screen 0.5, screen 0.03 center }} else {{ set xlabel {0} }}\nset key off\n"
              "set style fill solid 0.9 noborder\nset ytics nomirror\n"

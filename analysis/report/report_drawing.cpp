@@ -17,7 +17,7 @@ extern char** environ;
 namespace swarmcert::analysis {
 
 std::string plot_script(const std::string& commands, int height) {
-  // Okabe and Ito's colours, the darkest first; dashes tell curves apart without them.
+  // The colours of Okabe and Ito, darkest first; dash patterns distinguish curves without colour.
   return fmt::format(
              "set encoding utf8\n"
              "if (exists('narrow')) {{\n"
@@ -37,7 +37,8 @@ std::string plot_script(const std::string& commands, int height) {
          "set linetype cycle 6\n"
          "set grid linecolor rgb '#888888'\n"
          "set tics nomirror\n"
-         // viridis; gnuplot knows it by name from version 6 on. And blue over white to vermilion for signed values.
+         // viridis, which gnuplot knows by name only from version 6; and blue over white to vermilion for signed
+         // values.
          "set palette defined (0 '#440154', 1 '#482878', 2 '#3e4a89', 3 '#31688e', 4 '#26828e', 5 '#1f9e89', "
          "6 '#35b779', 7 '#6ece58', 8 '#b5de2b', 9 '#fde725')\n"
          "signed_colours = \"defined (-2 '#003f63', -1 '#0072b2', 0 '#f4f4f4', 1 '#d55e00', 2 "
@@ -54,7 +55,7 @@ double tick_step(double length) {
 
 namespace {
 
-/// What gnuplot 5.4 writes into text but XML does not allow there: browsers would not show such an image.
+/// Replaces what gnuplot 5.4 writes into text although XML forbids it there: browsers would not show such an image.
 std::string well_formed(std::string svg) {
   const std::pair<const char*, const char*> kReplaced[] = {
       {"]]>", "]]&gt;"}, {"\xEF\xBF\xBE", "\xEF\xBF\xBD"}, {"\xEF\xBF\xBF", "\xEF\xBF\xBD"}};
@@ -94,7 +95,7 @@ std::string draw(const std::string& folder, const std::string& script, bool is_n
   int status = 0;
   if (failed != 0 || waitpid(child, &status, 0) != child) return "";
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) return "";
-  // Cells of heat maps neither blur nor leave gaps.
+  // Cells of heat maps are neither blurred nor separated by gaps.
   const std::size_t head = svg.find("<title>");
   if (head == std::string::npos) return "";
   svg.insert(head, "<style>image{image-rendering:pixelated}polygon{shape-rendering:crispEdges}</style>\n");

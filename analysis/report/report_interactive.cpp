@@ -9,7 +9,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// A thousandth of a unit is less than a pixel; more digits would double the file.
+/// Rounds to a thousandth of a unit, which is less than a pixel; more digits would double the file.
 files::Json thousandths(double x) {
   return std::isfinite(x) ? files::Json(std::round(x * 1000) / 1000) : files::Json(nullptr);
 }

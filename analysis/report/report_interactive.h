@@ -1,4 +1,4 @@
-/// @file Figures that scripts draw in the page, from data that lie in the page as JSON.
+/// @file Figures drawn by scripts in the page from data embedded as JSON.
 #pragma once
 
 #include <string>
@@ -8,11 +8,11 @@
 
 namespace swarmcert::analysis {
 
-/// The data of a script as JSON that may stand inside an HTML script element; NaN becomes null.
+/// Returns the data of a script as JSON that is safe inside an HTML script element; NaN becomes null.
 std::string data_of(const std::vector<TimeSeries>& all, const std::string& unit);
 std::string data_of(const std::vector<Replay>& flights, const std::string& unit);
 
-/// A figure whose script finds an empty element `id` and its data in `id`-data.
+/// Returns a figure with an empty element `id` for its script and its data in `id`-data.
 std::string interactive(const std::string& id, const std::string& data, const std::string& caption);
 
 }  // namespace swarmcert::analysis

@@ -1,4 +1,5 @@
-// Buttons that copy an element's text. Without a clipboard (some browsers give files none) the old way is tried.
+// Buttons that copy an element's text. If there is no clipboard (some browsers give files none), it falls back to the
+// old API.
 (function () {
   'use strict';
   function copy(text) {

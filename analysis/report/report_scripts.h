@@ -1,4 +1,4 @@
-/// @file What a report's page needs, embedded at build time.
+/// @file Scripts and styles of report pages, embedded at build time.
 #pragma once
 
 #include <string_view>
@@ -8,11 +8,11 @@ namespace swarmcert::analysis {
 extern const std::string_view kPageScript;
 extern const std::string_view kPageStyle;
 
-/// dygraphs and this project's script behind it; empty where the build found no dygraphs (package libjs-dygraphs).
+/// dygraphs followed by this project's script; empty if the build found no dygraphs (package libjs-dygraphs).
 extern const std::string_view kTimeSeriesScript;
 extern const std::string_view kTimeSeriesStyle;
 
-/// three.js, its orbit controls and this project's script behind them; empty where the build found none (libjs-three).
+/// three.js and its orbit controls, followed by this project's script; empty if the build found none (libjs-three).
 extern const std::string_view kReplayScript;
 
 }  // namespace swarmcert::analysis

@@ -12,14 +12,14 @@ bool is_control(char c) {
   return byte < 0x20 || byte == 0x7F;
 }
 
-/// `text` with every byte replaced that is not part of valid UTF-8.
+/// Returns `text` with every byte replaced that is not part of valid UTF-8.
 std::string valid_utf8(const std::string& text) {
   const std::string quoted =
       nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   return nlohmann::json::parse(quoted).get<std::string>();
 }
 
-/// Valid UTF-8 with its middle left out where it is longer than gnuplot can place beside a plot.
+/// Returns valid UTF-8 without its middle part if it is longer than gnuplot can place next to a plot.
 std::string shortened(const std::string& text) {
   constexpr std::size_t kEnd = 13;
   std::vector<std::size_t> begins;

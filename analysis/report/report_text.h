@@ -1,4 +1,4 @@
-/// @file Escaping of users' text (names in logs, networks, files) for the languages of a report.
+/// @file Escaping of user text (names in logs, networks, files) for the languages of a report.
 #pragma once
 
 #include <string>
@@ -6,22 +6,23 @@
 
 namespace swarmcert::analysis {
 
-/// `text` for HTML, between tags and in quoted attributes. Bytes that are not UTF-8, and control characters, become
-/// U+FFFD.
+/// Escapes `text` for HTML, both between tags and in quoted attributes. Bytes that are not valid UTF-8, and control
+/// characters, become U+FFFD.
 std::string html_text(const std::string& text);
 
-/// JSON that may stand in an HTML script element: no "<" is left in it, so neither "</script>" nor "<!--" can occur.
+/// Makes JSON safe inside an HTML script element: no "<" is left, so neither "</script>" nor "<!--" can occur.
 std::string script_json(std::string json);
 
-/// `text` as one quoted field of a gnuplot data file, quotes included: it cannot end the field, its line or begin an
-/// escape. Quotes become primes, backslashes slashes, control characters spaces; long names lose their middle.
+/// Returns `text` as one quoted field of a gnuplot data file, including the quotes; it cannot end the field or its
+/// line, or start an escape. Quotes become primes, backslashes become slashes, control characters become spaces; the
+/// middle of long names is left out.
 std::string plot_field(const std::string& text);
 
-/// `text` as a gnuplot string in single quotes, in which nothing is expanded. Quotes become typographic ones: gnuplot
-/// understands '' within a string, but not at its start.
+/// Returns `text` as a single-quoted gnuplot string, in which nothing is expanded. Quotes become typographic quotes,
+/// because gnuplot accepts '' inside a string but not at its start.
 std::string plot_string(const std::string& text);
 
-/// `words` as a line that a POSIX shell reads back as the same words.
+/// Returns `words` as a line that a POSIX shell parses back into the same words.
 std::string shell_line(const std::vector<std::string>& words);
 
 }  // namespace swarmcert::analysis

@@ -1,10 +1,10 @@
-// Curves over time with zoom. The page's data are JSON; names in it become text, never markup.
+// Curves over time with zoom. The data of the page are JSON; names in it become text, never markup.
 (function () {
   'use strict';
   var box = document.getElementById('time-series');
   var data = JSON.parse(document.getElementById('time-series-data').textContent);
   var all = data.series, unit = String(data.unit);
-  // Colours of the page by name; dygraphs draws on a canvas, which knows no variables.
+  // Colours of the page by name, because dygraphs draws on a canvas, which does not resolve CSS variables.
   function page(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
   // Columns of a row: time, x, y, z, z without effects, z of the model before.
   function minus(a, b) { return a !== null && b !== null ? a - b : null; }
@@ -43,10 +43,10 @@
   var plot = document.createElement('div');
   plot.className = 'plot';
   box.appendChild(plot);
-  // The legend of dygraphs needs style attributes, which the page's policy forbids; this page has its own.
+  // The legend of dygraphs needs style attributes, which the content security policy forbids; this page has its own.
   Dygraph.PLUGINS = Dygraph.PLUGINS.filter(function (plugin) { return plugin !== Dygraph.Plugins.Legend; });
   var graph = null;
-  // dygraphs' own legend and labels are markup: only numbers and words of this file may reach them.
+  // Labels and the legend of dygraphs are markup, so only numbers and words of this file may reach them.
   function tell(view, time, values) {
     legend.textContent = '';
     view.labels.forEach(function (label, i) {
@@ -78,7 +78,7 @@
       unhighlightCallback: function () { tell(view); }
     });
     tell(view);
-    // The handles of the range selector serve the mouse only; selections and buttons do the same by key.
+    // The handles of the range selector work only with the mouse; selections and buttons do the same by keyboard.
     plot.querySelectorAll('img').forEach(function (handle) { handle.alt = ''; });
     graph.setAnnotations(series.marks.map(function (mark) {
       return {series: view.marked, x: Number(mark.time), shortText: String(Number(mark.rank)),

@@ -13,16 +13,16 @@
 namespace swarmcert::reproduction {
 namespace {
 
-/// What the paper does not state about its flights.
+/// Conditions of the flights that the paper does not state.
 struct Condition {
   const char* truth;     ///< name; networks are trained on flights of this truth with a full battery
-  double norm_exponent;  ///< of its wakes
-  double battery_V;      ///< at take-off of the flights that are judged
+  double norm_exponent;  ///< of the composition of its wakes
+  double battery_V;      ///< at take-off of the judged flights
   double higher_m;       ///< above the published heights
 };
 
-/// The composition that recorded flights have, that of the table's baselines, and both extremes; each with a full
-/// battery and with one that is nearly empty, and over the floor.
+/// The composition found in recorded flights, that of the table's baselines, and both extremes; each with a full
+/// battery, with a nearly empty one, and near the floor.
 constexpr std::array<Condition, 12> kConditions = {{{"flights", 1.85, 4.1, kHigher_m},
                                                     {"flights", 1.85, 3.1, kHigher_m},
                                                     {"calibrated", 1.15, 4.1, kHigher_m},
@@ -35,13 +35,13 @@ constexpr std::array<Condition, 12> kConditions = {{{"flights", 1.85, 4.1, kHigh
                                                     {"strongest", 8, 4.1, kHigher_m},
                                                     {"strongest", 8, 3.1, kHigher_m},
                                                     {"strongest", 8, 4.1, 0}}};
-constexpr std::size_t kSmallConditions = 4;  ///< flown at small size: their networks are those of the table
+constexpr std::size_t kSmallConditions = 4;  ///< flown at small size with the networks of the table
 
 /// The three results under one condition.
 struct Claims {
-  double two_at_four = 0;  ///< error of the baseline over that of the network trained with two, four vehicles
+  double two_at_four = 0;        ///< error of the baseline over that of the network trained with two, at four
   double saturated_share = 0;    ///< of control periods, worst vehicle and flight of three to five vehicles
-  int falling = 0, columns = 0;  ///< numbers of vehicles for which errors fall from training with 2 to 3 to 4
+  int falling = 0, columns = 0;  ///< vehicle counts whose errors fall from training with 2 to 3 to 4
   double growth = 0;             ///< error of the baseline at five vehicles over that at two
 
   bool harms() const { return two_at_four < 1; }
@@ -60,21 +60,21 @@ Claims judged(const files::Json& flights) {
   }
   for (std::size_t v = 0; v < 4; ++v, ++claims.columns) {
     const double with_two = errors[1][v].median_m, with_three = errors[2][v].median_m;
-    // tab:nnperf leaves the network of two out at five vehicles.
+    // tab:nnperf omits the network trained with two vehicles at five vehicles.
     const bool from_two = std::isnan(kPaper_m[1][v]) || with_three < with_two;
     claims.falling += from_two && errors[3][v].median_m < with_three ? 1 : 0;
   }
   return claims;
 }
 
-/// The place of the first condition with the same truth, whose networks they share: one shard trains them.
+/// Index of the first condition with the same truth, which shares its networks: one shard trains them.
 int first_of_truth(const Condition& condition) {
   const auto is_same = [&](const Condition& other) { return std::string(other.truth) == condition.truth; };
   return static_cast<int>(std::find_if(kConditions.begin(), kConditions.end(), is_same) -
                           kConditions.begin());
 }
 
-/// The flights of one condition with all training seeds, of which this shard computes its own.
+/// The flights of one condition with all training seeds; this shard computes its own share of them.
 files::Json flights_under(const Setting& setting, const Condition& condition) {
   const Truth trained = with_norm_exponent(setting, condition.truth, condition.norm_exponent);
   Truth flown = trained;

@@ -30,7 +30,7 @@ struct Labels {
   }
 };
 
-/// Lateral distance and height of the neighbour, in steps of 5 and 10 cm; "" outside of what is compared.
+/// Range of lateral distance and height of the neighbour, in steps of 5 and 10 cm; "" outside the compared region.
 std::string range_of(const float* x) {
   const int lateral = static_cast<int>(std::hypot(x[0], x[1]) / 0.05f);
   const int height = static_cast<int>(std::floor(x[2] / 0.1f));
@@ -39,9 +39,9 @@ std::string range_of(const float* x) {
                      0.05 * lateral + 0.05, 0.1 * height, 0.1 * height + 0.1);
 }
 
-/// Of stage 0 or 1, whose samples have one neighbour each.
+/// Label errors of stage 0 or 1, whose samples have one neighbour each.
 std::map<std::string, Labels> labels_of(const Setting& setting, Stages& stages, int stage) {
-  constexpr Eigen::Index kBlock = 100;  // records: 1 s, over which errors of labels are alike
+  constexpr Eigen::Index kBlock = 100;  // records: 1 s, within which label errors are similar
   constexpr std::size_t kLeastBlocks = 4;
   const residuals::Inputs inputs = stages.inputs({stage}, "fit");
   const learning::LearningData data =
@@ -138,8 +138,8 @@ Finding curriculum(const Setting& setting) {
   finding.tables.push_back(std::move(table));
   finding.json["least_distance_falls"] = falls;
   finding.notes.push_back(
-      fmt::format("The least distance flown, the mean of {} random walks, {} from stage to stage. Set points "
-                  "are drawn in where a network flies, by factors of our choice: left as they are, the "
+      fmt::format("The least distance flown, as the mean of {} random walks, {} from stage to stage. Set "
+                  "points are contracted in flights with a network, by factors of our choice: otherwise the "
                   "task's repulsion keeps four vehicles as far apart as two.",
                   scale_of(setting).walks, falls ? "falls" : "does not fall every time"));
   add_label_agreement(setting, stages, finding);
@@ -161,7 +161,7 @@ Finding minutes_of_data(const Setting& setting) {
     const std::optional<files::Network> network = stages.flown_network(stage);
     const std::string root = stages.flights(stage).folder + "/../minutes";
     const auto folder = [&](double some) { return fmt::format("{}/{}-{:g}", root, vehicles, some); };
-    // Half of each length is random walk, half swaps.
+    // Each duration is half random walk and half swaps.
     for (const double some : minutes) {
       LearnOptions options = stages.learn_options();
       options.steps = setting.full ? 6000 : 600;

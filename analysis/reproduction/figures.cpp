@@ -11,7 +11,7 @@
 namespace swarmcert::reproduction {
 namespace {
 
-/// The figures fly one truth: that with parameters from flights only.
+/// The figures use one truth, the one with parameters from flights only.
 Stages stages_of(const Setting& setting) { return {setting, truths(setting).front(), 0}; }
 
 std::uint64_t flight_seed(const Setting& setting) { return seed_of(setting.seed, "figures"); }
@@ -31,7 +31,8 @@ std::string series(const Flown& flown, const Row& row) {
   return text;
 }
 
-/// Rows "time place height height_d": vehicles cross each other's ways, so that the place is the one along the own.
+/// Rows "time position height height_d". Vehicles cross each other's paths, so the position is measured along each
+/// vehicle's own path.
 std::string paths(const Flown& flown) {
   std::string text;
   for (const auto& moments : flown.vehicles) {
@@ -121,7 +122,7 @@ namespace {
 struct Placement {
   const char* name;
   const char* words;
-  bool from_text;               ///< the paper's text gives the places; else they are ours
+  bool from_text;               ///< whether the positions come from the paper's text; otherwise they are ours
   std::vector<Relative> stars;  ///< positions and velocities of the neighbours
 };
 
@@ -156,7 +157,7 @@ double force_gf(Interaction& function, const Placement& placement, double y, dou
   return function.force_z_gf(neighbours);
 }
 
-/// Forces on a grid of places, as gnuplot reads them, and how far they are from the truth.
+/// Forces on a grid of positions in gnuplot's format, and their distance from the truth.
 struct HeatMap {
   std::string data;
   double least_gf = INFINITY, most_gf = -INFINITY, rms_gf = 0;
@@ -183,7 +184,7 @@ HeatMap heat_map(Interaction& learned, Interaction& truth, const Placement& plac
   return map;
 }
 
-/// The network's map beside that of the truth.
+/// The map of the network next to that of the truth.
 std::string heat_map_script(const std::string& name) {
   const auto plot = [&name](const char* title, int column) {
     return fmt::format(
@@ -233,9 +234,9 @@ Finding figure_heatmap(const Setting& setting) {
   finding.json["probe"] = {{"map", "c"},          {"y_m", -0.3},        {"z_m", -0.5},
                            {"network_gf", probe}, {"truth_gf", actual}, {"paper_gf", 4}};
   finding.notes.push_back(
-      fmt::format("At (0, -0.3, -0.5) in map c the network says {:.2f} gf and the truth {:.2f} gf; the "
-                  "paper's network said 4 gf.{}",
-                  probe, actual, setting.updraft ? "" : " This truth has no updraft; --updraft flies one."));
+      fmt::format("At (0, -0.3, -0.5) in map c the network predicts {:.2f} gf and the truth is {:.2f} gf; "
+                  "the paper's network predicted 4 gf.{}",
+                  probe, actual, setting.updraft ? "" : " This truth has no updraft; --updraft adds one."));
   return finding;
 }
 
@@ -263,7 +264,7 @@ Finding figure_validation(const Setting& setting) {
       e2 += (a - b) * (a - b) / n;
     }
     const double spread = std::sqrt((f2 - f * f) * (g2 - g * g));
-    // The topmost vehicle feels nothing: no correlation.
+    // The topmost vehicle feels no force, so there is no correlation.
     const bool varies = f2 - f * f > 1e-6;
     table.rows.push_back({std::to_string(i + 1), fmt::format("{:.2f}", std::sqrt(f2)),
                           fmt::format("{:.2f}", std::sqrt(e2)),

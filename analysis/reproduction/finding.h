@@ -1,4 +1,4 @@
-/// @file What an experiment found: numbers for machines, tables and figures for people.
+/// @file The result of an experiment: numbers as JSON, tables and figures for readers.
 #pragma once
 
 #include <string>
@@ -22,7 +22,7 @@ struct Figure {
 
 struct Finding {
   files::Json json;                 ///< fields of the result, without its head
-  std::vector<std::string> inputs;  ///< recorded files that it rests on
+  std::vector<std::string> inputs;  ///< recorded files on which it depends
   std::vector<std::string> notes;
   std::vector<Table> tables;
   std::vector<Figure> figures;

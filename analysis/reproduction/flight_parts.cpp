@@ -12,7 +12,7 @@ namespace {
 
 using stability::CascadeInput;
 
-/// sup |(h * v)(t)| for v at steps of kSetPointStep_s, by the trapezoidal rule.
+/// sup |(h * v)(t)| for v sampled at kSetPointStep_s, by the trapezoidal rule.
 double largest_response(const stability::TransferFunction& h, const std::vector<double>& v) {
   const std::vector<double> kernel =
       stability::sampled_response(h, kSetPointStep_s, static_cast<int>(v.size()));
@@ -25,7 +25,7 @@ double largest_response(const stability::TransferFunction& h, const std::vector<
   return largest;
 }
 
-/// The body axis about which the vehicle tilts to accelerate along a horizontal axis of the world, heading near zero.
+/// The body axis about which the vehicle tilts to accelerate along a horizontal world axis, with heading near zero.
 std::size_t tilt_axis(std::size_t axis) { return 1 - axis; }
 
 }  // namespace

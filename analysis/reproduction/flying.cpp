@@ -13,10 +13,10 @@ namespace {
 
 constexpr double kLost_m = 100;
 
-/// Height of the middle of the box of random walks, m.
+/// Height of the centre of the box of random walks, m.
 constexpr double kMiddle_m = 0.6;
 
-/// A task, flown elsewhere as the plan says.
+/// A task whose setpoints are moved as the plan says.
 class Placed final : public stability::Task {
  public:
   Placed(std::unique_ptr<stability::Task> task, const Plan& plan)
@@ -142,7 +142,7 @@ double Interaction::force_z_gf(const std::vector<Relative>& neighbours) {
   std::vector<stability::Neighbour> all;
   for (const Relative& x : neighbours) {
     const Eigen::Vector3d dv(x[3], x[4], x[5]);
-    // The vehicle itself is at rest: no effect of these truths asks for a wake's own velocity.
+    // The vehicle itself is at rest: no effect of these truths depends on the velocity of the wake.
     all.push_back({{x[0], x[1], x[2]}, dv, dv, mass_kg_, 0});
   }
   stability::Instant now;

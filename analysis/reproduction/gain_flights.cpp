@@ -20,11 +20,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Below this height a vehicle stands, takes off or lands.
+/// Below this height a vehicle is standing, taking off or landing.
 constexpr double kGround_m = 0.2;
-/// A set point that moves by less stays, for our purposes.
+/// A setpoint with a smaller range is treated as constant.
 constexpr double kMoves_m = 0.1;
-/// Records among which a log may pause while the recorder starts.
+/// Number of initial records in which a log may pause while the recorder starts.
 constexpr std::size_t kHead = 10;
 constexpr std::size_t kFewestRecords = 100;
 
@@ -79,7 +79,7 @@ class InfoFile {
   std::map<std::string, InfoLine> lines_;
 };
 
-/// The digits of "log104_2"; empty for names of another form.
+/// Returns the digits of "log104_2"; empty for names of another form.
 std::string digits_of(const std::string& name) {
   if (name.rfind("log", 0) != 0) return "";
   std::size_t end = 3;
@@ -87,7 +87,7 @@ std::string digits_of(const std::string& name) {
   return end == name.size() || name[end] == '_' ? name.substr(3, end - 3) : "";
 }
 
-/// Records from the last pause in the head of the log on.
+/// Index of the first record after the last pause near the start of the log.
 std::size_t first_record(const std::vector<logs::Sample>& samples) {
   std::size_t first = 0;
   for (std::size_t k = 1; k < std::min(kHead, samples.size()); ++k)
@@ -95,7 +95,7 @@ std::size_t first_record(const std::vector<logs::Sample>& samples) {
   return first;
 }
 
-/// The velocity of the set point at equal steps, interpolated.
+/// The velocity of the setpoint, interpolated to equal time steps.
 std::vector<double> at_equal_steps(const std::vector<logs::Sample>& samples, std::size_t first,
                                    std::size_t axis) {
   std::vector<double> result;
@@ -130,7 +130,7 @@ FlownAxis flown_axis(const std::vector<logs::Sample>& samples, std::size_t first
   return flown;
 }
 
-/// Why the position loop cannot be judged by this log; empty if it can.
+/// Returns why the position loop cannot be judged from this log; empty if it can.
 std::string problem_of(const logs::Log& log, std::size_t first) {
   if (!log.signals.position || !log.signals.targets) return "has no position and set point";
   if (log.signals.thrust != logs::ThrustSource::kForce) return "has no commanded thrust in newtons";

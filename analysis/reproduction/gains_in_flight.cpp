@@ -1,4 +1,4 @@
-// Tracking errors of gains that flew, predicted from the gains: calibrated on some flights, reported on others.
+// Tracking errors of gains used in flight, predicted from the gains: calibrated on some flights, reported on others.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -42,7 +42,7 @@ double median(std::vector<double> values) {
   return n == 0 ? NAN : (values[(n - 1) / 2] + values[n / 2]) / 2;
 }
 
-/// Force that acts per force commanded, of vehicles with these motors; of all, where none had them.
+/// Actual force over commanded force for vehicles with these motors; over all vehicles if none had them.
 double thrust_ratio(const std::vector<AxisFlight>& calibrating, const std::string& motors) {
   std::vector<double> same, all;
   for (const AxisFlight& one : calibrating) {
@@ -58,12 +58,12 @@ FlownPeak flown_peak(const AxisFlight& one, double ratio, FlightParts& parts) {
           parts.of(*one.flight, one.axis, rounded)};
 }
 
-/// What a flight is predicted from: flights of other gain sets, or all that calibrate.
+/// The basis of a prediction: flights of other gain sets, or all calibrating flights.
 struct Calibration {
   std::vector<AxisFlight> flights;
   std::map<std::string, double> ratios;
   PeakModel model;
-  /// Blind to the gains: the median peak of the same set point with the same motors in other gain sets.
+  /// Blind to the gains: the median peak for the same setpoint and motors in other gain sets.
   ConformalThreshold blind;
 
   double ratio(const std::string& motors) const {
@@ -100,7 +100,7 @@ Calibration calibration(std::vector<AxisFlight> flights, double level, FlightPar
   return result;
 }
 
-/// All calibrations of one track: one per gain set that is left out, and one with all.
+/// All calibrations of one track: one for each gain set left out, and one with all.
 class Calibrations {
  public:
   Calibrations(std::vector<AxisFlight> flights, const Setting& setting, CascadePlant plant)
@@ -108,7 +108,7 @@ class Calibrations {
     for (const AxisFlight& one : flights_) hashes_.insert(one.flight->sha256);
   }
 
-  /// A flight that is among the calibrating ones is judged without its gain set.
+  /// A calibrating flight is judged by the calibration without its gain set.
   std::string left_out_for(const AxisFlight& one) const {
     return hashes_.count(one.flight->sha256) > 0 ? one.group() : "";
   }
@@ -165,7 +165,7 @@ struct Summary {
   std::size_t flights = 0, gain_sets = 0;
   double coverage = 0, coverage_of_gain_sets = 0, median_ratio = 0;
   double blind_coverage = 0, blind_ratio = 0;
-  double rank = NAN, rank_rms = NAN;  ///< over gain sets, of means
+  double rank = NAN, rank_rms = NAN;  ///< over gain sets, of mean values
 };
 
 Summary summary(const std::vector<Judged>& judged) {
@@ -340,7 +340,7 @@ void refuse_too_few(const GainFolder& folder, Track track, int groups, bool leav
       {folder.path, "", "--calibrate", "",
        fmt::format("has {} gain sets {}{}, and a promise of {:g} needs at least {}", groups,
                    track == Track::kVertical ? "vertically" : track_name(track) + std::string(" track"),
-                   leaves_out ? " beside the one that is left out" : "", level, fewest),
+                   leaves_out ? " in addition to the one left out" : "", level, fewest),
        "calibrate on more flights, or ask for less with --coverage"});
 }
 

@@ -11,11 +11,11 @@
 namespace swarmcert::reproduction {
 namespace {
 
-/// How a network comes to keep a bound.
+/// How a network is made to keep a bound.
 struct Method {
   const char* name;
   training::Layers layers;
-  bool joint;  ///< the joint bound is limited, else the norm of each layer
+  bool joint;  ///< the joint bound is limited; otherwise the norm of each layer
 };
 constexpr Method kMethods[] = {{"spectral normalisation", training::Layers::kFree, false},
                                {"projection", training::Layers::kFree, true},
@@ -23,7 +23,7 @@ constexpr Method kMethods[] = {{"spectral normalisation", training::Layers::kFre
                                {"orthogonal", training::Layers::kOrthogonal, true},
                                {"sandwich", training::Layers::kSandwich, true}};
 
-/// What is swept: joint bounds in gf per unit of input, and norms of layers that lead to such bounds.
+/// Swept parameters: joint bounds in gf per unit of input, and layer norms that lead to such bounds.
 struct Sweep {
   std::vector<double> limits, gammas;
   int seeds;
@@ -34,8 +34,8 @@ Sweep sweep_of(const Setting& setting) {
   return {{10, 40}, {1, 2}, 1};
 }
 
-/// Of 2e-3 and 6e-3, the rate with the least error of one network on the selecting recorded flights, for every method
-/// at a bound of 30 to 40.
+/// Learning rate: of 2e-3 and 6e-3, the one with the smaller error of a single network on the selecting recorded
+/// flights, for every method at bounds of 30 to 40.
 constexpr double kRate = 6e-3;
 constexpr int kEpochs = 12;
 
@@ -59,13 +59,13 @@ Point point_of(const Setting& setting, const Source& source, const Method& metho
                              sweep_of(setting).seeds)};
 }
 
-/// Errors where the bound is `bound`.
+/// Errors at a given bound.
 struct Errors {
   double select_gf, test_gf;
 };
 
-/// Of networks that were limited to it, else between the two whose bounds are next to it, linear over the logarithm of
-/// the bound. Nothing beyond the ends.
+/// Errors of networks limited to this bound; otherwise interpolated between the two networks with adjacent bounds,
+/// linearly in the logarithm of the bound. Nothing outside the range.
 std::optional<Errors> errors_at(double bound, const std::vector<Point>& curve, bool joint) {
   for (std::size_t i = 0; i < curve.size(); ++i) {
     if (joint && curve[i].limit == bound)
@@ -114,7 +114,7 @@ Curves curves_of(const Setting& setting, const Source& source, Finding& finding)
   return curves;
 }
 
-/// One row per bound, one column per method, and the one that the selecting flights prefer.
+/// Adds one row per bound, one column per method, and the method preferred by the selecting flights.
 void add_equal_bounds(const Setting& setting, const Source& source, const Curves& curves, Finding& finding) {
   Table table = {
       source.name + " flights: test RMSE [gf] at equal proved joint bounds", {"joint bound [gf/unit]"}, {}};
@@ -180,8 +180,8 @@ Finding bounded_layers(const Setting& setting) {
   add_figure(source, curves, finding);
   finding.notes.push_back(
       "All with exact symmetry and the same epochs. The rate and the epoch of each network are chosen on the "
-      "selecting flights, "
-      "and nothing on those that test. Bounds are those of the certificate, not products of norms; at equal "
+      "selecting flights, and nothing on the test flights. Bounds are those of the certificate, not products "
+      "of norms; at equal "
       "bounds, spectral normalisation is interpolated between two gammas.");
   return finding;
 }

@@ -60,14 +60,14 @@ Learned read_back(const files::Json& file, const std::string& folder) {
   return learned;
 }
 
-/// What was trained, by whichever way.
+/// The trained network, however it was trained.
 struct Trained {
   learning::Run run;
   std::vector<learning::Score> scores;
   learning::OutputSupport support;
 };
 
-/// The mean of the networks of the folds; what they say of flights that they have not seen scales and silences it.
+/// Trains the mean of the networks of the folds, scaled and silenced by their outputs on unseen flights.
 Trained train_folds(const learning::RunOptions& run, int folds, learning::LearningData& data) {
   learning::CrossFit fit = learning::cross_fit(run, folds, data);
   Trained trained = {std::move(fit.run), std::move(fit.members), {}};
@@ -82,7 +82,7 @@ Trained train_one(const learning::RunOptions& run, int teachers, const learning:
   return {std::move(taught.run), std::move(taught.scores), {}};
 }
 
-/// Error on the test flights, gf; NaN without any.
+/// Error on the test flights, gf; NaN if there are none.
 double test_gf(const learning::LearningData& data, const Trained& trained, int jobs) {
   if (trained.support.silent.empty()) return learning::rmse(data, trained.run.theta, Use::kTest, jobs);
   training::Matrix outputs = learning::outputs_for(data, trained.run.theta, Use::kTest);
@@ -94,8 +94,8 @@ double test_gf(const learning::LearningData& data, const Trained& trained, int j
   return std::sqrt(squares / static_cast<double>(samples.size()));
 }
 
-/// Trains and writes network and certificate into `folder`; what was measured. `checkpoints`: files that are not needed
-/// any more once that is kept.
+/// Trains, writes network and certificate into `folder`, and returns the measurements.
+/// @param checkpoints files that are no longer needed once these are stored.
 files::Json train(const Setting& setting, const LearnOptions& options, const std::string& folder,
                   const std::string& hash, learning::LearningData data,
                   std::vector<std::string>& checkpoints) {
@@ -129,7 +129,7 @@ files::Json train(const Setting& setting, const LearnOptions& options, const std
   certify.jobs = setting.jobs;
   certify.lower.rounds = 0;  // only upper bounds are shown
   if (!setting.full && options.max_lipschitz == 0 && !options.tight_bounds)
-    certify.method = lipschitz::UpperMethod::kProduct;  // looser, but at once
+    certify.method = lipschitz::UpperMethod::kProduct;  // looser, but immediate
   const learning::Certified certified = learning::write_certificate(network, folder, certify);
   files::Json bounds = files::Json::array(), epochs = files::Json::array(), scores = files::Json::array();
   for (const learning::Score& score : found.scores) scores.push_back({score.seed, score.select_rmse});

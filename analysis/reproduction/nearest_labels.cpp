@@ -15,21 +15,21 @@ using Eigen::Index;
 constexpr std::size_t kNearest = 20;
 constexpr Index kTestStride = 20, kOtherStride = 5;
 constexpr double kLength_m = 0.05, kSpeed_m_s = 0.25;
-constexpr double kNear = 1.5;           ///< RMS distance over the nearest, in units of the two scales
-constexpr double kLeastHeight_m = 0.5;  ///< above it the ground is not felt
+constexpr double kNear = 1.5;           ///< RMS distance of the nearest records, in units of the two scales
+constexpr double kLeastHeight_m = 0.5;  ///< above this height there is no ground effect
 constexpr double kNearShare = 0.9;
 
 using State = std::array<double, 5>;
 
-/// What is left of position and velocity after any turn about the vertical: height, lateral distance, and velocities
-/// outwards, across and upwards.
+/// Quantities of position and velocity that are invariant under rotation about the vertical: height, lateral
+/// distance, and the velocity components outward, tangential and upward.
 State invariants(double x, double y, double z, double vx, double vy, double vz) {
   const double r = std::hypot(x, y), outwards = (x * vx + y * vy) / std::max(r, 0.03);
   const double across = std::sqrt(std::max(0.0, vx * vx + vy * vy - outwards * outwards));
   return {z / kLength_m, r / kLength_m, outwards / kSpeed_m_s, across / kSpeed_m_s, vz / kSpeed_m_s};
 }
 
-/// Of the neighbour if there is one, else of the own height and velocity.
+/// Invariants of the neighbour if there is one, otherwise own height and velocity.
 State state_of(const learning::LearningData& data, Index sample) {
   const training::Dataset& samples = data.samples;
   const int ground = data.layout.find(files::FunctionId::ground_phi());

@@ -20,7 +20,7 @@ std::string controller_name(int controller) {
 
 std::string metres(double value) { return std::isfinite(value) ? fmt::format("{:.3f}", value) : "lost"; }
 
-/// The largest height errors beside the paper's: a table, and column["max_z"].
+/// Compares the largest height errors with the paper's: a table, and column["max_z"].
 Spreads add_heights(const Truth& truth, const files::Json& flights, files::Json& column, Finding& finding) {
   const Spreads spreads = height_spreads(flights);
   Table table = {
@@ -76,9 +76,9 @@ void add_sideways(const Truth& truth, const files::Json& flights, files::Json& c
   finding.tables.push_back(std::move(sideways));
 }
 
-/// By how much networks divide the worst error, for each training seed: the least over the swarms of networks trained
-/// with three or four vehicles. A seed's networks stand beside the same baseline: the least over all seeds is a worst
-/// of more flights than the baseline's.
+/// Factors by which networks reduce the worst error, for each training seed: the minimum over the swarms for networks
+/// trained with three or four vehicles. The networks of all seeds are compared with the same baseline; the minimum
+/// over all seeds therefore involves a worst case over more flights than the baseline has.
 std::map<int, double> improvement_by_seed(const files::Json& flights, const Spreads& spreads) {
   std::map<int, double> factor_of_seed;
   for (const files::Json& flight : flights) {
@@ -92,13 +92,13 @@ std::map<int, double> improvement_by_seed(const files::Json& flights, const Spre
   return factor_of_seed;
 }
 
-/// What the tables say in a sentence, and its numbers in `column`.
+/// Summarises the tables in a sentence, with its numbers in `column`.
 void add_improvement(const Truth& truth, const files::Json& flights, const Spreads& spreads,
                      files::Json& column, Finding& finding) {
   double farthest = 0;
   for (std::size_t v = 0; v < 4; ++v)
     farthest = std::max(farthest, std::abs(spreads[0][v].most_m / kPaper_m[0][v] - 1));
-  double least_factor = INFINITY;  // of the networks trained with three or four, over all swarms
+  double least_factor = INFINITY;  // networks trained with three or four vehicles, over all swarms
   for (std::size_t c = 2; c < 4; ++c) {
     for (std::size_t v = 0; v < 4; ++v)
       least_factor = std::min(least_factor, spreads[0][v].most_m / spreads[c][v].most_m);
@@ -137,8 +137,8 @@ void add_truth(const Truth& truth, const files::Json& flights, Finding& finding)
 Finding performance(const Setting& setting) {
   Finding finding;
   finding.notes.push_back(
-      fmt::format("Flown {:.1f} m higher than the published scripts do: the lowest of five flies at 0.3 m "
-                  "there, and the floor would end an error of the paper's size. The height is ours.",
+      fmt::format("Flown {:.1f} m higher than in the published scripts: there the lowest of five flies at "
+                  "0.3 m, and an error of the paper's size would end on the floor. The height is our choice.",
                   kHigher_m));
   finding.json["columns"] = files::Json::array();
   finding.json["swaps_per_flight"] = 6;

@@ -10,10 +10,10 @@ namespace swarmcert::reproduction {
 
 namespace {
 
-/// A model's name and its residuals on the test flights.
+/// Name of a model and its residuals on the test flights.
 using Row = std::pair<std::string, std::vector<ResidualBlock>>;
 
-/// The ladder as a table and in JSON, each row with how much the error falls from the row before.
+/// The ladder as a table and in JSON, each row with the error reduction relative to the previous row.
 void add_rows(const std::vector<Row>& rows, Finding& finding) {
   Table table = {"Physics first: vertical residual on test flights",
                  {"model", "RMS [gf]", "90 %", "falls by [gf]", "90 %"},
@@ -39,7 +39,7 @@ void add_rows(const std::vector<Row>& rows, Finding& finding) {
   finding.tables.push_back(std::move(table));
 }
 
-/// All flights but those that test, of which every network of the folds leaves some out.
+/// All flights except the test flights; every network of the folds leaves out some of them.
 Recorded development_flights(const Setting& setting) {
   Recorded recorded = recorded_flights(setting, false);
   auto& fit = recorded.fit.found.flights;
@@ -49,7 +49,7 @@ Recorded development_flights(const Setting& setting) {
   return recorded;
 }
 
-/// The models without effects, with the masses that the fit prefers.
+/// Removes the effects from the models and sets the masses preferred by the fit.
 void make_nominal(const identification::Budget& budget, residuals::Inputs& inputs) {
   for (stability::Model& model : inputs.models) {
     model.effects.clear();
@@ -58,7 +58,7 @@ void make_nominal(const identification::Budget& budget, residuals::Inputs& input
   }
 }
 
-/// Physics, physics with the network, and the published networks, on the test flights.
+/// Compares physics, physics with the network, and the published networks on the test flights.
 void add_beside_published(const Row& physics, const Row& ours, const identification::BudgetRow& published,
                           Finding& finding) {
   Table table = {
@@ -80,7 +80,8 @@ void add_beside_published(const Row& physics, const Row& ours, const identificat
   finding.tables.push_back(std::move(table));
 }
 
-/// What the flights that no network of the folds had seen decided, the bounds, and the flights that were left out.
+/// Adds the decisions made by flights unseen by the networks of the folds, the bounds, and the flights that were left
+/// out.
 void add_decisions(const Learned& learned, double published_bound, const residuals::Inputs& test,
                    Finding& finding) {
   files::Json& json = finding.json["physics_then_network"];

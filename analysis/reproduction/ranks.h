@@ -5,7 +5,7 @@
 
 namespace swarmcert::reproduction {
 
-/// Spearman's: the correlation of ranks, ties at their mean rank. NaN for fewer than three values, or where one side is
+/// Spearman's rank correlation, with ties at their mean rank. NaN for fewer than three values, or if one side is
 /// constant.
 double rank_correlation(const std::vector<double>& a, const std::vector<double>& b);
 

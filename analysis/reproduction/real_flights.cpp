@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using TestBlocks = std::vector<ResidualBlock>;
 
-/// Mean over groups, and the largest ratio of one group.
+/// Mean over groups, and the largest ratio in one group.
 struct Beside {
   double mean_ours_gf = 0, mean_theirs_gf = 0, largest_ratio = 0;
   std::string where;
@@ -44,7 +44,7 @@ Beside beside(const std::map<std::string, double>& ours, const std::map<std::str
   return result;
 }
 
-/// Where ours lose most to the published networks, and how much of it is the mean of one flight.
+/// Lists where our networks lose most to the published networks, and how much of the loss is the mean of one flight.
 void add_flights(const learning::LearningData& data, const std::vector<TrackError>& ours,
                  const std::vector<TrackError>& theirs, Finding& finding) {
   constexpr std::size_t kShown = 8;
@@ -80,9 +80,9 @@ void add_flights(const learning::LearningData& data, const std::vector<TrackErro
   }
   finding.tables.push_back(std::move(table));
   finding.notes.push_back(
-      "Nearest records: mean of this flight's labels less those that the flights to fit and to select have "
-      "at the nearest relative states, for vehicles alone or with one neighbour. What is found there no "
-      "function of relative states can learn from them.");
+      "Nearest records: mean of this flight's labels minus those of the fitted and selecting flights at the "
+      "nearest relative states, for vehicles alone or with one neighbour. No function of the relative states "
+      "can learn this difference from them.");
 }
 
 void add_bounds(const Learned& ours, const learning::Certified& theirs, Finding& finding) {
@@ -99,7 +99,7 @@ void add_bounds(const Learned& ours, const learning::Certified& theirs, Finding&
   finding.tables.push_back(std::move(table));
 }
 
-/// What seeing the test flights is worth: the same networks, fitted to every flight as the published ones were.
+/// The benefit of having seen the test flights: the same networks, fitted to every flight as the published ones were.
 void add_having_seen(const Setting& setting, const Recorded& recorded, const TestBlocks& theirs_blocks,
                      Finding& finding) {
   Recorded all = recorded;
@@ -127,14 +127,14 @@ void add_having_seen(const Setting& setting, const Recorded& recorded, const Tes
       compared.mean_ours_gf, compared.mean_theirs_gf, compared.largest_ratio, compared.where, learned.bound));
 }
 
-/// At full size several networks compete on the selecting flights, with one that is fitted to what they say.
+/// At the full size several networks compete on the selecting flights, along with one fitted to their outputs.
 LearnOptions taught_options(const Setting& setting) {
   LearnOptions options = recorded_options(setting);
   options.teachers = setting.full ? 8 : 0;
   return options;
 }
 
-/// The networks that were trained, their errors on the selecting flights, and which was kept.
+/// Adds the trained networks, their errors on the selecting flights, and which one was kept.
 void add_candidates(const Learned& learned, Finding& finding) {
   finding.json["networks"] = files::Json::array();
   std::string select_gf;
@@ -145,13 +145,13 @@ void add_candidates(const Learned& learned, Finding& finding) {
   finding.json["kept_seed"] = learned.kept_seed;
   if (learned.scores.size() > 1) {
     finding.notes.push_back(
-        fmt::format("Errors on the selecting flights, in gf, of {} networks and of one fitted to what they "
-                    "say: {}. The least decided: seed {}.",
+        fmt::format("Errors on the selecting flights, in gf, of {} networks and of one fitted to their "
+                    "outputs: {}. The least error decided: seed {}.",
                     learned.scores.size() - 1, select_gf, learned.kept_seed));
   }
 }
 
-/// The deep set alone, with the authors' own labels: thrust behind their lag, acceleration as logged, their masses.
+/// The deep set alone, with the authors' own labels: lagged thrust, acceleration as logged, and their masses.
 void deep_set_alone(const Setting& setting, Finding& finding) {
   const Recorded recorded = recorded_flights(setting, true);
   const Learned learned =

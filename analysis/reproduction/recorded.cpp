@@ -12,8 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// gf per unit of input. Joint bounds of the published networks: 417.6 for the large pair, 373.7 for the small one,
-/// with gamma 3 in every layer, which ours keep as well.
+/// Limit in gf per unit of input. The joint bounds of the published networks are 417.6 for the large pair and 373.7
+/// for the small one, with gamma 3 in every layer, which our networks keep as well.
 constexpr double kMaxLipschitz = 373;
 
 bool is_fitted(const residuals::FlightFiles& flight) {
@@ -29,7 +29,7 @@ residuals::Inputs some_flights(const residuals::Inputs& all, const Keep& keep) {
   return some;
 }
 
-/// The small size takes the flights of one or two small vehicles.
+/// The small size uses the flights of one or two small vehicles.
 bool is_small(const residuals::FlightFiles& flight) {
   return flight.scenario == "21_randomwalk_s" || flight.scenario == "21_randomwalk_ss" ||
          flight.scenario == "21_swap_ss";
@@ -122,7 +122,7 @@ LearnOptions recorded_options(const Setting& setting) {
   options.sizes.features = 20;
   options.gamma.value = 3;
   options.max_lipschitz = kMaxLipschitz;
-  options.begins_within = false;  // makes no difference at a limit as large as that
+  options.begins_within = false;  // makes no difference for such a large limit
   options.turns = true;
   options.rate = 2e-3;
   options.batch = 1024;

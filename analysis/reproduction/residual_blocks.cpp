@@ -26,7 +26,7 @@ std::string composition_of(const std::vector<residuals::Track>& tracks, std::siz
   return (others.empty() ? "Ge" : others) + "2" + initial(tracks[own].kind);
 }
 
-/// 90 % interval of f over resampled blocks, given as indices.
+/// 90 % interval of f over resampled blocks, which are passed as indices.
 Interval bootstrap(std::size_t blocks, const std::function<double(const std::vector<std::size_t>&)>& f) {
   if (blocks < 2) return {};
   files::Random random(1);

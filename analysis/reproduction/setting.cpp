@@ -13,9 +13,9 @@ stability::EffectSpec& effect(stability::Model& model, const std::string& name) 
                        [&](const stability::EffectSpec& spec) { return spec.name == name; });
 }
 
-/// Air that the wake draws up around itself: a ring 0.15 m wide about 0.2 m beside and below a neighbour that moves
-/// past, +1.5 gf at 0.8 m/s. The paper sees one at that speed (fig:heatmap b), recorded flights of 2020 none above 0.2
-/// gf: the form and the size are ours.
+/// Air drawn upward around the wake: a ring 0.15 m wide about 0.2 m to the side of and below a moving neighbour, +1.5
+/// gf at 0.8 m/s. The paper shows one at that speed (fig:heatmap b); recorded flights of 2020 show none above 0.2 gf.
+/// The form and the size are our choice.
 stability::EffectSpec updraft() {
   stability::EffectSpec spec;
   spec.name = "updraft";
@@ -60,7 +60,7 @@ stability::Model nominal(const Truth& truth) {
 std::uint64_t seed_of(std::uint64_t seed, const std::string& use, std::uint64_t number) {
   std::uint64_t mixed = files::Random(seed).bits() ^ number;
   for (const char c : use) mixed = files::Random(mixed + static_cast<unsigned char>(c)).bits();
-  return files::Random(mixed).bits() >> 16;  // fits a JSON number
+  return files::Random(mixed).bits() >> 16;  // fits into a JSON number
 }
 
 }  // namespace swarmcert::reproduction

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of each scenario every other flight to fit; those that select and test stay.
+/// Keeps every other flight to fit of each scenario; selecting and test flights are unchanged.
 Recorded halved(Recorded flights) {
   auto& fit = flights.fit.found.flights;
   std::map<std::string, int> seen;

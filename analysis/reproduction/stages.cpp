@@ -60,8 +60,8 @@ std::uint64_t Stages::seed(const std::string& use, std::uint64_t number) const {
 
 LearnOptions Stages::learn_options() const {
   LearnOptions options;
-  options.sizes.ground = false;  // the paper's networks see neighbours only
-  options.gamma.value = 3;       // per layer, as the published code clips
+  options.sizes.ground = false;  // the networks of the paper have neighbours as their only inputs
+  options.gamma.value = 3;       // per layer, as in the published code
   options.steps = scale_of(setting_).steps;
   options.seed = seed("weights");
   return options;
@@ -108,7 +108,7 @@ files::Json Stages::fly_stage(int stage, const std::string& folder) {
     fly_logged(setting_, truth_, plans[k].second, network ? &*network : nullptr,
                (fs::path(folder) / plans[k].first).string());
   }
-  // The least distance of one walk says as much of its seed as of the stage.
+  // The least distance in a single walk depends on its seed as much as on the stage.
   const int walks = scale_of(setting_).walks;
   std::vector<double> least_m(static_cast<std::size_t>(walks)), percentile_m(least_m.size());
   files::parallel_for(walks, setting_.jobs, [&](int w) {

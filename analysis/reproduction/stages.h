@@ -1,4 +1,4 @@
-/// @file The curriculum of section III-C as files: flights and networks of each stage, made when they are asked for.
+/// @file The curriculum of section III-C as files: flights and networks of each stage, made on demand.
 #pragma once
 
 #include <optional>
@@ -10,51 +10,53 @@
 
 namespace swarmcert::reproduction {
 
-/// Stage 0: two vehicles without a network. 1: two with the network of stage 0. 2: three with that of stage 1. 3: four
-/// with that of stage 2. Every stage flies one random walk and repeated swaps. Its network learns from these flights
-/// and from those of all stages before it: the paper calls its curriculum cumulative. What was flown with fewer
-/// vehicles keeps swarms with fewer neighbours from being forgotten.
+/// Stage 0: two vehicles without a network. 1: two with the network of stage 0. 2: three with the network of stage 1.
+/// 3: four with the network of stage 2. Every stage flies one random walk and repeated swaps. Its network learns from
+/// these flights and from those of all earlier stages: the paper calls its curriculum cumulative. Flights with fewer
+/// vehicles ensure that swarms with fewer neighbours are not forgotten.
 ///
-/// A network allows closer flight (section III-C): the random walks of every stage that has one are drawn in further.
-/// Left as it is, the task's repulsion keeps more vehicles as far apart as fewer. How far is our choice.
+/// A network allows closer flight (section III-C), so the random walks of every stage with a network are contracted.
+/// Otherwise the task's repulsion would keep more vehicles as far apart as fewer ones. The factor is our choice.
 struct Stage {
   int vehicles;
-  double drawn_in;         ///< of the random walks' set points, see Plan
-  const char* flown_with;  ///< in words
+  double drawn_in;         ///< contraction of the setpoints of the random walks, see Plan
+  const char* flown_with;  ///< as text
 };
 inline constexpr Stage kStages[] = {{2, 1.0, "no network"},
                                     {2, 0.95, "network of 2, uncompensated"},
                                     {3, 0.9, "network of 2"},
                                     {4, 0.7, "network of 3"}};
 inline constexpr int kNumStages = 4;
-/// The stage whose network is "trained with" so many vehicles, 2 to 4.
+/// Returns the stage whose network is "trained with" this many vehicles, 2 to 4.
 inline int stage_of(int trained_with) { return trained_with - 1; }
 
-/// What was seen of a stage's flights.
+/// Statistics of the flights of a stage.
 struct StageFlights {
   std::string folder;           ///< with fit/, select/ and test/
-  double least_distance_m = 0;  ///< between any two vehicles in a random walk; mean of several walks
+  double least_distance_m = 0;  ///< between any two vehicles in a random walk; mean over several walks
   double percentile_distance_m =
-      0;  ///< 1 % of the distances to the nearest other vehicle are below; likewise
+      0;  ///< first percentile of the distances to the nearest other vehicle; mean over several walks
 };
 
-/// One truth and one training seed. Nothing is made twice: folders that are there and of the same origin are read.
+/// The stages of one truth and one training seed. Existing folders of the same origin are read instead of made again.
 class Stages {
  public:
-  /// @param training_seed 0, 1, ...: networks and flights of their own.
+  /// @param training_seed 0, 1, ...: each has its own networks and flights.
   Stages(const Setting& setting, const Truth& truth, int training_seed);
 
   StageFlights flights(int stage);
   Learned learned(int stage);
-  /// The network that flies stage `stage`; nothing for stage 0.
+  /// Returns the network used in flight by stage `stage`; nothing for stage 0.
   std::optional<files::Network> flown_network(int stage);
-  /// What the network of a stage learns from, selects and tests by: it is tested on the stage's own flights.
+  /// Returns the data from which the network of a stage learns, selects and tests; it is tested on the flights of its
+  /// stage.
   learning::LearningData data(int stage, const learning::NetworkSizes& sizes);
-  /// Text that changes with everything data() depends on.
+  /// Returns text that changes with everything on which data() depends.
   std::string data_key(int stage);
-  /// Flights of a stage with the nominal model. @param use "fit", "select" or "test".
+  /// Returns the flights of a stage with the nominal model.
+  /// @param use "fit", "select" or "test".
   residuals::Inputs inputs(const std::vector<int>& stages, const std::string& use);
-  /// Text that changes with everything the flights of `stage` depend on.
+  /// Returns text that changes with everything on which the flights of `stage` depend.
   std::string key(int stage);
 
   const Truth& truth() const { return truth_; }
@@ -62,7 +64,7 @@ class Stages {
   LearnOptions learn_options() const;
 
  private:
-  /// Flies a stage into `folder`; what was seen of its flights.
+  /// Flies a stage into `folder` and returns the statistics of its flights.
   files::Json fly_stage(int stage, const std::string& folder);
 
   const Setting& setting_;
@@ -75,7 +77,7 @@ class Stages {
 Flown fly_logged(const Setting& setting, const Truth& truth, const Plan& plan, const files::Network* network,
                  const std::string& folder);
 
-/// Flights in `folders` with the nominal model of `truth`, which is written beside the first of them.
+/// Returns the flights in `folders` with the nominal model of `truth`, which is written next to the first folder.
 residuals::Inputs read_simulated(const Truth& truth, const std::vector<std::string>& folders);
 
 }  // namespace swarmcert::reproduction

@@ -15,11 +15,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Both vehicles above push by at least this much, each alone, as far as two-vehicle flights know.
+/// Each of the two vehicles above exerts at least this force on its own, according to two-vehicle flights.
 constexpr double kActing_gf = 1;
 constexpr double kDefectBlock_s = 2;
 
-/// Sums over one block of one vehicle, by name of what is summed.
+/// Sums over one block of one vehicle, by the name of the summed quantity.
 using Sums = std::map<std::string, BlockMean>;
 using Blocks = std::map<std::string, Sums>;
 
@@ -63,7 +63,7 @@ void add_row(const std::string& who, const Blocks& blocks, const std::string& na
                                   {"interval_gf", defect.interval}});
 }
 
-/// Simulated flights of three: the truth and the network at the states that were flown.
+/// Simulated flights of three vehicles: the truth and the network at the states reached in flight.
 void add_simulated(const Setting& setting, const Truth& truth, Table& table, Finding& finding) {
   Stages stages(setting, truth, 0);
   const Learned learned = stages.learned(stage_of(3));
@@ -104,10 +104,11 @@ void add_simulated(const Setting& setting, const Truth& truth, Table& table, Fin
   add_row(fmt::format("network trained with 3 on it"), blocks, "network", records, table, finding);
 }
 
-/// Recorded flights of three small vehicles: the measured force, less what two-vehicle flights say of each neighbour.
+/// Recorded flights of three small vehicles: the measured force minus the force of each neighbour according to
+/// two-vehicle flights.
 void add_recorded(const Setting& setting, const Truth& truth, Table& table, Finding& finding) {
   if (setting.recorded.empty() || !fs::exists(fs::path(setting.recorded) / "flights")) {
-    finding.notes.push_back("Recorded flights are left out: --recorded names no folder that has them.");
+    finding.notes.push_back("Recorded flights are left out: --recorded names no folder that contains them.");
     return;
   }
   residuals::InputArguments arguments;
@@ -127,7 +128,7 @@ void add_recorded(const Setting& setting, const Truth& truth, Table& table, Find
       if (track.position_only) continue;
       const std::vector<Eigen::Vector3d> residual =
           residuals::force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
-      // Trim: what is left where nobody is above.
+      // Trim: the remaining force when no vehicle is above.
       BlockMean trim;
       std::vector<std::pair<std::size_t, std::array<Relative, 2>>> acting;
       for (std::size_t k = 0; k < residual.size(); ++k) {
@@ -176,13 +177,13 @@ Finding superposition(const Setting& setting) {
   const std::vector<Truth> all = truths(setting);
   for (const Truth& truth : all) add_simulated(setting, truth, table, finding);
   Setting recorded = setting;
-  recorded.updraft = false;  // the updraft is ours: recorded flights of two show none
+  recorded.updraft = false;  // the updraft is our assumption: recorded flights of two show none
   add_recorded(recorded, truths(recorded).front(), table, finding);
   finding.tables.push_back(std::move(table));
   finding.notes.push_back(
       "The defect is f(a,b) - f(a) - f(b), all relative to f of no neighbour. For recorded flights f(a) and "
-      "f(b) are the downwash fitted to flights of two vehicles, and f(a,b) is the measured force less the "
-      "vehicle's mean where nobody is above. Intervals: 90 %, blocks of 2 s.");
+      "f(b) are the downwash fitted to flights of two vehicles, and f(a,b) is the measured force minus the "
+      "vehicle's mean when no vehicle is above. Intervals: 90 %, blocks of 2 s.");
   return finding;
 }
 

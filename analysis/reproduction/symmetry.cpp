@@ -6,10 +6,10 @@
 namespace swarmcert::reproduction {
 namespace {
 
-/// How a network comes to say the same after a turn about the vertical.
+/// How a network is made symmetric under rotation about the vertical.
 struct Symmetry {
   const char* name;
-  bool turns, invariants;  ///< samples are turned; phi sees invariants
+  bool turns, invariants;  ///< samples are rotated; phi receives invariants
 };
 constexpr Symmetry kNone = {"none", false, false}, kTurned = {"turned samples", true, false},
                    kExact = {"exact", false, true};
@@ -23,7 +23,7 @@ Group train(const Setting& setting, const Source& source, const Symmetry& symmet
   return train_group(setting, source, half ? source.half : source.all, options, name, seeds);
 }
 
-/// Test errors of each symmetry, learned from all flights and from half of them.
+/// Test errors of each kind of symmetry, learned from all flights and from half of them.
 void add_data(const Setting& setting, const Source& source, Finding& finding) {
   const int seeds = setting.full ? 5 : 1;
   Table table = {fmt::format("{} flights: RMSE on flights not seen [gf], mean of {} seeds (standard error)",
@@ -46,7 +46,7 @@ void add_data(const Setting& setting, const Source& source, Finding& finding) {
   finding.tables.push_back(std::move(table));
 }
 
-/// Test error over the largest joint bound: what limits it, with turned samples and with exact symmetry.
+/// Test error over the largest joint bound, for each way to limit it, with rotated samples and with exact symmetry.
 void add_bounds(const Setting& setting, const Source& source, Finding& finding) {
   const int seeds = setting.full ? 3 : 1;
   const std::vector<double> gammas =
@@ -104,8 +104,9 @@ Finding symmetry(const Setting& setting) {
   }
   if (!setting.recorded.empty()) add_inputs(sources.back().all, finding);
   finding.notes.push_back(
-      "Epochs are chosen on the selecting flights, and nothing on those that test. Exact: every phi sees "
-      "invariants under turns about the vertical, and the slope of the map to them is in the bound.");
+      "Epochs are chosen on the selecting flights, and nothing on the test flights. Exact: every phi "
+      "receives invariants under rotation about the vertical, and the bound includes the slope of the map to "
+      "them.");
   return finding;
 }
 

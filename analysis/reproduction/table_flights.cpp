@@ -20,7 +20,7 @@ constexpr const char* kUnitSchema = "swarmcert/table-unit/1";
 struct Cell {
   int controller = 0, vehicles = 0, training_seed = 0;
   std::uint64_t flight_seed = 0;
-  double max_m[3] = {0, 0, 0};                  ///< |x|, |y|, |z|; infinite: lost
+  double max_m[3] = {0, 0, 0};                  ///< |x|, |y|, |z|; infinite: vehicle lost
   double p50_m[2] = {0, 0}, p95_m[2] = {0, 0};  ///< of |x|, |y|
   double saturated_share = 0;
 };
@@ -41,11 +41,11 @@ void fill(const Flown& flown, Cell& cell) {
 
 using Networks = std::array<std::optional<files::Network>, 4>;
 
-/// The flights of the table, not flown yet.
+/// The planned flights of the table.
 std::vector<Cell> planned(const Setting& setting, int training_seed) {
   std::vector<Cell> cells;
   for (const int controller : kControllers) {
-    if (controller == 0 && training_seed > 0) continue;  // the baseline knows no training
+    if (controller == 0 && training_seed > 0) continue;  // the baseline does not depend on training
     for (int vehicles = kLeastVehicles; vehicles <= kMostVehicles; ++vehicles) {
       for (int k = 0; k < scale_of(setting).flight_seeds; ++k) {
         Cell cell;

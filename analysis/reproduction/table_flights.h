@@ -1,4 +1,4 @@
-/// @file The flights behind tab:nnperf: six swaps of two to five vehicles under four controllers, and their errors.
+/// @file The flights behind tab:nnperf: six swaps of two to five vehicles with four controllers, and their errors.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 
 namespace swarmcert::reproduction {
 
-/// Swaps are flown that much above the published heights: the lowest of five flies at 0.3 m there, and the floor would
-/// end an error of the paper's size.
+/// Offset of the swaps above the published heights. There the lowest of five vehicles flies at 0.3 m, and an error of
+/// the size reported in the paper would end on the floor.
 inline constexpr double kHigher_m = 0.3;
 
 inline constexpr int kLeastVehicles = 2, kMostVehicles = 5;
@@ -22,19 +22,19 @@ inline constexpr double kPaper_m[4][4] = {{0.094, 0.139, 0.209, 0.314},
                                           {0.026, 0.082, 0.140, 0.159},
                                           {0.024, 0.061, 0.102, 0.150}};
 
-/// All flights of one training seed, as objects of result.json; read from `file` if it holds them.
+/// Returns all flights of one training seed as objects of result.json; read from `file` if it contains them.
 /// @param stages trained the networks, on flights of their own truth.
-/// @param flown  the truth that flies; its battery may be another one.
+/// @param flown the truth used in flight; its battery may differ.
 files::Json table_flights(const Setting& setting, Stages& stages, const Truth& flown, int training_seed,
                           double higher_m, const std::string& file);
 
-/// One field over the flights of one controller and number of vehicles; a lost flight counts as infinite.
+/// Statistics of one field over the flights of one controller and number of vehicles; a lost flight counts as infinite.
 struct Spread {
   double median_m = 0, least_m = 0, most_m = 0;
 };
 Spread spread_of(const files::Json& flights, int controller, int vehicles, const char* field);
 
-/// By controller, then by the number of vehicles from kLeastVehicles on.
+/// Indexed by controller, then by the number of vehicles starting at kLeastVehicles.
 using Spreads = std::array<std::array<Spread, 4>, 4>;
 Spreads height_spreads(const files::Json& flights);
 

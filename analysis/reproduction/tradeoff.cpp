@@ -14,7 +14,7 @@ namespace {
 constexpr int kVehicles = 3;
 constexpr double kSwap_s = 4.5, kMove_s = 3;
 
-/// The force that the position loop is left with: the truth less the prediction behind the motors' lag.
+/// Force remaining for the position loop: the truth minus the prediction after the lag of the motors.
 std::vector<double> remainder_N(const std::vector<Moment>& moments, double lag_s) {
   std::vector<double> remainder;
   double lagged = static_cast<double>(moments.front().prediction_gf);
@@ -26,7 +26,7 @@ std::vector<double> remainder_N(const std::vector<Moment>& moments, double lag_s
   return remainder;
 }
 
-/// What was seen of the remainder of one vehicle in a flight of swaps.
+/// Measured disturbance class of the remainder of one vehicle in a flight of swaps.
 stability::Disturbance measured(const std::vector<Moment>& moments, double lag_s) {
   const std::vector<double> f = remainder_N(moments, lag_s);
   stability::Disturbance seen;
@@ -49,10 +49,10 @@ stability::Disturbance measured(const std::vector<Moment>& moments, double lag_s
   return seen;
 }
 
-/// Largest z-errors of the swaps that test a network.
+/// Largest z-errors in the swaps that test a network.
 struct ErrorsInSwaps {
   double predicted_m = 0, flown_m = 0;
-  std::string by;  ///< which bound predicted it
+  std::string by;  ///< name of the bound that predicted it
 };
 
 ErrorsInSwaps errors_in_swaps(const Setting& setting, const Truth& truth, const stability::AxisLoop& loop,
@@ -118,8 +118,8 @@ Finding lipschitz_tradeoff(const Setting& setting) {
   }
   finding.tables.push_back(std::move(table));
   finding.notes.push_back(
-      "Predicted: the loop's exact gains times what was measured of the force that the prediction, behind "
-      "the motors' lag, leaves in swaps of three. It bounds the linear loop, for these flights: noise and "
+      "Predicted: the loop's exact gains times the measured remainder of the force after the prediction, "
+      "with the motors' lag, in swaps of three. It bounds the linear loop, for these flights: noise and "
       "saturation come on top.");
   finding.figures.push_back(
       {"lipschitz", data,

@@ -8,7 +8,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// Guards sums of weights like 1/3 + 1/3 + 1/3 against rounding.
+/// Tolerance for rounding in sums of weights such as 1/3 + 1/3 + 1/3.
 constexpr double kWeightRounding = 1e-9;
 
 /// P(at least `least` hits in `runs`), each with probability p in (0, 1).

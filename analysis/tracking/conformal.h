@@ -1,11 +1,12 @@
-/// @file Split-conformal prediction over groups of flights: a promise for a flight that was not seen.
+/// @file Split-conformal prediction over groups of flights: a promise for an unseen flight.
 ///
-/// A score says how far a flight exceeded a prediction made without it, e.g. measured peak over predicted peak. If the
-/// groups of flights (gain sets, vehicles, days) are exchangeable with that of a further flight, then this flight's
-/// score stays below the threshold with at least the stated probability, whatever the distribution of scores
-/// (Vovk et al. 2005; with groups: Dunn, Wasserman, Ramdas, J. Am. Stat. Assoc. 2022). Flights of one group may depend
-/// on each other; they share the weight of one. It is a statement on the average over calibrations: given the one at
-/// hand, the probability itself is random, with the Beta distribution of `coverage_90`.
+/// A score states how far a flight exceeded a prediction made without it, e.g. measured peak over predicted peak. If
+/// the groups of flights (gain sets, vehicles, days) are exchangeable with the group of a further flight, then the
+/// score of this flight stays below the threshold with at least the stated probability, whatever the distribution of
+/// scores (Vovk et al. 2005; with groups: Dunn, Wasserman, Ramdas, J. Am. Stat. Assoc. 2022). Flights within a group
+/// may depend on each other; together they have the weight of one. The statement holds on average over calibrations:
+/// given the calibration at hand, the coverage probability is itself random, with the Beta distribution of
+/// `coverage_90`.
 #pragma once
 
 #include <array>
@@ -22,24 +23,26 @@ struct FlightScore {
 };
 
 struct ConformalThreshold {
-  double level = 0;      ///< probability that was asked for
-  double threshold = 0;  ///< a further flight's score is at most this
-  int groups = 0;        ///< on which it rests
+  double level = 0;      ///< requested probability
+  double threshold = 0;  ///< upper bound on the score of a further flight
+  int groups = 0;        ///< number of groups used
   int flights = 0;
-  /// What the probability is for the calibration at hand: 5 % and 95 % quantiles of Beta(k, groups + 1 - k), with
-  /// k = ceil(level (groups + 1)) the rank of the threshold.
+  /// Coverage probability of the calibration at hand: 5 % and 95 % quantiles of Beta(k, groups + 1 - k), where k =
+  /// ceil(level (groups + 1)) is the rank of the threshold.
   Interval coverage_90;
 };
 
-/// Groups that a level needs at least: level / (1 - level), rounded up. With fewer no finite threshold holds.
+/// Returns the least number of groups for a level: level / (1 - level), rounded up. With fewer groups no finite
+/// threshold holds.
 int fewest_groups(double level);
 
-/// The smallest score at and below which the groups have a weight of level (groups + 1), a group's weight being one.
+/// Returns the smallest score such that the scores up to it have a weight of at least level (groups + 1), where each
+/// group has weight one.
 /// @param level in (0, 1).
-/// @throws std::invalid_argument for a level outside, or fewer than fewest_groups(level): ask first.
+/// @throws std::invalid_argument for a level outside this range, or for fewer than fewest_groups(level) groups.
 ConformalThreshold conformal_threshold(const std::vector<FlightScore>& scores, double level);
 
-/// Quantiles of the Beta distribution with whole parameters, by bisection of its binomial sum.
+/// Quantile of the Beta distribution with integer parameters, by bisection of the binomial sum.
 double beta_quantile(int a, int b, double probability);
 
 }  // namespace swarmcert::analysis

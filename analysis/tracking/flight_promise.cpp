@@ -13,7 +13,7 @@ namespace {
 
 using files::Json;
 
-/// |number| of an axis; infinite where it was not judged.
+/// |number| for an axis; infinite if the axis was not judged.
 double size_along(const Json& error, const std::string& of, const char* key, int axis,
                   const std::string& path) {
   const std::string field = of + "." + key;
@@ -33,7 +33,7 @@ MeasuredAxis measured_axis(const Json& error, const std::string& field, int axis
   return {size("bias"), size("amplitude"), size("rate"), size("variation"), size("impulse")};
 }
 
-/// @param velocity null where the log does not measure it.
+/// @param velocity null if the log does not measure it.
 stability::DisturbanceSource source_of(const Json& force, const Json& velocity, double window_s,
                                        const std::string& path) {
   std::array<MeasuredAxis, 3> axes;
@@ -47,7 +47,7 @@ stability::DisturbanceSource source_of(const Json& force, const Json& velocity, 
   return source;
 }
 
-/// Adds what acts beside the class; a declared error of the velocity takes the place of the measured one.
+/// Adds what acts in addition to the class; a declared error of the velocity replaces the measured one.
 void add_declared(const stability::DisturbanceSource& declared, stability::DisturbanceSource& source) {
   source.thrust_ratio_error = declared.thrust_ratio_error;
   for (int axis = 0; axis < 3; ++axis) {

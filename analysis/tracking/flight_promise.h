@@ -1,10 +1,10 @@
-/// @file A bound for a further flight: each flight that was compared gives the class of its own force error, each class
-/// a bound of the loop at hand, and these bounds the conformal threshold.
+/// @file A bound for a further flight. Each compared flight gives the class of its own force error, each class gives a
+/// bound of the loop at hand, and these bounds give the conformal threshold.
 ///
-/// The gains of the flights need not be those of the loop: what transfers is the force error. If a further flight is
-/// exchangeable with those compared and the loop is linear with the lags stated, the error of that flight stays below
-/// the threshold with at least the probability asked for: its bound is one more draw of the same distribution, and its
-/// error is at most its bound.
+/// The gains of the flights may differ from those of the loop: the force error is what transfers. If a further flight
+/// is exchangeable with the compared ones and the loop is linear with the stated lags, the error of that flight stays
+/// below the threshold with at least the requested probability: its bound is one more draw from the same distribution,
+/// and its error is at most its bound.
 #pragma once
 
 #include <string>
@@ -21,9 +21,9 @@ struct FlightClass {
   stability::DisturbanceSource source;
 };
 
-/// flights[].learning_error of a result of compare, largest values over windows that follow one another. Vehicles
-/// without one are left out; axes along which no force was judged have infinite classes.
-/// @throws files::InputError where the file is no such result.
+/// Reads flights[].learning_error of a result of compare: the largest values over consecutive windows. Vehicles
+/// without it are left out; axes along which no force was judged have infinite classes.
+/// @throws files::InputError if the file is not such a result.
 std::vector<FlightClass> read_flight_classes(const std::string& path);
 
 /// One row of TrackingReport::bounds.
@@ -31,12 +31,13 @@ struct PromisedBound {
   int axis = 0;
   stability::Channel channel = stability::Channel::kForce;
   stability::Loop loop = stability::Loop::kContinuous;
-  ConformalThreshold promise;  ///< its threshold is the bound, m
+  ConformalThreshold promise;  ///< the threshold is the bound in m
 };
 
-/// @param declared bias and errors of the estimates that act beside the classes. @param report of tracking_bounds():
-///   its gains are taken up again, and staircase_m and float32_m of its bounds are added.
-/// @throws std::invalid_argument for fewer flights than the level needs: see fewest_groups().
+/// @param declared bias and estimation errors that act in addition to the classes.
+/// @param report result of tracking_bounds(): its gains are reused, and staircase_m and float32_m of its bounds are
+///     added.
+/// @throws std::invalid_argument for fewer flights than the level needs; see fewest_groups().
 std::vector<PromisedBound> promised_bounds(const stability::Gains& gains, const stability::Plant& plant,
                                            const stability::TrackingReport& report,
                                            const std::vector<FlightClass>& flights,

@@ -17,7 +17,7 @@ namespace {
 
 using files::Json;
 
-/// 5 % and 95 % ends of the interval for `held` of `flights`.
+/// The 5 % and 95 % limits of the confidence interval for `held` out of `flights`.
 Interval clopper_pearson_90(int held, int flights) {
   if (flights == 0) return {0, 1};
   return {held == 0 ? 0 : beta_quantile(held, flights - held + 1, 0.05),
@@ -48,7 +48,7 @@ Promise read_promise(const std::string& path) {
   const auto has_text = [](const Json& row, const char* key) {
     return row.is_object() && row.contains(key) && row[key].is_string();
   };
-  // Rows of the sampled loop come after those of the continuous one, and take their place.
+  // Rows of the sampled loop follow those of the continuous loop and replace them.
   for (const Json& row : coverage["bounds"]) {
     if (!has_text(row, "axis") || !has_text(row, "channel")) refuse("coverage.bounds");
     if (row["channel"] != stability::name(stability::Channel::kForce)) continue;

@@ -23,7 +23,7 @@ stability::DisturbanceSource measured_source(const std::array<MeasuredAxis, 3>& 
     source.bias_N[axis] = std::isfinite(measured.bias) ? measured.bias : 0;
     square += d.rate_N_s * d.rate_N_s;
   }
-  // Of quantiles per axis: at least the vector's where they coincide.
+  // From quantiles per axis: at least the norm of the vector if the quantiles are attained together.
   source.rate_norm_N_s = std::sqrt(square);
   source.classes_contain_bias = source.amplitudes_reach_bias();
   return source;

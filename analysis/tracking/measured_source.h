@@ -1,5 +1,5 @@
-/// @file From numbers that flights showed to a disturbance source: what `bound --from`, promises over flights and the
-/// gate share.
+/// @file Converts numbers measured in flights to a disturbance source; shared by `bound --from`, promises over flights
+/// and the gate.
 #pragma once
 
 #include <array>
@@ -8,8 +8,8 @@
 
 namespace swarmcert::analysis {
 
-/// One axis of an error that was measured over windows that follow one another, in newton for a force, m/s for a
-/// velocity. Infinite: not known.
+/// One axis of an error measured over consecutive windows, in newton for a force, m/s for a velocity. Infinite:
+/// unknown.
 struct MeasuredAxis {
   double bias = 0;       ///< |mean| of a flight
   double amplitude = 0;  ///< largest value, bias included
@@ -18,12 +18,12 @@ struct MeasuredAxis {
   double impulse = 0;    ///< integral of the absolute value over a window, times s
 };
 
-/// The force error. Every window of the flight may bring the variation and the impulse of one again.
-/// @param window_s zero where it is not known: then both are those of the whole flight.
+/// Converts a force error. Every window of the flight may contribute the variation and the impulse of one window again.
+/// @param window_s zero if unknown: then variation and impulse refer to the whole flight.
 stability::DisturbanceSource measured_source(const std::array<MeasuredAxis, 3>& force, double window_s);
 
-/// The error of an estimate. The amplitude contains the bias; where it was measured below it, as quantiles of few
-/// flights can be, it is added.
+/// Converts an estimation error. The amplitude contains the bias; if the measured amplitude is below the bias, which
+/// can happen for quantiles of few flights, the bias is added.
 stability::EstimateError measured_estimate(const MeasuredAxis& error, double window_s);
 
 }  // namespace swarmcert::analysis

@@ -16,12 +16,12 @@ namespace {
 
 using files::Json;
 
-/// One flight in this many gives the shape.
+/// One flight in this many defines the shape.
 constexpr std::size_t kShapeOf = 3;
-/// No force is measured more finely, N.
+/// Force resolution in N; no force is measured more finely.
 constexpr double kFinest_N = 1e-9;
 constexpr int kMostCells = 1000;
-/// Tried: the least half-width of a cell as a share of the largest.
+/// Candidates for the least half-width of a cell as a share of the largest.
 constexpr double kFloors[] = {0.25, 0.5, 0.75, 1};
 
 using Ranges = std::array<Interval, 3>;
@@ -81,7 +81,7 @@ Ranges ranges_of(const Json& cell, const std::string& path) {
       refuse(path, field, "", "has not three numbers");
     for (std::size_t k = 0; k < 3; ++k) {
       if (!cell[key][k].is_number() || !std::isfinite(cell[key][k].get<double>()))
-        refuse(path, field, cell[key][k].dump(), "is no finite number");
+        refuse(path, field, cell[key][k].dump(), "is not a finite number");
       (key[1] == 'e' ? ranges[k].lower : ranges[k].upper) = cell[key][k].get<double>();
     }
   }
@@ -90,7 +90,7 @@ Ranges ranges_of(const Json& cell, const std::string& path) {
   return ranges;
 }
 
-/// By flight, in the order of their names.
+/// Cells by flight name, sorted.
 std::map<std::string, CellsOfFlight> read_flights(const Json& document, const ResidualEnvelope& envelope,
                                                   const std::string& kind, const std::string& path) {
   std::map<std::string, CellsOfFlight> flights;
@@ -116,7 +116,7 @@ std::map<std::string, CellsOfFlight> read_flights(const Json& document, const Re
 double middle(Interval x) { return x.lower + (x.upper - x.lower) / 2; }
 double half_width(Interval x) { return (x.upper - x.lower) / 2; }
 
-/// The largest half-width of a cell and of those around it, of cells with flights; 0 where there are none.
+/// The largest half-width of a cell and its adjacent cells, among cells with flights; 0 if there are none.
 double width_about(const ResidualEnvelope& envelope, std::size_t at, std::size_t axis) {
   double width_N = 0;
   const auto add = [&](const ResidualEnvelope::Cell& cell) {
@@ -133,8 +133,8 @@ double width_about(const ResidualEnvelope& envelope, std::size_t at, std::size_t
   return width_N;
 }
 
-/// Middles and half-widths of the ranges of `flights`, as read_measured_truth() says.
-/// @param floor no half-width is below this share of the largest along its axis.
+/// Midpoints and half-widths of the ranges of `flights`, as described for read_measured_truth().
+/// @param floor least half-width as a share of the largest along the same axis.
 ResidualEnvelope shape_of(const std::vector<const CellsOfFlight*>& flights, double floor,
                           ResidualEnvelope envelope) {
   std::optional<Ranges> everywhere;
@@ -176,8 +176,8 @@ double score_of(const CellsOfFlight& flight, const ResidualEnvelope& shape) {
   return score;
 }
 
-/// What a floor costs: the mean half-width of the cells, scaled so that as many of these flights as `level` says would
-/// have been inside the ranges of the others. An estimate that chooses.
+/// The cost of a floor: the mean half-width of the cells, scaled so that the share `level` of these flights would
+/// have been inside the ranges from the other flights. An estimate, used only for the choice.
 double cost_of(const std::vector<const CellsOfFlight*>& flights, double floor, double level,
                const ResidualEnvelope& empty) {
   std::vector<double> scores;
@@ -195,7 +195,7 @@ double cost_of(const std::vector<const CellsOfFlight*>& flights, double floor, d
   return scores[std::min(rank, scores.size() - 1)] * width_N;
 }
 
-/// The floor that costs least.
+/// The floor with the least cost.
 double best_floor(const std::vector<const CellsOfFlight*>& flights, double level,
                   const ResidualEnvelope& empty) {
   double best = kFloors[0], least = std::numeric_limits<double>::infinity();
@@ -228,7 +228,7 @@ MeasuredTruth read_measured_truth(const std::string& path, const std::string& ki
   }
   const auto fewest = static_cast<std::size_t>(fewest_groups(level));
   if (others.size() < fewest) {
-    // Of n flights n - ceil(n/3) give scores.
+    // Out of n flights, n - ceil(n/3) give scores.
     const std::size_t needed = fewest + (fewest + kShapeOf - 2) / (kShapeOf - 1);
     throw files::InputError(
         {path, "", "flights", std::to_string(flights.size()),

@@ -10,7 +10,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// Beyond this |log(predicted/peak)| a flight pulls with constant force.
+/// Transition of the Huber loss: beyond this |log(predicted/peak)| the influence of a flight is constant.
 constexpr double kHuberLog = 0.3;
 constexpr int kFitRounds = 30;
 constexpr int kFolds = 5;
@@ -18,7 +18,7 @@ constexpr double kLeastPeak_m = 1e-6;
 
 Eigen::Index at(std::size_t i) { return static_cast<Eigen::Index>(i); }
 
-/// Least squares in the free coordinates; zero in the others.
+/// Solves the least-squares problem in the free coordinates; the others are zero.
 Eigen::VectorXd free_solution(const Eigen::MatrixXd& G, const Eigen::VectorXd& f,
                               const std::vector<bool>& is_free) {
   std::vector<Eigen::Index> index;
@@ -31,13 +31,13 @@ Eigen::VectorXd free_solution(const Eigen::MatrixXd& G, const Eigen::VectorXd& f
     for (std::size_t j = 0; j < index.size(); ++j) part(at(i), at(j)) = G(index[i], index[j]);
   }
   Eigen::VectorXd result = Eigen::VectorXd::Zero(f.size());
-  // Parts can be multiples of each other; the least-norm solution shares the weight between them.
+  // Parts can be multiples of each other; the minimum-norm solution then shares the weight between them.
   const Eigen::VectorXd solution = part.completeOrthogonalDecomposition().solve(right);
   for (std::size_t i = 0; i < index.size(); ++i) result[index[i]] = solution[at(i)];
   return result;
 }
 
-/// One over the number of flights of each flight's group.
+/// Weight of each flight: one over the number of flights in its group.
 std::vector<double> group_weights(const std::vector<FlownPeak>& flights) {
   std::map<std::string, int> count;
   for (const FlownPeak& flight : flights) ++count[flight.group];
@@ -55,7 +55,7 @@ std::vector<double> largest_finite(const std::vector<FlownPeak>& flights) {
   return largest;
 }
 
-/// A loop that the model calls unstable has flown all the same: it counts as the worst of the stable ones.
+/// A loop that the model calls unstable was flown nevertheless: it counts as the worst of the stable loops.
 double finite_part(double part, double largest) { return std::isfinite(part) ? part : largest; }
 
 double prediction_m(const FlownPeak& flight, const std::vector<double>& weights,
@@ -128,7 +128,8 @@ std::vector<double> fit_peak_weights(const std::vector<FlownPeak>& flights,
   const std::vector<double> shares = group_weights(flights);
   Eigen::VectorXd predicted = peaks, scaled = Eigen::VectorXd::Zero(at(n));
   for (int round = 0; round < kFitRounds; ++round) {
-    // log(predicted) about the present prediction p: log(p) + (predicted - p)/p. The residual is relative to p.
+    // Linearises log(predicted) about the present prediction p: log(p) + (predicted - p)/p. The residual is relative
+    // to p.
     Eigen::VectorXd weight(predicted.size()), target(predicted.size());
     for (Eigen::Index i = 0; i < predicted.size(); ++i) {
       const double residual = std::log(predicted[i] / peaks[i]);

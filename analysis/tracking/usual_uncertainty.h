@@ -1,4 +1,4 @@
-/// @file How uncertain a vehicle is taken to be where nobody says: the defaults of `bound --uncertain` and of the gate.
+/// @file Default uncertainty of a vehicle, used by `bound --uncertain` and the gate.
 #pragma once
 
 #include "stability/bounds/tracking_bounds.h"
@@ -8,7 +8,7 @@ namespace swarmcert::analysis {
 
 inline Interval about(double value, double share) { return {value * (1 - share), value * (1 + share)}; }
 
-/// Mass within 5 %, thrust scale within 10 %, motor lag and delay within 20 % of what model and gains say.
+/// Returns mass within 5 %, thrust scale within 10 %, motor lag and delay within 20 % of the values in model and gains.
 inline stability::UncertainPlant usual_uncertainty(const stability::Gains& gains,
                                                    const stability::Plant& plant) {
   return {about(plant.mass_kg, 0.05), about(plant.thrust_scale, 0.1), about(gains.motor_lag_s, 0.2),

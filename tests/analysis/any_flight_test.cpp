@@ -1,4 +1,4 @@
-/// Flights of any name and vehicle: how they are found and grouped, judged axis by axis, inspected and drafted.
+/// Flights with arbitrary names and vehicles: discovery and grouping, judgement axis by axis, inspection, drafts.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -36,7 +36,8 @@ std::string hover_csv(double start_s, double duration_s) {
 }
 
 TEST(SmoothingWindow, AveragesAForceAsTheDerivativeOfItsVelocityAveragesIt) {
-  // A force that is linear between uneven records has exactly these integrals: both sides must agree to rounding.
+  // A force that is linear between unevenly spaced records has exactly these integrals, so both sides agree up to
+  // rounding.
   for (const auto source : {logs::ForceSource::kVelocity, logs::ForceSource::kPosition}) {
     residuals::SmoothingWindow force(source, 0.1, 1), motion(source, 0.1, 1);
     std::mt19937 random(3);
@@ -210,7 +211,7 @@ TEST(AnyFlight, AMassOfOneLogShiftsItsResidualByItsWeight) {
   EXPECT_NEAR(after - before, 0.010 * 9.81, 1e-3) << "10 g more than the model's 34 g";
 }
 
-/// compare gives an answer for every one of `paths`.
+/// Expects that compare gives an answer for every one of `paths`.
 void expect_answers(const std::vector<std::string>& paths, const files::Json& force_axes, int fewest = 100) {
   const ScratchFolder folder;
   for (const std::string& path : paths) {
@@ -246,7 +247,7 @@ TEST(AnyFlight, TheWholeOfEveryCollectionHasAnAnswer_slow) {
     const files::Json json = result_of(folder, "compare " + small_model() + " " + data + name, "compare");
     EXPECT_EQ(json["flights"].size(), logs) << name;
     std::size_t judged = 0;
-    // Named by independent scripts; the second topples within a third of a second after its first gap.
+    // Identified by independent scripts; the second topples within a third of a second after its first gap.
     const std::set<std::string> crashed = {"log30", "log88_2_yaw"};
     for (const files::Json& flight : json["flights"]) {
       if (flight["samples"].get<int>() > 0)
@@ -288,7 +289,7 @@ TEST(AnyFlight, InspectSaysWhereSignalsComeFromAndWhatToLogNext) {
 
 TEST(ModelDraft, FindsTheThrustRatioOfUpgradedMotors) {
   SWARMCERT_NEEDS_DATA();
-  // Mean of mass over commanded thrust of the flights with upgraded motors: 1.39 to 1.60 (independent scripts).
+  // Mean of mass over commanded thrust for the flights with upgraded motors: 1.39 to 1.60 (independent scripts).
   const ScratchFolder folder;
   const std::string logs =
       std::filesystem::absolute(data_path("collections/crazyswarm2-tools/logs/")).string();

@@ -1,4 +1,4 @@
-/// Flights of vehicles of any size and number of rotors; logs that share a clock; damaged logs; the page of inspect.
+/// Vehicles of any size and number of rotors; logs with a common clock; damaged logs; the page of inspect.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kHexMass_kg = 2.2, kHover = 0.5;
 
-/// Six rotors of which each gives a sixth of the weight at kHover, quadratically.
+/// Six rotors with a quadratic thrust map, each giving a sixth of the weight at kHover.
 std::string hexacopter() {
   const double coefficient_N = kHexMass_kg * 9.81 / 6 / (kHover * kHover);
   std::string rotors;
@@ -32,14 +32,14 @@ std::string hexacopter() {
       kHexMass_kg, rotors, coefficient_N);
 }
 
-/// On the ground for 2 s, up by 1.2 m within 2 s, then a hover that rises and falls a little; 20 s at 100 Hz. The
-/// commands are those that this needs. `front` is the command of rotor 1 over that of the others.
+/// On the ground for 2 s, up by 1.2 m within 2 s, then a hover that rises and falls slightly; 20 s at 100 Hz. The
+/// commands are those that this motion needs. `front` is the command of rotor 1 over that of the others.
 std::string hexacopter_csv(double front, double start_s = 0, double x_m = 0) {
   constexpr double kPi = 3.14159265358979, kSlow_1_s = 0.3;
   std::string text = "t,px,py,pz,vx,vy,vz,qx,qy,qz,qw,battery";
   for (int k = 1; k <= 6; ++k) text += fmt::format(",motor_command_{}", k);
   text += "\n";
-  const double rear = std::sqrt(2 - front * front);  // rotor 4 takes away what rotor 1 gives
+  const double rear = std::sqrt(2 - front * front);  // rotor 4 compensates for rotor 1
   for (int k = 0; k < 2000; ++k) {
     const double t = 0.01 * k, rising = std::min(std::max(t - 2, 0.0), 2.0), hovering = std::max(t - 4, 0.0);
     const double z =
@@ -77,13 +77,13 @@ TEST(AnyVehicle, AHexacoptersForceAndTorqueFollowFromItsRotorsAndTheirCommands) 
     EXPECT_GT(json["overall"]["samples"].get<int>(), 1000);
     EXPECT_LT(json["overall"]["rmse"]["z"].get<double>(), 0.1) << "newton, of a weight of 21.6 N";
     EXPECT_EQ(json["flights"][0]["judged"]["torque"], files::Json({"x", "y", "z"}));
-    // Rotor 1 is in front, rotor 4 behind: with u1 = 1.1 the first gives 1.21, the other 0.79 of a sixth of the weight.
-    // The residual is what else must balance them.
+    // Rotor 1 is in front, rotor 4 behind: with u1 = 1.1 rotor 1 gives 1.21 and rotor 4 gives 0.79 of a sixth of the
+    // weight. The residual is the torque that balances them.
     const double each_N = kHexMass_kg * 9.81 / 6, more = std::string(log) == "even.csv" ? 0 : 0.21;
     const files::Json& mean = json["flights"][0]["torque"]["slow_flight"]["mean"];
     EXPECT_NEAR(mean["x"].get<double>(), 0, 1e-6);
     EXPECT_NEAR(mean["y"].get<double>(), 0.3 * 2 * more * each_N, 0.01);
-    // Rotor 1 turns counter-clockwise, its reaction is clockwise; rotor 4 the other way.
+    // Rotor 1 turns counter-clockwise, so its reaction torque is clockwise; for rotor 4 it is the opposite.
     EXPECT_NEAR(mean["z"].get<double>(), 0.016 * 2 * more * each_N, 0.0005);
   }
 }
@@ -135,7 +135,7 @@ TEST(ModelDraft, TakesRotorsFromTheParametersOfAPx4Log) {
   EXPECT_TRUE(model.rotors[1].counterclockwise);
   EXPECT_FALSE(model.rotors[2].counterclockwise);
   ASSERT_TRUE(model.thrust_curve_N.has_value());
-  // The weight at a mean command of 0.47 .. 0.51, linearly.
+  // The weight at a mean command of 0.47 .. 0.51, with a linear map.
   EXPECT_NEAR(model.thrust.force_N(0.489, 16), 1.5 * 9.81 / 4, 0.05 * 1.5 * 9.81 / 4);
   bool from_parameters = false;
   for (const files::Json& parameter : json["parameters"]) {
@@ -146,7 +146,7 @@ TEST(ModelDraft, TakesRotorsFromTheParametersOfAPx4Log) {
   EXPECT_TRUE(from_parameters);
   const files::Json compared = json_of(folder, "compare m.toml " + log, "compare");
   EXPECT_EQ(compared["unit"], "N");
-  // The residual that independent scripts find is 0.13 m/s^2; these seconds are a part of the flight.
+  // Independent scripts find a residual of 0.13 m/s^2; these seconds are a part of the flight.
   EXPECT_LT(compared["overall"]["rmse"]["total"].get<double>(), 1.5 * 0.13);
 }
 
@@ -175,8 +175,8 @@ TEST(Clocks, OffsetsOfLogsWithAbsoluteTimesAreTheDifferencesOfTheirClocks) {
   const std::vector<residuals::Track> tracks = inputs.load(0, problems);
   ASSERT_EQ(tracks.size(), 2u);
   EXPECT_TRUE(tracks[1].has_absolute_clock);
-  // The right one began 3.5 s after the left one: its first record is at 3.5 s of the left one's clock, which began at
-  // 0.
+  // The right log began 3.5 s after the left one, so its first record is at 3.5 s on the left log's clock, which
+  // starts at 0.
   EXPECT_NEAR(tracks[1].instants.front().time_s - tracks[0].instants.front().time_s, 3.5, 1e-6);
   const files::Json json = json_of(folder, "compare .", "compare");
   EXPECT_EQ(json["clocks"]["absolute"], 1);
@@ -210,14 +210,14 @@ TEST(Keep, DamagedLogsAreLeftOutOfFitsAndNamedUnlessTheyAreKept) {
     EXPECT_EQ(tracks[0].position_only, !keep);
     EXPECT_EQ(problems.size(), keep ? 0u : 1u);
   }
-  // Judging is no fit.
+  // compare judges but does not fit, so it accepts the damaged log.
   EXPECT_GT(json_of(folder, "compare damaged.csv", "compare")["overall"]["samples"].get<int>(), 1000);
 }
 
 TEST(Keep, ImplausibleLogsAreJudgedWhereTheyAreKept) {
   const ScratchFolder folder;
   std::string text = "t,px,py,pz,vx,vy,vz,qx,qy,qz,qw,m1,m2,m3,m4,vbat\n";
-  for (int k = 0; k < 1500; ++k)  // the position moves 30 times as far as the velocity says
+  for (int k = 0; k < 1500; ++k)  // the position moves 30 times as far as the velocity implies
     text += fmt::format("{:.2f},{:.5f},0,1,{:.6f},0,0,0,0,0,1,0.6,0.6,0.6,0.6,3.8\n", 0.01 * k,
                         0.9 * std::sin(0.01 * k), 0.03 * std::cos(0.01 * k));
   write_text(folder / "log.csv", text);

@@ -23,7 +23,7 @@ TEST(BoundCommand, TheTheoremAppliesToIsotropicCompositeGainsWithTheBallOfTheRef
   EXPECT_TRUE(result["theorem"]["why_not"].empty());
   EXPECT_LE(result["vector"]["peak_gain"][0].get<double>(), 0.45955882352941174 + 1e-12);
   EXPECT_GE(result["vector"]["peak_gain"][1].get<double>(), 0.45955882352941174 - 1e-12);
-  EXPECT_EQ(result["exact"].size(), 12u);  // four channels; no rate_hz: continuous only
+  EXPECT_EQ(result["exact"].size(), 12u);  // four channels; without rate_hz only the continuous loop
 }
 
 TEST(BoundCommand, WritesACertificateOfTheGainsOfBothLoopsThatCheckAccepts) {
@@ -103,9 +103,9 @@ TEST(BoundCommand, WhatFloat32CostsIsPartOfTheErrorBudget) {
   }
 }
 
-/// Gains and mass of a flight of a Crazyflie whose z loop had no integrator and whose thrust was 0.1279 N off: it
-/// hovered
-/// 0.117 m from its set point in the mean, 0.1137 m of which the bias explains (IMRCLab/crazyswarm2-tools, log 58).
+/// Gains and mass of a flight of a Crazyflie whose z loop had no integrator and whose thrust was 0.1279 N off. It
+/// hovered 0.117 m from its setpoint on average, of which the bias explains 0.1137 m (IMRCLab/crazyswarm2-tools, log
+/// 58).
 std::string biased_flight(const ScratchFolder& folder) {
   std::string model = read_text(kSourceFolder + "/stability/models/crazyflie-small.toml");
   const std::size_t at = model.find("mass_kg = ");
@@ -172,7 +172,7 @@ TEST(BoundCommand, ErrorsOfTheEstimatesEnterWhereTheyActAndAreInEveryTotal) {
                 1e-12);
     EXPECT_GE(row["total"].get<double>(), row["amplitude"].get<double>());
   }
-  // A wrong velocity is a force of m Kd times it, in the command.
+  // A velocity error acts like a force of m Kd times the error in the command.
   const Json row = {{"axis", "z"}, {"loop", "continuous"}};
   EXPECT_NEAR(gains_of(row, "velocity")["amplitude"].get<double>(),
               0.0375 * 9 * gains_of(row, "command")["amplitude"].get<double>(), 1e-12);
@@ -194,7 +194,7 @@ TEST(BoundCommand, EveryClassOfAnErrorOfAnEstimateCounts) {
   };
   const double amplitude_m = part_of(" --velocity-error 0.1", "velocity_error");
   EXPECT_GT(amplitude_m, 0.05);
-  // Per unit: the gains that are printed.
+  // The printed gains are per unit.
   const Json exact = json_of(folder, "bound" + gains)["exact"];
   for (const Json& row : exact) {
     if (row["axis"] != "z" || row["loop"] != "sampled" || row["channel"] != "velocity") continue;
@@ -208,7 +208,7 @@ TEST(BoundCommand, EveryClassOfAnErrorOfAnEstimateCounts) {
   }
   const double both_m = part_of(" --velocity-error 0.1 --velocity-error-rate 0.1", "velocity_error");
   EXPECT_LT(both_m, amplitude_m);
-  // Who follows a wrong position that drifts slowly is off by little more than that.
+  // A vehicle that follows a slowly drifting position error is off by little more than that error.
   const double drift_m = part_of(" --position-error 0.02 --position-error-rate 0.001", "position_error");
   EXPECT_LT(drift_m, part_of(" --position-error 0.02", "position_error"));
   EXPECT_GT(drift_m, 0.02);
@@ -233,7 +233,7 @@ TEST(BoundCommand, AMovingSetPointIsAPartOfEveryTotal) {
     if (row["axis"] != "z") {
       EXPECT_EQ(part_m, 0);
     } else if (row["loop"] == "continuous") {
-      // The floor of the lag times what the set point asks of the force.
+      // The lag floor times the change of force that the setpoint requires.
       EXPECT_NEAR(part_m, moving["axes"][2]["lag_floor_rate"].get<double>() * 0.034 * 5, 1e-9);
     } else {
       EXPECT_GT(part_m, moving["axes"][2]["lag_floor_rate"].get<double>() * 0.034 * 5);
@@ -373,7 +373,7 @@ TEST(BoundCommand, TheReportPlotsTheErrorInsideTheBallAndTheTube) {
   const std::string command =
       "swarmcert bound" + gains + " --rate 0.5 --amplitude 0.1 --initial-error 0.1 --report r";
   ASSERT_EQ(run_shell(command, folder.path()).exit_code, 0);
-  EXPECT_EQ(run_shell(command, folder.path()).exit_code, 3);  // nothing is overwritten
+  EXPECT_EQ(run_shell(command, folder.path()).exit_code, 3);  // existing files are not overwritten
   EXPECT_NE(read_text(folder / "r/report.html").find("Rests on"), std::string::npos);
   std::istringstream data(read_text(folder / "r/theorem.dat"));
   std::string line;
@@ -386,7 +386,7 @@ TEST(BoundCommand, TheReportPlotsTheErrorInsideTheBallAndTheTube) {
     last = ramp;
   }
   EXPECT_GT(rows, 300);
-  EXPECT_GT(last, 0.99 * ball);  // the worst of its class reaches the ball
+  EXPECT_GT(last, 0.99 * ball);  // the worst disturbance of the class nearly reaches the ball
   std::istringstream tube(read_text(folder / "r/tube_z.dat"));
   std::getline(tube, line);
   double bound = 0, width = 0, error = 0, force = 0;

@@ -13,7 +13,7 @@ namespace {
 
 using files::Json;
 
-/// Gain sets that flew: 111 without a limit cycle, 119 and one axis of 29 with one.
+/// Gain sets used in flight: 111 without a limit cycle, 119 and one axis of 29 with one.
 TEST(BoundCommand, SaysWhichGainsAreCloseToALimitCycleOfTheAttitudeLoop) {
   const ScratchFolder folder;
   std::string model = read_text(kSourceFolder + "/stability/models/crazyflie-small.toml");
@@ -62,7 +62,7 @@ TEST(BoundCommand, TakesTheGainsOfTheAttitudeLawFromTheFileThatFlies) {
   EXPECT_TRUE(attitude_of(lag, "").is_null());
   EXPECT_EQ(attitude_of("[attitude]\nKR = 1\nKw = 1\n" + lag, " --attitude-gains 0.007,0.00115,0.03"), told)
       << "the option comes first";
-  // About the axes of the body: x is reached by a tilt about y.
+  // The gains are about body axes: motion along x requires a tilt about y.
   const Json softer = attitude_of("[attitude]\nKR = [0.007, 0.003, 1]\nKw = 0.00115\nKI = 0.03\n" + lag, "");
   EXPECT_EQ(softer[1], told[1]);
   EXPECT_NE(softer[0], told[0]);
@@ -77,7 +77,7 @@ TEST(BoundCommand, TakesTheGainsOfTheAttitudeLawFromTheFileThatFlies) {
   EXPECT_NE(half.output.find("Kw"), std::string::npos) << half.output;
 }
 
-/// Where Lambda and K couple axes, these have one row, as one loop; the others keep their own.
+/// Axes coupled by Lambda and K have one common row for their joint loop; the other axes keep their own rows.
 TEST(BoundCommand, CoupledAxesHaveMarginsOfTheAttitudeLoopAsOneLoop) {
   const ScratchFolder folder;
   const std::string law =
@@ -101,7 +101,7 @@ TEST(BoundCommand, CoupledAxesHaveMarginsOfTheAttitudeLoopAsOneLoop) {
   EXPECT_GT(std::abs(pair[0]["damping"].get<double>() - least), 1e-3) << pair[0];
   EXPECT_TRUE(pair[0]["exact"].is_null());
   EXPECT_NE(pair[0]["why_no_exact"].get<std::string>().find("coupled"), std::string::npos);
-  // As little coupling as can be changes as little.
+  // A tiny coupling changes the result only slightly.
   const Json hardly =
       result_of("Lambda = [[1.2, 1e-9, 0], [1e-9, 1.8, 0], [0, 0, 2]]\nK = [0.12, 0.15, 0.2]\n");
   for (const char* const margin : {"gain_margin", "delay_margin_s"}) {
@@ -121,11 +121,11 @@ TEST(BoundCommand, CoupledAxesHaveMarginsOfTheAttitudeLoopAsOneLoop) {
                                                "[0, 0, 2]]\nK = 0.12\n" +
                                                    law),
                 folder.path());
-  EXPECT_NE(text.output.find("as one loop, all motors together"), std::string::npos) << text.output;
+  EXPECT_NE(text.output.find("as one loop with all motors"), std::string::npos) << text.output;
 }
 
-/// A result of compare whose flights had these amplitudes along all axes, and otherwise anything.
-/// @param velocity_m_s amplitude of the error of the velocity of every flight; 0: not measured.
+/// A result of compare whose flights had these amplitudes along all axes; the other values are arbitrary.
+/// @param velocity_m_s amplitude of the velocity error of every flight; 0: not measured.
 std::string compared_flights(const ScratchFolder& folder, const std::vector<double>& amplitudes,
                              double velocity_m_s = 0) {
   Json flights = Json::array();
@@ -165,7 +165,7 @@ TEST(BoundCommand, PromisesAFurtherFlightTheBoundOfTheRankThatConformalPredictio
   // k = ceil(0.9 * 20) = 18 of 19: Beta(18, 2), quantiles by the incomplete beta function.
   EXPECT_NEAR(promise["interval"][0].get<double>(), 0.7736, 1e-3);
   EXPECT_NEAR(promise["interval"][1].get<double>(), 0.9810, 1e-3);
-  // The bound of the class of the 18th flight, whose rate says nothing.
+  // The bound for the class of the 18th flight, whose rate gives no bound.
   const Json of_class = json_of(folder, "bound" + gains + " --amplitude 0.18");
   ASSERT_EQ(promise["bounds"].size(), of_class["bounds"].size());
   for (std::size_t k = 0; k < promise["bounds"].size(); ++k) {

@@ -1,4 +1,4 @@
-// bound as a user runs it: what the force error is known from, uncertain and coupled loops, swarms.
+// bound as a user runs it: sources of the force error, uncertain and coupled loops, swarms.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -99,7 +99,7 @@ TEST(BoundCommand, TheErrorOfTheVelocityThatFlightsShowedIsAChannelOfItsOwn) {
       EXPECT_EQ(part_m, 0);
     }
   }
-  // A fast error of y counts by its amplitude, a slow one of x by less than that.
+  // A fast error of y counts by its amplitude, a slow error of x by less than that.
   for (const Json& exact : both["exact"]) {
     if (exact["channel"] != "velocity" || exact["loop"] != "continuous") continue;
     const auto part_of = [&](const char* axis) {
@@ -116,7 +116,7 @@ TEST(BoundCommand, TheErrorOfTheVelocityThatFlightsShowedIsAChannelOfItsOwn) {
       EXPECT_NEAR(part_of("y"), 0.02 * gain, 1e-6);
     }
   }
-  // The tube over time contains what was measured of the velocity, too.
+  // The tube over time also contains the measured velocity error.
   const auto last_of = [&](const std::string& more) {
     return json_of(folder, "bound" + gains + " --from both.json --tube" + more)["tube"][0]["at"]
         .back()["error_m"]
@@ -125,7 +125,7 @@ TEST(BoundCommand, TheErrorOfTheVelocityThatFlightsShowedIsAChannelOfItsOwn) {
   EXPECT_GT(last_of(""), last_of(" --velocity-error 0") + 1e-3);
 }
 
-/// Flights with an effect that the model lacks; what compare says of them bounds the errors that they had.
+/// Flights with an effect that the model lacks: the result of compare bounds the errors in these flights.
 TEST(BoundCommand, MeasuredNumbersOfRealFlightsBoundTheErrorsOfThoseFlights) {
   const ScratchFolder folder;
   const std::string truth = kSourceFolder + "/stability/models/crazyflie-small-effects.toml";
@@ -151,7 +151,7 @@ TEST(BoundCommand, MeasuredNumbersOfRealFlightsBoundTheErrorsOfThoseFlights) {
     EXPECT_LT(row["minimum"].get<double>(), 8 * error_z);
   }
   EXPECT_EQ(rows, 1);
-  // Every window may bring as much again: more than one impulse, less than many.
+  // Every window may contribute as much again: more than a single impulse, but less than many.
   const double one = result["exact"][9]["between_samples"]["impulse"].get<double>();
   const Json compare = files::parse_json(read_text(folder / "compare.json"), "compare.json");
   const double J = compare["learning_error"]["impulse"]["max"]["z"].get<double>();
@@ -189,7 +189,7 @@ TEST(BoundCommand, ADeclaredTruthIsEnclosedAndGivesABall) {
     proved = proved || (a["name"] == "constants of the declared truth" && a["status"] == "proved");
   }
   EXPECT_TRUE(proved);
-  // A network that is to cancel it adds its own rate; without a bound on speed nothing is bounded.
+  // A network that should cancel the force adds its own rate; without a bound on the speed nothing is bounded.
   const Json with_network = json_of(folder, "bound" + gains + truth + " --accel 2 --network " +
                                                 kSourceFolder + "/nn/networks/demo/network.toml");
   EXPECT_GT(with_network["theorem"]["ball"].get<double>(), result["theorem"]["ball"].get<double>());
@@ -220,7 +220,7 @@ TEST(BoundCommand, EnclosuresAndIntervalsContainTheEstimate) {
       EXPECT_GE(result["uncertain"]["gains"][i][gain][1].get<double>(), exact[gain].get<double>()) << gain;
     }
   }
-  // The sampled loop as well, at its samples.
+  // The same for the sampled loop, at its samples.
   const Json sampled = json_of(folder, "bound" + kFlown +
                                            " --verified --uncertain mass=0.034:0.0341 thrust=1:1 "
                                            "lag=0.0575:0.0575 delay=0:0");
@@ -271,7 +271,7 @@ TEST(BoundCommand, ADelayIsVerifiedAndADelayIntervalOnTheFlownGainsEnds) {
       EXPECT_LE(row[gain][0].get<double>(), row[gain][1].get<double>()) << row;
     }
   }
-  // A budget that does not suffice is named, and what was found until then still holds.
+  // An insufficient budget is reported, and the bounds found until then still hold.
   const std::string box = " --uncertain mass=0.032:0.036 thrust=0.9:1.1 lag=0.05:0.065 delay=0:0";
   const Json full = json_of(folder, "bound" + kFlown + box);
   const Json part = json_of(folder, "bound" + kFlown + box + " --loops 20");
@@ -282,7 +282,7 @@ TEST(BoundCommand, ADelayIsVerifiedAndADelayIntervalOnTheFlownGainsEnds) {
     const double lower = full["uncertain"]["gains"][i]["impulse"][0].get<double>();
     EXPECT_TRUE(found["impulse"][1].is_null() || found["impulse"][1].get<double>() >= lower) << found;
   }
-  // Too long for the vehicle: said, not enclosed.
+  // A delay that is too long for the vehicle is reported as unstable instead of enclosed.
   const Json unstable = json_of(
       folder, "bound" + kFlown + " --uncertain mass=0.034:0.034 thrust=1:1 lag=0.0575:0.0575 delay=0:0.3");
   EXPECT_EQ(unstable["uncertain"]["gains"][0]["status"], "unstable");
@@ -352,7 +352,7 @@ TEST(BoundCommand, ASwarmsBoundContainsTheForceDeclaredBesideItsCouplings) {
     for (std::size_t vehicle = 0; vehicle < 2; ++vehicle)
       EXPECT_GE(forced["error_m"][vehicle].get<double>(), alone["error_m"][vehicle].get<double>() + own_m);
   }
-  // The integral takes a constant force over in the long run.
+  // In the long run the integrator compensates for a constant force.
   EXPECT_EQ(json_of(folder, integrates + " --bias 0.01")["swarm"]["of_force"]["error_m"], 0);
   const Outcome missing = run_shell("swarmcert " + integrates + " --impulse 0.01", folder.path());
   EXPECT_EQ(missing.exit_code, 2) << missing.output;
@@ -370,7 +370,8 @@ TEST(BoundCommand, TheShippedSwarmsAreProvedInconclusiveAndRefuted) {
       run_shell("swarmcert bound" + gains + " --swarm " + swarms + "published-pair.toml", folder.path());
   EXPECT_EQ(pair.exit_code, 4) << pair.output;
   EXPECT_NE(pair.output.find("would do"), std::string::npos) << pair.output;
-  // With the integrator that flew (10 written, 2 acting), the third swarm is unstable, and a simulation shows it.
+  // With the integral gain used in flight (10 written, 2 effective), the third swarm is unstable, and a simulation
+  // shows it.
   const Outcome unstable = run_shell(
       "swarmcert bound" + kFlown + " --swarm " + swarms + "unstable-pair.toml --json u.json", folder.path());
   EXPECT_EQ(unstable.exit_code, 1) << unstable.output;

@@ -1,4 +1,4 @@
-/// Which function a certificate is about: the order of layers, blocks, and samples of the trained network.
+/// The function to which a certificate refers: the order of layers, blocks, and samples of the trained network.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,8 +20,8 @@ using tests::write_text;
 
 class CertifiedChain : public tests::CommandLineTest {
  protected:
-  /// A state dict of layers without biases, registered in this order. "shrink", then "grow", has slope 0: what passes
-  /// the first ReLU is multiplied by 0. The other way round it is steep.
+  /// A state dict of layers without biases, registered in this order. "shrink" followed by "grow" has slope 0,
+  /// because the output of the first ReLU is multiplied by 0. The opposite order is steep.
   void write_square(const std::string& first, const std::string& second) {
     const std::vector<tests::TensorSpec> tensors = {{"head.weight", "0", 2, {2, 1}, {1, 1}},
                                                     {first + ".weight", "1", 4, {2, 2}, {2, 1}},
@@ -48,7 +48,8 @@ TEST_F(CertifiedChain, AFileWithSeveralOrdersIsRefusedAndTheGivenOrderIsCertifie
   const auto upper = [&](const std::string& file) {
     return Json::parse(read_text(folder_ / file))["bounds"][0]["upper"].get<double>();
   };
-  // |x| -> 10 relu(x) -> steep keeps the second, 10 times, in the first place -> turn puts it back -> tail: 10^4.
+  // |x| -> 10 relu(x) -> steep keeps the second component, times 10, in the first place -> turn puts it back -> tail:
+  // 10^4.
   EXPECT_GE(upper("steep.json"), 1e4);
   EXPECT_LT(upper("turned.json"), 1);  // the other order is constant
 }
@@ -132,15 +133,15 @@ TEST_F(CertifiedChain, ASmoothActivationIsCertifiedCheckedAndHeldAgainstSamples)
   EXPECT_GE(result["bounds"][0]["upper"].get<double>(), 1e4);  // all slopes are 1 at the origin
   const double lower = result["bounds"][0]["lower"];
   EXPECT_LE(lower, 1e4);
-  EXPECT_GE(lower, 0.9999e4);  // 1.25e-5 from it the last tanh sees t = 1/80, and tanh(t) / t > 1 - t^2 / 3
-  expect("check cert.json " + net, 0, {"accepted", "1 lower bounds", chain});  // as the certificate states
+  EXPECT_GE(lower, 0.9999e4);  // at 1.25e-5 the last tanh has input t = 1/80, and tanh(t) / t > 1 - t^2 / 3
+  expect("check cert.json " + net, 0, {"accepted", "1 lower bounds", chain});  // as stated by the certificate
   expect("certify " + net + " --activation tanh --max-lipschitz 9000", 1, {"verdict: refuted"});
   expect("check cert.json " + net + " --activation tanh", 0, {"accepted", chain});
   expect("check cert.json " + net + " --activation relu", 1, {"rejected", "chain", "ReLU"});
   expect("certify " + net + " --activation sigmoid --max-lipschitz 160", 0,
          {"verdict: proved"});  // 10^4 / 4^3
   expect("certify " + net + " --activation sigmoid --max-lipschitz 150", 4, {"verdict: inconclusive"});
-  // head: (0, 10 x), and so on as above, through tanh: 10 tanh(10 tanh(10 tanh(10 x))).
+  // head: (0, 10 x), and so on as above, with tanh: 10 tanh(10 tanh(10 tanh(10 x))).
   write_text(folder_ / "tanh.csv", "0.01,9.9999950\n-0.002,-9.6210649\n0.1,10.0\n");
   expect("certify " + net + " --activation tanh --samples tanh.csv", 0, {"reproduces 3"});
   expect("certify " + net + " --activation relu --samples tanh.csv", 3, {"--activation"});
@@ -157,7 +158,7 @@ TEST_F(CertifiedChain, SeveralActivationsAndOneAtTheEndAreCertifiedCheckedAndHel
   const Json bound = Json::parse(read_text(folder_ / "out.json"))["bounds"][0];
   EXPECT_GE(bound["upper"].get<double>(), 2500);
   EXPECT_LE(bound["lower"].get<double>(), bound["upper"].get<double>());
-  EXPECT_GT(bound["lower"].get<double>(), 2400);  // within 1e-5 of 0, where the sigmoid sees at most 1/10
+  EXPECT_GT(bound["lower"].get<double>(), 2400);  // within 1e-5 of 0: the sigmoid's input is at most 1/10
   expect("certify " + net + given + " --max-lipschitz 2400", 1, {"verdict: refuted"});
   expect("check cert.json " + net, 0, {"accepted", chain});
   expect("check cert.json " + net + given, 0, {"accepted", chain});
@@ -200,11 +201,12 @@ TEST_F(CertifiedChain, InspectShowsTheActivationAfterEveryLayerButTheLast) {
 
 TEST_F(CertifiedChain, OnABoxASmoothNetworkHasASmallerBoundAndARange) {
   write_square("turn", "steep");
-  // Far from the origin each tanh is flat: the first one between 10 and 11, where its slope is at most 8.3e-9.
+  // Far from the origin every tanh is flat: the input of the first one is between 10 and 11, where its slope is at
+  // most 8.3e-9.
   write_text(folder_ / "box.toml", "schema = \"swarmcert/box/1\"\nlower = [1]\nupper = [1.1]\n");
   const std::string net = "net.pth --order head,steep,turn,tail --activation tanh";
   expect("certify " + net + " --domain box.toml -o cert.json --json out.json", 0,
-         {"over the box", "local_sdp", "Range over the box", "Nothing is said of a float32 evaluation"});
+         {"over the box", "local_sdp", "Range over the box", "This says nothing about a float32 evaluation"});
   const Json result = Json::parse(read_text(folder_ / "out.json")), bound = result["bounds"][0];
   EXPECT_EQ(bound["domain"], "box");
   EXPECT_LT(bound["upper"].get<double>(), 1e-2);
@@ -216,7 +218,7 @@ TEST_F(CertifiedChain, OnABoxASmoothNetworkHasASmallerBoundAndARange) {
   EXPECT_GE(range["upper"].get<double>(), range["upper_witness"]["value"].get<double>());
   EXPECT_TRUE(result["float32_error"].empty());
   expect("check cert.json " + net, 0, {"accepted"});
-  // Another behind each layer, and one at the end.
+  // A different activation after each layer, and one at the end.
   const std::string mixed = "net.pth --order head,steep,turn,tail --activation relu,tanh,gelu,sigmoid";
   expect("certify " + mixed + " --domain box.toml -o mixed.json", 0, {"local_sdp", "Range over the box"});
   expect("check mixed.json " + mixed, 0, {"accepted"});
@@ -240,7 +242,7 @@ TEST_F(CertifiedChain, MapsOfSmoothNetworksNameWhatProvesACell) {
     EXPECT_LE(cell["lower"], cell["upper"]);
   }
   EXPECT_NE(map["cells"][0]["upper_method"], "everywhere");
-  // The gradient of tanh(3 x) + tanh(2 y) is steepest at the cell's end (-1, -2/3).
+  // The gradient of tanh(3 x) + tanh(2 y) is steepest at the corner (-1, -2/3) of the cell.
   const double steepest = std::hypot(3 / std::pow(std::cosh(3), 2), 2 / std::pow(std::cosh(4.0 / 3), 2));
   EXPECT_GE(map["cells"][0]["upper"].get<double>(), steepest);
   EXPECT_LT(map["cells"][0]["upper"].get<double>(), 1.02 * steepest);

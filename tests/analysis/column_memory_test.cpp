@@ -1,4 +1,4 @@
-/// What is kept between passes changes no result.
+/// Columns kept between passes do not change any result.
 #include "analysis/identification/column_memory.h"
 
 #include <gtest/gtest.h>
@@ -43,7 +43,8 @@ class Remembered : public testing::Test {
     return identification::candidate(name, inputs_.models[0], covered_);
   }
 
-  /// As a selection and its refinement ask: all candidates, some of them, one off the grid, all with it.
+  /// Requests as made by a selection and its refinement: all candidates, some of them, one off the grid, all
+  /// including it.
   std::vector<std::pair<std::vector<Candidate>, Kept>> requests() const {
     std::vector<Candidate> all = identification::all_candidates(inputs_.models[0], covered_);
     std::vector<Candidate> some = {candidate("downwash"), candidate("vehicle_offset"),
@@ -87,7 +88,7 @@ void expect_alike(const Grams& kept, const Grams& anew) {
 }
 
 TEST_F(Remembered, GramsAreThoseOfAPassWithoutMemoryWhateverWasAskedBefore) {
-  // With room for everything, for the first request only, and for nothing.
+  // With memory for everything, for the first request only, and for nothing.
   const std::size_t column_bytes = 3 * sizeof(double) * covered_.records;
   const int columns = identification::columns_of(requests()[0].first).columns;
   for (const std::size_t room :
@@ -118,7 +119,7 @@ TEST_F(Remembered, InstrumentsAreTheSameBitsWithMemoryAskedOnceOrTwice) {
   ASSERT_EQ(anew.size(), effects.size());
   const auto memory = std::make_shared<ColumnMemory>(2, covered_.records);
   for (int time = 0; time < 2; ++time) {
-    // The second time from recent columns, not from the results.
+    // The second time the recent columns are used, not the stored results.
     memory->instrumented.clear();
     const auto known = instrument(passes(memory), effects);
     ASSERT_EQ(known.size(), anew.size());

@@ -19,7 +19,7 @@ using tests::write_text;
 
 class CommandLine : public tests::CommandLineTest {
  protected:
-  /// A 2-2-1 network f(x) = relu(3 x1) + relu(-3 x1 + x2): its Lipschitz constant is sqrt(10), its product bound
+  /// A 2-2-1 network f(x) = relu(3 x1) + relu(-3 x1 + x2). Its Lipschitz constant is sqrt(10), its product bound is
   /// larger.
   files::Weights small_network() {
     files::Weights weights;
@@ -59,7 +59,7 @@ TEST_F(CommandLine, TwoOutputsIntoOneFileAreRefusedBeforeAnyWork) {
 }
 
 TEST_F(CommandLine, AnOutputInAFolderThatDoesNotExistIsRefusedBeforeAnyWork) {
-  // The inputs do not exist either, and are not looked at.
+  // The inputs do not exist either, but are not read.
   expect("certify nowhere.pth -o typo/cert.json", 3, {"typo/cert.json", "folder that does not exist"});
   expect("add drag_linear --model nowhere.toml nowhere -o typo/fitted.toml", 3,
          {"folder that does not exist"});
@@ -84,7 +84,7 @@ TEST_F(CommandLine, SignalsEndACertificationWithWhatIsProvedAndSaySo) {
     const Outcome outcome = tests::run_shell(
         "timeout -s " + signal + " 2 sh -c 'exec " + certify + " --max-lipschitz 2.5'; echo exit $?",
         folder_.path());
-    // timeout reports 124; what the command itself ends with is in its result.
+    // timeout reports 124; the exit code of the command itself is in its result.
     EXPECT_NE(outcome.output.find("interrupted: the search for steep slopes"), std::string::npos)
         << outcome.output;
     const Json result = Json::parse(read_text(folder_ / "out.json"));
@@ -117,7 +117,7 @@ TEST_F(CommandLine, BadInputNamesFileFieldValueAndMend) {
   expect("certify empty.pth", 3, {"empty.pth", "empty"});
   write_text(folder_ / "noise.pth", "this is no weight file");
   expect("inspect noise.pth", 3, {"noise.pth"});
-  // The writer refuses such weights as the reader does, so the file is made from a sound one.
+  // The writer rejects such weights as the reader does, so the file is made from a valid one.
   saved(small_network(), "nan.safetensors");
   std::string bytes = read_text(folder_ / "nan.safetensors");
   const float one = 1;
@@ -151,7 +151,7 @@ TEST_F(CommandLine, CheckRejectsAnotherNetworkAndADamagedCertificate) {
   const std::string net = saved(small_network(), "net.safetensors");
   ASSERT_EQ(run("certify " + net + " -o cert.json").exit_code, 0);
   files::Weights other = small_network();
-  other.layers[0].weights[0] = 3.0000002384185791;  // one bit further
+  other.layers[0].weights[0] = 3.0000002384185791;  // one unit in the last place larger
   saved(other, "other.safetensors");
   expect("check cert.json other.safetensors", 1, {"rejected", "other.safetensors"});
   std::string text = read_text(folder_ / "cert.json");

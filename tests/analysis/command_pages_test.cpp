@@ -26,7 +26,7 @@ class CommandPages : public testing::Test {
     return outcome.output;
   }
 
-  /// The options that --help lists, as the parser's own formatter prints them: independent of the pages.
+  /// The options listed by --help, as printed by the parser's own formatter and therefore independent of the pages.
   std::set<std::string> options_of(const std::string& command) const {
     std::set<std::string> options;
     std::istringstream lines(text_of("swarmcert " + command + " --help"));
@@ -43,7 +43,7 @@ class CommandPages : public testing::Test {
   ScratchFolder folder_;
 };
 
-/// From `start` to the next of `end`.
+/// The text from `start` to the next occurrence of `end`.
 std::string section(const std::string& page, const std::string& start, const std::string& end) {
   const std::size_t from = page.find(start);
   if (from == std::string::npos) return "";
@@ -88,7 +88,7 @@ TEST_F(CommandPages, ManualPagesHaveTheVersionAndNoWarnings) {
 TEST_F(CommandPages, TabCompletesInAnInteractiveBash) {
   text_of("swarmcert --bash-completion > completion && bash -n completion");
   tests::write_text(folder_ / "weights.pth", "");
-  // The shell reads keys from a terminal, and runs a function in place of the tool.
+  // The shell reads keys from a terminal and runs a function in place of the tool.
   tests::write_text(folder_ / "keys",
                     "PS1=; source ./completion; swarmcert() { printf 'words:%s\\n' \"$*\"; }\n"
                     "swarmcert certi\t weig\t --meth\tbr\t --gamma 3\n"

@@ -20,8 +20,8 @@ using Eigen::Index;
 
 constexpr int kFlights = 6, kSamples = 400;
 
-/// Flights of a small vehicle with one or two neighbours, a smooth force, and an error of each flight's own; the last
-/// flight tests.
+/// Flights of a small vehicle with one or two neighbours, a smooth force, and an individual error per flight; the
+/// last flight is a test flight.
 LearningData flights() {
   LearningData data;
   data.layout = training::Layout(
@@ -117,7 +117,7 @@ TEST(CrossFit, JudgesEveryFlightByTheNetworkThatWasNotFittedToIt) {
   LearningData data = flights();
   const CrossFit fit = cross_fit(quick(), 3, data);
   ASSERT_EQ(fit.members.size(), 3u);
-  // Flight 1 is in the second fold: its labels decide nothing but the epoch of the second network.
+  // Flight 1 is in the second fold: its labels influence only the epoch of the second network.
   LearningData other = flights();
   const TrackSamples& judged = other.tracks[1];
   for (Index s = judged.begin; s < judged.end; ++s)

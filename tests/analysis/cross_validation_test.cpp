@@ -24,7 +24,7 @@ Candidate one_column(const std::string& name, double lower = -kInfinity, double 
   return candidate;
 }
 
-/// Blocks of random columns and what is left of them: 2 times column 0, 0.5 times column 1, and white noise.
+/// Blocks of random columns and residuals: 2 times column 0, 0.5 times column 1, and white noise.
 class Blocks {
  public:
   explicit Blocks(int count, int flights = 1) {
@@ -97,7 +97,7 @@ TEST(CrossValidation, BlockErrorsAddUpToTheMeanSquare) {
   }
 }
 
-/// One flight is unlike the others: left out as a whole, it cannot lend its blocks to the fit that is judged on it.
+/// One flight differs from the others: if it is left out as a whole, its blocks cannot influence the fit judged on it.
 TEST(CrossValidation, WholeFlightsAreLeftOutWhereThereAreFive) {
   Blocks blocks(50, 5);
   for (Block& block : blocks.grams.blocks) {

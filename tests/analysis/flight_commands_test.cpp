@@ -1,4 +1,4 @@
-/// compare, diagnose and add on the command line: too little data, wrong words, injected effects, reports.
+/// compare, diagnose and add on the command line: too little data, invalid arguments, injected effects, reports.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -80,7 +80,7 @@ TEST(FlightCommands, RefuseToInjectTwoLogsIntoOneFile) {
   EXPECT_FALSE(std::filesystem::exists(folder / "injected"));
 }
 
-/// One good log, one of which a line is damaged, one empty.
+/// One good log, one with a damaged line, one empty log.
 TEST(FlightCommands, WarnOfLogsThatAreDamagedOrCannotBeRead) {
   const ScratchFolder folder;
   fly(folder, 40, "flights");
@@ -114,14 +114,14 @@ TEST(FlightCommands, InjectAnEffectThatDiagnoseFindsAndAddTakesOutAgain) {
       << "nothing is overwritten";
   const files::Json ranking =
       result_of(folder, "diagnose " + small_model() + " injected --report report", "diagnose")["ranking"];
-  // The flight itself has the motors' lag that its gains assume.
+  // The flight itself has the motor lag that its gains assume.
   const auto drag = std::find_if(ranking.begin(), ranking.end(),
                                  [](const files::Json& entry) { return entry["effect"] == "drag_linear"; });
   ASSERT_NE(drag, ranking.end()) << ranking.dump(1);
   EXPECT_NEAR((*drag)["parameters"]["drag_N_s_m"]["value"].get<double>(), 0.03, 0.003);
   EXPECT_NE(read_text(folder / "report/report.html").find("drag_linear"), std::string::npos);
   EXPECT_NE(read_text(folder / "report/ranking_1.dat").find("drag_linear"), std::string::npos);
-  // What was put in is what the model takes out: the residual is as it was, but for the log's rounding.
+  // The model removes exactly what was injected: the residual is unchanged up to the rounding of the log.
   const double after =
       result_of(folder, "compare truth.toml injected", "compare")["overall"]["rmse"]["total"];
   EXPECT_NEAR(after, before, 0.002 * before);

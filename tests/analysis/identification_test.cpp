@@ -53,7 +53,7 @@ TEST(BoxLeastSquares, MeetsTheConditionsOfAnOptimumWithinBounds) {
   EXPECT_GT(free, 50);
 }
 
-/// Forty blocks of white noise; the one candidate's column is as random as the residual.
+/// Forty blocks of white noise; the column of the only candidate is as random as the residual.
 struct WhiteNoise {
   static constexpr int kBlocks = 40, kRows = 600;
   std::vector<Eigen::VectorXd> column, residual;
@@ -74,7 +74,7 @@ struct WhiteNoise {
     candidate.info = stability::effect_info("drag_linear");
     candidate.thetas = {{}};
   }
-  /// With `size` times the column in the residual.
+  /// Adds `size` times the column to the residual.
   Grams grams(double size) const {
     Grams result;
     result.candidates = {candidate};
@@ -107,8 +107,8 @@ TEST(Detectable, SizesAreWhereInjectionsBeginToShow) {
   }
 }
 
-/// A process of first order, whose mean has the variance (1 + rho) / (1 - rho) / n in long series. Blocks are its
-/// values less their mean, as residuals of a fit are.
+/// A first-order process, whose mean has the variance (1 + rho) / (1 - rho) / n for long series. Blocks hold its
+/// values minus their mean, like residuals of a fit.
 TEST(LongRunVariance, IsThatOfTheMeanOfACorrelatedProcess) {
   constexpr int kValues = 40, kSeries = 2000;
   std::mt19937_64 random(3);
@@ -128,7 +128,7 @@ TEST(LongRunVariance, IsThatOfTheMeanOfACorrelatedProcess) {
       for (double& value : values) value = (value - mean) / (kValues - 1);
       estimated += long_run_variance(values, std::vector<char>(kValues, 1));
     }
-    // Too large by a tenth and more, because correlations below 0 do not count; never too small.
+    // Too large by 10 % or more, because negative correlations are ignored; never too small.
     EXPECT_GT(estimated, 0.95 * squared_means) << rho;
     EXPECT_LT(estimated, 1.6 * squared_means) << rho;
   }
@@ -177,7 +177,7 @@ TEST(Selection, RanksByDropAndLetsLocalEffectsGoFirstOnlyWhereTheyExplainMuch) {
     const Members members = selection.ordered({{0, 0}, {1, 0}});
     return selection.candidate(members[0]).name;
   };
-  // Energies: 0.02^2 of the drag, local_size^2 of the ground.
+  // Energies: 0.02^2 for the drag, local_size^2 for the ground.
   EXPECT_EQ(first(0.001), "drag_linear");
   EXPECT_EQ(first(0.008), "drag_linear");
   EXPECT_EQ(first(0.013), "ground") << "less than drag, but more than a quarter of it";
@@ -196,7 +196,7 @@ TEST(Jackknife, IsTheVarianceOfWhiteNoiseAndKnowsWhenFewBlocksTell) {
   const Jackknife even = jackknife(grams.blocks, {0}, c);
   EXPECT_NEAR(even.variance[0], white, 0.5 * white);  // 40 blocks: 22 % standard error
   EXPECT_GT(even.freedom[0], 35);
-  // Of 40 blocks four tell something.
+  // Four of 40 blocks carry information.
   for (std::size_t k = 4; k < grams.blocks.size(); ++k) {
     grams.blocks[k].gram[0] = 0;
     grams.blocks[k].b[0] = 0;
@@ -222,7 +222,7 @@ TEST(Sandwich, IsTheVarianceOfWhiteNoiseAndGrowsWhereBlocksAreAlike) {
   const Eigen::VectorXd c = Eigen::VectorXd::Constant(1, product / energy);
   const double white = 0.01 * 0.01 / energy;
   EXPECT_NEAR(sandwich(grams.blocks, {0}, c)(0, 0), white, 0.5 * white);  // 40 blocks: 22 % standard error
-  // Each block twice: the same news counted twice, where the second follows the first.
+  // Each block twice: the same information is counted twice, where the second block follows the first.
   std::vector<Block> twice;
   for (const Block& block : grams.blocks) {
     twice.push_back(block);

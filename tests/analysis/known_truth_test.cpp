@@ -1,5 +1,5 @@
-/// Names that diagnose gives to recorded flights of which the truth is known. Sources: the collections' own notes on
-/// masses and motors; ratio, lag and drag by an independent program, windows of 100 ms.
+/// Effects that diagnose names for recorded flights with known truth. Sources: the collections' own notes on masses
+/// and motors; ratio, lag and drag from an independent program with windows of 100 ms.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,7 +28,7 @@ int place_of(const Diagnosis& diagnosis, const std::string& effect) {
   return -1;
 }
 
-/// The ranking in one line each, for messages.
+/// The ranking in one line per entry, for messages.
 std::string in_words(const Diagnosis& diagnosis) {
   std::string words;
   for (const Missing& missing : diagnosis.ranking) {

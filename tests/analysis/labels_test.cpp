@@ -1,4 +1,4 @@
-// Mislabelled logs: what two vehicles' streams say of each other, on recorded flights and on made-up numbers.
+// Mislabelled logs: consistency of the streams of two vehicles, on recorded flights and on synthetic numbers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,14 +15,14 @@ namespace {
 
 using residuals::Track;
 
-/// Twelve blocks of the same misfit, with a little scatter.
+/// Twelve blocks with the same misfit and a little scatter.
 std::map<int, double> misfit_of(double square) {
   std::map<int, double> blocks;
   for (int b = 0; b < 12; ++b) blocks[b] = square * (1 + 0.1 * (b % 3));
   return blocks;
 }
 
-/// Three logs; all pairs fit badly but these.
+/// Three logs; all pairs fit badly except these.
 Misfits three_logs(const std::vector<std::pair<int, int>>& good) {
   Misfits misfits;
   misfits.logs = 3;
@@ -39,13 +39,13 @@ TEST(Labels, StreamsThatGoAroundACircleAreExchangedAndOthersAreNot) {
   EXPECT_EQ(belongs_to(three_logs({{0, 0}, {1, 1}, {2, 2}}), 6), (std::vector<int>{0, 1, 2}));
   EXPECT_EQ(belongs_to(three_logs({{0, 1}, {1, 0}, {2, 2}}), 6), (std::vector<int>{1, 0, 2}));
   EXPECT_EQ(belongs_to(three_logs({{0, 1}, {1, 2}, {2, 0}}), 6), (std::vector<int>{1, 2, 0}));
-  // The first one fits the second one's, which fits its own: a vehicle that follows another one.
+  // The first log fits the second log's data, which also fits its own: a vehicle that follows another one.
   EXPECT_EQ(belongs_to(three_logs({{0, 1}, {1, 1}, {2, 2}}), 6), (std::vector<int>{0, 1, 2}));
 }
 
 TEST(Labels, AnExchangeNeedsTwiceTheFitInManyBlocks) {
   Misfits misfits = three_logs({{0, 1}, {1, 0}, {2, 2}});
-  misfits.squares[1] = misfit_of(0.3);  // of the first one, hardly better than its own
+  misfits.squares[1] = misfit_of(0.3);  // the first log's misfit is hardly better than its own
   EXPECT_EQ(belongs_to(misfits, 6), (std::vector<int>{0, 1, 2}));
   misfits = three_logs({{0, 1}, {1, 0}, {2, 2}});
   for (auto& blocks : misfits.squares) blocks.erase(blocks.find(7), blocks.end());
@@ -99,7 +99,8 @@ void take_path(const Track& from, Track& to) {
   }
 }
 
-/// Of the published flights of two vehicles that are judged: how many, and in how many the exchange is found.
+/// Among the published flights of two vehicles that are judged: their number, and the number in which the exchange is
+/// found.
 template <typename Take, typename MisfitsOf>
 std::pair<int, int> found_in_published_flights(const Take& take, const MisfitsOf& misfits_of) {
   const residuals::Inputs inputs = published("flights/development");

@@ -19,7 +19,8 @@ namespace {
 
 using Eigen::Index;
 
-/// Two compositions: forces around 1 gf of small vehicles, around 10 gf of large ones, twice as many of these.
+/// Two compositions: forces around 1 gf for small vehicles and around 10 gf for large ones, with twice as many of the
+/// latter.
 LearningData two_compositions() {
   LearningData data;
   data.layout = training::Layout(
@@ -66,7 +67,7 @@ TEST(Weighing, ByErrorsFollowsTheGradientOfTheMeanLogarithm) {
                 static_cast<float>(error * static_cast<double>(track.end - track.begin));
   }
   const training::Vector found = gradient_of(weighed, 0, 2400);
-  // Errors are taken from every eighth sample: the direction is right to a few percent.
+  // Errors are computed from every eighth sample, so the direction is accurate to a few percent.
   EXPECT_GT(found.normalized().dot(expected.normalized()), 0.99f);
 }
 
@@ -82,7 +83,7 @@ TEST(Weighing, ScenariosOfOneCompositionHaveErrorsOfTheirOwn) {
       << "of 10 gf and of 1";
 }
 
-/// One neighbour at random places; the label is a function of height and lateral distance alone, plus `offset_gf`.
+/// One neighbour at random positions; the label is a function of height and lateral distance only, plus `offset_gf`.
 void add_flight(LearningData& data, Use use, double offset_gf, double outwards_m, files::Random& random) {
   TrackSamples track;
   track.flight = std::string("swap/") + name(use);
@@ -101,7 +102,7 @@ void add_flight(LearningData& data, Use use, double offset_gf, double outwards_m
   data.tracks.push_back(track);
 }
 
-/// Targets of the compositions are `gain` times the output of the network, with an error of their own.
+/// Targets of the compositions are `gain` times the output of the network plus an independent error.
 LearningData selecting(const training::Vector& theta, const std::map<std::string, double>& gains) {
   LearningData data = two_compositions();
   files::Random random(4);
@@ -123,7 +124,7 @@ std::vector<Index> samples_of(const TrackSamples& track) {
   return samples;
 }
 
-/// Mean squares of the targets of a track, and of what `outputs` leave of them.
+/// Mean squares of the targets of a track, and of their residuals given `outputs`.
 std::pair<double, double> mean_squares(const LearningData& data, const TrackSamples& track,
                                        const training::Matrix& outputs) {
   double nothing = 0, network = 0;
@@ -137,7 +138,7 @@ std::pair<double, double> mean_squares(const LearningData& data, const TrackSamp
 
 TEST(OutputSupport, MinimisesTheErrorOfTheSelectingFlightsAndLeavesNoCompositionWorseThanWithout) {
   const training::Vector theta = training::initial_parameters(two_compositions().layout, 3);
-  // Half of the output is right for large vehicles; for small ones the output points the wrong way.
+  // Half of the output is right for large vehicles; for small ones the output has the wrong sign.
   const LearningData data = selecting(theta, {{"small>large", 0.5}, {"small>small", -0.3}});
   const training::Matrix outputs = outputs_for(data, theta, Use::kSelect);
   const OutputSupport support = output_support(data, outputs, outputs);
@@ -177,7 +178,7 @@ TEST(OutputSupport, OneCompositionThatTheOutputHarmsIsSilentAndTheOthersKeepThei
   EXPECT_NEAR(support.silent.begin()->second.network, std::sqrt(network), 1e-6);
   EXPECT_GT(network, nothing);
 
-  // No other scale, with the compositions that it helps, leaves less over all.
+  // No other scale, with the compositions that it helps, leaves a smaller total error.
   const auto left = [&](double scale) {
     double sum = 0;
     for (const TrackSamples& track : data.tracks) {
@@ -204,7 +205,7 @@ TEST(OutputSupport, OfAMeanTheErrorsOfSingleNetworksDoNotCount) {
   const training::Vector theta = training::initial_parameters(two_compositions().layout, 3);
   const LearningData data = selecting(theta, {{"small>large", 1.0}, {"small>small", 1.0}});
   const training::Matrix mean = outputs_for(data, theta, Use::kSelect);
-  // What one of many networks says: the mean, and an error of its own as large.
+  // The output of one of many networks: the mean plus an individual error of the same magnitude.
   training::Matrix one = mean;
   files::Random random(6);
   for (Index s = 0; s < one.cols(); ++s)

@@ -27,7 +27,7 @@ std::string refusal(const std::string& bytes) {
   return "accepted";
 }
 
-/// x of every sample that survived, in millimetres: the number of its record.
+/// x of every surviving sample in millimetres, which is the number of its record.
 std::vector<int> survivors(const logs::Log& log) {
   std::vector<int> numbers;
   for (const logs::Sample& sample : log.samples)

@@ -1,4 +1,4 @@
-/// @file Flight logs byte by byte, so that tests can damage them.
+/// @file Writes flight logs byte by byte, so that tests can damage them.
 #pragma once
 
 #include <zlib.h>
@@ -19,7 +19,7 @@ inline std::uint32_t crc32_of(const std::string& bytes) {
       ::crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
 }
 
-/// As the flown firmware stores it: the bitwise NOT of CRC-32.
+/// The checksum as stored by the flown firmware: the bitwise NOT of CRC-32.
 inline std::string stored_checksum(const std::string& bytes) { return bytes_of(~crc32_of(bytes)); }
 
 /// "tick", position and velocity in millimetres.
@@ -42,7 +42,7 @@ inline std::string usd_header(const std::vector<std::string>& tokens = small_tok
   return header + stored_checksum(header);
 }
 
-/// x counts the records, so that tests see which of them arrived.
+/// x counts the records, so that tests see which of them were read.
 inline std::string small_record(std::uint32_t tick_us, std::int16_t x_mm) {
   std::string record = bytes_of(tick_us) + bytes_of(x_mm);
   for (int i = 0; i < 5; ++i) record += bytes_of(std::int16_t{1});
@@ -83,7 +83,7 @@ inline std::string small_events(int version, int records = 20) {
   return file + bytes_of(crc32_of(file));
 }
 
-/// The small log as CSV with a columns.toml's names.
+/// The small log as CSV, with the names of a columns.toml.
 inline std::string small_csv(int records = 20) {
   std::string text = "t,px,py,pz,vx,vy,vz\n";
   for (int k = 0; k < records; ++k)

@@ -1,4 +1,4 @@
-/// Numbers that cannot be meant: options, model and gains files, and logs whose signals are in another unit.
+/// Implausible numbers: options, model and gains files, and logs with signals in another unit.
 #include "analysis/logs/plausibility.h"
 
 #include <fmt/core.h>
@@ -27,7 +27,7 @@ const std::string& model() {
   return path;
 }
 
-/// One refusal: the words say field, value and what was probably meant.
+/// Expects one refusal whose words name the field, the value and what was probably meant.
 void expect_refusal(const ScratchFolder& folder, const std::string& command, int code,
                     const std::vector<std::string>& words) {
   const Outcome outcome = run_shell("timeout 20 swarmcert " + command, folder.path());
@@ -68,7 +68,7 @@ TEST(Plausibility, ABatteryWithinTheRangeThatTheModelStatesIsTaken) {
   expect_refusal(folder, bound + "two.toml --battery 3.7", 2, {"two.toml", "6 .. 8.6 V"});
 }
 
-/// A simulated flight as CSV, its columns.toml, and what becomes of both when a column is scaled.
+/// A simulated flight as CSV with its columns.toml, with columns that can be scaled.
 class RecordedCsv {
  public:
   explicit RecordedCsv(const ScratchFolder& folder) : folder_(folder) {
@@ -171,7 +171,7 @@ struct WrongUnit {
   double added = 0;
 };
 
-/// inspect says it, and compare refuses the log in the same words instead of a residual.
+/// inspect reports the unit, and compare rejects the log with the same words instead of giving a residual.
 TEST(Plausibility, LogsInAnotherUnitAreRefusedWithTheOneThatWasMeant) {
   const ScratchFolder folder;
   const RecordedCsv flight(folder);
@@ -249,7 +249,7 @@ TEST(Plausibility, OfManyLogsThatAreWrongAlikeThreeAreNamedAndTheOthersCounted) 
   for (const files::Json& one : flights) EXPECT_EQ(one["plausibility"].size(), 1u) << one["file"];
 }
 
-/// A touch-down in flight: three records of 60 m/s^2.
+/// A touchdown in flight: three records of 60 m/s^2.
 TEST(Plausibility, AnImpactIsSaidAndCutSoThatItIsNotTheWorstMoment) {
   const ScratchFolder folder;
   const RecordedCsv flight(folder);

@@ -1,16 +1,16 @@
 #!/bin/sh
-# Runs a command against a Slurm of its own on this machine: own munge key and socket, own ports on the loopback,
-# no cgroups, all files in a folder of its own. When it returns the command's status, all that is gone again.
-#   private_slurm.sh COMMAND...          (77: Slurm or munge is not installed; 124: nothing came of it in two minutes)
+# Runs a command against a private Slurm instance on this machine: own munge key and socket, own ports on the loopback,
+# no cgroups, all files in its own folder. Returns the command's status after removing all of it.
+#   private_slurm.sh COMMAND...          (77: Slurm or munge is not installed; 124: no result within two minutes)
 set -eu
 PATH=$PATH:/usr/sbin:/sbin
 for program in munged slurmctld slurmd sbatch squeue sinfo; do
   command -v $program >/dev/null || { echo "private_slurm: $program is not installed"; exit 77; }
 done
-folder=$(mktemp -d /tmp/slurm.XXXXXX)  # a short path: sockets' names end after 108 characters
+folder=$(mktemp -d /tmp/slurm.XXXXXX)  # a short path: socket names are limited to 108 characters
 mkdir -p "$folder/state" "$folder/spool" "$folder/munge"
 chmod 0700 "$folder/munge"
-# Ports that hardly anything else uses, another pair for each run.
+# Ports that are rarely used otherwise, a different pair for each run.
 port=$((20000 + $$ % 10000 * 2))
 user=$(id -un)
 host=$(hostname -s 2>/dev/null || uname -n)

@@ -1,4 +1,4 @@
-/// The README as its reader uses it: a clone, every block pasted in order, and the numbers that it shows.
+/// The README as its reader uses it: a clone, every block pasted in order, and the numbers shown.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -14,7 +14,7 @@ namespace {
 
 /// One command of a ```console block and the output shown below it. "..." at the start of a line skips lines.
 struct Example {
-  std::string command;  ///< with its continuation lines, where lines end in a backslash
+  std::string command;  ///< including continuation lines after a backslash
   std::vector<std::string> output;
 };
 
@@ -44,7 +44,7 @@ std::vector<Block> blocks_of(const std::string& markdown) {
   return blocks;
 }
 
-/// Why a command is not run; empty if it is.
+/// Returns why a command is not run; empty if it is run.
 std::string excluded(const std::string& command) {
   const std::pair<const char*, const char*> kExcluded[] = {
       {"./bootstrap", "it installs packages and builds the tree that runs this test"},
@@ -56,7 +56,7 @@ std::string excluded(const std::string& command) {
   return "";
 }
 
-/// Text and numbers agree; numbers to seven digits, because the last ones may depend on the processor.
+/// Whether text and numbers agree; numbers to seven digits, because further digits may depend on the processor.
 bool same(const std::string& shown, const std::string& printed) {
   const char *a = shown.c_str(), *b = printed.c_str();
   const auto skip_blanks = [](const char*& at) {
@@ -96,7 +96,7 @@ bool appears(const std::string& shown, const std::vector<std::string>& printed, 
   return false;
 }
 
-/// What a command printed, line by line, and how it ended.
+/// The output of a command by line, and its exit code.
 struct Printed {
   std::vector<std::string> lines;
   int exit_code = -1;
@@ -104,7 +104,7 @@ struct Printed {
 
 constexpr const char* kEnd = "@@ exit code ";
 
-/// Runs the block in one shell, as if it were pasted.
+/// Runs the block in a single shell, as if it were pasted.
 std::vector<Printed> run_block(const Block& block, const std::string& script,
                                const std::filesystem::path& folder) {
   std::string text;
@@ -134,7 +134,7 @@ std::string joined(const std::vector<std::string>& lines) {
   return text;
 }
 
-/// Counts the lines that were compared.
+/// Checks an example and counts the compared lines.
 void check(const Example& example, const Printed& printed, int& compared) {
   const bool states_code = !example.output.empty() && example.output.back().rfind("exit code ", 0) == 0;
   const int expected = states_code ? std::atoi(example.output.back().c_str() + 10) : 0;
@@ -150,7 +150,7 @@ void check(const Example& example, const Printed& printed, int& compared) {
   }
 }
 
-/// Its words are checked where it is not run.
+/// Checks the arguments of a bootstrap command, which is not run.
 void check_bootstrap(const std::string& command, const std::filesystem::path& clone) {
   std::istringstream words(command);
   std::string verb;
@@ -181,11 +181,11 @@ TEST(Readme, BlocksKeepTheirCommandsInOrderWithContinuationsAndOutput) {
   EXPECT_EQ(blocks[1][0].command, "four");
 }
 
-/// In a clone of HEAD: what is not committed is not there, and what is committed by accident is. README.md is that of
-/// the clone as well.
+/// Uses a clone of HEAD: uncommitted files are missing, and files committed by accident are present. README.md is
+/// read from the clone as well.
 TEST(Readme, EveryBlockWorksInAFreshCloneAndPrintsWhatIsShown) {
   const ScratchFolder folder;
-  write_text(folder / "gitconfig", "[safe]\n\tdirectory = *\n");  // the checkout may be another user's
+  write_text(folder / "gitconfig", "[safe]\n\tdirectory = *\n");  // the checkout may belong to another user
   const Outcome cloned = run_shell(
       "GIT_CONFIG_GLOBAL='" + folder / "gitconfig" + "' git clone --quiet '" + source_path("") + "' clone",
       folder.path());

@@ -25,7 +25,7 @@ double filtered(AccelerometerFilter& filter, double time_s, double value) {
 }
 
 TEST(AccelerometerFilter, DelaysARampByTheTwoPolesAndKeepsItsSlope) {
-  // A Butterworth low-pass of order two delays slow signals by sqrt(2) / (2 pi cutoff).
+  // A second-order Butterworth low-pass delays slow signals by sqrt(2) / (2 pi cutoff).
   AccelerometerFilter filter(30, 1);
   const double delay_s = std::sqrt(2.0) / (2 * M_PI * 30);
   std::mt19937 random(1);
@@ -60,8 +60,8 @@ TEST(AccelerometerFilter, FiltersEveryAxisOfEveryChannelAsIfItWereAlone) {
 }
 
 TEST(VelocityError, IsWhatTheEstimatedVelocityHasMoreThanTheSlopeOfThePosition) {
-  // x swings with 0.3 m at 3 rad/s, its estimated velocity is 1.1 times too large; z stands, its velocity is off by
-  // 0.05.
+  // x oscillates with 0.3 m at 3 rad/s, and its estimated velocity is 1.1 times too large; z is constant, and its
+  // velocity is off by 0.05.
   residuals::Track track;
   double pause_s = 0;
   for (int i = 0; i < 2000; ++i) {
@@ -162,7 +162,7 @@ TEST(FlightCommands, GiveNoAnswerWithoutAUsableRecord) {
   const ScratchFolder folder;
   write_text(folder / "cf1_00", "");
   const std::string model = source_path("stability/models/crazyflie-small.toml");
-  // compare names the file that cannot be read; the others say that there is nothing to decide by.
+  // compare names the unreadable file; the other commands report that there are no data to decide.
   for (const auto& [command, exit_code] : {std::pair("compare " + model + " .", 3),
                                            {"diagnose " + model + " .", 4},
                                            {"add auto --model " + model + " . -o new.toml", 4}}) {
@@ -172,7 +172,7 @@ TEST(FlightCommands, GiveNoAnswerWithoutAUsableRecord) {
   EXPECT_FALSE(std::filesystem::exists(folder / "new.toml"));
 }
 
-/// network.toml of the networks that were published with the flights.
+/// network.toml for the networks that were published with the flights.
 std::string published_network() {
   std::string network = "schema = \"swarmcert/network/1\"\n";
   for (const char* part :
@@ -189,8 +189,8 @@ std::string published_network() {
 
 TEST(Compare, ReproducesTheErrorsOfThePublishedNetworks_slow) {
   SWARMCERT_NEEDS_DATA();
-  // Mean squares of f_a,z in gf^2 over the shared flights, with the authors' own filter; kinds of the neighbours,
-  // then of the vehicle; Ge: no neighbour.
+  // Mean squares of f_a,z in gf^2 over the shared flights, with the authors' own filter. Keys: kinds of the
+  // neighbours, then of the vehicle; Ge: no neighbour.
   const std::map<std::string, double> published = {
       {"Ge2L", 3.12},  {"Ge2S", 0.87},  {"L2L", 8.05},  {"S2S", 1.09},  {"L2S", 1.47},  {"S2L", 4.55},
       {"SS2L", 11.07}, {"SL2L", 14.68}, {"LL2S", 1.55}, {"SL2S", 2.52}, {"SS2S", 2.11}, {"LL2L", 11.18}};
@@ -211,7 +211,7 @@ TEST(Compare, ReproducesTheErrorsOfThePublishedNetworks_slow) {
   }
 }
 
-/// Flies two simulated vehicles past each other; the model of the second comparison lacks their downwash.
+/// Two simulated vehicles fly past each other; the model of the second comparison lacks their downwash.
 TEST(Trajectory, FollowsTheFlightThatTheModelMadeAndMissesWhatItLacks) {
   const ScratchFolder folder;
   const std::string gains = source_path("controller/gains/crazyflie-small.toml");
@@ -233,7 +233,7 @@ TEST(Trajectory, FollowsTheFlightThatTheModelMadeAndMissesWhatItLacks) {
   const auto rmse_z_m = [](const files::Json& json) { return json["trajectory"]["rmse"]["z"].get<double>(); };
   EXPECT_LT(rmse_z_m(right), 0.005);
   EXPECT_GT(rmse_z_m(wrong), 4 * rmse_z_m(right));
-  // What the model lacks is in the residual: pushed by it, the loop reaches the measured peaks.
+  // The residual contains what the model lacks: driven by it, the loop reaches the measured peaks.
   const files::Json& ratio = wrong["learning_error"]["peak_ratio"];
   EXPECT_EQ(ratio["tracks"], 2);
   EXPECT_NEAR(ratio["p50"]["z"].get<double>(), 1, 0.3);
@@ -246,7 +246,7 @@ TEST(Trajectory, IsRefusedWithTheReasonWhereALogHasNoSetPoints) {
   const ScratchFolder folder;
   const std::string gains = source_path("controller/gains/crazyflie-small.toml");
   const std::string model = source_path("stability/models/crazyflie-small.toml");
-  // The published CSV layout has no set points.
+  // The published CSV layout has no setpoints.
   ASSERT_EQ(run_shell("swarmcert simulate hover --duration 8 --model " + model + " --gains " + gains +
                           " -o flight && swarmcert inspect flight/cf1_00 --csv cf1_01.csv",
                       folder.path())
@@ -296,7 +296,7 @@ TEST(TorqueResidual, IsGivenWhereTheLogIsAsFastAsTheLoopAndRefusedWhereItAliases
   model.replace(model.find(rate), rate.size(), "log_rate_hz = 500.0");
   const std::string lag = "\n[[effect]]\nname = \"motor_lag\"\n";
   write_text(folder / "fast.toml", model + lag);
-  // What acted, 1.5e-4 N m about y, is missing in fast.toml.
+  // The torque that acted, 1.5e-4 N m about y, is missing in fast.toml.
   write_text(folder / "truth.toml",
              model + lag + "\n[[effect]]\nname = \"torque_bias\"\nparameters = { torque_y_Nm = 1.5e-4 }\n");
   const auto compare = [&](const std::string& truth, const std::string& name) {
@@ -329,7 +329,7 @@ double rmse_z_N(const files::Json& budget, const std::string& row, const std::st
   return 0;
 }
 
-/// What flew weighed as published; its model says 60 g.
+/// The vehicles flew with the published mass; their model states 60 g.
 TEST(Budget, TriesThePublishedMassOfEveryPublishedKind) {
   const ScratchFolder folder;
   const std::string flown = source_path("stability/models/crazyflie-large.toml");

@@ -29,7 +29,7 @@ RotorLoads loads(const Eigen::Vector4d& mean_N) {
 
 const Eigen::Vector4d kHealthy_N(0.087, 0.067, 0.092, 0.071);
 
-/// Two flights that differ by 1 mN here and there.
+/// Two flights that differ by 1 mN in some places.
 std::vector<RotorLoads> healthy() {
   return {loads(kHealthy_N + Eigen::Vector4d(1e-3, 0, -1e-3, 0)),
           loads(kHealthy_N - Eigen::Vector4d(1e-3, 0, -1e-3, 0))};
@@ -39,7 +39,7 @@ TEST(RotorBalance, NamesTheWeakRotorWithItsFactor) {
   for (int weak = 0; weak < 4; ++weak) {
     for (const double factor : {0.85, 0.75}) {
       Eigen::Vector4d now_N = kHealthy_N;
-      now_N[weak] /= factor;  // so that it gives what it gave
+      now_N[weak] /= factor;  // so that the rotor gives the same thrust as before
       const RotorBalance balance = rotor_balance({loads(now_N)}, healthy(), small());
       EXPECT_EQ(balance.rotor, weak + 1);
       const RotorFactor& found = balance.factors[static_cast<std::size_t>(weak)];
@@ -102,7 +102,8 @@ TEST(RotorFit, OfOneFlightIsAsUncertainAsTheBatterysPlace) {
                 1e-12);
 }
 
-/// CrazyPAD, vehicle E8: propellers cut by so many millimetres, both blades together, and flights of whole propellers.
+/// CrazyPAD, vehicle E8: propellers with the stated length in mm cut off both blades, and flights with whole
+/// propellers.
 struct Condition {
   const char* folder;
   double removed_mm;
@@ -147,7 +148,8 @@ TEST(RotorBalance, NamesCutPropellersAndNothingElseInRecordedFlights_slow) {
   EXPECT_EQ(others, 6 + 2 + 3 + 1 + 6 + 2);
 }
 
-/// What was cut off both blades, in millimetres: all but the last length in the name of a folder that has several.
+/// Total length cut off both blades in millimetres: all lengths in the name of a folder except the last, if there are
+/// several.
 double removed_mm(const std::string& folder) {
   std::vector<double> lengths;
   for (std::size_t at = folder.find("_M3_"); at != std::string::npos; at = folder.find('_', at + 1)) {
@@ -185,7 +187,7 @@ double spearman(const std::vector<double>& a, const std::vector<double>& b) {
   return xy / std::sqrt(xx * yy);
 }
 
-/// Factors of `add rotor_thrust` and of `diagnose --against` on the same flights.
+/// Factors found by `add rotor_thrust` and by `diagnose --against` on the same flights.
 TEST(RotorFit, WeaknessGrowsWithWhatWasCutOffInRecordedFlights_slow) {
   const std::string collection = tests::data_path("collections/crazypad");
   if (!std::filesystem::exists(collection)) GTEST_SKIP() << "no recorded data";

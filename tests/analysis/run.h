@@ -1,4 +1,4 @@
-/// @file Running the built command line as a user would.
+/// @file Runs the built command line as a user would.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -22,8 +22,8 @@ struct Outcome {
   std::string output;  ///< standard output and standard error, as a terminal shows them
 };
 
-/// Runs `command` in a shell with the built tool first in PATH, in `folder`. Results that it prints, or writes into a
-/// folder for temporary files, must conform to their schemas.
+/// Runs `command` in a shell in `folder`, with the built tool first in PATH. Results that it prints, or writes into a
+/// temporary folder, must conform to their schemas.
 inline Outcome run_shell(const std::string& command, const std::filesystem::path& folder) {
   const std::string tool_folder = std::filesystem::path(SWARMCERT_TOOL).parent_path().string();
   const std::string line =
@@ -46,7 +46,7 @@ inline Outcome run_shell(const std::string& command, const std::filesystem::path
   return outcome;
 }
 
-/// A folder of the running test's own, empty at its start and removed at its end.
+/// A folder of the running test, empty at its start and removed at its end.
 class ScratchFolder {
  public:
   ScratchFolder() {
@@ -70,12 +70,12 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-/// Tests that run `swarmcert` in a folder of their own.
+/// Base of tests that run `swarmcert` in a folder of their own.
 class CommandLineTest : public testing::Test {
  protected:
   Outcome run(const std::string& arguments) { return run_shell("swarmcert " + arguments, folder_.path()); }
 
-  /// Expects `arguments` to end with `exit_code` and to say each of `words`.
+  /// Expects that `arguments` ends with `exit_code` and that the output contains each of `words`.
   void expect(const std::string& arguments, int exit_code, const std::vector<std::string>& words) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.exit_code, exit_code) << "swarmcert " << arguments << "\n" << outcome.output;

@@ -1,4 +1,4 @@
-/// The scan of what is left, on remainders made by formulas whose truth is known.
+/// The scan of the remainder, on remainders made from formulas with known truth.
 #include "analysis/identification/scan/scan.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ using V = ScanVariable;
 constexpr int kBlockSamples = 20;
 constexpr double kNoise_N = 0.002;
 
-/// Four flights of 40 s: every variable is a slow sum of two sines of its own and of noise; forces are noise.
+/// Four flights of 40 s: every variable is a slow sum of two sines of its own and noise; forces are noise.
 struct Flights {
   ScanSamples samples;
   std::mt19937_64 generator;
@@ -63,7 +63,7 @@ struct Flights {
   }
   double uniform() { return std::generate_canonical<double, 53>(generator); }
   double at(Eigen::Index i, V v) const { return samples.values(i, static_cast<int>(v)); }
-  /// Adds a force along one of the world's axes; the body stands as the world does.
+  /// Adds a force along one of the world axes; the body frame is aligned with the world frame.
   template <typename Force>
   void push(int axis, const Force& force) {
     for (Eigen::Index i = 0; i < samples.size(); ++i) {
@@ -73,7 +73,8 @@ struct Flights {
   }
 };
 
-/// Of the neighbour, as many samples of 0.1 s ago as lags; the first samples of a flight take the first one.
+/// Stores the neighbour's velocities of the last samples, 0.1 s apart, one per lag; the first samples of a flight
+/// repeat the first one.
 void remember_velocities(ScanSamples& samples) {
   for (Eigen::Index i = 0; i < samples.size(); ++i) {
     for (int lag = 0; lag < NeighbourPlaces::kLags; ++lag) {
@@ -115,7 +116,8 @@ TEST(Scan, FindsALiftBesideANeighbourWithItsFormula) {
   EXPECT_NEAR(effect.parameters.at("width_m"), 0.25, 0.03);
 }
 
-/// A force of an edge would never end: what such a neighbour does is fitted by a form that vanishes far away.
+/// A force with the form of an edge would never end, so a form that vanishes far away fits the effect of such a
+/// neighbour.
 TEST(Scan, OffersNoFormOverNeighboursThatReachesFar) {
   Flights flights = of_two_vehicles(45);
   flights.push(2, [&](Eigen::Index i) {
@@ -155,7 +157,7 @@ TEST(Scan, TellsTheMotionOfANeighbourOverGroundFromThatAgainstTheVehicle) {
 TEST(Scan, FindsWhenANeighbourMovedThatDisturbsLater) {
   Flights flights = of_two_vehicles(43);
   const auto vy = static_cast<int>(V::kNeighbourVy);
-  double moved = 0;  // forgets within a third of a second, as nothing else here does
+  double moved = 0;  // decays within a third of a second, unlike anything else here
   for (Eigen::Index i = 0; i < flights.samples.size(); ++i) {
     moved = 0.7 * moved + flights.bell(flights.generator);
     flights.samples.values(i, vy) = static_cast<float>(moved);
@@ -226,7 +228,7 @@ TEST(Scan, CommandedRatesAreThoseThatTheSetPointsAskFor) {
       stability::Instant now;
       now.time_s = kStep_s * i;
       now.R_WB = Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-      now.omega_B_rad_s = {5, 5, 0.5};  // as flown: answers of the controller
+      now.omega_B_rad_s = {5, 5, 0.5};  // as in flight: the response of the controller
       track.instants.push_back(now);
       const double phase = kOmega_rad_s * now.time_s;
       track.targets.push_back({{kReach_m * std::sin(phase), 0, 1},
@@ -236,7 +238,7 @@ TEST(Scan, CommandedRatesAreThoseThatTheSetPointsAskFor) {
     const std::vector<stability::Instant> wanted = as_commanded(track, kSomeMass_kg);
     double fastest = 0;
     for (int i = 10; i < 390; ++i) {
-      // The thrust axis leans by atan(x'' / g) towards +x of the world.
+      // The thrust axis tilts by atan(x'' / g) towards +x of the world.
       const double phase = kOmega_rad_s * kStep_s * i;
       const double lean = -kReach_m * std::pow(kOmega_rad_s, 2) * std::sin(phase) / stability::kGravity_m_s2;
       const double slope = -kReach_m * std::pow(kOmega_rad_s, 3) * std::cos(phase) / stability::kGravity_m_s2;
@@ -322,7 +324,8 @@ TEST(Scan, FindsNothingWhereNothingIs) {
   EXPECT_EQ(claims, 0);
 }
 
-/// A gust pushes upwards, the controller takes thrust away: the force falls with the thrust, but not because of it.
+/// A gust pushes upward and the controller reduces the thrust: the force is negatively correlated with the thrust,
+/// but not caused by it.
 TEST(Scan, CountsNoAnswerOfTheController) {
   Flights flights(5);
   flights.push(2, [&](Eigen::Index) { return 0.01 * flights.bell(flights.generator); });
@@ -376,7 +379,7 @@ TEST(Scan, DoesNotDependOnTheNumberOfThreads) {
   for (std::size_t i = 0; i < one.entries.size(); ++i) EXPECT_EQ(one.entries[i].share, two.entries[i].share);
 }
 
-/// The same flights with torques of 1e-6 N m and rotors of 1e-3 N of noise in place of the force.
+/// The same flights with torques of 1e-6 N m noise and rotors of 1e-3 N noise in place of the force.
 ScanSamples balance_of(Flights& flights) {
   constexpr double kNoise_Nm = 1e-6, kNoiseOfRotor_N = 1e-3;
   ScanSamples samples = flights.samples;
@@ -407,7 +410,7 @@ TEST(BalanceScan, FindsTheAxisAndTheVariableOfATorque) {
     EXPECT_EQ(first.quantity, "torque");
     EXPECT_EQ(first.frame, "body");
     EXPECT_EQ(first.unit, "Nm");
-    // Noise of 1e-6 N m is what the right curve leaves of the axis.
+    // The correct curve leaves a noise of 1e-6 N m on the axis.
     EXPECT_NEAR(first.rmse_after, 1e-6, 1e-7);
     EXPECT_NEAR(first.share, 1 - std::pow(first.rmse_after / first.rmse_before, 2), 0.02);
     const std::vector<Formula> formulas = find_formulas(samples, found, 1, 1);
@@ -437,7 +440,7 @@ TEST(BalanceScan, NamesARotorOnlyWhereNoOtherDoesTheSame) {
   Flights flights(40);
   ScanSamples samples = balance_of(flights);
   const auto duty = static_cast<Eigen::Index>(V::kDuty2);
-  samples.commanded.col(duty) = samples.values.col(duty);  // set points confirm it
+  samples.commanded.col(duty) = samples.values.col(duty);  // setpoints confirm it
   constexpr Eigen::Index kSecond = 4, kThird = 5;
   const Eigen::VectorXf loss = 2e-3F * samples.values.col(duty).cwiseMax(0);
   samples.residual.col(kSecond) -= loss;
@@ -472,7 +475,7 @@ TEST(Formulas, RecoverTheFormAndItsNumbers) {
   EXPECT_NEAR(formulas[0].effect.parameters.at("a_N"), 0.03, 0.003);
 }
 
-/// What is written can be read back, and gives the force that was found.
+/// A written formula can be read back and gives the force that was found.
 TEST(Formulas, AreEffectsOfTheModelFile) {
   Flights flights(22);
   flights.push(0, [&](Eigen::Index i) { return 0.02 * std::max(0.0, flights.at(i, V::kSpeed) - 0.3); });
@@ -514,7 +517,7 @@ TEST(Proposals, AreNamedWithTheirPlace) {
     EXPECT_FALSE(is_proposal(name));
 }
 
-/// Functions and texts of all forms say the same.
+/// The functions and the texts of all forms agree.
 TEST(Forms, TextsGiveTheValues) {
   const auto check = [](const std::vector<Form>& forms) {
     for (const Form& form : forms) {

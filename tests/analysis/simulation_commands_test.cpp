@@ -1,5 +1,5 @@
-// spacing held against simulation, sweep when it is interrupted and on a cluster, iss-check and simulate as a user
-// runs them.
+// spacing compared with simulation, sweep when interrupted and on a cluster, iss-check and simulate as a user runs
+// them.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,8 +15,8 @@ using files::Json;
 
 const std::string kSource = SWARMCERT_SOURCE_DIR;
 
-/// One vehicle high above the origin, another that passes `gap_m` below it along x at a constant speed and sideways
-/// distance, or that stays there.
+/// One vehicle high above the origin, and another that passes `gap_m` below it along x at a constant speed and
+/// lateral distance, or stays there.
 class Pass : public stability::Task {
  public:
   Pass(double gap_m, double side_m, double speed_m_s)
@@ -124,7 +124,8 @@ void write_sweep(const ScratchFolder& folder, int steps) {
 TEST(SweepCommand, CtrlCKeepsWhatIsDoneAndResumeGivesTheSameBytes) {
   const ScratchFolder folder;
   write_sweep(folder, 30);
-  // Interrupts as soon as it has computed something; on a fast machine it may have ended by then, so several tries.
+  // Interrupts the run as soon as it has computed something. On a fast machine it may have ended by then, so there
+  // are several tries.
   int cells = 0, total = 0;
   for (const char* wait_s : {"0.4", "0.2", "0.1", "1.5"}) {
     run_shell("rm -rf cut", folder.path());

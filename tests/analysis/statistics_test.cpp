@@ -12,7 +12,7 @@ namespace swarmcert::residuals {
 namespace {
 
 TEST(ResidualStatistics, AreThoseOfANumberThatWasWorkedOutByHand) {
-  // x: 3, -3, 3, -3; y: 4 always; z: 0. The model explains half of x.
+  // x: 3, -3, 3, -3; y: always 4; z: 0. The model explains half of x.
   std::vector<Eigen::Vector3f> r, r0;
   for (const float sign : {1.f, -1.f, 1.f, -1.f}) {
     r.emplace_back(3 * sign, 4.f, 0.f);
@@ -70,14 +70,14 @@ TEST(ResidualStatistics, ResampledBlocksCoverTheRootMeanSquareAsOftenAsStated) {
   for (int run = 0; run < kRuns; ++run) {
     std::vector<BlockSum> blocks(60);
     for (BlockSum& block : blocks) {
-      const double power = 1 + 0.5 * random.symmetric();  // its mean is 1: so is that of the squares
+      const double power = 1 + 0.5 * random.symmetric();  // mean 1, and so is that of the squares
       block = {Eigen::Vector3d::Constant(100 * power), 100};
     }
     const Interval x = bootstrap_rmse(blocks, static_cast<std::uint64_t>(run))[0];
     EXPECT_LT(x.lower, x.upper);
     held += x.lower <= 1 && 1 <= x.upper ? 1 : 0;
   }
-  // Binomial with 0.9: within four standard deviations, and the bootstrap's own bias of a few percent.
+  // Binomial with 0.9: within four standard deviations, plus the bias of a few percent of the bootstrap.
   EXPECT_GT(held, 0.9 * kRuns - 4 * std::sqrt(0.09 * kRuns));
   EXPECT_LT(held, kRuns);
 }

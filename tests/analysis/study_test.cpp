@@ -53,7 +53,7 @@ TEST_F(Study, AddsWhatIsMissingAndLowersTheErrorOfTestFlights) {
   for (const char* const key : {"ladder", "remainder", "next"}) EXPECT_TRUE(json[key].is_array()) << key;
   EXPECT_EQ(read_text(folder_ / "copy.json"), read_text(folder_ / "out/study.json"));
   EXPECT_NE(outcome.output.find("Vertical error (RMS) on test flights"), std::string::npos) << outcome.output;
-  // The fitted model reproduces the error that the page states.
+  // The fitted model reproduces the error stated on the page.
   EXPECT_EQ(
       run_shell("swarmcert compare out/fitted.toml flights -q --json after.json", folder_.path()).exit_code,
       0);
@@ -96,7 +96,8 @@ TEST_F(Study, SaysWhatChangedAgainstOtherFlights) {
   const Outcome outcome = study("now --against before -o out");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   const files::Json json = result("out");
-  // Alone in the air the second model differs by motor lag and drag; a lag needs faster set points than these to show.
+  // In flights of a single vehicle the second model differs by motor lag and drag; these setpoints are too slow to
+  // show a lag.
   EXPECT_EQ(json["changed"]["verdict"], "missing_effect");
   std::set<std::string> changed;
   for (const files::Json& entry : json["changed"]["ranking"])
@@ -147,7 +148,7 @@ TEST_F(Study, WordsThatMakeNoSenseAreExplained) {
 
 TEST_F(Study, AddsTheThrustRatioThatDiagnoseNamesOfAWholeCollection_slow) {
   SWARMCERT_NEEDS_DATA();
-  // Most of these flights have upgraded motors, some fly with a payload: a scale of the thrust leads the ranking.
+  // Most of these flights have upgraded motors and some carry a payload, so a thrust scale leads the ranking.
   const Outcome outcome = run_shell(
       "swarmcert add auto -q --model " + source_path("stability/models/crazyflie-small.toml") + " " +
           data_path("collections/crazyswarm2-tools/logs") + " -o fitted.toml --json added.json",

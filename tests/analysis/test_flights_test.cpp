@@ -1,4 +1,4 @@
-/// Flights that are reported as test decide nothing: whatever they hold, what is fitted is the same, bit for bit.
+/// Flights reported as test flights influence nothing: whatever they contain, the fit is the same, bit for bit.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -17,7 +17,7 @@ const std::string& small_model() {
   return path;
 }
 
-/// One flight of two vehicles that push each other, as run `run` in folder `into`.
+/// One flight of two vehicles that exert forces on each other, as run `run` in folder `into`.
 void fly(const ScratchFolder& folder, int run, int seed, const std::string& into, int duration_s = 20) {
   const Outcome outcome = run_shell(
       fmt::format("swarmcert simulate random-walk -q --force --vehicles 2 --duration {} --seed {} --run {} "
@@ -28,7 +28,7 @@ void fly(const ScratchFolder& folder, int run, int seed, const std::string& into
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
 }
 
-/// What may become of run 4 of five, which is the one that tests.
+/// Possible damage to run 4 of five, which is the test flight.
 struct Damage {
   const char* name;
   std::function<void(const ScratchFolder&)> make;
@@ -55,7 +55,7 @@ std::vector<Damage> damages() {
            }}};
 }
 
-/// What `fitted` says with the five flights as flown, and with the last one damaged.
+/// Expects the same result from `fitted` for the five flights as recorded, and with the last one damaged.
 void expect_same(const std::function<std::string(const ScratchFolder&)>& fitted) {
   const ScratchFolder folder;
   for (int run = 0; run < 5; ++run) fly(folder, run, 30 + run, "flights");
@@ -101,7 +101,8 @@ TEST(TestFlights, ChangeNothingThatTrainFits) {
   });
 }
 
-/// The test flight alone would prefer the other mass: it flew 32 g. Both masses are tried on the flights to fit.
+/// The test flight alone would prefer the other mass, because it flew with 32 g. Both masses are tried on the fitted
+/// flights.
 TEST(TestFlights, DoNotChooseTheMassOfABudget) {
   const ScratchFolder folder;
   std::string light = read_text(source_path("stability/models/crazyflie-small.toml"));

@@ -12,7 +12,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-// The small vehicle's published map, as known truth.
+// The published map of the small vehicle, as known truth.
 constexpr double kTruth[5] = {11.093358483549203, -39.08104165843915, -9.525647087583181, 20.573302305476638,
                               38.42885066644033};
 
@@ -20,7 +20,7 @@ double thrust_gf(double p, double v) {
   return kTruth[0] + kTruth[1] * p + kTruth[2] * v + kTruth[3] * p * p + kTruth[4] * p * v;
 }
 
-/// Gaussian by the central limit: the same on every platform.
+/// Gaussian noise by the central limit theorem: the same on every platform.
 double noise(std::mt19937& generator) {
   double sum = 0;
   for (int i = 0; i < 12; ++i) sum += static_cast<double>(generator()) / 4294967296.0;
@@ -74,8 +74,8 @@ TEST(ThrustIdentification, FindsTheInverseMapOfExactData) {
   for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(result.pwm.coefficients[i].value, d[i], 1e-10);
 }
 
-// A 90 % interval must hold the truth in 90 % of repeated experiments: 400 experiments, binomial standard deviation
-// 1.5 %, so 84 % to 96 % is four of them.
+// A 90 % interval must contain the truth in 90 % of repeated experiments. For 400 experiments the binomial standard
+// deviation is 1.5 %, so 84 % to 96 % covers four of them.
 TEST(ThrustIdentification, IntervalsHoldTheTruthAsOftenAsTheySay) {
   constexpr int kExperiments = 400;
   int holds[5] = {};
@@ -109,17 +109,17 @@ TEST(ThrustIdentification, SaysWhatPoorDataLack) {
   EXPECT_NE(why({5}).find("5 rows for 5 coefficients"), std::string::npos);
   EXPECT_NE(why({12, 3.3, 4.2, 0.3, 1.0, 8.0}).find("too noisy"), std::string::npos);
 
-  // Battery and PWM that move together: rich in each, but not in both.
+  // Battery voltage and PWM vary together: each covers a wide range, but not independently.
   ThrustData together = measured({}, 4);
   for (ThrustSample& s : together.samples) s.v = 1.1 - 0.3 * s.p;
   EXPECT_NE(identify_thrust(together, 0.95).thrust.why_not.find("depend on each other"), std::string::npos);
-  // Two PWM levels cannot tell c10 from c20.
+  // Two PWM levels cannot distinguish c10 from c20.
   ThrustData levels = measured({}, 5);
   for (ThrustSample& s : levels.samples) s.p = s.p < 0.6 ? 0.3 : 0.9;
   EXPECT_NE(identify_thrust(levels, 0.95).thrust.why_not.find("depend on each other"), std::string::npos);
 }
 
-// A battery with internal resistance: v = v_open - sag p. The most that it will give is a function of p and v.
+// A battery with internal resistance: v = v_open - sag p. The maximum thrust is then a function of p and v.
 TEST(ThrustIdentification, RampsToFullPwmShowHowMuchTheBatteryWillSag) {
   const double sag = 0.12;
   ThrustData data;
@@ -139,7 +139,7 @@ TEST(ThrustIdentification, RampsToFullPwmShowHowMuchTheBatteryWillSag) {
     const ThrustIdentification result = identify_thrust(data, 0.95);
     ASSERT_TRUE(result.max_thrust.determined) << result.max_thrust.why_not;
     const auto& e = result.max_thrust.coefficients;
-    // At p, v the open voltage is v + sag p, and at full PWM the battery gives v + sag p - sag.
+    // At p, v the open-circuit voltage is v + sag p, and at full PWM the battery gives v + sag p - sag.
     const double slope = kTruth[2] + kTruth[4];
     EXPECT_NEAR(e[2].value, slope, 1e-6);
     EXPECT_NEAR(e[1].value, slope * sag, 1e-6);
@@ -205,7 +205,7 @@ TEST(ThrustData, ErrorsNameLineFieldValueAndMend) {
 
 class IdentifyThrustCommand : public testing::Test {
  protected:
-  /// The example of the help: a table in counts and volts.
+  /// The example in the help text: a table in counts and volts.
   static std::string table(const Experiment& e) {
     std::string text = "pwm,vbat,thrust_gf\n";
     for (const ThrustSample& s : measured(e, 7).samples) {

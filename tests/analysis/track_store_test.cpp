@@ -19,7 +19,7 @@ using residuals::Cut;
 using residuals::excerpt_of;
 using residuals::Track;
 
-/// At 100 Hz, with one neighbour; the first 5 s on the ground. What belongs to a record says when that was.
+/// A track at 100 Hz with one neighbour; the first 5 s on the ground. The fields of a record encode its time.
 Track straight_track(int seconds) {
   Track track;
   track.flight = "a/00";
@@ -97,7 +97,7 @@ TEST(TrackStore, OfManyShortTracksTakesAboutTheShare) {
       ++taken;
     }
   }
-  // 112 tracks are expected; the names draw them, so that their number has a standard deviation of 8.
+  // 112 tracks are expected. Names determine the selection, so the number has a standard deviation of 8.
   constexpr double kExpected = kShare * kTracks * 3000, kFourDeviations = 0.3;
   EXPECT_NEAR(static_cast<double>(used), kExpected, kFourDeviations * kExpected);
   EXPECT_NEAR(taken, kTracks * 1.5 / 4, kFourDeviations * kTracks * 1.5 / 4);

@@ -9,7 +9,8 @@ namespace {
 using files::Json;
 
 TEST(IssCheckCommand, WithoutAViolationAndWithoutTheTheoremItIsInconclusive) {
-  // A delay takes away the theorem, and the integrated loop has none: nothing is violated, and nothing is shown.
+  // With a delay the theorem does not apply, and the integrated loop has no delay: nothing is violated, and nothing
+  // is shown.
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n[lag]\ndelay_s = 0.01\n");
   const Outcome outcome =
@@ -24,7 +25,7 @@ TEST(IssCheckCommand, WithoutAViolationAndWithoutTheTheoremItIsInconclusive) {
 }
 
 TEST(IssCheckCommand, ARunOutsideTheHypothesesEndsTheCampaignInconclusiveAndNotInAFault) {
-  // 0.1 N/s drives the commanded force through zero in one run, where the full loop cannot be integrated; at 0.3 N/s
+  // At 0.1 N/s one run drives the commanded force through zero, where the full loop cannot be integrated; at 0.3 N/s
   // the thrust saturates or the vehicle tips over after about a second.
   const ScratchFolder folder;
   const std::string gains = " --gains " + kSourceFolder + "/controller/gains/composite.toml" + kModel;
@@ -113,7 +114,7 @@ TEST(SweepCommand, AnExistingShardIsKeptUnlessToldOtherwise) {
   EXPECT_EQ(run_shell("swarmcert sweep grid.toml -o parts --shard 0/4", folder.path()).exit_code, 3);
   EXPECT_EQ(run_shell("swarmcert sweep grid.toml -o parts --shard 0/4 --resume", folder.path()).exit_code, 0);
   EXPECT_EQ(run_shell("swarmcert sweep grid.toml -o parts --shard 5/4", folder.path()).exit_code, 2);
-  // A shard of another cut of the same grid has cells twice.
+  // A shard of another partition of the same grid contains cells twice.
   ASSERT_EQ(run_shell("swarmcert sweep grid.toml -o parts --shard 0/2", folder.path()).exit_code, 0);
   const Outcome twice = run_shell("swarmcert merge parts", folder.path());
   EXPECT_EQ(twice.exit_code, 3);
@@ -150,7 +151,7 @@ TEST(SweepCommand, AFolderWithOtherThingsIsLeftAlone) {
   EXPECT_EQ(run_shell("swarmcert sweep grid.toml -o photos -q --force", folder.path()).exit_code, 0);
 }
 
-/// The variables are those that Slurm sets; the array may start anywhere.
+/// The variables are those set by Slurm; the array may start at any index.
 TEST(SweepCommand, TasksOfAJobArrayMergeToTheWhole) {
   const ScratchFolder folder;
   write_grid(folder);
@@ -178,7 +179,7 @@ TEST(TuneCommand, FindsGainsThatAreBetterWithinTheConstraints) {
   EXPECT_GE(tuned["lag_limit_s"].get<double>(), result["constraints"]["least_lag_limit_s"].get<double>());
   EXPECT_FALSE(result["active_constraints"].empty());
   EXPECT_EQ(result["verdict"], "found");
-  // The rate gain may not get worse, which keeps the integrator: it is at least 1/(m Ki).
+  // The rate gain must not get worse, which keeps the integrator: the gain is at least 1/(m Ki).
   EXPECT_LE(tuned["rate"].get<double>(), shipped["rate"].get<double>() * (1 + 1e-8));
   EXPECT_GE(result["gains"]["Ki"].get<double>(), 9.999);
   EXPECT_EQ(result["firmware_parameters"][0]["name"], "Kpos_P");
@@ -198,7 +199,7 @@ TEST(TuneCommand, SameSeedSameBytes) {
 
 TEST(TuneCommand, ConstraintsThatCannotBeMetAreRefutedOrNotFoundWithTheNearestGains) {
   const ScratchFolder folder;
-  // The rate gain is at least 1/(0.034 kg 8 2 1/s^3) = 1.84 m per N/s within a factor of 8.
+  // The rate gain is at least 1/(0.034 kg 8 2 1/s^3) = 1.84 m per N/s if gains vary by at most a factor of 8.
   const Outcome refuted =
       run_shell("swarmcert tune" + kFlown + " --nodes 150 --max-rate 1.8 --json a.json", folder.path());
   EXPECT_EQ(refuted.exit_code, 1) << refuted.output;
@@ -223,7 +224,7 @@ TEST(TuneCommand, TunesWithoutAnIntegratorWhatHasNone) {
   EXPECT_LT(result["tuned"]["amplitude"].get<double>(), result["shipped"]["amplitude"].get<double>());
   EXPECT_LE(result["tuned"]["noise_command_m_s2"].get<double>(),
             result["shipped"]["noise_command_m_s2"].get<double>() * (1 + 1e-8));
-  // The same is reached from gains that have an integrator.
+  // Starting from gains with an integrator gives the same result.
   const Json dropped =
       json_of(folder, "tune" + kFlown + " --axis x --objective amplitude --no-integrator --nodes 200");
   EXPECT_EQ(dropped["gains"]["Ki"], 0);

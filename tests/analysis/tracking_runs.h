@@ -13,7 +13,7 @@ inline const std::string kModel = " --model " + kSourceFolder + "/stability/mode
 inline const std::string kFlown =
     " --gains " + kSourceFolder + "/controller/gains/crazyflie-small.toml" + kModel;
 
-/// The result of `swarmcert COMMAND`, which must end with exit code 0.
+/// Returns the result of `swarmcert COMMAND`, which must end with exit code 0.
 inline files::Json json_of(const ScratchFolder& folder, const std::string& command) {
   const Outcome outcome = run_shell("swarmcert " + command + " --force --json out.json", folder.path());
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;

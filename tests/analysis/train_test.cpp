@@ -17,7 +17,7 @@ using tests::Outcome;
 using tests::read_text;
 using tests::write_text;
 
-/// Three simulated swaps of two vehicles with downwash, and a model that knows nothing of it.
+/// Three simulated swaps of two vehicles with downwash, and a model without it.
 class Train : public testing::Test {
  protected:
   void SetUp() override {
@@ -53,7 +53,7 @@ TEST_F(Train, LearnsTheDownwashOfFlightsThatItDidNotSeeAndCertifiesTheResult) {
   EXPECT_GT(result["lipschitz"].get<double>(), 0);
   EXPECT_EQ(execute("swarmcert check out/certificate.json out/network.toml").exit_code, 0);
 
-  // The model with the network explains the flights better than the one without.
+  // The model with the network explains the flights better than the model without it.
   const auto rmse = [&](const std::string& model) {
     const Outcome compared = execute("swarmcert compare " + model + " flights --force --json compared.json");
     EXPECT_EQ(compared.exit_code, 0) << compared.output;
@@ -64,7 +64,7 @@ TEST_F(Train, LearnsTheDownwashOfFlightsThatItDidNotSeeAndCertifiesTheResult) {
 }
 
 TEST_F(Train, KeepsNoNetworkThatIsWorseThanNoneOnTheSelectingFlights) {
-  // Downwash in the flights to fit, none in those that select: what is learned must not fly.
+  // The fitted flights have downwash and the selecting flights do not: the learned force must not be used in flight.
   ASSERT_EQ(
       execute("swarmcert simulate swap --vehicles 2 --model nominal.toml --gains '" +
               std::string(SWARMCERT_SOURCE_DIR) + "/controller/gains/crazyflie-small.toml' --seed 9 -o calm")
@@ -87,7 +87,7 @@ TEST_F(Train, KeepsNoNetworkThatIsWorseThanNoneOnTheSelectingFlights) {
   EXPECT_NE(outcome.output.find("no network is kept"), std::string::npos) << outcome.output;
   EXPECT_EQ(read_text(folder_ / "out/model-small.toml").find("deep_set"), std::string::npos);
 
-  // With flights like those to fit, it is kept without a warning.
+  // With selecting flights like the fitted ones, it is kept without a warning.
   const Outcome like = execute(
       "swarmcert train nominal.toml flights/1 flights/2 --select flights/3 --phi 12,12 --rho 12 --features 8 "
       "--epochs 10 --batch 256 --rate 5e-3 -o kept --json kept.json");
@@ -98,7 +98,7 @@ TEST_F(Train, KeepsNoNetworkThatIsWorseThanNoneOnTheSelectingFlights) {
 }
 
 TEST_F(Train, TakesVehiclesOfOneKindWithModelsOfTheirOwn) {
-  // As compare --fitted writes them.
+  // As written by compare --fitted.
   std::string heavy = read_text(folder_ / "nominal.toml");
   const std::string mass = "mass_kg = 0.034";
   heavy.replace(heavy.find(mass), mass.size(), "mass_kg = 0.035");
@@ -128,11 +128,11 @@ TEST_F(Train, ModelsForPublishedSignalsHaveTheLagOfTheirLabels) {
   const std::size_t lag = model.find("\"motor_lag\"");
   ASSERT_NE(lag, std::string::npos) << model;
   EXPECT_EQ(model.find("\"motor_lag\"", lag + 1), std::string::npos) << "one lag";
-  // 16 % of the way per record of 10 ms: 0.01 / -log(0.84).
+  // The filter moves 16 % of the way per record of 10 ms: 0.01 / -log(0.84).
   EXPECT_NE(model.find("0.0573548"), std::string::npos) << model;
 }
 
-/// Wakes push to the side and tilt; logs at 500 Hz show both.
+/// Wakes push sideways and tilt the vehicle; logs at 500 Hz show both.
 class TrainVectors : public Train {
  protected:
   void SetUp() override {
@@ -140,7 +140,7 @@ class TrainVectors : public Train {
         read_text(std::string(SWARMCERT_SOURCE_DIR) + "/stability/models/crazyflie-small.toml");
     const std::string rate = "log_rate_hz = 100.0";
     nominal.replace(nominal.find(rate), rate.size(), "log_rate_hz = 500.0");
-    // What is judged knows the motors' lag, which the loop has anyway: torques follow it.
+    // The judged model has the motor lag, which the loop has anyway: torques follow it.
     write_text(folder_ / "nominal.toml", nominal + "\n[[effect]]\nname = \"motor_lag\"\n");
     write_text(folder_ / "truth.toml", nominal + R"toml(
 [[effect]]
@@ -244,7 +244,7 @@ TEST_F(Train, KeepsTheLipschitzLimitThatItWasGiven) {
   EXPECT_LE(tight["lipschitz"].get<double>(), loose / 2);
   EXPECT_EQ(tight["gamma_verdict"], "proved");
   EXPECT_LT(tight["test_rmse"].get<double>(), tight["test_rmse_of_nothing"].get<double>());
-  // As certify sees it, from the files alone.
+  // As seen by certify, from the files alone.
   EXPECT_EQ(execute(fmt::format("swarmcert certify tight/network.toml --max-lipschitz {} -o certificate.json",
                                 loose / 2))
                 .exit_code,
@@ -421,7 +421,7 @@ TEST_F(Train, HoldsBackNamedFlightsOrBlocksAndRefusesAFlightForTwoUses) {
   EXPECT_EQ(learn("flights/1 --select flights/2 --test flights/2").exit_code, 2);
 }
 
-/// Interrupted runs go on to the files, and the JSON, of an unbroken one; one Ctrl-C may be delivered twice.
+/// Interrupted runs continue to the same files and JSON as an uninterrupted run; one Ctrl-C may be delivered twice.
 TEST_F(Train, GoesOnWhereCtrlCStoppedIt) {
   const std::string options = "--epochs 150 --patience 150 --batch 64 --rate 2e-3 -q ";
   ASSERT_EQ(execute(train(options + "-o whole --json whole.json")).exit_code, 0);

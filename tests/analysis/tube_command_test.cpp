@@ -17,7 +17,7 @@ const std::string kSources = SWARMCERT_SOURCE_DIR;
 const std::string kNetwork = " --network " + kSources + "/nn/networks/demo/network.toml";
 const std::string kTruth = " --truth " + kSources + "/stability/models/crazyflie-small-effects.toml";
 
-/// kTruth's model with motors that follow at once, as composite.toml has them, in `folder`.
+/// The model of kTruth with motors that respond at once, as in composite.toml, written to `folder`.
 std::string truth_without_lag(const ScratchFolder& folder) {
   std::string text = read_text(kSources + "/stability/models/crazyflie-small-effects.toml");
   const std::size_t lag = text.find("[[effect]]\nname = \"motor_lag\"");
@@ -139,7 +139,7 @@ TEST(TubeCommand, AnIntervalOfLagsWidensTheTubeAndContainsTheTruthsLag) {
   refused("0.063 0.052", "the least and the largest");
 }
 
-/// Flies the swap `count` times, with a drag and a constant force of each flight's own, in `folder`/`name`.
+/// Simulates the swap `count` times in `folder`/`name`, with an individual drag and constant force per flight.
 /// @returns the largest error of each flight, x, y, z.
 std::vector<std::array<double, 3>> fly_swaps(const ScratchFolder& folder, const std::string& name, int first,
                                              int count) {
@@ -204,7 +204,8 @@ TEST(TubeCommand, ATruthThatFlightsMeasuredKeepsFurtherFlightsInItsTube) {
     largest_m = std::max(largest_m, most[2]);
   }
   EXPECT_GE(inside, 27);
-  // Noise of the accelerometer is in the ranges as if it were a force: 0.12 m/s^2 of noise widen the tube to several
+  // The ranges include accelerometer noise as if it were a force: 0.12 m/s^2 of noise widens the tube to several
+  // times that of the truth alone.
   // times that of the truth alone.
   EXPECT_LT(tube["radius_xyz_m"][2].get<double>(), 8 * largest_m);
 }
@@ -219,7 +220,7 @@ TEST(TubeCommand, AMeasuredTruthIsThatOfTheModelThatWasCompared) {
                               " --tube --task swap --duration 2 --quiet --from c.json --coverage 0.9";
   const Outcome other = run_shell(command + kTruth, folder.path());
   EXPECT_EQ(other.exit_code, 3);
-  EXPECT_NE(other.output.find("residuals are those of another model"), std::string::npos) << other.output;
+  EXPECT_NE(other.output.find("residuals belong to another model"), std::string::npos) << other.output;
   EXPECT_EQ(run_shell(command, folder.path()).exit_code, 2) << "no --truth";
   const Outcome few =
       run_shell(command + " --truth " + kSources + "/stability/models/crazyflie-small.toml", folder.path());
@@ -282,7 +283,7 @@ TEST(TubeCommand, WhatIsMissingOrMakesNoSenseIsSaid) {
 TEST(TubeCommand, WeightsThatAreNoNumberAreRefused) {
   const ScratchFolder folder;
   std::filesystem::copy(kSources + "/nn/networks/demo", folder.path() / "net");
-  // The data of a safetensors file end with the last tensor: its last number becomes NaN.
+  // The data of a safetensors file end with the last tensor; its last number becomes NaN.
   std::string bytes = read_text(folder / "net/phi.safetensors");
   bytes.replace(bytes.size() - 4, 4, std::string("\x00\x00\xc0\x7f", 4));
   write_text(folder / "net/phi.safetensors", bytes);

@@ -11,7 +11,7 @@ namespace {
 constexpr double kStep_s = 0.01;
 constexpr int kSamples = 60'000;
 
-/// A Gauss-Markov gust of variance 1 beside white noise.
+/// A Gauss-Markov gust of variance 1 plus white noise.
 std::vector<double> gusty(const Noise& noise) {
   std::mt19937 generator(4);
   std::normal_distribution<double> normal;
@@ -48,7 +48,7 @@ TEST(Whitening, InnovationsOfAGustAreNotCorrelated) {
   std::vector<double> innovations;
   for (std::size_t i = 0; i < r.size(); ++i)
     innovations.push_back(filter.advance(Eigen::Vector3d(r[i], 0, 0), kStep_s, i == 0)(0, 0));
-  for (std::size_t lag = 1; lag <= 20; ++lag)  // 4 standard deviations of a correlation of so many samples
+  for (std::size_t lag = 1; lag <= 20; ++lag)  // 4 standard deviations of a sample correlation
     EXPECT_LT(std::abs(correlation(innovations, lag)), 4 / std::sqrt(kSamples)) << lag;
 }
 

@@ -20,7 +20,7 @@ foreach(binary libswarmcert_flight.a workload.elf)
   endif()
 endforeach()
 
-# One function's frame. What the whole chain of calls takes is in firmware-facts.json.
+# The frame of a single function. firmware-facts.json states the stack of the whole call chain.
 set(stack_budget_bytes 768)
 file(GLOB_RECURSE graphs ${SCRATCH}/cortex-m4/*.ci)
 set(worst 0)

@@ -7,7 +7,7 @@
 namespace swarmcert::facts {
 namespace {
 
-// The form of arm-none-eabi-g++ 12.2's -fcallgraph-info=su.
+// The format of -fcallgraph-info=su in arm-none-eabi-g++ 12.2.
 constexpr char kGraph[] = R"graph(graph: { title: "x.cpp"
 node: { title: "entry" label: "void entry()\nx.cpp:1:1\n24 bytes (static)" }
 node: { title: "x.cpp:_Z1a" label: "int a()\nx.cpp:2:2\n100 bytes (static)" }

@@ -1,4 +1,4 @@
-# What the scripts of this folder share. SCRATCH: a folder of their own, with the cross build in cortex-m4/.
+# Functions shared by the scripts of this folder. SCRATCH: their scratch folder, with the cross build in cortex-m4/.
 foreach(program arm-none-eabi-g++ qemu-system-arm ninja)
   find_program(found_${program} ${program})
   if(NOT found_${program})
@@ -7,7 +7,7 @@ foreach(program arm-none-eabi-g++ qemu-system-arm ninja)
 endforeach()
 set(images ${SCRATCH}/cortex-m4/tests/firmware)
 
-# Runs a command, in the folder WORKING where that is set; leaves `output` and `error`.
+# Runs a command, in the folder WORKING if set; sets `output` and `error`.
 function(run)
   if(NOT WORKING)
     set(WORKING ${SCRATCH})
@@ -24,7 +24,7 @@ endfunction()
 
 set(qemu qemu-system-arm -M netduinoplus2 -nographic -semihosting-config enable=on,target=native)
 
-# Runs an image that writes target.bin, and moves that to `file`.
+# Runs an image that writes target.bin, and moves this file to `file`.
 function(run_image elf file)
   set(WORKING ${SCRATCH}/${CLAIM})
   file(REMOVE_RECURSE ${WORKING})

@@ -1,4 +1,4 @@
-# A build that lost both guards against contraction: its detector says so, and its words differ.
+# A build without both guards against contraction: its detector reports it, and its words differ.
 cmake_minimum_required(VERSION 3.25)
 include(${CMAKE_CURRENT_LIST_DIR}/common.cmake)
 set(contracted ${SCRATCH}/contracted)

@@ -1,4 +1,4 @@
-/// @file Programs for Cortex-M4 that tests build from exported source.
+/// @file Cortex-M4 programs that tests build from exported source.
 #pragma once
 
 #include <cstdlib>
@@ -6,12 +6,12 @@
 
 namespace swarmcert::tests {
 
-/// True where a program for Cortex-M4 can be built and run.
+/// Whether a Cortex-M4 program can be built and run.
 inline bool has_cortex_m_tools() {
   return std::system("command -v arm-none-eabi-g++ qemu-system-arm > /dev/null 2>&1") == 0;
 }
 
-/// Shell command that builds a bare program for Cortex-M4 from `sources`, one of which defines program().
+/// Returns the shell command that builds a bare Cortex-M4 program from `sources`, one of which defines program().
 inline std::string cortex_m_build(const std::string& sources, const std::string& output) {
   const std::string folder = SWARMCERT_SOURCE_DIR "/tests/firmware/";
   return "arm-none-eabi-g++ -std=c++17 -O2 -ffp-contract=off -mcpu=cortex-m4 -mthumb -mfloat-abi=hard "

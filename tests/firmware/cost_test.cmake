@@ -1,10 +1,10 @@
-# Instructions and modelled times against limits.txt; the model against what is known of the published kernel.
+# Checks instructions and modelled times against limits.txt, and the model against known times of the published kernel.
 cmake_minimum_required(VERSION 3.25)
 include(${CMAKE_CURRENT_LIST_DIR}/common.cmake)
 run(${qemu} -plugin file=${PLUGIN} -kernel ${images}/count.elf)
 string(REGEX MATCHALL "[a-z_0-9]+ [0-9]+ [0-9]+ [0-9]+\n" lines "${output}${error}")
 
-# The most that a name costs over all inputs of the image, cycles with taken branches at 1 and 3 more, in us.
+# The largest cost of a name over all inputs of the image; times in us, with 1 and 3 additional cycles per taken branch.
 foreach(line IN LISTS lines)
   string(REGEX MATCH "([a-z_0-9]+) ([0-9]+) ([0-9]+) ([0-9]+)" matched "${line}")
   set(name ${CMAKE_MATCH_1})
@@ -17,7 +17,7 @@ foreach(line IN LISTS lines)
     set(instructions_${name} 0)
     set(most_us_${name} 0)
   endif()
-  # No branch of a network looks at a number: any input, the same instructions.
+  # Branches of a network do not depend on the data: every input takes the same instructions.
   if(name MATCHES "^(phi|rho)_" AND NOT instructions EQUAL first_${name})
     message(FATAL_ERROR "${name} takes ${first_${name}} instructions for one input, ${instructions} for another")
   endif()

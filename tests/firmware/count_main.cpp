@@ -1,5 +1,5 @@
-// What one evaluation costs on the microcontroller: lines "NAME INSTRUCTIONS CYCLES TAKEN_BRANCHES", some names several
-// times, for other inputs. Run under QEMU with the plugin of cycle_model/.
+// Cost of one evaluation on the microcontroller: lines "NAME INSTRUCTIONS CYCLES TAKEN_BRANCHES", some names several
+// times, for different inputs. Run under QEMU with the plugin of cycle_model/.
 #include "flash_networks.h"
 #include "flight_case.h"
 #include "measure.h"

@@ -1,6 +1,5 @@
-// The app of controller/crazyflie against a stub of the stock firmware, on the host and under QEMU. Exit code: 0, the
-// line of the first check that failed as far as it fits into a byte, or 100 + the self-test's verdict where that
-// failed.
+// The app of controller/crazyflie against a stub of the stock firmware, on the host and under QEMU. Exit code: 0; the
+// line of the first failed check, as far as it fits into a byte; or 100 + the self-test's verdict if that failed.
 #include <cstring>
 
 #include "controller/flight_controller.h"
@@ -46,7 +45,7 @@ float sum(const control_t& control) {
   return total;
 }
 
-/// A neighbour half a metre above, seen for long enough that it counts in full.
+/// A neighbour half a metre above, visible for long enough to have full weight.
 void meet_a_neighbour() {
   for (int i = 0; i < 30; ++i) {
     now_ms += swarmcert::crazyflie::kPeriod_ms;
@@ -55,9 +54,9 @@ void meet_a_neighbour() {
   }
 }
 
-/// A rigid body under the commanded PWM, without lag or air: from half a metre off, tilted, turning and with its nose
-/// elsewhere, four seconds of the 1000 Hz loop. Returns the distance from the setpoint in metres; 1000 if it is not
-/// level.
+/// Simulates a rigid body under the commanded PWM, without lag or air, for four seconds of the 1000 Hz loop. It
+/// starts half a metre off, tilted, rotating and with another heading. Returns the distance from the setpoint in
+/// metres; 1000 if it is not level.
 float distance_after_four_seconds() {
   namespace controller = swarmcert::controller;
   constexpr float kStep_s = 1e-3f, kMass_kg = 0.034f, kDegreePerRadian = 57.29578f;
@@ -129,17 +128,17 @@ int check_app() {
   controllerOutOfTreeInit();
   if (!controllerOutOfTreeTest()) return 100 + status.self_test;
 
-  // Hover at the setpoint: level, four equal motors, and as much thrust as weight.
+  // Hover at the setpoint: level, four equal motors, and thrust equal to the weight.
   CHECK(parameters.enable == kSwarmcertOff);
   const control_t hover = fly(hover_setpoint(), level_state());
   CHECK(hover.controlMode == controlModeForce);
   for (const float force : hover.normalizedForces)
     CHECK(force == hover.normalizedForces[0] && force > 0.3f && force < 0.9f);
 
-  // As shipped, it flies.
+  // The vehicle flies with the default settings.
   CHECK(distance_after_four_seconds() < 0.05f);
 
-  // Every other tick of the 1000 Hz loop is skipped, and leaves the command as it is.
+  // Every second tick of the 1000 Hz loop is skipped and leaves the command unchanged.
   control_t untouched{};
   untouched.normalizedForces[2] = 0.125f;
   const setpoint_t setpoint = hover_setpoint();
@@ -148,7 +147,7 @@ int check_app() {
   controllerOutOfTree(&untouched, &setpoint, &sensors, &state, 1);
   CHECK(untouched.normalizedForces[2] == 0.125f && untouched.controlMode == controlModeLegacy);
 
-  // Off: nothing is computed. Compute only: logged, not applied. Apply: the thrust makes up for the predicted force.
+  // Off: nothing is computed. Compute only: logged, not applied. Apply: the thrust compensates for the predicted force.
   meet_a_neighbour();
   CHECK(status.predicted_N == 0 && status.neighbours == 0);
   parameters.enable = kSwarmcertComputeOnly;
@@ -166,18 +165,18 @@ int check_app() {
   CHECK(sum(fly(hover_setpoint(), level_state())) == sum(hover) && status.applied_N == 0);
   parameters.enable = kSwarmcertApply;
 
-  // The task hangs: its last prediction is not used for long.
+  // The task hangs: its last prediction is used only for a short time.
   now_ms += 101;
   CHECK(sum(fly(hover_setpoint(), level_state())) == sum(hover) && status.applied_N == 0);
 
-  // The neighbour is heard no more: out after half a second.
+  // The neighbour is no longer heard: it is dropped after half a second.
   now_ms += swarmcert::controller::kMaxNeighbourAge_ms;
   swarmcert::crazyflie::step_network(now_ms);
   CHECK(status.neighbours == 0);
   const float without_neighbours_N = status.predicted_N;
   CHECK(without_neighbours_N != predicted_N);
 
-  // A vehicle of a kind that the network has not, a broken estimate: f_a_hat = 0.
+  // A kind of vehicle that the network lacks, or an invalid estimate: f_a_hat = 0.
   meet_a_neighbour();
   CHECK(status.predicted_N != without_neighbours_N);
   parameters.own_kind = 200;
@@ -189,7 +188,7 @@ int check_app() {
   CHECK(status.predicted_N == 0 && status.prediction != 0);
   own[2] = 1;
 
-  // The attitude is lost: motors off. No setpoint: motors off. A dead battery sensor: still flying.
+  // Attitude lost: motors off. No setpoint: motors off. Defective battery sensor: the vehicle keeps flying.
   state_t lost = level_state();
   lost.attitudeQuaternion.w = 0;
   CHECK(sum(fly(hover_setpoint(), lost)) == 0 && status.faults != 0);
@@ -198,7 +197,7 @@ int check_app() {
   CHECK(sum(fly(hover_setpoint(), level_state())) > 0);
   battery_V = 3.9f;
 
-  // Turning by a yaw rate: the nose is asked for further to the left, so the motors that turn left push more.
+  // Turning by a yaw rate: the heading setpoint moves to the left, so the motors that yaw left are stronger.
   setpoint_t turning = hover_setpoint();
   turning.mode.yaw = modeVelocity;
   turning.attitudeRate.yaw = 90;

@@ -1,5 +1,5 @@
 # The app of controller/crazyflie: type-checked against the stub with the stock firmware's flags, run under QEMU and on
-# the host; wrong builds and changed weights are found by its self-test.
+# the host; its self-test detects wrong builds and changed weights.
 cmake_minimum_required(VERSION 3.25)
 include(${CMAKE_CURRENT_LIST_DIR}/common.cmake)
 include(${CMAKE_CURRENT_LIST_DIR}/crazyflie_build.cmake)
@@ -46,7 +46,7 @@ build_app(${folder}/fused ${folder}/network ${main} NO_KBUILD_FLAGS LAST "-D__bu
 expect_exit_code(102 "without flags and guard: the self-test finds contraction"
                  ${qemu} -kernel ${folder}/fused/app.elf)
 
-# The last bit of the first weight.
+# Flips the last bit of the first weight.
 file(COPY ${folder}/network DESTINATION ${folder}/changed)
 set(source ${folder}/changed/network/swarmcert_network.cpp)
 file(READ ${source} text)

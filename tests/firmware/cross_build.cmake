@@ -1,4 +1,4 @@
-# Cross-builds the folders that fly and their test images with the preset cortex-m4.
+# Cross-builds the folders used in flight and their test images with the preset cortex-m4.
 cmake_minimum_required(VERSION 3.25)
 include(${CMAKE_CURRENT_LIST_DIR}/common.cmake)
 file(MAKE_DIRECTORY ${SCRATCH})

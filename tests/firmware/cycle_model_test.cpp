@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint32_t kFlash = 0x08000000, kRam = 0x20000000;
 
-/// `code` as the processor's manual prints it: 16 bit, or two halves of 16 bit.
+/// Decodes `code` as printed in the processor manual: 16 bits, or two halves of 16 bits.
 Instruction decoded(std::uint32_t address, std::uint32_t code) {
   const std::uint16_t halves[2] = {static_cast<std::uint16_t>(code >> 16), static_cast<std::uint16_t>(code)};
   if (code >> 16 == 0) return decode(address, &halves[1], 2);
@@ -19,7 +19,7 @@ Instruction decoded(std::uint32_t address, std::uint32_t code) {
 
 int cycles(std::uint32_t code) { return decoded(kRam, code).cycles; }
 
-// Codes as arm-none-eabi-as writes them; cycles from the processor's Technical Reference Manual.
+// Encodings as produced by arm-none-eabi-as; cycles from the processor's Technical Reference Manual.
 TEST(Instruction, HasTheManualsCycles) {
   EXPECT_EQ(cycles(0x3201), 1) << "adds r2, #1";
   EXPECT_EQ(cycles(0x6862), 2) << "ldr r2, [r4, #4]";

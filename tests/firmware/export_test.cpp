@@ -97,11 +97,11 @@ int main() {
   ASSERT_EQ(run("g++ -std=c++17 -Isilent silent/swarmcert_network.cpp main.cpp -o flown").exit_code, 0);
   EXPECT_EQ(run("./flown").exit_code, 2) << "a golden vector is of this composition";
 
-  // A certificate of the network that always speaks is none of this one.
+  // A certificate of the network without silent compositions is not valid for this one.
   ASSERT_EQ(run("swarmcert certify network.toml --nodes 0 --method product -o cert.json").exit_code, 0);
   const Outcome other = run("swarmcert export silent.toml --certificate cert.json -o other");
   EXPECT_EQ(other.exit_code, 3) << other.output;
-  EXPECT_NE(other.output.find("where the network is silent"), std::string::npos) << other.output;
+  EXPECT_NE(other.output.find("the silent compositions"), std::string::npos) << other.output;
 }
 
 TEST_F(Firmware, LayersThatDoNotFitTheirArraysOrEachOtherDoNotCompile) {
@@ -187,7 +187,7 @@ TEST_F(Firmware, MatchAndSelfTestFindOneFlippedBitOfAnyArrayInAnElf) {
   EXPECT_EQ(tried, 20);
 }
 
-/// Nine decimal digits give a float back.
+/// Nine decimal digits identify a float.
 std::string decimal(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.9g, ", value);
@@ -251,7 +251,7 @@ TEST_F(Firmware, Float64NetworksAreExportedAsFloat32WhereAskedAndNeverSilently) 
   for (const std::string part : {"phi.ground", "phi.small", "phi.large", "rho.small", "rho.large"}) {
     files::Weights wide = weights(part);
     wide.precision = files::Precision::kFloat64;
-    wide.layers[0].weights[1] = 0.1;  // no float
+    wide.layers[0].weights[1] = 0.1;  // not a float
     files::save_safetensors(wide, folder_ / (part + ".safetensors"), true);
   }
   for (const std::string command :
@@ -270,7 +270,7 @@ TEST_F(Firmware, Float64NetworksAreExportedAsFloat32WhereAskedAndNeverSilently) 
   EXPECT_EQ(run("swarmcert match network.toml --as float32 flown").exit_code, 4);
   EXPECT_EQ(run("swarmcert match network.toml --as float32 out/swarmcert_network.cpp").exit_code, 1);
 
-  // A certificate must be about the rounded weights.
+  // A certificate must refer to the rounded weights.
   ASSERT_EQ(run("swarmcert certify network.toml --method product -o wide.cert.json").exit_code, 0);
   EXPECT_EQ(run("swarmcert export network.toml --as float32 --certificate wide.cert.json -o other").exit_code,
             3);

@@ -1,4 +1,4 @@
-/// @file A network of two kinds with ground and clamp, exported, and programs that are built from it.
+/// @file An exported network of two kinds with ground and clamp, and programs built from it.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 
 namespace swarmcert::tests {
 
-/// Exports a network of two kinds with ground and clamp, and compiles what came out.
+/// Exports a network of two kinds with ground and clamp, and compiles the export.
 class FirmwareTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -53,7 +53,7 @@ class FirmwareTest : public testing::Test {
 
   Outcome run(const std::string& command) { return run_shell(command, folder_.path()); }
 
-  /// "swarmcert match network.toml FILE", its exit code, and whether the text holds each of `words`.
+  /// Expects the exit code of "swarmcert match network.toml FILE" and each of `words` in its output.
   void expect_match(const std::string& file, int exit_code, const std::vector<std::string>& words) {
     const Outcome outcome = run("swarmcert match network.toml " + file);
     EXPECT_EQ(outcome.exit_code, exit_code) << outcome.output;
@@ -65,7 +65,8 @@ class FirmwareTest : public testing::Test {
     return files::load_weights(folder_ / (part + ".safetensors"));
   }
 
-  /// Writes `file` again with one bit of a stored float flipped. False if the float is not in it.
+  /// Copies `file` to `changed` with one bit of the stored float `value` flipped. Returns false if `file` does not
+  /// contain the float.
   bool flip_last_bit(const std::string& file, const std::string& changed, double value) {
     std::string bytes = read_text(folder_ / file);
     const float narrow = static_cast<float>(value);

@@ -1,5 +1,5 @@
-# firmware-facts.json: what the app of controller/crazyflie costs with the network NETWORK. Only what a build of the target
-# firmware_facts passes: SOURCE SCRATCH SWARMCERT PLUGIN COLLECT NETWORK OUTPUT.
+# Writes firmware-facts.json: the cost of the app of controller/crazyflie with the network NETWORK. Run by the target
+# firmware_facts, which passes SOURCE SCRATCH SWARMCERT PLUGIN COLLECT NETWORK OUTPUT.
 cmake_minimum_required(VERSION 3.25)
 include(${CMAKE_CURRENT_LIST_DIR}/common.cmake)
 include(${CMAKE_CURRENT_LIST_DIR}/crazyflie_build.cmake)
@@ -11,7 +11,7 @@ set(WORKING ${folder})
 run(${qemu} -plugin file=${PLUGIN} -kernel ${folder}/app/app.elf)
 file(WRITE ${folder}/counts.txt "${output}${error}")
 set(objects app/flight.o app/network.o app/network_task.o app/parameters.o)
-run(arm-none-eabi-ld -r ${objects} -o app/whole.o)  # with each template instance once
+run(arm-none-eabi-ld -r ${objects} -o app/whole.o)  # contains each template instance once
 run(arm-none-eabi-size -B -t app/whole.o)
 file(WRITE ${folder}/sizes.txt "${output}")
 run(arm-none-eabi-g++ --version)

@@ -1,4 +1,4 @@
-# firmware-facts.json of the bundled network: complete, and within the budgets of a stock Crazyflie.
+# Checks that firmware-facts.json of the bundled network is complete, and within the budgets of a stock Crazyflie.
 set(NETWORK ${SOURCE}/nn/networks/demo/network.toml)
 set(OUTPUT ${SCRATCH}/firmware-facts.json)
 include(${CMAKE_CURRENT_LIST_DIR}/facts.cmake)
@@ -22,8 +22,8 @@ string(JSON found GET "${facts}" network sha256)
 if(NOT found STREQUAL expected)
   message(FATAL_ERROR "facts of another network: ${found}")
 endif()
-# The app's task has CONFIG_APP_STACKSIZE words; the stabilizer's, which calls the controller, 450, and the system's, which
-# calls the self-test, 300, of which others need some.
+# Stack sizes in words: CONFIG_APP_STACKSIZE for the app's task, 450 for the stabilizer, which calls the controller, and
+# 300 for the system task, which calls the self-test. Other functions of these tasks need some of it.
 file(STRINGS ${SOURCE}/controller/crazyflie/app-config words REGEX "CONFIG_APP_STACKSIZE=")
 string(REGEX MATCH "[0-9]+" words "${words}")
 math(EXPR task_bytes "4 * ${words} - 256")

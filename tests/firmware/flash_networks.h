@@ -1,4 +1,4 @@
-/// @file Networks of the paper's sizes whose weights the compiler computes, so that they lie in flash as flown ones do.
+/// @file Networks of the paper's sizes with weights computed by the compiler, so that they lie in flash as in flight.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace swarmcert::tests {
 
-/// Numbers that the weights and biases of the first `layers` layers take up. Each array begins a line of the flash's
-/// cache, as exported ones do.
+/// Number of floats in the weights and biases of the first `layers` layers. Each array starts at a line of the flash
+/// cache, as in an export.
 constexpr int count_numbers(const int* sizes, int layers) {
   int count = 0;
   for (int k = 0; k < layers; ++k) {
@@ -19,7 +19,8 @@ constexpr int count_numbers(const int* sizes, int layers) {
   return count;
 }
 
-/// sizes: inputs, outputs of the first layer, ..., of the last. Random numbers, so that they serve in any layout.
+/// sizes: inputs, outputs of the first layer, ..., outputs of the last. The numbers are random, so that any layout
+/// can use them.
 template <int... sizes>
 struct FlashNetwork {
   static constexpr int kSizes[] = {sizes...};

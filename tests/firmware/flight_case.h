@@ -1,4 +1,4 @@
-/// @file A Crazyflie's control step with numbers as they come up in flight.
+/// @file A Crazyflie's control step with values typical of flight.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@ namespace swarmcert::tests {
 
 using Settings = controller::FlightSettings<float, controller::PidGains<float>>;
 
-/// Gains and calibration of the flown small vehicle.
+/// Gains and calibration of the small vehicle used in flight.
 inline Settings crazyflie_settings() {
   Settings settings{};
   settings.mass_kg = 0.034f;
@@ -27,7 +27,7 @@ inline Settings crazyflie_settings() {
   return settings;
 }
 
-/// Random states; every third time far from the reference, so that rotors saturate.
+/// Random states; every third state is far from the reference, so that rotors saturate.
 class FlightCase {
  public:
   bool is_lee() const { return count_ % 2 == 0; }
@@ -56,7 +56,7 @@ class FlightCase {
         controller::flight_step(settings_, memory_, measured_, reference_, effect_W_N_, 0u, position_is_due);
   }
 
-  /// Of the last step: keeps the compiler from leaving it out.
+  /// The last command; using it keeps the compiler from removing the step.
   const controller::FlightCommand<float>& command() const { return command_; }
 
  private:

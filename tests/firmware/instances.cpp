@@ -1,4 +1,4 @@
-// What firmware links: explicit instantiations, so that the archive shows everything that the templates need.
+// What firmware links: explicit instantiations, so that the archive contains everything that the templates need.
 #include "controller/flight_controller.h"
 #include "controller/gain_conversion.h"
 #include "controller/neighbours.h"

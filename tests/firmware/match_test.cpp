@@ -1,4 +1,4 @@
-// A change anywhere in an export, or in the program that was built from it, is found.
+// Any change in an export, or in the program built from it, is detected.
 #include "firmware/exported_network.h"
 
 namespace swarmcert {
@@ -21,7 +21,7 @@ class Match : public tests::FirmwareTest {
     write_text(folder_ / file, text.replace(at, from.size(), to));
   }
 
-  /// The result of `match network.toml FILE`, whose exit code must be 1.
+  /// Returns the result of `match network.toml FILE`, whose exit code must be 1.
   files::Json difference(const std::string& file) {
     const Outcome outcome = run("swarmcert match network.toml " + file + " -q --force --json match.json");
     EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
@@ -31,7 +31,7 @@ class Match : public tests::FirmwareTest {
     return json["first_difference"];
   }
 
-  /// The change of `file` is found through the folder, through the file, and through the source beside it.
+  /// Expects that the change of `file` is found through the folder, the file, and the source next to it.
   void expect_found(const std::string& file, std::size_t line) {
     for (const std::string& named : {std::string("out"), file, std::string(kSource)}) {
       const files::Json found = difference(named);
@@ -71,7 +71,8 @@ TEST_F(Match, LineEndsOfOtherSystemsAreNoDifferenceAndOtherWhiteSpaceIs) {
   EXPECT_EQ(run("swarmcert match network.toml out").exit_code, 0);
   write_text(folder_ / kSource, text + "\n");
   const files::Json longer = difference("out");
-  EXPECT_NE(longer["what"].get<std::string>().find("goes on where the export ends"), std::string::npos);
+  EXPECT_NE(longer["what"].get<std::string>().find("continues after the end of the export"),
+            std::string::npos);
   write_text(folder_ / kSource, text.substr(0, text.size() / 2));
   EXPECT_NE(difference("out")["what"].get<std::string>().find("ends here"), std::string::npos);
 }
@@ -116,7 +117,7 @@ TEST_F(Match, FindsWhatIsMissingOrAdditional) {
   write_text(folder_ / "out/nn/deep_set.hpp", "");
   EXPECT_EQ(difference("out")["file"], "out/nn/deep_set.hpp");
   fs::rename(folder_ / "out/nn/deep_set.hpp",
-             folder_ / "out/cstdint");  // would be taken by #include <cstdint>
+             folder_ / "out/cstdint");  // would be picked up by #include <cstdint>
   EXPECT_EQ(difference("out")["file"], "out/cstdint");
   fs::remove(folder_ / "out/cstdint");
   fs::rename(folder_ / "out/nn/mlp.h", folder_ / "mlp.h");
@@ -146,7 +147,7 @@ TEST_F(Match, ReadsTheParametersOfTheExportAndHoldsTheCertificateAgainstTheOneTh
   expect_match("other --certificate cert.json", 0, {"equal"});
   replace("cert.json", "\"schema\"", "\"note\": 1, \"schema\"");
   expect_match("other --certificate cert.json", 1, {"was exported with the certificate"});
-  // What it states is what everything in it has to agree with.
+  // Everything in the export has to agree with the stated parameters.
   replace("other/swarmcert_network.h", "kMostNeighbours = 3", "kMostNeighbours = 4");
   expect_match("other", 1, {"kMostNeighbours = 4"});
   replace("other/swarmcert_network.h", "kMostNeighbours = 4", "kMostNeighbours = 3");
@@ -246,12 +247,12 @@ TEST_F(Match, AProgramThatCannotBeRunIsInconclusiveWithTheReason) {
   ASSERT_EQ(built.exit_code, 0) << built.output;
   expect_match("stripped.elf", 4, {"inconclusive", "not checked", "no symbol"});
   expect_match("object.o", 4, {"not checked", "before it is linked"});
-  // A PATH that holds the tool and no QEMU.
+  // A PATH that contains the tool but not QEMU.
   const Outcome without =
       run("PATH=$(dirname $(command -v swarmcert)) swarmcert match network.toml program.elf");
   EXPECT_EQ(without.exit_code, 4) << without.output;
   EXPECT_NE(without.output.find("qemu-system-arm is not installed"), std::string::npos) << without.output;
-  // Code that does not come back: a fault at its first instruction.
+  // Code that does not return: a fault at its first instruction.
   const std::string text = read_text(folder_ / kSource);
   replace(kSource, "*force_N = 0.0f;\n", "*force_N = 0.0f; asm volatile(\"udf #0\");\n");
   ASSERT_EQ(

@@ -1,11 +1,11 @@
-/// @file How an image names a piece of work whose instructions and cycles cycle_model/plugin.cpp counts.
+/// @file Marks a piece of work whose instructions and cycles are counted by cycle_model/plugin.cpp.
 #pragma once
 
 #include "semihosting.h"
 
 namespace swarmcert::tests {
 
-/// Prints "NAME " and runs `work` between the plugin's markers, which prints the rest of the line.
+/// Prints "NAME " and runs `work` between the markers of the plugin, which prints the rest of the line.
 template <typename Work>
 [[gnu::noinline]] void measure(const char* name, const Work& work) {
   semihosting::print(name);

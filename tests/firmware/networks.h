@@ -1,4 +1,4 @@
-/// @file Networks of the paper's sizes with weights of their own, for the images that run on the microcontroller.
+/// @file Networks of the paper's sizes with their own weights, for images that run on the microcontroller.
 #pragma once
 
 #include "nn/deep_set.h"
@@ -8,7 +8,7 @@ namespace swarmcert::tests {
 /// The paper's sizes: phi 6-25-40-40-40, ground 4-25-40-40-40, rho 40-40-40-40-1.
 inline constexpr int kHidden = 40;
 
-/// Weights of one network of four layers. Random numbers are drawn into the arrays as they lie, whatever the layout.
+/// Weights of one network with four layers. Random numbers fill the arrays in memory order, whatever the layout.
 template <int Inputs, int First, int Outputs, nn::Layout layout = nn::Layout::kBlocks>
 struct FourLayers {
   float w1[First * Inputs], b1[First], w2[kHidden * First], b2[kHidden], w3[kHidden * kHidden], b3[kHidden],

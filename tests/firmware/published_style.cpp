@@ -3,7 +3,7 @@
 namespace swarmcert::tests {
 namespace {
 
-/// The sum grows in memory, and weights of one output are `outputs` apart. Returns where the next layer's begin.
+/// Accumulates the sum in memory; the weights of one output are `outputs` apart. Returns the start of the next layer.
 [[gnu::noinline]] const float* apply(int inputs, int outputs, const float* weights, const float* x, float* y,
                                      bool has_relu) {
   const float* const biases = weights + inputs * outputs;

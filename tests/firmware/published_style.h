@@ -1,11 +1,11 @@
-/// @file Networks evaluated in the style of the firmware that flew in the paper, to hold the cycle model against what
-/// is known of its time. Compiled with that firmware's options, contraction included.
+/// @file Networks evaluated in the style of the firmware used in the paper, to compare the cycle model with the known
+/// time of that firmware. Compiled with that firmware's options, including contraction.
 #pragma once
 
 namespace swarmcert::tests {
 
-/// @param values  of each layer the weights, [inputs][outputs], then the biases.
-/// @param buffers [80]; the result is in the last 40, or for rho in the one after the first 40.
+/// @param values for each layer the weights, [inputs][outputs], followed by the biases.
+/// @param buffers [80]; the result is in the last 40, or for rho in the element after the first 40.
 void published_phi(const float* values, const float* input, float* buffers);
 void published_rho(const float* values, const float* input, float* buffers);
 

@@ -1,4 +1,4 @@
-# The workload under every host compiler, optimisation level and contraction flag: always the same words.
+# Runs the workload with every host compiler, optimisation level and contraction flag: the words are always the same.
 #   cmake -DSOURCE=... -DSCRATCH=... -DHOST_WORKLOAD=... -P same_bits_test.cmake
 cmake_minimum_required(VERSION 3.25)
 

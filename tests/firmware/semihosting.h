@@ -1,5 +1,5 @@
-/// @file What the debugger, here QEMU, does for a program without an operating system: files, text, exit.
-/// Arm, "Semihosting for AArch32 and AArch64": the operation in r0, its arguments' address in r1, breakpoint 0xAB.
+/// @file Services of the debugger (here QEMU) for a program without an operating system: files, text, exit.
+/// Arm, "Semihosting for AArch32 and AArch64": operation in r0, address of the arguments in r1, breakpoint 0xAB.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ inline std::uint32_t call(std::uint32_t operation, const void* arguments) {
 
 inline void print(const char* text) { call(0x04, text); }
 
-/// Ends QEMU with this exit code.
+/// Terminates QEMU with this exit code.
 [[noreturn]] inline void exit(std::uint32_t code) {
   const std::uint32_t arguments[] = {0x20026, code};
   call(0x20, arguments);
@@ -23,13 +23,13 @@ inline void print(const char* text) { call(0x04, text); }
   }
 }
 
-/// A new binary file; -1 if there is none.
+/// Creates a binary file; returns -1 on failure.
 inline int create(const char* path, std::uint32_t length) {
   const std::uint32_t arguments[] = {reinterpret_cast<std::uint32_t>(path), 5, length};
   return static_cast<int>(call(0x01, arguments));
 }
 
-/// True if all bytes were written.
+/// Returns whether all bytes were written.
 inline bool write(int file, const void* bytes, std::uint32_t size) {
   const std::uint32_t arguments[] = {static_cast<std::uint32_t>(file), reinterpret_cast<std::uint32_t>(bytes),
                                      size};

@@ -1,4 +1,4 @@
-// From reset to program() on the STM32F405: floating point on, data copied, zeros cleared. A fault prints and ends.
+// From reset to program() on the STM32F405: enables floating point, copies data, clears zeros. A fault prints and ends.
 #include <cstdint>
 
 #include "semihosting.h"
@@ -24,7 +24,7 @@ int program();
   swarmcert::tests::semihosting::exit(static_cast<std::uint32_t>(program()));
 }
 
-/// Stack pointer, reset, then fourteen exceptions, none of which is expected.
+/// Stack pointer, reset, then fourteen exceptions, none of which should occur.
 [[gnu::section(".isr_vector"), gnu::used]] const void* const vectors[16] = {
     &stack_end,
     reinterpret_cast<const void*>(reset),

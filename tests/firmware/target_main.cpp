@@ -1,4 +1,4 @@
-// Writes the workload's words to target.bin in the folder where QEMU runs.
+// Writes the words of the workload to target.bin in the folder where QEMU runs.
 #include "semihosting.h"
 #include "workload.h"
 
@@ -31,7 +31,7 @@ FileSink sink;
 }  // namespace
 
 extern "C" int program() {
-  // Too large for the stack; built when program() runs, after the coprocessor is on.
+  // Too large for the stack; constructed when program() runs, after the floating-point unit is enabled.
   static swarmcert::tests::Workload<FileSink> workload(sink);
   sink.file = semihosting::create("target.bin", 10);
   if (sink.file < 0) return 3;

@@ -1,4 +1,5 @@
-/// @file Every function that flies, fed with random and boundary vectors; the same words on every machine.
+/// @file Runs every function used in flight with random and boundary vectors; the resulting words are the same on
+/// every machine.
 #pragma once
 
 #include <cstdint>
@@ -16,11 +17,11 @@ namespace swarmcert::tests {
 
 using controller::Vector3;
 
-/// Random numbers are drawn in statements of their own: in which order a call evaluates its arguments is up to the
-/// compiler, and compilers differ.
+/// Runs `vectors` vectors and passes every result to `sink(std::uint32_t)` as its bits. All NaNs are passed as the
+/// same word, because processors differ only in which NaN an invalid operation produces.
 ///
-/// Runs `vectors` vectors and hands every result to `sink(std::uint32_t)` as its bits, NaNs all alike: which NaN an
-/// invalid operation makes is the one thing on which processors differ.
+/// Each random number is drawn in a statement of its own, because the evaluation order of the arguments of a call is
+/// unspecified and compilers differ.
 template <typename Sink>
 class Workload {
  public:
@@ -61,7 +62,7 @@ class Workload {
   }
   /// In [-1, 1), a multiple of 2^-23.
   float unit() { return static_cast<float>(static_cast<std::int32_t>(bits() >> 8) - (1 << 23)) * 0x1p-23f; }
-  /// In [-largest, largest); in a boundary vector now and then something that should not be there.
+  /// In [-largest, largest); in a boundary vector occasionally an invalid or extreme value.
   float number(float largest) {
     static constexpr std::uint32_t kStrange[] = {0x7fc00000u, 0x7f800000u, 0xff800000u, 0x7f7fffffu,
                                                  0x00000001u, 0x80000000u, 0x007fffffu, 0x00800000u,
@@ -96,7 +97,7 @@ class Workload {
   }
   void put(const Vector3<float>& v) { put(v.x), put(v.y), put(v.z); }
 
-  // --- what flies ---
+  // --- functions used in flight ---
   void networks(int i) {
     nn::Neighbour<float> neighbours[controller::kMostNeighbours];
     float inputs[controller::kMostNeighbours][6], own[4], output[kHidden];

@@ -1,4 +1,4 @@
-// The GitHub action: what its step runs, run as GitHub runs it.
+// The GitHub action: runs its step as GitHub does.
 #include <gtest/gtest.h>
 
 #include "data.h"
@@ -8,7 +8,7 @@
 namespace swarmcert::tests {
 namespace {
 
-/// The environment that action.yml gives its step, from its `env:` lines, with these inputs.
+/// The environment that action.yml gives its step through its `env:` lines, for these inputs.
 std::string environment(const std::string& action, const std::map<std::string, std::string>& inputs) {
   std::string words;
   std::istringstream lines(action);

@@ -1,4 +1,5 @@
-// A bundle is accepted as written, anywhere; with any byte changed, file missing, added or swapped it is rejected.
+// A bundle is accepted as written, in any place; with any byte changed, or a file missing, added or swapped, it is
+// rejected.
 #include "analysis/gate/bundle.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// verify_bundle(); tells why it rejects.
+/// Runs verify_bundle() and returns the reason for rejection.
 std::string rejection(const std::string& folder, bool rerun = false) {
   const gate::BundleVerdict verdict = gate::verify_bundle(folder, rerun, {1, "", false, {}});
   return verdict.accepted ? "" : verdict.reason;
@@ -28,7 +29,7 @@ std::vector<std::string> files_of(const std::string& folder) {
   return files;
 }
 
-/// Replaces a file and states its new hash in the manifest: what only the checker and the match can see.
+/// Replaces a file and states its new hash in the manifest, so that only the checker and the match can detect it.
 void forge(const std::string& folder, const std::string& file, const std::string& bytes) {
   write_text(folder + "/" + file, bytes);
   files::Json manifest = files::parse_json(read_text(folder + "/manifest.json"), "manifest.json");
@@ -48,7 +49,7 @@ TEST(GateBundle, IsAcceptedAsWrittenAndRejectedWithAnyFileChangedMissingAddedOrS
   ASSERT_EQ(written.exit_code, 0) << written.output;
   EXPECT_EQ(release.run("swarmcert gate policy.toml -q --bundle bundle").exit_code, 3)
       << "nothing is overwritten";
-  // Elsewhere, without the release: the bundle stands for itself.
+  // In another place, without the release: the bundle is self-contained.
   const TempFolder elsewhere;
   const std::string bundle = elsewhere / "bundle";
   fs::rename(release / "bundle", bundle);
@@ -135,7 +136,7 @@ TEST(GateBundle, AForgedManifestDoesNotHideOtherWeightsCertificateSourceOrVerdic
     manifest["files"][0]["path"] = path;
     manifest["content_sha256"] = files::content_sha256(manifest);
     write_text(bundle + "/manifest.json", files::to_text(manifest));
-    EXPECT_NE(rejection(bundle).find("no path inside"), std::string::npos) << path << rejection(bundle);
+    EXPECT_NE(rejection(bundle).find("not a path inside"), std::string::npos) << path << rejection(bundle);
   }
   std::printf("forged manifests: %zu, caught by the checker or the match: %d\n", forged.size(), caught);
 }

@@ -1,4 +1,4 @@
-// A file of the release that is missing, damaged or another one never passes.
+// A file of the release that is missing, damaged or replaced never passes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -38,7 +38,7 @@ bool passes(const ReleaseFolder& release, const std::string& policy) {
   }
 }
 
-/// A release whose every file differs from that of the first one.
+/// Changes every file of a release so that it differs from that of the first release.
 void make_other(const ReleaseFolder& other) {
   change_tensor(other / "network/phi.safetensors", "fc1", 0.9);
   change_tensor(other / "network/rho.safetensors", "fc1", 0.9);
@@ -69,7 +69,7 @@ TEST(GateInputs, AMissingDamagedOrSwappedFileNeverPasses) {
     const std::string table = table_for(file);
     const std::string plain = release.policy_of({table});
     ASSERT_TRUE(passes(release, plain)) << file << "\n" << told(release.judge(plain));
-    // Of gains, models and logs only the policy's hashes say which ones they have to be.
+    // For gains, models and logs only the hashes in the policy determine which files are right.
     const std::string hashes = "hashes\n\"" + file + "\" = \"" + files::sha256(good) + "\"";
     const auto expect_refused = [&](const std::string& kind, bool is_pinned) {
       const std::string policy = is_pinned ? release.policy_of({hashes, table}) : release.policy_of({table});
@@ -101,7 +101,7 @@ TEST(GateInputs, AMissingDamagedOrSwappedFileNeverPasses) {
     expect_refused("cut", true);
     write_text(path, good + "\n");
     expect_refused("longer", true);
-    const bool is_evaluator = file.rfind("firmware/nn/", 0) == 0;  // the same in every release
+    const bool is_evaluator = file.rfind("firmware/nn/", 0) == 0;  // identical in every release
     EXPECT_EQ(read_text(other / file) == good, is_evaluator) << file;
     if (is_evaluator) {
       write_text(path, good);
@@ -138,7 +138,7 @@ TEST(GateInputs, ABaselineThatIsMissingOrEditedNeverPasses) {
   fs::remove(path);
   expect_refused();
   for (std::size_t at = 0; at < good.size(); ++at) {
-    if (std::isspace(static_cast<unsigned char>(good[at])) != 0) continue;  // layout is no content
+    if (std::isspace(static_cast<unsigned char>(good[at])) != 0) continue;  // white space is not content
     std::string damaged = good;
     damaged[at] = damaged[at] == '9' ? '8' : static_cast<char>(damaged[at] + 1);
     if (files::sha256(damaged) == files::sha256(good)) continue;

@@ -1,4 +1,5 @@
-// A policy that asks for less than the baseline's is named and fails, unless its numbers become the next baseline.
+// A policy that requires less than that of the baseline fails with the difference, unless its values become the next
+// baseline.
 #include "analysis/gate/baseline.h"
 #include "gate/release.h"
 #include "nn/base/input_error.h"
@@ -39,7 +40,7 @@ TEST(GateBaseline, NamesEveryLoosenedLimitAndDroppedCheckAndNothingElse) {
   EXPECT_EQ(words(baseline, then, {5.0, {}}), "regression.percent_of.a: 2 % before, 5 % now\n");
   EXPECT_EQ(words(baseline, then, {5.0, {{"a", 2.0}, {"b", 9.0}}}),
             "regression.percent_of.b: 5 % before, 9 % now\n");
-  // A table that could not be judged fails by itself: its rows are not dropped.
+  // A table that could not be judged fails on its own: its rows do not count as dropped.
   gate::Check unreadable = gate::row("b", 1);
   unreadable.stands_for_table = true;
   EXPECT_EQ(words(baseline, {then[0], unreadable, then[2]}, same), "");

@@ -1,4 +1,4 @@
-// The gate and the bundle compare the whole export and the code in the ELF, and not the weights alone.
+// The gate and the bundle compare the whole export and the code in the ELF file, not only the weights.
 #include "analysis/gate/bundle.h"
 #include "gate/release.h"
 #include "nn/base/content_hash.h"

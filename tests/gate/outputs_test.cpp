@@ -1,4 +1,4 @@
-// What continuous integration reads: required fields of each format, and names that try to break out of it.
+// Formats for continuous integration: required fields of each format, and names that try to break out of it.
 #include "analysis/gate/outputs.h"
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 namespace swarmcert::gate {
 namespace {
 
-/// Control characters, markup of every format, broken UTF-8, a workflow command.
+/// Control characters, markup of every format, invalid UTF-8, a workflow command.
 const std::string kHostile =
     "a<b>&\"'|`]]>\x01\x1b[31m\xff\xc3\n::error::owned\r\n%0A*_{}\\<script>alert(1)</script>, line: 7 "
     "\xe2\x98\x83";
@@ -40,10 +40,10 @@ bool has_controls(const std::string& text) {
                      [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\n'; });
 }
 
-/// A reader of the XML that to_junit() writes: elements nest, attributes are quoted, no other markup.
+/// A reader for the XML written by to_junit(): elements nest, attributes are quoted, no other markup.
 testing::AssertionResult is_well_formed(const std::string& text) {
   std::vector<std::string> open;
-  std::size_t at = text.find('\n') + 1;  // behind the declaration
+  std::size_t at = text.find('\n') + 1;  // after the declaration
   while (at < text.size()) {
     const char c = text[at];
     if (c == '>' || c == '"') return testing::AssertionFailure() << "stray " << c << " at " << at;
@@ -101,7 +101,7 @@ TEST(GateOutputs, SarifHasWhatTheStandardRequires) {
   const files::Json& run = document["runs"][0];
   const files::Json& driver = run["tool"]["driver"];
   EXPECT_EQ(driver["name"], "swarmcert");
-  ASSERT_EQ(run["results"].size(), 3u);  // what passes is no result
+  ASSERT_EQ(run["results"].size(), 3u);  // checks that pass give no result
   for (const files::Json& result : run["results"]) {
     EXPECT_FALSE(result["message"]["text"].get<std::string>().empty());
     const files::Json& rule = driver["rules"][result["ruleIndex"].get<std::size_t>()];
@@ -152,7 +152,7 @@ TEST(GateOutputs, MarkdownTerminalAndJsonKeepTheirFrameWhateverTheNamesHold) {
   EXPECT_FALSE(has_controls(to_table(result)));
   files::Json json;
   add_json(result, json);
-  const std::string text = files::to_text(json);  // throws for broken UTF-8
+  const std::string text = files::to_text(json);  // throws for invalid UTF-8
   EXPECT_EQ(json["checks"][2]["value"], nullptr);
   EXPECT_EQ(json["checks"][2]["verdict"], "inconclusive");
   EXPECT_EQ(json["verdict"], "fail");

@@ -1,4 +1,4 @@
-// Tracking bounds over an uncertain vehicle: what is enclosed is nowhere below what a plant of the box reaches.
+// Tracking bounds over an uncertain vehicle: the enclosure is never below a bound reached by a plant of the box.
 #include "analysis/gate/plant_box.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,8 @@ using stability::DisturbanceSource;
 using stability::TrackingSetup;
 using stability::UncertainPlant;
 
-/// A continuous loop of known gains. @param limit_m_s of the integrator.
+/// A continuous loop with known gains.
+/// @param limit_m_s limit of the integrator.
 TrackingSetup continuous_setup(double limit_m_s) {
   TrackingSetup setup;
   setup.model = tests::small_vehicle();
@@ -66,7 +67,7 @@ TEST(PlantBox, NoCornerIsAboveTheEnclosure) {
 }
 
 TEST(PlantBox, TheIntegralOfAnActingClampPassesTheLargestThrustScale) {
-  // Thrust of 1.3 times what the law commands: its integral's command acts 1.3 times, too.
+  // Thrust of 1.3 times the command: the integral's part of the command acts 1.3 times as well.
   const TrackingSetup setup = continuous_setup(0.5);
   UncertainPlant box = box_about(setup);
   box.lag_s = box.delay_s = {0, 0};
@@ -94,7 +95,7 @@ TEST(PlantBox, ErrorsOfTheEstimatesWidenTheBound) {
   for (int axis = 0; axis < 3; ++axis) {
     EXPECT_GT(velocity.reached_m[axis], 1.1 * without.reached_m[axis]);
     EXPECT_GT(velocity.enclosed_m[axis], 1.1 * without.enclosed_m[axis]);
-    // The vehicle follows the wrong position.
+    // The vehicle follows the erroneous position.
     EXPECT_GT(position.reached_m[axis], without.reached_m[axis] + 0.01);
   }
 }

@@ -1,4 +1,4 @@
-// A good release passes; a release that violates one kind of check is caught by that check and by no other.
+// A good release passes; a release that violates one kind of check is caught by that check and no other.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ void replace(const std::string& path, const std::string& from, const std::string
   write_text(path, text.replace(at, from.size(), to));
 }
 
-/// The release with `plant` done to it is caught by exactly `check`, and the command line exits 1.
+/// A fault: after `plant`, the release is caught by exactly `check`, and the command line exits with 1.
 struct Plant {
   std::string check;
   std::function<void(const ReleaseFolder&)> plant;
@@ -46,7 +46,8 @@ TEST(Gate, AGoodReleasePassesAndEachPlantedViolationIsCaughtByItsOwnCheckAlone) 
   }
   EXPECT_GE(with_baseline, 15u);
 
-  // Every table of the policy rejects one of these; `flash` of 64 KiB and a little, a flight pushed aside, and so on.
+  // Every table of the policy rejects one of these faults: slightly more than 64 KiB of `flash`, a displaced flight,
+  // and so on.
   const std::string gains =
       "schema = \"swarmcert/gains/1\"\n[position]\nLambda = [4, 4, 4]\nK = [0.136, 0.136, 0.136]\n";
   const std::vector<Plant> plants = {
@@ -132,7 +133,7 @@ TEST(Gate, AGoodReleasePassesAndEachPlantedViolationIsCaughtByItsOwnCheckAlone) 
     SCOPED_TRACE(plant.check);
     kinds.erase(std::find(kinds.begin(), kinds.end(), plant.check));
     const ReleaseFolder release(good);
-    // The approved hash is the planted file's, unless the hash is what is planted.
+    // The approved hash is that of the modified file, unless the hash is the planted fault.
     const std::string approved = release.policy();
     plant.plant(release);
     const std::string policy = plant.check == "hashes" ? approved : release.policy(plant.policy);

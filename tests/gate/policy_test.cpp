@@ -1,4 +1,4 @@
-// Policies: what is refused, with which line and hint; and what each check's limits mean.
+// Policies: which are rejected, with which line and hint; and the meaning of each check's limits.
 #include "analysis/gate/policy.h"
 
 #include <gtest/gtest.h>
@@ -88,7 +88,7 @@ TEST(GateChecks, LimitsInNewtonMeanTheSameAsInGramForce) {
 
 TEST(GateChecks, TheGuardFactorOfTheFlightsWidensTheMeasuredBound) {
   const ReleaseFolder release;
-  // Flown with downwash, which the model lacks: the residual pushes the loop again.
+  // Flown with downwash, which the model lacks: the residual drives the loop again.
   std::filesystem::remove_all(release / "flights");
   const std::string source = SWARMCERT_SOURCE_DIR;
   ASSERT_EQ(release
@@ -137,7 +137,7 @@ TEST(GateChecks, APromiseHasToHoldOnReferenceFlightsThatItWasNotMadeFrom) {
   EXPECT_NE(wide.witness.find("promised 0.9"), std::string::npos) << wide.witness;
   EXPECT_EQ(narrow.verdict, gate::Verdict::kFail);
   EXPECT_EQ(*narrow.value, 0);
-  // Flights from which it was made say nothing.
+  // Flights from which the promise was made do not count.
   std::string hashes;
   for (const std::string& file : release.files()) {
     if (file.rfind("flights/", 0) != 0) continue;
@@ -190,7 +190,7 @@ TEST(GateChecks, ALimitOfAFunctionThatNoNetworkCanHaveIsRefused) {
   for (const std::string name : {"phi_small", "psi:small", "set:small"}) {
     const std::string table = "lipschitz\nfunctions = { \"" + name + "\" = 30 }";
     EXPECT_TRUE(refuses([&] { release.judge(release.policy_of({table})); },
-                        {"policy.toml", name, "is no function", "phi:<kind>"}))
+                        {"policy.toml", name, "is not a function", "phi:<kind>"}))
         << name;
   }
 }
@@ -236,7 +236,7 @@ TEST(GateChecks, WhatRestsOnARejectedCertificateFailsUnlessThatIsJudgedByItself)
 
 TEST(GateCommand, InconclusiveFailsUnlessItIsAllowed) {
   const ReleaseFolder release;
-  // Between the slope that is attained and the bound that is proved.
+  // The limit lies between the attained slope and the proved bound.
   const gate::Check check =
       release.judge(release.policy_of({"float32_error\nmax_error_gf = 1e-12"})).checks.at(0);
   EXPECT_EQ(check.verdict, gate::Verdict::kInconclusive);

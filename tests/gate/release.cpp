@@ -68,7 +68,7 @@ void ReleaseFolder::certify_again() const {
   const Outcome outcome = run(
       "swarmcert certify network/network.toml --nodes 1 --blocks=position,velocity -q --force -o cert.json "
       "&& swarmcert export network/network.toml --certificate cert.json --force -q -o firmware");
-  // A network that breaks its gamma has a certificate all the same.
+  // A network that violates its gamma still has a certificate.
   EXPECT_TRUE(outcome.exit_code == 0 || fs::exists(folder_ / "cert.json")) << outcome.output;
   if (outcome.exit_code != 0) {
     const Outcome exported = run("swarmcert export network/network.toml --force -q -o firmware");

@@ -11,13 +11,13 @@
 
 namespace swarmcert::tests {
 
-/// Folder of a good release: network, certificate, source, ELF where a compiler is there, gains, model, swarm, box,
-/// facts, flights. Each test has one of its own.
+/// Folder of a good release: network, certificate, source, ELF file if a compiler is available, gains, model, swarm,
+/// box, facts, flights. Each test has its own.
 class ReleaseFolder {
  public:
-  /// Makes the release; a test that finds it incomplete has failed already.
+  /// Creates the release; if it is incomplete, the test has failed already.
   ReleaseFolder();
-  /// A copy, to be damaged.
+  /// Copies a release so that it can be damaged.
   explicit ReleaseFolder(const ReleaseFolder& other);
   ReleaseFolder& operator=(const ReleaseFolder&) = delete;
 
@@ -27,21 +27,21 @@ class ReleaseFolder {
 
   Outcome run(const std::string& command) const { return run_shell(command, folder_.path()); }
 
-  /// policy.toml with every check; `change` replaces whole tables by name ("range" -> "max_abs_force_gf = 1"), an empty
-  /// text removes one.
+  /// Writes policy.toml with every check; `change` replaces whole tables by name ("range" -> "max_abs_force_gf = 1"),
+  /// and an empty text removes one.
   std::string policy(const std::vector<std::pair<std::string, std::string>>& change = {}) const;
-  /// policy.toml with [release] and these tables only.
+  /// Writes policy.toml with only [release] and these tables.
   std::string policy_of(const std::vector<std::string>& tables) const;
 
   gate::GateResult judge(const std::string& policy, const std::string& baseline = "") const;
 
-  /// Network, certificate, source, ELF and facts of these weights, after a weight file was changed.
+  /// Renews network, certificate, source, ELF file and facts after a weight file was changed.
   void certify_again() const;
-  /// Builds the ELF from the exported source as it lies there, where the tools are installed.
+  /// Builds the ELF file from the present exported source, if the tools are installed.
   void build_elf() const;
   void write_facts(int flash_bytes) const;
 
-  /// Files that the release rests on, relative to the folder.
+  /// Files on which the release depends, relative to the folder.
   std::vector<std::string> files() const;
 
  private:
@@ -51,13 +51,13 @@ class ReleaseFolder {
   bool has_elf_ = false;
 };
 
-/// Names of the checks' tables that do not pass, each once.
+/// Names of the tables with checks that do not pass, without duplicates.
 std::vector<std::string> caught(const gate::GateResult& result);
 
-/// Scales what `pattern` names of a weight file: tensor and factor, and adds to it.
+/// Multiplies a tensor of a weight file by `factor` and adds `offset`.
 void change_tensor(const std::string& path, const std::string& tensor, double factor, double offset = 0);
 
-/// Everything that a run says about its result: for messages of failing tests.
+/// The complete result of a run as text, for messages of failing tests.
 std::string told(const gate::GateResult& result);
 
 }  // namespace swarmcert::tests

@@ -1,4 +1,4 @@
-// A network as train writes it by default, with compositions in which it is silent, goes through the gate as others do.
+// A network as written by train, with compositions in which it is silent, goes through the gate like any other.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -14,8 +14,8 @@ namespace {
 
 using files::Json;
 
-/// Trained on recorded flights of two and of three vehicles, of which one composition is better off without a network;
-/// its certificate with ranges, its source, and a policy with limits a little above what is proved.
+/// Trained on recorded flights of two and of three vehicles, in which one composition is better off without a
+/// network; its certificate with ranges, its source, and a policy with limits slightly above the proved values.
 class SilentRelease {
  public:
   SilentRelease() {
@@ -90,7 +90,7 @@ TEST(Gate, ATrainedReleaseWithSilentCompositionsPassesAndPlantedFaultsInItAreCau
   const Outcome good = release.run("swarmcert gate policy.toml -q");
   EXPECT_EQ(good.exit_code, 0) << good.output;
 
-  // Somebody lets the network speak where the flights said that it is no help.
+  // Removes a silent composition, although the flights showed that the network does not help there.
   const std::size_t begin = network.find("silent = ");
   ASSERT_NE(begin, std::string::npos);
   std::string spoken = network;
@@ -100,7 +100,8 @@ TEST(Gate, ATrainedReleaseWithSilentCompositionsPassesAndPlantedFaultsInItAreCau
     EXPECT_EQ(std::count(names.begin(), names.end(), check), 1) << check;
   write_text(release / "net/network.toml", network);
 
-  // The force of a large vehicle is near 40 gf but among the neighbours where it is 0: both the range and the step.
+  // The force of a large vehicle is near 40 gf except in the composition where it is 0: both the range and the jump
+  // change.
   change_tensor(release / "net/rho_large.safetensors", "fc2", 1, 40);
   release.certify_and_export();
   const gate::GateResult pushed = release.judge();

@@ -84,7 +84,7 @@ BeforeAfter before_and_after(const residuals::Inputs& inputs, const Ladder& ladd
           identification::picture_data(inputs, inputs.models[0], ladder.model)};
 }
 
-/// Comments at the head of the model file.
+/// Comment lines at the head of the model file.
 std::vector<std::string> heading_of(const stability::Model& model) {
   std::vector<std::string> lines = {"Effects fitted to flights by swarmcert add."};
   for (const stability::EffectSpec& effect : model.effects) {
@@ -95,7 +95,7 @@ std::vector<std::string> heading_of(const stability::Model& model) {
   return lines;
 }
 
-/// `add undo`: back to the model before the last accepted effect.
+/// `add undo`: restores the model from before the last accepted effect.
 int undo(const AddOptions& options, const CommonOptions& common) {
   if (options.flights.models.size() != 1) throw UsageError("add undo takes one --model");
   if (options.output.empty()) throw UsageError("add undo writes a new model: name it with -o");
@@ -115,7 +115,7 @@ int undo(const AddOptions& options, const CommonOptions& common) {
   return kDone;
 }
 
-/// `add show`: the ladders that model files keep, one below the other.
+/// `add show`: prints the ladders stored in model files, one below the other.
 int show(const AddOptions& options, const CommonOptions& common) {
   files::Json result = result_head("add", options.flights.models);
   result["ladders"] = files::Json::array();
@@ -123,7 +123,7 @@ int show(const AddOptions& options, const CommonOptions& common) {
   residuals::ForceUnit unit;
   for (const std::string& path : options.flights.models) {
     const stability::Model model = stability::read_model(path);
-    // One page, one unit: that of the first model.
+    // One page uses one unit, that of the first model.
     if (ladders.empty()) unit = residuals::chosen_force_unit(options.flights.unit, model);
     result["ladders"].push_back(
         {{"model", path}, {"ladder", ladder_json(model.ladder)}, {"effects", effects_json(model.effects)}});
@@ -176,7 +176,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   for (const std::string& problem : few_of_each(ladder.problems)) note("warning: " + problem);
   write_result(common, result);
   if (!ladder.too_poor.empty()) {
-    note("inconclusive: " + ladder.too_poor + "; 'swarmcert compare' says what was cut");
+    note("inconclusive: " + ladder.too_poor + "; 'swarmcert compare' shows what was cut");
     return kInconclusive;
   }
   if (common.prints_text()) {
@@ -184,7 +184,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
     if (ladder.any_accepted)
       fmt::print("Written: {}\n", options.output);
     else
-      fmt::print("Nothing helped: {} is not written. --keep-anyway writes it all the same.\n",
+      fmt::print("No effect helped: {} is not written. --keep-anyway writes it nevertheless.\n",
                  options.output);
   }
   std::vector<LadderOfModel> ladders;
@@ -211,13 +211,10 @@ int run_add(const AddOptions& options, const CommonOptions& common) {
 Command add_command() {
   return {
       "add", "Fit effects to flights and add them to a model, with the errors before and after",
-      "EFFECT is one name, several with commas, or auto: what diagnose finds on the flights of the fit. "
-      "An effect\n"
-      "is accepted if the error of flights that the fit has not seen falls; the test flights are only "
-      "shown.\n"
-      "formula is the best formula for what the model leaves, as diagnose shows it (formula:2 the second); "
-      "shape\n"
-      "is a smooth or monotone curve where no formula holds. "
+      "EFFECT is one name, several with commas, or auto: the effects that diagnose finds on the fitted "
+      "flights. An effect\nis accepted if it lowers the error on flights not used in the fit; the test "
+      "flights are only reported.\nformula is the best formula for the residual, as shown by diagnose "
+      "(formula:2 is the second best); shape\nis a smooth or monotone curve if no formula fits. "
       "vehicle_offset is a constant force of each vehicle; rotor_thrust a factor for each rotor, from its "
       "duty in slow\n"
       "flight; com_offset and torque_bias are fitted to the rotors' mean torques, accelerometer_scale to\n"
@@ -229,7 +226,7 @@ Command add_command() {
       [](CLI::App& app) {
         const auto options = std::make_shared<AddOptions>();
         app.add_option("EFFECT", options->effects,
-                       "Names of effects with commas between, formula, shape, auto, undo or show")
+                       "Names of effects separated by commas, formula, shape, auto, undo or show")
             ->required();
         declare_flights(app, options->flights, false);
         add_output(app, "-o,--output", options->output, "The new model.toml");

@@ -9,15 +9,16 @@
 
 namespace swarmcert::analysis {
 
-/// One entry per row: `effect`, `fit_rmse`, `select_rmse`, `test_rmse` in newton, `accepted`, `reason`.
+/// Returns one entry per row: `effect`, `fit_rmse`, `select_rmse`, `test_rmse` in newton, `accepted`, `reason`.
 files::Json ladder_json(const std::vector<stability::LadderRow>& rows);
 
-/// `ladder`, `earlier`, `test_looks`, `split`, `effects`.
+/// Adds `ladder`, `earlier`, `test_looks`, `split` and `effects` to the result.
 void add_ladder(const identification::Ladder& ladder, const residuals::Inputs& inputs, files::Json& result);
 
-/// Text for people.
+/// Prints the ladder as text.
 void print_ladder(const std::vector<stability::LadderRow>& rows);
-/// What the errors of the rows are of: the force residual, or the rotors' balance where that is what was fitted.
+/// Says which quantity the errors of the rows measure: the force residual, or the balance of the rotors where that
+/// was fitted.
 std::string what_rows_measure(const std::vector<stability::LadderRow>& rows);
 void print_ladder(const identification::Ladder& ladder);
 

@@ -19,7 +19,7 @@ std::string step(const stability::LadderRow& row) {
   return (row.effect == "nominal" ? "" : row.accepted ? "+ " : "refused: ") + row.effect;
 }
 
-/// So many decimals that the largest error has four digits: rows line up.
+/// Number of decimals with which the largest error has four digits, so that the rows line up.
 int decimals_of(const std::vector<stability::LadderRow>& rows, double per_newton) {
   double largest = 0;
   for (const stability::LadderRow& row : rows)
@@ -54,8 +54,8 @@ void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& 
           name +
           ".dat' using 1:xtic(4) title 'flights to fit' linecolor rgb '#999999', "
           "'' using 2 title 'flights to select' linetype 6, '' using 3 title 'test flights' linetype 1\n",
-      "Error ladder: how the error falls from the nominal model on, effect by effect, on the flights of "
-      "the fit, those that decide, and those that are only shown.");
+      "Error ladder: how the error falls from the nominal model on, effect by effect, on the fitted, the "
+      "selecting and the test flights.");
   report.table({"", "fit [" + unit + "]", "select [" + unit + "]", "test [" + unit + "]",
                 "test / noise floor", "note"},
                cells);
@@ -88,7 +88,8 @@ std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const
   }
   if (change != nullptr) {
     report.heading("Before and after");
-    report.paragraph("All flights, those of the fit among them: the error on test flights is in the ladder.");
+    report.paragraph(
+        "All flights, including those of the fit; the ladder states the error on the test flights.");
     add_before_and_after(report, change->before, change->after, change->pictures.room, unit);
     report.heading("What was added");
     add_effect_curves(report, change->pictures.effects, unit);

@@ -11,28 +11,28 @@
 
 namespace swarmcert::analysis {
 
-/// One ladder with the model that it led to.
+/// A ladder and the model that it led to.
 struct LadderOfModel {
   std::string title;
   std::vector<stability::LadderRow> rows;
   std::vector<stability::EffectSpec> effects;
 };
 
-/// The flights under the model that was given, and under the one that was fitted.
+/// The flights under the given model and under the fitted model.
 struct BeforeAfter {
   residuals::Comparison before, after;
   identification::PictureData pictures;
 };
 
-/// Writes FOLDER/report.html with a plot and a table per ladder, the effects' numbers and the JSON `result`; returns
-/// its path.
-/// @param change where effects were added: its pictures; else null
+/// Writes FOLDER/report.html with a plot and a table per ladder, the parameters of the effects and the JSON `result`.
+/// Returns the path of the page.
+/// @param change plots of the change if effects were added, else null
 /// @throws files::InputError as Report::write().
 std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const BeforeAfter* change,
                                 const residuals::ForceUnit& unit, const files::Json& result,
                                 const std::string& folder, bool overwrite);
 
-/// Bars and a table of the errors after each step.
+/// Adds bars and a table of the errors after each step.
 void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& rows, const std::string& name,
                        const residuals::ForceUnit& unit);
 

@@ -38,7 +38,7 @@ files::Json gains_json(const stability::Cascade& loop, CascadeInput input, const
           {"impulse", finite(h.max_abs())}};
 }
 
-/// Axes that Lambda or K couples to others.
+/// Axes that Lambda or K couples to other axes.
 std::vector<int> coupled_axes(const Tracking& input) {
   std::vector<int> result;
   for (int axis = 0; axis < 3; ++axis)
@@ -46,13 +46,13 @@ std::vector<int> coupled_axes(const Tracking& input) {
   return result;
 }
 
-/// Lags, ratio and, for x and y, attitude law of an axis, without its position gains.
+/// The lags, the thrust ratio and, for x and y, the attitude law of an axis, without its position gains.
 stability::Cascade without_position(const Tracking& input, const std::string& words, int axis) {
   stability::Cascade loop;
   loop.ratio = input.plant.thrust_scale;
   loop.lag_s = input.gains.motor_lag_s;
   if (axis == 2) return loop;
-  // A vehicle tilts about its other horizontal axis.
+  // The vehicle tilts about its other horizontal axis.
   const auto about = static_cast<std::size_t>(1 - axis);
   const std::array<double, 3> gains =
       !words.empty()
@@ -65,7 +65,8 @@ stability::Cascade without_position(const Tracking& input, const std::string& wo
   return loop;
 }
 
-/// The delay of gains.toml uses up the margin; where it uses up all of it, the loop is unstable.
+/// Subtracts the delay of gains.toml from the delay margin. If the delay uses up the whole margin, the loop is
+/// unstable.
 stability::CascadeMargins left_by_delay(stability::CascadeMargins margins, const Tracking& input) {
   margins.delay_s = std::max(0.0, margins.delay_s - input.gains.delay_s);
   return margins.delay_s == 0 ? stability::CascadeMargins{} : margins;
@@ -100,7 +101,7 @@ files::Json coupled_json(const Tracking& input, const std::string& words, const 
   std::string all;
   files::Json channels = files::Json::array();
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    // Where the delay of all motors makes the loop unstable, no channel has a margin left.
+    // If the delay of all motors makes the loop unstable, no channel has a margin left.
     stability::CascadeMargins& alone = margins.alone[i];
     alone = margins.together.gain > 0 ? left_by_delay(alone, input) : stability::CascadeMargins{};
     all += stability::axis_name(axes[i]);
@@ -132,7 +133,7 @@ stability::Cascade attitude_cascade(const Tracking& input, const std::string& wo
   const std::optional<stability::AxisLoop> position = axis_loop(input.gains, input.plant, axis);
   if (!position) throw UsageError("attitude gains: Lambda or K couples the axes; make them diagonal");
   stability::Cascade loop = without_position(input, words, axis);
-  // axis_loop() has the thrust's scale in its gains already.
+  // The gains from axis_loop() already contain the thrust scale.
   loop.Kp = position->Kp / loop.ratio;
   loop.Kd = position->Kd / loop.ratio;
   loop.Ki = position->Ki / loop.ratio;
@@ -172,7 +173,7 @@ void print_attitude(const files::Json& attitude) {
                number(row, "gain_margin", "{:.3g}"), number(row, "delay_margin_s", "{:.3g}"),
                number(row, "damping", "{:.3g}"), number(row, "frequency_rad_s", "{:.3g}"));
     if (!row.contains("channels")) continue;
-    fmt::print("    as one loop, all motors together; those of one axis alone:\n");
+    fmt::print("    as one loop with all motors; margins of each axis alone:\n");
     for (const files::Json& channel : row["channels"]) {
       fmt::print("    {} gain margin {}, delay margin {} s\n", channel["axis"].get<std::string>(),
                  number(channel, "gain_margin", "{:.3g}"), number(channel, "delay_margin_s", "{:.3g}"));

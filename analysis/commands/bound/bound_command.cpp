@@ -39,7 +39,7 @@ struct BoundOptions {
   std::string report;
 };
 
-/// What is asked for axis by axis needs loops of single axes.
+/// Rejects options that work axis by axis if axes are coupled: they need single-axis loops.
 void refuse_coupled_axes(const BoundOptions& options, const Tracking& input) {
   const char* const asked = options.is_uncertain ? "--uncertain"
                             : options.verified   ? "--verified"
@@ -58,8 +58,8 @@ bool has_initial(const stability::InitialError& initial) {
   return initial.position_m != 0 || initial.velocity_m_s != 0 || initial.learning_error_N != 0;
 }
 
-/// Through a thrust ratio r other than 1 the acceleration that is fed forward leaves the force (r - 1) m p_d'', which a
-/// jerk does not limit.
+/// With a thrust ratio r other than 1 the acceleration feedforward leaves the force (r - 1) m p_d'', which a bound on
+/// the jerk does not limit.
 void refuse_jerk_of_scaled_thrust(const stability::DisturbanceSource& source, const Tracking& input) {
   if (source.thrust_ratio_error > 0 && source.has_moving_reference()) {
     throw UsageError(
@@ -76,8 +76,8 @@ void refuse_jerk_of_scaled_thrust(const stability::DisturbanceSource& source, co
   }
 }
 
-/// The tubes start from rest; the tube around a task knows no force but that of the declared truth. What they or the
-/// swarm bound would leave out is refused.
+/// Rejects inputs that the tubes or the swarm bound would ignore: the tubes start from rest, and the tube around a
+/// task knows only the force of the declared truth.
 void refuse_what_is_left_out(const BoundOptions& options, const stability::DisturbanceSource& source) {
   const auto refuse = [](const char* what, const char* without) {
     throw UsageError(fmt::format("{} does not contain {}: leave one of them out", what, without));
@@ -102,14 +102,14 @@ void refuse_what_is_left_out(const BoundOptions& options, const stability::Distu
   }
 }
 
-/// The declared force, with the files it was read from in `inputs`.
+/// Returns the declared force and appends the files it was read from to `inputs`.
 LoadedDisturbance checked_disturbance(const BoundOptions& options, const Tracking& input,
                                       std::vector<std::string>& inputs) {
   const bool has_task = !options.task.task.empty();
   if (has_task && !options.tube) throw UsageError("--task requires --tube");
   DisturbanceArguments told = options.disturbance;
   if (has_task && options.coverage > 0) told.from.clear();  // measured beside --truth, not a class of its own
-  // The tube makes its own bounds of how vehicles move; without --speed there are no others.
+  // The tube bounds the motion of the vehicles itself; without --speed no other bounds are stated.
   if (has_task && told.speed < 0) told.network = {}, told.truth.clear(), told.certificate.clear();
   LoadedDisturbance disturbance = load_disturbance(told, input);
   stability::DisturbanceSource& source = disturbance.source;
@@ -139,14 +139,14 @@ files::Json uncertain_result(const BoundOptions& options, const Tracking& input,
   return uncertain_json(input, options.uncertain, run);
 }
 
-/// What the options ask for beside the bounds, each a field of the result.
+/// Adds the results requested in addition to the bounds, one member each.
 void add_extras(const BoundOptions& options, const CommonOptions& common, const Tracking& input,
                 const stability::DisturbanceSource& source, const stability::TrackingReport& report,
                 const std::optional<LocalTube>& local, const std::optional<MeasuredTruth>& measured,
                 files::Json& result) {
   if (options.is_uncertain) result["uncertain"] = uncertain_result(options, input, common);
   if (options.coverage > 0 && !measured) {
-    // Beside the file's classes stands only what was given on the command line.
+    // Only what was given on the command line is added to the classes of the file.
     DisturbanceArguments others = options.disturbance;
     others.from.clear();
     result["coverage"] = promise_json(input, report, load_disturbance(others, input).source, options.initial,
@@ -160,7 +160,7 @@ void add_extras(const BoundOptions& options, const CommonOptions& common, const 
   if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm, source);
 }
 
-/// The extras as text, where there are any.
+/// Prints the additional results as text.
 void print_extras(const files::Json& result) {
   const auto print = [&result](const char* field, void (*print_field)(const files::Json&)) {
     if (result.contains(field)) print_field(result[field]);
@@ -238,8 +238,8 @@ void declare_initial(CLI::App& app, stability::InitialError& initial) {
       ->check(CLI::NonNegativeNumber);
 }
 
-/// What the result holds beside the bounds.
-/// @return the option --uncertain, whose intervals may be left out.
+/// Declares the options for additional results.
+/// @return the option --uncertain, whose intervals are optional.
 CLI::Option* declare_extras(CLI::App& app, BoundOptions& options) {
   CLI::Option* const uncertain =
       app.add_option("--uncertain", options.uncertain,
@@ -255,12 +255,11 @@ CLI::Option* declare_extras(CLI::App& app, BoundOptions& options) {
   app.add_option(
       "--attitude-gains", options.attitude,
       "KR,Kw,KI of the attitude law, N m, N m s, N m/s: gains and limit-cycle margins of the cascade "
-      "(default: [attitude] of gains.toml, where it has them)");
-  app.add_option(
-         "--coverage", options.coverage,
-         "Bound that a further flight like those of --from keeps with this probability "
-         "(split-conformal prediction over flights); with --tube --task the tube, in which --truth is the "
-         "model that compare was run with")
+      "(default: [attitude] of gains.toml, if present)");
+  app.add_option("--coverage", options.coverage,
+                 "Bound that a further flight exchangeable with those of --from keeps with this probability "
+                 "(split-conformal prediction over flights); with --tube --task, the tube, where --truth "
+                 "must be the model that compare used")
       ->check(CLI::Range(0.5, 0.999))
       ->needs("--from");
   app.add_flag("--verified", options.verified, "Rigorous enclosures of the gains (intervals)");
@@ -281,34 +280,32 @@ CLI::Option* declare_extras(CLI::App& app, BoundOptions& options) {
 }  // namespace
 
 Command bound_command() {
-  return {
-      "bound", "Tracking error that gains and a vehicle give under a bounded force error",
-      "Says whether the tracking theorem applies and why not, its ball, the exact gains of every axis "
-      "for the\n"
-      "continuous and the sampled loop, and, for a declared or measured force error, the smallest of "
-      "five bounds,\n"
-      "each with the bias, the initial error and the errors of the estimates that are declared.\n"
-      "A certificate or a network bounds the rate of f_hat only and gives no ball; --truth declares what the "
-      "force\n"
-      "really is, and encloses its constants; --from takes measured quantiles.\n\n"
-      "Example: swarmcert bound --gains controller/gains/crazyflie-small.toml --model "
-      "stability/models/crazyflie-small.toml \\\n"
-      "           --amplitude 0.097 --impulse 0.0202 --rate 0.75\n"
-      "         swarmcert bound --gains controller/gains/composite.toml --model "
-      "stability/models/crazyflie-small.toml --tube --task swap \\\n"
-      "           --network nn/networks/demo/network.toml --truth "
-      "stability/models/crazyflie-small-effects.toml",
-      [](CLI::App& app) {
-        const auto options = std::make_shared<BoundOptions>();
-        declare_tracking(app, options->tracking);
-        declare_disturbance(app, options->disturbance);
-        declare_initial(app, options->initial);
-        const CLI::Option* const uncertain = declare_extras(app, *options);
-        return [options, uncertain](const CommonOptions& common) {
-          options->is_uncertain = uncertain->count() > 0;
-          return run_bound(*options, common);
-        };
-      }};
+  return {"bound", "Tracking error that gains and a vehicle give under a bounded force error",
+          "Reports whether the tracking theorem applies or why not, its ball, the exact gains of every axis "
+          "for the\n"
+          "continuous and the sampled loop, and, for a declared or measured force error, the smallest of "
+          "five bounds,\n"
+          "each with the bias, the initial error and the errors of the estimates that are declared.\n"
+          "A certificate or a network bounds the rate of f_hat only and gives no ball; --truth declares the "
+          "true force\nand encloses its constants; --from takes measured quantiles.\n\n"
+          "Example: swarmcert bound --gains controller/gains/crazyflie-small.toml --model "
+          "stability/models/crazyflie-small.toml \\\n"
+          "           --amplitude 0.097 --impulse 0.0202 --rate 0.75\n"
+          "         swarmcert bound --gains controller/gains/composite.toml --model "
+          "stability/models/crazyflie-small.toml --tube --task swap \\\n"
+          "           --network nn/networks/demo/network.toml --truth "
+          "stability/models/crazyflie-small-effects.toml",
+          [](CLI::App& app) {
+            const auto options = std::make_shared<BoundOptions>();
+            declare_tracking(app, options->tracking);
+            declare_disturbance(app, options->disturbance);
+            declare_initial(app, options->initial);
+            const CLI::Option* const uncertain = declare_extras(app, *options);
+            return [options, uncertain](const CommonOptions& common) {
+              options->is_uncertain = uncertain->count() > 0;
+              return run_bound(*options, common);
+            };
+          }};
 }
 
 }  // namespace swarmcert::analysis

@@ -21,7 +21,7 @@ namespace {
 using files::Json;
 using namespace stability;  // NOLINT: every name below is of that library
 
-/// "0.032:0.037"
+/// Parses "0.032:0.037".
 Interval range_of(const std::string& word, const std::string& text) {
   char* end = nullptr;
   Interval range;
@@ -36,7 +36,7 @@ Interval range_of(const std::string& word, const std::string& text) {
   return range;
 }
 
-/// Refuses an interval in another unit: battery in mV, times in ms, the thrust's scale in percent.
+/// Rejects an interval that appears to be in another unit: battery in mV, times in ms, thrust scale in percent.
 void check_range(const std::string& word, const std::string& name, const Interval& range,
                  const Model& model) {
   constexpr double kLongest_s = 1, kLargestScale = 10;
@@ -52,7 +52,7 @@ void check_range(const std::string& word, const std::string& name, const Interva
   if (!problem.empty()) throw UsageError("--uncertain " + word + ": " + problem);
 }
 
-/// The vehicle's intervals; those of the battery act on the thrust.
+/// The parameter intervals of the vehicle; the battery interval acts on the thrust.
 UncertainPlant intervals_of(const Tracking& input, const std::vector<std::string>& words) {
   UncertainPlant plant = usual_uncertainty(input.gains, input.plant);
   for (const std::string& word : words) {
@@ -75,7 +75,7 @@ UncertainPlant intervals_of(const Tracking& input, const std::vector<std::string
     } else if (name == "delay") {
       plant.delay_s = range;
     } else if (name == "battery" && range.lower > 0) {
-      // Thrust at the PWM that hovers with a full battery, without compensation.
+      // Thrust at the PWM that hovers with a full battery, without voltage compensation.
       const auto rotors = static_cast<double>(input.model.num_rotors());
       const double hover = input.model.thrust.pwm(input.model.weight_N() / rotors, kFullBattery_V);
       const auto ratio = [&](double v) {
@@ -100,7 +100,7 @@ Json worst_json(const UncertainGain& g) {
       {"mass_kg", g.mass_kg}, {"thrust_scale", g.thrust_scale}, {"lag_s", g.lag_s}, {"delay_s", g.delay_s}};
 }
 
-/// The loop of an axis without what varies.
+/// The loop of an axis without the uncertain parameters.
 AxisLoop fixed_part(const Tracking& input, int axis) {
   Plant nominal = input.plant;
   nominal.thrust_scale = 1;
@@ -117,7 +117,7 @@ std::string number_text(const Json& x) {
 
 std::string pair_text(const Json& pair) { return number_text(pair[0]) + " .. " + number_text(pair[1]); }
 
-/// An upper bound that is missing where a gain is finite at every point tried proves nothing.
+/// A missing upper bound proves nothing as long as the gain is finite at every point tried.
 const char* status_of(const UncertainNorms& norms) {
   if (std::isinf(norms.amplitude.lower)) return "unstable";
   for (const UncertainGain* const gain : {&norms.rate, &norms.amplitude, &norms.edge, &norms.impulse}) {
@@ -134,7 +134,7 @@ const char* end_name(UncertainNorms::End end) {
 
 constexpr double kUncertainGap = 0.02;
 
-/// Percent of the way to the gap asked for, or to the end of the budget.
+/// Progress in percent toward the requested gap or toward the end of the budget, whichever is further.
 class WayToGap {
  public:
   int percent(int evaluations, int most, double gap) {
@@ -169,7 +169,7 @@ Json uncertain_row(int axis, Channel channel, Loop loop, const UncertainNorms& n
           {"worst_impulse", worst_json(norms.impulse)}};
 }
 
-/// Rows of the axis before, for an axis that is the same.
+/// Repeats the rows of the previous axis for an axis with an identical loop.
 void repeat_rows(Json& rows, std::size_t count, int axis) {
   for (std::size_t i = 0; i < count; ++i) {
     Json row = rows[rows.size() - count];
@@ -178,19 +178,19 @@ void repeat_rows(Json& rows, std::size_t count, int axis) {
   }
 }
 
-/// One row of --uncertain: an axis, what acts on it, and the loop.
+/// One row of --uncertain: an axis, its input, and the loop.
 struct UncertainTask {
   int axis;
   Channel channel;
   Loop loop;
 };
 
-/// The norms of each task, computed in parallel.
+/// Computes the norms of all tasks in parallel.
 std::vector<UncertainNorms> norms_of(const std::vector<UncertainTask>& tasks, const Tracking& input,
                                      const UncertainPlant& plant, const UncertainRun& run) {
   std::vector<UncertainNorms> found(tasks.size());
   const int total = static_cast<int>(tasks.size());
-  std::atomic<int> percent_done{0};  // of each task, added up
+  std::atomic<int> percent_done{0};  // summed over the tasks
   files::parallel_for(total, run.jobs, [&](int i) {
     const UncertainTask& task = tasks[static_cast<std::size_t>(i)];
     const AxisLoop fixed = fixed_part(input, task.axis);
@@ -370,7 +370,7 @@ namespace {
 constexpr int kTubeSamples = 20001;
 constexpr double kTubeHorizon_s = 10, kTubeStep_s = kTubeHorizon_s / (kTubeSamples - 1);
 
-/// int |y| from zero to every sample, times `size`; zeros where that is 0.
+/// Integral of |y| from zero to every sample, times `size`; zeros if `size` is 0.
 std::vector<double> areas_of(const TransferFunction& y, double size) {
   std::vector<double> areas(kTubeSamples, 0.0);
   if (size == 0) return areas;
@@ -380,7 +380,7 @@ std::vector<double> areas_of(const TransferFunction& y, double size) {
   return areas;
 }
 
-/// Why there is no tube; nothing where there is one.
+/// Returns why there is no tube; nullptr if there is one.
 const char* no_tube(const AxisLoop& loop, const DisturbanceSource& source, int axis) {
   const Disturbance& d = source.axis[axis];
   if (!is_stable(loop)) return "unstable";
@@ -391,8 +391,8 @@ const char* no_tube(const AxisLoop& loop, const DisturbanceSource& source, int a
   return nullptr;
 }
 
-/// |e(t)| at most, at every `every`-th sample. Errors of the estimates count by their amplitude; a delay would only let
-/// them act later.
+/// Upper bound of |e(t)| at every `every`-th sample. Estimation errors enter by their amplitude; a delay would only
+/// make them act later.
 Json tube_of(const AxisLoop& loop, const DisturbanceSource& source, int axis, int every) {
   const Disturbance& d = source.axis[axis];
   const std::vector<double> kernel =
@@ -404,7 +404,7 @@ Json tube_of(const AxisLoop& loop, const DisturbanceSource& source, int axis, in
       areas_of(position_error_transfer(loop), source.position_error[axis].largest());
   double area = 0;
   double peak = 0;
-  double step = 0;  // response to a unit step, and the largest so far
+  double step = 0;  // response to a unit step, and its maximum so far
   double step_peak = 0;
   Json at = Json::array();
   for (int i = 0; i < kTubeSamples; ++i) {
@@ -417,7 +417,7 @@ Json tube_of(const AxisLoop& loop, const DisturbanceSource& source, int axis, in
     double bound = std::numeric_limits<double>::infinity();
     if (std::isfinite(d.amplitude_N)) bound = area * d.amplitude_N;
     if (std::isfinite(d.impulse_N_s)) {
-      // Of every pass that has begun by now.
+      // Sum over all passes that have begun by now.
       const double begun = d.pass_period_s > 0 ? 1 + std::floor(i * kTubeStep_s / d.pass_period_s) : d.passes;
       bound = std::min(bound, std::min<double>(d.passes, begun) * peak * d.impulse_N_s);
     }

@@ -42,7 +42,7 @@ Json theorem_json(const TrackingReport& report) {
   return json;
 }
 
-/// Which bound row.least() is.
+/// Name of the bound that row.least() returns.
 std::string smallest(const AxisBounds& row) {
   if (row.least() == row.bounds.least() && row.clamp.never_acts) return row.bounds.which();
   if (!std::isfinite(row.least())) return "none";
@@ -100,7 +100,7 @@ Json amplitudes_json(const EstimateError (&errors)[3]) {
   return {finite(errors[0].amplitude), finite(errors[1].amplitude), finite(errors[2].amplitude)};
 }
 
-/// All that is known of the errors of both estimates, one row per axis that errs.
+/// All stated errors of both estimates, one row per axis with an error.
 Json estimate_errors_json(const DisturbanceSource& source) {
   Json rows = Json::array();
   for (int axis = 0; axis < 3; ++axis) {
@@ -123,7 +123,7 @@ Json estimate_errors_json(const DisturbanceSource& source) {
   return rows;
 }
 
-/// Axes that Lambda or K couples to others: they have no loops, and so no rows, of their own.
+/// Axes that Lambda or K couples to other axes; they have no loops of their own and therefore no rows.
 std::vector<std::string> coupled_axes(const TrackingReport& report) {
   std::vector<std::string> names;
   for (int axis = 0; axis < 3; ++axis) {
@@ -133,7 +133,7 @@ std::vector<std::string> coupled_axes(const TrackingReport& report) {
   return names;
 }
 
-/// What the vector gain makes of the rate, where the theorem's loop is the one that flies.
+/// The bound from the vector gain and the rate, if the loop of the theorem is the one that flies.
 std::optional<double> vector_error_m(const DisturbanceSource& source, const TrackingReport& report) {
   if (!report.ball_m || !report.vector) return std::nullopt;
   return report.vector->upper * source.rate_norm_N_s;
@@ -164,7 +164,8 @@ void print_theorem(const DisturbanceSource& source, const TrackingReport& report
 void print_exact(const TrackingReport& report) {
   if (const std::vector<std::string> coupled = coupled_axes(report); !coupled.empty()) {
     fmt::print(
-        "\nLambda or K couples the axes {}: none has rows of its own. Ball, transient and vector gain hold "
+        "\nLambda or K couples the axes {}: they have no rows of their own. Ball, transient and vector gain "
+        "hold "
         "for all together.\n",
         fmt::join(coupled, ", "));
   }
@@ -214,7 +215,7 @@ void print_facts(const TrackingReport& report) {
   }
 }
 
-/// What every bound of a row contains beside its class, and what the total adds.
+/// Prints what every bound of a row contains in addition to its class, and what the total adds.
 void print_parts(const AxisBounds& row) {
   std::vector<std::string> parts;
   const auto add = [&parts](const char* what, double error_m) {

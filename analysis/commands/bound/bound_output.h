@@ -1,4 +1,4 @@
-/// @file Result of `bound` as JSON and as text.
+/// @file The result of `bound` as JSON and as text.
 #pragma once
 
 #include "analysis/commands/shared/tracking_input.h"
@@ -11,14 +11,14 @@ using files::finite;
 
 files::Json norms_json(const stability::GainNorms& norms);
 
-/// Six digits; "-" for a number that is not finite.
+/// Formats a number with six digits; "-" if it is not finite.
 std::string cell(double value);
 
-/// The members of the result after its head.
+/// Adds the members of the result that follow its head.
 void add_tracking_json(files::Json& result, const Tracking& input, const stability::DisturbanceSource& source,
                        const stability::TrackingReport& report);
 
-/// The table a controls engineer wants: hypotheses, gains, bounds and which of them is smallest.
+/// Prints the hypotheses, the gains, the bounds and which bound is smallest.
 void print_tracking(const Tracking& input, const stability::DisturbanceSource& source,
                     const stability::TrackingReport& report);
 

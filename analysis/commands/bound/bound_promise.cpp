@@ -12,7 +12,7 @@ namespace swarmcert::analysis {
 
 namespace {
 
-/// sha256 of every file that compare read, the flights' logs among them.
+/// SHA-256 of every file that compare read, including the logs of the flights.
 files::Json logs_of(const std::string& compared) {
   files::Json hashes = files::Json::array();
   for (const files::Json& input :
@@ -42,7 +42,7 @@ files::Json promise_json(const Tracking& input, const stability::TrackingReport&
   json["bounds"] = files::Json::array();
   for (const PromisedBound& row :
        promised_bounds(input.gains, input.plant, report, flights, declared, initial, level)) {
-    json["interval"] = row.promise.coverage_90;  // the same for all rows
+    json["interval"] = row.promise.coverage_90;  // identical for all rows
     json["bounds"].push_back({{"axis", stability::axis_name(row.axis)},
                               {"channel", stability::name(row.channel)},
                               {"loop", stability::name(row.loop)},
@@ -50,7 +50,7 @@ files::Json promise_json(const Tracking& input, const stability::TrackingReport&
                               {"unit", "m"}});
   }
   json["like_them"] =
-      "a flight whose force error is one more draw of what these flights' were drawn from: same vehicles, "
+      "a flight whose force error is drawn from the same distribution as in these flights: same vehicles, "
       "tasks and model";
   json["rests_on"] = "the linear loop with the lags of gains.toml; force errors below " +
                      std::string("the bandwidth that compare states; windows that follow one another");

@@ -8,10 +8,11 @@
 
 namespace swarmcert::analysis {
 
-/// `coverage` of the result: level, flights, interval, what the promise is about, and the bound of every row of
-/// bounds[].
-/// @param declared bias and errors of the estimates that were given beside the file. @param from result of compare.
-/// @throws files::InputError where it has fewer flights than the level needs.
+/// Returns `coverage` of the result: level, flights, interval, the statement of the promise, and the bound of every
+/// row of bounds[].
+/// @param declared bias and estimation errors given in addition to the file.
+/// @param from result of compare.
+/// @throws files::InputError if it has fewer flights than the level needs.
 files::Json promise_json(const Tracking& input, const stability::TrackingReport& report,
                          const stability::DisturbanceSource& declared, const stability::InitialError& initial,
                          const std::string& from, double level);

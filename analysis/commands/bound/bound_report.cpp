@@ -19,7 +19,7 @@ using namespace stability;  // NOLINT: every name below is of that library
 constexpr int kSamples = 4001;
 constexpr int kShown = 400;
 
-/// Seconds until the slowest pole has fallen to e^-10, at most two minutes.
+/// Time in seconds until the slowest pole has decayed to e^-10, at most two minutes.
 double horizon_s(const TransferFunction& h) {
   double slowest = 1e300;
   for (const std::complex<double>& pole : poles(sum(h.denominator, h.feedback))) {
@@ -28,7 +28,7 @@ double horizon_s(const TransferFunction& h) {
   return std::min(120.0, 10 / slowest + 4 * h.delay_s);
 }
 
-/// The theorem's transient and ball, and the errors of one axis under ramps of eps of either sign.
+/// Plots the theorem's transient and ball, and the errors of one axis under ramps of slope eps of either sign.
 void add_theorem_plot(Report& report, const Tracking& input, const TrackingReport& tracking) {
   if (!tracking.transient || !tracking.ball_m) return;
   const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, 2);
@@ -60,7 +60,7 @@ void add_theorem_plot(Report& report, const Tracking& input, const TrackingRepor
       "rest under a learning error that rises at the rate d_m for ever, the worst of its class.");
 }
 
-/// Tube of |e| from rest for forces within the amplitude, and the error under the worst of them.
+/// Plots the tube of |e| from rest for forces within the amplitude, and the error under the worst of these forces.
 void add_tube_plot(Report& report, const Tracking& input, const Disturbance& disturbance, int axis) {
   const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, axis);
   if (!loop || !is_stable(*loop) || !std::isfinite(disturbance.amplitude_N)) return;
@@ -94,10 +94,10 @@ void add_tube_plot(Report& report, const Tracking& input, const Disturbance& dis
           ".dat' using 1:2 with lines linewidth 2 title 'tube', '' using 1:(-$2) with lines "
           "linetype 1 notitle, '' using 1:3 with lines linetype 2 title 'bound at all times', '' using "
           "1:(-$3) with lines linetype 2 notitle, '' using 1:4 with lines linetype 3 title 'worst force'\n",
-      fmt::format("Axis {}, continuous loop, forces of at most {:.6g} N from rest: what |e| can have reached "
-                  "by each time, the bound at all times, and the error under the force that is worst at the "
-                  "end.",
-                  axis_name(axis), disturbance.amplitude_N));
+      fmt::format(
+          "Axis {}, continuous loop, forces of at most {:.6g} N from rest: the largest possible |e| up to "
+          "each time, the bound at all times, and the error under the force that is worst at the end.",
+          axis_name(axis), disturbance.amplitude_N));
 }
 
 }  // namespace

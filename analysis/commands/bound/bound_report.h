@@ -9,9 +9,9 @@
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html; returns its path. Plots: the theorem's transient with the response to a ramp inside the
-/// ball, per axis the response to the worst force of the amplitude class inside its tube, the gains and the bounds; the
-/// tube around a task. The JSON `result` goes into the page.
+/// Writes FOLDER/report.html and returns its path. Plots: the theorem's transient with the response to a ramp inside
+/// the ball; per axis the response to the worst force of the amplitude class inside its tube; the gains and the
+/// bounds; the tube around a task. The page embeds the JSON `result`.
 /// @throws files::InputError as Report::write().
 std::string write_bound_report(const Tracking& input, const LoadedDisturbance& disturbance,
                                const stability::TrackingReport& report,

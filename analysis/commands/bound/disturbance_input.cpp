@@ -21,7 +21,7 @@ using files::InputError;
 using files::Json;
 using stability::DisturbanceSource;
 
-/// "0.1" for every axis, or "0.1,0,-0.2".
+/// Parses "0.1" for all axes, or "0.1,0,-0.2".
 void read_axes(const char* option, const std::string& text, bool is_signed, double (&values)[3]) {
   if (text.empty()) return;
   const auto refuse = [&](const char* why) {
@@ -44,7 +44,7 @@ void read_axes(const char* option, const std::string& text, bool is_signed, doub
   if (count == 1) values[1] = values[2] = values[0];
 }
 
-/// Whatever is given of an error of an estimate takes the place of what was measured of it.
+/// Any number given for the error of an estimate replaces all that was measured for it.
 void read_estimate(const std::string& option, const EstimateArguments& arguments,
                    stability::EstimateError (&errors)[3]) {
   if (!arguments.are_given()) return;
@@ -83,7 +83,7 @@ void declare_estimate(CLI::App& app, const std::string& estimate, const std::str
   app.add_option(option + "-impulse", arguments.impulse, "int |" + error + "| dt, " + unit + " s" + axes);
 }
 
-/// A number for `axis` in what compare wrote: a number, or an object with axes, with quantiles, or with both.
+/// Reads the number for `axis` from the output of compare: a number, or an object with axes, quantiles, or both.
 double measured_number(const Json& value, const std::string& axis, const std::string& quantile,
                        const std::string& path, const std::string& field) {
   if (value.is_number()) return value.get<double>();
@@ -95,10 +95,10 @@ double measured_number(const Json& value, const std::string& axis, const std::st
   }
   throw InputError({path, "", field, value.is_object() ? "an object" : value.dump().substr(0, 40),
                     "has no number for axis " + axis + " and quantile " + quantile,
-                    "--quantile names one that is there"});
+                    "use --quantile to name an existing one"});
 }
 
-/// The quantiles that are asked for of one error; what is missing is not known, a bias none.
+/// Reads the requested quantiles of one error. A missing class is unbounded; a missing bias is zero.
 MeasuredAxis measured_axis(const Json& document, const std::string& field, int axis,
                            const DisturbanceArguments& arguments) {
   const Json& error = document[field];
@@ -111,7 +111,7 @@ MeasuredAxis measured_axis(const Json& document, const std::string& field, int a
           get("impulse")};
 }
 
-/// Zero where the file does not say.
+/// Window length in seconds; zero if the file does not state one.
 double window_of(const Json& document, const std::string& field, const std::string& path) {
   const Json& error = document[field];
   if (!error.contains("window_s") || !error["window_s"].is_number()) return 0;
@@ -133,11 +133,10 @@ void read_measured(const DisturbanceArguments& arguments, DisturbanceSource& sou
   for (int axis = 0; axis < 3; ++axis)
     axes[static_cast<std::size_t>(axis)] = measured_axis(document, "learning_error", axis, arguments);
   source = measured_source(axes, window_s);
-  // Variation and impulse are those of one window: every window of the flight brings as much again.
-  source.note = window_s > 0
-                    ? fmt::format("{} over windows of {} s, each of which may bring as much",
-                                  arguments.quantile, window_s)
-                    : arguments.quantile + " over windows of flights, of which one follows the other";
+  // Variation and impulse refer to one window: every window of the flight may contribute as much again.
+  source.note = window_s > 0 ? fmt::format("{} over windows of {} s, each of which may contribute as much",
+                                           arguments.quantile, window_s)
+                             : arguments.quantile + " over consecutive windows of flights";
   if (!document.contains("velocity_error") || !document["velocity_error"].is_object()) return;
   const double slopes_s = window_of(document, "velocity_error", arguments.from);
   for (int axis = 0; axis < 3; ++axis) {
@@ -153,12 +152,13 @@ double newtons(const std::string& unit, double value, const std::string& path) {
                     "state a force and its unit as output in network.toml"});
 }
 
-/// Lipschitz constants of f_hat in newton per unit of input: of one neighbour's input, and of the vehicle's own state.
+/// Lipschitz constants of f_hat in newton per unit of input: with respect to the input of one neighbour and to the
+/// vehicle's own state.
 struct Constants {
   double neighbour = -1, own = 0;
 };
 
-/// Largest bounds among the set functions (or the plain network) of a list of bounds.
+/// Largest bounds over the set functions (or the plain network) of a list of bounds.
 template <class Bounds, class Function, class Upper, class Unit>
 Constants largest(const Bounds& bounds, const Function& function, const Upper& upper, const Unit& unit,
                   const std::string& path) {
@@ -184,19 +184,18 @@ files::Network force_network(const DisturbanceArguments& arguments, std::vector<
   for (const std::string& path : input_files(network)) inputs.push_back(path);
   for (const std::string& composition : files::silent_compositions(network))
     notes.push_back("f_hat = 0 among " + composition +
-                    ": its rate holds while the neighbours stay the same; one that comes or goes there is an "
-                    "edge, at most the jump of certify --domain");
+                    ": its rate holds while the set of neighbours is constant; a neighbour that appears or "
+                    "disappears there causes an edge of at most the jump from certify --domain");
   return network;
 }
 
-/// Those of a certificate, which the checker must accept for the network.
+/// Constants of a certificate, which the checker must accept for the network.
 Constants certified_constants(const DisturbanceArguments& arguments, std::vector<std::string>& inputs,
                               std::vector<std::string>& notes) {
   inputs.push_back(arguments.certificate);
   const Json certificate = files::read_json(arguments.certificate, check::kCertificateSchema);
   if (arguments.network.file.empty() && arguments.network.phi.empty()) {
-    throw UsageError(
-        "--certificate C proves nothing without the network that it is about: add --network NET");
+    throw UsageError("--certificate C proves nothing without its network: add --network NET");
   }
   const files::Network network = force_network(arguments, inputs, notes);
   const check::CheckResult verdict = check::check(certificate, network);
@@ -207,7 +206,8 @@ Constants certified_constants(const DisturbanceArguments& arguments, std::vector
   return largest(
       certificate["bounds"],
       [](const Json& b) -> std::optional<files::FunctionId> {
-        // Only what bounds one neighbour's whole input, anywhere, in the Euclidean norm; the checker knows the rest.
+        // Uses only bounds on the whole input of one neighbour, on the whole domain, in the Euclidean norm; the
+        // checker verifies the rest.
         const bool is_plain = b.value("block", "all") == "all" && b.value("domain", "global") == "global" &&
                               (!b.contains("scale") || b["scale"].empty());
         if (!is_plain) return std::nullopt;
@@ -218,7 +218,7 @@ Constants certified_constants(const DisturbanceArguments& arguments, std::vector
       arguments.certificate);
 }
 
-/// Products of the layers' norms.
+/// Products of the spectral norms of the layers.
 Constants product_constants(const DisturbanceArguments& arguments, std::vector<std::string>& inputs,
                             std::vector<std::string>& notes) {
   const files::Network network = force_network(arguments, inputs, notes);
@@ -243,8 +243,8 @@ void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& so
   }
   const Constants lipschitz_N = arguments.certificate.empty() ? product_constants(arguments, inputs, notes)
                                                               : certified_constants(arguments, inputs, notes);
-  // A neighbour's input moves at |(v_rel, a_rel)|, and every neighbour adds its own; the ground's input is the own
-  // state.
+  // The input of a neighbour changes at rate |(v_rel, a_rel)|, and the rates of all neighbours add up; the input for
+  // the ground is the own state.
   if (arguments.acceleration < 0) notes.emplace_back("neighbours fly at constant velocity: no --accel");
   double rate = arguments.neighbours * lipschitz_N.neighbour *
                 std::hypot(arguments.speed, std::max(0.0, arguments.acceleration));
@@ -255,14 +255,14 @@ void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& so
             std::hypot(arguments.own_speed < 0 ? arguments.speed : arguments.own_speed,
                        std::max(0.0, arguments.own_accel < 0 ? arguments.acceleration : arguments.own_accel));
   }
-  source.f_hat_rate_N_s = rate * (1 + 1e-15 * 8);  // the few roundings above
+  source.f_hat_rate_N_s = rate * (1 + 1e-15 * 8);  // for the rounding of the operations above
   source.f_hat_rate_known = true;
   if (source.kind != "none") return;
   source.kind = "rate of f_hat";
   source.axis[2].rate_N_s = source.f_hat_rate_N_s;  // the network's output is the force along z
 }
 
-/// What acts: classes of the force error, its bias, errors of the ratio and of the estimates.
+/// Declares the disturbance itself: classes of the force error, its bias, errors of the ratio and of the estimates.
 void declare_force(CLI::App& app, DisturbanceArguments& arguments) {
   app.add_option("--rate", arguments.rate, "sup |eps'|, N/s: how fast the force error changes")
       ->check(CLI::NonNegativeNumber);
@@ -281,7 +281,7 @@ void declare_force(CLI::App& app, DisturbanceArguments& arguments) {
   declare_estimate(app, "position", "m", "the law sees through Kp and Ki", arguments.position_error);
 }
 
-/// How the set point moves, and how often passes follow one another.
+/// Declares the motion of the setpoint and the spacing of passes.
 void declare_motion_of_reference(CLI::App& app, DisturbanceArguments& arguments) {
   const std::string axes = "; for all axes, or X,Y,Z";
   app.add_option("--reference-step", arguments.reference_step, "Sum of all jumps of the set point, m" + axes);
@@ -290,7 +290,7 @@ void declare_motion_of_reference(CLI::App& app, DisturbanceArguments& arguments)
   app.add_option(
       "--reference-jerk", arguments.reference_jerk,
       "sup |p_d'''|, m/s^3, of a set point whose acceleration is fed forward through the lags" + axes);
-  auto* passes = app.add_option("--passes", arguments.passes, "How many such passes (default 1)")
+  auto* passes = app.add_option("--passes", arguments.passes, "Number of such passes (default 1)")
                      ->check(CLI::PositiveNumber);
   app.add_option("--every", arguments.every_s, "Least time between the starts of two passes, s")
       ->check(CLI::NonNegativeNumber)
@@ -300,7 +300,7 @@ void declare_motion_of_reference(CLI::App& app, DisturbanceArguments& arguments)
       ->needs(passes);
 }
 
-/// Where numbers come from that the user does not give.
+/// Declares the sources of numbers that the user does not give.
 void declare_sources(CLI::App& app, DisturbanceArguments& arguments) {
   auto* from =
       app.add_option("--from", arguments.from, "Result of compare: measured quantiles of the learning error");
@@ -313,7 +313,7 @@ void declare_sources(CLI::App& app, DisturbanceArguments& arguments) {
   declare_order(app, arguments.network);
 }
 
-/// How vehicles move, for a learned force or a declared truth.
+/// Declares the motion of the vehicles, for a learned force or a declared truth.
 void declare_motions(CLI::App& app, DisturbanceArguments& arguments) {
   app.add_option("--speed", arguments.speed, "Largest relative speed of a neighbour, m/s")
       ->check(CLI::NonNegativeNumber);
@@ -355,7 +355,7 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
 
 namespace {
 
-/// Refuses options that would change nothing: a user who gave them expects that they do.
+/// Rejects options that would have no effect, because a user who gives them expects one.
 void refuse_alone(const DisturbanceArguments& arguments) {
   const bool has_network = !arguments.network.file.empty() || !arguments.network.phi.empty();
   if (!has_network && arguments.certificate.empty() && arguments.truth.empty()) {
@@ -367,7 +367,7 @@ void refuse_alone(const DisturbanceArguments& arguments) {
     for (const auto& [option, is_given] : motions) {
       if (is_given) {
         throw UsageError(std::string(option) +
-                         " says how vehicles move, which matters to a learned or a declared force only: add "
+                         " states how vehicles move, which affects only a learned or a declared force: add "
                          "--network NET or --truth MODEL");
       }
     }
@@ -391,7 +391,7 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
       std::max({arguments.rate, arguments.amplitude, arguments.edge, arguments.impulse}) >= 0;
   if (int{is_declared} + int{!arguments.from.empty()} + int{!arguments.truth.empty()} > 1) {
     throw UsageError(
-        "--from, --truth and --rate, --amplitude, --edge, --impulse each say what the disturbance is: give "
+        "--from, --truth and --rate, --amplitude, --edge, --impulse each define the disturbance: give only "
         "one");
   }
   if (is_declared) {
@@ -417,7 +417,7 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
   if (!arguments.bias.empty()) {
     double bias_N[3] = {0, 0, 0};
     read_axes("--bias", arguments.bias, true, bias_N);
-    // Beside a measured bias, of whatever sign, which the measured amplitude contains but this one not.
+    // Adds to the measured bias regardless of sign; the measured amplitude contains the measured bias but not this one.
     for (int axis = 0; axis < 3; ++axis)
       source.bias_N[axis] = std::abs(source.bias_N[axis]) + std::abs(bias_N[axis]);
     source.classes_contain_bias = false;
@@ -445,9 +445,9 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
 
 void declare_no_class(DisturbanceSource& source) {
   source.kind = "declared";
-  source.note = "as given; no force error beside a constant one";
+  source.note = "as given; no force error other than a constant one";
   for (stability::Disturbance& d : source.axis) {
-    d.amplitude_N = d.variation_N = d.impulse_N_s = 0;  // its rate adds nothing to that
+    d.amplitude_N = d.variation_N = d.impulse_N_s = 0;  // the rate of a constant force is zero
   }
   source.rate_norm_N_s = 0;
 }

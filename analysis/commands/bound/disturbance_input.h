@@ -1,4 +1,4 @@
-/// @file Where the numbers of a force error come from: declared, measured, a declared truth, or a network's constant.
+/// @file The sources of the force error: declared, measured, a declared truth, or the Lipschitz constant of a network.
 #pragma once
 
 #include <optional>
@@ -9,7 +9,7 @@
 
 namespace swarmcert::analysis {
 
-/// Each a number for all axes, or X,Y,Z; empty: not given.
+/// Each option holds one number for all axes, or X,Y,Z; empty: not given.
 struct EstimateArguments {
   std::string amplitude, rate, edge, impulse;
   bool are_given() const { return !amplitude.empty() || !rate.empty() || !edge.empty() || !impulse.empty(); }
@@ -20,7 +20,7 @@ struct DisturbanceArguments {
   std::string bias;  ///< a number for all axes, or X,Y,Z; empty: not given
   double thrust_ratio_error = 0;
   EstimateArguments velocity_error, position_error;
-  std::string reference_step, reference_speed_step, reference_jerk;  ///< as bias
+  std::string reference_step, reference_speed_step, reference_jerk;  ///< like `bias`
   int passes = 1;
   double every_s = 0, pass_s = 0;
   std::string from;  ///< compare.json
@@ -32,7 +32,7 @@ struct DisturbanceArguments {
   double own_speed = -1, own_accel = -1;  ///< of every vehicle
   double thrust_rate = -1;
   double least_height = 0, largest_height = -1;
-  double neighbour_mass = 0;  ///< 0: as the truth's own
+  double neighbour_mass = 0;  ///< 0: taken from the truth
   std::string gap;            ///< "FROM:TO"
   int neighbours = 1;
 };
@@ -45,13 +45,14 @@ struct LoadedDisturbance {
   std::vector<std::string> inputs;  ///< files that were read
 };
 
-/// Where nothing is known of the force error beside its constant part: it has no other.
+/// States that the force error consists of its constant part only.
 void declare_no_class(stability::DisturbanceSource& source);
 
-/// In order: --rate and the like (declared), --from (measured), --truth (with the network's rate where one is named),
-/// a certificate or a network with --speed (rate of f_hat, which is no learning error). Bias and errors of the
-/// estimates come on top; alone, they stand beside a force error of zero.
-/// @throws UsageError for combinations that mean nothing; files::InputError for bad files.
+/// Evaluates the sources in this order: --rate and the other class options (declared), --from (measured), --truth
+/// (with the rate of the network if one is given), a certificate or a network with --speed (rate of f_hat, which is
+/// not the learning error). Bias and estimation errors are added; without any source they apply to a force error of
+/// zero.
+/// @throws UsageError for combinations that make no sense; files::InputError for invalid files.
 LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const Tracking& tracking);
 
 }  // namespace swarmcert::analysis

@@ -1,4 +1,4 @@
-/// @file What float32 on the vehicle costs, as text and as JSON.
+/// @file Errors added by float32 arithmetic on the vehicle, as text and as JSON.
 #pragma once
 
 #include "nn/base/json.h"

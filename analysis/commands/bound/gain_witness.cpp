@@ -20,7 +20,7 @@ constexpr double kMostSteps = 1 << 18;
 constexpr const char* kTooFarAbove =
     "the bounds that the checker can verify are more than 5 % above the enclosure";
 
-/// The characteristic polynomial, without the factor s that it has for Ki = 0; a delay is expanded.
+/// The characteristic polynomial, without the factor s present for Ki = 0; a delay is replaced by its expansion.
 Polynomial characteristic(const stability::AxisLoop& loop, const std::vector<double>& lags_s,
                           int delay_order) {
   Polynomial open = {1};
@@ -34,7 +34,7 @@ Polynomial characteristic(const stability::AxisLoop& loop, const std::vector<dou
                         stability::product(feedback, expansion));
 }
 
-/// The companion matrix of `p` in units of time of 2^-exponent s.
+/// The companion matrix of `p` with time in units of 2^-exponent s.
 MatrixXd companion(const Polynomial& p, int exponent) {
   const auto n = static_cast<Index>(p.size()) - 1;
   MatrixXd A = MatrixXd::Zero(n, n);
@@ -45,7 +45,7 @@ MatrixXd companion(const Polynomial& p, int exponent) {
   return A;
 }
 
-/// P of A'P + PA = -I, A shifted to the right by `shift`.
+/// Solves A'P + PA = -I for P, with A shifted to the right by `shift`.
 MatrixXd lyapunov(const MatrixXd& A, double shift) {
   const Index n = A.rows();
   const MatrixXd shifted = A + shift * MatrixXd::Identity(n, n);
@@ -68,7 +68,7 @@ MatrixXd lyapunov(const MatrixXd& A, double shift) {
   return P;
 }
 
-/// The largest entry becomes about 2^20, all multiples of 2^-60.
+/// Scales P so that its largest entry is about 2^20 and rounds all entries to multiples of 2^-60.
 std::vector<std::vector<double>> in_fixed_point(const MatrixXd& P) {
   const int exponent = 20 - std::ilogb(P.cwiseAbs().maxCoeff());
   std::vector<std::vector<double>> rows;
@@ -80,7 +80,7 @@ std::vector<std::vector<double>> in_fixed_point(const MatrixXd& P) {
   return rows;
 }
 
-/// The largest ratio of a bound to the upper end of what is known.
+/// The largest ratio of a bound to the upper end of its known enclosure.
 double excess(const check::GainBounds& bounds, const stability::VerifiedNorms& known) {
   double most =
       std::max({bounds.amplitude.get_d() / known.amplitude.upper, bounds.edge.get_d() / known.edge.upper,
@@ -137,12 +137,12 @@ std::optional<ProvedGains> search_witness(const stability::AxisLoop& loop, const
   return std::nullopt;
 }
 
-/// The largest modulus of an eigenvalue.
+/// The spectral radius of M.
 double radius_of(const MatrixXd& M) {
   return Eigen::EigenSolver<MatrixXd>(M, false).eigenvalues().cwiseAbs().maxCoeff();
 }
 
-/// P of P - (M/factor) P (M/factor)' = I in units in which the states are alike: w^k for the k-th derivative of e.
+/// Solves P - (M/factor) P (M/factor)' = I for P, in units that balance the states: w^k for the k-th derivative of e.
 MatrixXd contracted_form(const check::SampledWitness& loop, const MatrixXd& M, double factor) {
   const Index n = M.rows();
   const double w = std::sqrt(loop.Kp);
@@ -215,7 +215,7 @@ std::optional<ProvedSampledGains> sampled_gain_witness(const stability::SampledL
                                                        const SampledEnclosures& known, std::string& why) {
   try {
     return search_sampled(loop, known, why);
-  } catch (const std::runtime_error& refusal) {  // of numbers that the checker does not take
+  } catch (const std::runtime_error& refusal) {  // for numbers that the checker does not accept
     why = std::string("no witness was found: ") + refusal.what();
     return std::nullopt;
   }

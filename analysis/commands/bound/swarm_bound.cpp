@@ -13,19 +13,19 @@ using namespace stability;  // NOLINT: every name below is of that library
 
 namespace {
 
-/// A bound that is not finite would not tell the user what to add.
+/// Rejects infinite bounds with a message, because the bound alone would not tell the user which input to add.
 void refuse_unbounded(const CoupledVerdict& verdict) {
   if (!verdict.small_gain.proved) return;
   if (!std::isfinite(verdict.of_force.error_m) || !std::isfinite(verdict.of_force.acceleration_m_s2)) {
     throw UsageError(
-        "--swarm needs how large the force error beside the couplings is, or how fast it changes: add "
+        "--swarm needs the size of the force error not caused by the couplings, or its rate: add "
         "--amplitude E or --rate R");
   }
   for (std::size_t i = 0; i < verdict.small_gain.error_m.size(); ++i) {
     if (std::isfinite(verdict.small_gain.error_m[i]) && std::isfinite(verdict.small_gain.rate_N_s[i]))
       continue;
     throw UsageError(
-        "--swarm needs how large the errors of the estimates are, or how fast that of the velocity changes: "
+        "--swarm needs the size of the errors of the estimates, or the rate of the velocity error: "
         "add --velocity-error A or --velocity-error-rate R, and --position-error P");
   }
 }
@@ -92,13 +92,14 @@ void print_swarm(const Json& swarm) {
     const double of_estimates_m = swarm["of_estimates"]["error_m"];
     if (of_estimates_m > 0) {
       fmt::print(
-          "  of which {:.6g} m directly by errors of the estimates; what a network makes of them is not "
-          "in it, and belongs into cross_rate_N_s\n",
+          "  of which {:.6g} m directly from errors of the estimates; their effect through a network is not "
+          "included and belongs in cross_rate_N_s\n",
           of_estimates_m);
     }
     const double of_force_m = swarm["of_force"]["error_m"];
     if (of_force_m > 0)
-      fmt::print("  of which {:.6g} m directly by the force error beside the couplings\n", of_force_m);
+      fmt::print("  of which {:.6g} m directly from the force error not caused by the couplings\n",
+                 of_force_m);
     return;
   }
   if (!swarm["witness"].is_null()) {

@@ -15,7 +15,7 @@ namespace {
 
 using files::Json;
 
-/// The least double of 30 bits that is not below `exact`, so that its notation is short.
+/// The smallest double with a 30-bit significand that is not below `exact`, so that it prints with few digits.
 double short_double_above(const mpq_class& exact) {
   constexpr int kBits = 30;
   const double near = exact.get_d();
@@ -51,7 +51,7 @@ Json gains_of(const check::GainBounds& bounds) {
   return gains;
 }
 
-/// What entries of both kinds of loops have, the axis left empty.
+/// Members common to the entries of both kinds of loops; the axis is left empty.
 Json entry_of(const check::LoopNumbers& loop, const std::vector<std::vector<double>>& P, long steps) {
   return {{"axis", ""},
           {"mass_kg", files::hex_float(loop.mass_kg)},
@@ -101,7 +101,7 @@ stability::VerifiedNorms enclosures_of(const Json& gains) {
   return known;
 }
 
-/// The certificate entry of this loop, with its axis left empty; or a string with the reason why it has none.
+/// Returns the certificate entry of the loop with an empty axis, or a string with the reason why there is none.
 Json entry_or_reason(const stability::AxisLoop& loop, const Json& row) {
   if (row["status"] != "proved") return row["why"];
   std::string why;
@@ -110,7 +110,7 @@ Json entry_or_reason(const stability::AxisLoop& loop, const Json& row) {
 }
 
 /// The same for a sampled loop.
-/// @param rows of its inputs: force, command, velocity and position.
+/// @param rows rows of its inputs: force, command, velocity and position.
 Json sampled_entry_or_reason(const stability::SampledLoop& loop, const std::map<std::string, Json>& rows) {
   for (const auto& [input, row] : rows) {
     if (row["status"] != "proved") return row["why"];
@@ -122,7 +122,7 @@ Json sampled_entry_or_reason(const stability::SampledLoop& loop, const std::map<
   return found ? sampled_entry(*found) : Json(why);
 }
 
-/// What becomes of the rows of --verified: entries of loops, and rows that have none.
+/// Collects certificate entries, and the rows of --verified that have none.
 class Entries {
  public:
   void add(const Json& row, Json entry) {
@@ -150,7 +150,7 @@ std::string numbers_of(const stability::AxisLoop& loop) {
   return Json({loop.mass_kg, loop.Kp, loop.Kd, loop.Ki, loop.lags_s, loop.delay_s}).dump();
 }
 
-/// Axes that are the same are searched once.
+/// Searches only once for axes with identical loops.
 void add_continuous(const Tracking& input, const Json& verified, Entries& entries) {
   std::map<std::string, Json> known;
   for (const Json& row : verified) {

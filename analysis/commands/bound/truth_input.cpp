@@ -14,7 +14,7 @@ namespace {
 using files::Json;
 using stability::DisturbanceSource;
 
-/// "0.15:0.8"
+/// Parses "0.15:0.8".
 void read_gap(const std::string& text, stability::MotionSet& motion) {
   char* end = nullptr;
   motion.least_gap_m = std::strtod(text.c_str(), &end);
@@ -61,13 +61,13 @@ void add_truth(const Truth& truth, DisturbanceSource& source) {
       d.rate_N_s += effect.rate_N_s[i];
       source.bias_N[i] += effect.bias_N[i];
     }
-    d.amplitude_N *= 1 + 1e-14;  // sums of a few numbers
+    d.amplitude_N *= 1 + 1e-14;  // for the rounding of the sums
     d.rate_N_s *= 1 + 1e-14;
     square += d.rate_N_s * d.rate_N_s;
   }
   source.rate_norm_N_s = std::sqrt(square) * (1 + 1e-15);
   source.kind = "declared truth";
-  source.note = has_network ? "f_hat less the declared truth" : "the declared truth, without f_hat";
+  source.note = has_network ? "f_hat minus the declared truth" : "the declared truth, without f_hat";
 }
 
 namespace {

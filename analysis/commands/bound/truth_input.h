@@ -1,4 +1,4 @@
-/// @file A declared truth: what the force on a vehicle really is, as far as a user says so.
+/// @file A declared truth: the true force on a vehicle, as far as the user states it.
 #pragma once
 
 #include <string>
@@ -17,11 +17,12 @@ struct Truth {
   std::vector<stability::EffectBounds> effects;
 };
 
-/// Reads --truth and encloses its effects over the motions that the arguments state.
-/// @throws UsageError for a --gap that is none; files::InputError for bad files.
+/// Reads --truth and encloses its effects over the motions stated by the arguments.
+/// @throws UsageError for an invalid --gap; files::InputError for invalid files.
 Truth read_truth(const DisturbanceArguments& arguments, const Tracking& tracking);
 
-/// f_hat - f_a: the truth's numbers, with the network's rate where `source` has one. Without a network f_hat is 0.
+/// Adds f_hat - f_a: the bounds of the truth, plus the rate of the network if `source` has one. Without a network
+/// f_hat is 0.
 void add_truth(const Truth& truth, stability::DisturbanceSource& source);
 
 files::Json truth_json(const Truth& truth);

@@ -18,9 +18,9 @@ namespace {
 
 using files::Json;
 
-/// Points of the curves in the JSON result.
+/// Number of points of the curves in the JSON result.
 constexpr int kCurvePoints = 200;
-/// Far beyond the lag of any motor: a number in milliseconds is none in seconds.
+/// Far above the lag of any motor; larger numbers are probably milliseconds.
 constexpr double kLongestLag_s = 1;
 
 Json radii_json(const LeastTube& tube) {
@@ -98,7 +98,7 @@ void declare_tube(CLI::App& app, TubeArguments& arguments) {
 
 namespace {
 
-/// --lag-interval, which a truth with a lag lies in.
+/// Returns the interval of --lag-interval, which must contain the lag of the truth if it has one.
 std::optional<Interval> lag_interval(const TubeArguments& arguments, const stability::Model& truth,
                                      const Tracking& tracking) {
   if (arguments.motor_lag_s.empty()) return std::nullopt;
@@ -133,7 +133,7 @@ MeasuredTruth load_measured_truth(const DisturbanceArguments& disturbance, const
   if (!is_same) {
     throw files::InputError(
         {disturbance.from, "", "inputs", files::in_quotes(disturbance.truth),
-         "is not among the files that compare read: its residuals are those of another model",
+         "is not among the files that compare read: its residuals belong to another model",
          "give --truth the model of compare, or compare with this one"});
   }
   return read_measured_truth(disturbance.from, kind, level);
@@ -152,7 +152,7 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
   }
   if (disturbance.truth.empty()) {
     throw UsageError(
-        "a tube around a task needs what the force really is, since a network bounds only what it predicts: "
+        "a tube around a task needs the true force, since a network bounds only its own prediction: "
         "add --truth MODEL");
   }
   const std::unique_ptr<stability::Task> task =
@@ -169,7 +169,7 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
   Progress progress(common.quiet);
   const CancelOnInterrupt interrupt;
   LocalTubeOptions options;
-  // The networks of n - 1 neighbours side by side, for n vehicles: fewer parts where each costs more.
+  // For n vehicles, n copies of the network with n - 1 neighbours are enclosed: fewer boxes, as each costs more.
   const int pairs = arguments.vehicles * (arguments.vehicles - 1);
   options.enclosure.boxes = std::max(1, 2 * options.enclosure.boxes / pairs);
   options.enclosure.jobs = common.jobs;
@@ -214,13 +214,11 @@ Json measured_json(const MeasuredTruth& measured, const LocalTube& tube) {
       {"cells_in_tube_without_flights", tube.residual_cells_without_flights},
       {"elsewhere", "the hull of all cells with flights"},
       {"like_them",
-       "a flight whose residual is one more draw of what these flights' were drawn from: same vehicles, task "
+       "a flight whose residual is drawn from the same distribution as in these flights: same vehicles, task "
        "and model"},
-      {"rests_on",
-       fmt::format(
-           "forces are seen as their mean over {:g} s, so that faster ones are in no range; neighbours "
-           "are where the logs show them",
-           measured.mean_s)}};
+      {"rests_on", fmt::format("forces are means over {:g} s, so that the ranges do not cover faster ones; "
+                               "neighbours are at their logged positions",
+                               measured.mean_s)}};
 }
 
 void print_measured(const Json& measured) {
@@ -232,7 +230,7 @@ void print_measured(const Json& measured) {
   fmt::print(
       "  residual by the place of the neighbour: shape of {} flights, {:.3g} times as wide for {} others\n",
       measured["shape_flights"].get<int>(), measured["factor"].get<double>(), measured["flights"].get<int>());
-  fmt::print("  {} of the {} cells that the tube reaches have no such flight and take {}\n",
+  fmt::print("  {} of the {} cells that the tube reaches have no such flight and use {}\n",
              measured["cells_in_tube_without_flights"].get<int>(), measured["cells_in_tube"].get<int>(),
              measured["elsewhere"].get<std::string>());
   fmt::print("  like them: {}\n", measured["like_them"].get<std::string>());

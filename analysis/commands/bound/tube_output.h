@@ -17,22 +17,22 @@ struct TubeArguments {
   std::string task;  ///< empty: no tube around a task
   int vehicles = 2;
   double duration_s = 0;            ///< 0: the task's own
-  std::vector<double> motor_lag_s;  ///< from, to; empty: as the truth or the gains say
+  std::vector<double> motor_lag_s;  ///< from, to; empty: from the truth or the gains
 };
 
 /// Declares --task, --vehicles, --duration, --lag-interval.
 void declare_tube(CLI::App& app, TubeArguments& arguments);
 
-/// What the flights of --from say that --truth leaves out, for vehicles of `kind`.
-/// @throws UsageError where --truth is missing; files::InputError where the file is not of that model, or has too few
-///   flights for the level.
+/// Calibrates the part of the force that --truth leaves out, from the flights of --from, for vehicles of `kind`.
+/// @throws UsageError if --truth is missing; files::InputError if the file was computed with another model or has too
+///     few flights for the level.
 MeasuredTruth load_measured_truth(const DisturbanceArguments& disturbance, const std::string& kind,
                                   double level);
 
-/// Reads the network and the truth that `disturbance` names and looks for the tube, with progress.
-/// @param measured null: the truth is only declared.
-/// @param estimates whose velocity_error and position_error are known; nothing else of it is read.
-/// @throws UsageError where network, truth or task are missing or make no sense; files::InputError for bad files.
+/// Reads the network and the truth named by `disturbance` and searches for the tube, with progress reports.
+/// @param measured null if the truth is only declared.
+/// @param estimates only velocity_error and position_error, which must be known, are read.
+/// @throws UsageError if network, truth or task are missing or make no sense; files::InputError for invalid files.
 LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArguments& disturbance,
                           const Tracking& tracking, const stability::DisturbanceSource& estimates,
                           const MeasuredTruth* measured, const CommonOptions& common,
@@ -41,7 +41,7 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
 files::Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube,
                             const MeasuredTruth* measured);
 void print_local_tube(const files::Json& tube);
-/// Errors allowed over time, per vehicle, inside the radius.
+/// Adds a plot of the allowed errors over time, per vehicle, inside the radius.
 void add_local_tube_plot(Report& report, const LocalTube& tube, const files::Json& json);
 
 }  // namespace swarmcert::analysis

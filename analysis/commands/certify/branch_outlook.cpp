@@ -8,7 +8,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// More boxes than this are named so only.
+/// Larger numbers of boxes are only reported as more than this.
 constexpr double kMostBoxes = 1e15;
 
 }  // namespace
@@ -45,7 +45,8 @@ std::string branch_outlook_words(const lipschitz::CertifiedBound& bound) {
         *outlook->boxes, bound.nodes, 100 * outlook->gap_halfway, 100 * outlook->gap);
   } else {
     words += fmt::format(
-        "too early to say, or too far (the second half of {} boxes took the gap from {:.3g} % to {:.3g} %)",
+        "too early to estimate, or too many (the second half of {} boxes took the gap from {:.3g} % to "
+        "{:.3g} %)",
         bound.nodes, 100 * outlook->gap_halfway, 100 * outlook->gap);
   }
   return words +

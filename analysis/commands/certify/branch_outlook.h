@@ -8,20 +8,20 @@
 
 namespace swarmcert::analysis {
 
-/// Estimates from the course of a search, no bounds.
+/// Estimates extrapolated from the course of a search; these are not bounds.
 struct BranchOutlook {
-  static constexpr double kRatio = 1.01;  ///< upper / lower to be reached
-  double gap = 0, gap_halfway = 0;        ///< upper / lower - 1 after all of the boxes and after half of them
-  std::optional<double> boxes;  ///< in all, for kRatio, if the gap goes on falling by the same power of them
-  /// Share of upper - lower that is not explained by slopes seen in the part that dominates: what the relaxation of its
-  /// undecided neurons costs. The rest needs a steeper witness or smaller boxes.
+  static constexpr double kRatio = 1.01;  ///< target of upper / lower
+  double gap = 0, gap_halfway = 0;        ///< upper / lower - 1 after all boxes and after half of them
+  std::optional<double> boxes;  ///< total for kRatio, if the gap keeps falling with the same power of it
+  /// Share of upper - lower that slopes observed in the dominating part do not explain, i.e. the looseness of the
+  /// relaxation of its undecided neurons. The rest needs a steeper witness or smaller boxes.
   double relaxation_share = 0;
 };
 
-/// Nothing where no boxes were looked at, or no slope is witnessed.
+/// Returns nothing if no boxes were examined or no slope has a witness.
 std::optional<BranchOutlook> branch_outlook(const lipschitz::CertifiedBound& bound);
 
-/// The outlook as a sentence or two; empty where there is none.
+/// Describes the outlook in one or two sentences; empty if there is none.
 std::string branch_outlook_words(const lipschitz::CertifiedBound& bound);
 
 }  // namespace swarmcert::analysis

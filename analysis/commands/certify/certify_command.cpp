@@ -56,7 +56,7 @@ struct CertifyOptions {
   lipschitz::CertifyOptions certify;
 };
 
-/// Refuted if anything is, inconclusive if anything else is, proved if all is.
+/// kRefuted if any verdict is refuted; otherwise kInconclusive if any is inconclusive; otherwise kProved.
 Verdict all_of(const std::vector<Verdict>& verdicts) {
   Verdict total = Verdict::kProved;
   for (const Verdict verdict : verdicts) {
@@ -66,7 +66,7 @@ Verdict all_of(const std::vector<Verdict>& verdicts) {
   return total;
 }
 
-/// Whether gamma holds in every layer and --max-lipschitz for every composed function, where they are stated.
+/// Judges gamma in every layer and --max-lipschitz for every composed function, as far as they are stated.
 Verdict judge(const Certification& found, double max_lipschitz) {
   std::vector<Verdict> verdicts;
   for (const CertifiedLayer& layer : found.layers) {
@@ -83,7 +83,7 @@ Verdict judge(const Certification& found, double max_lipschitz) {
   return all_of(verdicts);
 }
 
-/// "3": as many of each kind; "small=1,large=2": that group.
+/// Parses "3" (the same number of each kind) or "small=1,large=2" (this group).
 void parse_neighbours(const std::string& text, lipschitz::ClaimOptions& claims) {
   const auto refuse = [&text]() {
     throw UsageError("--neighbours " + text + ": give a number (3) or a group (small=1,large=2)");
@@ -113,7 +113,8 @@ bool is_block(const std::string& word) {
   return word.size() > 1 && word[0] == 'x' && word.find_first_not_of("0123456789", 1) == std::string::npos;
 }
 
-/// --blocks takes a value or none, and NET may follow it: what is no list of blocks, where NET is missing, is NET.
+/// The value of --blocks is optional and NET may follow it: if NET is missing, a value that is not a list of blocks
+/// is NET.
 void parse_blocks(CertifyOptions& options) {
   std::istringstream list(options.blocks);
   std::vector<std::string> blocks;
@@ -128,7 +129,8 @@ void parse_blocks(CertifyOptions& options) {
   options.certify.blocks = std::move(blocks);
 }
 
-/// Holds NET against what was recorded from it. @throws InputError where it differs.
+/// Compares NET with recorded samples of its outputs.
+/// @throws InputError if they differ.
 std::map<files::FunctionId, files::SampleAgreement> compare_samples(const files::Network& network,
                                                                     const CertifyOptions& options) {
   std::map<files::FunctionId, files::SampleAgreement> result;
@@ -141,7 +143,7 @@ std::map<files::FunctionId, files::SampleAgreement> compare_samples(const files:
   return result;
 }
 
-/// certify(); what the options ask for and NET has not is a matter of usage.
+/// Calls certify(); options that NET does not support are usage errors.
 Certification certify_or_refuse(const files::Network& network, const lipschitz::CertifyOptions& options) {
   try {
     return certify(network, options);
@@ -162,7 +164,7 @@ void add_comparisons(const files::Network& network, const lipschitz::CertifyOpti
   });
 }
 
-/// Where no lower bound is searched. None with --nodes 0, as there.
+/// Adds sampled slopes for bounds without a witness. None with --nodes 0, which also disables lower bounds.
 void add_slope_estimates(const files::Network& network, const lipschitz::CertifyOptions& options,
                          CertifyOutput& output) {
   if (options.lower.rounds == 0) return;
@@ -179,7 +181,7 @@ void add_slope_estimates(const files::Network& network, const lipschitz::Certify
   });
 }
 
-/// Range and float32 error over the box of --domain, or over what the clamp lets through.
+/// Adds ranges and float32 errors over the box of --domain, or over the set that the clamp lets through.
 void add_ranges(const files::Network& network, const CertifyOptions& options, Progress& progress,
                 CertifyOutput& output) {
   const lipschitz::Domain domain =
@@ -199,7 +201,7 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Pr
   range.progress = [&progress](int done, int total) { progress.show(done, total, "ends of the range"); };
   const lipschitz::Stop stop(options.certify.cancelled);
   output.ranges_cut_short = stop.now();
-  if (output.ranges_cut_short) range.nodes = 1;  // wider, and proved all the same
+  if (output.ranges_cut_short) range.nodes = 1;  // wider, but still a proved enclosure
   output.ranges = lipschitz::ranges(network, domain, rho_bounds, range);
   const files::Parts parts = files::parts(network);
   const bool is_float32 = std::all_of(parts.begin(), parts.end(), [](const auto& part) {
@@ -208,7 +210,7 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Pr
   output.found.values =
       lipschitz::certified_values(network, domain, rho_bounds,
                                   {range.neighbours, options.domain.empty(), is_float32, options.input_step});
-  if (!is_float32) return;  // what flies are other weights (--as float32), or functions of unknown rounding
+  if (!is_float32) return;  // the vehicle has other weights (--as float32), or functions of unknown rounding
   lipschitz::Float32Options float32;
   float32.neighbours = range.neighbours;
   float32.input_step = options.input_step;
@@ -218,7 +220,7 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Pr
   output.float32_errors = lipschitz::float32_errors(network, domain, bounds, float32);
 }
 
-/// "dp_x_m,dp_z_m" and "12" or "12,8".
+/// Parses "dp_x_m,dp_z_m" and "12" or "12,8".
 void parse_map(const CertifyOptions& options, const files::Network& network,
                lipschitz::SlopeMapOptions& map) {
   const auto halves = [](const std::string& text, const char* option, const char* form) {
@@ -248,8 +250,7 @@ void parse_map(const CertifyOptions& options, const files::Network& network,
   }
 }
 
-/// Branch and bound and float32 errors are for ReLU. Of rotation invariants, bounds for all inputs are proved, and
-/// nothing else.
+/// Branch and bound and float32 errors require ReLU. For rotation invariants only bounds for all inputs are proved.
 void refuse_what_is_for_relu(const files::Network& network, const CertifyOptions& options) {
   struct Asked {
     bool is_asked;
@@ -270,7 +271,7 @@ void refuse_what_is_for_relu(const files::Network& network, const CertifyOptions
   }
 }
 
-/// Reads NET and the files beside it, and turns the words of the command line into options.
+/// Reads NET and related files, and converts command-line words to options.
 files::Network read_network(CertifyOptions& options) {
   if (!options.neighbours.empty()) parse_neighbours(options.neighbours, options.certify);
   parse_blocks(options);
@@ -284,7 +285,7 @@ files::Network read_network(CertifyOptions& options) {
   return network;
 }
 
-/// --gamma, --method, and how far its search goes.
+/// Sets --gamma, --method, and the limits of its search.
 void set_method(CertifyOptions& options) {
   if (options.gamma != 0) options.certify.gamma = files::GammaStatement{options.gamma};
   options.certify.method = options.method == "branch"    ? lipschitz::UpperMethod::kBranch
@@ -302,7 +303,7 @@ void set_method(CertifyOptions& options) {
   }
 }
 
-/// Bounds, and beside them what the options ask for.
+/// Computes the bounds and the additional results that the options request.
 CertifyOutput find_all(const files::Network& network, const CertifyOptions& options, Progress& progress) {
   CertifyOutput output;
   output.found = certify_or_refuse(network, options.certify);
@@ -359,7 +360,8 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   options.certify.progress = [&progress](int done, int total, const std::string& what) {
     progress.show(done, total, what);
   };
-  // The flag is for what has no clock of its own; what has one says that its time is over, rather than cancelled.
+  // The flag is for computations without their own time limit; those with one report that the time is over rather
+  // than a cancellation.
   constexpr double kLater_s = 0.1;
   const CancelOnInterrupt interrupt(options.seconds > 0 ? options.seconds + kLater_s : 0);
   options.certify.cancelled = interrupt.flag();
@@ -387,9 +389,9 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
 void declare_function(CLI::App& app, CertifyOptions& options) {
   app.add_option("--method", options.method,
                  "Upper bound: product (of spectral norms), sdp (LipSDP-Neuron; the layer-wise eclipse_fast "
-                 "where its search is interrupted), auto (the smallest of the three), or branch (branch and "
-                 "bound over the box of --domain; without --domain over all inputs; ReLU networks). Of other "
-                 "activations, product and sdp use the slopes that they have on the box of --domain")
+                 "if its search is interrupted), auto (the smallest of the three), or branch (branch and "
+                 "bound over the box of --domain; without --domain over all inputs; ReLU networks). For "
+                 "other activations, product and sdp use their slopes on the box of --domain")
       ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
       ->capture_default_str();
   app.add_option(
@@ -398,7 +400,7 @@ void declare_function(CLI::App& app, CertifyOptions& options) {
          "function must reproduce, else exit 3; PART=FILE for a part of a deep set, e.g. phi:small=FILE")
       ->allow_extra_args(false);
   app.add_option("--samples-tolerance", options.sample_tolerance,
-                 "How far samples may be off, times what their outputs range over")
+                 "Tolerance for samples, relative to the range of their outputs")
       ->check(CLI::Range(0.0, 0.1))
       ->capture_default_str();
   app.add_option("--as", options.as,
@@ -406,10 +408,10 @@ void declare_function(CLI::App& app, CertifyOptions& options) {
       ->check(CLI::IsMember({"float32"}));
 }
 
-/// @returns the option --blocks, which may stand without a value.
+/// @returns the option --blocks, whose value is optional.
 const CLI::Option* declare_inputs(CLI::App& app, CertifyOptions& options) {
   auto* blocks = app.add_option("--blocks", options.blocks,
-                                "Bounds per block of inputs as well: of every block, or of those named, "
+                                "Also bounds per block of inputs: for every block, or for the named ones, "
                                 "e.g. position,velocity,x2")
                      ->expected(0, 1)
                      ->type_name("[LIST]")
@@ -451,8 +453,8 @@ void declare_search_on_a_box(CLI::App& app, CertifyOptions& options) {
 
 void declare_limits(CLI::App& app, CertifyOptions& options) {
   app.add_flag("--range", options.range,
-               "Range, jump at a cut-off and float32 error over the clamp's box; --domain implies it. Where "
-               "network.toml lists compositions as silent, ranges and jumps hold their 0");
+               "Range, jump at a cut-off and float32 error over the clamp's box; --domain implies it. If "
+               "network.toml lists silent compositions, ranges and jumps include their output 0");
   app.add_option("--range-nodes", options.range_nodes,
                  "Maximum number of boxes of branch and bound per search for an end of a range, twice that "
                  "for linear forms over several neighbours (default: 16000, fewer for large networks)")
@@ -469,7 +471,7 @@ void declare_limits(CLI::App& app, CertifyOptions& options) {
       ->check(CLI::PositiveNumber);
   app.add_option("--nodes", options.nodes,
                  "Rounds of the search for lower bounds, per function; 0: none (default: 40, fewer for large "
-                 "networks). With --method branch: boxes to look at, per bound (default: 20000)")
+                 "networks). With --method branch: boxes to examine, per bound (default: 20000)")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--time", options.seconds,
                  "Time limit of the whole command in seconds. Bounds are proved all the same; those whose "
@@ -490,9 +492,8 @@ Command certify_command() {
           "and 'swarmcert check' verifies them without an optimiser. Lower bounds are slopes between two "
           "float32 points,\n"
           "exact or, with smooth activations, rounded down.\n"
-          "Verdict: proved (exit 0), refuted (1) or inconclusive (4), of --gamma and --max-lipschitz where "
-          "given, and of\n"
-          "the gamma that a network.toml states.\n\n"
+          "Verdict: proved (exit 0), refuted (1) or inconclusive (4), for --gamma and --max-lipschitz if "
+          "given, and for\nthe gamma that a network.toml states.\n\n"
           "Example: swarmcert certify nn/networks/demo/network.toml --max-lipschitz 500 -o cert.json",
           [](CLI::App& app) {
             const auto options = std::make_shared<CertifyOptions>();

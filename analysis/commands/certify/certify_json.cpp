@@ -98,7 +98,7 @@ Json chains_json(const files::Network& network) {
   return list;
 }
 
-/// What is known of where each part's chain comes from.
+/// Where the operation chain of each part comes from, as far as known.
 Json chain_sources_json(const files::Network& network) {
   Json sources = Json::object();
   for (const auto& [part, weights] : files::parts(network)) {
@@ -125,7 +125,7 @@ Json samples_result(const Certification& found) {
   return list;
 }
 
-/// A cell's box holds the two coordinates of the map; the others are the same for all cells.
+/// The box of a cell contains the two coordinates of the map; the other coordinates are the same for all cells.
 Json map_json(const files::Network& network, const lipschitz::SlopeMapOptions& options,
               const lipschitz::SlopeMap& map) {
   const auto [first, second] = options.coordinates;
@@ -165,7 +165,7 @@ Json layer_json(const CertifiedLayer& layer) {
           {"respects_gamma", respects}};
 }
 
-/// Bound `i` of those found.
+/// JSON of bound number `i`.
 Json bound_json(const files::Network& network, const CertifyOutput& output, std::size_t i) {
   const CertifiedBound& bound = output.found.bounds[i];
   Json json = summary(network, bound);
@@ -200,7 +200,7 @@ Json float32_error_json(const files::Network& network, const CertifyOutput& outp
           {"bound_in_certificate", stated != nullptr ? number_or_null(stated->float32_error) : Json()}};
 }
 
-/// The files that the result depends on, each once.
+/// The files on which the result depends, without duplicates.
 std::vector<std::string> files_read(const files::Network& network, const CertifyOutput& output) {
   std::vector<std::string> inputs = input_files(network);
   if (!output.domain_file.empty()) inputs.push_back(output.domain_file);
@@ -211,7 +211,7 @@ std::vector<std::string> files_read(const files::Network& network, const Certify
   return inputs;
 }
 
-/// One element per item, as `json_of` writes it.
+/// Returns an array with one element per item, as written by `json_of`.
 template <class Items, class JsonOf>
 Json list_of(const Items& items, const JsonOf& json_of) {
   Json list = Json::array();

@@ -58,10 +58,10 @@ std::vector<std::string> explain(const lipschitz::Comparison& comparison, double
                                  double lower) {
   std::vector<std::string> words;
   const double floor = comparison.floor.slope.value();
-  words.push_back(fmt::format(
-      "The product of norms is {:.3g} times the proved bound: it takes every layer at its steepest "
-      "direction and every ReLU as open.",
-      product / upper));
+  words.push_back(
+      fmt::format("The product of norms is {:.3g} times the proved bound: it assumes the steepest direction "
+                  "in every layer and every ReLU active.",
+                  product / upper));
   const lipschitz::StageLoss* worst = nullptr;
   for (const lipschitz::StageLoss& stage : comparison.stages)
     if (worst == nullptr || stage.loss() > worst->loss()) worst = &stage;
@@ -130,7 +130,7 @@ void print_chains(const files::Network& network, const Certification& found) {
     const double rounding = files::rounding_of_slope(*weights);
     if (rounding > 0)
       fmt::print(
-          "    folded weights that are no doubles are rounded to nearest; the bounds for all inputs plus "
+          "    folded weights that are not doubles are rounded to nearest; the bounds for all inputs plus "
           "{:.2g} hold for the exact ones\n",
           rounding);
     if (samples == found.samples.end()) continue;
@@ -169,8 +169,8 @@ void print_layers(const files::Network& network, const Certification& found) {
   }
 }
 
-/// Which searches were cut short, and how far they were; empty where none was. A search of boxes that ended because it
-/// could do no more says so as well.
+/// Says which searches were cut short and how far they got, or that branch and bound could not improve further. Empty
+/// if neither applies.
 std::string interruption_words(const CertifiedBound& bound) {
   std::string words;
   const auto add = [&words](const std::string& what) { words += (words.empty() ? "" : "; ") + what; };
@@ -279,7 +279,7 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
         range.neighbours_at_most > 0 ? " up to " + counted(range.neighbours_at_most, "neighbour") : "";
     fmt::print("  {}{}: {:.6g} ({:.6g}) .. ({:.6g}) {:.6g}", range.function.name(), many, range.lower,
                range.least.value, range.greatest.value, range.upper);
-    // Without silent compositions the jump hardly depends on the number of neighbours: it is printed once.
+    // Without silent compositions the jump hardly depends on the number of neighbours, so it is printed only once.
     const bool has_jump =
         range.neighbours_at_most == 1 || (range.neighbours_at_most > 1 && !network.silent.empty());
     if (has_jump) fmt::print("; a neighbour at a cut-off: a jump of at most {:.6g}", range.jump);
@@ -312,7 +312,7 @@ void print_arithmetic(const CertifyOutput& output) {
   if (output.ranges.empty()) return;
   fmt::print("\nLipschitz bounds, ranges and jumps are of the exact function of the stored weights. {}\n",
              output.float32_errors.empty()
-                 ? "Nothing is said of a float32 evaluation."
+                 ? "This says nothing about a float32 evaluation."
                  : "A float32 evaluation has steps and may\nleave them, by up to the float32 error.");
 }
 

@@ -1,4 +1,4 @@
-/// @file What `certify` found, as text and as JSON.
+/// @file Results of `certify` as text and as JSON.
 #pragma once
 
 #include <cstdint>
@@ -19,58 +19,60 @@ namespace swarmcert::analysis {
 struct CertifyOutput {
   lipschitz::Certification found;
   std::vector<std::optional<lipschitz::Comparison>>
-      comparisons;  ///< per bound of `found`; empty where not asked for
-  /// Per bound of `found`, where it has no witness; empty where none was asked for.
+      comparisons;  ///< one per bound of `found`; empty if not requested
+  /// One per bound of `found`, set if the bound has no witness; empty if not requested.
   std::vector<std::optional<lipschitz::Estimate>> slope_estimates;
   std::vector<lipschitz::CertifiedRange> ranges;
   std::vector<lipschitz::Float32Error> float32_errors;
   lipschitz::Verdict verdict = lipschitz::Verdict::kInconclusive;
   double max_lipschitz = 0;  ///< 0: no limit was given
   std::uint64_t seed = 1;
-  std::string domain_file;  ///< box.toml; empty: none
+  std::string domain_file;  ///< box.toml; empty if there is none
   lipschitz::SlopeMapOptions map;
   std::vector<lipschitz::SlopeMap> maps;
-  bool ranges_cut_short = false;  ///< ranges and float32 errors are of one part of the box
+  bool ranges_cut_short = false;  ///< ranges and float32 errors cover only a part of the box
 
   bool is_interrupted() const { return lipschitz::is_interrupted(found) || ranges_cut_short; }
 };
 
-/// Said of bounds of functions that have another activation than ReLU, or rotation invariants.
+/// Note for bounds of functions with activations other than ReLU or with rotation invariants as inputs.
 inline constexpr char kForReluOnly[] =
     "branch and bound is for ReLU networks of relative states: with other activations bounds on a box are "
     "proved from the slopes that they have there";
 
-/// Said of functions of rotation invariants.
+/// Note for functions of rotation invariants.
 inline constexpr char kNoLowerBound[] =
     "of functions of rotation invariants upper bounds for all inputs are proved, and no lower bounds";
 
-/// Said of networks that are silent in some compositions, whose names follow.
+/// Note for networks that output zero in some compositions; the names of the compositions follow.
 inline constexpr char kWhereSilent[] =
     "0 among these neighbours > vehicle, without a network: bounds hold while the neighbours stay the same, "
     "ranges hold this 0, and jumps hold the step to it: ";
 
-/// Unit of the network's outputs; "output" where NET states none.
+/// Unit of the network's outputs; "output" if NET states none.
 std::string output_unit(const files::Network& network);
 
-/// The steepest slope that was found between two points, a lower bound; 0 where none was.
+/// The steepest slope found between two points, a lower bound; 0 if none was found.
 double slope_found(const lipschitz::CertifiedBound& bound);
 
-/// The sampled slope of bound number `bound` of those found; none where it was not asked for.
+/// The sampled slope of bound number `bound`; nothing if it was not requested.
 std::optional<lipschitz::Estimate> slope_estimate_of(const CertifyOutput& output, std::size_t bound);
 
-/// What the certificate states of the function's values; null where it leaves them out.
+/// Value bounds that the certificate states for the function; null if it leaves them out.
 const lipschitz::CertifiedValues* in_certificate(const CertifyOutput& output,
                                                  const files::FunctionId& function, int neighbours);
 
 /// "set:small:large", "set:small:large position scaled", "set:small:large, at most 2 small".
 std::string label(const lipschitz::CertifiedBound& bound);
 
-/// What the numbers mean, in sentences.
-/// @param product product of spectral norms, `upper` the best proved bound, `lower` the steepest slope found (0: none).
+/// Explains the numbers in sentences.
+/// @param product product of spectral norms.
+/// @param upper the best proved bound.
+/// @param lower the steepest slope found; 0 if none.
 std::vector<std::string> explain(const lipschitz::Comparison& comparison, double product, double upper,
                                  double lower);
 
-/// The fields of the schema swarmcert/certify/1.
+/// Returns the fields of schema swarmcert/certify/1.
 files::Json certify_json(const files::Network& network, const CertifyOutput& output);
 
 void print_certification(const files::Network& network, const CertifyOutput& output);

@@ -38,7 +38,7 @@ void add_bounds(Report& report, const files::Network& network, const CertifyOutp
     rows.push_back({label(bound), bound.domain, number(bound.upper.value(), 10), name(bound.method),
                     number(bound.product.value(), 8), number(lower, 8),
                     files::unit(network, bound.function, bound.block)});
-    // A logarithmic axis has no zero.
+    // A logarithmic axis cannot show zero.
     data += fmt::format("{} {:.17g} {:.17g} {}\n", plot_field(label(bound)), bound.product.value(),
                         bound.upper.value(), lower > 0 ? fmt::format("{:.17g}", lower) : "NaN");
   }
@@ -55,10 +55,10 @@ void add_bounds(Report& report, const files::Network& network, const CertifyOutp
       "constant lies between the last two. Logarithmic scale.");
 }
 
-/// An enclosure with eight digits, rounded outwards.
+/// Formats an enclosure with eight digits, rounded outward.
 std::pair<std::string, std::string> outwards(double lower, double upper) {
   const double unit = std::pow(10, std::floor(std::log10(std::max(upper, 1e-300))) - 7);
-  constexpr double kSlack = 1e-15;  // of the divisions here
+  constexpr double kSlack = 1e-15;  // for the rounding of the divisions here
   return {number(std::floor(lower / unit * (1 - kSlack)) * unit, 8),
           number(std::ceil(upper / unit * (1 + kSlack)) * unit, 8)};
 }
@@ -74,12 +74,11 @@ void add_layers(Report& report, const CertifyOutput& output) {
                     layer.respects_gamma ? name(*layer.respects_gamma) : "not stated"});
     bars.push_back({layer.network.name() + " " + layer.name, upper, lower, upper});
   }
-  report.bars(
-      "layers", bars, "spectral norm [output per input of the layer]",
-      output.found.gamma
-          ? fmt::format("Spectral norms of the layers, at most {:.6g} where gamma holds in each layer.",
-                        output.found.gamma->value)
-          : std::string("Spectral norms of the layers."));
+  report.bars("layers", bars, "spectral norm [output per input of the layer]",
+              output.found.gamma
+                  ? fmt::format("Spectral norms of the layers, at most {:.6g} if gamma holds in each layer.",
+                                output.found.gamma->value)
+                  : std::string("Spectral norms of the layers."));
   report.table({"network", "layer", "at least", "at most", "within gamma"}, rows);
 }
 

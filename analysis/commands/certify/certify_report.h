@@ -7,8 +7,8 @@
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html and its plots; returns the path of report.html. The numbers carry the guarantees that
-/// `output` has; the JSON `result` goes into the page.
+/// Writes FOLDER/report.html and its plots, and returns the path of report.html. The numbers carry the guarantees of
+/// `output`; the page embeds the JSON `result`.
 /// @throws files::InputError if the folder is not empty and `overwrite` is false.
 std::string write_certify_report(const files::Network& network, const CertifyOutput& output,
                                  const files::Json& result, const std::string& folder, bool overwrite);

@@ -21,10 +21,11 @@ namespace {
 struct CheckOptions {
   std::string certificate;
   files::NetworkArguments network;
-  std::string gains, model;  ///< of a certificate of tracking gains
+  std::string gains, model;  ///< for a certificate of tracking gains
 };
 
-/// Whether the text is a certificate of tracking gains. Certificates of networks can be long: they are parsed once.
+/// Whether the text is a certificate of tracking gains. Certificates of networks can be long, so they are parsed only
+/// once.
 bool is_of_tracking(const std::string& text, const std::string& path) {
   if (text.find(check::kTrackingSchema) == std::string::npos) return false;
   const files::Json json = files::parse_json(text, path);
@@ -39,7 +40,7 @@ bool fits(const files::Json& entry, const char* key, double derived) {
   return is_close(files::parse_hex_float(entry[key].get<std::string>()), derived);
 }
 
-/// Whether an entry of an accepted certificate states the numbers of `loop`, up to their rounding.
+/// Whether an entry of an accepted certificate states the parameters of `loop`, up to rounding.
 bool states(const files::Json& entry, const stability::AxisLoop& loop) {
   std::vector<double> stated = files::parse_hex_floats(entry["lags_s"]), derived;
   std::copy_if(loop.lags_s.begin(), loop.lags_s.end(), std::back_inserter(derived),
@@ -62,7 +63,7 @@ bool states(const files::Json& entry, const stability::SampledLoop& loop) {
          fits(entry, "integrator_step_s", loop.integrator_step_s);
 }
 
-/// Rejects an accepted certificate whose loops are not those of the files.
+/// Rejects an accepted certificate whose loops differ from those of the given files.
 void compare_loops(const CheckOptions& options, const files::Json& certificate,
                    check::TrackingVerdict& verdict) {
   const stability::TrackingSetup setup = stability::load_tracking_setup(options.gains, options.model);
@@ -106,8 +107,7 @@ int check_gains(const CheckOptions& options, const CommonOptions& common, const 
     if (verdict.accepted) {
       fmt::print("accepted: {}: {} gains of {} loops\n", verdict.reason, verdict.gains, verdict.loops);
       if (gains.empty() || model.empty())
-        fmt::print(
-            "whether the loops are those of gains.toml and model.toml was not compared: --gains, --model\n");
+        fmt::print("the loops were not compared with gains.toml and model.toml: --gains, --model\n");
     } else {
       fmt::print("rejected: {}\n", verdict.reason);
     }
@@ -126,7 +126,7 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
     throw UsageError("--gains and --model are for certificates of tracking gains; " + options.certificate +
                      " is none");
   const files::Json certificate = files::parse_json(text, options.certificate, check::kCertificateSchema);
-  text = std::string();  // may be as large as all that follows
+  text = std::string();  // frees the text, which may be as large as all that follows
   const files::Network network = check::with_stated_activations(certificate, load_any_net(options.network));
   const check::CheckResult verdict = check::check(certificate, network);
 
@@ -158,7 +158,7 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
 }  // namespace
 
 Command check_command() {
-  return {"check", "Verify a certificate against the weights, independently of what wrote it",
+  return {"check", "Verify a certificate against the weights, independently of the program that wrote it",
           "Rebuilds every matrix inequality from the weights and verifies it in exact integer arithmetic, "
           "proofs on a box\n"
           "in double with every rounding accounted for; uses no optimiser. Accepted: exit 0. Rejected, with "

@@ -92,7 +92,7 @@ void write_fitted(const Budget& budget, const residuals::Fleet& fleet, const std
   std::filesystem::create_directories(folder);
   const std::filesystem::path path(folder);
   std::string text = "schema = \"swarmcert/flights/1\"\n";
-  std::map<std::string, std::string> of_kind;  // the vehicle whose model stands for its kind
+  std::map<std::string, std::string> of_kind;  // the vehicle whose model represents its kind
   const auto write_model = [&](const std::string& vehicle, const stability::Model& model) {
     files::write_file((path / (vehicle + ".toml")).string(),
                       stability::to_toml(model, {"Fitted jointly to flights by swarmcert compare --budget."}),

@@ -42,7 +42,7 @@ struct CompareOptions {
   std::string promise;
 };
 
-/// "FILE" for every kind, "KIND=FILE" for one.
+/// Parses "FILE" for every kind, or "KIND=FILE" for one kind.
 residuals::GainsOfKinds read_gains(const std::vector<std::string>& words) {
   residuals::GainsOfKinds gains;
   for (const std::string& word : words) {
@@ -55,7 +55,7 @@ residuals::GainsOfKinds read_gains(const std::vector<std::string>& words) {
   return gains;
 }
 
-/// @throws UsageError where gains are for a kind that no vehicle of the comparison has.
+/// @throws UsageError if gains are given for a kind that no compared vehicle has.
 void check_kinds(const residuals::GainsOfKinds& gains, const residuals::Inputs& inputs) {
   std::vector<std::string> kinds;
   for (const stability::Model& model : inputs.models) kinds.push_back(model.kind);
@@ -66,7 +66,7 @@ void check_kinds(const residuals::GainsOfKinds& gains, const residuals::Inputs& 
   }
 }
 
-/// The fit sees the models and rules of the comparison, and other flights.
+/// The fit uses the models and rules of the comparison, but other flights.
 identification::Budget budget_of(const CompareOptions& options, const residuals::Inputs& inputs,
                                  const CommonOptions& common) {
   FlightOptions words = options.flights;
@@ -84,7 +84,7 @@ identification::Budget budget_of(const CompareOptions& options, const residuals:
   for (const residuals::FlightFiles& flight : fit.found.flights) {
     for (const auto& [vehicle, log] : flight.logs) {
       if (judged.count(std::filesystem::weakly_canonical(log)) > 0)
-        throw UsageError("--budget names a flight that is judged as well: " + log);
+        throw UsageError("--budget names a flight that is also judged: " + log);
     }
   }
   Progress progress(common.quiet);
@@ -92,8 +92,8 @@ identification::Budget budget_of(const CompareOptions& options, const residuals:
                                       [&](int done, int total) { progress.show(done, total, "passes"); });
 }
 
-/// Writes every log with what the model's effects would have added to its accelerometer; those of vehicles without a
-/// model as they are. Same folder names and file names, so that flights stay flights.
+/// Writes every log with the contribution of the model's effects added to its accelerometer; logs of vehicles without
+/// a model are copied unchanged. Folder and file names are kept, so that flights remain flights.
 files::Json inject(const residuals::Inputs& inputs, const std::string& folder, bool overwrite) {
   namespace fs = std::filesystem;
   files::Json injected = files::Json::array(), unchanged = files::Json::array();
@@ -129,7 +129,7 @@ files::Json inject(const residuals::Inputs& inputs, const std::string& folder, b
           {"unchanged", std::move(unchanged)}};
 }
 
-/// The largest values over a flight's windows; axes that are not judged are null.
+/// The largest values over the windows of a flight; axes that are not judged are null.
 files::Json largest_json(const residuals::ErrorOfFlight& error, const std::function<bool(int)>& is_judged) {
   const auto axes = [&is_judged](const Eigen::Vector4d& v) {
     files::Json json = files::Json::object();
@@ -163,8 +163,8 @@ files::Json place_grid_json() {
           {"laterals", Grid::kLateral},  {"mean_s", residuals::kPlaceMean_s}};
 }
 
-/// flights[].learning_error, flights[].velocity_error and flights[].residual_by_place, from which bound --coverage
-/// makes its promise, and the quantiles of the velocity's error over all windows.
+/// Adds flights[].learning_error, flights[].velocity_error and flights[].residual_by_place, from which bound
+/// --coverage computes its promise, and the quantiles of the velocity error over all windows.
 void add_flight_errors(const std::vector<residuals::FlightError>& all, files::Json& result) {
   std::map<std::string, const residuals::FlightError*> errors;
   for (const residuals::FlightError& error : all) errors[error.path] = &error;
@@ -172,13 +172,13 @@ void add_flight_errors(const std::vector<residuals::FlightError>& all, files::Js
     flight["learning_error"] = flight["velocity_error"] = flight["residual_by_place"] = nullptr;
     const auto found = errors.find(flight["file"].get<std::string>());
     if (found == errors.end()) continue;
-    // As in the errors of the flight.
+    // The same axes as in the errors of the flight.
     const auto is_judged = [&flight](int k) {
       const char* const kNames[] = {"x", "y", "z"};
       return k == 3 || !flight["rmse"][kNames[k]].is_null();
     };
     flight["learning_error"] = largest_json(found->second->force, is_judged);
-    // A tube needs all axes.
+    // A tube needs all three axes.
     if (is_judged(0) && is_judged(1) && is_judged(2))
       flight["residual_by_place"] = places_json(found->second->places);
     if (!found->second->velocity.windows.empty())
@@ -189,7 +189,7 @@ void add_flight_errors(const std::vector<residuals::FlightError>& all, files::Js
   result["velocity_error"] = velocity ? json_of(*velocity) : files::Json();
 }
 
-/// How often a promise held on FLIGHTS, and where.
+/// How often the promise held on FLIGHTS, and where it failed.
 files::Json kept_promise_json(const residuals::Inputs& inputs, const std::string& path, int jobs) {
   const Promise promise = read_promise(path);
   const KeptPromise kept = kept_promise(promise, residuals::flight_peaks(inputs, jobs));
@@ -227,7 +227,7 @@ void print_promise_kept(const files::Json& promise) {
                promise["left_out"].size());
 }
 
-/// What is to be written must not be there already, unless --force says so.
+/// Output files must not exist yet, unless --force is given.
 void check_outputs(const CompareOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
@@ -240,9 +240,9 @@ void check_outputs(const CompareOptions& options, const CommonOptions& common) {
   }
 }
 
-/// What was asked for beside the comparison.
+/// Results requested in addition to the comparison.
 struct Extras {
-  std::optional<residuals::Comparison> own;  ///< With this tool's filter instead of the published one.
+  std::optional<residuals::Comparison> own;  ///< with this tool's filter instead of the published one
   std::optional<identification::Budget> budget;
 };
 
@@ -265,11 +265,11 @@ Extras add_extras(const CompareOptions& options, const residuals::Inputs& inputs
   return extras;
 }
 
-/// Nothing that could be read is bad input; flights that say too little are inconclusive.
+/// If no log could be read, the input is bad; if the flights contain too little data, the result is inconclusive.
 int exit_code_of(const residuals::Comparison& comparison) {
   if (comparison.overall.statistics.samples > 0) return kDone;
   note("no usable record: nothing was compared" + (comparison.problems.empty()
-                                                       ? "; 'swarmcert inspect LOG' says what is in a log"
+                                                       ? "; 'swarmcert inspect LOG' shows what is in a log"
                                                        : ": " + comparison.problems[0]));
   const bool refused = std::any_of(comparison.tracks.begin(), comparison.tracks.end(), [](const auto& track) {
     return std::any_of(track.doubts.begin(), track.doubts.end(),
@@ -283,7 +283,7 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   check_outputs(options, common);
   const residuals::GainsOfKinds gains = read_gains(options.gains);
   residuals::Inputs inputs = read_flights(options.flights, true, true);
-  // One pass over the flights asks for each log once, or twice in a row.
+  // A single pass reads each log once, or twice in succession, so a small cache suffices.
   constexpr std::size_t kOfOnePass_bytes = std::size_t{64} << 20;
   if (options.budget.empty() && options.inject.empty() && options.promise.empty())
     inputs.cache = std::make_shared<residuals::LogCache>(inputs.rules.per_mass, kOfOnePass_bytes);
@@ -291,7 +291,7 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   check_kinds(gains, inputs);
   Progress progress(common.quiet);
   const auto show = [&](int done, int total) { progress.show(done, total, "flights"); };
-  // Nobody else reads the errors of single flights, and they take as long as the comparison.
+  // Only these outputs use the errors of single flights, which take as long as the comparison.
   const bool wants_errors = !common.json.empty() || !options.report.empty() || host() != nullptr;
   std::vector<std::vector<residuals::FlightError>> errors(inputs.found.flights.size());
   const auto add_error = [&](std::size_t flight, const residuals::Track& track) {
@@ -362,16 +362,15 @@ Command compare_command() {
                    "Folder for the models fitted by --budget, one per vehicle, and their flights.toml");
         app.add_option(
             "--promise", options->promise,
-            "Result of bound --coverage: how often its promise holds on those of FLIGHTS that it was "
-            "not made from");
+            "Result of bound --coverage: how often its promise holds on the FLIGHTS not used to make it");
         add_output(app, "--inject", options->inject,
                    "Write FLIGHTS into this folder with the force of the model's effects added to the "
                    "accelerometer (open loop: nothing else changes)");
         app.add_flag(
             "--published-filter", options->flights.published_filter,
             "Cut and filter as the networks' authors did: 32 g (small) and 67 g (large), thrust lag 0.16 "
-            "per record, clocks as they are, |f_a,z| < 50 gf, contact kept; prints the mean squares with "
-            "this project's own filter beside");
+            "per record, clocks as they are, |f_a,z| < 50 gf, contact kept; also prints the mean squares "
+            "with this project's own filter");
         return [options](const CommonOptions& common) { return run_compare(*options, common); };
       }};
 }

@@ -23,7 +23,7 @@ using analysis::json_of;
 using residuals::Comparison;
 
 files::Json json_of(const Eigen::Vector3d& v) {
-  // JSON has no NaN: null where a spectrum could not be had.
+  // JSON has no NaN: null if a spectrum could not be computed.
   return {{"x", files::finite(v[0])}, {"y", files::finite(v[1])}, {"z", files::finite(v[2])}};
 }
 
@@ -108,7 +108,7 @@ files::Json json_of(const residuals::NeighbourMap& map) {
       {"cells", std::move(cells)}};
 }
 
-/// Sets the axes of every {x, y, z} below `json` that cannot be judged to null.
+/// Sets the axes that cannot be judged to null in every {x, y, z} below `json`.
 void blank_axes(files::Json& json, const Eigen::Vector3d& judged) {
   if (json.is_array()) {
     for (files::Json& element : json) blank_axes(element, judged);
@@ -162,7 +162,7 @@ files::Json json_of(const residuals::TorqueErrors& torque) {
           {"max", json_of(torque.max_Nm)}};
 }
 
-/// What became of every log: axes with records that were compared.
+/// The outcome for every log: axes with records that were compared.
 std::vector<LogOutcome> outcomes_of(const Comparison& comparison, const residuals::Inputs& inputs) {
   std::map<std::string, const residuals::TrackErrors*> tracks;
   for (const residuals::TrackErrors& track : comparison.tracks) tracks[track.path] = &track;
@@ -192,7 +192,7 @@ std::vector<LogOutcome> outcomes_of(const Comparison& comparison, const residual
   return outcomes;
 }
 
-/// How many logs have a torque residual; where none has, why.
+/// The number of logs with a torque residual; if there are none, the reason.
 files::Json torque_json(const Comparison& comparison) {
   std::size_t tracks = 0;
   std::string refused = "no vehicle has a model";
@@ -416,7 +416,7 @@ void print_errors(const Comparison& comparison, const Comparison* own, const res
   print_trajectories(comparison.trajectories);
 }
 
-/// What a flights.toml names, and what flew instead.
+/// Names the vehicles of a flights.toml and the vehicles that flew instead.
 std::string vehicles_without_model(const residuals::Inputs& inputs) {
   std::set<std::string> flown;
   for (const residuals::FlightFiles& flight : inputs.found.flights) {
@@ -440,7 +440,7 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
   if (inputs.rules.per_mass) {
     fmt::print(
         "No model is known: residuals are per mass, and thrust is in multiples of each log's hover thrust, "
-        "so that the mean vertical force says nothing.\n");
+        "so the mean vertical force is meaningless.\n");
     if (!inputs.fleet.empty()) fmt::print("{}\n", vehicles_without_model(inputs));
   }
   for (const std::string& pattern : residuals::patterns_without_log(inputs.log_rules, inputs.found))

@@ -15,7 +15,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// Two decimals, or three digits where these would lose too much.
+/// Formats with two decimals, or with three significant digits if two decimals would lose too much.
 std::string in_unit(double newton, const residuals::ForceUnit& unit) {
   const double value = newton / unit.size_N;
   return std::abs(value) < 1 ? fmt::format("{:.3g}", value) : fmt::format("{:.2f}", value);
@@ -60,7 +60,7 @@ const std::vector<std::string> kHeader = {"",
                                           "variance explained",
                                           "low band / floor"};
 
-/// Mean and spread of the vertical residual over the ranges of one variable.
+/// Plots mean and spread of the vertical residual over the ranges of one variable.
 void add_region_plot(Report& report, const residuals::Comparison& comparison, int variable,
                      const std::string& variable_unit, const residuals::ForceUnit& unit) {
   std::vector<const residuals::RegionErrors*> regions;
@@ -86,7 +86,7 @@ void add_region_plot(Report& report, const residuals::Comparison& comparison, in
                 "Vertical residual over " + label + ".");
 }
 
-/// Mean vertical residual by the place of the nearest neighbour.
+/// Plots the mean vertical residual over the position of the nearest neighbour.
 void add_neighbour_map(Report& report, const residuals::NeighbourMap& map, const residuals::ForceUnit& unit) {
   using Map = residuals::NeighbourMap;
   constexpr std::size_t kFewest = 20;
@@ -147,7 +147,7 @@ void add_trajectories(Report& report, const residuals::Comparison& comparison) {
 
 void add_learning_error(Report& report, const residuals::LearningError& learning,
                         const residuals::ForceUnit& unit) {
-  report.heading("What bound --from takes from these flights");
+  report.heading("Values that bound --from uses from these flights");
   report.paragraph(fmt::format(
       "Quantiles over {} windows of {} s of the residual behind a low-pass of {} Hz; bias: "
       "mean of a flight.",

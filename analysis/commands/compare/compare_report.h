@@ -10,8 +10,8 @@
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html, with forces in `unit`, with plots and the JSON `result`; returns its path. @throws as
-/// Report::write().
+/// Writes FOLDER/report.html with plots, forces in `unit`, and the JSON `result`. Returns its path.
+/// @throws as Report::write().
 std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
                                  const residuals::ForceUnit& unit, const files::Json& result,
                                  const std::string& folder, bool overwrite);

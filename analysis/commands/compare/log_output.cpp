@@ -16,7 +16,7 @@ using residuals::TrackErrors;
 
 struct Clocks {
   int reference = 0, absolute = 0, estimated = 0, unknown = 0;
-  double largest_s = 0;  ///< of the estimated ones
+  double largest_s = 0;  ///< largest estimated offset
 };
 
 Clocks clocks_of(const Comparison& comparison) {

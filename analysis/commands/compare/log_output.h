@@ -1,4 +1,4 @@
-/// @file What compare says about the logs themselves: cuts, clocks, damage, implausible numbers.
+/// @file Output of compare about the logs themselves: cuts, clocks, damage, implausible values.
 #pragma once
 
 #include "analysis/residuals/comparison.h"
@@ -6,17 +6,17 @@
 
 namespace swarmcert::analysis {
 
-/// {reference, estimated, unknown}: numbers of logs by what is known of their clocks.
+/// Returns {reference, estimated, unknown}: the number of logs by the state of their clocks.
 files::Json clocks_json(const residuals::Comparison& comparison);
 
-/// "reference": the first log of its flight, to which the others' clocks are related; "estimated"; "unknown": taken
-/// as equal, because no common start of a commanded movement gave an offset.
+/// Returns "reference" for the first log of its flight, to which the other clocks are related; "estimated"; or
+/// "unknown": taken as synchronous, because no common start of a commanded movement gave an offset.
 const char* clock_of(const residuals::TrackErrors& track);
 
-/// Records cut, by rule, and what is known of the clocks.
+/// Prints the records cut, by rule, and the state of the clocks.
 void print_cuts(const residuals::Comparison& comparison);
 
-/// Damaged files, and numbers that no flight has.
+/// Prints damaged files and implausible values.
 void print_doubts(const residuals::Comparison& comparison);
 
 }  // namespace swarmcert::analysis

@@ -26,7 +26,7 @@ struct DemoOptions {
   std::string output = "swarmcert-demo";
 };
 
-/// Tells what is done, and the command that does it alone.
+/// Announces each step, with the command that runs it on its own.
 class Speaker {
  public:
   explicit Speaker(const CommonOptions& common) : speaks_(common.prints_text()) {}
@@ -75,7 +75,7 @@ Certified certify_network(const files::Network& network, const std::string& file
           write_certify_report(network, output, result, (folder / "report").string(), common.force)};
 }
 
-/// Random walks of two vehicles, with the effects of crazyflie-small-effects.toml: FOLDER/1 .. FOLDER/3.
+/// Simulates random walks of two vehicles with the effects of crazyflie-small-effects.toml into FOLDER/1 .. FOLDER/3.
 void fly(const fs::path& folder, const std::string& models, bool force) {
   constexpr int kFlights = 3, kVehicles = 2;
   constexpr double kDuration_s = 25;
@@ -99,7 +99,7 @@ void fly(const fs::path& folder, const std::string& models, bool force) {
   }
 }
 
-/// Flies with effects that the studied model lacks, and studies the flights. Returns the page's path.
+/// Simulates flights with effects that the studied model lacks, and studies them. Returns the path of the page.
 std::string study_flights(const fs::path& folder, const CommonOptions& common, const Speaker& say,
                           files::Json& result) {
   const std::string models = bundled_folder("models", "stability/models");

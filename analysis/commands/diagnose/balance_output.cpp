@@ -33,15 +33,15 @@ files::Json torque_json(const TorqueBalance& balance) {
           {"torque_y_Nm", value_json(balance.torque_Nm.y(), balance.torque_half_Nm.y())}};
 }
 
-/// What tells entries of the two balances apart.
+/// What distinguishes the entries of the two balances.
 struct Entry {
   std::string effect, equivalence_class;
   files::Json parameters;
   std::vector<std::string> rivals;
 };
 
-/// What a balance of means finds, as an entry of the ranking. Errors are those of the balance, in newton: of torques,
-/// the force by which each rotor is off balance; of the accelerometer, mass times the error of its mean.
+/// Turns the result of a balance of means into a ranking entry. Its errors are those of the balance in newton: for
+/// torques, the force by which each rotor is off balance; for the accelerometer, mass times the error of its mean.
 template <class Balance>
 files::Json ranking_entry(const Balance& balance, const Entry& entry) {
   files::Json rivals = files::Json::array();
@@ -97,7 +97,7 @@ files::Json ranking_entry_of(const AccelerometerBalance& balance) {
        is_ambiguous ? std::vector<std::string>{"constant_force"} : std::vector<std::string>{}});
 }
 
-/// The force of a flight shows a scale of its accelerometer as one of its thrust.
+/// The force residual of a flight shows an accelerometer scale error as a thrust ratio.
 bool is_explained_ratio(const files::Json& entry, const AccelerometerBalance& balance) {
   constexpr double kAlike = 0.02;
   if (entry["effect"] != "thrust_ratio" || entry["kind"] != balance.kind) return false;

@@ -6,15 +6,15 @@
 
 namespace swarmcert::analysis {
 
-/// `torque_balance`: per vehicle what its rotors balance on average. What counts goes to the end of `ranking` as
-/// com_offset or torque_bias, and makes the verdict missing_effect. Prints it where `prints`.
-/// @return whether something is named.
+/// Adds `torque_balance`: per vehicle, the mean torque that its rotors balance. A significant torque is appended to
+/// `ranking` as com_offset or torque_bias, and makes the verdict missing_effect. Prints the balance if `prints`.
+/// @return whether an entry was added to the ranking.
 bool judge_torques(const residuals::Inputs& inputs, int jobs, bool prints, files::Json& result);
 
-/// `sensors`: per vehicle its accelerometer against its velocity. What counts goes to the head of `ranking` as
-/// accelerometer_scale, in place of a thrust_ratio that it explains, and makes the verdict missing_effect. Prints it
-/// where `prints`.
-/// @return whether something is named.
+/// Adds `sensors`: per vehicle, its accelerometer compared with its velocity. A significant scale goes to the head of
+/// `ranking` as accelerometer_scale, replaces a thrust_ratio that it explains, and makes the verdict missing_effect.
+/// Prints the comparison if `prints`.
+/// @return whether an entry was added to the ranking.
 bool judge_accelerometers(const residuals::Inputs& inputs, int jobs, bool prints, files::Json& result);
 
 }  // namespace swarmcert::analysis

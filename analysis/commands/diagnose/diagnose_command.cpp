@@ -31,7 +31,7 @@ struct DiagnoseOptions {
   bool each = false, next = false;
 };
 
-/// What the commands' options ask for, for all kinds of vehicles.
+/// The results that the options request, for all kinds of vehicles.
 struct Answers {
   std::vector<Diagnosis> diagnoses;  ///< one per kind; with --against one per vehicle
   std::vector<identification::Difference> differences;
@@ -71,7 +71,7 @@ Answers answer(const DiagnoseOptions& options, const CommonOptions& common, cons
     if (options.each) {
       std::vector<Diagnosis> own(answers.diagnoses.begin() + static_cast<std::ptrdiff_t>(first),
                                  answers.diagnoses.end());
-      // Against other flights, what these have in common is not known: the model's effects alone are held.
+      // With --against the effects common to all flights are unknown, so only the effects of the model are held fixed.
       const auto common_effects =
           others == nullptr ? specs_of(own[0].ranking) : std::vector<stability::EffectSpec>{};
       answers.each.push_back(
@@ -112,7 +112,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   add_diagnoses(answers.diagnoses, result);
   if (others) add_differences(answers.differences, other_files, result);
   const bool names_rotor = others && judge_rotors(inputs, *others, common.jobs, common.prints_text(), result);
-  // Against healthy flights the rotors are compared one by one.
+  // With --against the rotors are compared one by one with those of the healthy flights.
   const bool names_torque = !others && judge_torques(inputs, common.jobs, common.prints_text(), result);
   const bool names_sensor =
       !others && judge_accelerometers(inputs, common.jobs, common.prints_text(), result);
@@ -146,32 +146,33 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
 }  // namespace
 
 Command diagnose_command() {
-  return {"diagnose", "Find the physical effect that a model lacks, from flights",
-          "Every known effect is a candidate; one counts as found if it lowers the cross-validated error by "
-          "2 %,\n"
-          "is significant across blocks of 2 s, and is not contradicted by the set points. The remainder is "
-          "analysed separately. Means over a second show a centre of mass off the centre and an "
-          "accelerometer\n"
-          "that reads too much. Logs with the set points, path, sensors, name or kind of another vehicle are "
-          "told.\n\n"
-          "Example: swarmcert diagnose stability/models/crazyflie-small.toml flights/ --report out\n"
-          "         swarmcert diagnose model.toml today/ --against monday/ tuesday/ wednesday/",
-          [](CLI::App& app) {
-            const auto options = std::make_shared<DiagnoseOptions>();
-            declare_flights(app, options->flights, true);
-            app.add_option(
-                "--against", options->against,
-                "Other flights (the healthy vehicle, the last release): what they show is held, and "
-                "the ranking is the difference of each vehicle beyond their scatter; "
-                "rotors that give less now are named");
-            app.add_flag("--each", options->each,
-                         "Also thrust ratio, drag and lag of each flight and day, with drifts and outliers");
-            app.add_flag("--next", options->next,
-                         "Also which flights would separate rivals, or show what these flights cannot");
-            add_output(app, "--report", options->report, "Write an HTML report into this folder");
-            declare_unit(app, options->flights);
-            return [options](const CommonOptions& common) { return run_diagnose(*options, common); };
-          }};
+  return {
+      "diagnose", "Find the physical effect that a model lacks, from flights",
+      "Every known effect is a candidate; one counts as found if it lowers the cross-validated error by "
+      "2 %,\n"
+      "is significant across blocks of 2 s, and is not contradicted by the set points. The remainder is "
+      "analysed separately. Means over a second show a centre of mass off the centre and an "
+      "accelerometer\n"
+      "that reads too much. Logs with the set points, path, sensors, name or kind of another vehicle are "
+      "reported.\n\n"
+      "Example: swarmcert diagnose stability/models/crazyflie-small.toml flights/ --report out\n"
+      "         swarmcert diagnose model.toml today/ --against monday/ tuesday/ wednesday/",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<DiagnoseOptions>();
+        declare_flights(app, options->flights, true);
+        app.add_option(
+            "--against", options->against,
+            "Other flights (the healthy vehicle, the last release): their effects are held fixed, and the "
+            "ranking is the difference of each vehicle beyond their scatter; weakened rotors are reported");
+        app.add_flag("--each", options->each,
+                     "Also thrust ratio, drag and lag of each flight and day, with drifts and outliers");
+        app.add_flag(
+            "--next", options->next,
+            "Also list flights that would separate rivals, or show effects that these flights cannot");
+        add_output(app, "--report", options->report, "Write an HTML report into this folder");
+        declare_unit(app, options->flights);
+        return [options](const CommonOptions& common) { return run_diagnose(*options, common); };
+      }};
 }
 
 }  // namespace swarmcert::analysis

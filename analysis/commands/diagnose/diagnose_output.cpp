@@ -32,7 +32,7 @@ files::Json json_of(const identification::InstrumentedValue& value, double beyon
                                             : "agrees"}};
 }
 
-/// What flights cannot tell apart, and what these flights cannot.
+/// Effects that no flight can tell apart, followed by those that these flights cannot tell apart.
 std::string class_of(const Missing& missing) {
   std::string all = missing.equivalence_class;
   for (const identification::Rival& rival : missing.finding.rivals) all += " / " + rival.effect;
@@ -94,7 +94,7 @@ void print(const Missing& missing, int flights) {
   if (missing.equivalence_class != missing.effect)
     fmt::print("    flights cannot tell apart: {}\n", missing.equivalence_class);
   for (const identification::Rival& rival : finding.rivals)
-    fmt::print("    these flights cannot tell it from {}; what would: {}; {}\n", rival.effect,
+    fmt::print("    these flights cannot distinguish it from {}; flights that would: {}; {}\n", rival.effect,
                missing.excitation, rival.excitation);
 }
 
@@ -133,7 +133,8 @@ void print_diagnosis(const Diagnosis& diagnosis) {
       diagnosis.vehicle.empty() ? diagnosis.kind : diagnosis.vehicle, diagnosis.records, diagnosis.blocks);
   if (diagnosis.searched_blocks < diagnosis.blocks && diagnosis.too_poor.empty())
     fmt::print(
-        "  Names were looked for in {} of the blocks, spread over the flights; their numbers are of all.\n",
+        "  Effects were selected on {} of the blocks, spread over the flights; their numbers use all "
+        "blocks.\n",
         diagnosis.searched_blocks);
   if (!diagnosis.too_poor.empty()) {
     fmt::print("  No answer: {}.\n", diagnosis.too_poor);
@@ -141,18 +142,19 @@ void print_diagnosis(const Diagnosis& diagnosis) {
   }
   if (diagnosis.ranking.empty()) {
     fmt::print("  {}\n", diagnosis.remainder.flag
-                             ? "No effect of the library explains what is left."
+                             ? "No effect of the library explains the remainder."
                              : "No effect of the library is missing above the sizes below.");
   }
   for (const Missing& missing : diagnosis.ranking) print(missing, diagnosis.flights);
   for (const std::string& effect : diagnosis.contradicted) {
     fmt::print(
-        "  Not counted: {} fits, but not along the set points: the controller's answer to something else\n",
+        "  Not counted: {} fits, but not along the set points: it is the controller's response to something "
+        "else\n",
         effect);
   }
   for (const std::string& effect : diagnosis.suspected)
     fmt::print(
-        "  Not counted: {} fits, but explains little beside what is left, or set points do not confirm it\n",
+        "  Not counted: {} fits, but explains little of the remainder, or set points do not confirm it\n",
         effect);
   if (diagnosis.thrust_scale.is_known) {
     const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;

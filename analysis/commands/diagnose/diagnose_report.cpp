@@ -60,7 +60,7 @@ void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& 
   report.table({"effect", std::string("RMSE [") + unit.name + "]", "fall, 90 %", "values, 90 %",
                 "flights cannot tell apart", "these flights cannot tell it from", "what separates them"},
                rows);
-  // Kinds come from users: figures are numbered.
+  // Users choose the names of kinds, so figures are numbered.
   report.bars(name, bars, "fall of the error [%]",
               "How far each effect lowers the cross-validated error when it is added to those above it, with "
               "90 % intervals from resampled blocks.");
@@ -75,13 +75,12 @@ void add_left(Report& report, const Diagnosis& diagnosis, const residuals::Force
                   rest.depends_on.empty() ? "." : ". It depends on " + joined(rest.depends_on) + "."));
   if (!diagnosis.contradicted.empty()) {
     report.paragraph(
-        "Not counted, because set points contradict them (the controller's answer to something "
-        "else): " +
+        "Not counted, because set points contradict them (the controller's response to something else): " +
         joined(diagnosis.contradicted) + ".");
   }
   if (!diagnosis.suspected.empty()) {
-    report.paragraph("Not counted, because they explain little of what is left over: " +
-                     joined(diagnosis.suspected) + ".");
+    report.paragraph(
+        "Not counted, because they explain little of the remainder: " + joined(diagnosis.suspected) + ".");
   }
   if (diagnosis.thrust_scale.is_known) {
     const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;

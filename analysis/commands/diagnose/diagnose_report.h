@@ -12,12 +12,13 @@
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html with the ranking of every kind of vehicle as a plot and the JSON `result`; returns its
+/// Writes FOLDER/report.html with the ranking of every kind of vehicle as a plot and the JSON `result`. Returns its
 /// path.
-/// @param differences that the diagnoses are, in their order; empty where they are of all flights
-/// @param unit of the forces on the page
+/// @param differences the differences from which the diagnoses come, in the same order; empty for diagnoses of all
+///     flights
+/// @param unit unit of the forces on the page
 /// @param each the tables over flights, by kind; may be empty
-/// @param notes on clocks and labels, one sentence each
+/// @param notes one sentence per mislabelled log and per clock offset
 /// @throws as Report::write().
 std::string write_diagnose_report(const std::vector<identification::Diagnosis>& diagnoses,
                                   const std::vector<identification::Difference>& differences,
@@ -25,11 +26,12 @@ std::string write_diagnose_report(const std::vector<identification::Diagnosis>& 
                                   const std::vector<std::string>& notes, const residuals::ForceUnit& unit,
                                   const files::Json& result, const std::string& folder, bool overwrite);
 
-/// The ranking as a table and as bars. @param name of the figure
+/// Adds the ranking as a table and as bars.
+/// @param name name of the figure
 void add_ranking(Report& report, const identification::Diagnosis& diagnosis, const std::string& name,
                  const residuals::ForceUnit& unit);
 
-/// What is left after the effects that were found, what was not counted and why, and the detection limits.
+/// Adds what remains after the effects found, what was not counted and why, and the detection limits.
 void add_left(Report& report, const identification::Diagnosis& diagnosis, const residuals::ForceUnit& unit);
 
 }  // namespace swarmcert::analysis

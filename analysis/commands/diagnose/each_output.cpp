@@ -46,7 +46,7 @@ std::string cell(const FlightNumbers& numbers, const std::string& name) {
                      n.is_outlier ? " outlier" : "");
 }
 
-/// Those that some flight shows: logs without duties show no rotor.
+/// Parameters that at least one flight reveals; logs without duties reveal no rotor.
 std::vector<std::string> shown_numbers(const Each& each) {
   std::vector<std::string> shown;
   for (const std::string& name : identification::each_numbers()) {
@@ -71,7 +71,7 @@ std::string words(const Drift& drift) {
                      drift.interval.lower, drift.interval.upper, drift.flights);
 }
 
-/// `number` over the flights, one curve per vehicle; false where no flight shows it.
+/// Plots parameter `number` over the flights, one curve per vehicle. Returns false if no flight reveals it.
 bool add_plot(Report& report, const Each& each, const std::string& number, const std::string& name) {
   std::map<std::string, std::string> curves;
   int place = 0;
@@ -165,7 +165,7 @@ void add_each(Report& report, const Each& each, std::size_t number) {
   for (const EachDay& day : each.days) {
     if (day.flights > 1) add_row("mean of " + day.day, day.vehicle, day.numbers);
   }
-  report.paragraph("The same numbers of every flight; what all flights have in common besides is held:");
+  report.paragraph("The same parameters for every flight; the effects common to all flights are held fixed:");
   report.table(header, rows);
   std::size_t plots = 0;
   for (const std::string& name : identification::each_numbers()) {

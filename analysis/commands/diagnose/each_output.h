@@ -9,13 +9,14 @@
 
 namespace swarmcert::analysis {
 
-/// `each[]`, `each_days[]`, `each_drifts[]`. A number that a flight does not show is null.
+/// Adds `each[]`, `each_days[]`, `each_drifts[]`. A parameter that a flight does not reveal is null.
 void add_each(const std::vector<identification::Each>& kinds, files::Json& result);
 
-/// Lines for people: flights, then days of more than one flight, then drifts.
+/// Prints text lines: flights, then days with more than one flight, then drifts.
 void print_each(const identification::Each& each);
 
-/// A table, and a plot of every number over the flights. @param number of the kind, for the figures' names.
+/// Adds a table, and a plot of every parameter over the flights.
+/// @param number number of the kind, used in the names of figures.
 void add_each(Report& report, const identification::Each& each, std::size_t number);
 
 }  // namespace swarmcert::analysis

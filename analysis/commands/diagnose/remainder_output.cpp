@@ -22,7 +22,7 @@ constexpr std::size_t kShownCurves = 4;
 
 bool is_torque(const ScanEntry& entry) { return entry.quantity == "torque"; }
 
-/// The unit in which a page shows a quantity of that size.
+/// The unit in which a page shows a quantity of this magnitude.
 struct ShownUnit {
   std::string name;
   double per_si;
@@ -34,7 +34,7 @@ ShownUnit shown_unit(const ScanEntry& entry, const residuals::ForceUnit& force) 
   return entry.rmse_before < 1 ? ShownUnit{"mN m", 1e3} : ShownUnit{"N m", 1};
 }
 
-/// "m_s" as "m/s".
+/// Rewrites "m_s" as "m/s".
 std::string with_slash(std::string unit) {
   std::replace(unit.begin(), unit.end(), '_', '/');
   return unit;
@@ -61,7 +61,7 @@ files::Json curve_json(const ScanEntry& entry) {
   return points;
 }
 
-/// An entry of the scan of the force, or of the torques and rotors.
+/// An entry from the scan of the force, or of the torques and rotors.
 struct Listed {
   const ScanEntry* entry = nullptr;
   const identification::Formula* formula = nullptr;  ///< null: none
@@ -75,7 +75,7 @@ std::vector<Listed> listed(const identification::Scan& scan,
   return all;
 }
 
-/// So many of the force, and as many of torques and rotors.
+/// Counts the curves shown, separately for the force and for torques and rotors.
 struct Shown {
   std::size_t forces = 0, balances = 0;
   bool has_room(const ScanEntry& entry) {
@@ -84,8 +84,8 @@ struct Shown {
   }
 };
 
-/// Of both scans, each best first: the force before torques and rotors where its scan explains much, else by their
-/// shares.
+/// Merges both scans, each sorted best first. The force precedes torques and rotors if its scan explains much;
+/// otherwise entries are sorted by their share.
 std::vector<Listed> all_listed(const Diagnosis& diagnosis) {
   const std::vector<Listed> forces = listed(diagnosis.scan, diagnosis.formulas),
                             balances = listed(diagnosis.balance, diagnosis.balance_formulas);
@@ -129,7 +129,7 @@ std::string place_of(const ScanEntry& entry) {
   return text;
 }
 
-/// Of a curve's one axis, or of a map's two.
+/// Axis labels of a curve (one) or a map (two).
 std::pair<std::string, std::string> axis_labels(const ScanEntry& entry) {
   if (entry.variables.empty()) return {"neighbour to the side [m]", "neighbour above [m]"};
   const auto label = [](const std::string& name, ScanVariable variable) {
@@ -141,7 +141,7 @@ std::pair<std::string, std::string> axis_labels(const ScanEntry& entry) {
   return {named(entry.variables[0]), named(entry.variables[1])};
 }
 
-/// @param name of the figure.
+/// @param name name of the figure.
 void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
                const residuals::ForceUnit& force) {
   const auto [unit_name, per_unit] = shown_unit(entry, force);
@@ -163,7 +163,7 @@ void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
   const auto [along, across] = axis_labels(entry);
   std::string script = "set xlabel '" + along + "'\n";
   if (is_map) {
-    // White is no force.
+    // White means no force.
     script += fmt::format(
         "set ylabel '{}'\nset cblabel '{}'\nset palette @signed_colours\nset cbrange [{:.6g}:{:.6g}]\n"
         "plot '{}.dat' using 1:2:3 with points pointtype 5 pointsize 3 palette notitle\n",
@@ -171,10 +171,10 @@ void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
   } else {
     script += "set ylabel '" + shown + "'\nplot '" + name +
               ".dat' using 1:3:4 with filledcurves fillcolor rgb '#cccccc' title '90 %', '' using 1:2 with "
-              "linespoints linetype 1 title 'what is left'\n";
+              "linespoints linetype 1 title 'remainder'\n";
   }
   report.figure(name, data, script,
-                fmt::format("What is left: {}, {} axes; {:.0f} % of its mean square.", place_of(entry),
+                fmt::format("Remainder: {}, {} axes; {:.0f} % of its mean square.", place_of(entry),
                             entry.frame, 100 * entry.share));
 }
 
@@ -197,7 +197,7 @@ files::Json remainder_json(const Diagnosis& diagnosis) {
 void print_remainder(const Diagnosis& diagnosis) {
   const std::vector<Listed> entries = all_listed(diagnosis);
   if (entries.empty()) return;
-  fmt::print("  What is left varies with:\n");
+  fmt::print("  The remainder varies with:\n");
   Shown shown;
   for (const auto& [found, formula] : entries) {
     const ScanEntry& entry = *found;
@@ -218,7 +218,7 @@ void add_remainder(Report& report, const Diagnosis& diagnosis, std::size_t numbe
                    const residuals::ForceUnit& unit) {
   const std::vector<Listed> entries = all_listed(diagnosis);
   if (entries.empty()) {
-    report.paragraph("What is left varies with no variable of the scan.");
+    report.paragraph("The remainder varies with no variable of the scan.");
     return;
   }
   std::vector<std::vector<std::string>> rows;
@@ -234,8 +234,8 @@ void add_remainder(Report& report, const Diagnosis& diagnosis, std::size_t numbe
                                 per_unit * entry.rmse_after, unit_name),
                     set_points});
   }
-  report.paragraph("What is left varies with:");
-  report.table({"what", "share of what is left, 90 %", "RMSE", "set points"}, rows);
+  report.paragraph("The remainder varies with:");
+  report.table({"what", "share of the remainder, 90 %", "RMSE", "set points"}, rows);
   std::size_t figures = 0;
   Shown shown;
   for (const Listed& found : entries) {

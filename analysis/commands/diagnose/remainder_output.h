@@ -1,4 +1,4 @@
-/// @file What the remainder depends on, in the result, the text and the report of `diagnose`.
+/// @file The variables on which the remainder depends, in the result, the text and the report of `diagnose`.
 #pragma once
 
 #include <string>
@@ -10,13 +10,14 @@
 
 namespace swarmcert::analysis {
 
-/// `remainder[]` of one kind of vehicle, best first.
+/// Returns `remainder[]` for one kind of vehicle, best first.
 files::Json remainder_json(const identification::Diagnosis& diagnosis);
 
-/// The first few of them, a line each.
+/// Prints the first few entries, one line each.
 void print_remainder(const identification::Diagnosis& diagnosis);
 
-/// A table of them, with a figure for the first few. @param number of the kind, for the figures' names.
+/// Adds a table of the entries, with a figure for the first few.
+/// @param number number of the kind, used in the names of figures.
 void add_remainder(Report& report, const identification::Diagnosis& diagnosis, std::size_t number,
                    const residuals::ForceUnit& unit);
 

@@ -37,7 +37,7 @@ files::Json json_of(const RotorBalance& balance) {
           {"statement", identification::in_words(balance)}};
 }
 
-/// As an entry of the ranking: errors are those of the four loads, about what healthy flights have.
+/// Returns the ranking entry: its errors are those of the four rotor loads, relative to healthy flights.
 files::Json ranking_entry(const RotorBalance& balance, const std::string& kind) {
   Eigen::Vector4d left_N = balance.rise_N;
   left_N[balance.rotor - 1] = 0;

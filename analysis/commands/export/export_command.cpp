@@ -24,7 +24,7 @@ struct ExportOptions {
   firmware::ExportOptions source;
 };
 
-/// The content hash of the certificate in `path`, after a look whether it speaks of these weights as they are exported.
+/// Returns the content hash of the certificate in `path` after checking that it refers to the weights as exported.
 std::string certificate_of(const files::Network& network, const std::string& path, bool as_float32) {
   const auto refuse = [&](const std::string& field, const std::string& value, const std::string& what) {
     throw files::InputError({path, "", field, value, what, "certify the network that you export"});
@@ -53,11 +53,11 @@ std::string certificate_of(const files::Network& network, const std::string& pat
   if (rests_on_description && certificate["network"].value("description_sha256", "") != network.sha256)
     refuse("network.description_sha256", "",
            "is not the hash of " + network.path +
-               ", which states what phi sees, and where the network is silent");
+               ", which states the inputs of phi and the silent compositions");
   const bool certified_as_float32 = certificate["network"].value("as", files::Json()) == "float32";
   if (as_float32 && !certified_as_float32)
     refuse("network.as", "null",
-           "is about float64 weights, and float32 ones are exported: certify with --as float32");
+           "refers to float64 weights, but float32 weights are exported: certify with --as float32");
   return hash;
 }
 
@@ -98,8 +98,8 @@ int run_export(ExportOptions options, const CommonOptions& common) {
     fmt::print("compile swarmcert_network.cpp with -std=c++17 -O2 -ffp-contract=off -I{}\n", options.output);
     fmt::print("weights: {} bytes of flash", bytes);
     if (!fits)
-      fmt::print(", more than the {} of a Crazyflie, where this does not fit: {}",
-                 firmware::kCrazyflieFlash_bytes, firmware::kSmallerNetwork);
+      fmt::print(", which do not fit into the {} of a Crazyflie: {}", firmware::kCrazyflieFlash_bytes,
+                 firmware::kSmallerNetwork);
     fmt::print("\n");
   }
   return kDone;
@@ -119,7 +119,8 @@ Command export_command() {
         declare_network(app, options->network);
         add_output(app, "-o,--output", options->output, "Folder for the source")->required();
         declare_as(app, options->as);
-        app.add_option("--certificate", options->certificate, "Certificate whose hash goes into the source");
+        app.add_option("--certificate", options->certificate,
+                       "Certificate whose hash is written into the source");
         app.add_option("--most-neighbours", options->source.most_neighbours,
                        "Largest number of neighbours in one evaluation")
             ->check(CLI::Range(1, 64))

@@ -42,7 +42,7 @@ gate::GateSettings settings_of(const CommonOptions& common, Progress& progress) 
   return settings;
 }
 
-/// Appends, as GitHub asks for: several steps share the file.
+/// Appends to the summary, as GitHub requires, because several steps share the file.
 void append_summary(const std::string& markdown) {
   const char* const path = std::getenv("GITHUB_STEP_SUMMARY");
   if (path == nullptr || *path == '\0') return;
@@ -52,7 +52,7 @@ void append_summary(const std::string& markdown) {
   if (!file) throw files::InputError({path, "", "GITHUB_STEP_SUMMARY", "", "cannot be written", ""});
 }
 
-/// A table [hashes] of everything that the release rests on, to be pasted into the policy.
+/// Prints a table [hashes] of all files on which the release depends, to be pasted into the policy.
 void print_hashes(const gate::Policy& policy) {
   const std::filesystem::path folder = std::filesystem::absolute(policy.path).parent_path();
   fmt::print("[hashes]\n");
@@ -67,7 +67,7 @@ void print_hashes(const gate::Policy& policy) {
   }
 }
 
-/// Every check but `regression` passes: the release may become the next baseline.
+/// Whether every check except `regression` passes, so that the release may become the next baseline.
 bool may_become_baseline(const gate::GateResult& result) {
   for (const gate::Check& check : result.checks)
     if (check.name.rfind("regression", 0) != 0 && check.verdict != gate::Verdict::kPass) return false;
@@ -114,7 +114,8 @@ int run_gate(const GateOptions& options, const CommonOptions& common) {
     fmt::print("{}", to_github(result, allow));
     append_summary(to_markdown(result));
   }
-  // Before the baseline is replaced: a bundle holds the one that the release was held against.
+  // The bundle is written before the baseline is replaced: it contains the baseline against which the release was
+  // checked.
   if (!options.bundle.empty()) {
     const bool may = result.verdict() == gate::Verdict::kPass;
     const std::string sha256 = may ? write_bundle(options.bundle, policy, result, json, common.force) : "";
@@ -165,7 +166,7 @@ Command gate_command() {
       "gate", "Check a release against a policy: may it ship?",
       "POLICY.toml names the files of the release and has one table per check with its limits. Every check "
       "passes, fails\n"
-      "with a witness, or is inconclusive; checks that the policy does not ask for are listed. Exit code 0 "
+      "with a witness, or is inconclusive; checks that the policy does not request are listed. Exit code 0 "
       "if all pass, 3 for\n"
       "a file that is missing or damaged, else 1. Paths in a policy are relative to it.\n\n"
       "Example: swarmcert gate policy.toml --baseline baseline.json --junit gate.xml",

@@ -15,8 +15,8 @@ namespace {
 
 std::string cell(const std::optional<double>& x) { return x ? gate::number(x) : "-"; }
 
-/// What of its limit a check uses, in percent, so that more than 100 fails in either sense. NaN where a ratio says
-/// nothing.
+/// The share of its limit that a check uses, in percent, such that more than 100 fails whether the limit is an upper
+/// or a lower one. NaN if the ratio is meaningless.
 double used_percent(const gate::Check& check) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   if (!check.value || !check.limit || !(*check.value > 0) || !(*check.limit > 0)) return kNone;
@@ -36,7 +36,7 @@ void add_checks(Report& report, const gate::GateResult& result) {
   }
   if (!bars.empty())
     report.bars("limits", bars, "used of the limit [%]",
-                "What every check with a number uses of its limit: at 100 % the limit is reached.");
+                "Share of its limit that every check with a number uses: at 100 % the limit is reached.");
   report.heading("Checks");
   report.table({"check", "verdict", "value", "limit", "baseline", "unit", "policy line"}, rows);
   for (const gate::Check& check : result.checks) {

@@ -1,4 +1,4 @@
-/// @file A gate's result as a page: what of every limit is used, and what shows a failure.
+/// @file The gate's result as a page: how much of every limit is used, and the evidence of a failure.
 #pragma once
 
 #include <string>
@@ -10,7 +10,8 @@ namespace swarmcert::analysis {
 
 /// Writes FOLDER/report.html: verdict, bars of value over limit, the checks, the files with their SHA-256.
 /// @param json what --json writes
-/// @returns path of report.html. @throws files::InputError as Report::write() does.
+/// @returns the path of report.html.
+/// @throws files::InputError as Report::write().
 std::string write_gate_report(const gate::GateResult& result, const files::Json& json,
                               const std::string& folder, bool overwrite);
 

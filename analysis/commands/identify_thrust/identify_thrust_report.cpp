@@ -10,10 +10,10 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// More points would not show more.
+/// Additional points would not be visible.
 constexpr std::size_t kMostPoints = 2000;
 
-/// c00 + c10 p + c01 v + c20 p^2 + c11 p v, in gf; NaN where it was not determined.
+/// c00 + c10 p + c01 v + c20 p^2 + c11 p v, in gf; NaN if the fit is not determined.
 double fitted_gf(const PolynomialFit& fit, double p, double v) {
   if (!fit.determined) return std::nan("");
   double sum = 0;
@@ -70,7 +70,7 @@ std::string write_thrust_report(const ThrustData& data, const ThrustIdentificati
         "residual", points,
         "set xlabel 'p = PWM / 65536 [-]'\nset ylabel 'measured minus polynomial [gf]'\nset key off\n"
         "plot 'residual.dat' using 1:4 with points linetype 1 pointsize 0.4, 0 linecolor rgb 'black'\n",
-        "What the polynomial leaves of the measured thrust: a pattern is physics it does not have.");
+        "Residual of the polynomial: a pattern indicates physics that it lacks.");
   }
   add_polynomial(report, "Thrust from PWM and voltage", found.thrust);
   add_polynomial(report, "PWM from thrust and voltage", found.pwm);

@@ -10,7 +10,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// A member as people read it; nothing in it can reach the terminal unescaped.
+/// Formats a member for display; control characters are escaped before they reach the terminal.
 std::string cell(const files::Json& object, const char* key) {
   if (!object.is_object() || !object.contains(key) || object[key].is_null()) return "-";
   const files::Json& value = object[key];
@@ -51,7 +51,7 @@ files::Json inspect_network_certificate(const std::string& path, const files::Js
   return {{"file", path}, {"kind", "certificate"}, {"bounds", std::move(bounds)}};
 }
 
-/// The gains of one loop to one input, of a certificate that nobody has checked yet.
+/// The gains of one loop with respect to one input, from a certificate that has not been checked.
 files::Json gain_row(const files::Json& loop, const char* kind, const files::Json& input,
                      const files::Json& stated) {
   files::Json row = {{"loop", kind}, {"gains", files::Json::object()}};

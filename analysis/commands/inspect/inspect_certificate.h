@@ -1,4 +1,4 @@
-/// @file What a certificate states, as `inspect` shows it; nothing is checked.
+/// @file Statements of a certificate as shown by `inspect`; nothing is checked.
 #pragma once
 
 #include <string>
@@ -7,7 +7,8 @@
 
 namespace swarmcert::analysis {
 
-/// Of bounds of networks (kind "certificate") or of gains of position loops (kind "tracking_certificate").
+/// Describes a certificate of network bounds (kind "certificate") or of the gains of position loops (kind
+/// "tracking_certificate").
 /// @throws files::InputError for any other JSON.
 files::Json inspect_certificate(const std::string& path, bool print);
 

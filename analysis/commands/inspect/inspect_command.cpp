@@ -34,14 +34,14 @@ namespace {
 
 struct InspectOptions {
   std::vector<std::string> files;
-  files::NetworkArguments network;  ///< key, activation and order, of every weight file
+  files::NetworkArguments network;  ///< key, activation and order of every weight file
   std::string csv;
   std::string columns, columns_draft, report;
   double t0_s = -std::numeric_limits<double>::infinity();
   double t1_s = std::numeric_limits<double>::infinity();
 };
 
-/// What follows layer `k`: the activation, after the last one nothing.
+/// The operation after layer `k`: the activation; nothing after the last layer.
 std::string activation_after(const files::Weights& weights, std::size_t k) {
   return k + 1 < weights.layers.size() ? files::op_after(weights.layers[k]) : "";
 }
@@ -71,7 +71,7 @@ bool is_json(const std::string& path) {
   return first != std::string::npos && text[first] == '{';
 }
 
-/// What network.toml says beyond its weights, null where it says nothing.
+/// The statements of network.toml other than its weights; null where it states nothing.
 files::Json description(const files::Network& network) {
   using Gamma = files::GammaStatement;
   files::Json gamma, clamp;
@@ -171,17 +171,17 @@ files::Json inspect_model(const std::string& path, bool print) {
           {"effects", std::move(effects)}};
 }
 
-/// What the table of folders and the page need, log by log.
+/// Data for the table of folders and the page, one element per log.
 struct Seen {
   std::vector<LogOutcome> outcomes;
   std::vector<InspectedLog> logs;  ///< empty without --report
 };
 
-/// A file that may be a log: what was read of it, or why it cannot be read.
+/// A file that may be a log: its contents, or the reason why it cannot be read.
 struct LogRead {
-  bool is_log = false;  ///< else nothing but `error` says anything
+  bool is_log = false;  ///< if false, only `error` is set
   logs::Log log;
-  files::Json json;  ///< what `inspect` says of it
+  files::Json json;  ///< its description in the result
   LogOutcome outcome;
   std::exception_ptr error;
 };
@@ -204,13 +204,13 @@ LogRead log_read(const std::string& path, const InspectOptions& options) {
   return read;
 }
 
-/// The logs among `paths` in their order; as many are read at once, and held, as there are threads.
+/// Returns the logs among `paths` in their order. Reads and holds up to one log per thread ahead.
 class LogsInOrder {
  public:
   LogsInOrder(const std::vector<std::string>& paths, const InspectOptions& options, int jobs)
       : paths_(paths), options_(options), jobs_(jobs) {}
 
-  /// Of paths[index], each asked for once and in order.
+  /// Returns the log at paths[index]; each must be requested once and in order.
   LogRead next(std::size_t index) {
     if (index >= first_ + ahead_.size()) {
       first_ = index;
@@ -267,7 +267,7 @@ files::Json inspect_other(const std::string& path, const InspectOptions& options
   }
 }
 
-/// Files as they are, folders as the logs below them, with what was taken as one flight and why.
+/// Returns files unchanged and folders as the logs below them, and reports which logs were taken as one flight and why.
 std::vector<std::string> expanded(const std::vector<std::string>& words, files::Json& flights,
                                   files::Json& skipped) {
   std::vector<std::string> paths;
@@ -303,7 +303,7 @@ void print_grouping(const files::Json& flights, const files::Json& skipped) {
   if (!skipped.empty()) fmt::print("Skipped, no flight logs: {}\n", counted(skipped.size(), "file"));
 }
 
-/// Where names alone say too little, the log is inspected as the draft describes it.
+/// Where column names alone are not enough, the log is inspected as described by the draft.
 void write_draft(InspectOptions& options, const CommonOptions& common) {
   if (options.files.size() != 1) throw UsageError("--columns-draft takes one CSV");
   refuse_to_replace(common, options.columns_draft);
@@ -387,15 +387,15 @@ Command inspect_command() {
         add_output(app, "--csv", options->csv, "Write the one flight log as CSV in the authors' layout");
         app.add_option("--t0", options->t0_s, "CSV from this time of the log's clock, in seconds");
         app.add_option("--t1", options->t1_s, "CSV to before this time, in seconds");
-        app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");
+        app.add_option("--columns", options->columns, "columns.toml: meaning of the columns of CSV logs");
         add_output(
             app, "--report", options->report,
             "Write an HTML page on the flight logs into this folder: phases, events, gaps, signals, what "
             "can be judged, and what to log next time");
         add_output(app, "--columns-draft", options->columns_draft,
                    "Write a columns.toml for the one CSV: meaning, unit and frame of its columns, with the "
-                   "evidence; what names do not say is guessed from the values and marked, and what is left "
-                   "is listed to be filled in");
+                   "evidence. Properties not evident from names are guessed from the values and marked; the "
+                   "rest is listed to be filled in");
         app.add_option("--key", options->network.key,
                        "Key of the state dict inside a nested checkpoint, e.g. model");
         declare_activation(app, options->network);

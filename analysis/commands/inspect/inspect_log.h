@@ -1,4 +1,4 @@
-/// @file What `inspect` says of a flight log.
+/// @file Output of `inspect` for a flight log.
 #pragma once
 
 #include <string>
@@ -9,16 +9,19 @@
 
 namespace swarmcert::analysis {
 
-/// Members format, signals[], judged, missing[], phases[], events[] and what else is known of the log.
+/// Returns the members format, signals[], judged, missing[], phases[], events[] and everything else known about the
+/// log.
 files::Json describe_log(const logs::Log& log);
 
-/// Of a log that was opened. @param described by describe_log().
+/// Returns the outcome for a log that could be opened.
+/// @param described result of describe_log().
 LogOutcome outcome_of(const std::string& path, const logs::Log& log, const files::Json& described);
 
-/// The same as text on stdout.
+/// Prints the same as text to standard output.
 void print_log(const logs::Log& log);
 
-/// One line of a table of logs: records, time in the air, axes that can be judged, and what speaks against a flight.
+/// Prints one line of a table of logs: records, time in the air, axes that can be judged, and reasons why it may not
+/// be a flight.
 void print_log_row(const std::string& path, const files::Json& described);
 
 }  // namespace swarmcert::analysis

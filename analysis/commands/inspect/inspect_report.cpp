@@ -33,7 +33,7 @@ std::string words_of(const Json& list) {
   return words.empty() ? "none" : words;
 }
 
-/// The common parent folder of all logs, with a trailing slash; empty for a single log, or where they share none.
+/// The common parent folder of all logs, with a trailing slash; empty for a single log or if there is none.
 std::string common_folder(const std::vector<InspectedLog>& logs) {
   if (logs.size() < 2) return "";
   std::string common = logs[0].path;
@@ -44,7 +44,7 @@ std::string common_folder(const std::vector<InspectedLog>& logs) {
   return common.substr(0, common.rfind('/') == std::string::npos ? 0 : common.rfind('/') + 1);
 }
 
-/// `path` within `folder`; of the folder itself its last name. Long paths would fill narrow screens.
+/// Returns `path` relative to `folder`; for the folder itself its last component. Long paths would fill narrow screens.
 std::string within(const std::string& folder, const std::string& path) {
   if (folder.empty()) return path;
   if (path.compare(0, folder.size(), folder) == 0) return path.substr(folder.size());
@@ -130,7 +130,7 @@ void add_curve(Report& report, const InspectedLog& log, std::size_t number) {
           file + " using 1:2 with lines title 'height', " + file +
           " using 1:3 axes x1y2 with lines title 'thrust', " + file +
           " using 1:($4 > 0 ? 0.02 : NaN) axes x1y2 with lines lw 4 title 'in the air'\n",
-      "Height, thrust over what is common in the log, and when the vehicle was in the air.", 300);
+      "Height, thrust over its 75 % quantile in the log, and the times in the air.", 300);
 }
 
 }  // namespace

@@ -51,13 +51,14 @@ std::map<std::string, KindSummary> by_kind(const IssCheck& check) {
   return kinds;
 }
 
-/// Of the ball where that is exceeded, or nothing is and the run started at rest; else of the transient bound.
+/// Whether the shown ratio refers to the ball: if the ball is exceeded, or if nothing is violated and the run started
+/// at rest. Otherwise it refers to the transient bound.
 bool is_about_ball(const IssRun& run) { return run.ratio > 1 || (run.ratio > 0 && !run.is_violation); }
 
 double shown_ratio(const IssRun& run) { return is_about_ball(run) ? run.ratio : run.transient_ratio; }
 
-/// The run that shows most: a violation of the ball if there is one, else one of the transient bound, else the largest
-/// ratio.
+/// The most significant run: a violation of the ball if there is one, else of the transient bound, else the run with
+/// the largest ratio.
 const IssRun* witness(const IssCheck& check) {
   const IssRun* best = nullptr;
   for (const IssRun& run : check.runs) {
@@ -146,7 +147,7 @@ Json result_json(const IssCheckOptions& options, const IssCheck& check,
   return result;
 }
 
-/// What was not judged of the runs of a kind.
+/// What was not judged in the runs of a kind.
 std::string unjudged_text(const KindSummary& kind) {
   std::string text;
   if (kind.left > 0) text += fmt::format("  {} left a hypothesis", kind.left);
@@ -168,7 +169,7 @@ void print_verdict(const IssCheckOptions& options, const IssCheck& check) {
   } else {
     fmt::print("No violation found in {}{}.{}\n", counted(options.check.runs, "run"),
                check.cancelled ? ", which were interrupted" : "",
-               check.why_inconclusive().empty() ? " That is no proof." : "");
+               check.why_inconclusive().empty() ? " This is not a proof." : "");
   }
   const std::vector<std::string> why = check.why_inconclusive();
   if (!why.empty()) fmt::print("Inconclusive: {}\n", fmt::join(why, "; "));
@@ -182,9 +183,10 @@ void print(const IssCheckOptions& options, const IssCheck& check,
     fmt::print("The theorem does not apply:\n");
     for (const std::string& why : check.why_not) fmt::print("  - {}\n", why);
   }
-  fmt::print("Ball {:.6g} m for a learning error that changes by at most {:.4g} N/s{}\n", check.ball_m,
-             check.rate_N_s,
-             check.has_ball ? "" : " (these gains lack the theorem's form: what one might take for it)");
+  fmt::print(
+      "Ball {:.6g} m for a learning error that changes by at most {:.4g} N/s{}\n", check.ball_m,
+      check.rate_N_s,
+      check.has_ball ? "" : " (these gains do not have the theorem's form; this is the analogous number)");
   fmt::print(
       "Integrated with SUNDIALS (Dormand-Prince 5(4), 1e-9), {:.3g} s each; ratios are |error| over the "
       "ball, from rest\n",

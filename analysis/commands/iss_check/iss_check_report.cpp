@@ -18,12 +18,12 @@ std::string write_iss_check_report(const stability::IssCheck& check, const files
   report.paragraph(check.theorem_applies ? "The theorem's hypotheses hold for these gains."
                                          : "The theorem does not apply:");
   for (const std::string& why : check.why_not) report.paragraph(why + ".");
-  report.paragraph(
-      fmt::format("Ball: {:.6g} m for a learning error that changes by at most {:.4g} N/s{}. {} of {} runs "
-                  "violate it{}. No violation is no proof.",
-                  check.ball_m, check.rate_N_s,
-                  check.has_ball ? "" : " (these gains lack the theorem's form: what one might take for it)",
-                  check.violations, check.runs.size(), check.cancelled ? "; the check was interrupted" : ""));
+  report.paragraph(fmt::format(
+      "Ball: {:.6g} m for a learning error that changes by at most {:.4g} N/s{}. {} of {} runs "
+      "violate it{}. The absence of a violation is not a proof.",
+      check.ball_m, check.rate_N_s,
+      check.has_ball ? "" : " (these gains do not have the theorem's form; this is the analogous number)",
+      check.violations, check.runs.size(), check.cancelled ? "; the check was interrupted" : ""));
   for (const std::string& why : check.why_inconclusive()) report.paragraph("Inconclusive: " + why + ".");
   struct Kind {
     int row = 0, runs = 0, violations = 0;

@@ -1,4 +1,4 @@
-/// @file The report of `iss-check`: how near the runs came to the ball.
+/// @file The report of `iss-check`: how close the runs came to the ball.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html with every run's ratio and the JSON `result`; returns its path.
+/// Writes FOLDER/report.html with the ratio of every run and the JSON `result`. Returns its path.
 /// @throws files::InputError as Report::write().
 std::string write_iss_check_report(const stability::IssCheck& check, const files::Json& result,
                                    const std::string& folder, bool overwrite);

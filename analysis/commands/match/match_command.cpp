@@ -20,7 +20,7 @@ struct MatchOptions {
   int most_neighbours = firmware::ExportOptions().most_neighbours;
 };
 
-/// Keys of a changed number and of a changed file; null where the difference is neither of the kind.
+/// Members for a changed number and a changed file; null if the difference is neither.
 files::Json first_difference_of(const firmware::ArtefactMatch& match) {
   if (!match.first_difference) return {};
   files::Json json = {{"what", *match.first_difference}};
@@ -72,7 +72,7 @@ void print(const firmware::ArtefactMatch& match, const std::string& file) {
                match.arrays);
   } else {
     fmt::print(
-        "inconclusive: {} holds all {} weights and biases, bit for bit, and not all of it was checked\n",
+        "inconclusive: {} holds all {} weights and biases, bit for bit, but not everything was checked\n",
         file, match.numbers);
   }
   for (const std::string& what : match.compared) fmt::print("  compared: {}\n", what);
@@ -141,8 +141,7 @@ Command match_command() {
             auto* rho = app.add_option("--rho", options->network.rho, "Weight file of rho, instead of NET");
             phi->needs(rho);
             rho->needs(phi);
-            app.add_option("--key", options->network.key,
-                           "Where the state dict lies inside a nested checkpoint");
+            app.add_option("--key", options->network.key, "Key of the state dict inside a nested checkpoint");
             declare_order(app, options->network);
             declare_as(app, options->as);
             app.add_option("--certificate", options->certificate,

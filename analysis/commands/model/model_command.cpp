@@ -84,12 +84,12 @@ Command model_command() {
             const auto options = std::make_shared<ModelOptions>();
             app.add_option("draft FLIGHTS...", options->words, "draft, then flight logs or folders of them")
                 ->required();
-            app.add_option("--mass", options->mass_kg, "Mass of the vehicle in kg, where it is known");
+            app.add_option("--mass", options->mass_kg, "Mass of the vehicle in kg, if known");
             app.add_option("--base", options->base,
                            "model.toml whose thrust map and shape are assumed (default: crazyflie-small)");
             app.add_option("--flights", options->fleet, "flights.toml: masses of single logs");
             app.add_flag("--keep", options->keep, "Use damaged and implausible logs as well");
-            app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");
+            app.add_option("--columns", options->columns, "columns.toml: meaning of the columns of CSV logs");
             add_output(app, "-o,--output", options->output, "The new model.toml")->required();
             return [options](const CommonOptions& common) { return run_model(*options, common); };
           }};

@@ -99,7 +99,7 @@ int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
   std::string part;
   double share = 0;
   setting.progress = [&](int done, int total, const std::string& what) {
-    // A new part of the work, a new line: another word, or the same one from the beginning.
+    // A new stage starts a new line: its text differs, or its progress starts over.
     const std::string begins = what.substr(0, what.find(','));
     const double now = static_cast<double>(done) / std::max(total, 1);
     if (!progress || begins != part || now < share) progress = std::make_unique<Progress>(common.quiet);
@@ -169,8 +169,8 @@ Command reproduce_command() {
         app.add_option("--calibrate", options->setting.calibrate,
                        "gains-in-flight: folder with logs/logNN[_k] and info/infoNN.yaml to calibrate on");
         app.add_option("--flights", options->setting.flights,
-                       "gains-in-flight: such a folder to report on; the same one again judges each gain set "
-                       "by the others");
+                       "gains-in-flight: such a folder to report on; naming the same folder again judges "
+                       "each gain set by the others");
         app.add_option("--coverage", options->setting.coverage,
                        "gains-in-flight: probability with which a flight stays below its bound")
             ->check(CLI::Range(0.5, 0.99))

@@ -15,13 +15,13 @@ namespace {
 using identification::EffectCurve;
 using identification::RoomMap;
 
-/// Lengths of the map's axes.
+/// Lengths of the axes of the map.
 struct MapSize {
   double x, y;
 };
 
-/// gnuplot commands for two maps of NAME.dat on one colour scale, columns 3 (before) and 4 (after). On narrow screens
-/// they stand above each other, on a drawing of twice the height.
+/// gnuplot commands for two maps of NAME.dat with a common colour scale, columns 3 (before) and 4 (after). On narrow
+/// screens the maps are stacked, in a drawing of twice the height.
 std::string two_maps(const std::string& name, const std::string& x, const std::string& y, const MapSize& size,
                      const residuals::ForceUnit& unit) {
   const std::string file = "'" + name + ".dat'";
@@ -58,11 +58,12 @@ void add_room(Report& report, const RoomMap& map, const residuals::ForceUnit& un
     }
     data += "\n";
   }
-  report.figure("room", data,
-                two_maps("room", "x [m]", "y [m]",
-                         {RoomMap::kCells * map.step_m[0], RoomMap::kCells * map.step_m[1]}, unit),
-                "Mean vertical residual over the place in the room, before and after, on one colour scale; "
-                "cells of fewer than 20 records are empty.");
+  report.figure(
+      "room", data,
+      two_maps("room", "x [m]", "y [m]", {RoomMap::kCells * map.step_m[0], RoomMap::kCells * map.step_m[1]},
+               unit),
+      "Mean vertical residual over the position in the room, before and after, with a common colour scale; "
+      "cells of fewer than 20 records are empty.");
 }
 
 void add_neighbours(Report& report, const residuals::NeighbourMap& before,
@@ -86,15 +87,14 @@ void add_neighbours(Report& report, const residuals::NeighbourMap& before,
     data += "\n";
   }
   if (!any) return;
-  report.figure(
-      "neighbours", data,
-      two_maps("neighbours", "lateral distance [m]", "height of the neighbour above [m]",
-               {Map::kLateral * Map::kLateralStep_m, Map::kHeights * Map::kHeightStep_m}, unit),
-      "Mean vertical residual over the place of the laterally nearest neighbour, before and after, on "
-      "one colour scale.");
+  report.figure("neighbours", data,
+                two_maps("neighbours", "lateral distance [m]", "height of the neighbour above [m]",
+                         {Map::kLateral * Map::kLateralStep_m, Map::kHeights * Map::kHeightStep_m}, unit),
+                "Mean vertical residual over the position of the laterally nearest neighbour, before and "
+                "after, with a common colour scale.");
 }
 
-/// The residual's mean over the ranges of one variable, before and after.
+/// Plots the mean of the residual over the ranges of one variable, before and after.
 void add_variable(Report& report, const residuals::Comparison& before, const residuals::Comparison& after,
                   int variable, const residuals::ForceUnit& unit) {
   const auto mean_of = [&](const residuals::Comparison& comparison,
@@ -160,8 +160,8 @@ void add_effect_curves(Report& report, const std::vector<EffectCurve>& effects,
             plot_string(fmt::format("measured without it [{}]", unit.name)), name,
             2 * tick_step(most - least)),
         "Effect " + curve.effect +
-            ": what was measured where the model has every effect but this one, over what this one "
-            "predicts. Points on the line confirm the fit.");
+            ": the residual of the model with every effect but this one, over the prediction of this effect. "
+            "Points on the line confirm the fit.");
   }
 }
 

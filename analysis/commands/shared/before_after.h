@@ -1,4 +1,4 @@
-/// @file What adding effects to a model changed: maps, curves and worst moments before and after, for reports.
+/// @file The effect of adding effects to a model, for reports: maps, curves and worst moments before and after.
 #pragma once
 
 #include <string>
@@ -11,17 +11,17 @@
 
 namespace swarmcert::analysis {
 
-/// Vertical residuals over neighbours and over the room, each pair of maps on one colour scale, and over single
-/// variables. At most once per report.
+/// Adds the vertical residuals over neighbour positions and over the room, each pair of maps with a common colour
+/// scale, and over single variables. At most once per report.
 void add_before_and_after(Report& report, const residuals::Comparison& before,
                           const residuals::Comparison& after, const identification::RoomMap& room,
                           const residuals::ForceUnit& unit);
 
-/// What was measured of each effect, with the fitted formula as a line over it. At most once per report.
+/// Adds the measurements of each effect with the fitted formula as a line. At most once per report.
 void add_effect_curves(Report& report, const std::vector<identification::EffectCurve>& effects,
                        const residuals::ForceUnit& unit);
 
-/// A table of the largest residuals under both models.
+/// Adds a table of the largest residuals under both models.
 void add_worst_moments(Report& report, const residuals::Comparison& before,
                        const residuals::Comparison& after, const residuals::ForceUnit& unit);
 

@@ -1,4 +1,4 @@
-/// @file Offsets of clocks as JSON and as text.
+/// @file Clock offsets as JSON and as text.
 #pragma once
 
 #include <string>
@@ -9,15 +9,15 @@
 
 namespace swarmcert::analysis {
 
-/// To the end of `ranking` as clock_offset, which makes the verdict missing_effect; what stands before was judged with
-/// the clocks corrected. Prints them where `prints`.
+/// Appends the offsets to `ranking` as clock_offset, which makes the verdict missing_effect; all earlier entries were
+/// judged with the clocks corrected. Prints the offsets if `prints`.
 /// @return whether there are any.
 bool judge_clocks(const std::vector<identification::ClockOffset>& offsets, bool prints, files::Json& result);
 
-/// "clock_offsets" of add: the same for results without a ranking. Prints them where `prints`.
+/// Adds "clock_offsets" of add: the same for results without a ranking. Prints the offsets if `prints`.
 void add_clocks(const std::vector<identification::ClockOffset>& offsets, bool prints, files::Json& result);
 
-/// "The clock of cf2_00 is ...; all else was judged with it corrected."
+/// Returns "The clock of cf2_00 is ...; all else was judged with it corrected."
 std::string sentence(const identification::ClockOffset& offset);
 
 }  // namespace swarmcert::analysis

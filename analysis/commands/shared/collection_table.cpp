@@ -21,7 +21,7 @@ void add(CollectionRow& row, const LogOutcome& log) {
   if (!log.left_out_why.empty()) ++row.left_out[log.left_out_why];
 }
 
-/// The first folder below `folder` on the way to `path`; empty where the log lies in `folder` itself, or elsewhere.
+/// The first folder below `folder` on the way to `path`; empty if the log is in `folder` itself or outside it.
 std::string folder_below(const std::string& folder, const std::string& path) {
   const fs::path way = fs::path(path).lexically_relative(folder);
   const auto parts = std::distance(way.begin(), way.end());

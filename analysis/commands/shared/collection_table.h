@@ -1,4 +1,4 @@
-/// @file Which part of a collection of logs can be judged: one line for each folder.
+/// @file Table of the parts of a log collection that can be judged, one line per folder.
 #pragma once
 
 #include <map>
@@ -9,15 +9,15 @@
 
 namespace swarmcert::analysis {
 
-/// What became of one log.
+/// The outcome for one log.
 struct LogOutcome {
   std::string path;
   bool opened = false;
   bool force[3] = {};        ///< judged along x, y, z of the world
   bool torque = false;       ///< at least its mean in slow flight
-  double seconds = 0;        ///< of flight: in the air or, where a model was compared, used
-  double run_s = 0;          ///< that the program took to read and judge it; 0: not measured
-  std::string left_out_why;  ///< empty where at least one axis is judged
+  double seconds = 0;        ///< flight time: in the air, or the time used if a model was compared
+  double run_s = 0;          ///< run time of reading and judging the log; 0: not measured
+  std::string left_out_why;  ///< empty if at least one axis is judged
 };
 
 /// Sums over the logs of one folder.
@@ -28,15 +28,16 @@ struct CollectionRow {
   std::map<std::string, std::size_t> left_out;  ///< by reason
 };
 
-/// One row for each folder among `words` that a user named or, where its logs lie in several folders right below it,
-/// for each of those; a row for all where there are several. Empty where no folder was named.
+/// Returns one row per folder that the user named in `words`, or one row per subfolder if the logs of a named folder
+/// are in several of its direct subfolders; plus a row of totals if there are several rows. Empty if no folder was
+/// named.
 std::vector<CollectionRow> collection_rows(const std::vector<std::string>& words,
                                            const std::vector<LogOutcome>& logs);
 
-/// Without run_s: a result depends on its inputs alone.
+/// Without run_s, because a result depends on its inputs only.
 files::Json json_of(const std::vector<CollectionRow>& rows);
 
-/// On stdout: flight seconds, with what `seconds` counts, and the run time where it was measured.
+/// Prints the table to standard output: flight seconds, labelled by `seconds`, and the run time if it was measured.
 void print_collections(const std::vector<CollectionRow>& rows, const std::string& seconds);
 
 }  // namespace swarmcert::analysis

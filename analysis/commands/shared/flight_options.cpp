@@ -21,10 +21,9 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
   }
   app.add_option("--flights", options.fleet,
                  "flights.toml: vehicles with their models (default: the published ones)");
-  app.add_flag(
-      "--keep", options.keep,
-      "Take logs that are damaged or implausible, which are otherwise named and left out: implausible ones "
-      "everywhere, damaged ones where something is fitted");
+  app.add_flag("--keep", options.keep,
+               "Use damaged or implausible logs. By default these are reported and left out: implausible "
+               "logs always, damaged logs if something is fitted");
   app.add_option("--columns", options.columns,
                  "columns.toml: meaning of the columns of CSV logs; per signal column, unit and frame, as in "
                  "position_x = { column = \"px\", unit = \"mm\" }: time, position_x .. z, velocity_x .. z, "
@@ -83,7 +82,7 @@ residuals::ForceUnit page_unit(const FlightOptions& options, const residuals::In
   }
   if (options.unit.empty()) return residuals::force_unit(inputs);
   if (is_acceleration && inputs.models.size() > 1)
-    throw UsageError("--unit m_s2: the kinds of vehicles differ in mass; take N or gf, or one kind");
+    throw UsageError("--unit m_s2: the kinds of vehicles differ in mass; use N or gf, or a single kind");
   return residuals::chosen_force_unit(options.unit, inputs.models[0]);
 }
 

@@ -19,7 +19,7 @@ files::Network load_flown_net(const files::NetworkArguments& arguments, const st
     if (as != "float32") {
       throw files::InputError({weights->path, "", part.name(), "float64",
                                "flight code is float32: rounding changes the function",
-                               "say --as float32, here and to certify"});
+                               "use --as float32, here and in certify"});
     }
     is_rounded = true;
   }

@@ -1,4 +1,4 @@
-/// @file NET as flight code holds it: in float32.
+/// @file NET as stored by flight code, in float32.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@ namespace swarmcert::analysis {
 /// Declares --as.
 void declare_as(CLI::App& app, std::string& as);
 
-/// Loads NET. Weights in float64 are rounded where `as` is "float32"; `is_rounded` tells whether any were.
-/// @throws files::InputError for float64 weights otherwise: rounding changes the function.
+/// Loads NET. Rounds float64 weights if `as` is "float32"; `is_rounded` tells whether any were rounded.
+/// @throws files::InputError for float64 weights otherwise, since rounding changes the function.
 files::Network load_flown_net(const files::NetworkArguments& arguments, const std::string& as,
                               bool& is_rounded);
 

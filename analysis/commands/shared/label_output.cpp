@@ -15,7 +15,7 @@ files::Json parameters_of(const Mislabelled& label) {
           {fmt::format("misfit_as_labelled_{}", unit), {{"value", label.before}}}};
 }
 
-/// In newton; null where no force is compared.
+/// Force error in newton; null if no force is compared.
 files::Json force_of(const Mislabelled& label, double misfit) {
   if (label.what == Mislabelled::What::kSetPoints || !(label.mass_kg > 0)) return nullptr;
   return label.mass_kg * misfit;

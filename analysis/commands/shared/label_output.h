@@ -1,4 +1,4 @@
-/// @file What is mislabelled, as JSON and as text.
+/// @file Mislabelled logs as JSON and as text.
 #pragma once
 
 #include <string>
@@ -9,14 +9,14 @@
 
 namespace swarmcert::analysis {
 
-/// To the end of `ranking` as mislabelled, which makes the verdict missing_effect. Prints them where `prints`.
+/// Appends the labels to `ranking` as mislabelled, which makes the verdict missing_effect. Prints them if `prints`.
 /// @return whether there are any.
 bool judge_labels(const std::vector<identification::Mislabelled>& labels, bool prints, files::Json& result);
 
-/// "mislabelled" of add, whose result has no ranking. Prints them where `prints`.
+/// Adds "mislabelled" of add, whose result has no ranking. Prints the labels if `prints`.
 void add_labels(const std::vector<identification::Mislabelled>& labels, bool prints, files::Json& result);
 
-/// "Cf51 of swap/00 flew ..., all else was judged with the logs as they are: correct them first."
+/// Returns "Cf51 of swap/00 flew ..., all else was judged with the logs as they are: correct them first."
 std::string sentence(const identification::Mislabelled& label);
 
 }  // namespace swarmcert::analysis

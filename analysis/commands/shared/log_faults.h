@@ -1,4 +1,4 @@
-/// @file Faults of a log itself, clocks and labels, at the end of a ranking.
+/// @file Faults of a log itself, such as clocks and labels, at the end of a ranking.
 #pragma once
 
 #include <vector>
@@ -7,10 +7,11 @@
 
 namespace swarmcert::analysis {
 
-/// An entry with its own fields and what all of these have: each is of one vehicle, and of no form of a model.
+/// Returns an entry with its own fields plus those common to all faults: each belongs to one vehicle and has no model
+/// form.
 files::Json fault_entry(files::Json own);
 
-/// To the end of `ranking`. Any makes the verdict missing_effect, unless it is inconclusive.
+/// Appends the entries to `ranking`. Any entry makes the verdict missing_effect, unless the verdict is inconclusive.
 /// @return whether there are any.
 bool rank_faults(const std::vector<files::Json>& entries, files::Json& result);
 

@@ -1,4 +1,4 @@
-/// @file Outputs whose folder is not there, before work that would be lost.
+/// @file Rejects output paths whose folder does not exist, before work that would be lost.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 namespace swarmcert::analysis {
 
-/// @throws files::InputError if `path` names a file in a folder that does not exist. "" and "-" are no files.
+/// @throws files::InputError if `path` names a file in a folder that does not exist. "" and "-" name no file.
 inline void refuse_missing_folder(const std::string& path) {
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   std::error_code ignored;

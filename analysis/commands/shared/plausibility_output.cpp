@@ -8,7 +8,7 @@ namespace swarmcert::analysis {
 
 namespace {
 
-/// WHAT of "PATH: WHAT: ..."; empty where a line has another form, which then has no kind.
+/// WHAT of "PATH: WHAT: ..."; empty for lines of any other form, which have no kind.
 std::string kind_of(const std::string& line) {
   const std::size_t path_end = line.find(": ");
   if (path_end == std::string::npos) return "";

@@ -1,4 +1,4 @@
-/// @file Doubts about a log's numbers in results.
+/// @file Implausible values of a log in results.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace swarmcert::analysis {
 
-/// [{signal, value, words, refused}]; empty where nothing is implausible.
+/// Returns [{signal, value, words, refused}]; empty if nothing is implausible.
 files::Json json_of(const std::vector<logs::Doubt>& doubts);
 
-/// Lines "PATH: WHAT: ..." of many logs for a reader: of those that say the same WHAT the first three in their order,
-/// and then how many more there are. The JSON holds all of them.
+/// Shortens lines "PATH: WHAT: ..." of many logs for display: of the lines with the same WHAT it keeps the first
+/// three in their order and adds how many more there are. The JSON result contains all of them.
 std::vector<std::string> few_of_each(const std::vector<std::string>& lines);
 
 }  // namespace swarmcert::analysis

@@ -1,4 +1,4 @@
-/// @file The option --shard of commands whose work can be cut into parts.
+/// @file The option --shard of commands whose work can be split.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace swarmcert::analysis {
 
-/// @throws UsageError if `text` is not I/N with 0 <= I <= N: see files::shard_of().
+/// @throws UsageError if `text` is not I/N with 0 <= I <= N; see files::shard_of().
 inline files::Shard parse_shard(const std::string& text) {
   if (const auto shard = files::shard_of(text)) return *shard;
   throw UsageError("--shard " + text + ": write I/N with 0 <= I <= N, e.g. 2/8");

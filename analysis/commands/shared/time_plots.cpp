@@ -34,7 +34,7 @@ std::vector<const residuals::TrackErrors*> tracks_to_show(const residuals::Compa
   return chosen;
 }
 
-/// Vertical residual by time of the same log in another comparison.
+/// The vertical residual by time of the same log in another comparison.
 std::map<float, float> vertical_by_time(const residuals::Comparison* comparison,
                                         const residuals::TrackErrors& track) {
   std::map<float, float> vertical;

@@ -1,4 +1,4 @@
-/// @file What the commands on tracking error share: gains and model.
+/// @file Options shared by the commands on tracking error: gains and model.
 #pragma once
 
 #include <string>
@@ -18,8 +18,8 @@ void declare_tracking(CLI::App& app, TrackingArguments& arguments);
 
 using Tracking = stability::TrackingSetup;
 
-/// stability::load_tracking_setup() of what was declared.
-/// @throws UsageError if the battery's voltage is outside of the model's range.
+/// Calls stability::load_tracking_setup() with the declared options.
+/// @throws UsageError if the battery voltage is outside the range of the model.
 Tracking load_tracking(const TrackingArguments& arguments);
 
 }  // namespace swarmcert::analysis

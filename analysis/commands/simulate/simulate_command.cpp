@@ -19,7 +19,7 @@ namespace {
 
 using files::Json;
 
-/// Longest simulated flight: its log still fits into memory, and no battery lasts as long.
+/// Longest simulated flight: its log still fits into memory, and no battery lasts longer.
 constexpr double kLongestFlight_s = 86400;
 
 struct SimulateOptions {
@@ -96,7 +96,7 @@ void write_report(const SimulateOptions& options, const CommonOptions& common,
   report.result(result);
   report.paragraph(
       "Simulated in the sampled loop: controllers at their own rates, forces held between, Runge-Kutta per "
-      "control period. One run shows what happened in it, not what is the largest error possible.");
+      "control period. One run shows its own errors, not the largest possible error.");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < flown.vehicles.size(); ++i) {
     const auto& error = flown.vehicles[i].error;
@@ -144,7 +144,7 @@ void require_task_and_models(const SimulateOptions& options) {
   }
 }
 
-/// @param inputs takes the paths of the models.
+/// @param inputs receives the paths of the models.
 stability::Swarm read_swarm(const SimulateOptions& options, std::vector<std::string>& inputs) {
   std::vector<stability::Model> models;
   std::vector<int> kind_of;
@@ -159,7 +159,7 @@ stability::Swarm read_swarm(const SimulateOptions& options, std::vector<std::str
   return stability::Swarm(std::move(models), std::move(kind_of));
 }
 
-/// @param inputs takes the paths of its files.
+/// @param inputs receives the paths of the network's files.
 std::unique_ptr<files::Network> read_network(const files::NetworkArguments& arguments,
                                              std::vector<std::string>& inputs) {
   auto network = std::make_unique<files::Network>(load_evaluated_net(arguments));
@@ -220,7 +220,7 @@ int run_simulate(SimulateOptions options, const CommonOptions& common) {
   return kDone;
 }
 
-/// Empty where a simulation may last so long.
+/// Empty if a simulation may last that long.
 std::string refusal_of_duration(const std::string& seconds) {
   if (std::strtod(seconds.c_str(), nullptr) <= kLongestFlight_s) return {};
   return fmt::format(

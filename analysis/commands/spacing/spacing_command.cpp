@@ -24,7 +24,7 @@ struct SpacingOptions {
   std::string report;
 };
 
-/// The field of `neighbour` as `model` states it, or the effect's published fit where the model has no downwash.
+/// The field of `neighbour` as stated by `model`, or the published fit of the effect if the model has no downwash.
 DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, std::string& source) {
   const stability::EffectInfo& info = stability::effect_info("downwash");
   stability::EffectSpec spec;
@@ -56,7 +56,7 @@ DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, 
   return field;
 }
 
-/// @param source of the field.
+/// @param source the source of the field.
 void add_spacing(const stability::SpacingQuestion& question, const stability::Spacing& found,
                  const std::string& source, files::Json& result) {
   result["max_error_m"] = question.max_error_m;

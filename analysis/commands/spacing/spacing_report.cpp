@@ -58,8 +58,7 @@ std::string write_spacing_report(const stability::SpacingQuestion& question, con
         "speed", speed,
         "set xlabel 'height gap [m]'\nset ylabel 'least crossing speed [m/s]'\nset yrange [0:*]\n"
         "plot 'speed.dat' using 1:2 with linespoints notitle\n",
-        "Least speed of a straight pass below; 0 where the vehicle may stay, no point where no speed "
-        "suffices.");
+        "Least speed of a straight pass below; 0 if the vehicle may stay, no point if no speed suffices.");
   }
   report.heading("Rows");
   report.table({"height gap [m]", "force [N]", "error if it stays [m]", "may stay", "keep-out radius [m]",

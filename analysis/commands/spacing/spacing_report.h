@@ -8,7 +8,7 @@
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html with the keep-out shape, the least crossing speeds and the JSON `result`; returns its
+/// Writes FOLDER/report.html with the keep-out shape, the least crossing speeds and the JSON `result`. Returns its
 /// path.
 /// @throws files::InputError as Report::write().
 std::string write_spacing_report(const stability::SpacingQuestion& question, const stability::Spacing& found,

@@ -27,7 +27,7 @@ bool names(const residuals::FoundFlights& found, const residuals::FlightFiles& f
                      [&](const residuals::FlightFiles& other) { return other.logs == flight.logs; });
 }
 
-/// What --select and --test name; every other flight is for the fit. Empty where neither is given.
+/// Flights named by --select and --test; all other flights are used for the fit. Empty if neither option is given.
 std::optional<identification::Split> split_of(const StudyOptions& options, const residuals::Inputs& inputs) {
   if (options.select.empty() && options.test.empty()) return std::nullopt;
   if (options.select.empty() || options.test.empty())
@@ -45,7 +45,7 @@ std::optional<identification::Split> split_of(const StudyOptions& options, const
   return split;
 }
 
-/// What changed against the flights of --against, by the flights that do not only test.
+/// Changes relative to the flights of --against, from the flights that are not used for testing only.
 Changes changes_against(const residuals::Inputs& others, const identification::Study& study,
                         const residuals::Inputs& inputs, int jobs) {
   residuals::Inputs own = inputs;
@@ -112,7 +112,7 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
     fmt::print("Page: {}\n", page);
   }
   if (study.ladder.too_poor.empty()) return kDone;
-  note("inconclusive: " + study.ladder.too_poor + "; 'swarmcert compare' says what was cut");
+  note("inconclusive: " + study.ladder.too_poor + "; 'swarmcert compare' shows what was cut");
   return kInconclusive;
 }
 
@@ -122,7 +122,7 @@ Command study_command() {
   return {"study", "Find out what a model lacks, add it, and show the error fall, on one page",
           "Compares MODEL with FLIGHTS, finds where it fails and which physical effects are missing, adds "
           "them, and\n"
-          "compares again, on flights that nothing was fitted to as well. Writes DIR/study.html, "
+          "compares again, also on flights not used in the fit. Writes DIR/study.html, "
           "DIR/study.json,\n"
           "DIR/fitted.toml (if an effect was added) and the data of every plot.\n\n"
           "Example: swarmcert study stability/models/crazyflie-small.toml flights/ -o study\n"
@@ -132,11 +132,11 @@ Command study_command() {
             declare_flights(app, options->flights, true);
             app.add_option("--select", options->select, "Flights that only decide which effects are accepted")
                 ->allow_extra_args(false);
-            app.add_option("--test", options->test, "Flights that only test, and decide nothing")
+            app.add_option("--test", options->test, "Test flights, which decide nothing")
                 ->allow_extra_args(false);
             app.add_option("--against", options->against,
-                           "Other flights (the healthy vehicle, the last release): the page also says what "
-                           "changed since, beyond their scatter, as diagnose --against does");
+                           "Other flights (the healthy vehicle, the last release): the page also shows what "
+                           "changed beyond their scatter, like diagnose --against");
             declare_unit(app, options->flights);
             add_output(app, "-o,--output", options->output, "Folder for page, result and fitted model")
                 ->required();

@@ -37,7 +37,7 @@ std::vector<std::string> accepted_effects(const Study& study) {
   return names;
 }
 
-/// "a", "a and b", "a, b and c"
+/// Joins words as "a", "a and b", "a, b and c".
 std::string listed(const std::vector<std::string>& words) {
   std::string text;
   for (std::size_t i = 0; i < words.size(); ++i)
@@ -45,7 +45,7 @@ std::string listed(const std::vector<std::string>& words) {
   return text;
 }
 
-/// What the comparison says of the flights, else of their records.
+/// The reason stated by the comparison for the flights, or else for their records.
 std::string why_nothing_is_judged(const Study& study) {
   const residuals::Comparison& comparison = study.before.all;
   if (!comparison.problems.empty()) return comparison.problems[0];

@@ -12,29 +12,29 @@
 
 namespace swarmcert::analysis {
 
-/// The whole answer in one sentence, with its numbers.
+/// Returns the whole answer in one sentence, with its numbers.
 std::string headline(const identification::Study& study, const residuals::ForceUnit& unit);
 
-/// `before`, `after`, `ladder`, `ranking`, `remainder`, `verdict`, `next` and `split`; forces in newton.
+/// Adds `before`, `after`, `ladder`, `ranking`, `remainder`, `verdict`, `next` and `split`; forces in newton.
 void add_study(const identification::Study& study, const residuals::Inputs& inputs, files::Json& result);
 
-/// Ten lines for the terminal.
+/// Prints about ten lines for the terminal.
 void print_study(const identification::Study& study, const residuals::ForceUnit& unit);
 
-/// What differs from the flights of --against.
+/// Differences from the flights of --against.
 struct Changes {
   std::vector<identification::Difference> differences;  ///< one per vehicle
-  files::Json judged;                                   ///< of changed_json()
+  files::Json judged;                                   ///< from changed_json()
 };
 
-/// `verdict`, `ranking` and `rotors`, as diagnose --against writes them.
+/// Returns `verdict`, `ranking` and `rotors`, as written by diagnose --against.
 files::Json changed_json(const std::vector<identification::Difference>& differences,
                          const residuals::Inputs& inputs, const residuals::Inputs& others, int jobs);
 
-/// `against` and `changed`.
+/// Adds `against` and `changed`.
 void add_changes(const Changes& changes, const std::vector<std::string>& other_files, files::Json& result);
 
-/// One sentence per vehicle, and one per rotor that is named.
+/// Returns one sentence per vehicle, and one per rotor that is named.
 std::vector<std::string> in_words(const Changes& changes);
 
 void print_changes(const Changes& changes);

@@ -119,7 +119,7 @@ std::string write_page(const Study& study, const Notes& notes, const Changes* ch
   add_findings(report, study);
   report.heading("How the error fell");
   add_ladder_figure(report, study.ladder.rows, "ladder", unit);
-  report.heading("What is left, and what to fly next");
+  report.heading("The remainder, and what to fly next");
   add_left(report, study.diagnosis, unit);
   add_remainder(report, study.diagnosis, 1, unit);
   const std::vector<std::string> next = next_flights(study.diagnosis);

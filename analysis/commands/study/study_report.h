@@ -1,4 +1,4 @@
-/// @file What `study` leaves in its folder.
+/// @file The files that `study` writes into its folder.
 #pragma once
 
 #include <string>
@@ -9,10 +9,11 @@
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/study.html with the data of its plots, FOLDER/study.json (`result`) and, if an effect was added,
-/// FOLDER/fitted.toml; makes the folder. Returns the page's path.
-/// @param notes on clocks and labels by which the flights were read, one sentence each.
-/// @param changes of --against; may be null. @throws as Report::write().
+/// Creates the folder and writes FOLDER/study.html with the data of its plots, FOLDER/study.json (`result`) and, if
+/// an effect was added, FOLDER/fitted.toml. Returns the path of the page.
+/// @param notes one sentence per mislabelled log and per clock offset.
+/// @param changes the changes relative to --against; may be null.
+/// @throws as Report::write().
 std::string write_study_folder(const identification::Study& study, const std::vector<std::string>& notes,
                                const Changes* changes, const residuals::ForceUnit& unit,
                                const files::Json& result, const std::string& folder);

@@ -26,7 +26,7 @@ std::string report_folder(const std::string& folder, const std::string& report) 
   return report.empty() ? (std::filesystem::path(folder) / "report").string() : report;
 }
 
-/// Writes FOLDER/sweep.json and the report; what both commands do at their end.
+/// Writes FOLDER/sweep.json and the report; the last step of both commands.
 int finish(const std::string& command, const std::string& folder, const std::string& report_wanted,
            const std::vector<std::string>& inputs, const CommonOptions& common, bool may_replace) {
   const MergedSweep sweep = stability::read_shards(folder);

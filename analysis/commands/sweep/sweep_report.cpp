@@ -46,7 +46,7 @@ std::string where(const MergedSweep& sweep, const Cell& cell) {
   return text;
 }
 
-/// How many cells are infeasible, by the reason without its numbers.
+/// The number of infeasible cells by reason, with the numbers removed from the reason.
 std::map<std::string, int> reasons(const MergedSweep& sweep) {
   std::map<std::string, int> result;
   for (const Cell& cell : sweep.cells) {
@@ -68,7 +68,7 @@ std::vector<std::size_t> varying(const MergedSweep& sweep) {
   return result;
 }
 
-/// Cells in the plane of the first one or two varying axes, the others at their first value.
+/// Cells in the plane of the first one or two varying axes, with the other axes at their first value.
 std::string plane_data(const MergedSweep& sweep, const std::vector<std::size_t>& axes, std::size_t quantity) {
   const stability::Grid grid = axes_of(sweep);
   std::string data;
@@ -182,7 +182,7 @@ void print_sweep(const MergedSweep& sweep) {
 std::string write_sweep_report(const MergedSweep& sweep, const std::string& folder, bool overwrite) {
   Report report("Sweep of " + sweep.grid_path);
   report.result(sweep_json(sweep));
-  // Whether the cells came from one run or from shards put together: the page is the same.
+  // The page is the same whether the cells come from one run or from merged shards.
   report.made_by(shell_line({"swarmcert", "sweep", sweep.grid_path, "-o", "OUTPUT"}));
   for (std::size_t q = 0; q < sweep.compute.size(); ++q) add_plane(report, sweep, q);
   add_front(report, sweep);

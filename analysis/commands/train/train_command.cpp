@@ -40,14 +40,14 @@ const std::map<std::string, training::Layers> kLayers = {{"free", training::Laye
                                                          {"orthogonal", training::Layers::kOrthogonal},
                                                          {"sandwich", training::Layers::kSandwich}};
 
-/// Sums of squares of some targets, and of what the outputs leave of them.
+/// Sums of squares of targets, and of the residuals that the outputs leave.
 struct Squares {
   double nothing = 0, network = 0, samples = 0;
   Scores scores() const { return {std::sqrt(nothing / samples), std::sqrt(network / samples)}; }
 };
 
-/// Of the samples of `use`, by composition; NaN for `all` where there are none.
-/// @param outputs [outputs x samples] what the network says of them.
+/// Scores of the samples of `use` by composition; `all` is NaN if there are none.
+/// @param outputs [outputs x samples] outputs of the network for all samples.
 std::map<std::string, Scores> scores_by_composition(const LearningData& data, const training::Matrix& outputs,
                                                     Use use, Scores& all) {
   std::map<std::string, Squares> sums;
@@ -71,7 +71,7 @@ std::map<std::string, Scores> scores_by_composition(const LearningData& data, co
   return result;
 }
 
-/// Of each component of the target, over all samples that test.
+/// Scores of each component of the target over all test samples.
 std::vector<Scores> scores_by_component(const LearningData& data, const training::Matrix& outputs) {
   std::vector<Squares> sums(static_cast<std::size_t>(data.samples.outputs));
   for (const Eigen::Index s : data.indices(Use::kTest)) {
@@ -88,8 +88,8 @@ std::vector<Scores> scores_by_component(const LearningData& data, const training
   return result;
 }
 
-/// A run that was killed before its first epoch ended left nothing: --resume then begins, so that a job that is
-/// started again needs no other words.
+/// A run that was killed before the end of its first epoch has left nothing; --resume then starts from the beginning,
+/// so that a restarted job can use the same command line.
 void choose_beginning(const CommonOptions& common, TrainOptions& options) {
   if (fs::exists(options.output) && !fs::is_directory(options.output))
     throw files::InputError({options.output, "", "-o", "", "is a file", "name a folder"});
@@ -99,17 +99,17 @@ void choose_beginning(const CommonOptions& common, TrainOptions& options) {
     return;
   }
   const std::uint64_t first =
-      options.run.trainer.seed + (options.teachers > 0 ? 1 : 0);  // folds begin with it
+      options.run.trainer.seed + (options.teachers > 0 ? 1 : 0);  // the first fold also uses this seed
   if (options.run.resumes && !fs::exists(learning::checkpoint_of(options.run, first)))
     throw files::InputError({options.output, "", "--resume", "",
                              fmt::format("the folder holds no interrupted run of seed {}", first),
-                             "name the folder and the seed of one, or begin anew with --force instead"});
+                             "name the folder and the seed of one, or start over with --force instead"});
   if (!options.run.resumes && !common.force)
     throw files::InputError({options.output, "", "-o", "", "the folder is not empty",
                              "--resume goes on with the run in it, --force replaces it"});
 }
 
-/// Flights that are not fitted, with the same models; nothing where none are named.
+/// Flights that are not fitted, with the same models; nothing if none are named.
 std::optional<residuals::Inputs> others(const TrainOptions& options, const std::vector<std::string>& words) {
   if (words.empty()) return std::nullopt;
   FlightOptions chosen = options.flights;
@@ -120,7 +120,7 @@ std::optional<residuals::Inputs> others(const TrainOptions& options, const std::
   return read_flights(chosen, true, false, true);
 }
 
-/// A flight that is fitted and judges as well would make errors look too good without a word.
+/// Rejects flights that are both fitted and used to judge, since the errors would silently look too good.
 void refuse_twice(const learning::LearningFlights& flights) {
   std::set<std::string> seen;
   for (const residuals::Inputs* inputs : {flights.fit, flights.select, flights.test}) {
@@ -134,7 +134,7 @@ void refuse_twice(const learning::LearningFlights& flights) {
   }
 }
 
-/// With folds, the flights that are left out select.
+/// Rejects options that conflict with --folds, where the flights left out of each fit are the selecting flights.
 void check_folds(const TrainOptions& options) {
   if (options.folds == 0) return;
   if (options.folds == 1) throw UsageError("--folds 1 leaves no flight to fit: give at least 2");
@@ -145,7 +145,7 @@ void check_folds(const TrainOptions& options) {
     throw UsageError("--folds averages networks, which --gamma-mode equal forbids");
 }
 
-/// Sets the options of the trainer that the command line gives as words.
+/// Converts trainer options given as words on the command line.
 void choose_trainer(const CommonOptions& common, TrainOptions& options) {
   options.sizes.ground = !options.no_ground;
   options.sizes.invariants = options.symmetry == "exact";
@@ -168,7 +168,7 @@ void choose_trainer(const CommonOptions& common, TrainOptions& options) {
     throw UsageError("--gamma-mode equal is for --layers free");
 }
 
-/// Certifies the network that was written, and scores it on the flights of the test.
+/// Certifies the network that was written, and scores it on the test flights.
 void certify_and_score(const TrainOptions& options, int jobs, const LearningData& data,
                        const files::Network& network, Outcome& outcome) {
   const learning::Run& run = outcome.trained.run;
@@ -182,8 +182,9 @@ void certify_and_score(const TrainOptions& options, int jobs, const LearningData
   if (data.samples.outputs > 1) outcome.components = scores_by_component(data, outputs);
 }
 
-/// What selects: flights of their own, or with folds every flight, of which only the network speaks that was not
-/// fitted to it. Scales the outputs by it, and finds where there is to be no network, unless told not to.
+/// Scales the outputs by the selecting flights, and finds the compositions without a network unless told not to.
+/// Without folds the selecting flights are flights of their own; with folds they are all flights, each evaluated by
+/// the network that was not fitted to it.
 void select_and_scale(const TrainOptions& options, const LearningData& data, training::Matrix unseen,
                       Outcome& outcome) {
   training::Vector& theta = outcome.trained.run.theta;
@@ -198,7 +199,7 @@ void select_and_scale(const TrainOptions& options, const LearningData& data, tra
   learning::scale_outputs(data.layout, outcome.support.scales, theta);
 }
 
-/// Every file that was read, each once.
+/// All files that were read, without duplicates.
 std::vector<std::string> files_of(const learning::LearningFlights& flights) {
   std::vector<std::string> files = flights.fit->files();
   for (const residuals::Inputs* more : {flights.select, flights.test}) {
@@ -275,14 +276,14 @@ int run_train(TrainOptions options, const CommonOptions& common) {
 Command train_command() {
   return {
       "train", "Train spectrally normalised deep sets on flights, with a certificate of the result",
-      "The network learns what the vehicles' models leave of the vertical force, of the force, or of the "
+      "The network learns the residual of the vehicles' models: the vertical force, the force, or the "
       "torque. A phi per kind\nof neighbour, a rho per kind of vehicle, and a phi of the own state for the "
       "ground. Flights are split as wholes into fit,\nselect and test; the epoch with the least error on "
       "the selecting flights is kept, and projected so that gamma holds in\nexact arithmetic. With --folds "
-      "every flight that does not test is fitted. A vehicle among\nneighbours where the selecting flights "
-      "are "
-      "better off without a network gets none: see silent in network.toml. An "
-      "interrupted run goes on with --resume. What is flown is the vertical force; networks of a force or\n"
+      "every flight that does not test is fitted. Compositions\nin which the selecting flights are better "
+      "off without a network get none: see silent in network.toml. An "
+      "interrupted run goes on with --resume. The controller uses the vertical force; networks of a force "
+      "or\n"
       "torque act as effects of models, in simulation and in compare; simulate --torque-network flies a "
       "torque.\n\n"
       "Example: swarmcert train flights/ --epochs 20 -o trained",

@@ -14,8 +14,8 @@ void declare_data(CLI::App& app, TrainOptions& options) {
   app.add_option("--select", options.select,
                  "Flights that only decide when training ends; without it every fifth flight does");
   app.add_option("--split", options.split,
-                 "How FLIGHTS are held back where --select or --test name none: whole flights, or "
-                 "blocks of 2 s of each (auto: blocks where there are too few flights)")
+                 "How FLIGHTS are held back if --select or --test name none: whole flights, or blocks of 2 s "
+                 "of each (auto: blocks if there are too few flights)")
       ->check(CLI::IsMember({"auto", "flights", "blocks"}))
       ->capture_default_str();
 }
@@ -35,7 +35,7 @@ void declare_limits_of_training(CLI::App& app, TrainOptions& options) {
          "--layers", options.layers,
          "free: any weights, scaled back to their limits after each step; aol, orthogonal, sandwich: weights "
          "that keep them by construction (not with --gamma-mode equal). With a tight --max-lipschitz these "
-         "leave smaller errors than free; which one leaves least, the selecting flights say")
+         "give smaller errors than free; choose among them by the selecting flights")
       ->check(CLI::IsMember({"free", "aol", "orthogonal", "sandwich"}))
       ->capture_default_str();
   app.add_option("--max-lipschitz", options.run.max_lipschitz,
@@ -51,8 +51,9 @@ void declare_samples(CLI::App& app, TrainOptions& options) {
       ->check(CLI::IsMember({"scenarios", "errors"}))
       ->capture_default_str();
   app.add_option("--symmetry", options.symmetry,
-                 "vertical: every epoch turns every sample about the vertical and mirrors it, its force or "
-                 "torque included; exact: the networks see what no turn changes (vertical force only); none: "
+                 "vertical: every epoch rotates every sample about the vertical and mirrors it, including "
+                 "its force or torque; exact: the networks receive inputs invariant under rotation (vertical "
+                 "force only); none: "
                  "samples as recorded")
       ->check(CLI::IsMember({"vertical", "exact", "none"}))
       ->capture_default_str();
@@ -75,7 +76,7 @@ void declare_layers(CLI::App& app, TrainOptions& options) {
 
 void declare_run(CLI::App& app, TrainOptions& options) {
   app.add_flag("--allow-worse", options.allow_worse,
-               "Keep each kind's output as trained; without it, outputs are scaled down as far as suits the "
+               "Keep each kind's output as trained; by default, outputs are scaled down to suit the "
                "selecting flights (not with --gamma-mode equal), and compositions that are worse with "
                "the network than without get none: network.toml lists them as silent");
   app.add_option("--epochs", options.run.epochs, "Maximum number of epochs")
@@ -100,10 +101,10 @@ void declare_run(CLI::App& app, TrainOptions& options) {
       ->capture_default_str();
   app.add_option(
          "--folds", options.folds,
-         "Divide the flights that do not test into this many folds, train one network without each "
-         "fold, which selects its epoch, and write their mean as one network, this many times as wide; "
-         "what each network says of the fold that it has not seen takes the place of selecting flights: "
-         "it decides the scale of the outputs and the compositions without a network")
+         "Divide all flights but the test flights into this many folds, train one network without each "
+         "fold, which selects its epoch, and write their mean as one network, this many times as wide; the "
+         "outputs of each network on its unseen fold replace selecting flights: they decide the scale of the "
+         "outputs and the compositions without a network")
       ->check(CLI::Range(0, 100))
       ->capture_default_str();
   leave_out_of_record(

@@ -1,4 +1,4 @@
-/// @file What `train` is asked for.
+/// @file Options of `train`.
 #pragma once
 
 #include <CLI/CLI.hpp>

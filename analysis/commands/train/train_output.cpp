@@ -16,7 +16,7 @@ using learning::Use;
 
 namespace {
 
-/// Beyond what the order of two sums of float32 products can change.
+/// Whether the network is worse than none by more than the summation order of float32 products can explain.
 bool worse_than_none(const learning::SupportedErrors& errors) {
   return errors.network > errors.nothing * (1 + 1e-6);
 }
@@ -105,7 +105,7 @@ files::Json train_json(const TrainOptions& options, const std::vector<std::strin
 
 namespace {
 
-/// Which part of the output is kept, and why not all of it.
+/// Prints which part of the output is kept, and why not all of it.
 void print_support(const Outcome& outcome, const std::string& unit) {
   for (const auto& [kind, scale] : outcome.support.scales) {
     if (scale == 0) {
@@ -122,12 +122,12 @@ void print_support(const Outcome& outcome, const std::string& unit) {
         composition, errors.network, unit, errors.nothing);
 }
 
-/// Where the selecting flights are better off without the network.
+/// Prints the compositions in which the selecting flights are better off without the network.
 void print_worse_than_none(const Outcome& outcome, const std::string& unit) {
   if (!outcome.kept()) {
     fmt::print(
-        "no network is kept: on the selecting flights it leaves {:.3f} {}, none {:.3f}; the models written "
-        "are without it\n",
+        "no network is kept: on the selecting flights the error is {:.3f} {} with it and {:.3f} without; the "
+        "written models do not use it\n",
         outcome.support.all().network, unit, outcome.support.all().nothing);
   }
   for (const auto& [composition, scores] : outcome.support.left) {

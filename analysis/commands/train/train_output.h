@@ -1,4 +1,4 @@
-/// @file What `train` found, as text and as JSON.
+/// @file Results of `train` as text and as JSON.
 #pragma once
 
 #include <algorithm>
@@ -24,14 +24,14 @@ struct Scores {
 struct Outcome {
   learning::TaughtRun trained;
   std::vector<learning::Score>
-      members;  ///< of --folds, each on the fold that it left out; `trained` is their mean
+      members;  ///< networks of --folds, each scored on the fold left out of its fit; `trained` is their mean
   Scores all;
-  std::vector<Scores> components;  ///< x, y, z; empty where the target is one number
+  std::vector<Scores> components;  ///< x, y, z; empty if the target has one component
   std::map<std::string, Scores> compositions;
-  learning::OutputSupport support;  ///< of the selecting flights; with folds, unseen all of them
+  learning::OutputSupport support;  ///< from the selecting flights; with folds, from all flights
   learning::Certified certified;
 
-  /// A network that is worse than none on the selecting flights is not kept.
+  /// A network that is worse than no network on the selecting flights is not kept.
   bool kept() const {
     const auto& scales = support.scales;
     const bool silent = !scales.empty() && std::all_of(scales.begin(), scales.end(),
@@ -41,7 +41,7 @@ struct Outcome {
   }
 };
 
-/// The fields of the schema swarmcert/train/1.
+/// Returns the fields of schema swarmcert/train/1.
 files::Json train_json(const TrainOptions& options, const std::vector<std::string>& inputs,
                        const learning::LearningData& data, const Outcome& outcome);
 

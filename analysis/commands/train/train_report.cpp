@@ -42,7 +42,7 @@ void add_curve(Report& report, const LearningData& data, const learning::Run& ru
                   run.best_epoch + 1));
 }
 
-/// Share of the test samples per bin of one component of the target, before and after.
+/// Plots the share of the test samples per bin of one component of the target, before and after.
 void add_histogram(Report& report, const LearningData& data, const training::Matrix& outputs, int component) {
   const std::vector<Index> samples = data.indices(Use::kTest);
   if (samples.empty()) return;
@@ -69,10 +69,11 @@ void add_histogram(Report& report, const LearningData& data, const training::Mat
                   "lc 'gray' title 'without the network', '' using 1:3 with steps lw 2 title 'left by "
                   "the network'\n",
                   label, name),
-      fmt::format("What the model leaves on the test flights: {}, in bins of {}.", label, width));
+      fmt::format("Residual of the model on the test flights: {}, in bins of {}.", label, width));
 }
 
-/// What one neighbour at rest does to a vehicle at the origin, over the neighbour's place in the plane y = 0.
+/// Plots the force of one neighbour at rest on a vehicle at the origin, over the neighbour's position in the plane y
+/// = 0.
 void add_map(Report& report, const LearningData& data, const learning::Run& run, int phi, int rho,
              int component) {
   training::Dataset grid;
@@ -136,7 +137,7 @@ std::string write_train_report(const LearningData& data, const learning::Run& ru
         fmt::format("No network for {}: {:.3f} {} on the selecting flights with the output as trained, "
                     "{:.3f} without.",
                     composition, errors.network, learning::info(data.target).unit, errors.nothing));
-  // By symmetry nothing else can be in the plane y = 0.
+  // By symmetry the other component vanishes in the plane y = 0.
   std::vector<int> in_plane = {0};
   if (data.target == learning::Target::kForce) in_plane = {0, 2};
   if (data.target == learning::Target::kTorque) in_plane = {1};
@@ -154,7 +155,7 @@ std::string write_train_report(const LearningData& data, const learning::Run& ru
     }
   }
   report.heading("Flights");
-  std::map<std::vector<std::string>, Index> samples;  // blocks of one flight together
+  std::map<std::vector<std::string>, Index> samples;  // blocks of one flight are added up
   for (const learning::TrackSamples& track : data.tracks)
     samples[{track.flight, track.vehicle, track.composition, name(track.use)}] += track.end - track.begin;
   std::vector<std::vector<std::string>> rows;

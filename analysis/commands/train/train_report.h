@@ -9,7 +9,7 @@
 
 namespace swarmcert::analysis {
 
-/// Writes it into `folder`, with the command's result inside; returns the path of the HTML file.
+/// Writes the report, including the result of the command, into `folder`. Returns the path of the HTML file.
 std::string write_train_report(const learning::LearningData& data, const learning::Run& run,
                                const learning::OutputSupport& support, const files::Json& result,
                                const std::string& folder, bool overwrite);

@@ -29,7 +29,7 @@ struct TuneOptions {
   std::string report;
 };
 
-/// Part of the further lag that the shipped gains bear and that tuned ones must still bear, where nothing else is said.
+/// By default the tuned gains must tolerate this share of the additional lag that the shipped gains tolerate.
 constexpr double kKeptLag = 0.5;
 
 files::Json point_json(const TunedPoint& p, const stability::GainNorms& sampled) {
@@ -51,7 +51,7 @@ files::Json point_json(const TunedPoint& p, const stability::GainNorms& sampled)
   return json;
 }
 
-/// The gains as the published firmware calls them.
+/// The gains under the names used in the published firmware.
 struct FirmwareGain {
   const char* name;
   double TunedPoint::*value;
@@ -89,7 +89,7 @@ std::vector<TunedQuantity> quantities(const std::string& axis, const TuneResult&
               {"impulse", a.norms.impulse, b.norms.impulse, "m per N s"},
               {"impulse, sampled", found.shipped_sampled.impulse, found.best_sampled.impulse, "m per N s"},
               {"noise of the command", a.noise_m_s2, b.noise_m_s2, "m/s^2"},
-              {"further lag borne", a.lag_limit_s, b.lag_limit_s, "s"},
+              {"additional lag allowed", a.lag_limit_s, b.lag_limit_s, "s"},
               {"effort", a.effort, b.effort, "N/N"}});
   return all;
 }
@@ -102,7 +102,7 @@ void print_result(const TuneOptions& options, const TuneResult& found) {
   const stability::TuneConstraints& limits = options.tune.constraints;
   const TunedPoint& a = found.shipped;
   const TunedPoint& b = found.best;
-  fmt::print("Axis {}, least {} gain under: noise at most {:.6g} m/s^2, further lag of {:.6g} s borne",
+  fmt::print("Axis {}, least {} gain under: noise at most {:.6g} m/s^2, additional lag of {:.6g} s allowed",
              options.axis, options.objective, limits.most_noise_m_s2, limits.least_lag_limit_s);
   if (limits.most_rate > 0) fmt::print(", rate gain at most {:.6g}", limits.most_rate);
   if (limits.most_effort > 0) fmt::print(", effort at most {:.6g}", limits.most_effort);
@@ -149,8 +149,8 @@ stability::SampledLoop loop_of(const TuneOptions& options, const Tracking& input
   return *loop;
 }
 
-/// Sets the objective and, where the command line left them out, the limits: by default nothing may get worse than the
-/// given gains are, except the lag that is borne.
+/// Sets the objective and the limits that the command line leaves out: by default nothing may be worse than with the
+/// given gains, except the tolerated lag.
 void set_limits(const stability::SampledLoop& loop, const Tracking& input, int axis, TuneOptions& options) {
   if (!options.attitude.empty() && axis == 2)
     throw UsageError("--attitude-gains: the z axis has no attitude loop");
@@ -163,7 +163,7 @@ void set_limits(const stability::SampledLoop& loop, const Tracking& input, int a
                                                             : stability::TuneObjective::kImpulse;
   const TunedPoint shipped = evaluate_gains(loop, options.tune.objective);
   stability::TuneConstraints& limits = options.tune.constraints;
-  constexpr double kSlack = 1e-9;  // for rounding
+  constexpr double kSlack = 1e-9;  // for round-off error
   if (limits.most_noise_m_s2 == 0) limits.most_noise_m_s2 = shipped.noise_m_s2 * (1 + kSlack);
   if (limits.least_lag_limit_s == 0) limits.least_lag_limit_s = kKeptLag * shipped.lag_limit_s;
   if (limits.most_rate == 0 && loop.plant.Ki > 0) limits.most_rate = shipped.norms.rate * (1 + kSlack);
@@ -233,9 +233,9 @@ Command tune_command() {
       "tune", "Better gains for one axis under constraints",
       "Searches Kp, Kd, Ki of one axis, globally and then locally (NLopt), for the least worst-case error "
       "under\n"
-      "limits on the command's noise, the lag that must be borne, the rate gain, and the effort. Says which "
-      "limits hold\n"
-      "it back and what changes against the gains given. Exit code 4: no gains found; 1: proved that there "
+      "limits on the command's noise, the lag that must be tolerated, the rate gain, and the effort. Reports "
+      "the active\nlimits and the changes relative to the gains given. Exit code 4: no gains found; 1: "
+      "proved that there "
       "are none.\n\n"
       "Example: swarmcert tune --gains controller/gains/crazyflie-small.toml --model "
       "stability/models/crazyflie-small.toml",
@@ -260,11 +260,11 @@ Command tune_command() {
         app.add_option("--max-effort", limits.most_effort, "Largest effort gain, N/N")
             ->check(CLI::PositiveNumber);
         app.add_flag("--no-integrator", options->without_integrator,
-                     "Search Kp and Kd with Ki = 0, as where the gains given have Ki = 0");
+                     "Search Kp and Kd with Ki = 0, as if the gains given had Ki = 0");
         app.add_option(
             "--attitude-gains", options->attitude,
-            "KR,Kw,KI of the attitude law, N m, N m s, N m/s (x and y): propose nothing that bound calls "
-            "close to a limit cycle with it (default: [attitude] of gains.toml, where it has them)");
+            "KR,Kw,KI of the attitude law, N m, N m s, N m/s (x and y): propose no gains that bound reports "
+            "as close to a limit cycle (default: [attitude] of gains.toml, if present)");
         app.add_option("--range", options->tune.range, "Gains at most this factor away (default 8)")
             ->check(CLI::Range(1.01, 100.0));
         app.add_option("--nodes", options->tune.global_evaluations, "Evaluations of the global search")

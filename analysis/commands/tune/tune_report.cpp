@@ -28,7 +28,7 @@ std::string write_tune_report(const std::string& verdict, const std::vector<Tune
     if (is_finite) bars.push_back({quantity.name, percent, kNone, kNone});
   }
   report.bars("tuned", bars, "tuned, of the value under the gains given [%]",
-              "What the tuned gains make of each quantity; 100 % is what the gains given have.");
+              "Each quantity under the tuned gains, relative to the gains given (100 %).");
   if (!rows.empty()) report.table({"", "given", "tuned", "change", "unit"}, rows);
   return report.write(folder, overwrite);
 }

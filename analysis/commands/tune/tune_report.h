@@ -1,4 +1,4 @@
-/// @file The report of `tune`: what changes against the gains given.
+/// @file The report of `tune`: changes relative to the given gains.
 #pragma once
 
 #include <string>
@@ -8,15 +8,15 @@
 
 namespace swarmcert::analysis {
 
-/// One quantity under the gains given and under the tuned ones.
+/// One quantity under the given gains and under the tuned gains.
 struct TunedQuantity {
   std::string name;
   double shipped, tuned;
   std::string unit;
 };
 
-/// Writes FOLDER/report.html with a bar per quantity and the JSON `result`; returns its path.
-/// @param verdict what was found, in a sentence; `quantities` is empty where nothing was.
+/// Writes FOLDER/report.html with a bar per quantity and the JSON `result`. Returns its path.
+/// @param verdict one sentence stating what was found; `quantities` is empty if nothing was found.
 /// @throws files::InputError as Report::write().
 std::string write_tune_report(const std::string& verdict, const std::vector<TunedQuantity>& quantities,
                               const files::Json& result, const std::string& folder, bool overwrite);

@@ -10,34 +10,35 @@ namespace swarmcert::gate {
 
 using Run = std::function<void(Evidence&, Checks&)>;
 
-/// [hashes]: files are the ones that were approved.
+/// [hashes]: the files are the approved ones.
 Run read_hashes(const files::TomlTable& table, Policy& policy);
-/// [certificate]: accepted by the independent checker, of exactly these weights, in the flown precision.
+/// [certificate]: accepted by the independent checker, for exactly these weights, in the precision used in flight.
 Run read_certificate(const files::TomlTable& table, Policy& policy);
-/// [lipschitz]: proved Lipschitz constants, joint, per block, per function.
+/// [lipschitz]: proved Lipschitz constants: joint, per block, per function.
 Run read_lipschitz(const files::TomlTable& table, Policy& policy);
-/// [spectral_norms]: of every layer, against the declared gamma.
+/// [spectral_norms]: spectral norm of every layer against the declared gamma.
 Run read_spectral_norms(const files::TomlTable& table, Policy& policy);
-/// [float32_error]: what flies against the exact function, over the box.
+/// [float32_error]: error of the evaluation in flight relative to the exact function, over the box.
 Run read_float32_error(const files::TomlTable& table, Policy& policy);
-/// [range]: values over the box, and the jump where a neighbour comes or goes.
+/// [range]: values over the box, and the jump when a neighbour appears or disappears.
 Run read_range(const files::TomlTable& table, Policy& policy);
-/// [theorem]: hypotheses of the tracking theorem, and its ball.
+/// [theorem]: hypotheses and ball of the tracking theorem.
 Run read_theorem(const files::TomlTable& table, Policy& policy);
-/// [tracking]: bound on the tracking error over the vehicle's uncertainty, times the guard factor.
+/// [tracking]: bound on the tracking error over the uncertainty of the vehicle, times the guard factor.
 Run read_tracking(const files::TomlTable& table, Policy& policy);
-/// [small_gain]: margin of the swarm's loop of bounds.
+/// [small_gain]: margin of the small-gain condition of the swarm.
 Run read_small_gain(const files::TomlTable& table, Policy& policy);
-/// [match]: the exported source is that of this network, file by file; the ELF holds its weights and evaluates as it
-/// does.
+/// [match]: the exported source belongs to this network, file by file; the ELF file contains its weights and
+/// evaluates as the network does.
 Run read_match(const files::TomlTable& table, Policy& policy);
-/// Of one file. @throws files::InputError if it, or the network, cannot be read.
+/// Checks one file.
+/// @throws files::InputError if the file or the network cannot be read.
 Check match_row(Evidence& evidence, const std::string& name, int line, const std::string& path, bool is_elf);
 /// [firmware_facts]: flash, RAM, stack and times.
 Run read_firmware_facts(const files::TomlTable& table, Policy& policy);
-/// [residual]: the model against the reference flights.
+/// [residual]: error of the model on the reference flights.
 Run read_residual(const files::TomlTable& table, Policy& policy);
-/// [regression]: nothing is worse than in the baseline by more than so many percent.
+/// [regression]: no value is worse than in the baseline by more than the stated percentage.
 Run read_regression(const files::TomlTable& table, Policy& policy);
 
 }  // namespace swarmcert::gate

@@ -24,7 +24,7 @@ double of_axis(const residuals::Axes& axes, int axis) {
   return axis == 0 ? axes.x : axis == 1 ? axes.y : axes.z;
 }
 
-/// Of one axis, the quantile of what was measured.
+/// The measured quantile of one axis.
 double at(const LearningError::Quantiles& all, const std::string& quantile, int axis) {
   return std::abs(of_axis(quantile_of(all, quantile), axis));
 }
@@ -77,7 +77,7 @@ DisturbanceTable read_disturbance(const files::TomlTable& table) {
   result.declared.note = "as the policy declares";
   if (table.has("quantile")) {
     if (result.is_declared())
-      table.refuse("quantile", "", "stands beside a declared force error", "give one");
+      table.refuse("quantile", "", "conflicts with a declared force error", "give one");
     const std::vector<std::string> names = {"p50", "p95", "p99", "max"};
     result.quantile = names[table.choice("quantile", names)];
   }

@@ -18,9 +18,9 @@ using files::Json;
 constexpr char kFlash[] = "flash_bytes";
 
 struct Wanted {
-  std::string name;  ///< of the row
+  std::string name;  ///< row name
   std::vector<std::string>
-      path;  ///< members of the facts down to the number, or to a pair: the larger one counts
+      path;  ///< path of members to the number, or to a pair of which the larger one counts
   Limit limit;
 };
 
@@ -41,7 +41,7 @@ double number_at(const Json& facts, const std::vector<std::string>& path, const 
   return value.get<double>();
 }
 
-/// Why the facts are not those of the network; empty if they are.
+/// Returns why the facts do not belong to the network; empty if they do.
 std::string why_of_another(Evidence& evidence, const Json& facts, const std::string& file) {
   const files::Network& network = evidence.flown();
   if (!facts.contains("network") || !facts["network"].is_object() || !facts["network"].contains("weights") ||

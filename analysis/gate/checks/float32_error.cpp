@@ -20,7 +20,7 @@ Run read_float32_error(const files::TomlTable& table, Policy& policy) {
   options.input_step = table.has("input_step") ? table.number("input_step") : 0;
   if (options.input_step < 0) table.refuse("input_step", "", "must not be negative");
   return [limit = *limit, options](Evidence& evidence, Checks& checks) mutable {
-    if (!evidence.release().is_float32) throw Unfounded("the policy says that float64 flies");
+    if (!evidence.release().is_float32) throw Unfounded("the policy states that float64 is used in flight");
     if (evidence.flown().invariants)
       throw Unfounded("float32 errors are bounded of networks of relative states, not of invariants");
     options.jobs = evidence.settings().jobs;
@@ -36,7 +36,7 @@ Run read_float32_error(const files::TomlTable& table, Policy& policy) {
       check.witness = fmt::format("{}, up to {} neighbours", error.function.name(), error.neighbours_at_most);
     }
     if (errors.empty()) {
-      check.reason = "the network has no function that flies";
+      check.reason = "the network has no function that is used in flight";
     } else {
       judge(check, limit, worst, nothing_attained(limit));
     }

@@ -15,13 +15,13 @@ namespace swarmcert::gate {
 namespace {
 
 struct WantedBound {
-  std::string name;                           ///< of the row
-  std::optional<files::FunctionId> function;  ///< nothing: the plain network and every set function
+  std::string name;                           ///< row name
+  std::optional<files::FunctionId> function;  ///< empty: the plain network and every set function
   std::string block;
   Limit limit;
 };
 
-/// Whether the box of the certificate, on which its bounds hold, contains that of the release.
+/// Requires that the box of the certificate, on which its bounds hold, contains the box of the release.
 void require_certified_box(Evidence& evidence) {
   if (evidence.release().certificate.empty()) throw Unfounded("bounds on a box need a certificate");
   const files::Json& certified = evidence.certificate()["box"];
@@ -91,7 +91,8 @@ Run read_lipschitz(const files::TomlTable& table, Policy& policy) {
       const std::optional<files::FunctionId> function = files::FunctionId::parse(name);
       if (!function)
         functions.refuse(
-            name, "", "is no function: \"network\", \"phi:<kind>\", \"rho:<kind>\" or \"set:<phi>:<rho>\"");
+            name, "",
+            "is not a function: \"network\", \"phi:<kind>\", \"rho:<kind>\" or \"set:<phi>:<rho>\"");
       all.push_back({"lipschitz." + name, function, "all", *limit(functions, name, "")});
     }
   }

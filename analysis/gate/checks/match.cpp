@@ -22,7 +22,7 @@ Check match_row(Evidence& evidence, const std::string& name, int line, const std
   for (const EvidenceFile& file : evidence_files(evidence.policy(), ""))
     options.source.other_contents.push_back(file.path);
   if (!release.certificate.empty())
-    // The hash that it states: whether the certificate has that content is the business of [certificate].
+    // The hash as stated; [certificate] checks that the certificate has that content.
     options.source.certificate_sha256 = evidence.certificate().value("content_sha256", "");
   if (release.most_neighbours > 0) options.most_neighbours = release.most_neighbours;
   const firmware::ArtefactMatch match = match_artefact(evidence.flown(), path, options);
@@ -48,7 +48,7 @@ Run read_match(const files::TomlTable& table, Policy& policy) {
   if (!policy.release.has_network()) require_file(table, "", "network");
   if (policy.release.source.empty()) require_file(table, policy.release.elf, "source or elf");
   if (!policy.release.is_float32)
-    table.refuse("", "", "holds float32 weights against a network that flies in float64");
+    table.refuse("", "", "compares float32 weights with a network that is used in float64");
   return [line = table.line()](Evidence& evidence, Checks& checks) {
     const Release& release = evidence.release();
     if (!release.source.empty()) checks.push_back(match_row(evidence, "match", line, release.source, false));

@@ -26,7 +26,7 @@ std::string range_words(const CertifiedRange& range, const Attained& attained) {
   return text;
 }
 
-/// What one limit bounds.
+/// The quantity that a limit bounds.
 enum class RangeQuantity { kLargest, kLeast, kGreatest, kJump };
 
 struct WantedRange {

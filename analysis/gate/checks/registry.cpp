@@ -8,7 +8,7 @@ const std::vector<CheckKind>& check_kinds() {
       {"certificate", "accepted, of these weights, in the flown precision", read_certificate},
       {"lipschitz", "proved Lipschitz constants", read_lipschitz},
       {"spectral_norms", "of every layer, against the declared gamma", read_spectral_norms},
-      {"float32_error", "what flies against the exact function", read_float32_error},
+      {"float32_error", "the evaluation in flight against the exact function", read_float32_error},
       {"range", "values of the network over the box", read_range},
       {"theorem", "hypotheses of the tracking theorem", read_theorem},
       {"tracking", "bound on the tracking error", read_tracking},

@@ -12,7 +12,7 @@
 namespace swarmcert::gate {
 namespace {
 
-/// By how many percent of the baseline's value a value is worse; 0 if it is not.
+/// Returns by how many percent of the baseline's value a value is worse; 0 if it is not worse.
 double worse_percent(const Check& check, double baseline) {
   const double change = (check.more_is_worse ? 1 : -1) * (*check.value - baseline);
   if (change <= 0) return 0;
@@ -66,7 +66,7 @@ Run read_regression(const files::TomlTable& table, Policy& policy) {
       check.witness = fmt::format("{}: {:.6g} before, {:.6g} now", now.name, before->second, *now.value);
     }
     if (compared == 0) {
-      fail(check, "the baseline has none of this policy's numbers");
+      fail(check, "the baseline contains no values for this policy");
     } else if (!missing.empty()) {
       check.value = worst;
       check.reason = "has a baseline, but no value now: " + missing;

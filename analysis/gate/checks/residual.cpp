@@ -36,7 +36,7 @@ double value_of(const residuals::ErrorStatistics& s, ResidualQuantity quantity) 
   return static_cast<double>(s.samples);
 }
 
-/// The flight with the largest error, for a row that fails.
+/// Names the flight with the largest error, for a row that fails.
 std::string worst_track(const residuals::Comparison& comparison) {
   const residuals::TrackErrors* worst = nullptr;
   for (const residuals::TrackErrors& track : comparison.tracks) {

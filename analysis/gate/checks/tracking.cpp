@@ -16,12 +16,12 @@
 namespace swarmcert::gate {
 namespace {
 
-/// What is uncertain: an interval where stated, else so much about model and gains.
+/// Uncertain parameters: an interval if stated, otherwise the default about model and gains.
 struct Uncertainty {
   std::optional<Interval> mass_kg, thrust_scale, lag_s, delay_s;
 };
 
-/// Where the bound must hold for the check to pass.
+/// The set on which the bound must hold for the check to pass.
 enum class Over { kBox, kCorners };
 
 struct Guard {
@@ -53,7 +53,7 @@ stability::UncertainPlant box_of(const stability::TrackingSetup& setup, const Un
           stated.lag_s.value_or(usual.lag_s), stated.delay_s.value_or(usual.delay_s)};
 }
 
-/// How far peaks that were measured exceed those of the loop pushed by the measured residual; at least 1.
+/// Ratio by which measured peaks exceed those of the loop driven by the measured residual; at least 1.
 double guard_factor(Evidence& evidence, const Guard& guard, int axis) {
   if (guard.declared) return *guard.declared;
   const residuals::Trajectories& flown = evidence.comparison().trajectories;
@@ -100,14 +100,14 @@ void judge_tracking(Evidence& evidence, const DisturbanceTable& declared, const 
     check.value.reset();
     if (check.verdict == Verdict::kInconclusive)
       check.reason =
-          "nothing bounds the error: the loop is unstable in the box, the integrator's clamp may act, or "
-          "the force error's amplitude is not known";
+          "there is no bound on the error: the loop is unstable in the box, the integrator's clamp may act, "
+          "or the force error's amplitude is unknown";
   } else if (over == Over::kBox && !bound.is_enclosed && !(attained > limit.value)) {
     judge(check, limit, std::numeric_limits<double>::infinity(), attained);
     check.value.reset();
     check.reason = fmt::format(
         "at most {:.6g} m at the corners of the uncertainty, but nothing bounds a sampled loop with an "
-        "integrator clamp in between; over = \"corners\" is content with the corners",
+        "integrator clamp in between; over = \"corners\" checks only the corners",
         proved);
   } else {
     judge(check, limit, proved, attained);
@@ -115,7 +115,7 @@ void judge_tracking(Evidence& evidence, const DisturbanceTable& declared, const 
   checks.push_back(std::move(check));
 }
 
-/// How often the promise held on reference flights that it was not made from, along the worst axis.
+/// Judges how often the promise held on reference flights not used to make it, along the worst axis.
 void judge_promise(Evidence& evidence, const Limit& limit, Checks& checks) {
   const analysis::Promise promise = analysis::read_promise(evidence.release().promise);
   const analysis::KeptPromise kept = analysis::kept_promise(promise, evidence.flight_peaks());

@@ -1,6 +1,6 @@
 """Formal verification and analysis for learned multirotor controllers.
 
-The commands of the tool `swarmcert` as functions, with the same numbers to the last bit:
+The commands of the tool `swarmcert` as functions, with results that are identical to the last bit:
 
     import swarmcert
     found = swarmcert.certify({"fc1.weight": w1, "fc1.bias": b1, "fc2.weight": w2, "fc2.bias": b2}, max_lipschitz=20)
@@ -62,7 +62,7 @@ __all__ = [
 
 
 def _bundled_files() -> str:
-    """The folder that stands for the tool's own: PREFIX/bin above an installed package, else this one."""
+    """Returns the folder used in place of the tool's own: PREFIX/bin above an installed package, else this folder."""
     folder = _os.path.dirname(_os.path.abspath(__file__))
     above = folder
     while not _os.path.exists(_os.path.join(folder, "source_folder.txt")) and above != _os.path.dirname(above):

@@ -25,7 +25,7 @@ def _text(value: Any) -> str:
 
 
 def _words(command: str, options: Mapping[str, Any]) -> List[str]:
-    """Options as words: a list of texts is an option given several times, one of numbers a list with commas."""
+    """Options as words: a list of strings repeats the option, a list of numbers becomes a comma-separated value."""
     known = _OPTIONS[command]
     words: List[str] = []
     for key, value in options.items():
@@ -64,12 +64,12 @@ def _run(
 
 
 def run(command: str, *arguments: Any, progress: Optional[Progress] = None, **options: Any) -> Result:
-    """Any command of the command line, in this process: `run("tune", gains="g.toml", model="m.toml", axis="z")`.
+    """Runs any command of the tool in this process: `run("tune", gains="g.toml", model="m.toml", axis="z")`.
 
-    Prints nothing. Files are written only where an option such as `output` names them.
+    Prints nothing. Files are written only if an option such as `output` names them.
 
     Raises:
-        InputError: a file is wrong
+        InputError: a file is missing or invalid
         UsageError: an option does not exist or the options make no sense together
     """
     if command not in _OPTIONS:
@@ -87,26 +87,26 @@ def certify(
 ) -> Certification:
     """Spectral norms and Lipschitz bounds that hold in exact arithmetic.
 
-    Nothing is printed and no file is written or read, except the files that `net` or options name, so that it can be
-    called in every epoch of a training loop; the interpreter's lock is released, and Ctrl-C raises KeyboardInterrupt.
+    Prints nothing, and reads or writes only the files that `net` or options name, so that it can be called in every
+    epoch of a training loop. The interpreter lock is released, and Ctrl-C raises KeyboardInterrupt.
 
     Args:
         net: one of
             - a path: network.toml or one weight file;
             - a dict of arrays {"fc1.weight": [outputs, inputs], "fc1.bias": [outputs], ...} or a state dict of PyTorch:
-              ReLU between the layers, or what the option `activation` says, none after the last;
+              ReLU between the layers, or as set by the option `activation`, and none after the last;
             - a Sequential of Linear and ReLU;
             - {"phi": ..., "rho": ...}, or an object with these attributes: a deep set rho(sum_j phi(x_j)).
             Arrays are float32 or float64, or float16, which is a float32 network.
-        order: names of the layers in the order of evaluation where neither names nor shapes tell it; of a pair
+        order: names of the layers in the order of evaluation if neither names nor shapes determine it; for a pair
             {"phi": [...], "rho": [...]}.
         description: text of a network.toml; `net` is then a dict from the names under `weights` to arrays.
         progress: called with (done, total, what), at most 50 times a second.
-        options: those of `swarmcert certify --help`, with "_" for "-": max_lipschitz=500, method="sdp", gamma=3,
+        options: options of `swarmcert certify --help`, with "_" for "-": max_lipschitz=500, method="sdp", gamma=3,
             domain="box.toml", neighbours=3, nodes=0, time=10, as_="float32".
 
     Returns:
-        bounds, layers, range, verdict, ... as `--json` writes them; `certificate` as text; `upper()`.
+        bounds, layers, range, verdict, ... as written by `--json`; `certificate` as text; `upper()`.
     """
     loaded = _networks.load(net, order, description)
     result = _run("certify", (), options, progress, loaded)
@@ -118,7 +118,7 @@ def check(certificate: Any, net: Any, *, order: Any = (), description: Optional[
     """Verifies a certificate with the independent checker.
 
     Args:
-        certificate: what certify() returned, its text, or a path.
+        certificate: the result of certify(), the text of a certificate, or a path.
         net: as in certify().
 
     Returns:
@@ -134,7 +134,7 @@ def check(certificate: Any, net: Any, *, order: Any = (), description: Optional[
 def _flights(
     command: str, models: Sequence[Any], flights: Any, options: Dict[str, Any], progress: Optional[Progress]
 ) -> Result:
-    """Flights are a path, a mapping, or a list of these; so are those of the options that name flights."""
+    """Runs a command on flights: a path, a mapping, or a list of these; likewise for options that name flights."""
 
     def listed(given: Any) -> List[Any]:
         return [given] if isinstance(given, (str, os.PathLike)) or hasattr(given, "keys") else list(given)
@@ -160,14 +160,14 @@ def _models(model: Any) -> List[Any]:
 
 
 def compare(model: Any, flights: Any, *, progress: Optional[Progress] = None, **options: Any) -> Result:
-    """Force residuals of a model on flights, and where it fails. Forces are in newton.
+    """Force residuals of a model on flights, and where the model fails. Forces are in newton.
 
     Args:
         model: path of a model.toml, a list of them, or None for known vehicles.
-        flights: paths of logs or folders; or arrays: a dict as Log has it, or {"cf1": ..., "cf2": ...} for the vehicles
-            of one flight; or a list of these, one per flight. Arrays are handed over in temporary files. The options
-            select, test and against, where a command has them, take the same.
-        options: those of `swarmcert compare --help`.
+        flights: paths of logs or folders; or arrays: a dict with the names of Log, or {"cf1": ..., "cf2": ...} for the
+            vehicles of one flight; or a list of these, one per flight. Arrays are passed in temporary files. The
+            options select, test and against accept the same, if the command has them.
+        options: options of `swarmcert compare --help`.
 
     Returns:
         overall, flights, regions, moments, learning_error, ...; tables: flights, vehicles, regions, ...
@@ -176,14 +176,14 @@ def compare(model: Any, flights: Any, *, progress: Optional[Progress] = None, **
 
 
 def diagnose(model: Any, flights: Any, *, progress: Optional[Progress] = None, **options: Any) -> Result:
-    """Which physical effect a model lacks. Arguments as in compare(); tables: ranking, remainder, detectable."""
+    """Finds which physical effect a model lacks. Arguments as in compare(); tables: ranking, remainder, detectable."""
     return _flights("diagnose", _models(model), flights, options, progress)
 
 
 def study(
     model: Any, flights: Any, output: Path, *, progress: Optional[Progress] = None, **options: Any
 ) -> Result:
-    """compare, diagnose, add and compare again, on one page in the folder `output`. Arguments as in compare().
+    """Runs compare, diagnose, add and compare again, with one page in the folder `output`. Arguments as in compare().
 
     Returns:
         before, after, ladder, ranking, remainder, verdict, next
@@ -200,13 +200,13 @@ def add(
     progress: Optional[Progress] = None,
     **options: Any,
 ) -> Result:
-    """Fits effects and shows the error ladder on flights that nothing was fitted to.
+    """Fits effects and reports the error ladder on flights not used in the fit.
 
     Args:
         effects: "auto", one effect, or several.
         model, flights: as in compare().
         output: path of the new model.toml; written if an effect was accepted.
-        options: those of `swarmcert add --help`.
+        options: options of `swarmcert add --help`.
 
     Returns:
         ladder, effects, split, written
@@ -216,26 +216,26 @@ def add(
 
 
 def bound(gains: Path, model: Path, *, progress: Optional[Progress] = None, **options: Any) -> Result:
-    """Bounds of the tracking error, in metre. Options as in `swarmcert bound --help`: rate=0.3 (N/s), amplitude, ..."""
+    """Bounds on the tracking error in metres. Options as in `swarmcert bound --help`: rate=0.3 (N/s), amplitude, ..."""
     return _run("bound", (), {"gains": gains, "model": model, **options}, progress)
 
 
 def simulate(
     task: str, output: Path, *, gains: Path, model: Any, progress: Optional[Progress] = None, **options: Any
 ) -> Result:
-    """Flies "hover", "swap", "random-walk", "circle" or "takeoff" and writes logs into the folder `output`."""
+    """Simulates "hover", "swap", "random-walk", "circle" or "takeoff" and writes logs into the folder `output`."""
     return _run("simulate", [task], {"output": output, "gains": gains, "model": model, **options}, progress)
 
 
 def export(net: Any, output: Path, *, order: Any = (), description: Optional[str] = None, **options: Any) -> Result:
-    """Writes the network, as in certify(), as firmware source into the folder `output`."""
+    """Writes the network as firmware source into the folder `output`. `net` as in certify()."""
     return _run("export", (), {"output": output, **options}, None, _networks.load(net, order, description))
 
 
 def match(
     net: Any, firmware: Path, *, order: Any = (), description: Optional[str] = None, **options: Any
 ) -> Result:
-    """Whether an exported folder, a source file or an ELF holds exactly this network."""
+    """Checks whether an exported folder, a source file or an ELF file contains exactly this network."""
     loaded = _networks.load(net, order, description)
     if isinstance(loaded, _networks.Arrays):
         return _run("match", ["arrays", firmware], options, None, loaded)
@@ -243,7 +243,7 @@ def match(
 
 
 def schema(name: str = "") -> Any:
-    """The JSON Schema of a result or file, as a dict; without a name, the list of names."""
+    """Returns the JSON Schema of a result or file as a dict; without a name, the list of names."""
     result = _run("schema", [name] if name else [], {})
     return result["json_schema"] if name else result["names"]
 
@@ -251,12 +251,12 @@ def schema(name: str = "") -> Any:
 def residuals(
     model: Any, flights: Any, *, vehicles: Path = "", columns: Path = "", network: Path = ""
 ) -> List[_logs.Residuals]:
-    """The residuals behind compare(): one entry per vehicle and flight, arrays over the records.
+    """Returns the residuals used by compare(): one entry per vehicle and flight, with arrays over the records.
 
     Args:
         model, flights: as in compare().
-        vehicles: path of a flights.toml, as `--flights`.
-        columns, network: paths, as `--columns` and `--network`.
+        vehicles: path of a flights.toml, like `--flights`.
+        columns, network: paths, like `--columns` and `--network`.
     """
     if isinstance(flights, (str, os.PathLike)) or hasattr(flights, "keys"):
         flights = [flights]

@@ -6,7 +6,7 @@ from typing import Any
 class InputError(ValueError):
     """A file or an array that cannot be used.
 
-    Attributes, each a text that is empty where it does not apply:
+    Attributes, each a string that is empty if it does not apply:
         file:  path as given, or the name of the array
         where: "line 7", "offset 132"
         field: tensor or key, such as "fc2.weight"

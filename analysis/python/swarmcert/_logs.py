@@ -11,11 +11,11 @@ from ._errors import InputError
 
 
 class Source(NamedTuple):
-    """Where a signal of a log comes from."""
+    """The origin of a signal in a log."""
 
     name: str
     source: str  #: "measured", "derived" or "missing"
-    origin: str  #: columns of the file, or what it is derived from and how
+    origin: str  #: columns of the file, or the derivation from other signals
     unit: str  #: of the columns as stored
     rate_hz: float
     noise: float  #: standard deviation in SI units; NaN: not estimated
@@ -48,19 +48,19 @@ _COLUMNS = {
 class Log(Mapping[str, np.ndarray]):
     """A flight log in SI units: a mapping from names to arrays of float64, [n] or [n, k].
 
-    time_s [n]; position_m, velocity_m_s, specific_force_m_s2 (what an accelerometer feels, +9.81 upwards at rest),
-    target_position_m, target_velocity_m_s [n, 3], in the world with z up; attitude [n, 4]: unit quaternion x, y, z, w
-    that turns body into world; rates_rad_s, torque_command_N_m [n, 3], in the body; duty [n, 4]: PWM/65536;
-    battery_V [n]; thrust_N or thrust_over_hover [n] where the thrust does not come from the duties; motor_force_N [n,
-    4]; thrust_command_N [n]. What the log does not have is not there.
+    time_s [n]; position_m, velocity_m_s, specific_force_m_s2 (accelerometer reading, +9.81 upward at rest),
+    target_position_m, target_velocity_m_s [n, 3], in the world frame with z up; attitude [n, 4]: unit quaternion
+    x, y, z, w that rotates body to world; rates_rad_s, torque_command_N_m [n, 3], in the body frame; duty [n, 4]:
+    PWM/65536; battery_V [n]; thrust_N or thrust_over_hover [n] if the thrust does not come from the duties;
+    motor_force_N [n, 4]; thrust_command_N [n]. Signals that the log does not contain are absent.
 
     Attributes:
-        path, format:   of the file
-        units:          by name
-        sources:        list of Source: of every known signal, also of those that are missing
+        path, format:   path and format of the file
+        units:          unit by name
+        sources:        list of Source, for every known signal including missing ones
         judged_force:   axes along which a force can be judged, such as ["x", "y", "z"]
         findings:       what was damaged or left out
-        interpretation: what was decided from the data, and why
+        interpretation: decisions made from the data, with reasons
     """
 
     def __init__(self, read: Dict[str, Any]):
@@ -90,7 +90,7 @@ class Log(Mapping[str, np.ndarray]):
         return f"<Log {self.path} ({self.format}): {names}>"
 
     def table(self) -> Dict[str, np.ndarray]:
-        """One column per number, for pandas: "position_m_x", ..."""
+        """Returns one column per scalar, for pandas: "position_m_x", ..."""
         columns: Dict[str, np.ndarray] = {}
         for name, array in self._signals.items():
             if array.ndim == 1:
@@ -110,7 +110,7 @@ def read(log: Any, columns: Any = None) -> Log:
         columns: path of a columns.toml, for CSV files whose columns are not recognised
 
     Raises:
-        InputError: the file cannot be read at all. Damage inside it is skipped and stands in Log.findings.
+        InputError: the file cannot be read at all. Damaged parts are skipped and listed in Log.findings.
     """
     return Log(_core.read_log(os.fspath(log), os.fspath(columns) if columns is not None else ""))
 
@@ -120,9 +120,9 @@ def _refuse(field: str, value: str, what: str, hint: str) -> None:
 
 
 class Written:
-    """Flights given as arrays, as CSV files in a folder that is removed at the end; paths stay as they are.
+    """Writes flights given as arrays to CSV files in a temporary folder; paths are passed through.
 
-    A number is written with as many digits as it takes to read the same one back.
+    Numbers are written with enough digits to be read back exactly.
     """
 
     def __init__(self, flights: List[Any]):
@@ -184,23 +184,23 @@ class Written:
 
 
 class Residuals(NamedTuple):
-    """What a model leaves of the force on one vehicle in one flight; arrays over the log's records."""
+    """The force residual of a model for one vehicle in one flight; arrays over the records of the log."""
 
     flight: str
     vehicle: str
     kind: str
     file: str
-    judged: np.ndarray  #: [3] 1 for axes of the world along which a force can be judged, else 0
-    time_s: np.ndarray  #: [n] on the flight's clock
-    residual_N: np.ndarray  #: [n, 3] measured minus model, world, z up; m/s^2 where no model is known
+    judged: np.ndarray  #: [3] 1 for world axes along which a force can be judged, else 0
+    time_s: np.ndarray  #: [n] on the clock of the flight
+    residual_N: np.ndarray  #: [n, 3] measured minus model, world frame, z up; m/s^2 if no model is known
     position_m: np.ndarray  #: [n, 3]
     velocity_m_s: np.ndarray  #: [n, 3]
-    thrust_N: np.ndarray  #: [n] total thrust as the model sees it
-    used: np.ndarray  #: [n] bool: the record counts
-    cut: List[str]  #: [n] why not; "" where it counts
+    thrust_N: np.ndarray  #: [n] total thrust according to the model
+    used: np.ndarray  #: [n] bool: the record is used
+    cut: List[str]  #: [n] why the record is not used; "" if it is
 
     def table(self) -> Dict[str, np.ndarray]:
-        """One column per number, for pandas."""
+        """Returns one column per scalar, for pandas."""
         columns = {"time_s": self.time_s, "used": self.used, "cut": np.array(self.cut, dtype=object)}
         for name in ("residual_N", "position_m", "velocity_m_s"):
             for k, axis in enumerate("xyz"):

@@ -1,4 +1,4 @@
-"""Networks from paths, arrays and modules of PyTorch, which is never imported."""
+"""Networks from paths, arrays and PyTorch modules; PyTorch itself is never imported."""
 
 import os
 from typing import Any, Dict, List, Optional, Sequence, Tuple
@@ -10,14 +10,14 @@ from ._errors import InputError
 
 
 class Arrays:
-    """A network in memory, as the extension module takes it."""
+    """A network in memory, in the form expected by the extension module."""
 
     def __init__(self, parts: Dict[str, Dict[str, Any]], description: str = ""):
         self.source = {"parts": parts, "description": description}
 
 
 def _array(value: Any) -> np.ndarray:
-    """A numpy array; tensors of PyTorch are recognised by their methods and never change."""
+    """Returns a numpy array; PyTorch tensors are recognised by their methods and never modified."""
     if hasattr(value, "detach"):
         value = value.detach()
         if hasattr(value, "cpu"):
@@ -46,7 +46,7 @@ def _refuse_module(field: str, value: str, what: str) -> None:
 
 
 def _sequential(modules: Sequence[Any]) -> Dict[str, Any]:
-    """Linear, ReLU, Linear, ..., Linear: the order and the activations are what is evaluated."""
+    """Reads Linear, ReLU, Linear, ..., Linear: order and activations are those of the evaluation."""
     tensors: List[Tuple[str, Any]] = []
     for i, module in enumerate(modules):
         expected = "Linear" if i % 2 == 0 else "ReLU"
@@ -78,7 +78,7 @@ def _one(value: Any, order: Sequence[str]) -> Dict[str, Any]:
 
 
 def load(net: Any, order: Any = (), description: Optional[str] = None) -> Any:
-    """What certify() takes as a path (str) or as Arrays; see certify()."""
+    """Returns a network argument of certify() as a path (str) or as Arrays."""
     if isinstance(net, Arrays):
         return net
     if isinstance(net, (str, os.PathLike)):
@@ -101,12 +101,12 @@ def _of(order: Any, part: str) -> Sequence[str]:
 
 
 def save(net: Any, folder: Any, order: Any = (), description: Optional[str] = None, overwrite: bool = False) -> str:
-    """Writes a network of arrays into an existing folder, as safetensors, with network.toml where it is described.
+    """Writes a network of arrays to an existing folder as safetensors, with a network.toml if `description` is given.
 
-    A certificate of the arrays is a certificate of these files: their hashes are the same.
+    A certificate of the arrays is also a certificate of these files, because their hashes are the same.
 
     Returns:
-        Path of the network; of a pair, that of rho.
+        Path of the network; for a pair, the path of rho.
     """
     loaded = load(net, order, description)
     if not isinstance(loaded, Arrays):

@@ -1,4 +1,4 @@
-"""What the commands return."""
+"""Results of the commands."""
 
 import json
 from typing import Any, Dict, Iterator, List, Tuple
@@ -7,7 +7,7 @@ import numpy as np
 
 
 def _flat(row: Dict[str, Any], prefix: str = "") -> Iterator[Tuple[str, Any]]:
-    """Members of nested objects as "outer.inner"; arrays stay as they are."""
+    """Flattens members of nested objects to "outer.inner"; arrays are kept."""
     for key, value in row.items():
         if isinstance(value, dict):
             yield from _flat(value, prefix + key + ".")
@@ -16,7 +16,7 @@ def _flat(row: Dict[str, Any], prefix: str = "") -> Iterator[Tuple[str, Any]]:
 
 
 def _column(values: List[Any]) -> np.ndarray:
-    """Numbers as float64 with NaN for null, whole numbers and truth values as such, everything else as objects."""
+    """Returns numbers as float64 with NaN for null, integers and booleans as such, everything else as objects."""
     kinds = {type(value) for value in values}
     if kinds == {bool}:
         return np.array(values, dtype=bool)
@@ -31,14 +31,14 @@ def _column(values: List[Any]) -> np.ndarray:
 
 
 class Result:
-    """The result of a command: the same JSON that `--json` writes, to the last bit.
+    """The result of a command: the JSON that `--json` writes, identical to the last bit.
 
-    Fields are attributes and items: ``result.overall["rmse"]["z"]``, ``result["overall"]``. Their meaning and units
-    stand in the schema, ``swarmcert.schema(result.command)``.
+    Fields are attributes and items: ``result.overall["rmse"]["z"]``, ``result["overall"]``. The schema
+    ``swarmcert.schema(result.command)`` states their meaning and units.
 
     Attributes:
-        code:  exit code of the command line: 0 done or holds, 1 violated or refuted, 4 inconclusive
-        notes: lines that the command line writes to standard error
+        code:  exit code of the command: 0 done or holds, 1 violated or refuted, 4 inconclusive
+        notes: lines that the command writes to standard error
         text:  the JSON as text
     """
 
@@ -55,7 +55,7 @@ class Result:
 
     @property
     def holds(self) -> bool:
-        """Whether the command ended with 0: it is done, or what was claimed holds."""
+        """Whether the exit code is 0: the command is done, or the claim holds."""
         return self.code == 0
 
     def __getattr__(self, name: str) -> Any:
@@ -79,7 +79,7 @@ class Result:
         return f"<swarmcert {self.command}: code {self.code}, fields {', '.join(self.data)}>"
 
     def tables(self) -> List[str]:
-        """Names of the fields that table() takes."""
+        """Returns the names of the fields that table() accepts."""
 
         def is_rows(value: Any) -> bool:
             rows = list(value.values()) if isinstance(value, dict) else value
@@ -88,10 +88,10 @@ class Result:
         return [name for name, value in self.data.items() if is_rows(value)]
 
     def table(self, name: str) -> Dict[str, np.ndarray]:
-        """A list of objects as columns, for ``pandas.DataFrame(result.table("regions"))``.
+        """Returns a list of objects as columns, for ``pandas.DataFrame(result.table("regions"))``.
 
         Members of nested objects become columns such as "rmse.z". Numbers are float64 [rows] with NaN for null. An
-        object whose members are objects, such as compare's `vehicles`, is taken as rows, their names in "name".
+        object whose members are objects, such as compare's `vehicles`, becomes rows with the names in "name".
         """
         value = self.data[name]
         if isinstance(value, dict):
@@ -104,18 +104,18 @@ class Result:
 
 
 class Certification(Result):
-    """Result of certify(); `certificate` is the text that `certify -o` writes, for check() or a file."""
+    """The result of certify(); `certificate` is the text that `certify -o` writes, for check() or a file."""
 
     def __init__(self, code: int, text: str, notes: List[str], certificate: str) -> None:
         super().__init__(code, text, notes)
         self.certificate = certificate
 
     def upper(self, function: str = "") -> float:
-        """The proved Lipschitz constant over all inputs of all coordinates, in `bounds[].unit`.
+        """Returns the proved Lipschitz constant over all inputs and all coordinates, in `bounds[].unit`.
 
         Args:
-            function: "network", "phi:small", "set:small:small", ...; without it the largest of the whole network: of
-                the plain network or of all set functions.
+            function: "network", "phi:small", "set:small:small", ...; if omitted, the largest constant of the whole
+                network: of the plain network or of all set functions.
         """
         found = [
             bound["upper"]

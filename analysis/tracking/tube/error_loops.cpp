@@ -18,11 +18,11 @@ using stability::KernelCells;
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
-/// A slice is a whole number of periods up to this, relatively.
+/// Relative tolerance for a slice to count as an integer number of periods.
 constexpr double kPeriodTolerance = 1e-12;
 
 /// Cells of |k'| for ErrorLoop::slope1 .. slope3.
-/// @param more for a cell that is not quite a whole number of periods, relative to sup |k|.
+/// @param more allowance for a cell that deviates from an integer number of periods, relative to sup |k|.
 std::optional<KernelCells> slope_of(const std::optional<KernelCells>& kernel,
                                     const std::optional<KernelCells>& slope, double scale, double more) {
   if (!kernel || !slope) return std::nullopt;
@@ -36,11 +36,11 @@ std::optional<KernelCells> slope_of(const std::optional<KernelCells>& kernel,
   return result;
 }
 
-/// @param h4 missing where the loop has one lag, which makes it -direct_rest/tau.
+/// @param h4 missing if the loop has a single lag, where it equals -direct_rest/tau.
 void add_slopes(double slice_s, const std::optional<KernelCells>& h4, ErrorLoop& loop) {
   const double periods = std::round(slice_s / loop.period_s);
   if (!(periods >= 1) || !(std::abs(slice_s - periods * loop.period_s) <= kPeriodTolerance * slice_s)) return;
-  // What is left of a cell of P periods T is at most 1e-12 P T long, and t - t_k - T/2 there at most T/2.
+  // A cell of P periods T leaves a remainder of length at most 1e-12 P T, in which t - t_k - T/2 is at most T/2.
   const double more = 8 * kPeriodTolerance * periods;
   loop.slope1 = slope_of(loop.h1, loop.h2, 1, more);
   loop.slope2 = slope_of(loop.h2, loop.has_lag ? loop.h3 : loop.direct_rest, 1, more);
@@ -51,7 +51,7 @@ void add_slopes(double slice_s, const std::optional<KernelCells>& h4, ErrorLoop&
   loop.has_whole_periods = loop.slope1 && loop.slope2 && (loop.slope3 || !loop.has_lag);
 }
 
-/// p with every coefficient times `factor`, times s^power.
+/// p with every coefficient multiplied by `factor`, times s^power.
 IntervalVector times(Interval factor, const IntervalVector& p, int power = 0) {
   IntervalVector result(static_cast<std::size_t>(power));
   for (const Interval& c : p) result.push_back(factor * c);
@@ -64,8 +64,8 @@ IntervalVector sum(IntervalVector a, const IntervalVector& b) {
   return a;
 }
 
-/// Kernels of the loop whose motors' lag tau lies in an interval. With A the other lag, L = A + tau s A and
-///   D = d + tau d',   d = s^(2 + i) A + P,   d' = s^(3 + i) A,   i = 1 where Ki > 0, else 0; P as s^i allows.
+/// Kernels of the loop for motor lags tau in an interval. With the other lag A, L = A + tau s A and
+///   D = d + tau d',   d = s^(2 + i) A + P,   d' = s^(3 + i) A,   where i = 1 for Ki > 0, else 0, and P includes s^i.
 class LoopKernels {
  public:
   LoopKernels(const AxisLoop& loop, Interval motor_lag_s, double slice_s, int slices)
@@ -82,9 +82,9 @@ class LoopKernels {
                    motor_lag_s, slice_s, slices);
   }
 
-  /// L^-1[s^power/(m D)] with D of this class: h' has the power i.
+  /// L^-1[s^power/(m D)] with the D of this class: h' has power i.
   std::optional<KernelCells> h(int power) const { return cells_->cells(times(inverse_mass_, {1}, power)); }
-  /// L^-1[s^power (L - 1)/(s m D)]: g has the power i.
+  /// L^-1[s^power (L - 1)/(s m D)]: g has power i.
   std::optional<KernelCells> g(int power) const {
     const IntervalVector other(other_lag_.begin() + 1, other_lag_.end());  // (A - 1)/s
     const IntervalVector fixed = other.empty() ? IntervalVector() : times(inverse_mass_, other, power);
@@ -100,7 +100,7 @@ class LoopKernels {
   }
 
  private:
-  /// factor s^power A; empty without motors that lag.
+  /// factor s^power A; empty if the motors have no lag.
   IntervalVector by_motor(Interval factor, int power) const {
     return motor_.empty() ? IntervalVector() : times(factor, other_lag_, power);
   }
@@ -113,7 +113,7 @@ class LoopKernels {
 };
 
 /// @param loop its lags are those of the attitude.
-/// @param period_s of a sampled loop; 0: continuous.
+/// @param period_s period of a sampled loop; 0: continuous
 ErrorLoop error_loop(const AxisLoop& loop, Interval motor_lag_s, double period_s, double slice_s,
                      int slices) {
   ErrorLoop result;
@@ -216,7 +216,7 @@ void ErrorHistory::add(const ErrorHistory& other) {
     return;
   }
   for (std::size_t k = 0; k < position_m.size(); ++k) {
-    // Without a term there is nothing to round.
+    // A zero term needs no rounding.
     if (other.position_m[k] != 0) position_m[k] = up(position_m[k] + other.position_m[k]);
     if (other.velocity_m_s[k] != 0) velocity_m_s[k] = up(velocity_m_s[k] + other.velocity_m_s[k]);
   }
@@ -234,7 +234,7 @@ LagStart lag_start(const ErrorLoop& loop, double slice_s) {
   if (!loop.has_lag) return result;
   const Interval tau_s = loop.lags_s;
   const Interval cell_s = Interval(slice_s) * Interval(1 - 1e-12, 1 + 1e-12);
-  // A kernel leaves its mean over a cell by at most the integral of its slope's absolute value there.
+  // A kernel deviates from its mean over a cell by at most the integral of the absolute value of its derivative there.
   const auto values = [&](const KernelCells& kernel, const KernelCells& slope, Interval slope_scale = 1) {
     std::vector<Interval> of_cell;
     for (std::size_t n = 0; n < kernel.net.size(); ++n) {
@@ -245,7 +245,7 @@ LagStart lag_start(const ErrorLoop& loop, double slice_s) {
   };
   result.position_m = values(*loop.h1, *loop.h2);
   result.velocity_m_s = values(*loop.h2, *loop.h3);
-  // With one lag h'''' = -direct_rest/tau.
+  // For a single lag, h'''' = -direct_rest/tau.
   if (loop.direct_rest) result.acceleration_m_s2 = values(*loop.h3, *loop.direct_rest, Interval(1) / tau_s);
   return result;
 }
@@ -270,7 +270,7 @@ EstimateAnswer estimate_answer(const ErrorLoop& loop, double velocity_m_s, doubl
   result.errors = {of(loop.h1, result.force_N), of(loop.h2, result.force_N)};
   result.errors.add({of(loop.h, integrated_N), of(loop.h1, integrated_N)});
   if (loop.period_s == 0) return result;
-  // Without a lag e'' follows a force at once, and then feeds back.
+  // Without a lag, e'' follows a force at once, before feedback acts.
   result.acceleration_m_s2 = of(loop.has_lag ? loop.h3 : loop.direct_rest, result.force_N);
   const double at_once_m_s2 = loop.has_lag ? 0 : (Interval(result.force_N) / loop.mass_kg).upper;
   const std::vector<double> integrated = of(loop.h2, integrated_N);

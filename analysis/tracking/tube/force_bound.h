@@ -1,5 +1,4 @@
-/// @file Bounds of |f_hat - f_a| over a tube, stretch by stretch: straight from both forces, or from a Lipschitz
-/// constant.
+/// @file Bounds of |f_hat - f_a| over a tube, per stretch: directly from both forces, or from a Lipschitz constant.
 #pragma once
 
 #include <atomic>
@@ -14,22 +13,24 @@ namespace swarmcert::analysis {
 class ForceBound {
  public:
   virtual ~ForceBound() = default;
-  /// Makes ready for every tube within `largest`. @returns false where it was cancelled.
+  /// Prepares the bound for every tube within `largest`.
+  /// @returns false if cancelled.
   virtual bool prepare(const Radii& largest, const std::vector<TruthSizes>& truth) = 0;
-  /// Newton, per stretch of the scene, in real arithmetic. Precondition: radii within what was prepared.
+  /// Returns the bounds in newton per stretch of the scene, in real arithmetic. Precondition: radii within the
+  /// prepared ones.
   virtual std::vector<double> sizes(const Radii& radii) const = 0;
 };
 
 struct EnclosureOptions {
-  int boxes = 8;  ///< at most so many parts of each stretch's set of states
+  int boxes = 8;  ///< maximum number of parts of each stretch's set of states
   double tolerance =
-      0.04;  ///< no further where the bound is this near to a value found, of the largest bound of all
+      0.04;  ///< stops refining when the bound is this close to an attained value, relative to the largest bound
   int jobs = 0;
   const std::atomic<bool>* cancelled = nullptr;
   std::function<void(int done, int total)> progress;
 };
 
-/// From the difference itself, made ready stretch by stretch for the largest tube.
+/// Bounds the difference itself, prepared per stretch for the largest tube.
 class Enclosure final : public ForceBound {
  public:
   Enclosure(const Scene& scene, EnclosureOptions options) : scene_(scene), options_(std::move(options)) {}
@@ -42,18 +43,19 @@ class Enclosure final : public ForceBound {
   EnclosureOptions options_;
 };
 
-/// Constants of the network's force on a vehicle, newton per m and per m/s; `together` with respect to both at once.
+/// Lipschitz constants of the network's force on a vehicle, in newton per m and per m/s; `together` is with respect
+/// to both.
 struct ForceConstants {
-  double together = 0, position = 0, velocity = 0;  ///< of one neighbour's state
-  double own = 0;                                   ///< of the ground's input, together
+  double together = 0, position = 0, velocity = 0;  ///< with respect to the state of one neighbour
+  double own = 0;                                   ///< with respect to the input of the ground
 };
 
-/// |f_hat - f_a| at the set points, and from there by slopes: L |deviation| of each neighbour, and the truth's own
-/// gradient.
+/// Bounds |f_hat - f_a| at the setpoints, and extends it by slopes: L |deviation| of each neighbour, and the gradient
+/// of the truth.
 class SlopeBound final : public ForceBound {
  public:
-  /// @param at_set_points what an Enclosure says of radii 0.
-  /// @param constants per vehicle; they hold within `limit`.
+  /// @param at_set_points result of an Enclosure for radii 0.
+  /// @param constants per vehicle; valid within `limit`.
   SlopeBound(const Scene& scene, std::vector<double> at_set_points, std::vector<ForceConstants> constants)
       : scene_(scene), at_set_points_(std::move(at_set_points)), constants_(std::move(constants)) {}
   bool prepare(const Radii& largest, const std::vector<TruthSizes>& truth) override;
@@ -66,7 +68,7 @@ class SlopeBound final : public ForceBound {
   std::vector<TruthSizes> truth_;
 };
 
-/// What a deviation of a neighbour's position and velocity costs, the smaller of both bounds.
+/// Bound on the effect of a deviation of a neighbour's position and velocity; the smaller of both bounds.
 double slope_cost_N(const ForceConstants& constants, double position_m, double velocity_m_s);
 
 }  // namespace swarmcert::analysis

@@ -31,7 +31,7 @@ bool has_block(const files::Network& network, const files::FunctionId& function,
   return std::find(blocks.begin(), blocks.end(), block) != blocks.end();
 }
 
-/// LipSDP, at most `otherwise`; infinite for a block that the function has not.
+/// The LipSDP bound, at most `otherwise`; infinite for a block that the function does not have.
 double sdp_constant(const files::Network& network, const files::FunctionId& function,
                     const std::string& block, double otherwise, std::vector<double>* t,
                     const std::atomic<bool>* cancelled) {

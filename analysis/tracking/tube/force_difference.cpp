@@ -13,7 +13,7 @@ using Eigen::VectorXd;
 using lipschitz::Box;
 
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
-/// Far above what a few hundred roundings of terms of one size can cost, relative to that size.
+/// Relative allowance for round-off, far above the error of a few hundred operations on terms of equal magnitude.
 constexpr double kRounding = 1e-12;
 
 Box box_of(const std::vector<Interval>& states) {
@@ -29,12 +29,12 @@ bool by_bound(const std::shared_ptr<const T>& a, const std::shared_ptr<const T>&
 
 }  // namespace
 
-/// row x + constant
+/// The linear form row x + constant.
 struct ForceDifference::Form {
   VectorXd row;
   double constant = 0;
 
-  /// At least its largest value over a box, rounding included.
+  /// Upper bound of the form over a box, including round-off.
   double largest(const Box& box) const {
     double value = constant;
     double size = std::abs(constant);
@@ -52,23 +52,23 @@ struct ForceDifference::Form {
 struct ForceDifference::Part {
   Box box;
   Form above, below;  ///< f_hat - f_a <= above, f_a - f_hat <= below
-  double bound = 0;   ///< of |f_hat - f_a| on the part
-  double found = 0;   ///< |f_hat - f_a| somewhere in it: an estimate
-  Index widest = 0;   ///< coordinate to halve next
+  double bound = 0;   ///< bound on |f_hat - f_a| over the part
+  double found = 0;   ///< an attained |f_hat - f_a| in the part: an estimate
+  Index widest = 0;   ///< coordinate to bisect next
   LearnedForce::Forms learned;
 };
 
 /// The true wake over a part of the states. With a gradient it lies in at_centre_N + slope (x' - centre) -+ spread_N
-/// for x' in the part, which is what the network saw; the truth acts at x, which is x' up to what the network's age
-/// allows.
+/// for x' in the part, where x' is the state that the network received; the truth acts at x, which differs from x' by
+/// what the network's age allows.
 struct ForceDifference::WakeForm {
   TruthForce::Wake wake;
   Interval at_centre_N;
   VectorXd centre;  ///< of the part
   VectorXd slope;   ///< the middle of the gradient
-  VectorXd bend;    ///< half the gradient's width
+  VectorXd bend;    ///< half the width of the gradient
   double spread_N = 0;
-  double size_N = 0;  ///< of the terms, for their rounding
+  double size_N = 0;  ///< magnitude of the terms, for the bound on their rounding
 };
 
 ForceDifference::WakeForm ForceDifference::wake_form(const Box& box) const {
@@ -113,8 +113,8 @@ std::vector<Offset> ForceDifference::offsets_at(const VectorXd& x) const {
   return offsets;
 }
 
-/// At least sign (f_hat - f_a) on the box, where sign f_hat <= row x' + constant: once with the truth's slope, once
-/// with its range; the smaller counts.
+/// Upper bound of sign (f_hat - f_a) on the box, where sign f_hat <= row x' + constant: computed once with the slope
+/// of the truth and once with its range; the smaller bound is used.
 ForceDifference::Form ForceDifference::difference(const Box& box, const WakeForm& truth, const VectorXd& row,
                                                   double constant, double sign) const {
   const Interval rest_N = rest_.force_N[2];
@@ -132,7 +132,7 @@ ForceDifference::Form ForceDifference::difference(const Box& box, const WakeForm
   return sloped.largest(box) < flat.largest(box) ? sloped : flat;
 }
 
-/// |f_hat - f_a| where both forces act at x: an estimate.
+/// |f_hat - f_a| with both forces evaluated at x: an estimate.
 double ForceDifference::roughly(const VectorXd& x) const {
   const Interval f = scene_->truth().wake(offsets_at(x)).value_N + rest_.force_N[2];
   return std::abs(scene_->learned().roughly(x) - (f.lower + f.upper) / 2);
@@ -191,7 +191,7 @@ void ForceDifference::refine(int boxes, double tolerance_N, const std::atomic<bo
       std::push_heap(parts_.begin(), parts_.end(), by_bound<Part>);
     }
   }
-  for (auto& one : parts_) {  // the relaxations are not needed any more
+  for (auto& one : parts_) {  // the relaxations are no longer needed
     auto light = std::make_shared<Part>(*one);
     light->learned = {};
     one = std::move(light);

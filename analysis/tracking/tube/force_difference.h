@@ -1,4 +1,4 @@
-/// @file The difference of both forces, f_hat - f_a along z, over the states of one stretch.
+/// @file The difference of the forces, f_hat - f_a along z, over the states of one stretch.
 #pragma once
 
 #include <atomic>
@@ -9,20 +9,22 @@
 
 namespace swarmcert::analysis {
 
-/// f_hat(x(t - age)) - f_a(x(t)) for 0 <= age <= Scene::network_age_s(), where the network is given x with errors of
-/// the estimates. On each part of a box, the network lies between linear forms by outward-rounded relaxation (Reach),
-/// the truth between its mean value forms f_a(x_0) + G (x - x_0) in intervals; their difference is one linear form, so
-/// that slopes which agree cancel. A form holds on its whole part: for smaller deviations its largest value over what
-/// is left of the part holds as well, and costs nothing.
+/// Encloses f_hat(x(t - age)) - f_a(x(t)) for 0 <= age <= Scene::network_age_s(), where the network receives x with
+/// estimation errors. On each part of a box, outward-rounded relaxation (Reach) encloses the network between linear
+/// forms, and mean value forms f_a(x_0) + G (x - x_0) in interval arithmetic enclose the truth. The difference is one
+/// linear form, so that equal slopes cancel. A form holds on its whole part: for smaller deviations, its maximum over
+/// the remaining subset of the part is still a valid bound and costs nothing.
 class ForceDifference {
  public:
-  /// @param scene, stretch must outlive this. @param largest deviations for which it is made ready.
+  /// @param scene, stretch must outlive this object.
+  /// @param largest deviations for which the bound is prepared.
   ForceDifference(const Scene& scene, const Stretch& stretch, const Deviations& largest);
 
-  double bound_N() const;  ///< of |f_hat - f_a|, as far as it is refined
-  /// Halves the worst part until there are `boxes`, or the bound is within `tolerance_N` of a value found. Once only.
+  double bound_N() const;  ///< bound on |f_hat - f_a| at the present refinement
+  /// Halves the worst part until there are `boxes` parts, or the bound is within `tolerance_N` of an attained value.
+  /// Call at most once.
   void refine(int boxes, double tolerance_N, const std::atomic<bool>* cancelled);
-  /// Contains f_hat - f_a, newton, in real arithmetic. Precondition: deviations within `largest`.
+  /// Encloses f_hat - f_a in newton, in real arithmetic. Precondition: deviations within `largest`.
   Interval over(const Deviations& deviations) const;
 
  private:
@@ -40,7 +42,7 @@ class ForceDifference {
   const Stretch* stretch_;
   std::vector<Interval> all_;  ///< every state of the stretch
   TruthForce::Rest rest_;
-  std::vector<std::shared_ptr<const Part>> parts_;  ///< a heap, the worst first
+  std::vector<std::shared_ptr<const Part>> parts_;  ///< a heap, worst part first
 };
 
 }  // namespace swarmcert::analysis

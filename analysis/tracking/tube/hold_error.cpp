@@ -34,7 +34,7 @@ void LoopHistory::add(const LoopHistory& later) {
        {&LoopHistory::position_m, &LoopHistory::velocity_m_s, &LoopHistory::force_N, &LoopHistory::truth_N,
         &LoopHistory::planned_m_s2, &LoopHistory::jerk_m_s3, &LoopHistory::time_s,
         &LoopHistory::of_estimates_m_s2}) {
-    // NaN, which bounds nothing, stays.
+    // Keeps NaN, since it means that no bound is known.
     if (!std::isnan(this->*entry) && !(later.*entry <= this->*entry)) this->*entry = later.*entry;
   }
 }
@@ -67,7 +67,8 @@ HeldAnswer hold_error(const ErrorLoop& loop, const HeldSlice& slice) {
       T * Interval(loop.Ki) * (slice.history.position_m + T * slice.history.velocity_m_s) / Interval(2);
   const double near_m_s2 = std::max(slice.acceleration_m_s2.mag(), slice.acceleration_before_m_s2.mag());
   const double ever_m_s2 = std::max(near_m_s2, slice.largest_acceleration_m_s2);
-  // more <= per_rising_N (Kp |e'| + sup|p_d'''| + Kd (near + more)) + per_N (rest + trapezoidal (ever + more))
+  // `more`, the contribution of x to |e''| in the slice, satisfies
+  //   more <= per_rising_N (Kp |e'| + sup|p_d'''| + Kd (near + more)) + per_N (rest + trapezoidal (ever + more)).
   const Interval left = Interval(1) - per_rising_N * loop.Kd - per_N * trapezoidal;
   if (!(left.lower > 0)) return nothing;
   const double more_m_s2 = ((per_rising_N * (Interval(loop.Kp) * slice.velocity_m_s.mag() +

@@ -21,7 +21,7 @@ using lipschitz::ReachNetwork;
 
 constexpr double kOpenEnd = std::numeric_limits<double>::infinity();
 
-/// Layers that hand on what a ReLU has already let through: relu(I h) = h.
+/// Appends identity layers, which pass on what a ReLU has already let through: relu(I h) = h.
 void deepen(ReachNetwork& network, std::size_t depth, const std::string& path) {
   if (network.size() < depth && network.size() < 2) {
     throw files::InputError({path, "", "phi", "", "has networks with and without hidden layers",
@@ -34,7 +34,7 @@ void deepen(ReachNetwork& network, std::size_t depth, const std::string& path) {
   }
 }
 
-/// The same networks side by side: layer by layer, on inputs one after the other.
+/// Runs the networks in parallel as one, layer by layer, on the concatenation of their inputs.
 ReachNetwork side_by_side(const std::vector<ReachNetwork>& parts) {
   ReachNetwork result;
   for (std::size_t k = 0; k < parts.front().size(); ++k) {
@@ -56,7 +56,7 @@ ReachNetwork side_by_side(const std::vector<ReachNetwork>& parts) {
   return result;
 }
 
-/// Replaces the outputs of `parts` networks, `hidden` each, by their sum.
+/// Replaces the outputs of `parts` networks, `hidden` outputs each, by their sum.
 void add_up(ReachLayer& last, Index hidden) {
   const Index parts = last.bias.size() / hidden;
   MatrixXd weights(hidden, last.weights.cols());
@@ -64,7 +64,7 @@ void add_up(ReachLayer& last, Index hidden) {
   VectorXd size = VectorXd::Zero(hidden);
   weights.setZero();
   for (Index p = 0; p < parts; ++p) {
-    weights += last.weights.middleRows(p * hidden, hidden);  // no two have an entry in one place: exact
+    weights += last.weights.middleRows(p * hidden, hidden);  // exact: nonzero entries do not overlap
     bias += last.bias.segment(p * hidden, hidden);
     size += last.bias.segment(p * hidden, hidden).cwiseAbs();
   }
@@ -83,7 +83,7 @@ Index component(const std::string& name) {
 
 LearnedForce::LearnedForce(const files::Network& network, const std::string& kind, int neighbours) {
   files::require_relative_states(network, "a tube is of networks of relative states");
-  stability::DeepSetForce(network, kind, {kind});  // refuses what no flight could use
+  stability::DeepSetForce(network, kind, {kind});  // rejects networks that cannot be used in flight
   std::vector<std::string> kinds;
   for (const auto& [name, weights] : network.phi)
     if (name != files::kGroundKind) kinds.push_back(name);
@@ -99,7 +99,7 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
             : static_cast<int>(component(network.input_order[static_cast<std::size_t>(i)])));
   }
 
-  // Inputs in the order of the state: columns are moved or negated, which is exact.
+  // Orders the inputs as in the state: columns are moved or negated, which is exact.
   ReachNetwork one = lipschitz::reach_network(network.phi.at(phi));
   MatrixXd first = MatrixXd::Zero(one.front().weights.rows(), kPerNeighbour);
   for (int i = 0; i < inputs; ++i)
@@ -110,7 +110,7 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
   if (ground != network.phi.end()) {
     ground_function_ = files::FunctionId::set(files::kGroundKind, rho);
     parts.push_back(lipschitz::reach_network(ground->second));
-    parts.back().front().weights *= -1;  // it sees -z and -v
+    parts.back().front().weights *= -1;  // its inputs are -z and -v
   }
   std::size_t depth = 0;
   for (const ReachNetwork& part : parts) depth = std::max(depth, part.size());
@@ -167,13 +167,13 @@ LearnedForce::Forms LearnedForce::over(const lipschitz::Box& box, const Forms* a
     const double largest = std::max(std::abs(inner.lower[at]), std::abs(inner.upper[at]));
     for (Index r = 0; r < 2; ++r) size(r) += std::abs(rows(r, k)) * largest;
     if (inner.lower[at] == box.lower[at] && inner.upper[at] == box.upper[at]) continue;
-    // Beyond the clamp the input stands still: the form's largest value along this input is a constant.
+    // Beyond the clamp the input is constant, so the maximum of the form along this input is a constant.
     for (Index r = 0; r < 2; ++r) {
       constants(r) += std::max(rows(r, k) * inner.lower[at], rows(r, k) * inner.upper[at]);
       rows(r, k) = 0;
     }
   }
-  // A dozen roundings of the constant at most, and one of each coefficient by the unit.
+  // Covers about a dozen roundings of the constant, and one of each coefficient by the unit.
   constants += 1e-14 * size;
   forms.upper_row = newton_per_unit_ * rows.row(0).transpose();
   forms.lower_row = newton_per_unit_ * rows.row(1).transpose();

@@ -10,12 +10,12 @@ namespace {
 
 constexpr int kMostTrials = 14;
 constexpr int kMostSteps = 80;
-/// What is proved is this much larger than the fixed point, relatively and in m or m/s.
+/// Relative and absolute (m or m/s) margin of the proved tube over the fixed point.
 constexpr double kRelative = 1e-3, kAbsolute = 1e-7;
-/// No further round where the last one gained less, relatively.
+/// Stops when the last round improved the tube by less than this, relatively.
 constexpr double kWorthwhile = 0.01;
 
-/// A tube within which the bounds are prepared.
+/// A tube for which the bounds are prepared.
 class Trial {
  public:
   Trial(const Scene& scene, const ForceBound& bound, const Radii& largest, std::vector<TruthSizes> truth)
@@ -23,7 +23,7 @@ class Trial {
     for (int i = 0; i < scene.vehicles(); ++i) others_.push_back(scene.other_errors(i, truth_));
   }
 
-  /// B(r), for r within the tube.
+  /// B(r), for r within the prepared tube.
   Radii allowed(const Radii& radii) const {
     const std::vector<double> force_N = bound_.sizes(radii);
     Radii result = Radii::none(scene_.vehicles());
@@ -41,7 +41,8 @@ class Trial {
     return result;
   }
 
-  /// Radii that prove themselves; false where there are none within the tube. @param reached what was too large.
+  /// Finds radii that prove themselves. Returns false if there are none within the prepared tube; `reached` then
+  /// holds the radii that were too large.
   bool least(Radii& found, Radii& reached) const {
     Radii r = Radii::none(scene_.vehicles());
     double last_step = 0;
@@ -51,7 +52,7 @@ class Trial {
       if (!next.within(largest_)) return false;
       const double step = distance(next, r);
       const double ratio = last_step > 0 ? std::min(step / last_step, 0.999) : 0;
-      // A geometric series from here on, with some room.
+      // Assumes a geometric series from here on, with some margin.
       Radii guess = extrapolated(r, next, 1.05 * ratio / (1 - ratio)).scaled(1 + kRelative, kAbsolute);
       if (guess.within(largest_) && proves_itself(guess)) {
         tighten(guess);
@@ -62,7 +63,7 @@ class Trial {
       last_step = step;
       r = next;
     }
-    // The fixed point itself may lie at the tube's edge.
+    // The fixed point itself may lie on the boundary of the tube.
     if (!proves_itself(largest_)) return false;
     found = largest_;
     tighten(found);
@@ -135,7 +136,7 @@ LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m, d
   };
   std::vector<TruthSizes> truth = prepared(none);
   if (result.cancelled) return result;
-  // Without any deviation: below every tube.
+  // B(0), below every tube.
   const Radii start = Trial(scene, bound, none, std::move(truth)).allowed(none);
   Radii largest = start.scaled(1.4, 1e-4);
   if (largest.largest_position_m() > wanted_m) {
@@ -148,7 +149,7 @@ LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m, d
   }
   for (int i = 0; i < kMostTrials; ++i) {
     truth = prepared(largest);
-    // What is proved already stays so when a later round is interrupted.
+    // Earlier proofs remain valid when a later round is interrupted.
     if (result.cancelled) break;
     const Trial trial(scene, bound, largest, std::move(truth));
     Radii found, reached;

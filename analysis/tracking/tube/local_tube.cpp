@@ -12,22 +12,22 @@ namespace swarmcert::analysis {
 
 namespace {
 
-/// How much wider than the tube the box is on which local constants are sought.
+/// Size of the box on which local constants are computed, relative to the tube.
 constexpr double kLocalBox = 1.6;
-/// More parts slice by slice, where each slice is made ready once or twice, than for one radius, where all are many
-/// times.
+/// Factor on the number of parts for the sliced tube, where each slice is prepared once or twice, relative to a
+/// single radius, where all slices are prepared many times.
 constexpr int kSlicedParts = 4;
-/// How many times as wide as the tube slice by slice one radius for the whole flight may be.
+/// Largest useful width of a tube with one radius for the whole flight, relative to the sliced tube.
 constexpr double kWidest = 2.5;
 constexpr double kFarthest_m = 0.5;
 
-/// The bound of a row that has better constants is at most that of a row with worse ones: a tube proved by the latter
-/// is proved by the former.
+/// The bound of a row with better constants is at most that of a row with worse constants, so a tube proved by the
+/// latter is also proved by the former.
 void inherit(LeastTube& better, const LeastTube& worse) {
   if (worse.proved && (!better.proved || worse.radius_m(2) < better.radius_m(2))) better = worse;
 }
 
-/// A tube of one radius, as far as it is proved, cut down to what holds slice by slice.
+/// Intersects a tube of one radius, as far as it is proved, with the sliced tube.
 LeastTube narrowed(const LeastTube& tube, const SlicedTube& sliced, const Motion& motion) {
   if (!sliced.proved) return tube;
   LeastTube result = tube;
@@ -108,14 +108,14 @@ LocalTube tube_of_loop(const stability::TrackingSetup& tracking, const stability
     EnclosureOptions finer = with_progress;
     finer.boxes *= kSlicedParts;
     result.sliced = sliced_tube(scene, finer, tolerance_N);
-    // What is much wider than a tube that is proved already adds nothing to it.
+    // A tube that is much wider than one already proved adds nothing to it.
     const double wanted_m = result.sliced.proved ? kWidest * result.sliced.radii().largest_position_m()
                                                  : std::numeric_limits<double>::infinity();
     show(2, "tube of one radius");
     Enclosure enclosure(scene, with_progress);
     result.one_radius = least_tube(scene, enclosure, kFarthest_m, wanted_m);
   }
-  // Constants of the network prove no tube of the sampled loop where the forces themselves do not.
+  // If the forces themselves prove no tube of the sampled loop, constants of the network do not either.
   if (is_sampled && has_start && !is_cancelled() && !result.sliced.proved && !result.one_radius.proved) {
     result.why = result.sliced.why;
     return result;
@@ -136,7 +136,7 @@ LocalTube tube_of_loop(const stability::TrackingSetup& tracking, const stability
     row("product", std::vector<ForceConstants>(per_vehicle, global.product));
     row("global", std::vector<ForceConstants>(per_vehicle, global.sdp));
     steps.next("local constants");
-    // On the tube that is proved, or on what errors would be if they did not feed back.
+    // On the proved tube, or on the errors that would occur without feedback of the errors.
     const LeastTube so_far = narrowed(result.one_radius, result.sliced, scene.motion());
     Radii box = so_far.proved ? so_far.radii.scaled(kLocalBox, 1e-4) : none;
     if (!so_far.proved) {

@@ -10,24 +10,25 @@ namespace {
 
 using stability::SetpointRange;
 
-/// Ends are moved outwards to multiples of this, so that periods which differ by rounding alone are found to be the
-/// same.
+/// Interval ends are rounded outward to multiples of this, so that periods that differ only by rounding are
+/// recognised as equal.
 constexpr double kGrid = 0x1p-24;
 
 Interval snapped(Interval x) {
   return {std::floor(x.lower / kGrid) * kGrid, std::ceil(x.upper / kGrid) * kGrid};
 }
 
-/// Where the set points of all vehicles are: from `memory_s` before a slice on, in it, and from `held_s` before it on.
+/// Setpoint ranges of all vehicles: in a slice and the `memory_s` before it, in the slice alone, and in it and the
+/// `held_s` before it.
 struct SliceRanges {
   std::vector<SetpointRange> ranges, now, held;
-  bool complete = false;  ///< The task knows all of them.
+  bool complete = false;  ///< the task has an enclosure for all of them
 };
 
 SliceRanges ranges_of(const stability::Task& task, int vehicles, int slice, double slice_s, double memory_s,
                       double held_s) {
   SliceRanges result;
-  // A little more than the slice: slice * slice_s is rounded.
+  // Slightly more than the slice, because slice * slice_s is rounded.
   const double margin_s = 1e-12 * (slice + 2);
   const auto add_ranges = [&](double before_s, std::vector<SetpointRange>& to) {
     const double from_s = std::max(0.0, slice * slice_s - before_s - margin_s);
@@ -42,7 +43,7 @@ SliceRanges ranges_of(const stability::Task& task, int vehicles, int slice, doub
   return result;
 }
 
-/// A stretch and its numbers: stretches with equal numbers are the same one.
+/// A stretch with its numbers as a key: stretches with equal numbers are identical.
 struct KeyedStretch {
   Stretch stretch;
   std::vector<double> key;
@@ -54,7 +55,7 @@ struct KeyedStretch {
     return outer;
   }
 
-  /// How vehicle `other` moves relative to `own`.
+  /// Appends the motion of vehicle `other` relative to `own`.
   void add_neighbour(const SetpointRange& own, const SetpointRange& other) {
     for (int a = 0; a < 3; ++a) stretch.state.push_back(kept(other.p_W_m[a] - own.p_W_m[a]));
     for (int a = 0; a < 3; ++a) stretch.state.push_back(kept(other.v_W_m_s[a] - own.v_W_m_s[a]));
@@ -68,7 +69,7 @@ struct KeyedStretch {
   }
 };
 
-/// The stretch of vehicle `i` in a slice.
+/// Returns the stretch of vehicle `i` in a slice.
 KeyedStretch stretch_in(const SliceRanges& slice, int i) {
   const auto at = static_cast<std::size_t>(i);
   const SetpointRange& own = slice.ranges[at];

@@ -6,8 +6,8 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// At least the first and the last cell, of `count`, that x meets; x may lie outside. The width of a cell is far above
-/// what rounding moves an edge by, and cells that x touches count.
+/// Returns the first and the last of `count` cells that x may meet; x may lie outside. Cells that x only touches are
+/// included, and the tolerance far exceeds the rounding error of a cell edge.
 std::array<int, 2> cells_of(Interval x, double lowest, double step, int count) {
   constexpr double kEdge = 1e-9;
   const double first = std::floor((x.lower - lowest) / step - kEdge);

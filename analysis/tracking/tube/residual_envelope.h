@@ -1,4 +1,4 @@
-/// @file What flights say that a declared truth leaves out: forces by the place of the neighbour.
+/// @file The force that a declared truth leaves out according to flights, by the position of the neighbour.
 #pragma once
 
 #include <array>
@@ -8,12 +8,13 @@
 
 namespace swarmcert::analysis {
 
-/// Ranges of a force on a vehicle, in newton and world axes, by the cell of the place of one neighbour: the laterally
-/// nearest of those within the grid's heights. `away` holds where there is none or it is beyond the grid.
+/// Ranges of a force on a vehicle, in newton and world axes, by the cell of the position of one neighbour: the one
+/// with the smallest lateral distance among those within the grid's heights. `away` applies if there is none or it is
+/// outside the grid.
 struct ResidualEnvelope {
   struct Cell {
     std::array<Interval, 3> force_N;
-    int flights = 0;  ///< that have been in it; 0: a range that others gave
+    int flights = 0;  ///< number of flights that visited it; 0: the range comes from other cells
   };
   double lowest_m = 0, height_step_m = 0, lateral_step_m = 0;
   int heights = 0, laterals = 0;
@@ -24,10 +25,10 @@ struct ResidualEnvelope {
     return static_cast<std::size_t>(height) * static_cast<std::size_t>(laterals) +
            static_cast<std::size_t>(lateral);
   }
-  /// Every cell that may count while the neighbours are at these offsets. Whichever of them is the nearest, its cells
-  /// are among these; so is `away`, unless one of them is certainly within the grid.
+  /// Returns every cell that may apply while the neighbours are at these offsets. Whichever neighbour is nearest, its
+  /// cells are included; so is `away`, unless one neighbour is certainly within the grid.
   std::vector<std::size_t> reached(const std::vector<Offset>& neighbours) const;
-  /// Contains the force along `axis` wherever the neighbours are within their offsets.
+  /// Encloses the force along `axis` for all neighbour positions within the offsets.
   Interval over(const std::vector<Offset>& neighbours, std::size_t axis) const;
 };
 

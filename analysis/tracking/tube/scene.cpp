@@ -10,7 +10,7 @@ namespace swarmcert::analysis {
 
 namespace {
 
-/// Largest part of an interval of lags: from its lag to this much more, as a logarithm. Errors of one part differ by
+/// Largest part of a lag interval, as the logarithm of the ratio of its ends. The errors within one part differ
 /// little, and those of all parts are united.
 constexpr double kLagPart = 0.05;
 constexpr int kMostLagParts = 16;
@@ -142,7 +142,7 @@ Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& t
   add_lag_parts(is_sampled);
   if (!refusal().empty() || !loops_.axis[2].has_lag) return;
   lag_start_z_ = lag_start(loops_.axis[2], motion_.slice_s);
-  // Vehicles start at their set points; the prediction is what it differs from the truth, and the truth.
+  // Vehicles start at their setpoints; the prediction is the truth plus the difference f_hat - f_a.
   const Deviations none = all_within(Radii::none(vehicles));
   for (int i = 0; i < vehicles; ++i) {
     const int first = motion_.stretch_of[static_cast<std::size_t>(i)].front();
@@ -167,7 +167,7 @@ void Scene::add_lag_parts(bool is_sampled) {
     part.loops = count == 1 ? loops_
                             : error_loops(tracking_, motion_.slice_s, motion_.slices, is_sampled,
                                           Interval(from_s, to_s));
-    // A part of an interval for which there are kernels has them too, unless rounding decides.
+    // If there are kernels for the whole interval, there are kernels for each part, unless rounding decides otherwise.
     if (!part.loops.refusal.empty()) loops_.refusal = part.loops.refusal;
     if (part.loops.refusal.empty() && part.loops.axis[2].has_lag)
       part.start_z = lag_start(part.loops.axis[2], motion_.slice_s);
@@ -200,7 +200,7 @@ std::vector<Interval> Scene::seen_states(const Stretch& stretch, const Deviation
   if (estimates_.are_zero()) return states;
   std::size_t at = 0;
   for (int n = 0; n + 1 < vehicles(); ++n) {
-    // The vehicle's own error and its neighbour's.
+    // The vehicle's own error plus that of its neighbour.
     for (std::size_t k = 0; k < 3; ++k, ++at) states[at] = widened(states[at], 2 * estimates_.position_m[k]);
     for (std::size_t k = 0; k < 3; ++k, ++at)
       states[at] = widened(states[at], 2 * estimates_.velocity_m_s[k]);
@@ -231,7 +231,7 @@ TruthForce::Rest Scene::rest(const Stretch& stretch, const Deviations& deviation
   const std::vector<Interval> states = this->states(stretch, deviations);
   const Interval* const own = &states[states.size() - kOwnState];
   const Interval velocity[3] = {own[1], own[2], own[3]};
-  // The thrust's vector behind a first-order lag: |T'| <= |command - T| / tau.
+  // The thrust vector follows a first-order lag: |T'| <= |command - T| / tau.
   const double tau_s = motor_lag_s_.lower;
   const double thrust_rate_N_s =
       tau_s > 0 ? up(2 * tracking_.plant.largest_thrust_N / tau_s) : std::numeric_limits<double>::infinity();

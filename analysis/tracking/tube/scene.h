@@ -1,5 +1,4 @@
-/// @file Vehicles that fly a task with a network, in the world of a declared truth: what every tube about them rests
-/// on.
+/// @file Vehicles that fly a task with a network under a declared truth: the common basis of all tubes.
 #pragma once
 
 #include <array>
@@ -15,59 +14,59 @@
 
 namespace swarmcert::analysis {
 
-/// How far each vehicle may be from its set point, axis by axis: |e| and |e'| of vehicle i are at most these.
+/// Deviation of each vehicle from its setpoint per axis: bounds on |e| and |e'| of vehicle i.
 struct Radii {
   std::vector<std::array<double, 3>> position_m, velocity_m_s;
 
   static Radii none(int vehicles);
-  /// Whether every entry is at most `other`'s. False for NaN.
+  /// Whether every entry is at most that of `other`. False for NaN.
   bool within(const Radii& other) const;
-  /// Whether every entry is below `other`'s. False for NaN.
+  /// Whether every entry is below that of `other`. False for NaN.
   bool below(const Radii& other) const;
   Radii scaled(double factor, double more) const;  ///< factor x + more
   double largest_position_m(int axis) const;
   double largest_position_m() const;  ///< over all axes
 };
 
-Radii smaller(const Radii& a, const Radii& b);  ///< entry by entry
+Radii smaller(const Radii& a, const Radii& b);  ///< entrywise
 Radii larger(const Radii& a, const Radii& b);
 
-/// Where one vehicle may be about its set point: e and e' lie in these.
+/// Deviation of one vehicle from its setpoint: intervals of e and e'.
 struct Deviation {
   std::array<Interval, 3> position_m, velocity_m_s;
 };
 using Deviations = std::vector<Deviation>;  ///< of every vehicle
 
-/// All that is within radii.
+/// Returns the symmetric intervals of the given radii.
 Deviations all_within(const Radii& radii);
 
-/// The declared truth at the states of one stretch: f_a and how it changes.
+/// The declared truth at the states of one stretch: f_a and its sensitivity.
 struct TruthSizes {
   Interval force_N[3];
-  double rest_width_N = 0;           ///< along z, of all but wakes: largest change within the tube
+  double rest_width_N = 0;           ///< along z, of all effects but wakes: largest change within the tube
   std::vector<double> gradient_N_m;  ///< per neighbour, |d f_z / d p_j|; infinite where the field jumps
 };
 
-/// Makes `a` contain `b`.
+/// Enlarges `a` to contain `b`.
 void unite(TruthSizes& a, const TruthSizes& b);
 
-/// The loops whose motors lag by what lies in a part of the interval of lags, and what the start of rotors does to z.
+/// The loops for motor lags in one part of the lag interval, and the effect of the rotors' initial thrust on z.
 struct LagPart {
   ErrorLoops loops;
   LagStart start_z;
 };
 
-/// How old the states are, at most, that a prediction rests on when it acts: a period of the network and its latency,
-/// and one of a sampled loop, which acts for that long on what it was told.
+/// Returns the maximum age of the states behind a prediction while it acts: one period of the network and its
+/// latency, plus one period of a sampled loop, which acts on its input for that long.
 double network_age_s(const stability::Gains& gains, bool is_sampled = false);
 
 class Scene {
  public:
-  /// @param network_age_s how old the states are, at most, that a prediction rests on when it acts.
+  /// @param network_age_s maximum age of the states behind a prediction while it acts.
   /// @param is_sampled see error_loops().
   /// @param motor_lag_s see error_loops().
-  /// @param estimates what is wrong with what every vehicle knows of itself and is told by others.
-  /// @param residual what acts beside the truth's effects, where not null; must outlive this.
+  /// @param estimates errors of each vehicle's own state estimates and of those it receives from others.
+  /// @param residual force that acts in addition to the effects of the truth; may be null; must outlive this object.
   /// @throws files::InputError as LearnedForce.
   Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
         const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
@@ -77,63 +76,64 @@ class Scene {
   const stability::TrackingSetup& tracking() const { return tracking_; }
   const LearnedForce& learned() const { return learned_; }
   const TruthForce& truth() const { return truth_; }
-  const ResidualEnvelope* residual() const { return residual_; }  ///< null: there is none
+  const ResidualEnvelope* residual() const { return residual_; }  ///< null: none
   const Motion& motion() const { return motion_; }
   const ErrorLoops& loops() const { return loops_; }
-  /// Parts that cover the interval of lags, none of which is wider than its kLagPart, unless there were too many.
+  /// Parts that cover the lag interval, none wider than kLagPart unless there would be too many.
   const std::vector<LagPart>& lag_parts() const { return lag_parts_; }
   double network_age_s() const { return network_age_s_; }
   Interval motor_lag_s() const { return motor_lag_s_; }
   bool has_lag_interval() const { return motor_lag_s_.lower < motor_lag_s_.upper; }
   const EstimateErrors& estimates() const { return estimates_; }
-  /// What these do to each axis of every vehicle.
+  /// Effect of the estimation errors on each axis of every vehicle.
   const EstimateAnswer& estimate_answer(std::size_t axis) const { return estimate_answers_[axis]; }
   int vehicles() const { return motion_.vehicles; }
-  /// Why nothing can be said; empty otherwise.
+  /// Returns why no statement is possible; empty otherwise.
   std::string refusal() const;
 
-  /// Every state that a vehicle can meet in a stretch while all are within `radii`.
+  /// Returns all states that a vehicle can reach in a stretch while all deviations hold.
   std::vector<Interval> states(const Stretch& stretch, const Deviations& deviations) const;
-  /// The same states as the network is given them, with the errors of the estimates.
+  /// Returns the same states as the network receives them, with estimation errors.
   std::vector<Interval> seen_states(const Stretch& stretch, const Deviations& deviations) const;
-  /// True offsets of the neighbours, of `states` and of what these become within network_age_s.
-  /// @param all the stretch's states: the velocities at which offsets may change.
-  /// @param are_seen `states` are what the network was given.
+  /// Returns the true offsets of the neighbours, for `states` and for what these become within network_age_s.
+  /// @param all all states of the stretch: the velocities at which offsets may change.
+  /// @param are_seen `states` are as the network receives them.
   std::vector<Offset> offsets(const std::vector<Interval>& states, const std::vector<Interval>& all,
                               bool are_seen = false) const;
-  /// The residual, which may change at any rate, included.
+  /// Includes the residual, which may change at any rate.
   TruthForce::Rest rest(const Stretch& stretch, const Deviations& deviations, double acceleration_m_s2) const;
   TruthSizes truth_sizes(const Stretch& stretch, const Deviations& deviations) const;
   std::vector<TruthSizes> truth_sizes(const Radii& radii) const;  ///< of every stretch
 
-  /// Thrust beyond the weight at t = 0, N: rotors start anywhere between the weight and the force that the first
-  /// prediction asks for.
+  /// Thrust in excess of the weight at t = 0, N: rotors start anywhere between the weight and the force requested by
+  /// the first prediction.
   Interval excess_at_start_N(int vehicle) const { return excess_N_[static_cast<std::size_t>(vehicle)]; }
 
-  /// Bounds of the errors of one vehicle that f_hat - f_a does not cause along z: the feed-forward's and the truth's
-  /// lag, the rotors' start and errors of the estimates, and along x and y the truth itself.
+  /// Bounds of the errors of one vehicle from all causes other than f_hat - f_a along z: the lag of the feedforward
+  /// and of the truth, the rotors' initial thrust, estimation errors, and along x and y the truth itself.
   std::array<ErrorHistory, 3> other_errors(int vehicle, const std::vector<TruthSizes>& truth) const;
-  /// What one axis adds to its history in one slice.
+  /// Returns the contribution of one slice to the history of one axis.
   LoopHistory in_slice(const Stretch& stretch, int slice, std::size_t axis, double force_N,
                        const TruthSizes& truth, double position_m, double velocity_m_s) const;
-  /// hold_error_N() of a vehicle's axis.
+  /// hold_error_N() for an axis of a vehicle.
   double hold_error_N(int vehicle, std::size_t axis, const LoopHistory& history) const;
-  /// The same slice by slice while all are within `radii`. @param force_N of |f_hat - f_a| along z, per stretch.
+  /// The same per slice while all deviations are within `radii`.
+  /// @param force_N bound on |f_hat - f_a| along z, per stretch.
   std::array<std::vector<double>, 3> hold_sizes_N(int vehicle, const Radii& radii,
                                                   const std::vector<double>& force_N,
                                                   const std::vector<TruthSizes>& truth) const;
-  /// Bounds of the errors that hold_sizes_N() causes; nothing to add where the loop is continuous.
+  /// Bounds of the errors caused by hold_sizes_N(); zero if the loop is continuous.
   std::array<ErrorHistory, 3> hold_errors(int vehicle, const Radii& radii, const std::vector<double>& force_N,
                                           const std::vector<TruthSizes>& truth) const;
-  /// One number per slice from one per stretch.
+  /// Expands one number per stretch to one number per slice.
   std::vector<double> by_slice(int vehicle, const std::vector<double>& by_stretch) const;
-  /// Of |e_z| while |f_hat - f_a| is at most `force_N` (per stretch), `other` included.
+  /// Bounds |e_z| while |f_hat - f_a| is at most `force_N` (per stretch), including `other`.
   ErrorHistory errors_z(int vehicle, const std::vector<double>& force_N, const ErrorHistory& other) const;
 
-  /// Deviation of a neighbour's relative position and velocity, Euclidean norms.
+  /// Bounds on the deviation of a neighbour's relative position and velocity, in Euclidean norms.
   double position_deviation_m(const Radii& radii, int vehicle, int neighbour) const;
   double velocity_deviation_m_s(const Radii& radii, int vehicle, int neighbour) const;
-  /// The vehicle that is the j-th neighbour of `vehicle`.
+  /// Returns the vehicle that is the j-th neighbour of `vehicle`.
   static int neighbour(int vehicle, int j) { return j < vehicle ? j : j + 1; }
 
  private:

@@ -13,7 +13,7 @@ namespace swarmcert::analysis {
 namespace {
 
 constexpr int kMostTries = 12;
-/// What is tried is this much wider than what came out last, relatively and in m or m/s.
+/// Relative and absolute (m or m/s) widening of the last result for the next trial.
 constexpr double kWiderBy = 0.02, kWiderBy_m = 1e-6;
 
 Interval wider(Interval x) {
@@ -48,7 +48,7 @@ Deviations hull_of(const Deviations& a, const Deviations& b) {
   return each(a, b, [](Interval x, Interval y) { return hull(x, y); });
 }
 
-/// By the part of the interval of lags in which the vehicle's own lies.
+/// Deviations by the part of the lag interval in which the vehicle's own lag lies.
 using ByPart = std::vector<Deviations>;
 
 template <class Change>
@@ -68,7 +68,7 @@ ByPart hull_of(const ByPart& a, const ByPart& b) {
   return each(a, b, [](Interval x, Interval y) { return hull(x, y); });
 }
 
-/// Whatever part each vehicle's lag lies in.
+/// The hull over all parts, valid for any lag of each vehicle.
 Deviations united(const ByPart& parts) {
   Deviations result = parts.front();
   for (const Deviations& part : parts) result = hull_of(result, part);
@@ -101,7 +101,7 @@ class Sweep {
         axes[2].excess_N = scene.excess_at_start_N(i);
       }
     }
-    // Where slices are whole periods, only their borders are rounded.
+    // If slices are whole periods, only their boundaries are affected by rounding.
     const ErrorLoop& loop = scene.loops().axis[0];
     if (loop.period_s > 0)
       held_ = loop.has_whole_periods
@@ -110,13 +110,13 @@ class Sweep {
     remembered_ = static_cast<int>(std::ceil(scene.network_age_s() / scene.motion().slice_s + 1e-9));
   }
 
-  /// @returns false where no tube was found for the next slice, or it was cancelled.
+  /// @returns false if no tube was found for the next slice, or if cancelled.
   bool advance(SlicedTube& tube, double farthest_m) {
     const auto n = static_cast<int>(tube.slices.size());
     for (auto& of_part : axes_)
       for (auto& of_vehicle : of_part)
         for (AxisInSlices& axis : of_vehicle) axis.begin_slice();
-    // As if the signals stood still.
+    // The first trial assumes that the signals do not change.
     Signals signals = last_;
     if (n == 0) signals.assign(axes_.size(), std::vector<Signal>(axes_.front().size()));
     ByPart tried;
@@ -152,16 +152,17 @@ class Sweep {
   };
   using Signals = std::vector<std::vector<Signal>>;  ///< [part][vehicle]
 
-  /// Deviations in the last `slices` slices too.
+  /// Includes the deviations of the last `slices` slices.
   ByPart with_past(ByPart now, int slices) const {
     const auto count = std::min(past_.size(), static_cast<std::size_t>(slices));
     for (std::size_t back = 1; back <= count; ++back) now = hull_of(now, past_[past_.size() - back]);
     return now;
   }
 
-  /// Of one vehicle, for every part in which its lag may lie. Its neighbours' lags are anywhere.
-  /// @param seen what a prediction that acts in the slice may rest on.
-  /// @param recent what a command that acts in it may rest on.
+  /// Sets the signals of one vehicle for every part in which its lag may lie; the lags of its neighbours may lie
+  /// anywhere.
+  /// @param seen deviations on which a prediction acting in the slice may be based.
+  /// @param recent deviations on which a command acting in the slice may be based.
   void set_signals(int vehicle, int slice, const ByPart& seen, const ByPart& recent, Signals& signals) const {
     const Motion& motion = scene_.motion();
     const int s = motion.stretch_of[static_cast<std::size_t>(vehicle)][static_cast<std::size_t>(slice)];
@@ -179,7 +180,7 @@ class Sweep {
     }
   }
 
-  /// What follows for each axis.
+  /// Derives the signals of the loop for each axis.
   void set_loop_signals(const Stretch& stretch, int slice, const std::array<AxisInSlices, 3>& axes,
                         const Deviation& seen, const Deviation& recent, Signal& signal) const {
     const Interval mass_kg(scene_.tracking().plant.mass_kg);
@@ -253,10 +254,10 @@ class Sweep {
   const Scene& scene_;
   const EnclosureOptions& options_;
   double tolerance_N_;
-  int held_ = 0;  ///< slices before the present one in which a command that acts in it may have been made
-  int remembered_ = 0;  ///< slices before the present one whose states the network may still act upon
+  int held_ = 0;  ///< earlier slices in which a command acting in the present one may have been computed
+  int remembered_ = 0;  ///< earlier slices whose states the network may still act upon
   std::vector<std::vector<std::array<AxisInSlices, 3>>> axes_;  ///< [part][vehicle]
-  std::vector<ByPart> past_;                                    ///< slice by slice
+  std::vector<ByPart> past_;                                    ///< one per slice
   Signals last_;
 };
 

@@ -15,9 +15,9 @@ namespace {
 using stability::exp;
 using stability::pow;
 
-/// exp(-7^2/2), where the simulator's wakes end, rounded up.
+/// exp(-7^2/2), rounded up: the strength at which the simulator cuts off wakes.
 constexpr double kCutOff = 2.3e-11;
-/// What is smaller counts as a number between zero and this: logarithms end somewhere.
+/// Smaller numbers are treated as any number between zero and this, to keep logarithms finite.
 constexpr double kTiny = 1e-280;
 
 Interval square(Interval x) { return abs(x) * abs(x); }
@@ -25,7 +25,7 @@ Interval cut(Interval x, double from, double to) {
   return {std::clamp(x.lower, from, to), std::clamp(x.upper, from, to)};
 }
 
-/// x^p of an interval of numbers that are not negative.
+/// x^p for an interval of non-negative numbers.
 Interval power(Interval x, double p) {
   return {x.lower > kTiny ? std::max(0.0, pow(Interval(x.lower), p).lower) : 0,
           pow(Interval(std::max(x.upper, kTiny)), p).upper};
@@ -41,14 +41,13 @@ double value_of(const stability::EffectSpec& spec, const char* name) {
   throw std::logic_error(std::string("no parameter ") + name);
 }
 
-/// A field and its gradient on a set.
+/// Enclosure of a field and its gradient on a set.
 struct Strength {
   Interval g;
   Offset slope;
 };
 
-/// (0.3/h)^decay exp(-r^2 / (2 s^2)) u(z), h = max(z, 0.12 m), s = spread + spread_slope h, as effects/downwash.h has
-/// it.
+/// (0.3/h)^decay exp(-r^2 / (2 s^2)) u(z), h = max(z, 0.12 m), s = spread + spread_slope h, as in effects/downwash.h.
 Strength below_a_vehicle(const Offset& dp, double decay, double spread_m, double spread_slope) {
   Strength result;
   const Interval z = dp[2];
@@ -60,7 +59,7 @@ Strength below_a_vehicle(const Offset& dp, double decay, double spread_m, double
   const Interval rr = square(dp[0]) + square(dp[1]);
   const Interval profile = exp(-(rr / (Interval(2) * ss)));
   const Interval full = pow(Interval(stability::kWakeReference_m) / h, decay) * profile;
-  // u = x^2 (3 - 2 x) rises from 0 where vehicles touch to 1 at the nearest gap of the fits.
+  // u = x^2 (3 - 2 x) rises from 0 at contact of the vehicles to 1 at the smallest gap covered by the fits.
   const Interval range = Interval(stability::kWakeNearest_m) - Interval(stability::kWakeTouching_m);
   const Interval x = cut((z - Interval(stability::kWakeTouching_m)) / range, 0, 1);
   const auto fade = [](double t) {
@@ -71,7 +70,7 @@ Strength below_a_vehicle(const Offset& dp, double decay, double spread_m, double
   result.g.lower = std::max(0.0, result.g.lower);
   result.slope[0] = -(result.g * dp[0] / ss);
   result.slope[1] = -(result.g * dp[1] / ss);
-  // Below 0.12 m only u changes, above only the rest; a set on both sides has either slope.
+  // Below 0.12 m only u varies, above it only the remaining factors; a set on both sides may have either slope.
   const Interval rises = full * (Interval(6) * x * (Interval(1) - x) / range);
   const Interval falls = full * (Interval(spread_slope) * rr / (ss * s) - Interval(decay) / h);
   result.slope[2] = z.lower >= stability::kWakeNearest_m   ? falls
@@ -91,7 +90,7 @@ TruthForce::TruthForce(const stability::Model& truth, double largest_thrust_N)
     const bool for_some_only = !effect.vehicle.empty();
     if (!effect.is_expression() && effect.name == "downwash") {
       if (value_of(effect, "tail") != 0 || value_of(effect, "convection_s_m") != 0) {
-        refuse("has a tail or is carried along by the air, of which there is no enclosure over a tube");
+        refuse("has a tail or is carried along by the air, for which there is no enclosure over a tube");
       }
       downwash_.push_back({value_of(effect, "amplitude_N"), value_of(effect, "decay_exponent"),
                            value_of(effect, "spread_m"), value_of(effect, "spread_slope"),
@@ -105,7 +104,7 @@ TruthForce::TruthForce(const stability::Model& truth, double largest_thrust_N)
     } else if (effect.name == "motor_lag") {
       motor_lag_s_ = value_of(effect, "tau_s");
     } else if (effect.name == "thrust_ratio" || effect.name == "delay") {
-      refuse("acts through the loop, where a tube does not follow it");
+      refuse("acts through the loop, which a tube does not model");
     } else {
       stability::MotionSet motion;
       motion.relative_speed_m_s = motion.speed_m_s = motion.acceleration_m_s2 = motion.thrust_rate_N_s = 1;
@@ -131,19 +130,19 @@ void TruthForce::add(const Downwash& field, const std::vector<Offset>& neighbour
     total = ++count == 1 ? one.g : total + one.g;
   }
   if (count == 0) return;
-  if (count > 1) {  // (sum g^p)^(1/p), which rises in each g
+  if (count > 1) {  // (sum g^p)^(1/p), which is increasing in each g
     Interval powers;
     for (const Strength& one : each)
       if (one.g.upper > 0) powers += power(one.g, field.norm);
     total = power({std::max(0.0, powers.lower), powers.upper}, 1 / field.norm);
-    // 1/p is rounded: d ln(total) = d(1/p) ln(sum), and |ln| < 700.
+    // Accounts for the rounding of 1/p: d ln(total) = d(1/p) ln(sum), and |ln| < 700.
     total = total * Interval(1 - 1e-12, 1 + 1e-12);
   }
   const Interval A(field.amplitude_N);
   Interval force = -(A * total);
   if (field.for_some_only) force = hull(force, Interval(0));
   sum.value_N += force;
-  // A wake that ends changes the sum by at most its own strength there.
+  // Cutting off a wake changes the sum by at most its own strength there.
   const double cut_off =
       up(field.amplitude_N * field.mass_factor.upper * kCutOff *
          pow(Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m), field.decay).upper *
@@ -152,7 +151,7 @@ void TruthForce::add(const Downwash& field, const std::vector<Offset>& neighbour
   sum.value_N += Interval(-cut_off, cut_off);
   for (std::size_t j = 0; j < each.size(); ++j) {
     if (each[j].g.upper <= 0) continue;
-    // d total / d g_j = (g_j / total)^(p - 1), between 0 and 1.
+    // d total / d g_j = (g_j / total)^(p - 1), which lies between 0 and 1.
     Interval share(1);
     if (count > 1) {
       share = {0, 1};
@@ -191,7 +190,7 @@ void TruthForce::add(const Lift& field, const std::vector<Offset>& neighbours, W
     sum.value_N += Interval(-cut_off, cut_off);
     Offset& gradient = sum.gradient_N_m[j];
     for (std::size_t k = 0; k < 2; ++k) gradient[k] += -(force * neighbours[j][k] / ss);
-    // h is z beyond 0.12 m, and z = -dp_z: the force rises with dp_z.
+    // h equals z beyond 0.12 m, and z = -dp_z: the force increases with dp_z.
     const Interval rise = force * Interval(field.decay) / h;
     gradient[2] += z.lower >= stability::kWakeNearest_m ? rise : hull(rise, Interval(0));
   }

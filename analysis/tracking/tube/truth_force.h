@@ -1,4 +1,4 @@
-/// @file The declared truth on a set of states: what force it can be there, and how it changes with the positions.
+/// @file The declared truth on a set of states: the forces possible there, and how they change with the positions.
 #pragma once
 
 #include <array>
@@ -10,39 +10,40 @@
 
 namespace swarmcert::analysis {
 
-using Offset = std::array<Interval, 3>;  ///< of a neighbour from the vehicle, world axes, m
+using Offset = std::array<Interval, 3>;  ///< of a neighbour relative to the vehicle, world axes, m
 
-/// Forces of one vehicle's declared effects, enclosed in real arithmetic.
+/// Encloses the forces of one vehicle's declared effects in real arithmetic.
 class TruthForce {
  public:
-  /// @param truth its effects act on every vehicle, its mass is that of every neighbour. Effects that act through the
-  ///   loop or on rotation alone are no force here.
-  /// @param largest_thrust_N of all rotors.
+  /// @param truth its effects act on every vehicle; its mass is that of every neighbour. Effects that act only
+  ///     through the loop or on rotation are no force here.
+  /// @param largest_thrust_N maximum total thrust of all rotors.
   TruthForce(const stability::Model& truth, double largest_thrust_N);
 
-  /// Why this truth has no enclosure; empty where it has one.
+  /// Returns why this truth has no enclosure; empty if it has one.
   const std::string& refusal() const { return refusal_; }
-  /// Of its motors; no force, and the loop has a lag of its own. 0 where it declares none.
+  /// Motor lag of the truth; not a force, since the loop has a lag of its own. 0 if the truth declares none.
   double motor_lag_s() const { return motor_lag_s_; }
 
   /// Force along z of the neighbours' wakes (downwash, upper_lift).
   struct Wake {
     Interval value_N;
-    std::vector<Offset> gradient_N_m;  ///< per neighbour, of every point of the set
-    /// false: the field may jump inside the set, and only value_N says something.
+    std::vector<Offset> gradient_N_m;  ///< per neighbour, over all points of the set
+    /// false: the field may jump inside the set, and only value_N is valid.
     bool has_gradient = true;
-    /// The field of the simulator ends at seven spreads: there it misses the gradient's field by at most this.
+    /// The simulator cuts the field off at seven spreads, where it differs from the field of the gradient by at most
+    /// this.
     double cut_off_N = 0;
   };
   Wake wake(const std::vector<Offset>& neighbours) const;
 
-  /// Everything else, which depends on the vehicle's own state.
+  /// All other effects, which depend on the vehicle's own state.
   struct Rest {
     Interval force_N[3];
-    double rate_N_s[3] = {0, 0, 0};  ///< of what has a rate
-    double abrupt_N[3] = {0, 0, 0};  ///< size of what may change at any rate: the thrust's rate is not known
+    double rate_N_s[3] = {0, 0, 0};  ///< of the part whose rate is bounded
+    double abrupt_N[3] = {0, 0, 0};  ///< part that may change at any rate: the thrust's rate is unknown
   };
-  /// @param acceleration_m_s2, thrust_rate_N_s bounds of |v'| and of |(T b3)'|; they enter the rates only.
+  /// @param acceleration_m_s2, thrust_rate_N_s bounds of |v'| and |(T b3)'|; used only for the rates.
   Rest rest(Interval height_m, const Interval velocity_m_s[3], double acceleration_m_s2,
             double thrust_rate_N_s) const;
 

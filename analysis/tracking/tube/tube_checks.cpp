@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kNotKnown = std::numeric_limits<double>::infinity();
 constexpr double kGravity_m_s2 = stability::kGravity_m_s2;
-/// Where neighbours begin to fade in flight (controller::CutOffs): 1 m less 0.1 m.
+/// Distance from which neighbours are faded out in flight (controller::CutOffs): 1 m less 0.1 m.
 constexpr double kFade_m = 0.9;
 
 double largest(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
@@ -24,33 +24,34 @@ double length(Interval x, Interval y, Interval z) {
 
 double length(const double (&x)[3]) { return length(x[0], x[1], x[2]); }
 
-/// a x, where a factor of 0 wins over one that is not known.
+/// a x, where a factor of 0 takes precedence over an unknown one.
 double times(double a, double x) { return a == 0 || x == 0 ? 0 : up(a * x); }
 
-/// What the tube says of one vehicle's loop.
+/// Bounds on one vehicle's loop that follow from the tube.
 struct Loads {
   double integral_m_s[3] = {0, 0, 0};       ///< sup |int e|
   double acceleration_m_s2[3] = {0, 0, 0};  ///< sup |e''|
-  double command_N[3] = {0, 0, 0};          ///< sup of the force commanded, without gravity
+  double command_N[3] = {0, 0, 0};          ///< sup of the commanded force, without gravity
 };
 
-/// What acts on one axis of one vehicle, stretch by stretch.
+/// Bounds on the signals of one axis of one vehicle, per stretch.
 struct AxisLoads {
-  std::vector<double> error_N;       ///< force that is not modelled, with that of the held command
+  std::vector<double> error_N;       ///< force that is not modelled, including that of the held command
   std::vector<double> truth_N;       ///< sup of the true force
-  std::vector<double> lagged_N;      ///< sup of what passes the lags
+  std::vector<double> lagged_N;      ///< sup of the signal behind the lags
   std::vector<double> planned_m_s2;  ///< sup of the planned acceleration
   std::vector<double> jerk_m_s3;
   LoopHistory met;
-  double hold_N = 0;  ///< largest part of the held command in error_N
+  double hold_N = 0;  ///< largest contribution of the held command to error_N
 };
 
-/// What the integrator's steps add to the integral of an error of the estimated position.
+/// Contribution of the integrator's steps to the integral of an error of the estimated position.
 double stepped_m_s(const Scene& scene, std::size_t axis) {
   return up(scene.loops().axis[axis].period_s * scene.estimates().position_m[axis]);
 }
 
-/// What errors of the estimated velocity, and of the integrator's steps with the position's, add to the command.
+/// Contribution of errors of the estimated velocity, and of the integrator's steps with errors of the position, to
+/// the command.
 double estimate_error_N(const Scene& scene, std::size_t axis) {
   const ErrorLoop& loop = scene.loops().axis[axis];
   return up(scene.tracking().plant.mass_kg * up(times(loop.Kd, scene.estimates().velocity_m_s[axis]) +
@@ -86,7 +87,7 @@ AxisLoads axis_loads(const Scene& scene, const LocalTube& tube, int vehicle, std
   return result;
 }
 
-/// A lag is a mean over the past: it moves w by at most its time constants times sup |w'|, or by twice sup |w|.
+/// A lag averages over the past: it changes w by at most its time constants times sup |w'|, or by twice sup |w|.
 double lag_error_N(const ErrorLoop& loop, const AxisLoads& acting, double mass_kg) {
   if (!loop.has_lag) return 0;
   const bool starts_at_rest = acting.planned_m_s2.front() < 1e-6;
@@ -95,7 +96,7 @@ double lag_error_N(const ErrorLoop& loop, const AxisLoads& acting, double mass_k
   return up(2 * largest(acting.truth_N) + up(mass_kg * std::min(2 * largest(acting.planned_m_s2), by_jerk)));
 }
 
-/// f_hat = f_a + (f_hat - f_a) is fed forward along z.
+/// Bound of the feedforward force along z, f_hat = f_a + (f_hat - f_a).
 double fed_forward_N(const LocalTube& tube, const std::vector<int>& stretches) {
   double fed_N = 0;
   for (const int s : stretches) {
@@ -116,17 +117,17 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
     // int e = h * (f_a - f_hat + m x) + g * w
     if (loop.h) integral_m_s = largest(convolved(*loop.h, acting.error_N));
     if (loop.g && loop.Ki > 0) integral_m_s = up(integral_m_s + largest(convolved(*loop.g, acting.lagged_N)));
-    // The integrator adds up the position as it is estimated.
+    // The integrator sums the estimated position.
     const double position_error_m = scene.estimates().position_m[axis];
     const double velocity_error_m_s = scene.estimates().velocity_m_s[axis];
     if (loop.demand && position_error_m > 0)
       integral_m_s =
           up(integral_m_s + up(times(loop.demand->total(), position_error_m) + stepped_m_s(scene, axis)));
-    // Rotors that start with an excess add exp(-t/tau) of it to the force.
+    // An initial excess of the rotors adds exp(-t/tau) times the excess to the force.
     const double excess_N = axis == 2 ? scene.excess_at_start_N(vehicle).mag() : 0;
     if (loop.h && loop.has_lag)
       integral_m_s = up(integral_m_s + times(up(excess_N * loop.lags_s.upper), loop.h->peak));
-    // A held command differs from the continuous law's by x.
+    // A held command differs from that of the continuous law by x.
     const double feedback =
         up(up(acting.hold_N / mass_kg) +
            times(loop.Kp, up(tube.tube.radii.position_m[i][axis] + position_error_m)) +
@@ -159,11 +160,11 @@ ForceErrorBounds bounds_of(const Scene& scene, const LocalTube& tube, const std:
     const double size_N = tube.tube.force_N[at];
     result.amplitude_N = std::max(result.amplitude_N, size_N);
     result.impulse_N_s = up(result.impulse_N_s + up(size_N * slice_s));
-    // Rates: the network's by its constants, the truth's by its gradient.
+    // The rate of the network follows from its constants, that of the truth from its gradient.
     const std::vector<Interval> states = scene.states(stretch, deviations);
     const ForceConstants none{kNotKnown, kNotKnown, kNotKnown, kNotKnown};
     const ForceConstants& c = constants.empty() ? none : constants[i];
-    // What the network is told may jump by the errors of the estimates.
+    // The inputs of the network may jump by the estimation errors.
     double learned = scene.estimates().are_zero() ? 0 : kNotKnown;
     const double own_acceleration =
         up(length(loads[i].acceleration_m_s2) +
@@ -192,13 +193,13 @@ ForceErrorBounds bounds_of(const Scene& scene, const LocalTube& tube, const std:
     result.rate_N_s = std::max(result.rate_N_s, rate);
     result.variation_N = up(result.variation_N + up(rate * slice_s));
   }
-  // The force error begins at once: an edge of its own, which rate and variation do not see.
+  // The force error starts with a step, which is not part of the rate and the variation of the slices.
   const double start_N = tube.tube.force_N[static_cast<std::size_t>(motion.stretch_of[i].front())];
   result.variation_N = up(result.variation_N + start_N);
   const ErrorLoop& loop = scene.loops().axis[2];
   result.lag_m = lag.largest_position_m();
   const auto with_lag = [&](double bound) { return up(bound + result.lag_m); };
-  // What is not continuous counts as an amplitude: what the staircase differs from its source, abrupt effects.
+  // Discontinuous parts count as an amplitude: the difference of the staircase from its source, and abrupt effects.
   const double stair_m = times(loop.h1->total(), up(times(scene.network_age_s(), learned_rate) + abrupt_N));
   result.by_rate_m = result.by_edges_m = kNotKnown;
   if (loop.h) {
@@ -215,7 +216,7 @@ ForceErrorBounds bounds_of(const Scene& scene, const LocalTube& tube, const std:
 
 Interval common(Interval a, Interval b) { return {std::max(a.lower, b.lower), std::min(a.upper, b.upper)}; }
 
-/// The errors of one vehicle slice by slice: what the sizes of all signals allow, within what is known already.
+/// Adds the errors of one vehicle per slice, as bounded by the sizes of all signals, within the bounds known already.
 void add_slices(const std::array<ErrorHistory, 3>& history, std::size_t vehicle,
                 std::vector<Deviations>& slices) {
   for (std::size_t n = 0; n < slices.size(); ++n) {
@@ -229,7 +230,7 @@ void add_slices(const std::array<ErrorHistory, 3>& history, std::size_t vehicle,
   }
 }
 
-/// Takes the proof back where an integrator could reach its limit.
+/// Withdraws the proof if an integrator could reach its limit.
 void check_integrators(const Scene& scene, const Loads& loads, LocalTube& tube) {
   const stability::Gains& gains = scene.tracking().gains;
   const double share = gains.rate_hz > 0 ? up(gains.integrator_step_s * gains.rate_hz) : 1;
@@ -239,17 +240,17 @@ void check_integrators(const Scene& scene, const Loads& loads, LocalTube& tube) 
     if (scene.loops().axis[axis].Ki > 0 && !(demand_m_s <= limit_m_s) && tube.proved) {
       tube.proved = false;
       tube.why = fmt::format(
-          "the integrator of axis {} could reach {:.3g} m s, beyond its limit of {:.3g} m s, where the "
-          "loop is another",
+          "the integrator of axis {} could reach {:.3g} m s, beyond its limit of {:.3g} m s, where this loop "
+          "no longer applies",
           stability::axis_name(static_cast<int>(axis)), demand_m_s, limit_m_s);
     }
   }
 }
 
-/// What the vehicles ask of their rotors.
+/// Demand on the rotors of the vehicles.
 struct ThrustUse {
   double command_N = 0;  ///< the largest command
-  bool is_kept = true;   ///< no command saturates or points down
+  bool is_kept = true;   ///< no command saturates or points downward
 };
 
 ThrustUse thrust_use(const stability::Plant& plant, const std::vector<Loads>& all) {
@@ -265,7 +266,7 @@ ThrustUse thrust_use(const stability::Plant& plant, const std::vector<Loads>& al
   return use;
 }
 
-/// Whether no neighbour is ever so far away that it fades.
+/// Whether no neighbour is ever so far away that it is faded out.
 bool neighbours_are_near(const Scene& scene, const Deviations& deviations) {
   for (const Stretch& stretch : scene.motion().stretches) {
     const std::vector<Interval> states = scene.seen_states(stretch, deviations);
@@ -284,8 +285,9 @@ void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, Loc
     tube.assumptions.push_back({name, status, note});
   };
   add("the force is that of the declared truth", "assumed",
-      scene.residual() == nullptr ? "enclosed at every state of the tube"
-                                  : "and a residual within what flights measured by the neighbour's place");
+      scene.residual() == nullptr
+          ? "enclosed at every state of the tube"
+          : "and a residual within the ranges measured in flights by the neighbour's position");
   if (scene.loops().is_sampled()) {
     add("sampled position loop, axes apart, first-order lags", "assumed",
         fmt::format("the hold of the command over {:.3g} s and the integrator's steps are in the bounds; the "
@@ -301,7 +303,7 @@ void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, Loc
         fmt::format("{:.4g} to {:.4g} s, whatever [lag] and the truth state", scene.motor_lag_s().lower,
                     scene.motor_lag_s().upper));
   } else if (scene.truth().motor_lag_s() > 0) {
-    add("motors lag as the truth says", "assumed",
+    add("motors lag as stated by the truth", "assumed",
         fmt::format("{:.3g} s, whatever [lag] states", gains.motor_lag_s));
   }
   add("all vehicles have these gains and this model", "assumed", "and start at rest at their set points");
@@ -309,7 +311,7 @@ void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, Loc
     double excess_N = 0;
     for (int i = 0; i < scene.vehicles(); ++i)
       excess_N = std::max(excess_N, scene.excess_at_start_N(i).mag());
-    add("rotors start between the weight and what the first prediction asks for", "assumed",
+    add("rotors start between the weight and the force that the first prediction requests", "assumed",
         fmt::format("at most {:.3g} N away from the weight", excess_N));
   }
   if (scene.estimates().are_zero()) {
@@ -317,11 +319,10 @@ void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, Loc
   } else {
     const EstimateErrors& e = scene.estimates();
     add("errors of the estimates stay within their bounds", "assumed",
-        fmt::format(
-            "velocity {:.3g}, {:.3g}, {:.3g} m/s, position {:.3g}, {:.3g}, {:.3g} m, of any course; also "
-            "what the network is told, of the vehicle and of its neighbours",
-            e.velocity_m_s[0], e.velocity_m_s[1], e.velocity_m_s[2], e.position_m[0], e.position_m[1],
-            e.position_m[2]));
+        fmt::format("velocity {:.3g}, {:.3g}, {:.3g} m/s, position {:.3g}, {:.3g}, {:.3g} m, of any course; "
+                    "the same for the states passed to the network, of the vehicle and of its neighbours",
+                    e.velocity_m_s[0], e.velocity_m_s[1], e.velocity_m_s[2], e.position_m[0], e.position_m[1],
+                    e.position_m[2]));
   }
   add("predictions are a staircase", "proved",
       fmt::format("states up to {:.3g} s old are in the bounds", scene.network_age_s()));
@@ -330,10 +331,10 @@ void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, Loc
       fmt::format("commands of at most {:.3g} N, of {:.3g} N", thrust.command_N,
                   tracking.plant.largest_thrust_N));
   add("neighbours count fully", near ? "proved" : "assumed",
-      "within 0.9 m along each axis, where none fades");
+      "within 0.9 m along each axis, where none is faded out");
 }
 
-/// Which cells of the residual vehicles can meet.
+/// Counts the cells of the residual that vehicles can reach.
 void count_residual_cells(const Scene& scene, LocalTube& tube) {
   if (scene.residual() == nullptr) return;
   const std::vector<ResidualEnvelope::Cell>& cells = scene.residual()->cells;

@@ -1,4 +1,4 @@
-/// @file What the stub of the stock firmware answers, for a test to set.
+/// @file Answers of the stub of the stock firmware, set by tests.
 #pragma once
 
 #include <cstdint>

@@ -38,13 +38,13 @@ void decode_float_arithmetic(Instruction& instruction, std::uint32_t first, std:
     case 0x9:
     case 0xA:
       instruction.cycles =
-          kMultiplyAccumulate;  // the addend, its destination, is needed late: no wait for it
+          kMultiplyAccumulate;  // the addend, its destination, is needed late, so there is no wait for it
       break;
     case 0x8:
       instruction.cycles = kDivision;
       break;
     case 0xB: {
-      const bool has_operand = (second >> 6 & 1) != 0;  // else an immediate
+      const bool has_operand = (second >> 6 & 1) != 0;  // otherwise an immediate
       const std::uint32_t kind = first & 0xF;
       instruction.reads[0] = has_operand ? m : kNoRegister;
       instruction.reads[1] = kNoRegister;
@@ -63,7 +63,7 @@ void decode_float_arithmetic(Instruction& instruction, std::uint32_t first, std:
 
 void decode_float(Instruction& instruction, std::uint32_t first, std::uint32_t second) {
   instruction.is_float = true;
-  const bool is_double = (second >> 8 & 1) != 0;  // of transfers only: there is no arithmetic in double
+  const bool is_double = (second >> 8 & 1) != 0;  // transfers only: there is no double-precision arithmetic
   const int d = static_cast<int>((second >> 12 & 0xF) << 1 | (first >> 6 & 1));
   if (first >> 8 == 0xEE) {
     if ((second & 0x10) == 0) return decode_float_arithmetic(instruction, first, second);
@@ -86,7 +86,7 @@ void decode_float(Instruction& instruction, std::uint32_t first, std::uint32_t s
   } else {
     instruction.cycles = 1 + static_cast<int>(second & 0xFF);
   }
-  if (is_load) instruction.writes = kNoRegister;  // a load's cycles cover the wait for its result
+  if (is_load) instruction.writes = kNoRegister;  // the cycles of a load include the wait for its result
 }
 
 void decode_wide(Instruction& instruction, std::uint32_t first, std::uint32_t second) {

@@ -1,9 +1,9 @@
-/// @file What the cycle model knows about one Thumb instruction.
+/// @file Properties of one Thumb instruction for the cycle model.
 ///
-/// Cycles are those of the Cortex-M4 Technical Reference Manual (Arm 100166, "Processor instructions" and "FPU
-/// instruction set"): one for arithmetic; two for a load, one where it follows a load or store; 1 + N for N words
-/// at once; three for a multiply-accumulate; fourteen for a division or square root. Where the manual gives a range
-/// the longest is taken. A taken branch refills the pipeline in 1 to 3 cycles more, which the model counts apart.
+/// Cycles follow the Cortex-M4 Technical Reference Manual (Arm 100166, "Processor instructions" and "FPU instruction
+/// set"): one for arithmetic; two for a load, one if it follows a load or store; 1 + N for N words at once; three for
+/// a multiply-accumulate; fourteen for a division or square root. Where the manual gives a range, the model uses the
+/// longest. A taken branch takes 1 to 3 additional cycles to refill the pipeline, which the model counts separately.
 #pragma once
 
 #include <cstdint>
@@ -16,15 +16,15 @@ struct Instruction {
   std::uint32_t address = 0;
   int size_bytes = 2;
   int cycles = 1;
-  bool is_core_access = false;  ///< a load or store of one core register: in a row they overlap by a cycle
+  bool is_core_access = false;  ///< a load or store of one core register; consecutive ones overlap by a cycle
   bool is_float = false;
-  /// Single-precision registers; an instruction that reads the result of the one before it waits a cycle.
+  /// Single-precision registers; an instruction that reads the result of the previous one waits a cycle.
   int writes = kNoRegister;
   int reads[2] = {kNoRegister, kNoRegister};
-  int marker = 0;  ///< of DBG, a hint that does nothing: its number; 0 for any other instruction
+  int marker = 0;  ///< number of DBG, a hint without effect; 0 for any other instruction
 };
 
-/// @param bytes [size_bytes] as they lie in memory, 2 or 4.
+/// @param bytes [size_bytes] as stored in memory, 2 or 4.
 Instruction decode(std::uint32_t address, const void* bytes, int size_bytes);
 
 }  // namespace swarmcert::cycle_model

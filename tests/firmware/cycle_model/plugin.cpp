@@ -1,5 +1,5 @@
-// QEMU plugin: instructions and modelled cycles between the markers DBG #1 and DBG #2 of a program. At each DBG #2 it
-// prints "INSTRUCTIONS CYCLES TAKEN_BRANCHES" behind what the program printed before.
+// QEMU plugin: counts instructions and modelled cycles between the markers DBG #1 and DBG #2 of a program. At each
+// DBG #2 it prints "INSTRUCTIONS CYCLES TAKEN_BRANCHES" after the output of the program.
 //   qemu-system-arm ... -plugin file=libfirmware_cycles.so
 #include <cstdio>
 #include <deque>
@@ -55,7 +55,7 @@ void access(unsigned, std::uint32_t info, std::uint64_t address, void*) {
 }
 
 void translate(std::uint64_t, qemu_plugin_tb* block) {
-  constexpr int kNoRegisters = 0, kReadsAndWrites = 3;  // QEMU 7.2 takes a 1, reads only, for writes only
+  constexpr int kNoRegisters = 0, kReadsAndWrites = 3;  // QEMU 7.2 interprets 1 (reads only) as writes only
   for (std::size_t i = 0; i < qemu_plugin_tb_n_insns(block); ++i) {
     qemu_plugin_insn* const insn = qemu_plugin_tb_get_insn(block, i);
     translated.push_back(decode(static_cast<std::uint32_t>(qemu_plugin_insn_vaddr(insn)),

@@ -7,7 +7,7 @@
 namespace swarmcert::facts {
 namespace {
 
-/// What stands between quotes behind `field` in `line`; empty if nothing does.
+/// Returns the quoted text after `field` in `line`; empty if there is none.
 std::string quoted(const std::string& line, const std::string& field) {
   const std::size_t begin = line.find(field + ": \"");
   if (begin == std::string::npos) return "";
@@ -32,7 +32,7 @@ void CallGraph::add(const std::string& text) {
       if (bytes == std::string::npos) continue;  // declared here, defined elsewhere
       if (label.compare(bytes + sizeof kBytes - 1, 7, "static)") != 0)
         throw std::runtime_error("no fixed stack: " + label);
-      const std::size_t begin = label.rfind('n', bytes) + 1;  // behind "\n"
+      const std::size_t begin = label.rfind('n', bytes) + 1;  // after "\n"
       function.bytes = std::max(function.bytes, std::stoi(label.substr(begin, bytes - begin)));
     }
   }

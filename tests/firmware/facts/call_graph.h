@@ -1,4 +1,4 @@
-/// @file How much stack a function and everything that it calls can need, from GCC's -fcallgraph-info=su.
+/// @file Worst-case stack of a function and everything that it calls, from GCC's -fcallgraph-info=su.
 #pragma once
 
 #include <map>
@@ -8,12 +8,12 @@
 
 namespace swarmcert::facts {
 
-/// Stack that is granted to a function whose code is not in the graph: the stock firmware's, memcpy and the like.
+/// Stack assumed for a function whose code is not in the graph: the stock firmware's, memcpy and the like.
 inline constexpr int kOutside_bytes = 64;
 
 struct StackUse {
   int bytes = 0;
-  std::vector<std::string> path;  ///< the calls that need it, from the entry on
+  std::vector<std::string> path;  ///< the call path that needs it, from the entry on
   std::set<std::string> outside;  ///< functions without code in the graph, anywhere below the entry
 };
 
@@ -22,7 +22,8 @@ class CallGraph {
   /// Adds the contents of one .ci file. @throws std::runtime_error for a function whose frame has no fixed size.
   void add(const std::string& text);
 
-  /// The most that `entry` and what it calls have on the stack at once; functions outside count kOutside_bytes.
+  /// Returns the largest stack use of `entry` and everything it calls; functions outside the graph count as
+  /// kOutside_bytes.
   /// @throws std::runtime_error if there is no such function, or if it can reach recursion or a call through a pointer.
   StackUse worst(const std::string& entry) const;
 
@@ -30,8 +31,8 @@ class CallGraph {
 
  private:
   struct Function {
-    std::string name;  ///< as the source has it
-    int bytes = -1;    ///< of its frame; -1: outside
+    std::string name;  ///< as in the source
+    int bytes = -1;    ///< size of its frame; -1: outside
     std::set<std::string> calls;
   };
 

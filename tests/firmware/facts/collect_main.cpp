@@ -1,4 +1,4 @@
-// Writes firmware-facts.json from what facts.cmake measured:
+// Writes firmware-facts.json from the measurements of facts.cmake:
 //   firmware_facts NETWORK COUNTS SIZES COMPILER FLAGS OUTPUT GRAPH.ci...
 // COUNTS: lines "NAME INSTRUCTIONS CYCLES TAKEN_BRANCHES". SIZES: arm-none-eabi-size -B -t of the app's objects.
 #include <algorithm>
@@ -19,10 +19,10 @@ namespace {
 
 using swarmcert::files::Json;
 
-/// The most of each quantity over all runs under one name.
+/// The maximum of each quantity over all runs with the same name.
 struct Cost {
   std::uint64_t instructions = 0;
-  double least_us = 0, most_us = 0;  ///< a taken branch costing 1 to 3 cycles more
+  double least_us = 0, most_us = 0;  ///< for 1 and for 3 additional cycles per taken branch
 };
 
 std::map<std::string, Cost> read_costs(const std::string& path) {
@@ -49,7 +49,7 @@ Json json_of(const Cost& cost) {
   return {{"instructions", cost.instructions}, {"modelled_us", {cost.least_us, cost.most_us}}};
 }
 
-/// The image numbers the kinds of phi and rho; here they have their names.
+/// Replaces the numbers that the image uses for the kinds of phi and rho by their names.
 Json network_costs(const swarmcert::files::Network& network, std::map<std::string, Cost>& costs) {
   Json result = Json::object();
   const auto take = [&](const std::string& counted, const std::string& name) {
@@ -75,7 +75,7 @@ Json stack_of(const swarmcert::facts::CallGraph& graph, const std::string& entry
   return {{"bytes", use.bytes}, {"path", use.path}, {"outside", use.outside}};
 }
 
-/// Code with constants, and variables, of all objects: the last line of `size -B -t`.
+/// Total size of code with constants and of variables over all objects: the last line of `size -B -t`.
 Json sizes(const std::string& path) {
   const std::string text = swarmcert::files::read_file(path);
   const std::size_t total = text.rfind("(TOTALS)");

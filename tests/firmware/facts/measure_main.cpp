@@ -1,5 +1,5 @@
-// What the app of controller/crazyflie costs with an exported network: lines "NAME INSTRUCTIONS CYCLES TAKEN_BRANCHES",
-// some names several times, of which the largest counts. Run under QEMU with the plugin of cycle_model/.
+// Cost of the app of controller/crazyflie with an exported network: lines "NAME INSTRUCTIONS CYCLES TAKEN_BRANCHES".
+// For a name with several lines the largest counts. Run under QEMU with the plugin of cycle_model/.
 #include "controller/neighbours.h"
 #include "controller/trigonometry.h"
 #include "measure.h"
@@ -43,7 +43,7 @@ void parts() {
     part(rho[kind], swarmcert_network::deep_set(kind).rho);
 }
 
-/// The set function with one to ten neighbours, of each kind in turn and of all kinds mixed.
+/// The set function with one to ten neighbours, of each kind in turn and with all kinds mixed.
 void sets() {
   static const char* const names[] = {"set_of_1", "set_of_2", "set_of_3", "set_of_4", "set_of_5",
                                       "set_of_6", "set_of_7", "set_of_8", "set_of_9", "set_of_10"};
@@ -65,7 +65,7 @@ void sets() {
   }
 }
 
-/// Peers in sight for half a second: close by, or in the fading zone with another weight each, which is the worst.
+/// Peers visible for half a second: close by, or in the fading zone with different weights, which is the worst case.
 void network_task(const char* name, bool fading) {
   for (int i = 0; i < 50; ++i) {
     now_ms += crazyflie::kPeriod_ms;
