@@ -10,9 +10,9 @@
 //
 // Upper bounds are proved in exact arithmetic, lower bounds are slopes between two float32 points.
 //
-// A state dict holds weights: neither the order of its layers nor what stands between them. Record what the trained network
-// gives, and `certify net.pth --samples samples.npz` refuses a file of any other function, be it another order, activation or
-// skip connection:
+// A state dict contains weights, but neither the order of its layers nor the operations between them. Record outputs of the
+// trained network, and `certify net.pth --samples samples.npz` refuses a file that represents any other function because of a
+// different order, activation or skip connection:
 //
 //     import numpy, torch
 //     model.eval()
@@ -37,7 +37,7 @@ int main() {
   const lipschitz::Certification found = lipschitz::certify(network, options);
 
   // %% [markdown]
-  // Every layer was trained to keep its spectral norm at or below gamma = 3. Does it, for the weights as stored?
+  // Every layer was trained to keep its spectral norm at or below gamma = 3. Do the stored weights satisfy this?
 
   // %%
   for (const lipschitz::CertifiedLayer& layer : found.layers) {
@@ -47,7 +47,7 @@ int main() {
   }
 
   // %% [markdown]
-  // The bounds. The set function is rho(sum of phi): its input is one neighbour that moves.
+  // The bounds. The set function is rho(sum of phi); its input is the neighbour that moves.
 
   // %%
   std::string data;
@@ -66,8 +66,8 @@ int main() {
                  "'' using 4 title 'product of norms' linecolor rgb '#999999'\n");
 
   // %% [markdown]
-  // The certificate holds the proofs. A small checker verifies it against the weights and trusts no optimiser. A bound one
-  // percent below what was proved may even be true, but its proof does not hold, and a new hash does not help.
+  // The certificate contains the proofs. A small checker verifies it against the weights and does not trust the optimiser. A
+  // bound one percent lower may be true, but the proof does not support it, even with a recomputed hash.
 
   // %%
   files::Json certificate = lipschitz::certificate(network, found);

@@ -7,7 +7,7 @@
 //     limsup |e| <= d_m / (lambda_min(Lambda)^2 lambda_min(K))     the theorem's ball
 //     sup |e|     = |h|_1 d_m                                      exact for a linear loop; h: step response of the error
 //
-// The theorem knows no motor lag. The exact gain of the loop does.
+// The theorem does not account for motor lag; the exact gain of the loop does.
 
 // %%
 #include <fmt/format.h>
@@ -30,9 +30,9 @@ int main() {
   fmt::print("exact, one axis: {:.4f} m\n", exact * rate_N_s);
 
   // %% [markdown]
-  // Without lag the theorem is sharp. Now Lambda and K are scaled together, c times each, and the force comes through a
-  // motor with a time constant of 57 ms, as published flights show it. Near the stability limit the ball promises what the
-  // loop does not keep: a lag is a failed hypothesis of the theorem, not a detail. `swarmcert bound` names it.
+  // Without lag the theorem is sharp. Now Lambda and K are both scaled by c, and the force passes through a motor with a
+  // time constant of 57 ms, the value found in published flights. Near the stability limit the loop leaves the ball: a lag
+  // violates a hypothesis of the theorem, and `swarmcert bound` reports it.
 
   // %%
   std::string data;

@@ -1,13 +1,13 @@
 // %% [markdown]
 // # 03 Gate a release
 //
-// May this release ship? A policy states a limit for everything that it rests on:
+// May this release ship? A policy states a limit for everything that the release depends on:
 //
 //     proved <= limit               pass
 //     attained > limit              fail, with the witness
-//     proved > limit >= attained    inconclusive: it may be true, nobody has shown it
+//     proved > limit >= attained    inconclusive: neither proved nor refuted
 //
-// Only the first may fly.
+// Only a release that passes may fly.
 
 // %%
 #include <fmt/format.h>
@@ -50,7 +50,7 @@ int main() {
     fmt::print("{:<16} {}\n", check.name, gate::name(check.verdict));
 
   // %% [markdown]
-  // The same network under other limits. Where nothing is proved and nothing attained, the release does not pass either.
+  // The same network under other limits. A release whose limit is neither proved nor violated does not pass either.
 
   // %%
   std::string data;
@@ -72,7 +72,8 @@ int main() {
                  "'' using 1:2:3 with labels offset 0,1 notitle\n");
 
   // %% [markdown]
-  // One digit of the certificate is changed, here of the hash that names the weights: it is refused, and the release with it.
+  // One digit of the certificate is changed, here in the hash of the weights: the checker rejects the certificate, and the gate
+  // the release.
 
   // %%
   std::string certificate = files::read_file("cert.json");

@@ -1,11 +1,11 @@
 // %% [markdown]
 // # 04 Compare with a flight
 //
-// Where is the model wrong? The residual is what the accelerometer feels and the model does not explain:
+// Where is the model wrong? The residual is the part of the measured specific force that the model does not explain:
 //
 //     r = m a_specific - f_u - f_model        (a_specific: specific force in the world frame; f_u: thrust from PWM and battery)
 //
-// The flight is simulated: the truth has motor lag, downwash, drag and ground effect, the model has none of them.
+// The flight is simulated: the truth has motor lag, downwash, drag and ground effect; the model has none of them.
 
 // %%
 #include <fmt/format.h>
@@ -33,7 +33,7 @@ int main() {
              all.bias.z * gf);
 
   // %% [markdown]
-  // In which regions is it worst? The words come from cuts of the flight by height, speed, neighbours and thrust.
+  // In which regions is it worst? Regions are ranges of height, speed, place of the neighbours and thrust.
 
   // %%
   for (std::size_t i = 0; i < 3 && i < comparison.regions.size(); ++i) {
@@ -42,7 +42,7 @@ int main() {
   }
 
   // %% [markdown]
-  // The vertical residual of one vehicle over time: the other one passes above.
+  // The vertical residual of one vehicle over time, while the other one passes above.
 
   // %%
   std::string data;

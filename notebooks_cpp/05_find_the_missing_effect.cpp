@@ -2,12 +2,12 @@
 // # 05 Find the missing effect
 //
 // Which physics does the model lack? Every effect of the library is linear in its coefficients c and nonlinear in its
-// shape theta, and the columns X_k that the simulator flies are those that are fitted:
+// shape parameters theta, and the fit uses the same columns X_k as the simulator:
 //
 //     r(t) = sum_k c_k X_k(t; theta) + noise,      c within physical bounds, theta from a small grid
 //
-// An effect counts if it lowers the error of flights held out of the fit, stands out from the scatter between blocks of 2 s,
-// and is there along the set points as well.
+// An effect counts if it lowers the error of flights that are not part of the fit, is significant against the scatter between
+// blocks of 2 s, and is confirmed by instrumental variables made from the setpoints.
 
 // %%
 #include <fmt/format.h>
@@ -40,7 +40,7 @@ int main() {
   }
 
   // %% [markdown]
-  // The values, beside what was simulated: tau 0.0575 s, drag 0.013 N s/m.
+  // The estimates. Simulated were tau = 0.0575 s and drag = 0.013 N s/m.
 
   // %%
   for (const identification::Missing& one : missing) {

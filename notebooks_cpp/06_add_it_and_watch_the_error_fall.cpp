@@ -1,8 +1,8 @@
 // %% [markdown]
 // # 06 Add it and watch the error fall
 //
-// Does the new model predict flights that it has not seen? Flights are split as wholes: some for the fit, one to decide
-// whether an effect stays, one that decides nothing and is scored once at the end.
+// Does the new model predict flights that it has not seen? Whole flights are assigned to the fit, to the selection of effects,
+// and to a final test that influences nothing.
 //
 //     accepted if RMSE(select) falls by at least half a percent;   reported: RMSE(test)
 
@@ -44,7 +44,7 @@ int main() {
                  "'' using 0:4 with lines dashtype 2 linecolor rgb '#999999' title 'noise floor'\n");
 
   // %% [markdown]
-  // The new model is a file that every command reads; it remembers how it came about.
+  // The new model is a file that every command reads; it records its own history.
 
   // %%
   files::write_file("fitted.toml", stability::to_toml(ladder.model), true);

@@ -3,9 +3,9 @@
 //
 // What does a smaller Lipschitz bound cost in accuracy? Every layer is trained under
 //
-//     |W_k| <= gamma       so that  L <= gamma^K  for K layers,  and LipSDP proves less
+//     |W_k| <= gamma       so that  L <= gamma^K  for K layers,  and LipSDP proves a smaller bound
 //
-// Small gamma: a slow, safe prediction that misses the jet. Large gamma: the reverse.
+// A small gamma gives a slowly changing prediction that misses the jet, a large gamma the reverse.
 
 // %%
 #include <fmt/format.h>

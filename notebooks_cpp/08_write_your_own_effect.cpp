@@ -5,8 +5,8 @@
 //
 //     f_x = -k max(0, x - x0)         k in N/m, x0 in m
 //
-// An effect says what one unit of each coefficient does, and where it would be noticed. The simulator and the
-// identification use these columns and nothing else.
+// An effect returns the force per unit of each coefficient, and states where it acts. The simulator and the identification
+// use only these columns.
 
 // %%
 #include <fmt/format.h>
@@ -46,7 +46,7 @@ int main() {
                   [](const EffectSpec&, const EffectContext&) { return std::make_unique<Net>(); });
 
   // %% [markdown]
-  // Model files may now name it. The truth has it, the model that is diagnosed has not.
+  // Model files may now name the effect. The truth includes it; the diagnosed model does not.
 
   // %%
   files::write_file("truth.toml",
@@ -66,7 +66,7 @@ int main() {
   }
 
   // %% [markdown]
-  // What the vehicle felt: the residual along x, over x, and the force of the truth.
+  // The residual along x over x, with the true force.
 
   // %%
   std::vector<std::string> problems;

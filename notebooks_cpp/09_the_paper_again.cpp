@@ -1,8 +1,8 @@
 // %% [markdown]
-// # 09 The paper again
+// # 09 Reproducing the paper
 //
 // `swarmcert reproduce EXPERIMENT -o DIR` repeats the table and figures of the paper (Shi et al.,
-// *Neural-Swarm*, ICRA 2020) in simulation and on the published flights, and some experiments beyond it. Each
+// *Neural-Swarm*, ICRA 2020) in simulation and on the published flights, and adds some experiments. Each
 // run writes a report, its plots with their data, and `result.json`. Results are shown as found, with their
 // seeds. By default an experiment has the small size that also runs in the tests; `--full` flies a minute per
 // task and uses more seeds, `--shard i/N` divides the work.
@@ -50,9 +50,9 @@ int main() {
   // here it decreases it by a factor of 1.3 to 1.9. Vehicles fly 0.3 m above the published heights, where the
   // floor would otherwise limit the errors.
   //
-  // `reproduce claims --full` asks under which conditions that the paper leaves open three of its results appear.
+  // `reproduce claims --full` tests under which conditions, which the paper does not state, three of its results appear.
   // Wakes are composed by a p-norm: p = 1 adds them up, a large p keeps the strongest. Medians over three training
-  // seeds and five flights each, seed 1; batteries of 4.1 and 3.1 V and both heights differ only where it says so.
+  // seeds and five flights each, seed 1; results for batteries of 4.1 and 3.1 V and for both heights differ only where stated.
   //
   // | p | baseline, five vehicles over two | error of four without a network over that with one trained on two | errors fall from training with two to three to four |
   // |---|---|---|---|
@@ -62,10 +62,10 @@ int main() {
   // | 8 | 1.6 | 0.99 | 3 of 4 |
   // | paper | 3.3 | 0.71 | 4 of 4 |
   //
-  // A network trained with two vehicles harms four only where further wakes hardly count, since it adds them up. The
-  // baseline's growth with the number of vehicles needs wakes that do count. No composition of this family gives
-  // both, so the two rows of the paper's table do not follow from pairwise wakes and the stated training alone.
-  // Thrust saturates, in 3 to 6 % of the time, where the battery is at 3.1 V, and never at 4.1 V.
+  // A network trained with two vehicles harms four only if additional wakes have little effect, because the network
+  // adds them up. The baseline's growth with the number of vehicles requires that they do have an effect. No
+  // composition of this family gives both, so the two rows of the paper's table do not follow from pairwise wakes and
+  // the stated training alone. Thrust saturates during 3 to 6 % of the time with a battery at 3.1 V, and never at 4.1 V.
   //
   // On the published flights (`reproduce real-flights --recorded DIR --full`), eight networks compete on the
   // selecting flights. The chosen one leaves 1.829 gf in the mean over scenarios; the published networks
