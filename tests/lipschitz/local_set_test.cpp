@@ -102,6 +102,27 @@ TEST(CountedNeighbours, BoundIsAboveEverySampledSlope) {
   EXPECT_LT(gain, 0.95) << "stating a number of neighbours never improved a bound";
 }
 
+TEST(CountedNeighbours, ProofIsTheSameBytesOnAnyNumberOfThreads) {
+  std::mt19937 generator(5);
+  const files::Network network = tests::deep_set(tests::random_network({3, 12, 8}, generator),
+                                                 tests::random_network({8, 12, 1}, generator));
+  const lipschitz::Domain domain = {{"phi:default", {{-1, -1, -1}, {1, 1, 1}}}};
+  const Claim claim = counted("set:default:default", {{"default", 2}});
+  const SdpBound global = tests::sdp_bound_of(network, claim.function);
+  BranchOptions options = so_many_boxes(600);
+  options.pairs = 4;
+  const LocalBound alone = local_bound(network, claim, domain, global.proof->t, options);
+  options.jobs = 3;
+  const LocalBound together = local_bound(network, claim, domain, global.proof->t, options);
+  ASSERT_TRUE(alone.proof && together.proof);
+  EXPECT_EQ(together.nodes, alone.nodes);
+  EXPECT_GT(alone.nodes, 500) << "too few boxes for several at once: the test shows nothing";
+  EXPECT_EQ(together.proof->rho, alone.proof->rho);
+  EXPECT_EQ(together.proof->tree.tree, alone.proof->tree.tree);
+  EXPECT_EQ(together.proof->tree.multipliers, alone.proof->tree.multipliers);
+  EXPECT_EQ(together.steep_centres.size(), alone.steep_centres.size());
+}
+
 TEST(CountedNeighbours, WitnessHasNoMoreOfThemThanListed) {
   std::mt19937 generator(4);
   const files::Network network = tests::deep_set(tests::random_network({2, 5, 4}, generator),
