@@ -100,7 +100,7 @@ char CortexM::next_byte() {
     pollfd waiting = {socket_, POLLIN, 0};
     const int ready = ::poll(&waiting, 1, kMostSeconds * 1000);
     if (ready < 0 && errno == EINTR) continue;
-    if (ready <= 0) throw NotRun(fmt::format("the call did not come back within {} s", kMostSeconds));
+    if (ready <= 0) throw NotRun(fmt::format("the call did not return within {} s", kMostSeconds));
     char buffer[4096];
     const ssize_t size = ::recv(socket_, buffer, sizeof buffer, 0);
     if (size <= 0)

@@ -52,7 +52,7 @@ std::optional<FileDifference> difference_of(const std::string& file, const std::
   difference.line = 1 + static_cast<std::size_t>(std::count(expected.begin(), mine, '\n'));
   difference.expected = line_at(expected, at);
   difference.found = line_at(found, at);
-  difference.what = at == found.size() ? "the file ends here, the export goes on"
+  difference.what = at == found.size() ? "the file ends here, but the export continues"
                     : at == expected.size()
                         ? "the file continues after the end of the export"
                         : fmt::format("is '{}', exported is '{}'", difference.found, difference.expected);

@@ -16,7 +16,7 @@ namespace swarmcert::gate {
 namespace {
 
 constexpr char kBaselineSchema[] = "swarmcert/baseline/2";
-constexpr char kMend[] = "write it anew with swarmcert gate --update-baseline";
+constexpr char kMend[] = "write it again with swarmcert gate --update-baseline";
 
 bool is_of_regression(const std::string& name) { return name.rfind("regression", 0) == 0; }
 

@@ -77,7 +77,7 @@ State read_checkpoint(const std::string& key, const std::string& path) {
   };
   State state;
   try {
-    if (file.at("run") != key) refuse("run", "this checkpoint is of other flights, options or seed");
+    if (file.at("run") != key) refuse("run", "this checkpoint belongs to other flights, options or seed");
     state.trainer = as_vector(file.at("trainer"));
     state.best = as_vector(file.at("best"));
     state.shares = file.at("shares").get<std::vector<double>>();
@@ -151,7 +151,7 @@ Run run_training(const LearningData& data, const RunOptions& options) {
     const double fit = std::sqrt(trainer.run_epoch(epoch, rate));
     if (!std::isfinite(fit) || !trainer.theta().allFinite())
       throw files::InputError({"", "", "--rate", fmt::format("{}", chosen.learning_rate),
-                               fmt::format("the weights grew beyond all numbers in epoch {}", epoch + 1),
+                               fmt::format("the weights diverged in epoch {}", epoch + 1),
                                "give a smaller rate, or a smaller --gamma"});
     Vector candidate = trainer.theta();
     if (options.max_lipschitz > 0) {

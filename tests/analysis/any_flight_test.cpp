@@ -196,7 +196,7 @@ TEST(AnyFlight, WhatAFlightsTomlNamesAndNoLogIsCalledIsSaid) {
   const Outcome outcome = run_shell("swarmcert compare one.csv --flights flights.toml", folder.path());
   EXPECT_NE(outcome.output.find("[log.\"alpha/**\"] matches none of these logs"), std::string::npos)
       << outcome.output;
-  EXPECT_NE(outcome.output.find("flights.toml knows alpha; the logs are of "), std::string::npos)
+  EXPECT_NE(outcome.output.find("flights.toml names alpha; the logs are of "), std::string::npos)
       << outcome.output;
 }
 

@@ -66,7 +66,7 @@ TEST_F(CommandLine, AnOutputInAFolderThatDoesNotExistIsRefusedBeforeAnyWork) {
 }
 
 TEST_F(CommandLine, CheckSaysThatTheCertificateStandsFirst) {
-  expect("check network.toml cert.json", 2, {"network.toml", "the certificate stands first"});
+  expect("check network.toml cert.json", 2, {"network.toml", "the certificate comes first"});
 }
 
 TEST_F(CommandLine, InspectGoesOnAfterABadFileAndSaysSoInItsExitCode) {
@@ -200,7 +200,7 @@ TEST_F(CommandLine, BlocksScaleBoxRangeAndExplanationOfAPlainNetwork) {
   const std::string net = saved(small_network(), "net.safetensors");
   write_text(folder_ / "box.toml", "schema = \"swarmcert/box/1\"\nlower = [-1, -1]\nupper = [1, 2]\n");
   expect("certify " + net + " --blocks --scale 1,2 --domain box.toml --explain -o cert.json --json out.json",
-         0, {"network x0", "network scaled", "wastes most", "Range over the box", "Float32"});
+         0, {"network x0", "network scaled", "has the largest slack", "Range over the box", "Float32"});
   expect("check cert.json " + net, 0, {"accepted", "4 upper bounds"});
   const Json result = Json::parse(read_text(folder_ / "out.json"));
   ASSERT_EQ(result["bounds"].size(), 4U);

@@ -64,7 +64,7 @@ void check(const std::vector<std::string>& names, const stability::Model& model)
       throw UsageError("unknown effect " + name + ": " + files::did_you_mean(name, all));
     if (identification::is_taken(name, model))
       throw UsageError("the model has the effect " + name +
-                       " already; remove it from the file to fit it anew");
+                       " already; remove it from the file to fit it again");
   }
 }
 

@@ -206,7 +206,7 @@ void print_facts(const TrackingReport& report) {
                cell(f.effort_gain), cell(f.effective_Ki),
                std::isfinite(f.clamp_authority_N) ? cell(f.clamp_authority_N) : "any");
     if (std::abs(f.effective_Ki - f.written_Ki) > 1e-9 * f.written_Ki) {
-      fmt::print("       the integrator's step weakens Ki {:.4g} times: {} is written\n",
+      fmt::print("       the integrator's step reduces Ki by a factor of {:.4g}: {} is written\n",
                  f.written_Ki / f.effective_Ki, f.written_Ki);
     }
     if (f.clamp_residual_m > 0) {

@@ -148,7 +148,7 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
     throw UsageError("unknown task " + arguments.task + ": " + files::did_you_mean(arguments.task, tasks));
   }
   if (disturbance.network.file.empty() && disturbance.network.phi.empty()) {
-    throw UsageError("a tube around a task is that of a network's predictions: add --network NET");
+    throw UsageError("a tube around a task needs the predictions of a network: add --network NET");
   }
   if (disturbance.truth.empty()) {
     throw UsageError(
@@ -179,7 +179,7 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
     options.estimates.position_m[k] = estimates.position_error[k].largest();
     if (!std::isfinite(options.estimates.velocity_m_s[k] + options.estimates.position_m[k])) {
       throw UsageError(
-          "--tube --task needs how large the errors of the estimates are: add --velocity-error V and "
+          "--tube --task needs the size of the errors of the estimates: add --velocity-error V and "
           "--position-error P");
     }
   }
@@ -376,8 +376,8 @@ void add_local_tube_plot(Report& report, const LocalTube& tube, const Json& json
         i == 0 ? "" : ", ", 2 * i + 2, i + 1, i + 1, 2 * i + 3, i + 1);
   }
   report.figure("local_tube", data, script + "\n",
-                fmt::format("Between which values the height error of each vehicle lies at each time: "
-                            "proved, and within {:.4g} m over the whole flight.",
+                fmt::format("Proved range of the height error of each vehicle at each time, within {:.4g} m "
+                            "over the whole flight.",
                             tube.tube.radius_m(2)));
 }
 

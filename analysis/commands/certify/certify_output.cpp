@@ -66,10 +66,10 @@ std::vector<std::string> explain(const lipschitz::Comparison& comparison, double
   for (const lipschitz::StageLoss& stage : comparison.stages)
     if (worst == nullptr || stage.loss() > worst->loss()) worst = &stage;
   if (worst != nullptr && worst->gain > 0)
-    words.push_back(fmt::format(
-        "{} wastes most: its norm is {:.4g}, but along the steepest pattern it amplifies by {:.4g} "
-        "(a factor {:.3g}). Regularising it further costs the least.",
-        worst->name, worst->norm, worst->gain, worst->loss()));
+    words.push_back(
+        fmt::format("{} has the largest slack: its norm is {:.4g}, but along the steepest pattern it "
+                    "amplifies by {:.4g} (a factor {:.3g}). Regularising it further costs the least.",
+                    worst->name, worst->norm, worst->gain, worst->loss()));
   double open = 1;
   std::size_t tightest = 0;
   for (std::size_t k = 0; k < comparison.floor.relu_gains.size(); ++k) {
@@ -77,18 +77,17 @@ std::vector<std::string> explain(const lipschitz::Comparison& comparison, double
     if (comparison.floor.relu_gains[k] < comparison.floor.relu_gains[tightest]) tightest = k;
   }
   if (!comparison.floor.relu_gains.empty() && open > 0)
-    words.push_back(
-        fmt::format("ReLUs that close take a factor {:.3g} off the product, most of it behind {}.", 1 / open,
-                    comparison.stages[tightest].name));
+    words.push_back(fmt::format("Inactive ReLUs reduce the product by a factor {:.3g}, most of it after {}.",
+                                1 / open, comparison.stages[tightest].name));
   if (floor > 0)
     words.push_back(fmt::format(
-        "At most {:.2g} % of the bound is the relaxation: some ReLU pattern has the slope {:.8g}, and "
-        "no method that ignores which patterns are reachable gets below it.",
+        "The relaxation accounts for at most {:.2g} % of the bound: some ReLU pattern has the slope {:.8g}, "
+        "and no method that ignores which patterns are reachable can prove a smaller bound.",
         100 * (upper / floor - 1), floor));
   if (lower > 0 && floor > lower)
     words.push_back(
-        fmt::format("The remaining factor {:.4g} down to the steepest slope found is patterns that no input "
-                    "reaches, or slopes that the search did not find.",
+        fmt::format("The remaining factor {:.4g} down to the steepest slope found is due to patterns that no "
+                    "input reaches, or to slopes that the search did not find.",
                     floor / lower));
   return words;
 }
@@ -184,8 +183,7 @@ std::string interruption_words(const CertifiedBound& bound) {
   if (!words.empty()) return "interrupted: " + words + "; more time may give closer bounds";
   if (bound.branch_stop == lipschitz::BranchStop::kNothingToHalve)
     return fmt::format(
-        "branch and bound stopped after {} boxes: no halving of the box that dominates decides another of "
-        "its neurons{}",
+        "branch and bound stopped after {} boxes: bisecting the dominating box decides no further neuron{}",
         bound.nodes,
         bound.domain == "global"
             ? "; far out, kinks that run side by side to infinity meet in one point of the cover"

@@ -82,7 +82,8 @@ void compare_loops(const CheckOptions& options, const files::Json& certificate,
 
 int check_gains(const CheckOptions& options, const CommonOptions& common, const std::string& text) {
   if (!options.network.file.empty() || !options.network.phi.empty())
-    throw UsageError(options.certificate + " is of tracking gains and of no network: leave the network out");
+    throw UsageError(options.certificate +
+                     " is a certificate of tracking gains, not of a network: omit the network");
   const files::Json certificate = files::parse_json(text, options.certificate, check::kTrackingSchema);
   std::vector<std::string> inputs;
   if (host() == nullptr || !host()->certificate) inputs.push_back(options.certificate);
@@ -119,7 +120,7 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
   const bool is_in_memory = host() != nullptr && host()->certificate;
   if (!is_in_memory && std::filesystem::path(options.certificate).extension() == ".toml")
     throw UsageError("CERTIFICATE " + options.certificate +
-                     ": is a TOML file; the certificate stands first: check cert.json network.toml");
+                     ": is a TOML file; the certificate comes first: check cert.json network.toml");
   std::string text = is_in_memory ? *host()->certificate : files::read_file(options.certificate);
   if (is_of_tracking(text, options.certificate)) return check_gains(options, common, text);
   if (!options.gains.empty() || !options.model.empty())
@@ -163,8 +164,8 @@ Command check_command() {
           "proofs on a box\n"
           "in double with every rounding accounted for; uses no optimiser. Accepted: exit 0. Rejected, with "
           "the reason: exit 1.\n"
-          "A certificate of tracking gains needs no network; with --gains and --model, which it "
-          "must be of, the loops are derived anew.\n\n"
+          "A certificate of tracking gains needs no network; with --gains and --model, to which it must "
+          "belong, the loops are derived again.\n\n"
           "Example: swarmcert check cert.json nn/networks/demo/network.toml\n"
           "         swarmcert check gains-cert.json --gains controller/gains/composite.toml",
           [](CLI::App& app) {
@@ -174,9 +175,9 @@ Command check_command() {
                 ->required();
             declare_network(app, options->network);
             app.add_option("--gains", options->gains,
-                           "gains.toml that a certificate of tracking gains must be of");
+                           "gains.toml to which a certificate of tracking gains must belong");
             app.add_option("--model", options->model,
-                           "model.toml that a certificate of tracking gains must be of");
+                           "model.toml to which a certificate of tracking gains must belong");
             return [options](const CommonOptions& common) { return run_check(*options, common); };
           }};
 }

@@ -352,7 +352,7 @@ Command compare_command() {
                "logs' set points")
             ->allow_extra_args(false);
         app.add_option("--network", options->flights.network,
-                       "network.toml: a learned force that every model gets, in place of its own");
+                       "network.toml: a learned force for every model, in place of its own");
         app.add_option(
                "--budget", options->budget,
                "Flights to fit: how the error of FLIGHTS falls from the nominal model by motor lag, offset "

@@ -424,7 +424,7 @@ std::string vehicles_without_model(const residuals::Inputs& inputs) {
   }
   std::string known;
   for (const auto& [vehicle, use] : inputs.fleet) known += (known.empty() ? "" : ", ") + vehicle;
-  return fmt::format("flights.toml knows {}; the logs are of {}.", known, fmt::join(flown, ", "));
+  return fmt::format("flights.toml names {}; the logs are of {}.", known, fmt::join(flown, ", "));
 }
 
 }  // namespace

@@ -20,8 +20,8 @@ LogOutcome outcome_of(const std::string& path, const logs::Log& log, const files
 /// Prints the same as text to standard output.
 void print_log(const logs::Log& log);
 
-/// Prints one line of a table of logs: records, time in the air, axes that can be judged, and reasons why it may not
-/// be a flight.
+/// Prints one line of a table of logs: records, time in the air, axes that can be judged, and the reason if it is not
+/// a flight.
 void print_log_row(const std::string& path, const files::Json& described);
 
 }  // namespace swarmcert::analysis

@@ -123,7 +123,7 @@ int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
   if (common.prints_text()) print(finding);
   if (is_part) {
     if (common.prints_text())
-      fmt::print("Part {} is done. When all are, the same command without --shard puts them together.\n",
+      fmt::print("Part {} is done. When all parts are, the same command without --shard merges them.\n",
                  options.shard);
     return kDone;
   }

@@ -180,7 +180,7 @@ ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s,
   }
   if (tracking.plant.thrust_scale != 1) {
     loops.refusal =
-        "the force that acts is not the force commanded (thrust_ratio), which a tube does not follow";
+        "the force that acts is not the force commanded (thrust_ratio), which a tube does not model";
     return loops;
   }
   std::optional<AxisLoop> last;

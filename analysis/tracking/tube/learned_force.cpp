@@ -82,7 +82,7 @@ Index component(const std::string& name) {
 }  // namespace
 
 LearnedForce::LearnedForce(const files::Network& network, const std::string& kind, int neighbours) {
-  files::require_relative_states(network, "a tube is of networks of relative states");
+  files::require_relative_states(network, "a tube requires a network of relative states");
   stability::DeepSetForce(network, kind, {kind});  // rejects networks that cannot be used in flight
   std::vector<std::string> kinds;
   for (const auto& [name, weights] : network.phi)

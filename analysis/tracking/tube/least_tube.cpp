@@ -171,7 +171,7 @@ LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m, d
     result.loop_gain =
         (at_edge.largest_position_m(2) - start.largest_position_m(2)) / std::max(radius_m, 1e-12);
     result.why = fmt::format(
-        "a radius of {:.3g} m lets |f_hat - f_a| grow so far that the loop answers with {:.3g} m: an error "
+        "a radius of {:.3g} m lets |f_hat - f_a| grow so far that the loop responds with {:.3g} m: an error "
         "of one metre adds {:.3g} m to its own bound",
         radius_m, at_edge.largest_position_m(2), result.loop_gain);
     const Radii wider = larger(largest, reached).scaled(1.25, 0);
