@@ -696,6 +696,7 @@ type activation =
 | Silu
 | Gelu
 | Sorted of sorting
+| Keeping of int * activation
 
 (** val inserted :
     ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 list -> 'a1 list **)
@@ -749,6 +750,21 @@ let sorted_by low high s l =
   | Groups k -> sorted_groups low high (length l) k l
   | Halves -> app (of_halves high l) (of_halves low l)
   | Pairs -> app (of_pairs high l) (of_pairs low l)
+
+(** val base : activation -> activation **)
+
+let rec base a = match a with
+| Keeping (_, b) -> base b
+| _ -> a
+
+(** val by_number :
+    (activation -> 'a1 -> 'a2) -> ('a1 -> 'a2) -> activation -> 'a1 list ->
+    'a2 list **)
+
+let rec by_number f g a l =
+  match a with
+  | Keeping (n, b) -> app (by_number f g b (firstn n l)) (map g (skipn n l))
+  | _ -> map (f a) l
 
 (** val weighted_gram :
     'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
@@ -1154,7 +1170,7 @@ type claim =
 
 (** val steepest : activation -> dyadic **)
 
-let steepest = function
+let rec steepest = function
 | Sigmoid ->
   (((fun p -> p) Big.one), (Big.neg ((fun p -> Big.shift_left p 1) Big.one)))
 | Selu ->
@@ -1214,6 +1230,8 @@ let steepest = function
     ((fun p -> Big.shift_left p 1) Big.one))))))))))))), (Big.neg
     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
     ((fun p -> Big.succ (Big.shift_left p 1)) Big.one)))))
+| Keeping (_, b) ->
+  if is_nonnegative (add0 (steepest b) (neg one)) then steepest b else one
 | _ -> one
 
 (** val is_rising : activation -> bool **)
@@ -1227,7 +1245,13 @@ let is_rising = function
 
 let is_entrywise = function
 | Sorted _ -> false
+| Keeping (_, _) -> false
 | _ -> true
+
+(** val changes_numbers : activation -> bool **)
+
+let changes_numbers a =
+  is_entrywise (base a)
 
 (** val is_relu : activation -> bool **)
 
@@ -1239,6 +1263,13 @@ let is_relu = function
 
 let range_of a =
   ((if is_rising a then zero else add0 one (neg (steepest a))), (steepest a))
+
+(** val kept_range : rangeD **)
+
+let kept_range =
+  ((add0 one ((Big.neg Big.one), (Big.neg ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+     ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))), one)
 
 (** val unit_of : activation -> dyadic **)
 
@@ -2759,10 +2790,11 @@ let greatest_ends i j =
 
 (** val activated_ends : activation -> box -> box **)
 
-let activated_ends a b =
+let rec activated_ends a b =
   match a with
   | Relu -> map relu_ends b
   | Sorted s -> sorted_by least_ends greatest_ends s b
+  | Keeping (n, c) -> app (activated_ends c (firstn n b)) (skipn n b)
   | _ -> map (values_between a) b
 
 (** val plus_ends : box -> box -> box **)
@@ -3182,10 +3214,12 @@ let constant_form i =
 
 (** val activated_known : activation -> dyadic -> known list -> known list **)
 
-let activated_known a rounding s =
+let rec activated_known a rounding s =
   match a with
   | Sorted k ->
     map constant_form (sorted_by least_ends greatest_ends k (map fst s))
+  | Keeping (n, b) ->
+    app (activated_known b rounding (firstn n s)) (skipn n s)
   | _ -> map (activated_form a rounding) s
 
 (** val contains_known : box -> known list -> bool **)
@@ -3965,17 +3999,28 @@ let rec following between0 = function
 | [] -> []
 | l :: hidden' -> ((hd Relu between0), l) :: (following (tl between0) hidden')
 
+(** val units : activation -> 'a1 list -> dyadic list **)
+
+let units a rows0 =
+  by_number (fun b _ -> unit_of b) (fun _ -> one) a rows0
+
+(** val scale_columns : dyadic list -> matrixD -> matrixD **)
+
+let scale_columns b m =
+  map (times mul0 b) m
+
 (** val scaled_matrices :
-    dyadic -> activation list -> layerD list -> layerD -> stack **)
+    dyadic list -> activation list -> layerD list -> layerD -> stack **)
 
 let rec scaled_matrices b between0 later last0 =
   match later with
-  | [] -> ([], (scale_all mul0 b (fst last0)))
+  | [] -> ([], (scale_columns b (fst last0)))
   | l :: later' ->
     let rest0 =
-      scaled_matrices (unit_of (hd Relu between0)) (tl between0) later' last0
+      scaled_matrices (units (hd Relu between0) (fst l)) (tl between0) later'
+        last0
     in
-    (((scale_all mul0 b (fst l)) :: (fst rest0)), (snd rest0))
+    (((scale_columns b (fst l)) :: (fst rest0)), (snd rest0))
 
 (** val matrices : part -> stack **)
 
@@ -3984,16 +4029,26 @@ let matrices p =
   | [] -> ([], (fst p.outer))
   | first0 :: later ->
     let rest0 =
-      scaled_matrices (unit_of (hd Relu p.between)) (tl p.between) later
-        p.outer
+      scaled_matrices (units (hd Relu p.between) (fst first0)) (tl p.between)
+        later p.outer
     in
     (((fst first0) :: (fst rest0)), (snd rest0))
 
-(** val ranges_by : (activation -> rangeD) -> part -> rangeD list list **)
+(** val divided_ranges : activation -> 'a1 list -> rangeD list **)
 
-let ranges_by range p =
-  map (fun l -> map (fun _ -> range (fst l)) (fst (snd l)))
-    (following p.between p.hidden)
+let divided_ranges a rows0 =
+  map (fun _ -> divided_range (base a)) rows0
+
+(** val whole_ranges : activation -> 'a1 list -> rangeD list **)
+
+let whole_ranges a rows0 =
+  by_number (fun b _ -> range_of b) (fun _ -> kept_range) a rows0
+
+(** val ranges_by :
+    (activation -> matrixD -> rangeD list) -> part -> rangeD list list **)
+
+let ranges_by ranges p =
+  map (fun l -> ranges (fst l) (fst (snd l))) (following p.between p.hidden)
 
 (** val relu_between : part -> bool **)
 
@@ -4003,7 +4058,7 @@ let relu_between p =
 (** val entrywise_between : part -> bool **)
 
 let entrywise_between p =
-  forallb is_entrywise p.between
+  forallb changes_numbers p.between
 
 (** val parts_of : part list -> function0 -> part list **)
 
@@ -4033,7 +4088,7 @@ let check_slope ps f moves scale0 u rho t factor0 =
     ((&&)
       ((&&) (well_formed ps f moves scale0)
         (forallb entrywise_between (parts_of ps f))) (is_nonnegative u))
-    (check_parts (flat_map (ranges_by divided_range) (parts_of ps f)) ([],
+    (check_parts (flat_map (ranges_by divided_ranges) (parts_of ps f)) ([],
       (selector moves scale0)) (map matrices (parts_of ps f)) u rho t factor0)
 
 (** val find_norm : claim list -> int -> int -> dyadic option **)
@@ -4111,9 +4166,10 @@ let check_product ps accepted f moves scale0 u =
 
 (** val steepest_known : activation -> known list -> dyadic **)
 
-let steepest_known a s =
+let rec steepest_known a s =
   match a with
   | Sorted _ -> one
+  | Keeping (n, b) -> larger one (steepest_known b (firstn n s))
   | _ ->
     fold_right (fun n m ->
       let (l, h) = slopes_between a (fst n) in larger (larger h (neg l)) m)
@@ -4151,6 +4207,11 @@ let check_local_product ps accepted f moves scale0 b u =
     (option_map (mul0 (steepest_on_box p b))
       (norms accepted (moved f) 0 (layers p)))
 
+(** val slopes_known : activation -> known list -> rangeD list **)
+
+let slopes_known =
+  by_number (fun b n -> slopes_between b (fst n)) (fun _ -> kept_range)
+
 (** val ranges_centred :
     dyadic list -> dyadic -> activation list -> layerD list -> known list ->
     rangeD list list **)
@@ -4161,11 +4222,8 @@ let rec ranges_centred radius rounding between0 hidden0 s =
   | l :: hidden' ->
     let t = passed radius rounding (fst l) (snd l) s in
     let a = hd Relu between0 in
-    (map (fun n -> slopes_between a (fst n)) t) :: (ranges_centred radius
-                                                     rounding (tl between0)
-                                                     hidden'
-                                                     (activated_known a
-                                                       rounding t))
+    (slopes_known a t) :: (ranges_centred radius rounding (tl between0)
+                            hidden' (activated_known a rounding t))
 
 (** val ranges_on_box : part -> box -> rangeD list list **)
 
@@ -4182,7 +4240,7 @@ let local_ranges ps f b =
   (ranges_on_box (part_at ps (moved f)) b) :: (match f with
                                                | Alone _ -> []
                                                | Set_of (_, rho) ->
-                                                 (ranges_by range_of
+                                                 (ranges_by whole_ranges
                                                    (part_at ps rho)) :: [])
 
 (** val undivided_matrices : part -> stack **)

@@ -173,6 +173,7 @@ type activation =
 | Silu
 | Gelu
 | Sorted of sorting
+| Keeping of int * activation
 
 val inserted :
   ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 list -> 'a1 list
@@ -192,6 +193,12 @@ val of_pairs : ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
 
 val sorted_by :
   ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> sorting -> 'a1 list -> 'a1
+  list
+
+val base : activation -> activation
+
+val by_number :
+  (activation -> 'a1 -> 'a2) -> ('a1 -> 'a2) -> activation -> 'a1 list -> 'a2
   list
 
 val weighted_gram :
@@ -358,9 +365,13 @@ val is_rising : activation -> bool
 
 val is_entrywise : activation -> bool
 
+val changes_numbers : activation -> bool
+
 val is_relu : activation -> bool
 
 val range_of : activation -> rangeD
+
+val kept_range : rangeD
 
 val unit_of : activation -> dyadic
 
@@ -810,12 +821,21 @@ val fits_part : part -> bool
 
 val following : activation list -> 'a1 list -> (activation * 'a1) list
 
+val units : activation -> 'a1 list -> dyadic list
+
+val scale_columns : dyadic list -> matrixD -> matrixD
+
 val scaled_matrices :
-  dyadic -> activation list -> layerD list -> layerD -> stack
+  dyadic list -> activation list -> layerD list -> layerD -> stack
 
 val matrices : part -> stack
 
-val ranges_by : (activation -> rangeD) -> part -> rangeD list list
+val divided_ranges : activation -> 'a1 list -> rangeD list
+
+val whole_ranges : activation -> 'a1 list -> rangeD list
+
+val ranges_by :
+  (activation -> matrixD -> rangeD list) -> part -> rangeD list list
 
 val relu_between : part -> bool
 
@@ -860,6 +880,8 @@ val steepest_on_box : part -> box -> dyadic
 val check_local_product :
   part list -> claim list -> function0 -> bool list -> dyadic list -> box ->
   dyadic -> bool
+
+val slopes_known : activation -> known list -> rangeD list
 
 val ranges_centred :
   dyadic list -> dyadic -> activation list -> layerD list -> known list ->

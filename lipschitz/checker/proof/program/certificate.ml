@@ -92,9 +92,9 @@ let check net json =
     [ "schema"; "tool"; "statement"; "network"; "box"; "layers"; "bounds"; "laws"; "values"; "content_sha256" ] json;
   let member key = find "certificate" key json in
   let net = with_stated_activations net json in
-  let sorts (_, w) = List.exists Activation.sorts (Weights.between w) in
-  let text = Statement.text ~sorts:(List.exists sorts net.parts) ~of_invariants:net.invariants
-      ~silent_names:(Functions.silent_names net) in
+  let some property = List.exists (fun (_, w) -> List.exists property (Weights.between w)) net.parts in
+  let text = Statement.text ~sorts:(some Activation.sorts) ~keeps:(some Activation.keeps)
+      ~of_invariants:net.invariants ~silent_names:(Functions.silent_names net) in
   require (member "statement" = Text text)
     "statement is not the one that is checked";
   let rest = List.filter (fun (key, _) -> key <> "content_sha256") (members "certificate" json) in

@@ -52,7 +52,7 @@ let stages state claim =
   match claim with
   | Proved.Norm_at_most (p, k, _) -> [], ([], Proved.matrix_at state.parts p k)
   | Slope_at_most (f, moves, scale, _) ->
-    List.concat_map (Proved.ranges_by Proved.divided_range) (Proved.parts_of state.parts f),
+    List.concat_map (Proved.ranges_by Proved.divided_ranges) (Proved.parts_of state.parts f),
     joined f moves scale Proved.matrices
   | Slope_in_box (f, moves, scale, box, _) ->
     List.concat (Proved.local_ranges state.parts f box), joined f moves scale Proved.undivided_matrices

@@ -58,24 +58,21 @@ let unit (net : Network.t) f block =
   if starts_with "phi:" f then "hidden/" ^ input else if starts_with "rho:" f then
       output ^ "/hidden" else output ^ "/" ^ input
 
-type operation = { op : string; layer : string option; from : int; onto : int }
+type operation = { op : string; layer : string option; from : int; onto : int; words : string }
 let chain (net : Network.t) part =
   let w = weights net part in
   let n = inputs net part in
-  let clamp = if net.clamp <> [] && Network.is_clamped part then [ { op = "clamp"; layer = None; from = n; onto = n } ]
-      else [] in
+  let clamp = if net.clamp <> [] && Network.is_clamped part then 
+      [ { op = "clamp"; layer = None; from = n; onto = n; words = "clamp" } ] else [] in
   let linear (l : Weights.layer) =
-    { op = "linear"; layer = Some l.name; from = Weights.inputs l; onto = Weights.outputs l } in
+    { op = "linear"; layer = Some l.name; from = Weights.inputs l; onto = Weights.outputs l;
+      words = if l.name = "" then "linear" else l.name } in
   let activated a (l : Weights.layer) =  (* in front of l *)
-    [ { op = Activation.name a; layer = None; from = Weights.inputs l; onto = Weights.inputs l }; linear l ] in
+    [ { op = Activation.name a; layer = None; from = Weights.inputs l; onto = Weights.inputs l;
+        words = Activation.words a }; linear l ] in
   clamp @ linear (List.hd w.layers) :: List.concat (List.map2 activated (Weights.between w) (List.tl w.layers))
 
-let chain_words steps =
-  String.concat " - " (List.map (fun step -> match step.op, step.layer with
-      | "clamp", _ -> "clamp"
-      | _, Some "" -> "linear"
-      | _, Some name -> name
-      | op, None -> Option.fold ~none:"linear" ~some:Activation.words (Activation.called op)) steps)
+let chain_words steps = String.concat " - " (List.map (fun step -> step.words) steps)
 let silent_names (net : Network.t) = List.map (fun (own, kinds) -> String.concat "+" kinds ^ ">" ^ own) net.silent
 (* Parts that have the same words, together. *)
 let words (net : Network.t) =

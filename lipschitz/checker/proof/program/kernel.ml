@@ -17,10 +17,12 @@ let matrix = list long_numbers
 let pair first second out (a, b) = Printf.bprintf out "(%a,%a)" first a second b
 
 let layer = pair matrix long_numbers
-let activation out a = Buffer.add_string out (match a with
-    | Proved.Relu -> "Relu" | Tanh -> "Tanh" | Sigmoid -> "Sigmoid" | Softplus -> "Softplus" | Elu -> "Elu"
-    | Selu -> "Selu" | Silu -> "Silu" | Gelu -> "Gelu" | Sorted Halves -> "(Sorted Halves)"
-    | Sorted Pairs -> "(Sorted Pairs)" | Sorted (Groups k) -> Printf.sprintf "(Sorted (Groups %d))" k)
+let rec activation_words = function
+  | Proved.Relu -> "Relu" | Tanh -> "Tanh" | Sigmoid -> "Sigmoid" | Softplus -> "Softplus" | Elu -> "Elu"
+  | Selu -> "Selu" | Silu -> "Silu" | Gelu -> "Gelu" | Sorted Halves -> "(Sorted Halves)"
+  | Sorted Pairs -> "(Sorted Pairs)" | Sorted (Groups k) -> Printf.sprintf "(Sorted (Groups %d))" k
+  | Keeping (n, a) -> Printf.sprintf "(Keeping %d%%nat %s)" n (activation_words a)
+let activation out a = Buffer.add_string out (activation_words a)
 let part out { Proved.hidden; outer; clamp; between } =
   Printf.bprintf out "Part %a %a %a %a" (list layer) hidden layer outer (list (pair number number)) clamp
     (list activation) between

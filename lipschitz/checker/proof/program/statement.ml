@@ -31,6 +31,11 @@ let sorting =
    maxmin:halves, of 2 h numbers, is max(t_i, t_(i+h)) for i = 1 .. h and then min(t_i, t_(i+h)); \
    maxmin:pairs is max(t_(2i-1), t_(2i)) for i = 1 .. h and then min(t_(2i-1), t_(2i))."
 
+(* What is added for networks with a skip connection past another activation than ReLU. *)
+let keeping =
+  " tanh:n, and so with other names, is that function of each of the first n numbers of a layer and leaves the others \
+   as they are."
+
 (* What is added for networks of rotation invariants. *)
 let invariants =
   " A set function takes of each neighbour its relative position p in m and velocity v in m/s, whose vertical \
@@ -45,6 +50,7 @@ let silent =
    among other neighbours than these. Ranges hold this 0, and jumps bound the steps as well by which one \
    neighbour that comes or goes makes or ends such a composition, while all are in the box or clamp: "
 
-let text ~sorts ~of_invariants ~silent_names =
-  common ^ (if sorts then sorting else "") ^ (if of_invariants then invariants else "")
+let text ~sorts ~keeps ~of_invariants ~silent_names =
+  common ^ (if sorts then sorting else "") ^ (if keeps then keeping else "")
+  ^ (if of_invariants then invariants else "")
   ^ if silent_names = [] then "" else silent ^ String.concat ", " silent_names ^ "."

@@ -38,7 +38,8 @@ let with_activations w stated =
     | [], _ -> true
     | a :: stated, layer :: layers -> outputs layer mod Activation.group a = 0 && fit stated layers
     | _ :: _, [] -> false in
-  if w.activations <> None && count > 1 then (if w.activations = Some stated then Some w else None)
+  if w.activations <> None && count > 1 then
+    (if Option.map (List.map Proved.base) w.activations = Some stated then Some w else None)
   else if List.length stated < count - 1 || not (fit stated w.layers) then None
   else
     let w = if List.length stated = count then with_identity w else w in

@@ -7,7 +7,10 @@ Open Scope R_scope.
 (** Sorting acts on the whole layer: in groups of k numbers side by side, or as the larger and the smaller of two, of
     one number in each half of the layer or of neighbours; the larger ones come first. *)
 Inductive sorting := Groups (k : nat) | Halves | Pairs.
-Inductive activation := Relu | Tanh | Sigmoid | Softplus | Elu | Selu | Silu | Gelu | Sorted (s : sorting).
+(** `Keeping n a` is a of the first n numbers of a layer. The others stay as they are: what a skip connection takes past
+    a. *)
+Inductive activation := Relu | Tanh | Sigmoid | Softplus | Elu | Selu | Silu | Gelu | Sorted (s : sorting)
+  | Keeping (n : nat) (a : activation).
 
 (** Of numbers or of intervals: `low` and `high` give the smaller and the larger one of two. *)
 Section Sorting.
@@ -86,12 +89,35 @@ Definition act (a : activation) (x : R) : R :=
   | Selu => selu_scale * relu x + selu_scale * selu_alpha * falling x
   | Silu => x / (1 + exp (- x))
   | Gelu => x / 2 * (1 + erf (x / sqrt 2))
-  | Sorted _ => x  (* by number it does nothing; see `activated` *)
+  | Sorted _ | Keeping _ _ => x  (* by number they do nothing; see `activated` *)
   end.
 
 (** Of a whole layer. *)
-Definition activated (a : activation) (y : list R) : list R :=
-  match a with Sorted s => sort_layer s y | _ => map (act a) y end.
+Fixpoint activated (a : activation) (y : list R) : list R :=
+  match a with
+  | Sorted s => sort_layer s y
+  | Keeping n b => activated b (firstn n y) ++ skipn n y
+  | _ => map (act a) y
+  end.
+
+(** What changes the numbers of a layer that change at all. *)
+Fixpoint base (a : activation) : activation := match a with Keeping _ b => base b | _ => a end.
+(** A list with one entry for each number of a layer: f of those that change, g of those that stay. *)
+Fixpoint by_number {A B} (f : activation -> A -> B) (g : A -> B) (a : activation) (l : list A) : list B :=
+  match a with
+  | Keeping n b => by_number f g b (firstn n l) ++ map g (skipn n l)
+  | _ => map (f a) l
+  end.
+Lemma length_by_number {A B} (f : activation -> A -> B) g a l : length (by_number f g a l) = length l.
+Proof.
+  revert l. induction a as [| | | | | | | |s|n a IH]; intros l; simpl; try apply map_length.
+  now rewrite app_length, IH, map_length, <- app_length, firstn_skipn.
+Qed.
+(** What is the same of both. *)
+Lemma by_number_alike {A B} (f : A -> B) a l : by_number (fun _ => f) f a l = map f l.
+Proof.
+  revert l. induction a as [| | | | | | | |s|n a IH]; intros l; simpl; auto. now rewrite IH, <- map_app, firstn_skipn.
+Qed.
 
 (** Every slope of f lies in [a, b]. *)
 Definition slopes (f : R -> R) (a b : R) : Prop := forall x y, x <= y -> a * (y - x) <= f y - f x <= b * (y - x).

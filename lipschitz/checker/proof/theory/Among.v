@@ -65,7 +65,9 @@ Proof.
   intros F L. assert (Forall (fun k => bias_fits (snd k)) (relu_layers ls)) as B.
   { unfold relu_layers. apply Forall_map. eapply Forall_impl; [|exact F]. intros l E. unfold bias_fits. simpl.
     now rewrite !map_length. }
-  rewrite (length_through _ z B n L). unfold outputs, relu_layers. rewrite map_map. clear.
+  assert (Forall (fun k => keeps_length (fst k)) (relu_layers ls)) as K
+    by (unfold relu_layers; apply Forall_map, Forall_forall; intros l _ y; apply map_length).
+  rewrite (length_through _ z B K n L). unfold outputs, relu_layers. rewrite map_map. clear.
   generalize (repeat (@nil R) n), (repeat (@nil dyadic) n), (eq_trans (repeat_length (@nil R) n)
     (eq_sym (repeat_length (@nil dyadic) n))).
   intros e d E. induction ls as [|l ls IH]; auto. destruct ls; [|exact IH]. simpl. apply map_length.

@@ -107,7 +107,7 @@ Proof.
 Qed.
 
 (** A hidden layer with what the matrix takes of it. *)
-Definition bent_as (k : (R -> R) * layer) (b : @bent_layer R) :=
+Definition bent_as (k : (list R -> list R) * layer) (b : @bent_layer R) :=
   bias_fits (snd k) /\ snd b = weights k /\ fits (weights k) (multipliers_of b).
 
 (** From h, h' on. *)
@@ -128,11 +128,10 @@ Proof.
     set (y := affine m c h) in *. set (y' := affine m c h') in *.
     assert (length y = length m) as Hy by (unfold y; now apply length_affine).
     assert (length y' = length m) as Hy' by (unfold y'; now apply length_affine).
-    set (z := map f y) in *. set (z' := map f y') in *.
-    assert (length z = length m) as Hz by (unfold z; now rewrite map_length).
-    assert (length z' = length m) as Hz' by (unfold z'; now rewrite map_length).
+    set (z := f y) in *. set (z' := f y') in *. destruct (increments_lengths _ _ _ _ _ Hf) as (Hr & _ & Lz & Lz').
+    assert (length z = length m) as Hz by congruence. assert (length z' = length m) as Hz' by congruence.
     destruct (IH t2 z z') as [rest Hrest]; try congruence.
-    exists (minus z z' ++ rest). destruct (increments_lengths _ _ _ _ Hf) as [Hr _].
+    exists (minus z z' ++ rest).
     assert (length (scale_rowsR (sums Rplus r) m) = length m) as Lw
       by (apply length_scale_rows; unfold sums; rewrite map_length; congruence).
     unfold multipliers_of, ranges_of. cbn [fst snd].
@@ -144,7 +143,7 @@ Proof.
       by (rewrite length_minus by congruence; unfold apply, scale_all;
           rewrite !map_length, length_scale_rows by congruence; lia).
     rewrite apply_scale_all, !apply_scale_rows, dot_scale_l, (dot_comm _ (minus z z')), !times_scale, !dot_scale_r.
-    pose proof (increments_constraint f r t2 y y' Hf Hp2) as C. cbv zeta in C. fold z z' in C.
+    pose proof (increments_constraint r t2 y y' z z' Hf Hp2) as C. cbv zeta in C.
     unfold y, y' in C. rewrite minus_affine in C by auto.
     change (sums_of r) with (sums Rplus r) in C. change (products_of r) with (products Rmult r) in C. lra.
 Qed.

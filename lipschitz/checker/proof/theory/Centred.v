@@ -66,9 +66,10 @@ Definition activated_form (a : activation) (rounding : dyadic) (n : known) : kno
 Definition constant_form (i : dyadic * dyadic) : known :=
   (i, Linear [] (floor_to (-64) (half (add (fst i) (snd i))))
         (add (ceil_to (-64) (half (add (snd i) (neg (fst i))))) grid)).
-Definition activated_known (a : activation) (rounding : dyadic) (s : list known) : list known :=
+Fixpoint activated_known (a : activation) (rounding : dyadic) (s : list known) : list known :=
   match a with
   | Sorted k => map constant_form (sorted_by least_ends greatest_ends k (map fst s))
+  | Keeping n b => activated_known b rounding (firstn n s) ++ skipn n s
   | _ => map (activated_form a rounding) s
   end.
 Fixpoint contains_known (a : box) (s : list known) : bool :=
@@ -243,13 +244,14 @@ Qed.
 Lemma activated_known_follow a radius d s y : bounded_by radius d -> Forall2 (follows d) s y ->
   Forall2 (follows d) (activated_known a (rounding_of radius) s) (activated a y).
 Proof.
-  intros B H. destruct (is_entrywise a) eqn:E.
-  - assert (Forall2 (follows d) (map (activated_form a (rounding_of radius)) s) (map (act a) y)) as F.
-    { induction H; simpl; constructor; auto. now apply activated_form_follows. }
-    destruct a; try discriminate; exact F.
-  - destruct a; try discriminate. cbn [activated_known activated]. apply follows_within in H.
-    apply (sorted_within s0) in H. rewrite within_lies in H. induction H; simpl; constructor; auto.
-    now apply constant_form_follows.
+  intros B. assert (forall c s y, is_entrywise c = true -> Forall2 (follows d) s y ->
+    Forall2 (follows d) (map (activated_form c (rounding_of radius)) s) (map (act c) y)) as F.
+  { clear - B. intros c s y E H. induction H; simpl; constructor; auto. now apply activated_form_follows. }
+  revert s y. induction a as [| | | | | | | |k|n a IH]; intros s y H; try (now apply F);
+    cbn [activated_known activated].
+  - apply follows_within in H. apply (sorted_within k) in H. rewrite within_lies in H.
+    induction H; simpl; constructor; auto. now apply constant_form_follows.
+  - apply Forall2_app; [apply IH; now apply related_firstn|now apply related_skipn].
 Qed.
 Lemma contains_known_within d a s y : contains_known a s = true -> Forall2 (follows d) s y -> within a y.
 Proof.

@@ -257,12 +257,13 @@ Proof.
   - apply IH; [rewrite skipn_length; lia|]. rewrite <- (firstn_skipn (length m) t) in Ht. now apply Forall_app in Ht.
 Qed.
 
-(** A network with these matrices, any biases and any functions. *)
+(** A network with these matrices, any biases and any functions that keep the number of numbers. *)
 Definition stack := (list matrixD * matrixD)%type.
-Definition real_stack := (list ((R -> R) * layer) * layer)%type.
+Definition real_stack := (list ((list R -> list R) * layer) * layer)%type.
 Definition run (l : real_stack) : list R -> list R := network (fst l) (snd l).
 Definition of_matrix (m : matrixD) (l : layer) := fst l = realm m /\ length (snd l) = length m.
-Definition of_stage (m : matrixD) (k : (R -> R) * layer) := of_matrix m (snd k).
+Definition keeps_length (f : list R -> list R) := forall y, length (f y) = length y.
+Definition of_stage (m : matrixD) (k : (list R -> list R) * layer) := of_matrix m (snd k) /\ keeps_length (fst k).
 Definition instance (p : stack) (l : real_stack) := Forall2 of_stage (fst p) (fst l) /\ of_matrix (snd p) (snd l).
 Definition real_range (r : rangeD) : range := (real (fst r), real (snd r)).
 Definition real_ranges : list (list rangeD) -> list (list range) := map (map real_range).
@@ -270,9 +271,9 @@ Definition real_ranges : list (list rangeD) -> list (list range) := map (map rea
 Lemma matrix_fits m l : of_matrix m l -> bias_fits l.
 Proof. intros [E H]. unfold bias_fits. now rewrite E, map_length. Qed.
 Lemma stages_fit ms ks : Forall2 of_stage ms ks ->
-  Forall (fun k => bias_fits (snd k)) ks /\ map weights ks = map realm ms.
+  Forall (fun k => bias_fits (snd k)) ks /\ map weights ks = map realm ms /\ Forall (fun k => keeps_length (fst k)) ks.
 Proof.
-  intros H. induction H as [|m k ms ks H Hs [IH1 IH2]]; simpl; split; auto.
+  intros H. induction H as [|m k ms ks [H K] Hs (IH1 & IH2 & IH3)]; simpl; repeat split; auto.
   - constructor; auto. eapply matrix_fits; eauto.
   - f_equal; auto. apply H.
 Qed.
@@ -296,7 +297,8 @@ Proof.
   induction M as [|m [f [m' c]] ms ks Hm Hms IH]; intros [|r ranges] ts h h' A F; simpl in A; try contradiction;
     [split; constructor|].
   destruct ts as [|t ts]; simpl in F; inversion F as [|? ? ? ? H F']; subst. destruct A as [_ A].
-  destruct (IH ranges ts _ _ A F') as [B E]. pose proof (matrix_fits _ _ Hm) as L. destruct Hm as [Em _].
+  destruct (IH ranges ts _ _ A F') as [B E]. destruct Hm as [Hm _]. pose proof (matrix_fits _ _ Hm) as L.
+  destruct Hm as [Em _].
   split; cbn [List.combine images map].
   - constructor; [|exact B]. unfold bent_as, weights, multipliers_of. cbn [fst snd] in *. subst m'.
     split; [exact L|]. split; [reflexivity|exact H].
@@ -327,8 +329,8 @@ Proof.
   assert (real (-1, 0)%Z = -1) as M by (unfold real; simpl; ring).
   rewrite forallb_forall, <- Forall_forall in Ht. pose proof (split_fits t hidden Hn Ht) as F.
   unfold matrix_inequality in HP. destruct (forallb _ ranges) eqn:Z.
-  - destruct (stages_fit _ _ Hks) as [B W]. apply unit_ranges in Z.
-    destruct Hks as [|first [g [m c]] later ks [E Hc] Hks]; simpl in HP.
+  - destruct (stages_fit _ _ Hks) as (B & W & _). apply unit_ranges in Z.
+    destruct Hks as [|first [g [m c]] later ks [[E Hc] _] Hks]; simpl in HP.
     + rewrite real_norm_inequality in HP.
       destruct (length last <=? _)%nat.
       * now apply norm_lmi_bounds.

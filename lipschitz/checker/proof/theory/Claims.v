@@ -35,27 +35,35 @@ Definition fits_part (p : part) : bool := forallb (fun l => length (snd l) =? le
 (** Each hidden layer with what follows it. *)
 Fixpoint following {A} (between : list activation) (hidden : list A) : list (activation * A) :=
   match hidden with [] => [] | l :: hidden' => (hd Relu between, l) :: following (tl between) hidden' end.
-(** Of the network whose functions are divided by b_k = unit_of: M_1, b_1 M_2, b_2 M_3, ... `b`: of the function in
-    front. *)
-Fixpoint scaled_matrices (b : dyadic) (between : list activation) (later : list layerD) (last : layerD) : stack :=
+(** What each number is divided by that leaves a layer with these rows; what stays is not. *)
+Definition units {A} (a : activation) (rows : list A) : list dyadic :=
+  by_number (fun b _ => unit_of b) (fun _ => one) a rows.
+Definition scale_columns (b : list dyadic) (m : matrixD) : matrixD := map (times mul b) m.
+(** Of the network whose functions are divided by b_k = units, B_k = diag (b_k): M_1, M_2 B_1, M_3 B_2, ... `b`: of the
+    function in front. *)
+Fixpoint scaled_matrices (b : list dyadic) (between : list activation) (later : list layerD) (last : layerD) : stack :=
   match later with
-  | [] => ([], scale_all mul b (fst last))
+  | [] => ([], scale_columns b (fst last))
   | l :: later' =>
-      let rest := scaled_matrices (unit_of (hd Relu between)) (tl between) later' last in
-      (scale_all mul b (fst l) :: fst rest, snd rest)
+      let rest := scaled_matrices (units (hd Relu between) (fst l)) (tl between) later' last in
+      (scale_columns b (fst l) :: fst rest, snd rest)
   end.
 Definition matrices (p : part) : stack :=
   match hidden p with
   | [] => ([], fst (outer p))
   | first :: later =>
-      let rest := scaled_matrices (unit_of (hd Relu (between p))) (tl (between p)) later (outer p) in
+      let rest := scaled_matrices (units (hd Relu (between p)) (fst first)) (tl (between p)) later (outer p) in
       (fst first :: fst rest, snd rest)
   end.
-(** Of each hidden neuron, with the range that its function has. *)
-Definition ranges_by (range : activation -> rangeD) (p : part) : list (list rangeD) :=
-  map (fun l => map (fun _ => range (fst l)) (fst (snd l))) (following (between p) (hidden p)).
+(** Of each hidden neuron, the range of the layer's function, divided or not. *)
+Definition divided_ranges {A} (a : activation) (rows : list A) : list rangeD :=
+  map (fun _ => divided_range (base a)) rows.
+Definition whole_ranges {A} (a : activation) (rows : list A) : list rangeD :=
+  by_number (fun b _ => range_of b) (fun _ => kept_range) a rows.
+Definition ranges_by (ranges : activation -> matrixD -> list rangeD) (p : part) : list (list rangeD) :=
+  map (fun l => ranges (fst l) (fst (snd l))) (following (between p) (hidden p)).
 Definition relu_between (p : part) : bool := forallb is_relu (between p).
-Definition entrywise_between (p : part) : bool := forallb is_entrywise (between p).
+Definition entrywise_between (p : part) : bool := forallb changes_numbers (between p).
 Definition parts_of (ps : list part) (f : function) : list part :=
   match f with Alone p => [part_at ps p] | Set_of phi rho => [part_at ps phi; part_at ps rho] end.
 (** Every network's biases fit; rho has no clamp; `moves` and a scale that is stated have one entry per input. *)
@@ -65,7 +73,7 @@ Definition well_formed (ps : list part) (f : function) (moves : list bool) (scal
   && positive_scale scale && (is_nil scale || (length scale =? length moves)%nat).
 Definition check_slope ps f moves scale u rho t factor : bool :=
   well_formed ps f moves scale && forallb entrywise_between (parts_of ps f) && is_nonnegative u
-  && check_parts (flat_map (ranges_by divided_range) (parts_of ps f)) ([], selector moves scale)
+  && check_parts (flat_map (ranges_by divided_ranges) (parts_of ps f)) ([], selector moves scale)
        (map matrices (parts_of ps f)) u rho t factor.
 
 (** Slopes by products of norms that were accepted before. *)
@@ -103,9 +111,10 @@ Definition check_product ps accepted f moves scale u : bool :=
   check_product_with ps accepted f moves scale u (norm_of ps accepted (moved f)).
 
 (** The same in a box, with the largest slope that the functions of the part that moves have there. *)
-Definition steepest_known (a : activation) (s : list known) : dyadic :=
+Fixpoint steepest_known (a : activation) (s : list known) : dyadic :=
   match a with
   | Sorted _ => one
+  | Keeping n b => larger one (steepest_known b (firstn n s))
   | _ => fold_right (fun n m => let (l, h) := slopes_between a (fst n) in larger (larger h (neg l)) m) zero s
   end.
 Fixpoint steepest_centred (radius : list dyadic) (rounding : dyadic) (between : list activation) (hidden : list layerD)
@@ -129,6 +138,8 @@ Definition check_local_product ps accepted f moves scale (b : box) u : bool :=
 
 (** In a box, by a matrix inequality with the slopes that each neuron of the part that moves has there; no function is
   divided. Behind it, terms of a sum may be anything. *)
+Definition slopes_known : activation -> list known -> list rangeD :=
+  by_number (fun b n => slopes_between b (fst n)) (fun _ => kept_range).
 Fixpoint ranges_centred (radius : list dyadic) (rounding : dyadic) (between : list activation) (hidden : list layerD)
     (s : list known) : list (list rangeD) :=
   match hidden with
@@ -136,7 +147,7 @@ Fixpoint ranges_centred (radius : list dyadic) (rounding : dyadic) (between : li
   | l :: hidden' =>
       let t := passed radius rounding (fst l) (snd l) s in
       let a := hd Relu between in
-      map (fun n => slopes_between a (fst n)) t
+      slopes_known a t
       :: ranges_centred radius rounding (tl between) hidden' (activated_known a rounding t)
   end.
 Definition ranges_on_box (p : part) (b : box) : list (list rangeD) :=
@@ -146,7 +157,7 @@ Definition ranges_on_box (p : part) (b : box) : list (list rangeD) :=
 (** Of each part. *)
 Definition local_ranges (ps : list part) (f : function) (b : box) : list (list (list rangeD)) :=
   ranges_on_box (part_at ps (moved f)) b
-  :: match f with Alone _ => [] | Set_of _ rho => [ranges_by range_of (part_at ps rho)] end.
+  :: match f with Alone _ => [] | Set_of _ rho => [ranges_by whole_ranges (part_at ps rho)] end.
 Definition undivided_matrices (p : part) : stack := (map fst (hidden p), fst (outer p)).
 Definition check_local_slope ps f moves scale (b : box) u rho t factor : bool :=
   well_formed ps f moves scale && forallb entrywise_between (parts_of ps f)

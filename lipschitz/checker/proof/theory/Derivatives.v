@@ -18,7 +18,7 @@ Definition slope_at (a : activation) (t : dyadic) : fixed :=
   | Selu => if is_positive t then selu_scaleF else mulF (mulF selu_scaleF selu_alphaF) (exp_of_minus_size t)
   | Silu => addF (sigmoidF t) (mulF (of_dyadic t) (bumpF (exp_of_minus_size t)))
   | Gelu => gelu_slopeF t
-  | Relu | Sorted _ => (0, 0)
+  | Relu | Sorted _ | Keeping _ _ => (0, 0)
   end.
 (** The absolute values of an interval's numbers. *)
 Definition nearest (i : dyadic * dyadic) : dyadic :=

@@ -46,7 +46,7 @@ Definition value_at (a : activation) (t : dyadic) : fixed :=
   | Selu => seluF t
   | Silu => mulF (of_dyadic t) (sigmoidF t)
   | Gelu => mulF (of_dyadic t) (probabilityF t)
-  | Relu | Sorted _ => (0, 0)
+  | Relu | Sorted _ | Keeping _ _ => (0, 0)
   end.
 
 (** SiLU and GELU fall up to their minimum, which lies between the first two numbers, and rise behind; they are nowhere
@@ -71,9 +71,10 @@ Definition values_between (a : activation) (i : dyadic * dyadic) : dyadic * dyad
 
 Definition least_ends (i j : dyadic * dyadic) : dyadic * dyadic := (smaller (fst i) (fst j), smaller (snd i) (snd j)).
 Definition greatest_ends (i j : dyadic * dyadic) : dyadic * dyadic := (larger (fst i) (fst j), larger (snd i) (snd j)).
-Definition activated_ends (a : activation) (b : box) : box :=
+Fixpoint activated_ends (a : activation) (b : box) : box :=
   match a with
   | Sorted s => sorted_by least_ends greatest_ends s b
+  | Keeping n c => activated_ends c (firstn n b) ++ skipn n b
   | Relu => map relu_ends b
   | _ => map (values_between a) b
   end.

@@ -138,7 +138,10 @@ Fixpoint open_ones (lines : list line) (dz : list R) : list R :=
   | _, _ => []
   end.
 Lemma relu_increment a b : 0 <= (relu a - relu b) * ((a - b) - (relu a - relu b)).
-Proof. pose proof (slope_increment relu 0 1 a b relu_slopes) as S. rewrite Rmult_0_l, Rminus_0_r in S. lra. Qed.
+Proof.
+  pose proof (slope_increment relu (0, 1) a b relu_slopes) as S. unfold increment_within in S. cbn [fst snd] in S.
+  rewrite Rmult_0_l, Rminus_0_r in S. lra.
+Qed.
 Lemma relu_step_holds lines ts ys n y y' v pre post :
   Forall2 sign_holds lines y -> Forall2 sign_holds lines y' -> Forall (fun t => is_nonnegative t = true) ts ->
   applyR (realm ys) v = minus y y' -> length pre = n ->

@@ -303,11 +303,14 @@ Proof.
 Qed.
 Lemma activated_within a b x : within b x -> within (activated_ends a b) (activated a x).
 Proof.
-  intros H. destruct (is_relu a) eqn:Q; [destruct a; try discriminate; now apply relu_within|].
-  destruct (is_entrywise a) eqn:E; [|destruct a; try discriminate; now apply sorted_within].
-  assert (within (map (values_between a) b) (map (act a) x)) as W.
-  { rewrite within_lies in *. induction H; simpl; constructor; auto. now apply values_between_lies. }
-  destruct a; try discriminate; exact W.
+  assert (forall c b x, is_relu c = false -> is_entrywise c = true -> within b x ->
+    within (map (values_between c) b) (map (act c) x)) as W.
+  { clear. intros c b x Q E H. rewrite within_lies in *. induction H; simpl; constructor; auto.
+    now apply values_between_lies. }
+  revert b x. induction a as [| | | | | | | |s|n a IH]; intros b x H; try (now apply W);
+    [now apply relu_within|now apply sorted_within|]. rewrite within_lies in H.
+  apply within_lies, Forall2_app; [|now apply related_skipn].
+  apply within_lies, IH, within_lies. now apply related_firstn.
 Qed.
 Lemma plus_within a b x y : within a x -> within b y -> within (plus_ends a b) (plusR x y).
 Proof.

@@ -33,7 +33,7 @@ Proof.
   unfold affineD, affine. now rewrite (f_plus add Rplus real real_add),
       (f_apply zero add mul 0 Rplus Rmult real real_zero real_add real_mul).
 Qed.
-Definition relu_layers (hidden : list layerD) := map (fun l => (relu, real_layer l)) hidden.
+Definition relu_layers (hidden : list layerD) := map (fun l => (map relu, real_layer l)) hidden.
 Lemma real_network hidden last x :
   reals (networkD hidden last x) = network (relu_layers hidden) (real_layer last) (reals x).
 Proof.

@@ -9,30 +9,33 @@ Notation matrix := (list (list R)).
 Notation layer := (matrix * list R)%type.
 Definition affine (m : matrix) (b x : list R) : list R := plusR (applyR m x) b.
 (** Each hidden layer with the function that follows it. *)
-Fixpoint network (hidden : list ((R -> R) * layer)) (last : layer) (x : list R) : list R :=
+Fixpoint network (hidden : list ((list R -> list R) * layer)) (last : layer) (x : list R) : list R :=
   match hidden with
   | [] => affine (fst last) (snd last) x
-  | (f, (m, b)) :: hidden' => network hidden' last (map f (affine m b x))
+  | (f, (m, b)) :: hidden' => network hidden' last (f (affine m b x))
   end.
 Definition bias_fits (l : layer) := length (snd l) = length (fst l).
-Definition weights (k : (R -> R) * layer) : matrix := fst (snd k).
+Definition weights (k : (list R -> list R) * layer) : matrix := fst (snd k).
 Definition norm (u : list R) := sqrt (square u).
 
-(** What the inequality rests on: slopes of f between the numbers of y and y' lie in a range [a, b] for each. *)
+(** What the inequality rests on: between the numbers of y and y', where those of z and z' belong to them, slopes lie in
+    a range [a, b] for each. *)
 Notation range := (R * R)%type.
-Fixpoint increments_within (f : R -> R) (ranges : list range) (y y' : list R) : Prop :=
-  match ranges, y, y' with
-  | (a, b) :: ranges', u :: v, u' :: v' =>
-      0 <= (f u - f u' - a * (u - u')) * (b * (u - u') - (f u - f u')) /\ increments_within f ranges' v v'
-  | [], [], [] => True
-  | _, _, _ => False
+Definition increment_within (r : range) (y y' z z' : R) : Prop :=
+  0 <= (z - z' - fst r * (y - y')) * (snd r * (y - y') - (z - z')).
+Fixpoint increments_within (ranges : list range) (y y' z z' : list R) : Prop :=
+  match ranges, y, y', z, z' with
+  | r :: ranges', u :: v, u' :: v', w :: x, w' :: x' =>
+      increment_within r u u' w w' /\ increments_within ranges' v v' x x'
+  | [], [], [], [], [] => True
+  | _, _, _, _, _ => False
   end.
 (** The same of all hidden layers, from what enters the first. *)
-Fixpoint along (hidden : list ((R -> R) * layer)) (ranges : list (list range)) (h h' : list R) : Prop :=
+Fixpoint along (hidden : list ((list R -> list R) * layer)) (ranges : list (list range)) (h h' : list R) : Prop :=
   match hidden, ranges with
   | (f, (m, b)) :: hidden', r :: ranges' =>
-      increments_within f r (affine m b h) (affine m b h')
-      /\ along hidden' ranges' (map f (affine m b h)) (map f (affine m b h'))
+      let y := affine m b h in let y' := affine m b h' in
+      increments_within r y y' (f y) (f y') /\ along hidden' ranges' (f y) (f y')
   | [], [] => True
   | _, _ => False
   end.
@@ -54,40 +57,41 @@ Qed.
 Lemma length_minus u v : length v = length u -> length (minus u v) = length u.
 Proof. unfold minus. revert v. induction u as [|a u IH]; intros [|b v]; simpl; try discriminate; auto. Qed.
 
-Lemma slope_increment f a b u u' : slopes f a b ->
-  0 <= (f u - f u' - a * (u - u')) * (b * (u - u') - (f u - f u')).
-Proof. intros S. destruct (Rle_dec u u'); [specialize (S u u')|specialize (S u' u)]; nra. Qed.
-Lemma increments_lengths f r y y' : increments_within f r y y' -> length y = length r /\ length y' = length r.
+Lemma slope_increment f r u u' : slopes f (fst r) (snd r) -> increment_within r u u' (f u) (f u').
 Proof.
-  revert y y'. induction r as [|[a b] r IH]; intros [|u y] [|u' y']; simpl; try tauto.
-  intros [_ H]. destruct (IH y y' H). lia.
+  intros S. unfold increment_within. destruct (Rle_dec u u'); [specialize (S u u')|specialize (S u' u)]; nra.
 Qed.
-(** Of a function with one range everywhere. *)
-Lemma slopes_increments f a b y y' : slopes f a b -> length y' = length y ->
-  increments_within f (repeat (a, b) (length y)) y y'.
+Lemma increments_lengths r y y' z z' : increments_within r y y' z z' ->
+  length y = length r /\ length y' = length r /\ length z = length r /\ length z' = length r.
 Proof.
-  intros S. revert y'. induction y as [|u y IH]; intros [|u' y']; simpl; try discriminate; auto.
-  intros H. split; [now apply slope_increment|]. apply IH. lia.
+  revert y y' z z'. induction r as [|a r IH]; intros [|u y] [|u' y'] [|w z] [|w' z']; simpl; try tauto.
+  intros [_ H]. destruct (IH y y' z z' H) as (? & ? & ? & ?). repeat split; lia.
+Qed.
+Lemma increments_app r s y y' z z' v v' w w' : increments_within r y y' z z' -> increments_within s v v' w w' ->
+  increments_within (r ++ s) (y ++ v) (y' ++ v') (z ++ w) (z' ++ w').
+Proof.
+  intros H G. revert y y' z z' H. induction r as [|a r IH]; intros [|u y] [|u' y'] [|t z] [|t' z']; simpl; try tauto.
+  intros [I H]. split; auto.
 Qed.
 
 (** dz ((a + b) dy - dz) - a b dy^2 >= 0, with multipliers. *)
 Definition sums_of (r : list range) := map (fun i => fst i + snd i) r.
 Definition products_of (r : list range) := map (fun i => fst i * snd i) r.
-Lemma increments_constraint f r t y y' : increments_within f r y y' -> Forall (Rle 0) t ->
-  let dz := minus (map f y) (map f y') in let dy := minus y y' in
+Lemma increments_constraint r t y y' z z' : increments_within r y y' z z' -> Forall (Rle 0) t ->
+  let dz := minus z z' in let dy := minus y y' in
   dotR dz (timesR t dz) <= dotR dz (timesR t (timesR (sums_of r) dy)) - dotR dy (timesR (timesR t (products_of r)) dy).
 Proof.
-  simpl. unfold minus. intros H Ht. revert r y y' H.
-  induction Ht as [|c t Hc Ht IH]; intros [|[a b] r] [|u y] [|u' y']; simpl; try tauto; try lra.
-  intros [S H]. specialize (IH r y y' H). pose proof (Rmult_le_pos _ _ Hc S). nra.
+  simpl. unfold minus. intros H Ht. revert r y y' z z' H.
+  induction Ht as [|c t Hc Ht IH]; intros [|[a b] r] [|u y] [|u' y'] [|w z] [|w' z']; simpl; try tauto; try lra.
+  intros [S H]. specialize (IH r y y' z z' H). pose proof (Rmult_le_pos _ _ Hc S). simpl in *. nra.
 Qed.
-Lemma slope_constraint f r t y y' : increments_within f r y y' -> Forall unit_range r -> Forall (Rle 0) t ->
-  let dz := minus (map f y) (map f y') in dotR dz (timesR t dz) <= dotR dz (timesR t (minus y y')).
+Lemma slope_constraint r t y y' z z' : increments_within r y y' z z' -> Forall unit_range r -> Forall (Rle 0) t ->
+  let dz := minus z z' in dotR dz (timesR t dz) <= dotR dz (timesR t (minus y y')).
 Proof.
-  simpl. unfold minus. intros H U Ht. revert r y y' H U.
-  induction Ht as [|c t Hc Ht IH]; intros [|[a b] r] [|u y] [|u' y']; simpl; try tauto; try lra.
-  intros [S H] U. inversion U as [|? ? E U']; subst. inversion E; subst. specialize (IH r y y' H U').
-  pose proof (Rmult_le_pos _ _ Hc S). nra.
+  simpl. unfold minus. intros H U Ht. revert r y y' z z' H U.
+  induction Ht as [|c t Hc Ht IH]; intros [|[a b] r] [|u y] [|u' y'] [|w z] [|w' z']; simpl; try tauto; try lra.
+  intros [S H] U. inversion U as [|? ? E U']; subst. inversion E; subst. specialize (IH r y y' z z' H U').
+  pose proof (Rmult_le_pos _ _ Hc S). simpl in *. nra.
 Qed.
 
 Definition fits (m : matrix) (t : list R) := length t = length m /\ Forall (Rle 0) t.
@@ -118,9 +122,9 @@ Proof.
   - destruct ranges as [|r ranges]; [contradiction|]. destruct Hal as [Hf Hal].
     inversion Hbs as [|? ? Hc Hbs']; inversion Hts as [|? t2 ? ts' [Ht2 Hp2] Hts']; inversion U as [|? ? U1 U2]; subst.
     unfold bias_fits, weights in *. simpl in *.
-    set (z := map f (affine m c h)). set (z' := map f (affine m c h')).
-    assert (length z = length m) as Hz by (unfold z; now rewrite map_length, length_affine).
-    assert (length z' = length m) as Hz' by (unfold z'; now rewrite map_length, length_affine).
+    set (z := f (affine m c h)) in *. set (z' := f (affine m c h')) in *.
+    destruct (increments_lengths _ _ _ _ _ Hf) as (Ly & _ & Lz & Lz'). rewrite length_affine in Ly by auto.
+    assert (length z = length m) as Hz by congruence. assert (length z' = length m) as Hz' by congruence.
     destruct (IH t2 ranges ts' z z') as [rest Hrest]; try congruence; auto.
     exists (minus z z' ++ rest).
     assert (length (minus h h') = length t) as L by (rewrite length_minus; auto).
@@ -128,8 +132,8 @@ Proof.
     rewrite dot_columns, (dot_comm (_ ++ _)), dot_app_short
       by (rewrite length_minus by congruence; unfold apply, scale_all; rewrite !map_length, length_scale_rows; lia).
     rewrite apply_scale_all, apply_scale_rows, dot_scale_l, (dot_comm _ (minus z z')), times_scale, dot_scale_r.
-    pose proof (slope_constraint f r t2 (affine m c h) (affine m c h') Hf U1 Hp2) as C.
-    cbv zeta in C. rewrite minus_affine in C by auto. fold z z' in C. simpl in C. nra.
+    pose proof (slope_constraint r t2 _ _ _ _ Hf U1 Hp2) as C.
+    cbv zeta in C. rewrite minus_affine in C by auto. simpl in C. nra.
 Qed.
 
 (** Completes the square rho^2 |dx|^2 - 2 rho l dx + |l|^2. *)
@@ -149,12 +153,12 @@ Theorem lmi_bounds rho t f first b1 hidden r ranges ts last b x x' :
   square (minus (g x) (g x')) <= rho * square (minus x x').
 Proof.
   intros Hr H1 Hh Hl [Hf Hal] U [Ht Hp] Hts HP. inversion U as [|? ? U1 U2]; subst. simpl. unfold bias_fits in *.
-  simpl in *. set (z := map f (affine first b1 x)) in *. set (z' := map f (affine first b1 x')) in *.
-  assert (length z = length first) as Hz by (unfold z; now rewrite map_length, length_affine).
-  assert (length z' = length first) as Hz' by (unfold z'; now rewrite map_length, length_affine).
+  simpl in *. set (z := f (affine first b1 x)) in *. set (z' := f (affine first b1 x')) in *.
+  destruct (increments_lengths _ _ _ _ _ Hf) as (Ly & _ & Lz & Lz'). rewrite length_affine in Ly by auto.
+  assert (length z = length first) as Hz by congruence. assert (length z' = length first) as Hz' by congruence.
   destruct (later_layers rho t hidden ranges ts last b z z') as [rest Hrest]; try congruence; auto.
-  pose proof (slope_constraint f r t (affine first b1 x) (affine first b1 x') Hf U1 Hp) as C.
-  cbv zeta in C. rewrite minus_affine in C by auto. fold z z' in C.
+  pose proof (slope_constraint r t _ _ _ _ Hf U1 Hp) as C.
+  cbv zeta in C. rewrite minus_affine in C by auto.
   specialize (HP (minus z z' ++ rest)). unfold lmi in HP. rewrite form_sum, form_scale, form_gram in HP.
   set (l := combine_rows _ _) in HP.
   assert (dotR l (minus x x') = dotR (minus z z') (timesR t (applyR first (minus x x')))) as E.

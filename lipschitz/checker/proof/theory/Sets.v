@@ -42,15 +42,16 @@ Proof. intros H. unfold affine. now rewrite apply_product, (plus_assoc _ b s), !
     !plus_assoc by auto. Qed.
 
 (** Through all of the hidden layers. *)
-Definition through (hidden : list ((R -> R) * layer)) (x : list R) : list R :=
-  fold_left (fun h k => map (fst k) (affine (fst (snd k)) (snd (snd k)) h)) hidden x.
-Lemma length_through hidden x : Forall (fun k => bias_fits (snd k)) hidden -> forall n, length x = n ->
+Definition through (hidden : list ((list R -> list R) * layer)) (x : list R) : list R :=
+  fold_left (fun h k => fst k (affine (fst (snd k)) (snd (snd k)) h)) hidden x.
+Lemma length_through hidden x : Forall (fun k => bias_fits (snd k)) hidden ->
+  Forall (fun k => keeps_length (fst k)) hidden -> forall n, length x = n ->
   length (through hidden x) = length (List.last (map weights hidden) (repeat [] n)).
 Proof.
-  unfold through. intros H. revert x. induction H as [|[f [m b]] hidden Hb H IH]; intros x n Hn; simpl.
+  unfold through. intros H. revert x. induction H as [|[f [m b]] hidden Hb H IH]; intros x K n Hn; simpl.
   - now rewrite repeat_length.
-  - unfold bias_fits in Hb. simpl in Hb.
-    rewrite (IH _ (length m)) by (now rewrite map_length, length_affine).
+  - unfold bias_fits in Hb. simpl in Hb. inversion K as [|? ? Kf K']; subst.
+    rewrite (IH _ K' (length m)) by (simpl in Kf; now rewrite Kf, length_affine).
     clear. destruct hidden as [|l hidden]; simpl; [now rewrite repeat_length|].
     revert l. induction hidden as [|k hidden IH]; intros l; simpl; auto.
 Qed.
@@ -60,15 +61,16 @@ Lemma network_end h last x : network h last x = affine (fst last) (snd last) (th
 Proof. unfold through. revert x. induction h as [|[f [m b]] h IH]; intros x; simpl; auto. Qed.
 
 (** rho(phi(x) + s) as one chain. *)
-Definition joined (phi : list ((R -> R) * layer)) (w : matrix) (b s : list R) (rho : list ((R -> R) * layer))
-    (last : layer) : real_stack :=
+Definition joined (phi : list ((list R -> list R) * layer)) (w : matrix) (b s : list R)
+    (rho : list ((list R -> list R) * layer)) (last : layer) : real_stack :=
   let join (l : layer) := (product 0 Rplus Rmult (fst l) w, plusR (applyR (fst l) (plusR b s)) (snd l)) in
   match rho with [] => (phi, join last) | (f, v) :: rho' => (phi ++ (f, join v) :: rho', last) end.
 Lemma network_joined phi w b s rho last x : Forall (fun k => bias_fits (snd k)) phi ->
+  Forall (fun k => keeps_length (fst k)) phi ->
   length (hd [] w) = length (List.last (map weights phi) (repeat [] (length x))) ->
   run (joined phi w b s rho last) x = network rho last (plusR (network phi (w, b) x) s).
 Proof.
-  intros Hp Hw. rewrite <- (length_through phi x Hp _ eq_refl) in Hw. unfold run.
+  intros Hp Kp Hw. rewrite <- (length_through phi x Hp Kp _ eq_refl) in Hw. unfold run.
   destruct rho as [|[f [v c]] rho]; simpl.
   - rewrite !network_end. now apply affine_join.
   - rewrite network_app, (network_end phi). simpl. now rewrite affine_join.
@@ -89,9 +91,9 @@ Proof.
     - symmetry. apply (f_product zero add mul 0 Rplus Rmult real real_zero real_add real_mul).
     - change (plusR _ d) with (affine (realm v) d (plusR b s)).
       rewrite length_affine by (now rewrite map_length). unfold product. now rewrite !map_length. }
-  destruct Hr as [|v [f v'] rho lr Hv Hr]; simpl in *.
+  destruct Hr as [|v [f v'] rho lr [Hv Kf] Hr]; simpl in *.
   - split; [exact Hp|]. now apply L.
-  - split; [|exact Hl]. apply Forall2_app; [exact Hp|]. constructor; [|exact Hr]. now apply L.
+  - split; [|exact Hl]. apply Forall2_app; [exact Hp|]. constructor; [|exact Hr]. split; [now apply L|exact Kf].
 Qed.
 
 Lemma along_app h1 h2 r1 r2 x x' : along h1 r1 x x' -> along h2 r2 (through h1 x) (through h1 x') ->
@@ -115,7 +117,8 @@ Lemma run_join p l s k x : instance p l -> length x = inputs (fst p) (snd p) ->
   length (hd [] (snd p)) = outputs (fst p) (inputs (fst p) (snd p)) ->
   length (hd [] (fst (snd l))) = length (through (fst l) x) /\ run (join l s k) x = run k (plusR (run l x) s).
 Proof.
-  destruct l as [lp [w' b]]. intros [Hp [E Hb]] Hx Hw. simpl in *. subst w'. destruct (stages_fit _ _ Hp) as [F M].
+  destruct l as [lp [w' b]]. intros [Hp [E Hb]] Hx Hw. simpl in *. subst w'.
+  destruct (stages_fit _ _ Hp) as (F & M & K).
   assert (length (hd [] (realm (snd p))) = length (List.last (map weights lp) (repeat [] (length x)))) as L.
   { rewrite M. unfold outputs in Hw.
     assert (length (hd [] (realm (snd p))) = length (hd [] (snd p))) as ->

@@ -1,7 +1,7 @@
 (** Accepted norms and slopes hold: by a matrix inequality, by a vector, by a product of norms. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Activations Form Network Sorting Checker Meaning Steepness Sets Distance Blocks
-    Lower Values Fixed Enclosures Intervals Derivatives Centred Claims.
+From Swarmcert Require Import Algebra Activations Form Network Sorting Bent Checker Meaning Steepness Sets Distance
+    Blocks Lower Values Fixed Enclosures Intervals Derivatives Centred Claims.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -43,64 +43,99 @@ Qed.
 
 (** Slopes by a matrix inequality *)
 (** Part p with each function divided by its b, and the matrix behind it multiplied by that. *)
-Definition scaled_layer (b : R) (l : layer) : layer := (scale_allR b (fst l), snd l).
-Definition divided_act (a : activation) (t : R) : R := / real (unit_of a) * act a t.
-Fixpoint scaled_layers (b : R) (between : list activation) (later : list layer) (last : layer) : real_stack :=
+Definition scaled_layer (b : list R) (l : layer) : layer := (map (timesR b) (fst l), snd l).
+Definition divided : activation -> list R -> list R :=
+  by_number (fun b t => / real (unit_of b) * act b t) (fun t => t).
+Fixpoint scaled_layers (b : list R) (between : list activation) (later : list layer) (last : layer) : real_stack :=
   match later with
   | [] => ([], scaled_layer b last)
   | l :: later' =>
       let a := hd Relu between in
-      let rest := scaled_layers (real (unit_of a)) (tl between) later' last in
-      ((divided_act a, scaled_layer b l) :: fst rest, snd rest)
+      let rest := scaled_layers (reals (units a (fst l))) (tl between) later' last in
+      ((divided a, scaled_layer b l) :: fst rest, snd rest)
   end.
 Definition stack_of (p : part) : real_stack :=
   match hidden p with
   | [] => ([], real_layer (outer p))
   | first :: later =>
       let a := hd Relu (between p) in
-      let rest := scaled_layers (real (unit_of a)) (tl (between p)) (map real_layer later) (real_layer (outer p)) in
-      ((divided_act a, real_layer first) :: fst rest, snd rest)
+      let rest :=
+        scaled_layers (reals (units a (fst first))) (tl (between p)) (map real_layer later) (real_layer (outer p)) in
+      ((divided a, real_layer first) :: fst rest, snd rest)
   end.
 (** Without division. *)
-Definition functions_and_layers (between : list activation) (hidden : list layer) : list ((R -> R) * layer) :=
-  map (fun l => (act (fst l), snd l)) (following between hidden).
+Definition whole : activation -> list R -> list R := by_number act (fun t => t).
+Definition functions_and_layers (between : list activation) (hidden : list layer) :
+    list ((list R -> list R) * layer) := map (fun l => (whole (fst l), snd l)) (following between hidden).
+Lemma whole_activated a y : changes_numbers a = true -> activated a y = whole a y.
+Proof.
+  revert y. induction a as [| | | | | | | |s|n a IH]; intros y H; try discriminate; try reflexivity.
+  unfold whole in *. cbn [activated by_number]. now rewrite IH, map_id.
+Qed.
+Lemma units_map {A B} (f : A -> B) a l : units a (map f l) = units a l.
+Proof.
+  unfold units. revert l. induction a as [| | | | | | | |s|n a IH]; intros l; simpl; rewrite ?map_map; auto.
+  now rewrite firstn_map, IH, skipn_map, map_map.
+Qed.
 Lemma affine_scaled b (l : layer) x :
-  affine (fst (scaled_layer b l)) (snd (scaled_layer b l)) x = affine (fst l) (snd l) (scaleR b x).
+  affine (fst (scaled_layer b l)) (snd (scaled_layer b l)) x = affine (fst l) (snd l) (timesR b x).
+Proof. unfold affine. f_equal. simpl. unfold apply. rewrite map_map. apply map_ext. intros r. apply dot_times. Qed.
+Lemma times_app u v x y : length u = length x -> timesR (u ++ v) (x ++ y) = timesR u x ++ timesR v y.
+Proof. revert x. induction u as [|a u IH]; intros [|b x]; simpl; try discriminate; auto. intros. rewrite IH; auto. Qed.
+Lemma times_divided {A} a (rows : list A) y : length y = length rows ->
+  timesR (reals (units a rows)) (divided a y) = whole a y.
 Proof.
-  unfold affine. f_equal. simpl. rewrite apply_scale_all. unfold apply, scale. rewrite map_map. apply map_ext. intros r.
-  symmetry. apply dot_scale_r.
+  assert (forall c (f : R -> R) (rows : list A) y, 0 < real c -> length y = length rows ->
+    timesR (reals (map (fun _ => c) rows)) (map (fun t => / real c * f t) y) = map f y) as C.
+  { clear. intros c f rows. induction rows as [|r rows IH]; intros [|t y]; simpl; try discriminate; auto.
+    intros P L. rewrite IH by auto. f_equal. field. lra. }
+  unfold units, divided, whole.
+  revert rows y. induction a as [| | | | | | | |s|n a IH]; intros rows y L; cbn [by_number];
+    try (apply C; auto; apply divided_range_holds).
+  rewrite map_app, times_app.
+  - rewrite IH by (rewrite !firstn_length; lia). f_equal. rewrite map_id.
+    pose proof (C one (fun t => t) (skipn n rows) (skipn n y)) as Q. rewrite real_one in Q.
+    rewrite map_id in Q. rewrite <- Q at 2 by (rewrite ?skipn_length; lra || lia). f_equal.
+    rewrite <- (map_id (skipn n y)) at 1. apply map_ext. intros. field.
+  - rewrite map_length, !length_by_number, !firstn_length. lia.
 Qed.
-Lemma scale_divided a x : scaleR (real (unit_of a)) (map (divided_act a) x) = map (act a) x.
+Lemma scaled_run b between later last x : Forall bias_fits later -> run (scaled_layers b between later last) x =
+  network (functions_and_layers between later) last (timesR b x).
 Proof.
-  destruct (divided_range_holds a) as [P _]. unfold scale, divided_act. rewrite map_map. apply map_ext. intros t.
-  field. lra.
+  intros F. revert b between x.
+  induction F as [|[m c] later Fc F IH]; intros b between x; [apply (affine_scaled b last)|].
+  unfold run in *. cbn [scaled_layers fst snd network functions_and_layers following map].
+  rewrite <- (affine_scaled b (m, c)). cbn [fst snd scaled_layer]. rewrite IH, times_divided; auto.
+  rewrite length_affine; rewrite map_length; auto.
 Qed.
-Lemma scaled_run b between later last x : run (scaled_layers b between later last) x =
-  network (functions_and_layers between later) last (scaleR b x).
-Proof.
-  revert b between x. induction later as [|[m c] later IH]; intros b between x; [apply (affine_scaled b last)|].
-  unfold run in *. simpl. rewrite IH, scale_divided. unfold functions_and_layers. f_equal. f_equal.
-  apply (affine_scaled b (m, c)).
-Qed.
-Lemma entrywise_first between : forallb is_entrywise between = true ->
-  is_entrywise (hd Relu between) = true /\ forallb is_entrywise (tl between) = true.
+Lemma entrywise_first between : forallb changes_numbers between = true ->
+  changes_numbers (hd Relu between) = true /\ forallb changes_numbers (tl between) = true.
 Proof. destruct between; simpl; auto. intros H. now apply andb_prop in H. Qed.
 Lemma unclamped_network p x : entrywise_between p = true -> unclamped p x =
   network (functions_and_layers (between p) (map real_layer (hidden p))) (real_layer (outer p)) x.
 Proof.
   unfold entrywise_between, unclamped, functions_and_layers. generalize (between p) as s. revert x.
   induction (map real_layer (hidden p)) as [|[m c] ls IH]; intros x s H; simpl; auto.
-  destruct (entrywise_first s H) as [E H']. rewrite IH by auto. f_equal.
-  destruct (hd Relu s); try discriminate; reflexivity.
+  destruct (entrywise_first s H) as [E H']. now rewrite IH, whole_activated by auto.
 Qed.
-Lemma value_run p x : entrywise_between p = true -> value p x = run (stack_of p) (clamped (clamp p) x).
+Lemma fits_layer p l : fits_part p = true -> In l (layers p) -> length (snd l) = length (fst l).
+Proof. unfold fits_part. rewrite forallb_forall. intros H G. now apply Nat.eqb_eq, H. Qed.
+Lemma value_run p x : fits_part p = true -> entrywise_between p = true ->
+  value p x = run (stack_of p) (clamped (clamp p) x).
 Proof.
-  intros H. unfold value. rewrite unclamped_network by auto. unfold stack_of, functions_and_layers.
-  destruct (hidden p) as [|[m c] later]; [reflexivity|].
+  intros F H. unfold value. rewrite unclamped_network by auto. unfold stack_of, functions_and_layers.
+  destruct (hidden p) as [|[m c] later] eqn:E; [reflexivity|].
   set (a := hd Relu (between p)). set (y := clamped (clamp p) x).
-  pose proof (scaled_run (real (unit_of a)) (tl (between p)) (map real_layer later) (real_layer (outer p))
-    (map (divided_act a) (affine (fst (real_layer (m, c))) (snd (real_layer (m, c))) y))) as R.
-  rewrite scale_divided in R. symmetry. exact R.
+  assert (forall l, In l (hidden p) -> bias_fits (real_layer l)) as B.
+  { intros l I. unfold bias_fits, real_layer. simpl. rewrite !map_length. apply (fits_layer p); auto.
+    apply in_or_app. now left. }
+  rewrite E in B. assert (Forall bias_fits (map real_layer later)) as Bl
+    by (apply Forall_map, Forall_forall; intros l I; apply B; now right).
+  pose proof (scaled_run (reals (units a m)) (tl (between p)) (map real_layer later) (real_layer (outer p))
+    (divided a (affine (fst (real_layer (m, c))) (snd (real_layer (m, c))) y)) Bl) as R.
+  rewrite times_divided in R.
+  - symmetry. exact R.
+  - rewrite length_affine by (apply B; now left). simpl. apply map_length.
 Qed.
 Lemma relu_entrywise p : relu_between p = true -> entrywise_between p = true.
 Proof.
@@ -121,56 +156,86 @@ Proof.
   - apply IH. constructor.
   - now apply IH.
 Qed.
-Lemma map_const {A B} (i : B) (l : list A) : map (fun _ => i) l = repeat i (length l).
-Proof. induction l; simpl; congruence. Qed.
-(** Functions that have one range everywhere. *)
+(** Functions whose slopes lie in these ranges everywhere. *)
 Lemma along_everywhere hidden ranges x x' : Forall (fun k => bias_fits (snd k)) hidden ->
-  Forall2 (fun (k : (R -> R) * layer) r => exists i, r = repeat i (length (weights k)) /\
-    slopes (fst k) (real (fst i)) (real (snd i))) hidden ranges ->
+  Forall2 (fun (k : (list R -> list R) * layer) r => forall y y', length y = length (weights k) ->
+    length y' = length (weights k) -> increments_within (map real_range r) y y' (fst k y) (fst k y')) hidden ranges ->
   along hidden (real_ranges ranges) x x'.
 Proof.
-  intros B H. revert x x'. induction H as [|[f [m c]] r hidden ranges [i [-> S]] H IH]; intros x x'; cbn; auto.
+  intros B H. revert x x'. induction H as [|[f [m c]] r hidden ranges S H IH]; intros x x'; cbn; auto.
   inversion B as [|? ? Bm B']; subst. unfold bias_fits, weights in *. cbn [fst snd] in *. split; auto.
-  rewrite <- (map_const i m), map_map, map_const, <- (length_affine m c x Bm).
-  apply slopes_increments; auto. now rewrite !length_affine.
+  apply S; now apply length_affine.
 Qed.
-Lemma fits_layer p l : fits_part p = true -> In l (layers p) -> length (snd l) = length (fst l).
-Proof. unfold fits_part. rewrite forallb_forall. intros H G. now apply Nat.eqb_eq, H. Qed.
+(** Number by number: of those that change, and of those that stay. *)
+Lemma increments_by_number {A} (f : activation -> R -> R) (g : activation -> A -> rangeD) (k : A -> rangeD)
+    (P Q : A -> R -> Prop) a l y y' :
+  (forall n u u', P n u -> Q n u' ->
+    increment_within (real_range (g (base a) n)) u u' (f (base a) u) (f (base a) u')) ->
+  (forall n, real (fst (k n)) <= 1 <= real (snd (k n))) -> Forall2 P l y -> Forall2 Q l y' ->
+  increments_within (map real_range (by_number g k a l)) y y'
+    (by_number f (fun t => t) a y) (by_number f (fun t => t) a y').
+Proof.
+  intros H K. assert (forall (F : R -> R) (G : A -> rangeD) l y y',
+    (forall n u u', P n u -> Q n u' -> increment_within (real_range (G n)) u u' (F u) (F u')) ->
+    Forall2 P l y -> Forall2 Q l y' -> increments_within (map real_range (map G l)) y y' (map F y) (map F y')) as C.
+  { clear. intros F G l y y' I HP. revert y'. induction HP as [|n u l y p HP IH]; intros y' HQ;
+      inversion HQ as [|? u' ? z q HQ']; subst; simpl; auto. }
+  revert l y y' H. induction a as [| | | | | | | |s|n a IH]; intros l y y' H HP HQ; try (now apply C).
+  cbn [by_number base] in *. rewrite map_app.
+  pose proof (increments_app _ _ _ _ _ _ _ _ _ _
+    (IH (firstn n l) (firstn n y) (firstn n y') H (related_firstn _ n _ _ HP) (related_firstn _ n _ _ HQ))
+    (C (fun t => t) k (skipn n l) (skipn n y) (skipn n y') (fun m u u' _ _ => stays_within (k m) u u' (K m))
+      (related_skipn _ n _ _ HP) (related_skipn _ n _ _ HQ))) as J.
+  now rewrite !firstn_skipn in J.
+Qed.
+Lemma any_numbers {A} (l : list A) (y : list R) : length y = length l -> Forall2 (fun _ _ => True) l y.
+Proof. revert y. induction l as [|n l IH]; intros [|u y]; simpl; try discriminate; auto. Qed.
 Lemma instance_matrices p : fits_part p = true -> instance (matrices p) (stack_of p).
 Proof.
   intros H.
   assert (forall l, In l (layers p) -> of_matrix (fst l) (real_layer l)) as F.
   { intros l Hl. split; [reflexivity|]. simpl. rewrite map_length. now apply (fits_layer p). }
   assert (forall b l, In l (layers p) ->
-    of_matrix (scale_all mul b (fst l)) (scaled_layer (real b) (real_layer l))) as Q.
-  { intros b l Hl. destruct (F l Hl) as [_ B]. split; simpl in *.
-    - symmetry. apply (f_scale_all mul Rmult real real_mul).
-    - rewrite B. unfold scale_all. now rewrite map_length. }
+    of_matrix (scale_columns b (fst l)) (scaled_layer (reals b) (real_layer l))) as Q.
+  { intros b l Hl. destruct (F l Hl) as [_ B]. unfold scale_columns. split; simpl in *.
+    - rewrite !map_map. apply map_ext. intros r. symmetry. apply (f_times mul Rmult real real_mul).
+    - now rewrite B, map_length. }
+  assert (forall a, keeps_length (divided a)) as K by (intros a y; apply length_by_number).
   unfold matrices, stack_of, layers in *. destruct (hidden p) as [|first later]; simpl.
   - split; [constructor|]. apply F. now left.
   - assert (of_matrix (fst first) (real_layer first)) as F1 by (apply F; now left).
     assert (forall b l, In l (later ++ [outer p]) ->
-      of_matrix (scale_all mul b (fst l)) (scaled_layer (real b) (real_layer l))) as Q'
+      of_matrix (scale_columns b (fst l)) (scaled_layer (reals b) (real_layer l))) as Q'
       by (intros; apply Q; now right).
-    clear F Q. generalize (unit_of (hd Relu (between p))) as b, (tl (between p)) as s.
+    clear F Q. generalize (units (hd Relu (between p)) (fst first)) as b, (tl (between p)) as s.
     assert (forall b s, instance (scaled_matrices b s later (outer p))
-      (scaled_layers (real b) s (map real_layer later) (real_layer (outer p)))) as I.
+      (scaled_layers (reals b) s (map real_layer later) (real_layer (outer p)))) as I.
     { induction later as [|l later IH]; intros b s; simpl.
       - split; [constructor|]. apply Q'. now left.
-      - destruct (IH ltac:(intros; apply Q'; now right) (unit_of (hd Relu s)) (tl s)) as [I1 I2].
-        split; [|exact I2]. constructor; [|exact I1]. apply Q'. now left. }
-    intros b s. destruct (I b s) as [I1 I2]. split; [|exact I2]. constructor; [exact F1|exact I1].
+      - rewrite units_map.
+        destruct (IH ltac:(intros; apply Q'; now right) (units (hd Relu s) (fst l)) (tl s)) as [I1 I2].
+        split; [|exact I2]. constructor; [|exact I1]. split; [|apply K]. apply Q'. now left. }
+    intros b s. destruct (I b s) as [I1 I2]. split; [|exact I2]. constructor; [|exact I1]. split; [exact F1|apply K].
+Qed.
+Lemma divided_increments {A} a (rows : list A) y y' : length y = length rows -> length y' = length rows ->
+  increments_within (map real_range (divided_ranges a rows)) y y' (divided a y) (divided a y').
+Proof.
+  intros L L'. unfold divided_ranges. rewrite <- (by_number_alike (fun _ => divided_range (base a)) a).
+  apply (increments_by_number _ _ _ (fun _ _ => True) (fun _ _ => True)); auto using any_numbers.
+  - intros _ u u' _ _. apply (slope_increment (fun t => / real (unit_of (base a)) * act (base a) t)).
+    apply divided_range_holds.
+  - intros _. apply divided_range_has_one.
 Qed.
 Lemma divided_along p x x' : fits_part p = true ->
-  along (fst (stack_of p)) (real_ranges (ranges_by divided_range p)) x x'.
+  along (fst (stack_of p)) (real_ranges (ranges_by divided_ranges p)) x x'.
 Proof.
   intros H. destruct (instance_matrices p H) as [I _].
   apply along_everywhere; [now apply (stages_fit (fst (matrices p)))|].
   clear. unfold ranges_by, stack_of. destruct (hidden p) as [|first later]; [constructor|]. cbn.
-  constructor; [|generalize (real (unit_of (hd Relu (between p)))) as b, (tl (between p)) as s;
+  constructor; [|generalize (reals (units (hd Relu (between p)) (fst first))) as b, (tl (between p)) as s;
     induction later as [|l later IH]; intros b s; cbn; constructor; [|apply IH]];
-    eexists; (split; [rewrite map_const; unfold weights, scale_all; cbn; now rewrite ?map_length|
-      apply divided_range_holds]).
+    cbn [fst snd weights scaled_layer real_layer]; intros y y' L L'; rewrite ?map_length in L, L';
+    now apply divided_increments.
 Qed.
 Lemma length_value p x : fits_part p = true -> length (value p x) = length (fst (outer p)).
 Proof.
@@ -209,7 +274,8 @@ Lemma chain_sound ps f moves scale u rho t factor (matrices_of : part -> stack) 
   well_formed ps f moves scale = true -> forallb entrywise_between (parts_of ps f) = true -> is_nonnegative u = true ->
   check_parts (concat ranges) ([], selector moves scale) (map matrices_of (parts_of ps f)) u rho t factor = true ->
   (forall p, fits_part p = true -> instance (matrices_of p) (of_part p)) ->
-  (forall p z, entrywise_between p = true -> value p z = run (of_part p) (clamped (clamp p) z)) ->
+  (forall p z, fits_part p = true -> entrywise_between p = true ->
+    value p z = run (of_part p) (clamped (clamp p) z)) ->
   agree moves x y -> let c := clamped (clamp (part_at ps (moved f))) in
   along_after (stacks_of ps f rest of_part) ranges (c x) (c y) ->
   norm (minus (value_of ps f rest x) (value_of ps f rest y)) <= real u * distance scale x y.
@@ -244,7 +310,7 @@ Lemma slope_sound ps f moves scale u rho t factor :
 Proof.
   unfold check_slope. intros H rest x y Ha _. do 3 both H. rewrite flat_map_concat_map in H0.
   apply (chain_sound ps f moves scale u rho t factor matrices stack_of _ rest x y H H2 H1 H0 instance_matrices
-    (fun p z E => value_run p z E) Ha).
+    value_run Ha).
   unfold well_formed in H. do 4 both H. destruct f as [p|phi k]; cbn in *.
   - both H. split; auto. now apply divided_along.
   - both H. both H7. split; [now apply divided_along|]. split; auto. now apply divided_along.
@@ -301,15 +367,46 @@ Proof.
   revert between. induction hidden as [|h hidden IH]; intros between; simpl; auto.
   unfold with_slopes_R in *. simpl. rewrite IH. ring.
 Qed.
+Lemma length_activated_alike a u v : length u = length v -> length (activated a u) = length (activated a v).
+Proof.
+  revert u v. induction a as [| | | | | | | |s|n a IH]; intros u v E; simpl; rewrite ?map_length; auto.
+  - apply (related_length (fun _ _ => True)), related_sorted; auto. now apply any_numbers.
+  - rewrite !app_length, !skipn_length, E. f_equal. apply IH. now rewrite !firstn_length, E.
+Qed.
+(** Of those that change and those that stay. *)
+Lemma square_kept a n p q c c' : length p = length q -> 0 <= c -> c <= c' -> 1 <= c' ->
+  square (minus (activated a (firstn n p)) (activated a (firstn n q)))
+    <= c * c * square (minus (firstn n p) (firstn n q)) ->
+  square (minus (activated (Keeping n a) p) (activated (Keeping n a) q)) <= c' * c' * square (minus p q).
+Proof.
+  intros E C L O H. assert (length (firstn n p) = length (firstn n q)) as F by now rewrite !firstn_length, E.
+  change (apart (activated (Keeping n a) p) (activated (Keeping n a) q) <= c' * c' * apart p q).
+  rewrite <- (firstn_skipn n p), <- (firstn_skipn n q) at 1. simpl. rewrite !firstn_skipn.
+  change (square (minus _ _)) with (apart (activated a (firstn n p)) (activated a (firstn n q))) in H at 1.
+  rewrite <- (firstn_skipn n p) at 3. rewrite <- (firstn_skipn n q) at 3.
+  rewrite !apart_app by auto using length_activated_alike.
+  pose proof (square_nonneg (minus (firstn n p) (firstn n q))) as P.
+  pose proof (square_nonneg (minus (skipn n p) (skipn n q))) as Q. fold (apart (firstn n p) (firstn n q)) in *.
+  fold (apart (skipn n p) (skipn n q)) in *. assert (c * c <= c' * c') by nra. assert (1 <= c' * c') by nra. nra.
+Qed.
+Lemma square_contracts a p q : length p = length q ->
+  square (minus (activated a p) (activated a q)) <= real (steepest a) * real (steepest a) * square (minus p q).
+Proof.
+  assert (forall b p q, length p = length q ->
+    square (minus (map (act b) p) (map (act b) q)) <= real (steepest b) * real (steepest b) * square (minus p q)) as M.
+  { clear. intros b p q E. destruct (all_slopes b) as [C S]. now apply slopes_contract. }
+  revert p q. induction a as [| | | | | | | |s|n a IH]; intros p q E; try (now apply M).
+  - simpl. rewrite real_one, !Rmult_1_l. now apply sorting_contracts.
+  - destruct (keeping_steepest n a). apply (square_kept a n p q (real (steepest a))); auto; [apply all_slopes|].
+    apply IH. now rewrite !firstn_length, E.
+Qed.
+Lemma norm_from_square c u v : 0 <= c -> square u <= c * c * square v -> norm u <= c * norm v.
+Proof.
+  intros C H. unfold norm. rewrite <- (sqrt_square c) by auto. rewrite <- sqrt_mult_alt by nra. now apply sqrt_le_1_alt.
+Qed.
 Lemma activated_contracts a p q : length p = length q ->
   norm (minus (activated a p) (activated a q)) <= real (steepest a) * norm (minus p q).
-Proof.
-  intros E. destruct (all_slopes a) as [C S].
-  assert (norm (minus (map (act a) p) (map (act a) q)) <= real (steepest a) * norm (minus p q)) as M.
-  { unfold norm. rewrite <- (sqrt_square (real (steepest a))) at 1 by auto. rewrite <- sqrt_mult_alt by nra.
-    apply sqrt_le_1_alt. now apply slopes_contract. }
-  destruct a; try exact M. simpl. rewrite real_one, Rmult_1_l. apply norm_le. now apply sorting_contracts.
-Qed.
+Proof. intros E. apply norm_from_square; [apply all_slopes|now apply square_contracts]. Qed.
 (** One layer and what follows it: `step` lengthens no difference by more than c. *)
 Lemma layer_bound (step : list R -> list R) c w k u : 0 <= c -> 0 <= w ->
   (forall p q, length p = length q -> norm (minus (step p) (step q)) <= c * norm (minus p q)) ->
@@ -456,18 +553,27 @@ Proof.
   pose proof (Rmax_r (real h) (- real l)). split; [lra|]. intros k [<-|I]; [rewrite S; lra|].
   specialize (IH k I). destruct (slopes_between a (fst k)). lra.
 Qed.
+Lemma square_contracts_in a t p q d e : Forall2 (follows d) t p -> Forall2 (follows e) t q ->
+  let c := real (steepest_known a t) in 0 <= c /\
+  square (minus (activated a p) (activated a q)) <= c * c * square (minus p q).
+Proof.
+  assert (forall b t p q, is_entrywise b = true -> Forall2 (follows d) t p -> Forall2 (follows e) t q ->
+    let c := real (steepest_known b t) in 0 <= c /\
+    square (minus (map (act b) p) (map (act b) q)) <= c * c * square (minus p q)) as M.
+  { clear. intros b t p q E P G. destruct (steepest_known_above b t E) as [C H]. split; auto.
+    now apply (contracts_in b _ t p q d e). }
+  revert t p q. induction a as [| | | | | | | |s|n a IH]; intros t p q P G; try (now apply M);
+    assert (length p = length q) as E by now rewrite <- (related_length _ _ _ P), <- (related_length _ _ _ G).
+  - simpl. rewrite real_one, !Rmult_1_l. split; [lra|]. now apply sorting_contracts.
+  - destruct (IH (firstn n t) (firstn n p) (firstn n q)) as [C B]; try now apply related_firstn.
+    cbn [steepest_known]. rewrite real_larger, real_one. set (c := real (steepest_known a (firstn n t))) in *.
+    pose proof (Rmax_l 1 c). pose proof (Rmax_r 1 c). split; [lra|]. now apply (square_kept a n p q c).
+Qed.
 Lemma activated_contracts_in a t p q d e : Forall2 (follows d) t p -> Forall2 (follows e) t q ->
   0 <= real (steepest_known a t) /\
   norm (minus (activated a p) (activated a q)) <= real (steepest_known a t) * norm (minus p q).
 Proof.
-  intros P G. destruct (is_entrywise a) eqn:E.
-  - destruct (steepest_known_above a t E) as [C H]. split; auto. set (c := real (steepest_known a t)) in *.
-    assert (activated a p = map (act a) p /\ activated a q = map (act a) q) as [-> ->]
-      by (destruct a; auto; discriminate).
-    unfold norm. rewrite <- (sqrt_square c) by auto. rewrite <- sqrt_mult_alt by nra. apply sqrt_le_1_alt.
-    now apply (contracts_in a c t p q d e).
-  - destruct a; try discriminate. simpl steepest_known. rewrite real_one, Rmult_1_l. split; [lra|].
-    apply norm_le, sorting_contracts. now rewrite <- (related_length _ _ _ P), <- (related_length _ _ _ G).
+  intros P G. destruct (square_contracts_in a t p q d e P G) as [C H]. split; auto. now apply norm_from_square.
 Qed.
 Lemma centred_layers_bound radius d e between hs l us s : bounded_by radius d -> bounded_by radius e ->
   Forall2 norm_bound_of (hs ++ [l]) us ->
@@ -517,8 +623,9 @@ Qed.
 (** By a matrix inequality with these slopes *)
 Definition undivided_stack (p : part) : real_stack :=
   (functions_and_layers (between p) (map real_layer (hidden p)), real_layer (outer p)).
-Lemma undivided_value p x : entrywise_between p = true -> value p x = run (undivided_stack p) (clamped (clamp p) x).
-Proof. intros H. unfold value. now rewrite unclamped_network. Qed.
+Lemma undivided_value p x : fits_part p = true -> entrywise_between p = true ->
+  value p x = run (undivided_stack p) (clamped (clamp p) x).
+Proof. intros _ H. unfold value. now rewrite unclamped_network. Qed.
 Lemma undivided_instance p : fits_part p = true -> instance (undivided_matrices p) (undivided_stack p).
 Proof.
   intros H. assert (forall l, In l (layers p) -> of_matrix (fst l) (real_layer l)) as F.
@@ -528,28 +635,31 @@ Proof.
   assert (forall l, In l (hidden p) -> of_matrix (fst l) (real_layer l)) as G
     by (intros; apply F; unfold layers; apply in_or_app; now left).
   clear F. generalize (between p) as s. induction (hidden p) as [|l ls IH]; intros s; cbn; constructor.
-  - apply G. now left.
+  - split; [apply G; now left|intros y; apply length_by_number].
   - apply IH. intros. apply G. now right.
 Qed.
 Lemma undivided_along p x x' : fits_part p = true ->
-  along (fst (undivided_stack p)) (real_ranges (ranges_by range_of p)) x x'.
+  along (fst (undivided_stack p)) (real_ranges (ranges_by whole_ranges p)) x x'.
 Proof.
   intros H. destruct (undivided_instance p H) as [I _].
   apply along_everywhere; [now apply (stages_fit (fst (undivided_matrices p)))|]. clear.
   unfold ranges_by, undivided_stack, functions_and_layers. cbn [fst]. generalize (between p) as s.
   induction (hidden p) as [|l ls IH]; intros s; cbn; constructor; [|apply IH].
-  eexists. split; [rewrite map_const; unfold weights; cbn; now rewrite map_length|]. apply range_holds.
+  cbn [fst snd weights real_layer]. intros y y' L L'. rewrite map_length in L, L'.
+  apply (increments_by_number _ _ _ (fun _ _ => True) (fun _ _ => True)); auto using any_numbers.
+  - intros _ u u' _ _. apply slope_increment, range_holds.
+  - intros _. apply kept_range_has_one.
 Qed.
-Lemma increments_in a t p q d e : is_entrywise a = true -> Forall2 (follows d) t p -> Forall2 (follows e) t q ->
-  increments_within (act a) (map real_range (map (fun n => slopes_between a (fst n)) t)) p q.
+Lemma increments_in a t p q d e : changes_numbers a = true -> Forall2 (follows d) t p -> Forall2 (follows e) t q ->
+  increments_within (map real_range (slopes_known a t)) p q (whole a p) (whole a q).
 Proof.
-  intros E P. revert q. induction P as [|n y t p [[L1 L2] _] P IH]; intros q G;
-    inversion G as [|? z ? q' [[M1 M2] _] G']; subst; cbn; auto. split; auto.
-  pose proof (slopes_between_hold a (fst n) E) as S.
+  intros E. apply increments_by_number; [|intros; apply kept_range_has_one].
+  intros n y z [[L1 L2] _] [[M1 M2] _]. pose proof (slopes_between_hold (base a) (fst n) E) as S.
+  unfold increment_within, real_range. cbn [fst snd].
   destruct (Rle_lt_dec y z) as [O|O]; [specialize (S y z L1 O M2)|specialize (S z y M1 ltac:(lra) L2)]; nra.
 Qed.
 Lemma centred_along radius d e between hs s : bounded_by radius d -> bounded_by radius e ->
-  forallb is_entrywise between = true ->
+  forallb changes_numbers between = true ->
   (forall k, In k hs -> length (snd k) = length (fst k)) -> forall x y,
   Forall2 (follows d) s x -> Forall2 (follows e) s y ->
   along (functions_and_layers between (map real_layer hs))
@@ -558,7 +668,7 @@ Proof.
   intros D E. revert between s. induction hs as [|k hs IH]; intros between s N L x y X Y; cbn; auto.
   set (a := hd Relu between).
   destruct (entrywise_first between N) as [A' N']. fold a in A'.
-  assert (forall z, activated a z = map (act a) z) as M by (intros; destruct a; auto; discriminate).
+  assert (forall z, activated a z = whole a z) as M by (intros; now apply whole_activated).
   pose proof (passed_follow radius d (fst k) (snd k) s x D (L k (or_introl eq_refl)) X) as P.
   pose proof (passed_follow radius e (fst k) (snd k) s y E (L k (or_introl eq_refl)) Y) as G.
   split; [now apply (increments_in a _ _ _ d e)|]. apply IH; auto.

@@ -3,19 +3,22 @@ From Coq Require Import List ZArith Reals Lra Lia Psatz.
 From Swarmcert Require Import Exponential Activations ErrorFunction Form Network Checker Meaning.
 Open Scope R_scope.
 
-(** No slope is larger in absolute value. *)
-Definition steepest (a : activation) : dyadic :=
+(** No slope is larger in absolute value; of what stays as it is, it is 1. *)
+Fixpoint steepest (a : activation) : dyadic :=
   match a with
   | Relu | Tanh | Softplus | Elu | Sorted _ => one
   | Sigmoid => (1, -2)%Z
   | Selu => (7917775536320561, -52)%Z
   | Silu => (72089, -16)%Z
   | Gelu => (4625, -12)%Z
+  | Keeping _ b => if is_nonnegative (add (steepest b) (neg one)) then steepest b else one
   end.
 (** No slope is negative. *)
 Definition is_rising (a : activation) : bool := match a with Silu | Gelu => false | _ => true end.
-(** Whether it acts number by number. *)
-Definition is_entrywise (a : activation) : bool := match a with Sorted _ => false | _ => true end.
+(** Whether it acts number by number, on all numbers of a layer. *)
+Definition is_entrywise (a : activation) : bool := match a with Sorted _ | Keeping _ _ => false | _ => true end.
+(** The same where some numbers may stay. *)
+Definition changes_numbers (a : activation) : bool := is_entrywise (base a).
 Definition is_relu (a : activation) : bool := match a with Relu => true | _ => false end.
 
 Lemma slopes_of_derivative (f d : R -> R) a b : (forall x, derivable_pt_lim f x (d x)) ->
@@ -187,6 +190,14 @@ Proof. unfold steepest. rewrite real_below. change (Pos.to_nat 16) with 16%nat. 
 Lemma real_gelu : real (steepest Gelu) = 4625 / 4096.
 Proof. unfold steepest. rewrite real_below. change (Pos.to_nat 12) with 12%nat. lra. Qed.
 Lemma real_one : real one = 1. Proof. unfold one, real. simpl. ring. Qed.
+Lemma keeping_steepest n a : 1 <= real (steepest (Keeping n a)) /\ real (steepest a) <= real (steepest (Keeping n a)).
+Proof.
+  cbn [steepest]. destruct (is_nonnegative (add (steepest a) (neg one))) eqn:E.
+  - apply real_nonnegative in E. rewrite real_add, real_neg, real_one in E. lra.
+  - assert (is_positive (neg (add (steepest a) (neg one))) = true) as P.
+    { unfold is_nonnegative in E. apply Z.leb_gt in E. unfold is_positive. apply Z.ltb_lt. simpl in *. lia. }
+    apply real_positive in P. rewrite real_neg, real_add, real_neg, real_one in P. rewrite real_one. lra.
+Qed.
 Theorem rising_slopes a : is_rising a = true -> 0 < real (steepest a) /\ slopes (act a) 0 (real (steepest a)).
 Proof.
   assert (real (1, -2)%Z = 1 / 4) as Q by (rewrite real_below; change (Pos.to_nat 2) with 2%nat; lra).
@@ -200,6 +211,8 @@ Proof.
   - auto.
   - exact selu_slopes.
   - intros x y L. simpl. lra.
+  - pose proof (keeping_steepest n a). cbn [steepest] in H0. lra.
+  - intros x y L. pose proof (keeping_steepest n a) as K. cbn [act steepest] in *. nra.
 Qed.
 Theorem all_slopes a : 0 <= real (steepest a) /\ slopes (act a) (- real (steepest a)) (real (steepest a)).
 Proof.
@@ -219,6 +232,20 @@ Proof.
   rewrite real_add, real_neg, real_one. destruct a; try discriminate; rewrite ?real_silu, ?real_gelu;
     [exact silu_slopes|]. intros x y L. pose proof (gelu_slopes x y L). lra.
 Qed.
+(** Of what stays as it is, whose slope is 1. *)
+Definition kept_range : rangeD := (add one (-1, -24)%Z, one).
+Lemma kept_range_has_one : real (fst kept_range) <= 1 <= real (snd kept_range).
+Proof.
+  unfold kept_range. cbn [fst snd]. rewrite real_add, real_one, real_below. change (Pos.to_nat 24) with 24%nat. lra.
+Qed.
+Lemma stays_within r x y : real (fst r) <= 1 <= real (snd r) ->
+  increment_within (real (fst r), real (snd r)) x y x y.
+Proof.
+  unfold increment_within. cbn [fst snd]. intros H.
+  replace ((x - y - real (fst r) * (x - y)) * (real (snd r) * (x - y) - (x - y)))
+    with ((1 - real (fst r)) * (real (snd r) - 1) * ((x - y) * (x - y))) by ring.
+  apply Rmult_le_pos; [apply Rmult_le_pos; lra|]. pose proof (Rle_0_sqr (x - y)) as Q. exact Q.
+Qed.
 (** What functions are divided by, and between which slopes they are then. *)
 Definition unit_of (a : activation) : dyadic := if is_rising a then steepest a else one.
 Definition divided_range (a : activation) : rangeD := if is_rising a then (zero, one) else range_of a.
@@ -235,4 +262,12 @@ Proof.
     now apply divided_slopes.
   - rewrite real_one. split; [lra|]. apply (slopes_extensional (act a)); [intros; rewrite Rinv_1; ring|].
     apply range_holds.
+Qed.
+(** So is what stays, which is not divided. *)
+Lemma divided_range_has_one a : real (fst (divided_range a)) <= 1 <= real (snd (divided_range a)).
+Proof.
+  unfold divided_range. destruct (is_rising a) eqn:E; cbn [fst snd].
+  - rewrite real_zero, real_one. lra.
+  - unfold range_of. rewrite E. cbn [fst snd]. rewrite real_add, real_neg, real_one.
+    destruct a; try discriminate; rewrite ?real_silu, ?real_gelu; lra.
 Qed.
