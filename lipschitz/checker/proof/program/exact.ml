@@ -14,7 +14,19 @@ let of_float x =
   let zeros = Z.trailing_zeros mantissa in
   Z.shift_right mantissa zeros, Z.of_int (exponent - 53 + zeros)
 
-(* Rounded to nearest, ties to even. *)
+(* Rounded to nearest, ties to even; infinite beyond the range of a double. *)
+let nearest (m, e) =
+  let size = Z.numbits m in
+  let dropped = max (size - 53) (-1074 - e) in
+  if dropped <= 0 then Float.ldexp (Z.to_float m) e
+  else if dropped > size + 1 then 0.
+  else
+    let whole = Z.shift_right (Z.abs m) dropped and half = Z.shift_left Z.one (dropped - 1) in
+    let beyond = Z.compare (Z.sub (Z.abs m) (Z.shift_left whole dropped)) half in
+    let rounded = if beyond > 0 || (beyond = 0 && Z.is_odd whole) then Z.succ whole else whole in
+    let size = Float.ldexp (Z.to_float rounded) (e + dropped) in
+    if Z.sign m < 0 then -. size else size
+(* The same to float32. *)
 let float32 x = Int32.float_of_bits (Int32.bits_of_float x)
 
 (* A C99 hex float that a double holds exactly; strictly what the C++ reader takes. *)

@@ -1,5 +1,5 @@
 (* ONNX models that are a chain of linear layers with an activation behind each, the last one possibly not, MaxMin and
-   GroupSort as exporters write them, in several nodes. *)
+   GroupSort as exporters write them, in several nodes; and graphs of such layers with skip connections. *)
 
 open Refusal
 
@@ -111,18 +111,64 @@ let activation_of node =
   | "Gelu" when is_exact -> Some Gelu
   | _ -> None
 
-(* Exporters write SiLU as the product of x and Sigmoid(x), MaxMin as Split, Max, Min and Concat of halves, or as
-   ReduceMax, ReduceMin and Concat of pairs. Each group becomes one node. What else takes a value from inside of it
-   takes one that is not known any more, and is refused. *)
-let rec with_groups_joined nodes =
-  let joined op first last parts rest =
-    { op; inputs = [ List.hd first.inputs ]; outputs = last.outputs; attributes = []; parts }
-    :: with_groups_joined rest in
-  let take a b c d = (a = c && b = d) || (a = d && b = c) in
+(* Exporters write SiLU as the product of x and Sigmoid(x), GELU as x (1 + Erf(x / sqrt 2)) 0.5, MaxMin as Split, Max,
+   Min and Concat of halves, or as ReduceMax, ReduceMin and Concat of pairs. Each group becomes one node. What else
+   takes a value from inside of it takes one that is not known any more, and is refused. *)
+let joined op first last parts =
+  { op; inputs = [ List.hd first.inputs ]; outputs = last.outputs; attributes = []; parts }
+(* Whether a stored number, and the only one of its tensor, is off `wanted` by `error` at most. *)
+let holds kept name wanted error = match Hashtbl.find_opt kept name with
+  | Some { shape; kind = (1 | 11) as kind; raw; _ } when size shape = 1 ->
+    Float.abs (Weights.number_at (if kind = 1 then "float32" else "float64") raw 0 0 -. wanted) <= error
+  | _ -> false
+(* SiLU and GELU, whose nodes need not follow one another beside skip connections. The last one of a group takes its
+   place. *)
+let with_smooth kept nodes =
+  let ( let* ) = Option.bind in
+  let writers = Hashtbl.create 64 and takers = Hashtbl.create 64 in
+  List.iter (fun node ->
+      List.iter (fun name -> Hashtbl.replace writers name node) node.outputs;
+      List.iter (fun name -> Hashtbl.add takers name ()) node.inputs) nodes;
+  (* The node that computes a value which one other node takes, and once. *)
+  let inner op name = match Hashtbl.find_opt writers name with
+    | Some node when node.op = op && List.length (Hashtbl.find_all takers name) = 1 -> Some node
+    | _ -> None in
+  let some op node found = match node with
+    | { inputs = [ a; b ]; outputs = [ _ ]; _ } when node.op = op -> List.find_map found [ a, b; b, a ]
+    | _ -> None in
+  let when_ condition result = if condition then Some result else None in
+  let silu last = some "Mul" last (fun (s, x) ->
+      let* sigmoid = inner "Sigmoid" s in
+      when_ (sigmoid.inputs = [ x ]) ("Swish", sigmoid, [ s ])) in
+  let gelu last = some "Mul" last (fun (p, half) ->
+      let* product = when_ (holds kept half 0.5 0.) p in
+      let* product = inner "Mul" product in
+      some "Mul" product (fun (q, x) ->
+          let* sum = inner "Add" q in
+          some "Add" sum (fun (r, one) ->
+              let* erf = when_ (holds kept one 1. 0.) r in
+              let* erf = inner "Erf" erf in
+              match erf.inputs with
+              | [ from ] ->
+                let* quotient = inner "Div" from in
+                (match quotient.inputs with
+                 | [ divided; root ] when divided = x && holds kept root (sqrt 2.) 1e-7 ->
+                   Some ("Gelu", quotient, [ p; q; r; from ])
+                 | _ -> None)
+              | _ -> None))) in
+  let group node = match silu node with Some group -> Some group | None -> gelu node in
+  let inside = Hashtbl.create 16 in
+  List.iter (fun node ->
+      let forget (_, _, names) = List.iter (fun name -> Hashtbl.replace inside name ()) names in
+      Option.iter forget (group node)) nodes;
+  List.filter_map (fun node ->
+      if List.exists (Hashtbl.mem inside) node.outputs then None else match group node with
+        | Some (op, first, _) -> Some (joined op first node [])
+        | None -> Some node) nodes
+let take a b c d = (a = c && b = d) || (a = d && b = c)
+let rec with_sorting nodes =
+  let joined op first last parts rest = joined op first last parts :: with_sorting rest in
   match nodes with
-  | ({ op = "Sigmoid"; inputs = [ x ]; outputs = [ s ]; _ } as first)
-    :: ({ op = "Mul"; inputs = [ a; b ]; outputs = [ _ ]; _ } as last) :: rest when take a b x s ->
-    joined "Swish" first last [] rest
   | ({ op = "Split"; inputs = _ :: _; outputs = [ p; q ]; _ } as split)
     :: { op = one; inputs = [ a; b ]; outputs = [ c ]; _ } :: { op = two; inputs = [ a'; b' ]; outputs = [ d ]; _ }
     :: ({ op = "Concat"; inputs = [ e; f ]; outputs = [ _ ]; _ } as concat) :: rest
@@ -135,8 +181,9 @@ let rec with_groups_joined nodes =
     when r = r' && ((one = "ReduceMax" && two = "ReduceMin" && e = c && f = d)
                     || (one = "ReduceMin" && two = "ReduceMax" && e = d && f = c)) ->
     joined "PairsMaxMin" first concat [ first; second; concat ] rest
-  | node :: rest -> node :: with_groups_joined rest
+  | node :: rest -> node :: with_sorting rest
   | [] -> []
+let with_groups_joined kept nodes = with_sorting (with_smooth kept nodes)
 
 (* "Reshape" and "Flatten": the sizes of the same numbers. *)
 let reshaped path stored shape node =
@@ -195,20 +242,38 @@ let sorting path stored shape node =
     Proved.Groups n, shape,
     if integer_of node "largest" 1 = 0 then None else Some (Array.init (size shape) largest_first)
 
-let follow path kept state current node =
-  let refuse what = refuse_node path node what in
-  let result = output node in
-  let keep tensor = Hashtbl.add kept result { tensor with name = result } in
-  let stored name = match Hashtbl.find_opt kept name with Some t -> t | None -> refuse "lacks its weights or biases" in
+let stored_by path kept node name = match Hashtbl.find_opt kept name with
+  | Some t -> t | None -> refuse_node path node "lacks its weights or biases"
+(* Whether the node is a constant, or another name of one, which is stored from now on. *)
+let stores path kept node =
+  let keep tensor = let name = output node in Hashtbl.add kept name { tensor with name }; true in
+  match node.op, node.inputs with
+  | "Constant", [] ->
+    (match List.assoc_opt "value" node.attributes with
+     | Some { tensor = Some t; _ } -> keep t | _ -> refuse_node path node "holds no tensor")
+  | "Identity", [ input ] when Hashtbl.mem kept input -> keep (stored_by path kept node input)
+  | _ -> false
+let require_no_factors path node =
   let number name otherwise = match List.assoc_opt name node.attributes with
     | None -> otherwise | Some { number = Some x; _ } -> x | Some _ -> -1. in
-  let start (weight : stored) transposed =
+  if number "alpha" 1. <> 1. || number "beta" 1. <> 1. || number "transA" 0. <> 0. then
+    refuse_node path node "scales or transposes"
+(* Whether y = x W, and not x W'. *)
+let is_transposed node = node.op = "MatMul" || integer_of node "transB" 0 = 0
+let sizes_of_matrix path node (weight : stored) = match weight.shape with
+  | [ a; b ] -> if is_transposed node then a, b else b, a | _ -> refuse_node path node "its weights are no matrix"
+let no_operator = "is not Gemm, MatMul of the input with weights, Add, Reshape, Flatten, Identity, MaxMin, TopK or an \
+                   activation that is known"
+
+let follow path kept state current node =
+  let refuse what = refuse_node path node what in
+  let stored = stored_by path kept node in
+  let start (weight : stored) =
     if state.layers <> [] && not state.is_activated then refuse "two linear layers without an activation between them";
-    let inputs, outputs = match weight.shape with
-      | [ a; b ] -> if transposed then a, b else b, a | _ -> refuse "its weights are no matrix" in
+    let inputs, outputs = sizes_of_matrix path node weight in
     let sizes = but_last state.shape @ [ if last state.shape = 0 then inputs else last state.shape ] in
     if size (but_last sizes) <> 1 || last sizes <> inputs then refuse "takes no single row of numbers that fits";
-    state.layers <- { weight; transposed; order = state.order; bias = None } :: state.layers;
+    state.layers <- { weight; transposed = is_transposed node; order = state.order; bias = None } :: state.layers;
     state.shape <- but_last sizes @ [ outputs ];
     state.is_activated <- false;
     state.order <- None in
@@ -221,22 +286,18 @@ let follow path kept state current node =
     state.activations <- activation :: state.activations;
     state.is_activated <- true in
   if node.op <> "TopK" && List.length node.outputs <> 1 then refuse "has not exactly one output";
-  match node.op, node.inputs with
-  | "Constant", [] ->
-    (match List.assoc_opt "value" node.attributes with
-     | Some { tensor = Some t; _ } -> keep t; current | _ -> refuse "holds no tensor")
-  | "Identity", [ input ] when Hashtbl.mem kept input -> keep (stored input); current
-  | op, inputs ->
+  if stores path kept node then current
+  else begin
+    let op = node.op and inputs = node.inputs in
     if List.length (List.filter (( = ) current) inputs) <> 1 then refuse "does not take the value before it once";
     List.iter (fun name -> if name <> current && name <> "" && not (Hashtbl.mem kept name) then
                   refuse "takes what is neither the value before it nor stored") inputs;
     (match op, inputs with
      | "Gemm", (first :: weight :: rest) when first = current && weight <> "" && List.length rest <= 1 ->
-       if number "alpha" 1. <> 1. || number "beta" 1. <> 1. || number "transA" 0. <> 0. then
-           refuse "scales or transposes";
-       start (stored weight) (number "transB" 0. = 0.);
+       require_no_factors path node;
+       start (stored weight);
        (match rest with [ bias ] when bias <> "" -> add_bias (stored bias) | _ -> ())
-     | "MatMul", [ first; weight ] when first = current -> start (stored weight) true
+     | "MatMul", [ first; weight ] when first = current -> start (stored weight)
      | "Add", [ a; b ] -> add_bias (stored (if a = current then b else a))
      | "Identity", [ _ ] -> ()
      | ("Reshape" | "Flatten"), first :: _ when first = current ->
@@ -247,9 +308,9 @@ let follow path kept state current node =
        state.shape <- shape;
        state.order <- order
      | _, [ _ ] when activation_of node <> None -> activate (Option.get (activation_of node))
-     | _ -> refuse "is not Gemm, MatMul of the input with weights, Add, Reshape, Flatten, Identity, MaxMin, TopK or an \
-                    activation that is known");
-    result
+     | _ -> refuse no_operator);
+    output node
+  end
 
 let layer_name names k weight =
   let name = if String.length weight > 7 && Weights.ends_with ".weight" weight then
@@ -285,6 +346,100 @@ let input_shape path message =
     bad_input "%s: the shape of the input is unknown or too large" path;
   sizes
 
+(* With skip connections: the layers that Folding makes of the graph, as tensors, and what is between them. *)
+let folded path kept nodes input shape outputs =
+  let refuse node what = refuse_node path node what in
+  let nodes = List.filter (fun node -> not (stores path kept node)) nodes in
+  let inputs = match last shape, List.find_opt (fun node -> node.op = "Gemm" || node.op = "MatMul") nodes with
+    | 0, Some ({ inputs = _ :: weight :: _; _ } as node) ->
+      fst (sizes_of_matrix path node (stored_by path kept node weight))
+    | 0, _ -> bad_input "%s: the model does not state the size of its input" path
+    | n, _ -> n in
+  let shape = but_last shape @ [ inputs ] in
+  if size shape > 1 lsl 20 then bad_input "%s: the input has more than 2^20 entries" path;
+  let chain, first = Folding.start path (size shape) in
+  let values = Hashtbl.create 16 and uses = Hashtbl.create 64 in
+  let count name = Option.value (Hashtbl.find_opt uses name) ~default:0 in
+  List.iter (fun name -> Hashtbl.replace uses name (count name + 1))
+    (List.concat_map (fun node -> node.inputs) nodes @ outputs);
+  Hashtbl.add values input (first, shape);
+  let numbers node (t : stored) =
+    let kind = match t.kind with 1 -> "float32" | 11 -> "float64" | _ -> refuse node "takes numbers of another type" in
+    Array.init (size t.shape) (fun k ->
+        let x = Weights.number_at kind t.raw 0 k in
+        if Float.is_finite x then x else refuse node "a number is not finite") in
+  (* Added to a row of n numbers. *)
+  let added_to_row node n (t : stored) =
+    if List.mem t.shape [ [ n ]; [ 1; n ] ] then numbers node t else refuse node "adds numbers of another shape" in
+  let computed node =
+    let stored = stored_by path kept node in
+    let value name = match Hashtbl.find_opt values name with
+      | Some value -> value | None -> refuse node "takes what is neither computed before it nor stored" in
+    let is_value = Hashtbl.mem values in
+    let linear from weight bias =
+      let x, shape = value from and weight = stored weight in
+      let inputs, outputs = sizes_of_matrix path node weight in
+      if size (but_last shape) <> 1 || last shape <> inputs then refuse node "takes no single row of numbers that fits";
+      let w = numbers node weight and transposed = is_transposed node in
+      let at i j = if transposed then w.(j * outputs + i) else w.(i * inputs + j) in
+      let rows = Array.init outputs (fun i -> Array.init inputs (at i)) in
+      Folding.linear chain weight.name rows bias x, but_last shape @ [ outputs ] in
+    let outputs_of weight = snd (sizes_of_matrix path node (stored weight)) in
+    match node.op, node.inputs with
+    | "Gemm", (from :: weight :: rest) when weight <> "" && List.length rest <= 1 ->
+      require_no_factors path node;
+      let n = outputs_of weight in
+      linear from weight (match rest with
+          | [ bias ] when bias <> "" -> added_to_row node n (stored bias) | _ -> Array.make n 0.)
+    | "MatMul", [ from; weight ] -> linear from weight (Array.make (outputs_of weight) 0.)
+    | ("Add" | "Sub"), [ a; b ] when is_value a && is_value b ->
+      let (x, shape), (y, other) = value a, value b in
+      if shape <> other then refuse node "its inputs are of different shapes";
+      Folding.sum chain x (if node.op = "Sub" then Folding.negated y else y), shape
+    | ("Add" | "Sub"), [ a; b ] ->
+      let x, shape = value (if is_value a then a else b) in
+      if size (but_last shape) <> 1 then refuse node "takes no single row of numbers";
+      let shifts = added_to_row node (last shape) (stored (if is_value a then b else a)) in
+      let constant = { Folding.rows = Array.map (fun _ -> []) shifts; shifts; first = "" } in
+      let negated_if condition = if condition then Folding.negated else Fun.id in
+      let is_sub = node.op = "Sub" in
+      Folding.sum chain (negated_if (is_sub && is_value b) x) (negated_if (is_sub && is_value a) constant), shape
+    | "Identity", [ from ] -> value from
+    | ("Reshape" | "Flatten"), from :: _ ->
+      let x, shape = value from in
+      x, reshaped path stored shape node
+    | _, [ from ] when activation_of node <> None ->
+      let x, shape = value from in
+      let is_needed name = count name > List.length (List.filter (( = ) name) node.inputs) in
+      let needed = List.sort compare (List.filter is_needed (List.of_seq (Hashtbl.to_seq_keys values))) in
+      let y, behind = Folding.activated chain (Option.get (activation_of node)) x
+          (List.map (fun name -> name, fst (value name)) needed) in
+      List.iter (fun (name, y) -> Hashtbl.replace values name (y, snd (value name))) behind;
+      y, shape
+    | ("MaxMin" | "PairsMaxMin" | "TopK"), _ -> refuse node "has a skip connection beside it"
+    | _ -> refuse node no_operator in
+  List.iter (fun node ->
+      if List.length node.outputs <> 1 then refuse node "has not exactly one output";
+      let result = computed node in
+      List.iter (fun name ->
+          Hashtbl.replace uses name (count name - 1);
+          if count name = 0 then Hashtbl.remove values name) node.inputs;
+      if count (output node) > 0 then Hashtbl.replace values (output node) result) nodes;
+  let output = match outputs with
+    | [ name ] when Hashtbl.mem values name -> fst (Hashtbl.find values name)
+    | _ -> bad_input "%s: the graph's output is not where its nodes end" path in
+  if chain.layers = [] && output.rows = Folding.identity (size shape) then bad_input "%s: has no linear layer" path;
+  let layers, between = Folding.finished chain output in
+  let is_double = Hashtbl.fold (fun _ (t : stored) found -> found || t.kind = 11) kept false in
+  let kind = if not is_double && chain.is_exact && List.for_all Folding.holds_float32 layers then "float32"
+    else "float64" in
+  let names = Hashtbl.create 16 in
+  let tensors k (layer : Folding.layer) =
+    let name = layer_name names k layer.weights and outputs = Array.length layer.map in
+    [ { Weights.tensor = name ^ ".weight"; shape = [ outputs; layer.inputs ]; kind; numbers = Folding.dense layer };
+      { Weights.tensor = name ^ ".bias"; shape = [ outputs ]; kind; numbers = (fun () -> layer.biases) } ] in
+  List.concat (List.mapi tensors layers), between
+
 let require_single_names path names =
   let names = List.filter (( <> ) "") names in
   if List.length (List.sort_uniq compare names) <> List.length names then
@@ -307,18 +462,28 @@ let read path bytes ~order =
   require_single_names path
     (name_of input :: Hashtbl.fold (fun name _ names -> name :: names) kept []
      @ List.concat_map (fun node -> node.outputs) nodes);
-  let state = { layers = []; is_activated = false; activations = []; shape = input_shape path input; order = None } in
   let constants, others = List.partition (fun node -> node.op = "Constant") nodes in
-  let end_of_chain = List.fold_left (follow path kept state) (name_of input) (constants @ with_groups_joined others) in
-  if List.map name_of (texts path 12 graph) <> [ end_of_chain ] then bad_input
-      "%s: the graph's output is not where its chain of nodes ends" path;
-  if state.layers = [] then bad_input "%s: has no linear layer" path;
-  let names = Hashtbl.create 16 in
-  let tensors = List.concat (List.mapi (fun k layer ->
-      let name = layer_name names k layer.weight.name in
-      declared ?order:layer.order layer.weight (name ^ ".weight") layer.transposed
-      :: (match layer.bias with Some b -> [ declared b (name ^ ".bias") false ] | None -> []))
-          (List.rev state.layers)) in
-  let w = Weights.assemble ~path ~sha256:(Sha256.to_hex (Sha256.string bytes)) Layer_order.Evaluation ~order tensors in
-  let w = if state.is_activated then Weights.with_identity ?order:state.order w else w in
-  { w with activations = Some (List.rev state.activations) }
+  List.iter (fun node -> ignore (stores path kept node)) constants;
+  let others = with_groups_joined kept others and shape = input_shape path input and input = name_of input in
+  let outputs = List.map name_of (texts path 12 graph) in
+  let assembled = Weights.assemble ~path ~sha256:(Sha256.to_hex (Sha256.string bytes)) Layer_order.Evaluation ~order in
+  let taken = List.filter (fun name -> name <> "" && not (Hashtbl.mem kept name))
+      (List.concat_map (fun node -> node.inputs) others) in
+  if List.length (List.sort_uniq compare taken) < List.length taken then begin
+    let tensors, between = folded path kept others input shape outputs in
+    { (assembled tensors) with activations = Some between }
+  end else begin
+    let state = { layers = []; is_activated = false; activations = []; shape; order = None } in
+    let end_of_chain = List.fold_left (follow path kept state) input others in
+    if outputs <> [ end_of_chain ] then bad_input "%s: the graph's output is not where its chain of nodes ends" path;
+    if state.layers = [] then bad_input "%s: has no linear layer" path;
+    let names = Hashtbl.create 16 in
+    let tensors = List.concat (List.mapi (fun k layer ->
+        let name = layer_name names k layer.weight.name in
+        declared ?order:layer.order layer.weight (name ^ ".weight") layer.transposed
+        :: (match layer.bias with Some b -> [ declared b (name ^ ".bias") false ] | None -> []))
+            (List.rev state.layers)) in
+    let w = assembled tensors in
+    let w = if state.is_activated then Weights.with_identity ?order:state.order w else w in
+    { w with activations = Some (List.rev state.activations) }
+  end
