@@ -546,7 +546,31 @@ class OnnxTensor:
         require_input(not self.kind or len(self.numbers) == math.prod(self.shape), "a tensor contradicts its shape")
 
 
-def group_from(node, takers):
+def gelu_from(node, takers, stored):
+    """Returns the nodes of the GELU that starts with `node` (x / sqrt 2, Erf, + 1, times x, times 0.5); [] if there is none."""
+    def holds(name, wanted, error=0.0):
+        return name in stored and len(stored[name].numbers) == 1 and abs(stored[name].numbers[0] - wanted) <= error
+
+    def taker(kind, name, *second):
+        """Returns the only node that uses `name`, if it is of this kind and its other input satisfies `second`."""
+        (found,) = takers.get(name, []) if len(takers.get(name, [])) == 1 else [None]
+        fits = found is not None and found.kind == kind and found.inputs.count(name) == 1
+        others = [other for other in found.inputs if other != name] if fits else []
+        return found if fits and len(others) == len(second) and all(is_(o) for is_, o in zip(second, others)) else None
+
+    x, group = node.inputs[0], [node]
+    if len(node.inputs) != 2 or not holds(node.inputs[1], math.sqrt(2), 1e-7):
+        return []
+    for kind, *second in (("Erf",), ("Add", lambda name: holds(name, 1.0)), ("Mul", lambda name: name == x),
+                          ("Mul", lambda name: holds(name, 0.5))):
+        following = taker(kind, group[-1].outputs[0], *second)
+        if following is None:
+            return []
+        group.append(following)
+    return group
+
+
+def group_from(node, takers, stored):
     """Returns the nodes that together compute one activation, starting with `node`; the last node comes last."""
     if len(node.inputs) == 0 or len(node.outputs) == 0:
         return []
@@ -554,6 +578,8 @@ def group_from(node, takers):
     if node.kind == "Sigmoid" and [n.kind for n in takers.get(y, [])] == ["Mul"]:
         (product,) = takers[y]
         return [node, product] if sorted(product.inputs) == sorted([x, y]) else []
+    if node.kind == "Div":
+        return gelu_from(node, takers, stored)
     if node.kind == "Split" and len(node.outputs) == 2 and len(set(node.outputs)) == 2:
         pair = takers.get(y, [])
         if takers.get(node.outputs[1], []) != pair or any(sorted(n.inputs) != sorted(node.outputs) for n in pair):
@@ -573,19 +599,20 @@ def group_from(node, takers):
     return [node] * (node.kind == "Split") + pair + both[:1]
 
 
-def with_groups_joined(nodes):
-    """Replaces each group by one node at the position of its last node: "Swish", "MaxMin" of halves, "PairsMaxMin".
-    Another node that uses a value inside a group then refers to an unknown value and is refused."""
+def with_groups_joined(nodes, stored):
+    """Replaces each group by one node at the position of its last node: "Swish", "Gelu", "MaxMin" of halves,
+    "PairsMaxMin". Another node that uses a value inside a group then refers to an unknown value and is refused."""
     takers = {}
     for node in nodes:
         for name in set(node.inputs):
             takers.setdefault(name, []).append(node)
-    groups = {id(group[-1]): group for group in (group_from(node, takers) for node in nodes) if group}
+    groups = {id(group[-1]): group for group in (group_from(node, takers, stored) for node in nodes)
+              if group}
     inner = {id(node) for group in groups.values() for node in group}
     for node in nodes:
         if id(node) in groups:
             group = groups[id(node)]
-            kind = {"Sigmoid": "Swish", "Split": "MaxMin", "ReduceMax": "PairsMaxMin"}[group[0].kind]
+            kind = {"Sigmoid": "Swish", "Div": "Gelu", "Split": "MaxMin", "ReduceMax": "PairsMaxMin"}[group[0].kind]
             yield OnnxNode(kind, group[0].inputs[:1], node.outputs, {}, group)
         elif id(node) not in inner:
             yield node
@@ -917,7 +944,7 @@ def read_onnx(data, order):
     require_input(len(inputs) == 1, "the graph has not one input")
     names = [inputs[0][0]] + list(stored) + [name for node in nodes for name in node.outputs if name]
     require_input(len(stored) == len(tensors) and len(set(names)) == len(names), "two values have the same name")
-    joined = list(with_groups_joined(nodes))
+    joined = list(with_groups_joined([node for node in nodes if not stores(stored, node)], stored))
     taken = [name for node in joined for name in node.inputs if name and name not in stored]
     if any(taken.count(name) > 1 for name in taken):
         return OnnxFolding(stored, inputs[0][0], input_shape(inputs[0][1])).run(

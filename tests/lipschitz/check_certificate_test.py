@@ -34,7 +34,8 @@ def safetensors(sizes, generator, names=()):
 
 
 def onnx(nodes, sizes, generator):
-    """An ONNX model: layers w1, w2, ... of these sizes, and `nodes` as (type, inputs, output)."""
+    """An ONNX model: layers w1, w2, ... of these sizes, numbers "one", "half" and "root" of 2, and `nodes` as (type,
+    inputs, output)."""
     def varint(value):
         return bytes([value]) if value < 128 else bytes([value & 127 | 128]) + varint(value >> 7)
 
@@ -51,6 +52,8 @@ def onnx(nodes, sizes, generator):
         numbers = pack(f"<{shape[0] * shape[1]}f", *(generator.uniform(-1, 1) for _ in range(shape[0] * shape[1])))
         graph += field(5, b"".join(field(1, size) for size in shape) + field(2, 1) + field(8, f"w{k + 1}")
                        + field(9, numbers))
+    for name, number in ("one", 1.0), ("half", 0.5), ("root", 2 ** 0.5):
+        graph += field(5, field(2, 1) + field(8, name) + field(9, pack("<f", number)))
     graph += field(11, field(1, "x")) + field(12, field(1, "y"))
     return field(1, 8) + field(2, "test") + field(7, graph)
 
@@ -67,6 +70,7 @@ def smooth_models(folder, generator):
         "actor": ([layer(1, "x", "a"), ("Relu", ["a"], "b"), layer(2, "b", "c"), ("Tanh", ["c"], "y")], [3, 5, 2]),
         "several": ([layer(1, "x", "a"), ("Sigmoid", ["a"], "s"), ("Mul", ["a", "s"], "b"), layer(2, "b", "c"),
                      ("Relu", ["c"], "d"), layer(3, "d", "e"), ("Sigmoid", ["e"], "y")], [3, 5, 4, 2]),
+        "gelu": ([layer(1, "x", "a"), *gelu_nodes("a", "b"), layer(2, "b", "y")], [3, 5, 2]),
         "elu": ([layer(1, "x", "a"), ("Celu", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2]),
         "swish": ([layer(1, "x", "a"), ("Swish", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2])}
     for name, (nodes, sizes) in models.items():
@@ -74,12 +78,25 @@ def smooth_models(folder, generator):
         yield [str(folder / f"{name}.onnx")]
 
 
+def gelu_nodes(x, y):
+    """As PyTorch exports it."""
+    return [("Div", [x, "root"], f"{y}q"), ("Erf", [f"{y}q"], f"{y}e"), ("Add", [f"{y}e", "one"], f"{y}s"),
+            ("Mul", [x, f"{y}s"], f"{y}p"), ("Mul", [f"{y}p", "half"], y)]
+
+
+def onnx_layer(k, x, y):
+    return ("MatMul", [x, f"w{k}"], y)
+
+
+def residual_block(k, x, y, *nodes):
+    """y = x + the layers k and k + 1 of x, with `nodes` from ya to yb between them."""
+    return [onnx_layer(k, x, f"{y}a"), *nodes, onnx_layer(k + 1, f"{y}b", f"{y}c"), ("Add", [x, f"{y}c"], y)]
+
+
 def skip_models(folder, generator):
     """ONNX models with skip connections past smooth activations: residual blocks, parallel branches, also with ReLU
     blocks; some fold two layers into one whose weights are not doubles."""
-    layer = lambda k, x, y: ("MatMul", [x, f"w{k}"], y)
-    block = lambda k, x, y, *nodes: [layer(k, x, f"{y}a"), *nodes, layer(k + 1, f"{y}b", f"{y}c"),
-                                     ("Add", [x, f"{y}c"], y)]
+    layer, block = onnx_layer, residual_block
     silu = [("Sigmoid", ["ra"], "rs"), ("Mul", ["ra", "rs"], "rb")]
     models = {
         "residual": ([layer(1, "x", "h"), *block(2, "h", "r", ("Tanh", ["ra"], "rb")), layer(4, "r", "y")],
@@ -88,11 +105,20 @@ def skip_models(folder, generator):
         "branches": ([layer(1, "x", "h"), ("Tanh", ["h"], "t"), ("Sigmoid", ["h"], "s"), ("Sub", ["t", "s"], "d"),
                       layer(2, "d", "e"), ("Softplus", ["e"], "y")], [3, 4, 2]),
         "with_relu": ([layer(1, "x", "h"), *block(2, "h", "r", ("Relu", ["ra"], "rb")),
-                       *block(4, "r", "q", ("Gelu", ["qa"], "qb")), ("Relu", ["q"], "p"), ("Add", ["p", "h"], "y")],
+                       *block(4, "r", "q", *gelu_nodes("qa", "qb")), ("Relu", ["q"], "p"), ("Add", ["p", "h"], "y")],
                       [3, 3, 4, 3, 4, 3])}
     for name, (nodes, sizes) in models.items():
         (folder / f"{name}.onnx").write_bytes(onnx(nodes, sizes, generator))
         yield [str(folder / f"{name}.onnx")]
+
+
+def relu_skip_model(folder, generator):
+    """An ONNX model of two residual blocks, ReLU in each and between them."""
+    nodes = [onnx_layer(1, "x", "h"), *residual_block(2, "h", "r", ("Relu", ["ra"], "rb")), ("Relu", ["r"], "q"),
+             *residual_block(4, "q", "s", ("Relu", ["sa"], "sb")), onnx_layer(6, "s", "y")]
+    path = folder / "resnet.onnx"
+    path.write_bytes(onnx(nodes, [3, 3, 4, 3, 4, 3, 2], generator))
+    return path
 
 
 def heterogeneous(folder, generator):
@@ -127,6 +153,23 @@ def smooth(folder):
                              ("ground", '"softplus"'), ("rho", '"selu"')):
         text = text.replace(f'weights = "{part}.safetensors"',
                             f'weights = "{part}.safetensors"\nactivation = {activation}')
+    net.write_text(text)
+    return net
+
+
+def with_skips(folder, generator):
+    """The network.toml of heterogeneous(), with skip connections in both phi and in rho."""
+    layer, block = onnx_layer, residual_block
+    models = {
+        "small": ([layer(1, "x", "h"), *block(2, "h", "r", ("Sigmoid", ["ra"], "rb")), layer(4, "r", "y")],
+                  [6, 3, 4, 3, 4]),
+        "large": ([layer(1, "x", "h"), ("Relu", ["h"], "p"), ("Sub", ["p", "h"], "q"), layer(2, "q", "y")], [6, 4, 4]),
+        "rho": ([*block(1, "x", "r", ("Elu", ["ra"], "rb")), ("Sigmoid", ["r"], "s"),
+                 ("Add", ["s", "x"], "t"), layer(3, "t", "y")], [4, 3, 4, 1])}
+    net, text = folder / "skips.toml", (folder / "network.toml").read_text()
+    for name, (nodes, sizes) in models.items():
+        (folder / f"skips_{name}.onnx").write_bytes(onnx(nodes, sizes, generator))
+        text = text.replace(f'"{name}.safetensors"', f'"skips_{name}.onnx"')
     net.write_text(text)
     return net
 
