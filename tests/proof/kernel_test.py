@@ -60,6 +60,14 @@ def main():
         assert len(between) == 1
         steeper = text.replace(between[0], between[0].replace("Sigmoid", "Tanh"))
         assert kernel(folder / "Steeper.v", steeper).returncode != 0
+        model = folder / "around.onnx"  # x + W sigmoid (V x): what stays has a slope of 1
+        model.write_bytes(common.onnx(common.residual_block(1, "x", "y", ("Sigmoid", ["ya"], "yb")), [2, 3, 2],
+                                      generator))
+        text = smooth.check(smooth.certify(model), model, "--coq").stdout
+        accepted(kernel(folder / "Around.v", text))
+        assert text.count("(Keeping 3%nat Sigmoid)") == 1
+        all_change = text.replace("(Keeping 3%nat Sigmoid)", "Sigmoid")
+        assert kernel(folder / "AllChange.v", all_change).returncode != 0
 
 
 if __name__ == "__main__":

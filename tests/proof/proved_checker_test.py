@@ -94,6 +94,9 @@ def kinds(folder, generator):
     float32 = ["--as", "float32"]
     pair = ["--phi", folder / "small.safetensors", "--rho", folder / "rho.safetensors"]
     parts = ["--method", "branch", "--cuts", "20"]
+    skips, cubed = [common.with_skips(folder, generator)], ["--domain", folder / "cube.toml"]
+    residual, around, _, with_relu = common.skip_models(folder, generator)
+    relu_skips = [common.relu_skip_model(folder, generator)]
     return [
         ("plain", [tiny], [], 0.16),
         ("one layer", [line], ["--blocks"], 0.2),
@@ -128,6 +131,18 @@ def kinds(folder, generator):
         ("rotation invariants", [common.of_invariants(folder, generator)], ["--neighbours", "large=2,small=1"], 0.03),
         ("gelu, slopes on a box", [tiny], ["--activation", "gelu", "--domain", folder / "plane.toml"], 0.03),
         ("relu, silu, slopes on a box", [tiny], ["--activation", "relu,silu", "--domain", folder / "plane.toml"], 0.03),
+        ("skip connections past tanh", residual, ["--blocks", "--scale", "1,2,4"], 0.03),
+        ("skip connections past silu and tanh, values on a box", around, [*cubed, "--range"], 0.02),
+        ("skip connections past silu and tanh, products on a box", around, [*cubed, "--method", "product"], 0.02),
+        ("skip connections past relu and gelu, slopes on a box", with_relu, cubed, 0.02),
+        ("skip connections past relu, values on a box", relu_skips, [*float32, *cubed, "--range"], 0.02),
+        ("skip connections past relu and parts of a box", relu_skips, ["--method", "branch", *cubed], 0.01),
+        ("skip connections of parts, laws", skips, ["--blocks=position", "--neighbours", "large=2,small=1"], 0.02),
+        ("skip connections of parts, products", skips, ["--neighbours", "2", "--method", "product"], 0.02),
+        ("skip connections of parts, slopes on a box", skips,
+         ["--neighbours", "large=2,small=1", "--domain", folder / "part.toml", "--blocks=position"], 0.02),
+        ("skip connections of parts, values on a box", skips,
+         ["--neighbours", "small=2", "--domain", folder / "part.toml", "--range", "--method", "product"], 0.02),
         ("cover by parts", [tiny], parts, 0.03),
         ("pair and cover by parts", pair, parts, 0.02),
         ("kinds by parts for a number of neighbours", hetero,
@@ -461,11 +476,61 @@ def every_format(folder, generator):
     print(f"{len(files)} formats of weight files read alike")
 
 
+def skips_past(certificate, net, folder):
+    """How many numbers an activation changes, and that others stay, is part of what is stated."""
+    assert second.KEEPING_STATEMENT in certificate["statement"]
+
+    def refused(change):
+        changed = json.loads(json.dumps(certificate))
+        change(changed)
+        assert changed != certificate
+        changed["content_sha256"] = second.content_sha256(changed)
+        path = folder / "kept.json"
+        path.write_text(json.dumps(changed))
+        one, three = first(path, net), proved(path, net)
+        assert one.returncode == three.returncode == 1, f"{one} {three}"
+        assert second.check(changed, second.Network(**arguments(net)))
+
+    (name,) = certificate["network"]["weights"]
+    step = next(k for k, s in enumerate(certificate["network"]["weights"][name]["chain"]) if ":" in s["op"])
+    op, kept = certificate["network"]["weights"][name]["chain"][step]["op"].split(":")
+    for other in op, f"{op}:{int(kept) + 1}", f"{op}:{int(kept) - 1}", f"{op}:{kept}:{kept}":
+        refused(lambda changed: changed["network"]["weights"][name]["chain"][step].update(op=other))
+    refused(lambda changed: changed.update(statement=certificate["statement"].replace(second.KEEPING_STATEMENT, "")))
+
+
+def graphs_that_are_not_read(folder, generator):
+    """Both read a model with a skip connection; what they do not know beside one, or does not fit, each refuses."""
+    layer, tanh = common.onnx_layer, ("Tanh", ["h"], "t")
+    model, path = folder / "graph.onnx", folder / "graph.json"
+
+    def codes(nodes):
+        model.write_bytes(common.onnx(nodes, [3, 4, 4, 2], generator))
+        path.unlink(missing_ok=True)
+        certify = run([common.SWARMCERT, "certify", model, "--nodes", "1", "-q", "-o", path])
+        if not path.exists():
+            path.write_text("{}")
+        return certify.returncode, proved(path, [model]).returncode
+
+    assert codes([layer(1, "x", "h"), tanh, ("Add", ["t", "h"], "y")]) == (0, 0)
+    for nodes in (
+            [layer(1, "x", "h"), tanh, ("Mul", ["t", "h"], "y")],  # not affine
+            [layer(1, "x", "h"), tanh, ("Add", ["t", "x"], "y")],  # other sizes
+            [layer(1, "x", "h"), tanh, ("Add", ["t", "h"], "s"), layer(3, "x", "y")],
+            [layer(1, "x", "h"), tanh, ("Add", ["t", "later"], "y"), layer(1, "h", "later")],
+            [layer(1, "x", "h"), tanh, ("Add", ["t", "h"], "s"), ("Mystery", ["s"], "y")],
+            [layer(1, "x", "h"), tanh, ("Add", ["t", "h"], "s")],  # ends at no output
+            [layer(1, "x", "h"), ("TopK", ["h"], "s"), ("Add", ["s", "h"], "y")],
+            [("Add", ["x", "x"], "y")]):
+        assert codes(nodes) == (3, 3), nodes
+
+
 def main():
     generator = random.Random(23)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         every_format(folder, generator)
+        graphs_that_are_not_read(folder, generator)
         everything = kinds(folder, generator)
         laws_in_a_box(folder, next(net for name, net, _, _ in everything if name == "pair"))
         total = 0
@@ -482,6 +547,8 @@ def main():
             else:  # the proved one is exact, the first uses double
                 in_double = ", those by parts of boxes in double with every rounding accounted for"
                 assert three.returncode == 0 and three.stdout == one.stdout.replace(in_double, ""), f"{one} {three}"
+            if name == "skip connections past tanh":
+                skips_past(certificate, net, folder)
             if name == "parts of a box":
                 a_smaller_bound(certificate, net, folder)
             if index == 0:
