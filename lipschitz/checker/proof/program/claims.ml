@@ -5,7 +5,7 @@ open Refusal
 open Json
 
 (* By parts: proved for all inputs, and not written by --coq. Among: for a number of neighbours in a box. *)
-type source = Proved_here | By_parts | In_box | Among | Not_checked
+type source = Proved_here | By_parts | In_box | Among
 type t = {
   net : Network.t;
   json : Json.t;
@@ -160,16 +160,14 @@ let bound_keys = [ "function"; "domain"; "block"; "law"; "norm"; "scale"; "unit"
 
 let too_little where = where ^ ": claims less than the product of the norms"
 
-let check_product state where names claim scale upper =
-  let largest = match scale with [] -> 1. | first :: rest -> List.fold_left Float.max first rest in
+let check_product state where names claim ~largest upper =
   let total = List.fold_left (fun total name -> match Hashtbl.find_opt state.norms name with
       | Some norm ->
         List.fold_left (fun total activation -> times total (Proved.steepest activation)) (times total norm)
           (Weights.between (Functions.weights state.net name))
-      | None -> rejected "%s: there is no network %s" where (shown name)) (Exact.of_float largest) names in
+      | None -> rejected "%s: there is no network %s" where (shown name)) largest names in
   require (at_most total upper) "%s" (too_little where);
-  prove state claim Proved.By_product (too_little where);
-  Proved_here
+  prove state claim Proved.By_product (too_little where)
 
 (* The box of a part; the theorems apply the clamp themselves. *)
 let box_of state where part =
@@ -203,8 +201,9 @@ let check_activations state where bound names =
           "%s: a bound from slopes of single numbers%s" where of_
       end) activations
 
-(* The map to rotation invariants is in no theorem. What a certificate may state of its functions at all, is checked. *)
-let check_of_invariants state bound f where ~scale ~neighbours upper =
+(* Functions of states, whose invariants phi sees: bounded in units of how steep these are. *)
+let observed_by part = if part = "phi:ground" then Proved.Vehicle else Neighbour
+let check_of_invariants state bound names f where ~scale ~neighbours upper =
   let of_ = " of a function of rotation invariants" in
   require (find where "domain" bound = Text "global" && find where "upper_method" bound <> Text "branch")
     "%s: a bound on a box%s" where of_;
@@ -212,8 +211,20 @@ let check_of_invariants state bound f where ~scale ~neighbours upper =
     "%s: a lower bound%s" where of_;
   require (scale = []) "%s: a scale%s" where of_;
   require (find where "block" bound = Text "all") "%s is bounded for all inputs together" where;
-  not_checked state (Printf.sprintf "%s <= %s:%s" where (text where (find where "upper_hex" bound)) of_);
-  Hashtbl.replace state.uppers (f, "all", neighbours) (upper, Not_checked)
+  let observed = observed_by (List.hd names) and index = Functions.index state.net in
+  let slope = Proved.slope_of_invariants observed and count = Proved.number_of_invariants observed in
+  let alike x = List.init count (fun _ -> x) in
+  let claim = Proved.Slope_at_most (function_of state names, alike true, alike slope, upper) in
+  (match find where "upper_method" bound, find where "proof" bound with
+   | Text ("sdp" | "eclipse_fast"), proof ->
+     let neurons = hidden_neurons state names in
+     prove_by state claim (inequality state claim where ~neurons ~upper proof) (no_factor where)
+   | Text "product", Null -> check_product state where names claim ~largest:slope upper
+   | _ -> rejected "%s: unknown upper_method" where);
+  prove state (Slope_of_states (observed, index (List.hd names), index (List.nth names 1), upper)) Proved.By_invariants
+    (where ^ ": claims less than the bound times the slope of the invariants");
+  state.upper_bounds <- state.upper_bounds + 1;
+  Hashtbl.replace state.uppers (f, "all", neighbours) (upper, Proved_here)
 
 (* From the slopes that activations have on the box. *)
 let local_methods = [ Text "local_sdp"; Text "local_product" ]
@@ -244,7 +255,9 @@ let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~
     | method_ when List.mem method_ local_methods ->
       check_local state where bound names ~func ~moves ~exact_scale ~upper
     | Text "branch" -> check_parts state where bound names ~func ~moves ~scale ~exact_scale ~neighbours ~upper
-    | Text "product" when find where "proof" bound = Null -> check_product state where names claim scale upper
+    | Text "product" when find where "proof" bound = Null ->
+      let largest = match scale with [] -> 1. | first :: rest -> List.fold_left Float.max first rest in
+      check_product state where names claim ~largest:(Exact.of_float largest) upper; Proved_here
     | _ -> rejected "%s: unknown upper_method" where in
   if scale = [] then begin
     Hashtbl.replace state.uppers (f, block, neighbours) (upper, source);
@@ -252,7 +265,7 @@ let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~
        && find where "domain" bound = Text "box" && neighbours = [] then
       Hashtbl.replace state.in_box (f, block) ()
   end;
-  if source <> Not_checked then state.upper_bounds <- state.upper_bounds + 1;
+  state.upper_bounds <- state.upper_bounds + 1;
   match find where "lower_witness" bound with
   | Null -> require (find where "lower" bound = Null && find where "lower_hex" bound = Null)
       "%s: lower without a witness" where
@@ -282,7 +295,8 @@ let check_bound state bound =
       (find where "upper_hex" bound)) in
   check_status where bound;
   check_activations state where bound names;
-  if Functions.maps_to_invariants state.net f then check_of_invariants state bound f where ~scale ~neighbours upper
+  if Functions.maps_to_invariants state.net f then
+    check_of_invariants state bound names f where ~scale ~neighbours upper
   else check_bound_by_theorems state bound names f block where ~scale ~neighbours ~upper
 
 (* Laws *)
@@ -324,8 +338,13 @@ let check_law state law =
     | _ -> false in
   let is_written = List.for_all (fun (_, _, _, source) -> source = Proved_here) bounds in
   let everywhere = List.for_all (fun (_, _, _, source) -> source = Proved_here || source = By_parts) bounds in
-  if List.exists (fun (_, _, _, source) -> source = Not_checked) bounds
-     || not (everywhere || List.for_all has_box bounds) then
+  if state.net.invariants then begin
+    let kind (f, n, _, _) = (observed_by (part f), Functions.index state.net (part f)), Z.of_int n in
+    let rho = Functions.index state.net ("rho:" ^ rho) in
+    prove state (Law_of_states (stacked, List.map kind bounds, rho, upper)) By_triangle reason;
+    state.upper_bounds <- state.upper_bounds + 1
+  end
+  else if not (everywhere || List.for_all has_box bounds) then
     not_checked state (Printf.sprintf "%s: rests on a bound that is not checked" where)
   else begin
     let kind (f, n, _, _) = (Functions.index state.net (part f), Functions.moves state.net f block), Z.of_int n in

@@ -19,7 +19,7 @@ let index (net : Network.t) part =
   go 0 net.parts
 let is_relu net part = Weights.is_relu (weights net part)
 let inputs net part = Weights.inputs (Weights.first_layer (weights net part))
-(* Set functions that take states, and whose phi sees invariants of them: beyond the theorems. *)
+(* Set functions that take states, and whose phi sees invariants of them. *)
 let maps_to_invariants (net : Network.t) f = net.invariants && starts_with "set:" f
 let has_ground (net : Network.t) = List.mem_assoc "phi:ground" net.parts
 

@@ -19,7 +19,7 @@ Lemma find_slope_sound ps accepted phi rho moves u : Forall (holds ps) accepted 
   find_slope accepted phi rho moves = Some u -> holds ps (Slope_at_most (Set_of phi rho) moves [] u).
 Proof.
   intros H. revert u. induction H as [|c rest Hc H IH]; intros u; [discriminate|].
-  destruct c as [| |[|q k] m [|] v| | | | | | | | | | | |]; simpl find_slope; auto.
+  destruct c as [| |[|q k] m [|] v| | | | | | | | | | | | | |]; simpl find_slope; auto.
   destruct (Nat.eqb_spec phi q), (Nat.eqb_spec rho k); cbn [andb]; try apply IH.
   destruct (same_moves moves m) eqn:E; [|apply IH]. apply same_moves_eq in E. subst.
   destruct (find_slope rest q k m) as [w|]; [destruct (at_most w v)|]; intros G; inversion G; subst;
@@ -104,10 +104,12 @@ Lemma dot_counted (f : mover -> R) r ms : 0 <= r -> Forall (fun m => f m <= r) m
 Proof.
   intros Hr H. induction H as [|m ms Hm H IH]; [simpl; lra|]. cbn [map length dot]. rewrite S_INR. lra.
 Qed.
-Lemma counted ms (k : kind) : may_move k ms -> INR (length ms) <= IZR (snd k).
-Proof. intros [H _]. rewrite INR_IZR_INZ. now apply IZR_le. Qed.
+(** No more than stated. *)
+Definition few (k : kind) (ms : list mover) : Prop := (Z.of_nat (length ms) <= snd k)%Z.
+Lemma counted ms (k : kind) : few k ms -> INR (length ms) <= IZR (snd k).
+Proof. intros H. rewrite INR_IZR_INZ. now apply IZR_le. Qed.
 Lemma sum_of_steps (ps : list part) cs kinds movers r : 0 <= r -> not_negative cs kinds ->
-  Forall2 may_move kinds movers -> Forall (fun m => step_of m <= r) (concat movers) ->
+  Forall2 few kinds movers -> Forall (fun m => step_of m <= r) (concat movers) ->
   dotR (map bound (steps_of ps cs (combine kinds movers))) (map far (steps_of ps cs (combine kinds movers))) <=
   fold_right Rplus 0 (map (fun ck : dyadic * kind => IZR (snd (snd ck)) * real (fst ck)) (combine cs kinds)) * r.
 Proof.
@@ -120,7 +122,7 @@ Proof.
   pose proof (Rmult_le_compat_l (real c) _ _ Hc (Rle_trans _ _ _ B N')) as P.
   rewrite Rmult_plus_distr_r. apply Rplus_le_compat; [|exact IH]. eapply Rle_trans; [apply Req_le; exact D|]. lra.
 Qed.
-Lemma square_of_bounds (ps : list part) cs kinds movers : not_negative cs kinds -> Forall2 may_move kinds movers ->
+Lemma square_of_bounds (ps : list part) cs kinds movers : not_negative cs kinds -> Forall2 few kinds movers ->
   square (map bound (steps_of ps cs (combine kinds movers))) <=
   fold_right Rplus 0 (map (fun ck : dyadic * kind => IZR (snd (snd ck)) * (real (fst ck) * real (fst ck)))
       (combine cs kinds)).
@@ -137,7 +139,24 @@ Proof.
 Qed.
 Lemma Forall2_lengths {A B} (P : A -> B -> Prop) a b : Forall2 P a b -> length a = length b.
 Proof. intros H. induction H; simpl; auto. Qed.
-Lemma law_of_steps ps rho cs kinds movers (stacked : bool) u v : fits_part (part_at ps rho) = true -> 0 <= real u ->
+Lemma law_of_sums ps cs kinds movers (stacked : bool) u v change : 0 <= real u -> not_negative cs kinds ->
+  Forall2 few kinds movers ->
+  let steps := steps_of ps cs (combine kinds movers) in
+  norm change <= dotR (map bound steps) (map far steps) ->
+  real v = fold_right Rplus 0 (map
+      (fun ck : dyadic * kind => IZR (snd (snd ck)) * (if stacked then
+      real (fst ck) * real (fst ck) else real (fst ck))) (combine cs kinds)) ->
+  real v <= real (if stacked then mul u u else u) -> bounded_change stacked u change (concat movers).
+Proof.
+  intros H B M steps T E Ht. unfold steps in T. clear steps. pose proof (Forall2_lengths _ _ _ B) as Lc.
+  pose proof (Forall2_lengths _ _ _ M) as Lm. destruct stacked; simpl.
+  - eapply Rle_trans; [exact T|]. eapply Rle_trans; [apply cauchy|]. rewrite steps_far by auto.
+    apply Rmult_le_compat_r; [apply norm_nonneg|]. apply sqrt_below; auto. rewrite real_mul in Ht.
+    pose proof (square_of_bounds ps cs kinds movers B M). lra.
+  - intros r Hr F. eapply Rle_trans; [exact T|].
+    eapply Rle_trans; [apply (sum_of_steps ps cs kinds movers r Hr B M F)|]. apply Rmult_le_compat_r; auto. lra.
+Qed.
+Lemma law_of_steps ps rho cs kinds movers (stacked : bool) u v : 0 <= real u ->
   not_negative cs kinds -> Forall2 may_move kinds movers ->
   let steps := steps_of ps cs (combine kinds movers) in
   norm (minus (value (part_at ps rho) (vector_sum (map before steps)))
@@ -149,15 +168,10 @@ Lemma law_of_steps ps rho cs kinds movers (stacked : bool) u v : fits_part (part
   bounded_change stacked u (minus (value (part_at ps rho) (sum_at ps fst groups))
     (value (part_at ps rho) (sum_at ps snd groups))) (concat movers).
 Proof.
-  intros Hf H B M steps T E Ht. unfold steps in T. clear steps. pose proof (Forall2_lengths _ _ _ B) as Lc. pose
-    proof (Forall2_lengths _ _ _ M) as Lm.
-  cbv zeta. unfold sum_at. destruct (steps_values ps cs kinds movers Lc) as [-> ->].
-  destruct stacked; simpl.
-  - eapply Rle_trans; [exact T|]. eapply Rle_trans; [apply cauchy|]. rewrite steps_far by auto.
-    apply Rmult_le_compat_r; [apply norm_nonneg|]. apply sqrt_below; auto. rewrite real_mul in Ht.
-    pose proof (square_of_bounds ps cs kinds movers B M). lra.
-  - intros r Hr F. eapply Rle_trans; [exact T|].
-    eapply Rle_trans; [apply (sum_of_steps ps cs kinds movers r Hr B M F)|]. apply Rmult_le_compat_r; auto. lra.
+  intros H B M steps T E Ht. unfold steps in T. clear steps. cbv zeta. unfold sum_at.
+  destruct (steps_values ps cs kinds movers (Forall2_lengths _ _ _ B)) as [-> ->].
+  apply law_of_sums with (cs := cs) (v := v) (ps := ps) (kinds := kinds); auto.
+  clear - M. induction M as [|k ms kinds movers [N _] M IH]; constructor; auto.
 Qed.
 Lemma telescope_all ps rho steps : fits_part (part_at ps rho) = true -> Forall (fun m => forall s,
       norm (minus (value (part_at ps rho) (plusR (before m) s)) (value (part_at ps rho) (plusR (after m) s)))
@@ -183,7 +197,7 @@ Lemma find_slope_in_sound ps accepted phi rho moves b u : Forall (holds ps) acce
   find_slope_in accepted phi rho moves b = Some u -> holds ps (Slope_in_box (Set_of phi rho) moves [] b u).
 Proof.
   intros H. revert u. induction H as [|c rest Hc H IH]; intros u; [discriminate|].
-  destruct c as [| |[|q k] m [|] v| |[|q k] m [|] d v| | | | | | | | | |]; simpl find_slope_in; auto.
+  destruct c as [| |[|q k] m [|] v| |[|q k] m [|] d v| | | | | | | | | | | |]; simpl find_slope_in; auto.
   - destruct (Nat.eqb_spec phi q), (Nat.eqb_spec rho k); cbn [andb]; try apply IH.
     destruct (same_moves moves m) eqn:E; [|apply IH]. apply same_moves_eq in E. subst.
     assert (holds ps (Slope_in_box (Set_of q k) m [] b v)) as Hv by (intros r x y A L _ _; now apply Hc).
