@@ -1,6 +1,7 @@
 #include "analysis/logs/column_names.h"
 
 #include <cctype>
+#include <map>
 
 #include "analysis/logs/angles.h"
 
@@ -72,7 +73,8 @@ void add_crazyflie(Table& t) {
   t.push_back({kVelocity, axes("stateestimate.v#"), "m/s"});
   // kalman.stateP* is a velocity in the body frame, so for kalman.state* the velocity is derived from the position.
   t.push_back({kForceWorld, axes("stateestimatez.a#"), "mm/s^2", 1, 1000});
-  t.push_back({kForceBody, axes("acc.#"), "g", kGravity_m_s2, 1});
+  // acc.x of the firmware is in g; acc_x is what others call it, in any unit.
+  t.push_back({kForceBody, axes("acc.#"), "g", kGravity_m_s2, 1, Ask::kGravityUnit});
   t.push_back({kAttitude, quaternion("stateestimate.q#"), "1"});
   t.push_back({kPackedAttitude, {"stateestimatez.quat"}, "packed"});
   t.push_back({kAttitude, each("kalman.q#", {"1", "2", "3", "0"}), "1"});
@@ -152,16 +154,31 @@ void add_generic(Table& t) {
         "body.rates.#", "twist.angular.#", "twist.twist.angular.#"})
     t.push_back({kRates, axes(group), "", 1, 1, Ask::kRates});
   t.push_back({kRates, {"p", "q", "r"}, "", 1, 1, Ask::kRates});
-  for (const char* group : {"motor.#", "motor#", "m#", "u#", "pwm#", "pwm.#", "duty.#", "thrust.#", "cmd.#"})
+  t.push_back({kForceBody, axes("imu.a#"), "", 1, 1, Ask::kAcceleration});
+  t.push_back({kRates, axes("imu.g#"), "", 1, 1, Ask::kRates});
+  for (const char* group : {"motor.#", "motor#", "m#", "u#", "pwm#", "pwm.#", "duty.#", "thrust.#", "cmd.#",
+                            "motor.cmd.#", "motor.cmd#", "motorcmd#"})
     t.push_back({kDuty, rotors(group), "", 1, 1, Ask::kMotors});
+  // Counted from 0.
+  for (const char* group : {"motor.#", "motor#", "m#", "u#", "pwm#", "pwm.#", "duty.#"})
+    t.push_back({kDuty, each(group, {"0", "1", "2", "3"}), "", 1, 1, Ask::kMotors});
   for (const char* group : {"rpm#", "rpm.#", "motor.rpm.#", "rotor.speed.#", "motor.speed.#", "omega.m#"})
     t.push_back({kRotorSpeed, rotors(group), "rpm"});
   for (const char* name : {"battery", "vbat", "voltage", "battery.voltage", "batteryvoltage", "batt", "bat",
                            "v.bat", "battery.v"})
     t.push_back({kBattery, {name}, "V"});
-  for (const char* group :
-       {"target.#", "ref.#", "des.#", "setpoint.#", "sp.#", "desired.#", "target.p#", "#.ref", "#.des", "#.d",
-        "p#.ref", "p#.des", "#.sp", "target.position.#", "reference.#"})
+  for (const char* group : {"target.#",    "ref.#",
+                            "des.#",       "setpoint.#",
+                            "sp.#",        "desired.#",
+                            "target.p#",   "#.ref",
+                            "#.des",       "#.d",
+                            "p#.ref",      "p#.des",
+                            "#.sp",        "target.position.#",
+                            "reference.#", "ref#",
+                            "sp#",         "des#",
+                            "target#",     "#.setpoint",
+                            "pos.sp.#",    "pos.ref.#",
+                            "pos.des.#",   "position.setpoint.#"})
     t.push_back({kTargetPosition, axes(group), "m"});
   for (const char* group :
        {"target.v#", "ref.v#", "des.v#", "setpoint.v#", "sp.v#", "v#.ref", "v#.des", "v#.sp"})
@@ -204,6 +221,30 @@ std::string plain_name(const std::string& column) {
       std::isdigit(static_cast<unsigned char>(column[bracket + 1])) != 0)
     plain += "." + plain_name(column.substr(bracket + 1));
   return plain;
+}
+
+StatedUnit stated_unit(const std::string& column) {
+  static const std::map<std::string, const char*> spelled = {
+      {"m", "m"},         {"mm", "mm"},      {"cm", "cm"},         {"m.s", "m/s"},       {"mps", "m/s"},
+      {"mm.s", "mm/s"},   {"mmps", "mm/s"},  {"cm.s", "cm/s"},     {"cmps", "cm/s"},     {"m.s2", "m/s^2"},
+      {"m.s.2", "m/s^2"}, {"mps2", "m/s^2"}, {"mm.s2", "mm/s^2"},  {"mm.s.2", "mm/s^2"}, {"g", "g"},
+      {"mg", "mg"},       {"rad", "rad"},    {"deg", "deg"},       {"degrees", "deg"},   {"rad.s", "rad/s"},
+      {"radps", "rad/s"}, {"rads", "rad/s"}, {"mrad.s", "mrad/s"}, {"deg.s", "deg/s"},   {"degps", "deg/s"},
+      {"dps", "deg/s"},   {"v", "V"},        {"volt", "V"},        {"volts", "V"},       {"mv", "mV"},
+      {"pct", "%"},       {"percent", "%"},  {"pwm", "PWM"}};
+  const std::string plain = plain_name(column);
+  const std::size_t open = column.find_last_of("[("), close = column.find_last_of("])");
+  if (open != std::string::npos && close != std::string::npos && close > open) {
+    const std::string inside = column.substr(open + 1, close - open - 1);
+    const auto known = spelled.find(plain_name(inside));
+    return {known != spelled.end() ? known->second : inside == "%" ? "%" : "", plain};
+  }
+  // The longest unit first: "vx.mm.s" is in mm/s. A name is left before it.
+  for (std::size_t dot = plain.find('.'); dot != std::string::npos; dot = plain.find('.', dot + 1)) {
+    const auto known = spelled.find(plain.substr(dot + 1));
+    if (known != spelled.end()) return {known->second, plain.substr(0, dot)};
+  }
+  return {"", plain};
 }
 
 std::vector<std::string> called_names(const std::string& column) {

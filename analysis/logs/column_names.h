@@ -15,6 +15,7 @@ namespace swarmcert::logs {
 enum class Ask {
   kNothing,
   kAcceleration,   ///< unit, frame, and whether gravity is in it
+  kGravityUnit,    ///< nothing where it shows 1 g in its unit; else all that kAcceleration asks
   kAngles,         ///< degrees or radians, and the signs
   kLegacyPitch,    ///< nothing open: the second component is minus the rotation about y
   kRates,          ///< degrees or radians per second
@@ -40,6 +41,15 @@ const std::vector<NamedColumns>& column_names();
 /// Returns the name in lower case, without a unit in brackets, with each run of other characters than letters and
 /// digits replaced by a dot.
 std::string plain_name(const std::string& column);
+
+/// The unit that the name of a column states.
+struct StatedUnit {
+  std::string unit;   ///< spelled as in columns.toml; empty if there is no known unit
+  std::string plain;  ///< plain_name() without the unit after the last word
+};
+
+/// Returns the unit in brackets, "vx (mm/s)", or after the last word, "vx_mm_s", "pos_x_m", "roll_deg", "acc_z_mps2".
+StatedUnit stated_unit(const std::string& column);
 
 /// Returns the names under which a column with the plain name `column` is looked up: the name itself and the name
 /// without its first word, unless that word marks a setpoint. "att.stateestimate.qx" is also found as

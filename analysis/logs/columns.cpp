@@ -35,16 +35,16 @@ std::map<std::string, NamedSignal> named_signals() {
   const auto of_both_signs = [&](std::vector<Unit> units) {
     static const std::map<std::string, const char*> negative = {
         {"1", "-1"},           {"m", "-m"},         {"mm", "-mm"},         {"m/s", "-m/s"},
-        {"mm/s", "-mm/s"},     {"m/s^2", "-m/s^2"}, {"mm/s^2", "-mm/s^2"}, {"g", "-g"},
-        {"mg", "-mg"},         {"rad", "-rad"},     {"deg", "-deg"},       {"rad/s", "-rad/s"},
-        {"mrad/s", "-mrad/s"}, {"deg/s", "-deg/s"}};
+        {"cm", "-cm"},         {"mm/s", "-mm/s"},   {"cm/s", "-cm/s"},     {"m/s^2", "-m/s^2"},
+        {"mm/s^2", "-mm/s^2"}, {"g", "-g"},         {"mg", "-mg"},         {"rad", "-rad"},
+        {"deg", "-deg"},       {"rad/s", "-rad/s"}, {"mrad/s", "-mrad/s"}, {"deg/s", "-deg/s"}};
     const std::size_t count = units.size();
     for (std::size_t i = 0; i < count; ++i)
       units.push_back({negative.at(units[i].name), -units[i].multiply, units[i].divide});
     return units;
   };
-  const std::vector<Unit> length = of_both_signs({{"m", 1, 1}, {"mm", 1, 1000}});
-  const std::vector<Unit> speed = of_both_signs({{"m/s", 1, 1}, {"mm/s", 1, 1000}});
+  const std::vector<Unit> length = of_both_signs({{"m", 1, 1}, {"cm", 1, 100}, {"mm", 1, 1000}});
+  const std::vector<Unit> speed = of_both_signs({{"m/s", 1, 1}, {"cm/s", 1, 100}, {"mm/s", 1, 1000}});
   const std::vector<Unit> force = {{"N", 1, 1}, {"gf", kGravity_m_s2, 1000}};
   add("time", {""}, kTime, {{"s", 1e6, 1}, {"ms", 1e3, 1}, {"us", 1, 1}});
   add("position", axes, kPosition, length);
@@ -59,9 +59,9 @@ std::map<std::string, NamedSignal> named_signals() {
   add("roll", {""}, kEuler, angle);
   add("pitch", {""}, kEuler + 1, angle);
   add("yaw", {""}, kEuler + 2, angle);
-  add("requested", motors, kRequested, {{"1", 1, 1}, {"PWM", 1, 65536}});
+  add("requested", motors, kRequested, {{"1", 1, 1}, {"%", 1, 100}, {"PWM", 1, 65536}});
   add("rate", axes, kRates, of_both_signs({{"rad/s", 1, 1}, {"mrad/s", 1, 1000}, {"deg/s", kDegree_rad, 1}}));
-  add("duty", motors, kDuty, {{"1", 1, 1}, {"PWM", 1, 65536}});
+  add("duty", motors, kDuty, {{"1", 1, 1}, {"%", 1, 100}, {"PWM", 1, 65536}});
   add("battery", {""}, kBattery, {{"V", 1, 1}, {"mV", 1, 1000}});
   add("target_position", axes, kTargetPosition, length);
   add("target_velocity", axes, kTargetVelocity, speed);
@@ -72,6 +72,19 @@ std::map<std::string, NamedSignal> named_signals() {
 }
 
 }  // namespace
+
+std::optional<UnitFactor> unit_factor(int signal, const std::string& unit) {
+  static const std::map<std::string, NamedSignal> named = named_signals();
+  // Forces in B and accelerations are in the units of forces in W.
+  const int alike = signal >= kForceBody && signal < kAttitude ? kForceWorld : signal;
+  for (const auto& [name, known] : named) {
+    if (known.signal != alike) continue;
+    for (const Unit& candidate : known.units) {
+      if (unit == candidate.name) return UnitFactor{candidate.multiply, candidate.divide};
+    }
+  }
+  return std::nullopt;
+}
 
 const SignalMap& known_columns() {
   static const SignalMap map;

@@ -33,7 +33,8 @@ struct SignalWords {
 
 const std::vector<SignalWords>& signal_words() {
   static const std::vector<const char*> axes = {"_x", "_y", "_z"}, four = {"_1", "_2", "_3", "_4"};
-  static const std::vector<UnitGuess> length = {{"m", 1}, {"mm", 1000}}, speed = {{"m/s", 1}, {"mm/s", 1000}};
+  static const std::vector<UnitGuess> length = {{"m", 1}, {"cm", 100}, {"mm", 1000}};
+  static const std::vector<UnitGuess> speed = {{"m/s", 1}, {"cm/s", 100}, {"mm/s", 1000}};
   static const std::vector<SignalWords> all = {
       {kPosition, "position", axes, length, "world"},
       {kVelocity, "velocity", axes, speed, "world"},
@@ -64,8 +65,8 @@ const std::vector<SignalWords>& signal_words() {
        {{"rad", 1}, {"deg", 1 / kDegree_rad}, {"-rad", -1}, {"-deg", -1 / kDegree_rad}},
        nullptr},
       {kRates, "rate", axes, {{"rad/s", 1}, {"mrad/s", 1000}, {"deg/s", 1 / kDegree_rad}}, "body"},
-      {kDuty, "duty", four, {{"1", 1}, {"PWM", 65536}}, nullptr},
-      {kRequested, "requested", four, {{"1", 1}, {"PWM", 65536}}, nullptr},
+      {kDuty, "duty", four, {{"1", 1}, {"%", 100}, {"PWM", 65536}}, nullptr},
+      {kRequested, "requested", four, {{"1", 1}, {"%", 100}, {"PWM", 65536}}, nullptr},
       {kBattery, "battery", {""}, {{"V", 1}, {"mV", 1000}}, nullptr},
       {kTargetPosition, "target_position", axes, length, "world"},
       {kTargetVelocity, "target_velocity", axes, speed, "world"},
@@ -114,7 +115,8 @@ const UnitGuess& unit_of(const SignalWords& words, double slope) {
 /// values.
 double slope_by_name(const Carried& carried, const std::vector<double>& stored) {
   const double largest = std::max(quantile_of(stored, 1), -quantile_of(stored, 0));
-  if (carried.signal == kDuty || carried.signal == kRequested) return largest > 1.5 ? 65536 : 1;
+  if (carried.signal == kDuty || carried.signal == kRequested)
+    return largest > 101 ? 65536 : largest > 1.5 ? 100 : 1;
   if (carried.signal == kBattery) return median(stored) > 500 ? 1000 : 1;
   return carried.divide / carried.multiply;
 }

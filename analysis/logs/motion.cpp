@@ -102,17 +102,45 @@ std::array<std::vector<double>, 3> as_world(const SignalTable& t, int signal, do
   return world;
 }
 
+/// Returns whether the vector has about this norm when gravity is included: vehicles rest and hover most of the time.
+bool is_about(double size, double gravity) { return size > 0.7 * gravity && size < 1.4 * gravity; }
+
+/// Returns whether an accelerometer whose name implies a unit keeps it: its norm is about 1 g in this unit, or no other
+/// unit fits better. Otherwise the columns get their stored values again, with an unknown unit.
+bool keeps_unit(Draft& draft, double size_m_s2) {
+  SignalTable& t = draft.table;
+  for (Carried& carried : draft.recognition.groups) {
+    if (carried.signal != kForceBody) continue;
+    const double factor = carried.multiply / carried.divide;
+    const double stored = size_m_s2 / factor;
+    const bool suits_other = is_about(stored, kGravity_m_s2) || is_about(stored, 1) ||
+                             is_about(stored, 1000) || is_about(stored, 1000 * kGravity_m_s2);
+    if (is_about(size_m_s2, kGravity_m_s2) || !suits_other) return true;
+    for (int k = 0; k < 3; ++k) {
+      for (double& value : t[kForceBody + k]) value /= factor;
+    }
+    carried.unit = "";
+  }
+  return false;
+}
+
 /// The median norm shows the unit and whether gravity is included; the acceleration shows the frame.
 void settle_accelerometer(Draft& draft) {
   const Carried& carried = *draft.recognition.find(kForceBody);
   SignalTable& t = draft.table;
-  if (carried.ask != Ask::kAcceleration || !draft.asks_physics) return;
+  const bool is_open = carried.ask == Ask::kAcceleration || carried.ask == Ask::kGravityUnit;
+  if (!is_open || !draft.asks_physics) return;
   std::vector<double> sizes;
   for (std::size_t i = 0; i < t.size(); ++i) {
     const Vector f = t.three(kForceBody, i);
     sizes.push_back(std::hypot(f[0], f[1], f[2]));
   }
-  const double size = median(sizes);
+  double size = median(sizes);
+  if (carried.ask == Ask::kGravityUnit) {
+    const double factor = carried.multiply / carried.divide;
+    if (keeps_unit(draft, size)) return;
+    size /= factor;
+  }
   struct Unit {
     const char* name;
     double gravity, scale;
@@ -123,7 +151,7 @@ void settle_accelerometer(Draft& draft) {
                         {"mm/s^2", 1000 * kGravity_m_s2, 0.001}};
   const Unit* unit = nullptr;
   for (const Unit& candidate : units) {
-    if (size > 0.7 * candidate.gravity && size < 1.4 * candidate.gravity) unit = &candidate;
+    if (is_about(size, candidate.gravity)) unit = &candidate;
   }
   const bool without_gravity = unit == nullptr;
   double best = std::nan(""), best_scale = 1;

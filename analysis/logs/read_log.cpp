@@ -30,9 +30,10 @@ Format kind_of(std::istream& in) {
   in.seekg(0);
   const std::string start(head, size);
   if (size >= 3 && static_cast<unsigned char>(start[0]) == 0xBC && start[2] == 0) return Format::kUsdEvents;
+  // "Time (s),X (m)" of a CSV is no such list: no name holds a blank, and "s" is no type.
   const std::size_t bracket = start.find('(');
   if (bracket != std::string::npos && bracket >= 2 && bracket + 3 < size && start[bracket + 2] == ')' &&
-      start[bracket + 3] == ',')
+      start[bracket + 3] == ',' && size_of(start[bracket + 1]) > 0 && start[bracket - 1] != ' ')
     return Format::kUsd;
   if (start[0] == '#' && start.find('\0') == std::string::npos)
     return Format::kCsv;  // a comment may have no separator

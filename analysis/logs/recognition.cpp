@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <unordered_map>
 
 #include "nn/base/input_error.h"
@@ -19,41 +20,58 @@ class ColumnIndex {
       const std::string& name = topic.columns[c].name;
       const auto index = static_cast<int>(c);
       exact_.emplace(name, index);
-      for (std::string& called : called_names(plain_name(name))) plain_.emplace(std::move(called), index);
+      const std::string plain = plain_name(name);
+      for (std::string& called : called_names(plain)) plain_.emplace(std::move(called), index);
+      StatedUnit stated = stated_unit(name);
+      if (stated.plain == plain) continue;
+      units_.emplace(index, std::move(stated.unit));
+      for (std::string& called : called_names(stated.plain)) before_unit_.emplace(std::move(called), index);
     }
   }
 
-  /// Returns one index per name; -1 if the topic has no such column. The first column with a name is used.
-  std::vector<int> columns_called(const std::vector<std::string>& names) const {
+  /// Returns one index per name; -1 if the topic has no such column. The first column with a name is used. A column whose
+  /// name continues with a unit is used only if no other has the name, and only with a unit of `signal`.
+  std::vector<int> columns_called(int signal, const std::vector<std::string>& names) const {
     std::vector<int> columns;
     for (const std::string& name : names) {
-      const Names& known = name.find('[') != std::string::npos ? exact_ : plain_;
-      const auto found = known.find(name);
-      columns.push_back(found == known.end() ? -1 : found->second);
+      if (name.find('[') != std::string::npos) {
+        columns.push_back(find(exact_, name));
+        continue;
+      }
+      columns.push_back(find(plain_, name));
+      if (columns.back() >= 0) continue;
+      const int longer = find(before_unit_, name);
+      if (longer >= 0 && unit_factor(signal, units_.at(longer))) columns.back() = longer;
     }
     return columns;
   }
 
  private:
   using Names = std::unordered_map<std::string, int>;
-  Names exact_, plain_;
+
+  static int find(const Names& names, const std::string& name) {
+    const auto found = names.find(name);
+    return found == names.end() ? -1 : found->second;
+  }
+
+  Names exact_, plain_, before_unit_;
+  std::unordered_map<int, std::string> units_;  ///< of the columns of `before_unit_`
 };
 
-/// Handles a length whose column states a smaller unit in brackets, "X (mm)", "vx [cm/s]".
-void take_stated_unit(const RawTopic& topic, Carried& carried) {
-  if ((carried.unit != "m" && carried.unit != "m/s") || carried.multiply != 1 || carried.divide != 1) return;
+/// Applies the unit that the columns state in their names, "X (mm)", "roll_deg", instead of the default unit of the name.
+/// Duties keep theirs, because values called PWM have any scale. Accelerations without a unit are judged by their norm.
+void take_stated_unit(const RawTopic& topic, const NamedColumns& row, Carried& carried) {
+  const bool is_exact = row.names[0].find('[') != std::string::npos;
+  if (is_exact || row.ask == Ask::kMotors || row.ask == Ask::kAcceleration) return;
   for (const int c : carried.columns) {
     if (c < 0) continue;
-    const std::string& name = topic.columns[static_cast<std::size_t>(c)].name;
-    const std::size_t open = name.find_last_of("[("), close = name.find_last_of("])");
-    if (open == std::string::npos || close == std::string::npos || close < open) return;
-    const std::string stated = name.substr(open + 1, close - open - 1);
-    for (const auto& [prefix, parts] : {std::pair<std::string, double>{"m", 1000}, {"c", 100}}) {
-      if (stated != prefix + carried.unit) continue;
-      carried.divide = parts;
-      carried.unit = stated;
-      return;
-    }
+    const StatedUnit stated = stated_unit(topic.columns[static_cast<std::size_t>(c)].name);
+    const std::optional<UnitFactor> factor = unit_factor(carried.signal, stated.unit);
+    if (!factor) return;
+    carried.multiply = factor->multiply;
+    carried.divide = factor->divide;
+    carried.unit = stated.unit;
+    if (carried.ask == Ask::kAngles) carried.ask = Ask::kNothing;
     return;
   }
 }
@@ -127,8 +145,9 @@ void recognise_by_names(const RawLog& log, Recognition& found) {
   for (const NamedColumns& row : column_names()) {
     if (found.find(row.signal) != nullptr) continue;
     for (std::size_t t = 0; t < log.topics.size() && found.find(row.signal) == nullptr; ++t) {
-      Carried carried{row.signal, t,      indices[t].columns_called(row.names), row.unit, row.multiply,
-                      row.divide, row.ask};
+      Carried carried{
+          row.signal, t,      indices[t].columns_called(row.signal, row.names), row.unit, row.multiply,
+          row.divide, row.ask};
       drop_empty_columns(log.topics[t], carried);
       const auto missing = std::count(carried.columns.begin(), carried.columns.end(), -1);
       const auto size = static_cast<std::ptrdiff_t>(carried.columns.size());
@@ -141,7 +160,7 @@ void recognise_by_names(const RawLog& log, Recognition& found) {
                                  (is_quaternion ? ": no unit quaternions" : ": only zeros"));
         continue;
       }
-      take_stated_unit(log.topics[t], carried);
+      take_stated_unit(log.topics[t], row, carried);
       found.groups.push_back(std::move(carried));
     }
   }

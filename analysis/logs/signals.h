@@ -1,6 +1,7 @@
 /// @file Assignment of columns to signals, with units and frames.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,14 @@ struct SignalSource {
 
 /// The user's meaning of the columns. If empty, columns are recognised by name (column_names.h).
 using SignalMap = std::vector<SignalSource>;
+
+/// A stored number times multiply / divide is the signal in its own unit.
+struct UnitFactor {
+  double multiply, divide;
+};
+
+/// Returns the factor of `unit`, spelled as in columns.toml; nothing if `signal` has no such unit.
+std::optional<UnitFactor> unit_factor(int signal, const std::string& unit);
 
 /// Returns the empty map.
 const SignalMap& known_columns();

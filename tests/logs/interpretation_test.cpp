@@ -9,6 +9,7 @@
 #include <fstream>
 #include <functional>
 #include <sstream>
+#include <tuple>
 
 #include "analysis/logs/battery_compensation.h"
 #include "analysis/logs/columns_draft.h"
@@ -109,6 +110,55 @@ TEST(Interpretation, DecidesUnitsAndSignsOfAnglesFromTheLateralAcceleration) {
       EXPECT_FALSE(log.interpretation.empty());
     }
   }
+}
+
+/// The swing with every column in another unit, which its name states as `names` write it.
+logs::Log swing_in_units(const std::string& names, double length, double angle, double force) {
+  std::string text = names + "\n";
+  for (int k = 0; k < 800; ++k) {
+    const Swing s(0.01 * k);
+    text += fmt::format("{:.4f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},0,", s.t, length * s.x, length * s.y,
+                        length, length * s.vx, length * s.vy);
+    text += fmt::format("{:.6f},{:.6f},0,0,0,{:.6f}", angle * s.roll, angle * s.pitch, force * s.load());
+    text += motors(s) + "\n";
+  }
+  std::istringstream in(text);
+  return logs::parse_log(in, "swing.csv");
+}
+
+TEST(Interpretation, TakesUnitsThatNamesState) {
+  const double degree = 180 / kPi;
+  const std::string motors = ",m1,m2,m3,m4,vbat_V";
+  const std::tuple<std::string, double, double, double> cases[] = {
+      {"t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,roll_rad,pitch_rad,yaw_rad,acc_x_mps2,acc_y_mps2,acc_z_mps2", 1,
+       1, 1},
+      {"Time (s),X (mm),Y (mm),Z (mm),VX (mm/s),VY (mm/s),VZ (mm/s),Roll (deg),Pitch (deg),Yaw (deg),"
+       "acc_x (m/s^2),acc_y (m/s^2),acc_z (m/s^2)",
+       1000, degree, 1},
+      {"time_s,pos_x_cm,pos_y_cm,pos_z_cm,vel_x_cmps,vel_y_cmps,vel_z_cmps,roll_deg,pitch_deg,yaw_deg,"
+       "accel_x_g,accel_y_g,accel_z_g",
+       100, degree, 1 / logs::kGravity_m_s2}};
+  for (const auto& [names, length, angle, force] : cases) {
+    SCOPED_TRACE(names);
+    const logs::Log log = swing_in_units(names + motors, length, angle, force);
+    ASSERT_EQ(log.samples.size(), 800u);
+    EXPECT_NEAR(log.samples[100].position_m[2], 1, 1e-6);
+    EXPECT_NEAR(log.samples[100].velocity_m_s[0], Swing(1).vx, 1e-5);
+    EXPECT_LT(axis_error(log), 1e-4);
+    EXPECT_LT(force_error_m_s2(log), 0.01);
+  }
+}
+
+TEST(Interpretation, AnAccelerometerThatIsCalledAsTheFirmwaresIsInTheUnitThatItShows) {
+  const auto flown = [](double force) {
+    return swing(std::string("roll,pitch,yaw,acc_x,acc_y,acc_z") + kMotors, [&](const Swing& s) {
+      return fmt::format("{:.6f},{:.6f},0,0,0,{:.6f}", s.roll, s.pitch, force * s.load()) + motors(s);
+    });
+  };
+  for (const double per_m_s2 : {1.0, 1 / logs::kGravity_m_s2, 1000.0, 1000 / logs::kGravity_m_s2})
+    EXPECT_LT(force_error_m_s2(flown(per_m_s2)), 0.01) << per_m_s2;
+  // 0.3 g is no unit: a fault, which is named and not scaled away.
+  EXPECT_GT(force_error_m_s2(flown(0.3 / logs::kGravity_m_s2)), 5);
 }
 
 TEST(Interpretation, DecidesTheOrderOfAQuaternion) {

@@ -46,6 +46,41 @@ TEST(ColumnNames, OneWordBeforeANameIsPassedOverUnlessItMakesItASetPoint) {
   EXPECT_EQ(logs::called_names("pm.vbat"), (std::vector<std::string>{"pm.vbat"}));
 }
 
+TEST(ColumnNames, AUnitMayStandInBracketsOrBehindTheName) {
+  const auto unit = [](const std::string& column) { return logs::stated_unit(column).unit; };
+  const auto plain = [](const std::string& column) { return logs::stated_unit(column).plain; };
+  EXPECT_EQ(unit("vx (mm/s)"), "mm/s");
+  EXPECT_EQ(unit("Acc Z [m/s^2]"), "m/s^2");
+  EXPECT_EQ(unit("Motor 1 (%)"), "%");
+  EXPECT_EQ(unit("vx_mm_s"), "mm/s");  // not m/s of a signal "vx.m"
+  EXPECT_EQ(plain("vx_mm_s"), "vx");
+  EXPECT_EQ(unit("acc_z_mps2"), "m/s^2");
+  EXPECT_EQ(plain("roll_deg"), "roll");
+  EXPECT_EQ(unit("vbat_mV"), "mV");
+  // A name is no unit, and what is unknown says nothing.
+  for (const char* const column : {"m", "g", "x", "q.w", "pos_x_furlong", "time[ms]"})
+    EXPECT_EQ(unit(column), "") << column;
+}
+
+TEST(ColumnNames, AUnitBehindTheNameCountsOnlyForSignalsOfThatUnit) {
+  const auto recognised = [](const std::vector<std::string>& names) {
+    logs::RawLog log;
+    log.topics.emplace_back();
+    log.topics.back().time_s = {0, 0.01, 0.02};
+    for (const std::string& name : names) log.topics.back().columns.push_back({name, "", {0.5, 0.5, 0.5}});
+    return logs::recognise(log, logs::known_columns());
+  };
+  const logs::Recognition speeds = recognised({"x_mm_s", "y_mm_s", "z_mm_s"});
+  EXPECT_EQ(speeds.find(logs::kPosition), nullptr);
+  const logs::Recognition places = recognised({"x_cm", "y_cm", "z_cm"});
+  ASSERT_NE(places.find(logs::kPosition), nullptr);
+  EXPECT_EQ(places.find(logs::kPosition)->divide, 100);
+  // What has the name without a unit comes first.
+  const logs::Recognition both = recognised({"x_mm", "y_mm", "z_mm", "x", "y", "z"});
+  ASSERT_NE(both.find(logs::kPosition), nullptr);
+  EXPECT_EQ(both.find(logs::kPosition)->columns, (std::vector<int>{3, 4, 5}));
+}
+
 TEST(Formats, EachIsOneLineOfTheListAndOneSource) {
   const std::filesystem::path folder = source_path("analysis/logs/formats");
   std::ifstream in(folder / "formats.cpp");
