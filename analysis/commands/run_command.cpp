@@ -55,7 +55,8 @@ std::string explain(const CLI::App& app, const CLI::ParseError& error, int argc,
   for (const CLI::Option* option : scope->get_options()) {
     for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
   }
-  if (extras == nullptr) {
+  // An option that is missing may be there, misspelled.
+  if (extras == nullptr && dynamic_cast<const CLI::RequiredError*>(&error) == nullptr) {
     const std::string range = explain_range(*scope, error.what());
     return range.empty() ? error.what() : range;
   }

@@ -44,6 +44,7 @@ TEST_F(CommandLine, HelpShowsEveryCommandAndEachHasAnExample) {
 TEST_F(CommandLine, MisspeltCommandsAndOptionsAreUsageErrorsWithASuggestion) {
   expect("certfy x", 2, {"certfy", "did you mean", "certify"});
   expect("certify x --gama 3", 2, {"--gama", "did you mean", "--gamma"});
+  expect("bound --gain g.toml --model m.toml", 2, {"--gain", "did you mean \"--gains\""});
   expect("--hepl", 2, {"--hepl", "did you mean \"--help\""});
   expect("certify x --max-lipschtz=3", 2, {"--max-lipschtz", "--max-lipschitz"});
   expect("", 2, {"name a command", "swarmcert --help"});
