@@ -55,7 +55,7 @@ std::string explain(const CLI::App& app, const CLI::ParseError& error, int argc,
   for (const CLI::Option* option : scope->get_options()) {
     for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
   }
-  // An option that is missing may be there, misspelled.
+  // A required option may be missing because it was misspelled.
   if (extras == nullptr && dynamic_cast<const CLI::RequiredError*>(&error) == nullptr) {
     const std::string range = explain_range(*scope, error.what());
     return range.empty() ? error.what() : range;

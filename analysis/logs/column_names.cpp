@@ -73,7 +73,7 @@ void add_crazyflie(Table& t) {
   t.push_back({kVelocity, axes("stateestimate.v#"), "m/s"});
   // kalman.stateP* is a velocity in the body frame, so for kalman.state* the velocity is derived from the position.
   t.push_back({kForceWorld, axes("stateestimatez.a#"), "mm/s^2", 1, 1000});
-  // acc.x of the firmware is in g; acc_x is what others call it, in any unit.
+  // acc.x of the firmware is in g; other programs use the name acc_x with any unit.
   t.push_back({kForceBody, axes("acc.#"), "g", kGravity_m_s2, 1, Ask::kGravityUnit});
   t.push_back({kAttitude, quaternion("stateestimate.q#"), "1"});
   t.push_back({kPackedAttitude, {"stateestimatez.quat"}, "packed"});
@@ -159,7 +159,7 @@ void add_generic(Table& t) {
   for (const char* group : {"motor.#", "motor#", "m#", "u#", "pwm#", "pwm.#", "duty.#", "thrust.#", "cmd.#",
                             "motor.cmd.#", "motor.cmd#", "motorcmd#"})
     t.push_back({kDuty, rotors(group), "", 1, 1, Ask::kMotors});
-  // Counted from 0.
+  // Motors counted from 0.
   for (const char* group : {"motor.#", "motor#", "m#", "u#", "pwm#", "pwm.#", "duty.#"})
     t.push_back({kDuty, each(group, {"0", "1", "2", "3"}), "", 1, 1, Ask::kMotors});
   for (const char* group : {"rpm#", "rpm.#", "motor.rpm.#", "rotor.speed.#", "motor.speed.#", "omega.m#"})
@@ -239,7 +239,7 @@ StatedUnit stated_unit(const std::string& column) {
     const auto known = spelled.find(plain_name(inside));
     return {known != spelled.end() ? known->second : inside == "%" ? "%" : "", plain};
   }
-  // The longest unit first: "vx.mm.s" is in mm/s. A name is left before it.
+  // The longest unit first: "vx.mm.s" is in mm/s. A name must remain before it.
   for (std::size_t dot = plain.find('.'); dot != std::string::npos; dot = plain.find('.', dot + 1)) {
     const auto known = spelled.find(plain.substr(dot + 1));
     if (known != spelled.end()) return {known->second, plain.substr(0, dot)};

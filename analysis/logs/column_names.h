@@ -15,7 +15,7 @@ namespace swarmcert::logs {
 enum class Ask {
   kNothing,
   kAcceleration,   ///< unit, frame, and whether gravity is in it
-  kGravityUnit,    ///< nothing where it shows 1 g in its unit; else all that kAcceleration asks
+  kGravityUnit,    ///< nothing if its norm is 1 g in its unit; otherwise the same as kAcceleration
   kAngles,         ///< degrees or radians, and the signs
   kLegacyPitch,    ///< nothing open: the second component is minus the rotation about y
   kRates,          ///< degrees or radians per second

@@ -75,7 +75,7 @@ std::map<std::string, NamedSignal> named_signals() {
 
 std::optional<UnitFactor> unit_factor(int signal, const std::string& unit) {
   static const std::map<std::string, NamedSignal> named = named_signals();
-  // Forces in B and accelerations are in the units of forces in W.
+  // Forces in B and accelerations have the same units as forces in W.
   const int alike = signal >= kForceBody && signal < kAttitude ? kForceWorld : signal;
   for (const auto& [name, known] : named) {
     if (known.signal != alike) continue;

@@ -112,7 +112,7 @@ TEST(Interpretation, DecidesUnitsAndSignsOfAnglesFromTheLateralAcceleration) {
   }
 }
 
-/// The swing with every column in another unit, which its name states as `names` write it.
+/// The swing with every column in a different unit, stated in its name in the style of `names`.
 logs::Log swing_in_units(const std::string& names, double length, double angle, double force) {
   std::string text = names + "\n";
   for (int k = 0; k < 800; ++k) {
@@ -157,7 +157,7 @@ TEST(Interpretation, AnAccelerometerThatIsCalledAsTheFirmwaresIsInTheUnitThatItS
   };
   for (const double per_m_s2 : {1.0, 1 / logs::kGravity_m_s2, 1000.0, 1000 / logs::kGravity_m_s2})
     EXPECT_LT(force_error_m_s2(flown(per_m_s2)), 0.01) << per_m_s2;
-  // 0.3 g is no unit: a fault, which is named and not scaled away.
+  // A norm of 0.3 g fits no unit: it is a fault, which must be reported rather than scaled away.
   EXPECT_GT(force_error_m_s2(flown(0.3 / logs::kGravity_m_s2)), 5);
 }
 

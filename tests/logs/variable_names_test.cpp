@@ -57,7 +57,7 @@ TEST(ColumnNames, AUnitMayStandInBracketsOrBehindTheName) {
   EXPECT_EQ(unit("acc_z_mps2"), "m/s^2");
   EXPECT_EQ(plain("roll_deg"), "roll");
   EXPECT_EQ(unit("vbat_mV"), "mV");
-  // A name is no unit, and what is unknown says nothing.
+  // A name alone is not a unit, and unknown units are ignored.
   for (const char* const column : {"m", "g", "x", "q.w", "pos_x_furlong", "time[ms]"})
     EXPECT_EQ(unit(column), "") << column;
 }
@@ -75,7 +75,7 @@ TEST(ColumnNames, AUnitBehindTheNameCountsOnlyForSignalsOfThatUnit) {
   const logs::Recognition places = recognised({"x_cm", "y_cm", "z_cm"});
   ASSERT_NE(places.find(logs::kPosition), nullptr);
   EXPECT_EQ(places.find(logs::kPosition)->divide, 100);
-  // What has the name without a unit comes first.
+  // A column that has the name without a unit takes precedence.
   const logs::Recognition both = recognised({"x_mm", "y_mm", "z_mm", "x", "y", "z"});
   ASSERT_NE(both.find(logs::kPosition), nullptr);
   EXPECT_EQ(both.find(logs::kPosition)->columns, (std::vector<int>{3, 4, 5}));
