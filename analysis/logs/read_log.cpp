@@ -30,7 +30,7 @@ Format kind_of(std::istream& in) {
   in.seekg(0);
   const std::string start(head, size);
   if (size >= 3 && static_cast<unsigned char>(start[0]) == 0xBC && start[2] == 0) return Format::kUsdEvents;
-  // "Time (s),X (m)" of a CSV is no such list: no name holds a blank, and "s" is no type.
+  // "Time (s),X (m)" of a CSV is not such a list: names contain no blanks, and "s" is not a type.
   const std::size_t bracket = start.find('(');
   if (bracket != std::string::npos && bracket >= 2 && bracket + 3 < size && start[bracket + 2] == ')' &&
       start[bracket + 3] == ',' && size_of(start[bracket + 1]) > 0 && start[bracket - 1] != ' ')
