@@ -85,12 +85,21 @@ void ExactSum::add_product(const Enclosed& a, const Enclosed& b) {
 
 Enclosed ExactSum::value() const {
   if (parts_.empty()) return {0, radius_};
-  // Summed in descending order of magnitude, so that the error of each addition, part - (next - sum), is a double.
-  double sum = 0, rest = 0;
-  for (std::size_t i = parts_.size(); i-- > 0;) {
-    const double next = sum + parts_[i];
-    rest += std::fabs(parts_[i] - (next - sum));
+  // Summed in descending order of magnitude up to the first addition that rounds. Its error, part - (next - sum), is a
+  // double. The remaining parts are smaller than that error; they decide the rounding if it is half a unit in the last
+  // place.
+  double sum = 0, error = 0;
+  std::size_t left = parts_.size();
+  while (left > 0 && error == 0) {
+    const double part = parts_[--left], next = sum + part;
+    error = part - (next - sum);
     sum = next;
+  }
+  double rest = std::fabs(error);
+  for (std::size_t i = left; i-- > 0;) rest += std::fabs(parts_[i]);
+  if (left > 0 && (error < 0) == (parts_[left - 1] < 0)) {
+    const double further = sum + 2 * error;
+    if (further - sum == 2 * error) sum = further;
   }
   const double radius = rest > 0 || radius_ > 0 ? (rest + radius_) * kUp + kLeast : 0;
   return {sum, radius};

@@ -23,6 +23,18 @@ TEST(ExactSum, IsExactWhereADoubleHoldsTheSum) {
   EXPECT_LT(sum.value().radius, 0x1p-59);
 }
 
+/// Half a unit in the last place of 1, and a little on one of its sides: 1 alone would be the even one of both.
+TEST(ExactSum, IsRoundedToNearestAlsoWhereTheRestIsHalfAUnitAndALittle) {
+  for (const double sign : {1.0, -1.0})
+    for (const double little : {0x1p-80, 0.0, -0x1p-80, 0x1p-110}) {
+      ExactSum sum;
+      for (const double part : {0x1p-53, 1.0, little}) sum.add({sign * part, 0});
+      EXPECT_EQ(sum.value().value, sign * (little > 0 ? 1 + 0x1p-52 : 1)) << sign << " " << little;
+      EXPECT_GE(sum.value().radius, 0x1p-53 - 0x1p-80);
+      EXPECT_LT(sum.value().radius, 0x1p-52);
+    }
+}
+
 TEST(ExactSum, EnclosesProductsThatUnderflow) {
   ExactSum sum;
   sum.add_product({0x1p-600, 0}, {0x1p-600, 0});
