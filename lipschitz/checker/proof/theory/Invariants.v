@@ -80,7 +80,7 @@ Proof.
   assert (distance (repeat c n) (invariants o x) (invariants o y) <= norm (minus x y)) as D.
   { unfold distance, norm. apply sqrt_le_1_alt. rewrite square_in_alike by (rewrite ?length_minus; lra || congruence).
     pose proof (invariants_contract o x y X Y) as K. cbv zeta in K. fold c in K.
-    apply Steepness.divided; [nra|lra]. }
+    apply divided; [nra|lra]. }
   pose proof (norm_nonneg (minus x y)). unfold f. eapply Rle_trans; [exact B|].
   apply Rle_trans with (real w * norm (minus x y)); [now apply Rmult_le_compat_l|now apply Rmult_le_compat_r].
 Qed.

@@ -44,7 +44,7 @@ Qed.
 (** Slopes by a matrix inequality *)
 (** Part p with each function divided by its b, and the matrix behind it multiplied by that. *)
 Definition scaled_layer (b : list R) (l : layer) : layer := (map (timesR b) (fst l), snd l).
-Definition divided : activation -> list R -> list R :=
+Definition divided_by_number : activation -> list R -> list R :=
   by_number (fun b t => / real (unit_of b) * act b t) (fun t => t).
 Fixpoint scaled_layers (b : list R) (between : list activation) (later : list layer) (last : layer) : real_stack :=
   match later with
@@ -52,7 +52,7 @@ Fixpoint scaled_layers (b : list R) (between : list activation) (later : list la
   | l :: later' =>
       let a := hd Relu between in
       let rest := scaled_layers (reals (units a (fst l))) (tl between) later' last in
-      ((divided a, scaled_layer b l) :: fst rest, snd rest)
+      ((divided_by_number a, scaled_layer b l) :: fst rest, snd rest)
   end.
 Definition stack_of (p : part) : real_stack :=
   match hidden p with
@@ -61,16 +61,16 @@ Definition stack_of (p : part) : real_stack :=
       let a := hd Relu (between p) in
       let rest :=
         scaled_layers (reals (units a (fst first))) (tl (between p)) (map real_layer later) (real_layer (outer p)) in
-      ((divided a, real_layer first) :: fst rest, snd rest)
+      ((divided_by_number a, real_layer first) :: fst rest, snd rest)
   end.
 (** Without division. *)
-Definition whole : activation -> list R -> list R := by_number act (fun t => t).
+Definition whole_by_number : activation -> list R -> list R := by_number act (fun t => t).
 Definition functions_and_layers (between : list activation) (hidden : list layer) :
-    list ((list R -> list R) * layer) := map (fun l => (whole (fst l), snd l)) (following between hidden).
-Lemma whole_activated a y : changes_numbers a = true -> activated a y = whole a y.
+    list ((list R -> list R) * layer) := map (fun l => (whole_by_number (fst l), snd l)) (following between hidden).
+Lemma whole_activated a y : changes_numbers a = true -> activated a y = whole_by_number a y.
 Proof.
   revert y. induction a as [| | | | | | | |s|n a IH]; intros y H; try discriminate; try reflexivity.
-  unfold whole in *. cbn [activated by_number]. now rewrite IH, map_id.
+  unfold whole_by_number in *. cbn [activated by_number]. now rewrite IH, map_id.
 Qed.
 Lemma units_map {A B} (f : A -> B) a l : units a (map f l) = units a l.
 Proof.
@@ -83,13 +83,13 @@ Proof. unfold affine. f_equal. simpl. unfold apply. rewrite map_map. apply map_e
 Lemma times_app u v x y : length u = length x -> timesR (u ++ v) (x ++ y) = timesR u x ++ timesR v y.
 Proof. revert x. induction u as [|a u IH]; intros [|b x]; simpl; try discriminate; auto. intros. rewrite IH; auto. Qed.
 Lemma times_divided {A} a (rows : list A) y : length y = length rows ->
-  timesR (reals (units a rows)) (divided a y) = whole a y.
+  timesR (reals (units a rows)) (divided_by_number a y) = whole_by_number a y.
 Proof.
   assert (forall c (f : R -> R) (rows : list A) y, 0 < real c -> length y = length rows ->
     timesR (reals (map (fun _ => c) rows)) (map (fun t => / real c * f t) y) = map f y) as C.
   { clear. intros c f rows. induction rows as [|r rows IH]; intros [|t y]; simpl; try discriminate; auto.
     intros P L. rewrite IH by auto. f_equal. field. lra. }
-  unfold units, divided, whole.
+  unfold units, divided_by_number, whole_by_number.
   revert rows y. induction a as [| | | | | | | |s|n a IH]; intros rows y L; cbn [by_number];
     try (apply C; auto; apply divided_range_holds).
   rewrite map_app, times_app.
@@ -132,7 +132,7 @@ Proof.
   rewrite E in B. assert (Forall bias_fits (map real_layer later)) as Bl
     by (apply Forall_map, Forall_forall; intros l I; apply B; now right).
   pose proof (scaled_run (reals (units a m)) (tl (between p)) (map real_layer later) (real_layer (outer p))
-    (divided a (affine (fst (real_layer (m, c))) (snd (real_layer (m, c))) y)) Bl) as R.
+    (divided_by_number a (affine (fst (real_layer (m, c))) (snd (real_layer (m, c))) y)) Bl) as R.
   rewrite times_divided in R.
   - symmetry. exact R.
   - rewrite length_affine by (apply B; now left). simpl. apply map_length.
@@ -200,7 +200,7 @@ Proof.
   { intros b l Hl. destruct (F l Hl) as [_ B]. unfold scale_columns. split; simpl in *.
     - rewrite !map_map. apply map_ext. intros r. symmetry. apply (f_times mul Rmult real real_mul).
     - now rewrite B, map_length. }
-  assert (forall a, keeps_length (divided a)) as K by (intros a y; apply length_by_number).
+  assert (forall a, keeps_length (divided_by_number a)) as K by (intros a y; apply length_by_number).
   unfold matrices, stack_of, layers in *. destruct (hidden p) as [|first later]; simpl.
   - split; [constructor|]. apply F. now left.
   - assert (of_matrix (fst first) (real_layer first)) as F1 by (apply F; now left).
@@ -218,7 +218,7 @@ Proof.
     intros b s. destruct (I b s) as [I1 I2]. split; [|exact I2]. constructor; [|exact I1]. split; [exact F1|apply K].
 Qed.
 Lemma divided_increments {A} a (rows : list A) y y' : length y = length rows -> length y' = length rows ->
-  increments_within (map real_range (divided_ranges a rows)) y y' (divided a y) (divided a y').
+  increments_within (map real_range (divided_ranges a rows)) y y' (divided_by_number a y) (divided_by_number a y').
 Proof.
   intros L L'. unfold divided_ranges. rewrite <- (by_number_alike (fun _ => divided_range (base a)) a).
   apply (increments_by_number _ _ _ (fun _ _ => True) (fun _ _ => True)); auto using any_numbers.
@@ -651,7 +651,7 @@ Proof.
   - intros _. apply kept_range_has_one.
 Qed.
 Lemma increments_in a t p q d e : changes_numbers a = true -> Forall2 (follows d) t p -> Forall2 (follows e) t q ->
-  increments_within (map real_range (slopes_known a t)) p q (whole a p) (whole a q).
+  increments_within (map real_range (slopes_known a t)) p q (whole_by_number a p) (whole_by_number a q).
 Proof.
   intros E. apply increments_by_number; [|intros; apply kept_range_has_one].
   intros n y z [[L1 L2] _] [[M1 M2] _]. pose proof (slopes_between_hold (base a) (fst n) E) as S.
@@ -668,7 +668,7 @@ Proof.
   intros D E. revert between s. induction hs as [|k hs IH]; intros between s N L x y X Y; cbn; auto.
   set (a := hd Relu between).
   destruct (entrywise_first between N) as [A' N']. fold a in A'.
-  assert (forall z, activated a z = whole a z) as M by (intros; now apply whole_activated).
+  assert (forall z, activated a z = whole_by_number a z) as M by (intros; now apply whole_activated).
   pose proof (passed_follow radius d (fst k) (snd k) s x D (L k (or_introl eq_refl)) X) as P.
   pose proof (passed_follow radius e (fst k) (snd k) s y E (L k (or_introl eq_refl)) Y) as G.
   split; [now apply (increments_in a _ _ _ d e)|]. apply IH; auto.
