@@ -63,9 +63,15 @@ class ColumnIndex {
 void take_stated_unit(const RawTopic& topic, const NamedColumns& row, Carried& carried) {
   const bool is_exact = row.names[0].find('[') != std::string::npos;
   if (is_exact || row.ask == Ask::kMotors || row.ask == Ask::kAcceleration) return;
-  for (const int c : carried.columns) {
-    if (c < 0) continue;
-    const StatedUnit stated = stated_unit(topic.columns[static_cast<std::size_t>(c)].name);
+  for (std::size_t k = 0; k < carried.size(); ++k) {
+    if (carried.columns[k] < 0) continue;
+    const std::string& name = topic.columns[static_cast<std::size_t>(carried.columns[k])].name;
+    const std::string plain = plain_name(name);
+    const StatedUnit stated = stated_unit(name);
+    // "pwm" of pwm.m1_pwm belongs to the name that the firmware gives.
+    const std::vector<std::string> called = called_names(plain);
+    if (stated.plain != plain && std::find(called.begin(), called.end(), row.names[k]) != called.end())
+      return;
     const std::optional<UnitFactor> factor = unit_factor(carried.signal, stated.unit);
     if (!factor) return;
     carried.multiply = factor->multiply;

@@ -75,6 +75,10 @@ TEST(ColumnNames, AUnitBehindTheNameCountsOnlyForSignalsOfThatUnit) {
   const logs::Recognition places = recognised({"x_cm", "y_cm", "z_cm"});
   ASSERT_NE(places.find(logs::kPosition), nullptr);
   EXPECT_EQ(places.find(logs::kPosition)->divide, 100);
+  // The firmware's own names keep their units, whatever their last word.
+  const logs::Recognition duties = recognised({"pwm.m1_pwm", "pwm.m2_pwm", "pwm.m3_pwm", "pwm.m4_pwm"});
+  ASSERT_NE(duties.find(logs::kDuty), nullptr);
+  EXPECT_EQ(duties.find(logs::kDuty)->unit, "1/65536");
   // A column that has the name without a unit takes precedence.
   const logs::Recognition both = recognised({"x_mm", "y_mm", "z_mm", "x", "y", "z"});
   ASSERT_NE(both.find(logs::kPosition), nullptr);
