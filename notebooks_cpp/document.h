@@ -24,7 +24,8 @@ struct RunCell : Cell {
 /// Notebook format 4.5. A plot is one display_data with SVG, PNG and text; its data stand in its metadata.
 files::Json to_ipynb(const std::vector<RunCell>& cells);
 
-/// Where two notebooks differ, images aside: the first cell with both texts; empty if nowhere. Both must have the images.
+/// Returns the first cell in which two notebooks differ, with both texts; empty if there is none. Images are only
+/// compared by presence.
 std::string first_difference(const files::Json& committed, const files::Json& fresh);
 
 }  // namespace swarmcert::notebook

@@ -5,7 +5,8 @@
 
 namespace swarmcert::notebook {
 
-/// Flies the model in `truth` on random walks, and writes FOLDER/<run>/cf1_00, cf2_00, ... in the published binary format.
+/// Simulates random walks with the model in `truth` and writes FOLDER/<run>/cf1_00, cf2_00, ... in the published binary
+/// format.
 void simulate_flights(const std::string& truth, int vehicles, int runs, double duration_s,
                       const std::string& folder);
 

@@ -29,8 +29,8 @@ class ColumnIndex {
     }
   }
 
-  /// Returns one index per name; -1 if the topic has no such column. The first column with a name is used. A column whose
-  /// name continues with a unit is used only if no other has the name, and only with a unit of `signal`.
+  /// Returns one index per name; -1 if the topic has no such column. The first column with a name is used. A column
+  /// whose name continues with a unit is used only if no other has the name, and only with a unit of `signal`.
   std::vector<int> columns_called(int signal, const std::vector<std::string>& names) const {
     std::vector<int> columns;
     for (const std::string& name : names) {
@@ -58,7 +58,7 @@ class ColumnIndex {
   std::unordered_map<int, std::string> units_;  ///< of the columns of `before_unit_`
 };
 
-/// Applies the unit that the columns state in their names, "X (mm)", "roll_deg", instead of the default unit of the name.
+/// Applies the unit that the columns state in their names, "X (mm)", "roll_deg", instead of the name's default unit.
 /// Duties keep theirs, because values called PWM have any scale. Accelerations without a unit are judged by their norm.
 void take_stated_unit(const RawTopic& topic, const NamedColumns& row, Carried& carried) {
   const bool is_exact = row.names[0].find('[') != std::string::npos;

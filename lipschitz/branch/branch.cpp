@@ -24,9 +24,9 @@ constexpr double kLazy = 0.9;
 /// that depend on s alone stay undecided, because no input reaches them; they do not affect the bound once their
 /// multipliers are large.
 constexpr int kInVain = 6;
-/// Parts that take a step at once, on as many threads as there are: a kPartsPerStep-th of the queue, at most kMostSteps.
-/// Nearly all parts that dominate are halved sooner or later, so taking several costs hardly any boxes, except where the
-/// queue is short. The number does not depend on the threads, so neither does the result.
+/// Number of parts that take a step at the same time: the length of the queue over kPartsPerStep, at most kMostSteps.
+/// Nearly all dominating parts are halved sooner or later, so taking several at once costs hardly any additional boxes
+/// unless the queue is short. The number does not depend on the number of threads, hence neither does the result.
 constexpr std::size_t kPartsPerStep = 8, kMostSteps = 16;
 /// If a search ends with at most this many parts, at most kPolished dominating ones are solved again, with kFineSteps
 /// steps and up to kMostPairs pairs.

@@ -44,7 +44,7 @@ const std::vector<Layer>& layers() {
         "nn/weights"}},
       {"lipschitz/branch",
        {"lipschitz/base", "lipschitz/checker", "lipschitz/solver", "lipschitz/upper", "lipschitz/values",
-        "nn/weights"}},
+        "nn/base", "nn/weights"}},
       {"lipschitz/lower",
        {"lipschitz/base", "lipschitz/checker", "lipschitz/solver", "lipschitz/values", "nn/base",
         "nn/weights"}},

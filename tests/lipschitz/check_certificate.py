@@ -547,7 +547,7 @@ class OnnxTensor:
 
 
 def gelu_from(node, takers, stored):
-    """Returns the nodes of the GELU that starts with `node` (x / sqrt 2, Erf, + 1, times x, times 0.5); [] if there is none."""
+    """Returns the nodes of the GELU that starts with `node`: x / sqrt 2, Erf, + 1, times x, times 0.5; [] if none."""
     def holds(name, wanted, error=0.0):
         return name in stored and len(stored[name].numbers) == 1 and abs(stored[name].numbers[0] - wanted) <= error
 

@@ -486,8 +486,8 @@ def skips_past(certificate, net, folder):
 
 
 def slope_of_invariants(certificate, net, folder):
-    """Checks that all three checkers reject a product of norms without the slope of the invariants, 3/2 for a neighbour,
-    and laws that use such bounds."""
+    """Checks that all three checkers reject a product of norms without the slope of the invariants, 3/2 for a
+    neighbour, and laws that use such bounds."""
     def refused(change):
         changed = json.loads(json.dumps(certificate))
         change(changed)
