@@ -119,7 +119,7 @@ void start_from_any_number(const std::vector<CertifiedBound>& bounds, CertifiedB
 }
 
 /// Replaces the bound for all inputs by a smaller one for the box, if branch and bound finds one.
-/// @param jobs threads for its boxes.
+/// @param jobs number of threads for its boxes.
 void branch_further(const Network& network, const Domain& domain, const CertifyOptions& options,
                     const Stop& stop, int jobs, CertifiedBound& bound) {
   BranchOptions branch = options.branch;
@@ -162,7 +162,7 @@ void branch_all(const Network& network, const CertifyOptions& options, const Sto
     const auto is_due = [&](const CertifiedBound& bound) {
       return is_branched(options, bound) && bound.neighbours.empty() != are_counted;
     };
-    // Threads that no bound of its own keeps busy help with the boxes of another.
+    // Threads without a bound of their own work on the boxes of another bound.
     const auto due = static_cast<int>(std::count_if(bounds.begin(), bounds.end(), is_due));
     const int jobs_per_bound = files::thread_count(options.jobs) / std::max(due, 1);
     files::parallel_for(static_cast<int>(bounds.size()), options.jobs, [&](int i) {

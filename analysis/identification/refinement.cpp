@@ -135,7 +135,7 @@ class Refinement {
       if (!u.is_shape) continue;
       const double at = thetas[u.member][u.index], h = kDifference * u.scale;
       const double lower = std::max(at - h, parameter(u).lower), upper = std::min(at + h, parameter(u).upper);
-      // Not the wider side: with room on both, rounding would choose, and differently on other processors.
+      // The wider side is not used: with room on both sides, round-off would decide, differently on other processors.
       const bool has_room_above = at + h <= parameter(u).upper || upper - at >= at - lower;
       const double neighbour = has_room_above ? upper : lower;
       widths[k] = neighbour - at;

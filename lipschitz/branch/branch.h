@@ -48,7 +48,7 @@ struct BranchOptions {
   /// Spends all time on boxes, for callers that run many searches: the parts that dominate at the end are not solved
   /// more accurately, and no outlook is computed.
   bool boxes_only = false;
-  int jobs = 1;  ///< threads; the result does not depend on their number
+  int jobs = 1;  ///< number of threads; does not affect the result
   const std::atomic<bool>* cancelled = nullptr;
   /// Called periodically with the used share of the nodes or of the time, and the bound so far.
   std::function<void(double share, double bound)> progress;

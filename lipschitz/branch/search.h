@@ -66,7 +66,7 @@ class BranchSearch {
     int undecided_then = 0;             ///< number of undecided neurons when these multipliers were computed
     std::shared_ptr<const OfRho> form;  ///< inherited or own; null if the function is not a set function
     int undecided_form = 0;             ///< number of undecided neurons when that form was computed
-    // Recorded in the node at the next commit().
+    // Moved to the node by record().
     std::vector<check::Decision> decided;
     bool has_new_form = false;
     bool operator<(const Part& other) const { return rho < other.rho; }
@@ -88,24 +88,24 @@ class BranchSearch {
   // branch.cpp. Functions that are const run on several threads at once.
   /// Returns the parts of the given boxes, with multipliers.
   std::vector<Part> roots();
-  /// Takes from the queue the parts of the next steps: those that dominate. Their number depends on the queue only.
+  /// Removes the dominating parts from the queue for the next steps. Their number depends only on the queue.
   std::vector<Part> next_batch(std::priority_queue<Part>& queue) const;
-  /// One step of a part; none if the search is to stop.
+  /// Performs one step on a part; returns it unchanged if the search is to stop.
   Step advanced(Part part) const;
   /// Improves the part's form or multipliers if due. Returns whether it did; the part is then queued by its new rho.
   bool sharpen(Part& part) const;
   /// Records a step in the tree and queues the parts that it leaves.
   void commit(Step step, std::priority_queue<Part>& queue);
-  /// Records what a part has learnt in its node.
+  /// Moves the new decisions and the new form of a part to its node.
   void record(Part& part);
-  /// Counts a new part of the tree and looks at the slope at its centre.
+  /// Counts a new part and evaluates the slope at its centre.
   void count(const Part& part);
-  /// Why the search stops now; kNothingRun if it goes on.
+  /// Returns why the search stops now; kNothingRun if it continues.
   BranchStop why_stop(const std::priority_queue<Part>& queue) const;
-  /// The share of the time limit that has been used; 0 without a limit.
+  /// Returns the share of the time limit that has been used; 0 without a limit.
   double share_of_time() const;
   bool is_cancelled() const { return options_.cancelled != nullptr && *options_.cancelled; }
-  /// The bound that is close enough to what is attained.
+  /// Returns the bound below which the search need not continue: the attained slope plus the tolerance.
   double enough() const;
   /// Returns the result of a search that stopped; empties the queue.
   BranchResult finished(std::priority_queue<Part>& queue);

@@ -1,4 +1,4 @@
-/// Refined shapes and their intervals are properties of the flights, not of the last bits of a sum.
+/// Refined shape parameters and their intervals do not depend on round-off.
 #include "analysis/identification/refinement.h"
 
 #include <gtest/gtest.h>
