@@ -1,6 +1,9 @@
 #include "lipschitz/values/float32_layers.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <optional>
 #include <utility>
 
@@ -16,8 +19,17 @@ using Eigen::VectorXd;
 
 /// A bound, with a wide margin, on the relative rounding of a few operations in double.
 constexpr double kSafe = 0x1p-40;
+/// Half of what floats are apart below the normal ones.
+constexpr double kLeastFloatStep = 0x1p-150;
 /// Below the overflow of float32, with room for what is off.
 constexpr double kLargest = 0x1p126;
+
+bool is_power_of_two(double x) {
+  constexpr std::uint64_t kFraction = 0x000fffffffffffffu;
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &x, sizeof bits);
+  return (bits & kFraction) == 0;
+}
 
 VectorXd side(const std::vector<double>& values) {
   return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
@@ -120,16 +132,34 @@ class PartialSums {
 
 }  // namespace
 
+double half_float_step(double size) {
+  constexpr std::uint64_t kExponent = 0x7ff0000000000000u;
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &size, sizeof bits);
+  bits &= kExponent;
+  double power = 0;
+  std::memcpy(&power, &bits, sizeof power);
+  return std::max(kFloatUnit * power, kLeastFloatStep);
+}
+
 VectorXd layer_rounding(const ReachLayer& layer, const VectorXd& lower, const VectorXd& upper,
                         const AffineForms* forms) {
   PartialSums sums(layer, forms);
-  ArrayXd error = ArrayXd::Zero(layer.bias.size());
+  const Index outputs = layer.bias.size();
+  ArrayXd error = ArrayXd::Zero(outputs);
+  Eigen::Array<bool, Eigen::Dynamic, 1> is_zero = layer.bias.array() == 0 && layer.bias_radius.array() == 0;
   for (Index j = 0; j < lower.size(); ++j) {
     const double largest = std::max(std::abs(lower(j)), std::abs(upper(j)));
     if (largest == 0) continue;
     sums.add(j, lower(j), upper(j));
-    error += kFloatUnit * (layer.weights.col(j).array().abs() * largest) + 0x1p-150;
-    error += kFloatUnit * (sums.largest() + error);
+    const ArrayXd size = sums.largest();
+    for (Index i = 0; i < outputs; ++i) {
+      const double w = layer.weights(i, j);
+      if (w == 0) continue;
+      error(i) += is_power_of_two(w) ? kLeastFloatStep : half_float_step((1 + kSafe) * std::abs(w) * largest);
+      if (!is_zero(i)) error(i) += half_float_step((1 + kSafe) * (size(i) + error(i)));
+      is_zero(i) = false;
+    }
   }
   error *= 1 + sum_rounding(2 * lower.size() + 1);
   for (Index i = 0; i < error.size(); ++i)

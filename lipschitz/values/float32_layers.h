@@ -13,12 +13,17 @@ namespace swarmcert::lipschitz {
 /// Unit round-off u: the relative error of a sum or a product in float32.
 inline constexpr double kFloatUnit = 0x1p-24;
 
+/// Returns an upper bound on |fl(x) - x| for |x| <= size, where fl rounds to the nearest float32: half the distance
+/// between floats just above `size`. It lies between u size / 2 and u size, u = 2^-24; 2^-150 below the normal floats.
+double half_float_step(double size);
+
 /// Returns a bound, entry by entry, on |fl(W h + b) - (W h + b)| in the order of summation of nn/dense_layer.h, for any
 /// float32 h with lower <= h <= upper; infinite if it might overflow.
 ///
-/// The sum starts from b. Each product has an error of at most u |w_j h_j| + 2^-150 and each sum an error of at most u
-/// times its magnitude, u = 2^-24. The magnitude of a partial sum is bounded by the interval of its exact value and by
-/// the errors so far. A product with h_j = 0 and its addition are exact. Fused multiply-adds round less often.
+/// The sum starts from b. Each product and each sum is rounded, with an error of at most half_float_step() of its
+/// magnitude. The magnitude of a partial sum is bounded by the interval of its exact value and by the errors so far. A
+/// product with h_j = 0 and its addition are exact, as are a product with a power of two, apart from underflow, and the
+/// first addition to a bias of 0. Fused multiply-adds round less often.
 /// @param forms affine forms that also enclose h, which give tighter intervals of the partial sums; null: none.
 Eigen::VectorXd layer_rounding(const ReachLayer& layer, const Eigen::VectorXd& lower,
                                const Eigen::VectorXd& upper, const AffineForms* forms = nullptr);

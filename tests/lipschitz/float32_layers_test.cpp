@@ -110,13 +110,26 @@ TEST(LayerRounding, CountsNeitherProductsWithZeroNorTheirAdditions) {
   EXPECT_EQ(bound(sum, zero, one), with_one);
 }
 
+TEST(HalfFloatStep, IsNeverExceededAndAttainedHalfwayBetweenFloats) {
+  Random random(4);
+  for (int sample = 0; sample < 20000; ++sample) {
+    const double x = std::ldexp(random.symmetric(), static_cast<int>(random.below(280)) - 160);
+    const double off = std::abs(static_cast<double>(static_cast<float>(x)) - x);
+    ASSERT_LE(off, lipschitz::half_float_step(std::abs(x))) << x;
+    const auto near = static_cast<float>(std::abs(x));
+    const double next = static_cast<double>(std::nextafter(near, INFINITY)), here = static_cast<double>(near);
+    EXPECT_EQ(lipschitz::half_float_step(here), (next - here) / 2);
+  }
+  EXPECT_EQ(lipschitz::half_float_step(0), 0x1p-150);
+}
+
 /// 1 - 1 + tiny: a bound for any order of summation allows errors relative to 1, a bound for this order does not.
 TEST(LayerRounding, TakesPartialSumsAsTheyAreAdded) {
   const Sum sum{{-1, 0x1p-30f}, 1};
   const VectorXd ones = VectorXd::Ones(2);
-  EXPECT_LE(bound(sum, ones, ones), 1.001 * 0x1p-24);  // from the product 1; the sums are 0 and 2^-30
+  EXPECT_LE(bound(sum, ones, ones), 0x1p-50);  // the products are exact, the sums are 0 and 2^-30
   const Sum other{{0x1p-30f, -1}, 1};
-  EXPECT_GE(bound(other, ones, ones), 1.9 * 0x1p-24);
+  EXPECT_GE(bound(other, ones, ones), 0x1p-24);
   EXPECT_GE(bound(other, ones, ones), other.off({1, 1}));
   EXPECT_GT(other.off({1, 1}), 0);
 }
@@ -125,6 +138,14 @@ TEST(LayerRounding, IsInfiniteWhereFloat32MightOverflow) {
   const Sum sum{{0x1p100f}, 0};
   EXPECT_TRUE(std::isinf(bound(sum, VectorXd::Zero(1), VectorXd::Constant(1, 0x1p27))));
   EXPECT_TRUE(std::isfinite(bound(sum, VectorXd::Zero(1), VectorXd::Constant(1, 0x1p20))));
+}
+
+TEST(LayerRounding, CountsNoProductWithAPowerOfTwoAndNoFirstAdditionToABiasOfZero) {
+  const VectorXd ones = VectorXd::Ones(1);
+  EXPECT_LE(bound({{4}, 0}, -ones, ones), 0x1p-149);
+  EXPECT_GE(bound({{3}, 0}, -ones, ones), 0x1p-23);  // of the product alone, between 2 and 4
+  EXPECT_LE(bound({{3}, 0}, -ones, ones), 1.001 * 0x1p-23);
+  EXPECT_GE(bound({{3}, 2}, -ones, ones), 3 * 0x1p-23);  // and of the sum, between 4 and 8
 }
 
 /// h = (x, x, x, ...) with weights 1, -1, 1, ...: the sums alternate between x and 0, which intervals cannot represent.
@@ -137,8 +158,11 @@ TEST(LayerRounding, KnowsWhatTheTermsOfAPartialSumHaveInCommon) {
                                      VectorXd::Zero(kInputs)};
   const double u = 0x1p-24;
   const double with_forms = lipschitz::layer_rounding(sum.layer(), -ones, ones, &forms)(0);
-  EXPECT_NEAR(with_forms, (kInputs + kInputs / 2) * u, 1e-4 * u);  // all products and every second sum
-  EXPECT_NEAR(bound(sum, -ones, ones), (kInputs + kInputs * (kInputs + 1) / 2) * u, 1e-4 * u);
+  // Products are exact, and so are the first sum and every other one that follows.
+  EXPECT_NEAR(with_forms, (kInputs / 2 - 1) * u, 1e-4 * u);
+  double by_intervals = 0;
+  for (Index j = 2; j <= kInputs; ++j) by_intervals += lipschitz::half_float_step(static_cast<double>(j));
+  EXPECT_GE(bound(sum, -ones, ones), by_intervals);
 }
 
 /// The layers in exact arithmetic, up to the round-off of double, and by the loop of the flight code.
