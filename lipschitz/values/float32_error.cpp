@@ -24,7 +24,9 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using files::Network;
 
-constexpr int kUsualRoundingNodes = 8000;
+constexpr int kUsualRoundingNodes = 16000;
+/// Parts halved between two looks at the queue: fixed, so that the search is the same for any number of threads.
+constexpr std::size_t kErrorPartsAtOnce = 8;
 
 /// All sums here are of numbers that are not negative, with far fewer than 2^20 operations: their rounding in double is
 /// below this relative amount.
@@ -71,13 +73,31 @@ double behind(const ReachNetwork& chain, const Reach& reach, const LayerErrors& 
   return safely(total);
 }
 
-/// The largest value over the box of `cost`, a function of the bounds over a part of it: best first, up to `nodes`
-/// parts, fewer where it is stopped.
+/// How an error is searched over parts of the box.
+struct ErrorPartSearch {
+  int nodes;  ///< parts, at most
+  int jobs;   ///< threads; the result does not depend on them
+  Stop stop;
+};
+
+/// The dimension in which halving the reach's box may change the outputs most; -1: none.
+Index dimension_to_halve(const ReachNetwork& chain, const Reach& reach) {
+  VectorXd gain = reach.influence(Eigen::RowVectorXd::Ones(chain.back().weights.rows()));
+  for (Index k = 0; k < gain.size(); ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    gain(k) *= reach.box().upper[i] - reach.box().lower[i];
+  }
+  Index widest = -1;
+  return gain.maxCoeff(&widest) > 0 ? widest : -1;
+}
+
+/// The largest value over the box of `cost`, a function of the bounds over a part of it: best first, up to as many
+/// parts as `search` says, fewer where it is stopped.
 template <class Cost>
-double largest_over_parts(const ReachNetwork& chain, const Box& box, int nodes, const Stop& stop,
+double largest_over_parts(const ReachNetwork& chain, const Box& box, const ErrorPartSearch& search,
                           const Cost& cost) {
   struct Part {
-    double cost;
+    double cost = 0;
     std::shared_ptr<const Reach> reach;
     bool operator<(const Part& other) const { return cost < other.cost; }
   };
@@ -87,20 +107,27 @@ double largest_over_parts(const ReachNetwork& chain, const Box& box, int nodes, 
   };
   std::priority_queue<Part> queue;
   queue.push(part_of(box, nullptr, kInfinity));
-  for (int done = 1; done + 2 <= nodes && !stop.now(); done += 2) {
-    const Part top = queue.top();
-    const VectorXd slope = top.reach->influence(Eigen::RowVectorXd::Ones(chain.back().weights.rows()));
-    Index widest = -1;
-    double width = 0;
-    for (std::size_t k = 0; k < box.lower.size(); ++k) {
-      const double gain =
-          slope(static_cast<Index>(k)) * (top.reach->box().upper[k] - top.reach->box().lower[k]);
-      if (gain > width) width = gain, widest = static_cast<Index>(k);
+  for (int done = 1; !search.stop.now();) {
+    std::vector<Part> halved;
+    std::vector<Box> pieces;
+    while (!queue.empty() && halved.size() < kErrorPartsAtOnce &&
+           done + 2 * static_cast<int>(halved.size() + 1) <= search.nodes) {
+      const Index widest = dimension_to_halve(chain, *queue.top().reach);
+      if (widest < 0) break;
+      const auto [first, second] = halves(queue.top().reach->box(), widest);
+      pieces.push_back(first);
+      pieces.push_back(second);
+      halved.push_back(queue.top());
+      queue.pop();
     }
-    if (widest < 0) break;
-    queue.pop();
-    const auto [first, second] = halves(top.reach->box(), widest);
-    for (const Box& piece : {first, second}) queue.push(part_of(piece, top.reach.get(), top.cost));
+    if (halved.empty()) break;
+    std::vector<Part> children(pieces.size());
+    files::parallel_for(static_cast<int>(pieces.size()), search.jobs, [&](int index) {
+      const auto i = static_cast<std::size_t>(index);
+      children[i] = part_of(pieces[i], halved[i / 2].reach.get(), halved[i / 2].cost);
+    });
+    for (Part& child : children) queue.push(std::move(child));
+    done += static_cast<int>(pieces.size());
   }
   return queue.top().cost;
 }
@@ -130,8 +157,8 @@ struct TermError {
 class SetError {
  public:
   SetError(const Network& network, const files::FunctionId& function, const Domain& domain, int nodes,
-           const Stop& stop)
-      : names_(function.parts()), parts_(files::parts(network)), domain_(domain), nodes_(nodes), stop_(stop) {
+           int jobs, const Stop& stop)
+      : names_(function.parts()), parts_(files::parts(network)), domain_(domain), search_{nodes, jobs, stop} {
     has_ground_ = names_.size() == 2 && !names_[0].is_ground_phi() &&
                   parts_.count(files::FunctionId::ground_phi()) == 1;
     phi_ = reach_network(*parts_.at(names_[0]));
@@ -155,7 +182,7 @@ class SetError {
   }
 
   double plain() const {
-    return largest_over_parts(phi_, domain_.at(names_[0]), nodes_, stop_, [&](const Reach& reach) {
+    return largest_over_parts(phi_, domain_.at(names_[0]), search_, [&](const Reach& reach) {
       return behind(phi_, reach, layer_errors(phi_, reach, exact_inputs(phi_)), phi_tails_, 1);
     });
   }
@@ -172,8 +199,8 @@ class SetError {
                  const std::vector<double>& tail) const {
     TermError result;
     const Box& box = domain_.at(part);
-    result.values = hull(network, box, nodes_).bounds;
-    result.weighted = largest_over_parts(network, box, nodes_, stop_, [&](const Reach& reach) {
+    result.values = hull(network, box, search_.nodes).bounds;
+    result.weighted = largest_over_parts(network, box, search_, [&](const Reach& reach) {
       return behind(network, reach, layer_errors(network, reach, exact_inputs(network)), tail, rho_bound_);
     });
     result.output = layer_errors(network, Reach(network, box), exact_inputs(network)).total.back();
@@ -220,7 +247,7 @@ class SetError {
     chain.insert(chain.end(), rho_.begin(), rho_.end());
     std::vector<double> tail = phi_tails_;
     tail.insert(tail.end(), rho_tails_.begin(), rho_tails_.end());
-    return largest_over_parts(chain, domain_.at(names_[0]), nodes_, stop_, [&](const Reach& reach) {
+    return largest_over_parts(chain, domain_.at(names_[0]), search_, [&](const Reach& reach) {
       return behind(chain, reach, layer_errors(chain, reach, exact_inputs(chain)), tail, 1);
     });
   }
@@ -228,8 +255,7 @@ class SetError {
   std::vector<files::FunctionId> names_;
   files::Parts parts_;
   const Domain& domain_;
-  int nodes_;
-  Stop stop_;
+  ErrorPartSearch search_;
   bool has_ground_ = false;
   ReachNetwork phi_, rho_;
   std::vector<double> phi_tails_, rho_tails_;
@@ -265,11 +291,13 @@ std::vector<Float32Error> float32_errors(const Network& network, const Domain& d
   }
   const std::vector<files::FunctionId> functions = value_functions(network);
   std::vector<std::vector<Float32Error>> found(functions.size());
-  files::parallel_for(static_cast<int>(functions.size()), options.jobs, [&](int index) {
+  const int jobs = files::thread_count(options.jobs), functions_at_once = static_cast<int>(functions.size());
+  const int jobs_each = std::max(1, jobs / std::max(1, functions_at_once));
+  files::parallel_for(functions_at_once, jobs, [&](int index) {
     const files::FunctionId& function = functions[static_cast<std::size_t>(index)];
     const std::vector<files::FunctionId> names = function.parts();
     const int nodes = options.nodes > 0 ? options.nodes : usual_nodes(network, function, kUsualRoundingNodes);
-    const SetError error(network, function, inflated_domain, nodes, options.stop);
+    const SetError error(network, function, inflated_domain, nodes, jobs_each, options.stop);
     double evaluation = 0;
     for (int n = names.size() == 1 ? 1 : 0; n <= (names.size() == 1 ? 1 : options.neighbours); ++n) {
       evaluation = std::max(evaluation, names.size() == 1 ? error.plain() : error.set(n));

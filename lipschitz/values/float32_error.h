@@ -25,7 +25,7 @@ struct Float32Error {
 struct Float32Options {
   int neighbours = 1;     ///< largest number of neighbours
   double input_step = 0;  ///< inputs are multiples of this, rounded to nearest; 0: only rounded to float32
-  int nodes = 0;          ///< parts of the box per function; 0: 8000, fewer for large networks, at least 600
+  int nodes = 0;          ///< parts of the box per function; 0: 16000, fewer for large networks, at least 600
   int jobs = 0;
   /// Ends the search over parts and the semidefinite programs of the tails; tails then get layer-by-layer bounds.
   Stop stop;
