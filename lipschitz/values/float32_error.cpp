@@ -25,7 +25,7 @@ using Eigen::VectorXd;
 using files::Network;
 
 constexpr int kUsualRoundingNodes = 16000;
-/// Parts halved between two looks at the queue: fixed, so that the search is the same for any number of threads.
+/// Number of parts halved at the same time; fixed, so that the result does not depend on the number of threads.
 constexpr std::size_t kErrorPartsAtOnce = 8;
 
 /// All sums here are of numbers that are not negative, with far fewer than 2^20 operations: their rounding in double is
@@ -73,14 +73,14 @@ double behind(const ReachNetwork& chain, const Reach& reach, const LayerErrors& 
   return safely(total);
 }
 
-/// How an error is searched over parts of the box.
+/// Options of the search for the largest error over parts of the box.
 struct ErrorPartSearch {
   int nodes;  ///< parts, at most
   int jobs;   ///< threads; the result does not depend on them
   Stop stop;
 };
 
-/// The dimension in which halving the reach's box may change the outputs most; -1: none.
+/// Returns the coordinate along which halving the box of the reach may change the outputs most; -1 if there is none.
 Index dimension_to_halve(const ReachNetwork& chain, const Reach& reach) {
   VectorXd gain = reach.influence(Eigen::RowVectorXd::Ones(chain.back().weights.rows()));
   for (Index k = 0; k < gain.size(); ++k) {
@@ -91,8 +91,8 @@ Index dimension_to_halve(const ReachNetwork& chain, const Reach& reach) {
   return gain.maxCoeff(&widest) > 0 ? widest : -1;
 }
 
-/// The largest value over the box of `cost`, a function of the bounds over a part of it: best first, up to as many
-/// parts as `search` says, fewer where it is stopped.
+/// Returns the largest value over the box of `cost`, a function of the bounds over a part of the box, by best-first
+/// search with the number of parts given by `search`, or fewer if it is stopped.
 template <class Cost>
 double largest_over_parts(const ReachNetwork& chain, const Box& box, const ErrorPartSearch& search,
                           const Cost& cost) {

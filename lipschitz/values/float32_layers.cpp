@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 /// A bound, with a wide margin, on the relative rounding of a few operations in double.
 constexpr double kSafe = 0x1p-40;
-/// Half of what floats are apart below the normal ones.
+/// Half the distance between floats below the normal range.
 constexpr double kLeastFloatStep = 0x1p-150;
 /// Below the overflow of float32, with room for what is off.
 constexpr double kLargest = 0x1p126;

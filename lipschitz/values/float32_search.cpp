@@ -16,11 +16,11 @@
 namespace swarmcert::lipschitz {
 namespace {
 
-/// Of one climb: random points, then steps of a cloud of points, then steps of its worst point.
+/// Numbers of evaluations of one local search: random points, then steps of the set of points, then of its worst point.
 constexpr int kRandomErrors = 1000, kCloudSteps = 250, kCloudPoints = 16, kErrorSteps = 10000;
-/// The cloud is so much smaller than the box, binary logarithm: what a step of it changes is not chance.
+/// Binary logarithm of the size of the set of points relative to the box, so that its mean error varies smoothly.
 constexpr double kCloud_log2 = -10;
-/// The shortest steps: about from one float to the next.
+/// Binary logarithm of the shortest steps, about the distance between neighbouring floats.
 constexpr double kShortestErrorStep_log2 = -24;
 
 using Points = std::vector<std::vector<float>>;
@@ -47,7 +47,8 @@ class ErrorSearch {
     }
   }
 
-  /// One climb from a random place; its worst point and about the error there. No points where there is no float32.
+  /// One local search from a random point; returns its worst point and an estimate of the error there; no points if the
+  /// box contains no float32.
   std::pair<double, Points> climb() {
     Points best;
     double worst = -1;
@@ -67,7 +68,7 @@ class ErrorSearch {
     return {worst, best};
   }
 
-  /// In exact arithmetic, rounded down.
+  /// Returns the exact error at a point, rounded down.
   Attained attained(Points points) const {
     Attained result;
     if (points.empty()) return result;
@@ -92,7 +93,7 @@ class ErrorSearch {
     best = std::move(x);
   }
 
-  /// About the root of the mean squared error around x; keeps its worst point.
+  /// Returns an estimate of the root mean square error around x; keeps the worst point.
   double cloud(const Points& x, double& worst, Points& best) {
     double squares = 0;
     for (int i = 0; i < kCloudPoints; ++i) {
@@ -119,7 +120,7 @@ class ErrorSearch {
     return points;
   }
 
-  /// Some coordinates moved by up to `scale` sides of the box.
+  /// Returns x with some coordinates moved by up to `scale` times the sides of the box.
   Points moved(Points points, double scale) {
     const bool is_one = random_.below(3) == 0;  // coordinate
     const std::uint64_t which = random_.below(points.size());
@@ -159,7 +160,7 @@ class ErrorSearch {
     return names_.size() == 1 ? sum : in_double_.at(names_[1])(sum);
   }
 
-  /// As nn/deep_set.h evaluates it: the ground first, then the neighbours in the order of their bits.
+  /// Evaluation as in nn/deep_set.h: first the ground, then the neighbours in the order of their bits.
   std::vector<float> in_float32(const Points& points) const {
     if (names_.size() == 1) return in_float_.at(names_[0])(points[0]);
     std::vector<const std::vector<float>*> order;

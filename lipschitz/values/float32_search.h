@@ -11,16 +11,17 @@
 namespace swarmcert::lipschitz {
 
 struct Float32Search {
-  int starts = 8;  ///< climbs, each of about fifteen thousand evaluations
+  int starts = 8;  ///< number of local searches, each of about fifteen thousand evaluations
   std::uint64_t seed = 1;
 };
 
-/// `value` is |f32(x) - f(x)|_2 at float32 points of the box, in exact arithmetic, rounded down: a lower bound of
-/// Float32Error::evaluation. Empty points where the box holds no float32. Rounding errors are rough: they follow the
-/// sizes of values and slopes over long distances, and chance over short ones. So a climb first moves a cloud of points
-/// to where errors are large, then its worst point by steps of all sizes, down to neighbouring floats.
+/// Returns float32 points of the box and `value` = |f32(x) - f(x)|_2 there, computed exactly and rounded down: a lower
+/// bound on Float32Error::evaluation. The points are empty if the box contains no float32. Round-off errors follow the
+/// magnitudes of values and slopes over long distances, and look random over short ones. A local search therefore first
+/// moves a set of points to a region with large errors, and then its worst point with steps of all sizes, down to
+/// neighbouring floats.
 /// @param function "network" or a set function, with exactly `neighbours` neighbours and the ground's input.
-/// @param domain by part, finite, as it leaves the clamp; NET has no invariants and is stored in float32.
+/// @param domain by part, finite, after the clamp. NET has no invariants and is stored in float32.
 Attained float32_error_found(const files::Network& network, const Domain& domain,
                              const files::FunctionId& function, int neighbours, const Float32Search& search);
 

@@ -1,4 +1,4 @@
-// Where the float32 evaluation is far from the exact function: the error stated is that of the code that flies there.
+// The error found by the search is the error of the flight code at the stated points.
 #include "lipschitz/values/float32_search.h"
 
 #include <gmpxx.h>
@@ -28,7 +28,7 @@ Network set_with_ground(std::mt19937& generator) {
   return network;
 }
 
-/// By nn/deep_set.h; the first of the points is the ground's.
+/// Evaluates with nn/deep_set.h; the first point is the ground's.
 float flown(const Network& network, const std::vector<std::vector<float>>& points) {
   const files::Evaluator<float> phi(network.phi.at("default")), ground(network.phi.at("ground")),
       rho(network.rho.at("default"));
