@@ -67,6 +67,7 @@ Candidate vehicle_offset(const stability::Model& model, const Coverage& coverage
   Candidate result;
   result.name = result.spec.name = "constant_force";
   result.info = stability::effect_info("constant_force");
+  stability::scale_bounds(model.mass_kg, result.info);
   result.thetas = {{}};
   result.vehicles = coverage.vehicles;
   std::vector<stability::Parameter> all;
@@ -175,6 +176,7 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
     result.spec.name = name;
   }
   result.info = info_of(result.spec, model.path);
+  if (!result.spec.is_expression()) stability::scale_bounds(model.mass_kg, result.info);
   result.thetas = stability::make_effect(result.spec, {"", {}, model.path})->grid(coverage.range);
   if (result.info.remembers) {
     // A lag or delay has gain 1. Some tolerance lets a coarse grid of times find it.

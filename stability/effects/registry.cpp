@@ -83,6 +83,20 @@ std::unique_ptr<Effect> make_effect(const EffectSpec& spec, const EffectContext&
   return find(spec.name).make(spec, context);
 }
 
+void scale_bounds(double mass_kg, EffectInfo& info) {
+  constexpr double kStatedFor_kg = 0.067;  // the larger one of the published vehicles
+  const double factor = std::max(1.0, mass_kg / kStatedFor_kg);
+  for (Parameter& coefficient : info.linear) {
+    // "force_x_N", "drag_N_s_m", "stiffness_N_m", "torque_x_Nm"
+    const std::size_t unit = coefficient.name.find("_N");
+    if (unit == std::string::npos) continue;
+    const std::string rest = coefficient.name.substr(unit + 2);
+    if (!rest.empty() && rest[0] != '_' && rest != "m") continue;
+    coefficient.lower *= factor;
+    coefficient.upper *= factor;
+  }
+}
+
 EffectValues effect_values(const EffectInfo& info, const EffectSpec& spec) {
   const auto values = [&spec](const std::vector<Parameter>& parameters) {
     std::vector<double> result;
