@@ -87,7 +87,7 @@ TEST(BoundCommand, FlownGainsAreNotOfTheTheoremsFormAndTheWeakenedIntegratorIsSh
   EXPECT_EQ(result["axes"][2]["written_Ki"], 10);
   EXPECT_EQ(result["exact"].size(), 24u);
   const Outcome text = run_shell("swarmcert bound" + kFlown, folder.path());
-  EXPECT_NE(text.output.find("weakens Ki 5 times"), std::string::npos) << text.output;
+  EXPECT_NE(text.output.find("reduces Ki by a factor of 5"), std::string::npos) << text.output;
 }
 
 TEST(BoundCommand, WhatFloat32CostsIsPartOfTheErrorBudget) {

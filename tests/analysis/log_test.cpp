@@ -266,7 +266,7 @@ TEST(Columns, RefuseWhatTheyDoNotKnow) {
   };
   EXPECT_NE(refusal_of(small_columns(), "position_x", "positon_x").find("did you mean \"position_x\"?"),
             std::string::npos);
-  EXPECT_NE(refusal_of(small_columns(), "\"mm\"", "\"cm\"").find("position_x.unit"), std::string::npos);
+  EXPECT_NE(refusal_of(small_columns(), "\"mm\"", "\"km\"").find("position_x.unit"), std::string::npos);
   EXPECT_NE(refusal_of(small_columns(), "\"world\"", "\"body\"").find("frame"), std::string::npos);
 }
 

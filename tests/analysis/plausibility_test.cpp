@@ -41,10 +41,10 @@ TEST(Plausibility, OptionsInAnotherUnitAreRefusedWithTheOneThatWasMeant) {
   const ScratchFolder folder;
   const std::string bound = "bound --gains " + gains() + " --model " + model() + " --rate 0.3 ";
   expect_refusal(folder, bound + "--battery 3700", 2,
-                 {"--battery", "3700 V lies outside the battery range", "2.5 .. 4.5 V", "3700 mV are 3.7"});
+                 {"--battery", "3700 V lies outside the battery range", "2.5 .. 4.5 V", "3700 mV is 3.7"});
   expect_refusal(folder, bound + "--battery 42", 2, {"--battery", "42 V lies outside the battery range"});
   expect_refusal(folder, bound + "--uncertain battery=3700:4200", 2,
-                 {"--uncertain battery=3700:4200", "3700 mV are 3.7"});
+                 {"--uncertain battery=3700:4200", "3700 mV is 3.7"});
   expect_refusal(folder, bound + "--uncertain battery=3.7:42", 2, {"42 V lies outside"});
   expect_refusal(folder, bound + "--uncertain lag=10:30", 2, {"lag=10:30", "20 ms are 0.02"});
   expect_refusal(folder, bound + "--uncertain delay=0:4", 2, {"delay=0:4", "longer than 1 s"});

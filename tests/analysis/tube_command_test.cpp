@@ -192,8 +192,8 @@ TEST(TubeCommand, ATruthThatFlightsMeasuredKeepsFurtherFlightsInItsTube) {
   EXPECT_LT(measured["interval"][0].get<double>(), 0.9);
   EXPECT_GT(measured["interval"][1].get<double>(), 0.9);
   EXPECT_GT(measured["cells_in_tube"].get<int>(), measured["cells_in_tube_without_flights"].get<int>());
-  EXPECT_NE(outcome.output.find("take the hull of all cells"), std::string::npos);
-  EXPECT_NE(outcome.output.find("rests on: forces are seen as their mean over 0.1 s"), std::string::npos);
+  EXPECT_NE(outcome.output.find("use the hull of all cells"), std::string::npos);
+  EXPECT_NE(outcome.output.find("rests on: forces are means over 0.1 s"), std::string::npos);
   int inside = 0;
   double largest_m = 0;
   for (const std::array<double, 3>& most : fly_swaps(folder, "further", 1001, 30)) {

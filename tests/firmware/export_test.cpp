@@ -294,7 +294,8 @@ TEST_F(Firmware, ANetworkThatIsLargerThanTheFlashIsNotExportedWithoutAWordOfIt) 
     EXPECT_EQ(json["weights_bytes"], bytes);
     EXPECT_EQ(json["fits_crazyflie"], width == 16);
     EXPECT_NE(exported.output.find(std::to_string(bytes) + " bytes of flash"), std::string::npos);
-    EXPECT_EQ(exported.output.find("more than the 1048576 of a Crazyflie") == std::string::npos, width == 16);
+    EXPECT_EQ(exported.output.find("which do not fit into the 1048576 of a Crazyflie") == std::string::npos,
+              width == 16);
     EXPECT_EQ(exported.output.find("fewer --folds") == std::string::npos, width == 16) << exported.output;
   }
 }

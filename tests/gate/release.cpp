@@ -135,7 +135,7 @@ std::string ReleaseFolder::policy(const Tables& change) const {
        "max_joint_gf = 6\nmax_position_gf_m = 6\nmax_velocity_gf_s_m = 6\n"
        "functions = { \"phi:small\" = 30, \"rho:small\" = 40 }"},
       {"spectral_norms", ""},
-      {"float32_error", "max_error_gf = 1e-4"},
+      {"float32_error", "max_error_gf = 6e-5"},
       {"range", "max_abs_force_gf = 100\nmax_jump_gf = 400"},
       {"theorem", ""},
       {"tracking", "amplitude_N = 0.02\nguard_factor = 1.1\nmax_error_m = 0.03"},

@@ -164,24 +164,24 @@ TEST(Model, RefusesNumbersInOtherUnits) {
       "vehicle.torque_per_thrust_m = 6: is more than arm_m");
   const std::string grams = refusal(replaced(kVehicle, "mass_kg = 0.034", "mass_kg = 34"));
   has(grams, "line 4: vehicle.mass_kg = 34: weighs 333.5 N");
-  has(grams, "34 g are 0.034");
+  has(grams, "34 g is 0.034");
   has(refusal(replaced(kVehicle, "mass_kg = 0.034", "mass_kg = 34e-6")), "vehicle.mass_kg = 3.4e-05: weighs");
   has(refusal(replaced(kVehicle, "arm_m = 0.046", "arm_m = 46")), "vehicle.arm_m = 46");
-  has(refusal(replaced(kVehicle, "arm_m = 0.046", "arm_m = 46")), "46 mm are 0.046");
+  has(refusal(replaced(kVehicle, "arm_m = 0.046", "arm_m = 46")), "46 mm is 0.046");
   const std::string newton = refusal(replaced(kVehicle, "c10 = 20.0", "c10 = 0.196"));
   has(newton, "vehicle.thrust: 4 rotors give 0.007691 N");
   has(newton, "gram-force (not newton)");
   has(refusal(replaced(kVehicle, "c10 = 20.0", "c10 = 20.0e-4")), "not percent or counts");
   has(refusal(kVehicle + "[sensor]\nlog_rate_hz = 1e9\n"), "sensor.log_rate_hz = 1e+09: is above 100000 Hz");
   has(refusal(replaced(kVehicle, "[vehicle.thrust]", "battery_range_V = [3000, 4200]\n[vehicle.thrust]")),
-      "4200 mV are 4.2");
+      "4200 mV is 4.2");
 }
 
 TEST(Model, StatesTheRangeOfItsBatteryOrHasThatOfOneCell) {
   const Model one = parse_model(kVehicle, "m.toml");
   EXPECT_EQ(battery_problem(one, 3.7), "");
   EXPECT_NE(battery_problem(one, 42), "");
-  EXPECT_NE(battery_problem(one, 3700).find("3700 mV are 3.7"), std::string::npos);
+  EXPECT_NE(battery_problem(one, 3700).find("3700 mV is 3.7"), std::string::npos);
   EXPECT_NE(battery_problem(one, 0), "");
   const Model three = parse_model(
       replaced(kVehicle, "[vehicle.thrust]", "battery_range_V = [9, 13]\n[vehicle.thrust]"), "m.toml");
