@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <unordered_map>
 
 #include "nn/base/input_error.h"
@@ -58,28 +59,42 @@ class ColumnIndex {
   std::unordered_map<int, std::string> units_;  ///< of the columns of `before_unit_`
 };
 
-/// Applies the unit that the columns state in their names, "X (mm)", "roll_deg", instead of the name's default unit.
-/// Duties keep theirs, because values called PWM have any scale. Accelerations without a unit are judged by their norm.
+/// Returns the unit that the name of column k of `carried` states, "X (mm)", "roll_deg"; empty if it states none in
+/// which the signal can be.
+std::string stated_by_column(const RawTopic& topic, const NamedColumns& row, const Carried& carried,
+                             std::size_t k) {
+  const std::string& name = topic.columns[static_cast<std::size_t>(carried.columns[k])].name;
+  const std::string plain = plain_name(name);
+  const StatedUnit stated = stated_unit(name);
+  // "pwm" of pwm.m1_pwm belongs to the name that the firmware gives.
+  const std::vector<std::string> called = called_names(plain);
+  if (stated.plain != plain && std::find(called.begin(), called.end(), row.names[k]) != called.end())
+    return "";
+  return unit_factor(carried.signal, stated.unit) ? stated.unit : "";
+}
+
+/// Returns whether all columns of a group state the same unit, or none: a group has one factor.
+bool have_one_unit(const RawTopic& topic, const NamedColumns& row, const Carried& carried) {
+  std::set<std::string> units;
+  for (std::size_t k = 0; k < carried.size(); ++k)
+    if (carried.columns[k] >= 0) units.insert(stated_by_column(topic, row, carried, k));
+  return units.size() <= 1;
+}
+
+/// Applies the unit that the columns state in their names instead of the name's default unit. Duties keep theirs,
+/// because values called PWM have any scale. Accelerations without a unit are judged by their norm.
 void take_stated_unit(const RawTopic& topic, const NamedColumns& row, Carried& carried) {
   const bool is_exact = row.names[0].find('[') != std::string::npos;
   if (is_exact || row.ask == Ask::kMotors || row.ask == Ask::kAcceleration) return;
-  for (std::size_t k = 0; k < carried.size(); ++k) {
-    if (carried.columns[k] < 0) continue;
-    const std::string& name = topic.columns[static_cast<std::size_t>(carried.columns[k])].name;
-    const std::string plain = plain_name(name);
-    const StatedUnit stated = stated_unit(name);
-    // "pwm" of pwm.m1_pwm belongs to the name that the firmware gives.
-    const std::vector<std::string> called = called_names(plain);
-    if (stated.plain != plain && std::find(called.begin(), called.end(), row.names[k]) != called.end())
-      return;
-    const std::optional<UnitFactor> factor = unit_factor(carried.signal, stated.unit);
-    if (!factor) return;
-    carried.multiply = factor->multiply;
-    carried.divide = factor->divide;
-    carried.unit = stated.unit;
-    if (carried.ask == Ask::kAngles) carried.ask = Ask::kNothing;
-    return;
-  }
+  std::size_t first = 0;
+  while (carried.columns[first] < 0) ++first;
+  const std::string unit = stated_by_column(topic, row, carried, first);
+  if (unit.empty()) return;
+  const UnitFactor factor = *unit_factor(carried.signal, unit);
+  carried.multiply = factor.multiply;
+  carried.divide = factor.divide;
+  carried.unit = unit;
+  if (carried.ask == Ask::kAngles) carried.ask = Ask::kNothing;
 }
 
 /// Returns false for groups that need all their columns: a vertical velocity alone is useful, half a quaternion is not.
@@ -164,6 +179,10 @@ void recognise_by_names(const RawLog& log, Recognition& found) {
                                             (is_quaternion && !is_unit_quaternion(log.topics[t], carried)))) {
         found.rejected.push_back(names_of(log, carried) +
                                  (is_quaternion ? ": no unit quaternions" : ": only zeros"));
+        continue;
+      }
+      if (!have_one_unit(log.topics[t], row, carried)) {
+        found.rejected.push_back(names_of(log, carried) + ": different units");
         continue;
       }
       take_stated_unit(log.topics[t], row, carried);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "nn/arithmetic.h"
 #include "nn/base/doubles.h"
 
 namespace swarmcert::lipschitz {
@@ -26,9 +27,7 @@ constexpr double kLargest = 0x1p126;
 
 bool is_power_of_two(double x) {
   constexpr std::uint64_t kFraction = 0x000fffffffffffffu;
-  std::uint64_t bits = 0;
-  std::memcpy(&bits, &x, sizeof bits);
-  return (bits & kFraction) == 0;
+  return (nn::bits(x) & kFraction) == 0;
 }
 
 VectorXd side(const std::vector<double>& values) {
@@ -134,9 +133,7 @@ class PartialSums {
 
 double half_float_step(double size) {
   constexpr std::uint64_t kExponent = 0x7ff0000000000000u;
-  std::uint64_t bits = 0;
-  std::memcpy(&bits, &size, sizeof bits);
-  bits &= kExponent;
+  const std::uint64_t bits = nn::bits(size) & kExponent;
   double power = 0;
   std::memcpy(&power, &bits, sizeof power);
   return std::max(kFloatUnit * power, kLeastFloatStep);

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <cstring>
 #include <map>
 #include <utility>
 #include <vector>
 
 #include "lipschitz/base/rounding.h"
 #include "lipschitz/checker/witness.h"
+#include "nn/arithmetic.h"
 #include "nn/base/random.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
@@ -25,12 +24,6 @@ constexpr double kCloud_log2 = -10;
 constexpr double kShortestErrorStep_log2 = -24;
 
 using Points = std::vector<std::vector<float>>;
-
-std::uint32_t float_bits(float x) {
-  std::uint32_t bits = 0;
-  std::memcpy(&bits, &x, sizeof bits);
-  return bits;
-}
 
 class ErrorSearch {
  public:
@@ -174,7 +167,7 @@ class ErrorSearch {
     for (std::size_t j = has_ground_ ? 1 : 0; j < points.size(); ++j) order.push_back(&points[j]);
     std::sort(order.begin(), order.end(), [](const std::vector<float>* a, const std::vector<float>* b) {
       return std::lexicographical_compare(a->begin(), a->end(), b->begin(), b->end(),
-                                          [](float x, float y) { return float_bits(x) < float_bits(y); });
+                                          [](float x, float y) { return nn::bits(x) < nn::bits(y); });
     });
     std::vector<float> sum(static_cast<std::size_t>(parts_.at(names_[1])->inputs()));
     if (has_ground_) sum = in_float_.at(terms_[0])(points[0]);

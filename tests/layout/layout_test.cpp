@@ -40,7 +40,7 @@ const std::vector<Layer>& layers() {
       {"lipschitz/upper",
        {"lipschitz/base", "lipschitz/checker", "lipschitz/solver", "nn/base", "nn/weights"}},
       {"lipschitz/values",
-       {"lipschitz/base", "lipschitz/checker", "lipschitz/solver", "lipschitz/upper", "nn/base",
+       {"lipschitz/base", "lipschitz/checker", "lipschitz/solver", "lipschitz/upper", "nn", "nn/base",
         "nn/weights"}},
       {"lipschitz/branch",
        {"lipschitz/base", "lipschitz/checker", "lipschitz/solver", "lipschitz/upper", "lipschitz/values",

@@ -79,6 +79,14 @@ TEST(ColumnNames, AUnitBehindTheNameCountsOnlyForSignalsOfThatUnit) {
   const logs::Recognition duties = recognised({"pwm.m1_pwm", "pwm.m2_pwm", "pwm.m3_pwm", "pwm.m4_pwm"});
   ASSERT_NE(duties.find(logs::kDuty), nullptr);
   EXPECT_EQ(duties.find(logs::kDuty)->unit, "1/65536");
+  // One factor for all: columns in different units are refused, not scaled by the unit of the first.
+  for (const std::vector<std::string>& mixed :
+       {std::vector<std::string>{"x_m", "y_m", "z_mm"}, {"x", "y", "z_mm"}}) {
+    const logs::Recognition refused = recognised(mixed);
+    EXPECT_EQ(refused.find(logs::kPosition), nullptr) << mixed[1];
+    ASSERT_FALSE(refused.rejected.empty());
+    EXPECT_EQ(refused.rejected[0], mixed[0] + ", " + mixed[1] + ", z_mm: different units");
+  }
   // A column that has the name without a unit takes precedence.
   const logs::Recognition both = recognised({"x_mm", "y_mm", "z_mm", "x", "y", "z"});
   ASSERT_NE(both.find(logs::kPosition), nullptr);

@@ -34,6 +34,6 @@ std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const
 
 /// Adds bars and a table of the errors after each step.
 void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& rows, const std::string& name,
-                       const residuals::ForceUnit& unit);
+                       const residuals::ForceUnit& force);
 
 }  // namespace swarmcert::analysis
