@@ -26,7 +26,7 @@ constexpr double kCentred = 0.3;  ///< Newton decrement below which a point coun
 constexpr double kStepBehind = 0.1;
 /// If the domain is unbounded: distances from the centre at which walks start, and the range of R of their regions, in
 /// units of the median distance of the first stage's kinks.
-constexpr double kNearest = 0.1, kFarthest = 10, kLeastReach = 1, kLargestReach = 1000;
+constexpr double kNearestStart = 0.1, kFarthestStart = 10, kLeastReach = 1, kLargestReach = 1000;
 /// Start distances of walks at geometrically spaced scales, because kinks of later layers may lie anywhere.
 constexpr double kLadderNearest = 1e-3, kLadderFarthest = 1e5;
 /// Largest distance along a ray at which the slope at infinity is evaluated, and the factor between distances.
@@ -153,7 +153,7 @@ void RegionWalk::start_walk() {
   entered_in_vain_ = 0;
   reach_ = random_.log_uniform(kLeastReach, kLargestReach);
   if (!recession_) {
-    queue_.push(steepest_start(kNearest, kFarthest));
+    queue_.push(steepest_start(kNearestStart, kFarthestStart));
   } else if (walks_++ % 2 == 0) {
     queue_.push(start_at_infinity());
   } else {

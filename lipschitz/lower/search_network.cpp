@@ -184,7 +184,8 @@ VectorXd SearchNetwork::value(const std::vector<float>& inputs) const {
       for (Eigen::Index i = 0; i < h.size(); ++i)
         if (!passes[static_cast<std::size_t>(i)]) h[i] = std::max(h[i], 0.0);
     }
-    h = (stage.weights * h + stage.biases).eval();
+    const VectorXd product = stage.weights * h;
+    h = product + stage.biases;
   }
   return h;
 }

@@ -581,16 +581,20 @@ def run():
         nets += [([str(square), *order], ["--activation", "groupsort:3", "--domain", str(folder / "cube.toml")])]
         (folder / "cube.toml").write_text('schema = "swarmcert/box/1"\nlower = [-1, -1, 0]\nupper = [1, 0, 0.5]\n')
         tried = rejected = 0
+        fixed = set()
         for index, (net, options) in enumerate(nets):
             path = folder / f"certificate{index}.json"
-            subprocess.run([SWARMCERT, "certify", *net, *options, "--nodes", "20" if "branch" in options else "1", "-q",
+            subprocess.run([SWARMCERT, "certify", *net, *options, "--nodes", "8" if "branch" in options else "1", "-q",
                             "-o", path],
                            check=True, capture_output=True)
             certificate = second.parse(path.read_text())
             assert first_checker(certificate, net, folder, 0)[0]
             reason = second.check(certificate, second.Network(**arguments(net)))
             assert not reason, f"the second checker rejects a sound certificate: {reason}"
-            check_fixed(certificate, net, folder)
+            fields = (*certificate, *certificate["network"]["weights"], bool(certificate["laws"]))
+            if fields not in fixed:
+                fixed.add(fields)
+                check_fixed(certificate, net, folder)
             if net[0] in (smooth_net, beside_net) or net[0].endswith(".onnx") or "--activation" in options:
                 check_activations(certificate, net, folder)
             if net[0] == invariant_net:
@@ -598,7 +602,7 @@ def run():
             if net[0] == silent_net:
                 check_silent(certificate, net, folder)
             paths = list(leaves(certificate))
-            chosen = [generator.choice(paths) for _ in range(MUTATIONS if index == 1 else MUTATIONS // 5)]
+            chosen = [generator.choice(paths) for _ in range(MUTATIONS if index == 1 else MUTATIONS // 10)]
             changed, longer = zip(*(forged(certificate, p, generator) for p in chosen))
             with ThreadPoolExecutor(2) as pool:
                 first = list(pool.map(lambda i: first_checker(changed[i], net, folder, i), range(len(changed))))

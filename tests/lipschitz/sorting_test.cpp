@@ -26,7 +26,7 @@ files::Weights sorting(files::Weights weights, Activation activation) {
   return weights;
 }
 
-lipschitz::CertifyOptions quick() {
+lipschitz::CertifyOptions few_rounds() {
   lipschitz::CertifyOptions options;
   options.lower.rounds = 1;
   options.jobs = 1;
@@ -60,7 +60,7 @@ TEST(Sorting, BoundsAreTheProductAndAboveEverySampledSlope) {
   for (const Activation activation : kSorting) {
     const Network network =
         tests::plain(sorting(tests::random_network({3, 8, 16, 8, 2}, generator), activation));
-    const auto found = certify(network, quick());
+    const auto found = certify(network, few_rounds());
     ASSERT_EQ(found.bounds.size(), 1U);
     const lipschitz::CertifiedBound& bound = found.bounds.front();
     EXPECT_EQ(bound.method, lipschitz::UpperMethod::kProduct);
@@ -88,7 +88,7 @@ TEST(Sorting, TheProductIsAttainedByOrthogonalLayersAndBelowTheBoundThatReluGive
   const files::Weights weights = tests::weights(
       {tests::layer(2, 2, turned), tests::layer(2, 2, turned), tests::layer(2, 2, {c, s, -s, c})});
   const Network network = tests::plain(sorting(weights, files::group_sort(2)));
-  const auto found = certify(network, quick());
+  const auto found = certify(network, few_rounds());
   EXPECT_NEAR(found.bounds.front().upper.value(), 1, 1e-9);
   EXPECT_NEAR(lipschitz::slope_estimate(network, found.bounds.front(), {}).value(), 1, 1e-6);
   // max(a, b) = b + relu(a - b), min(a, b) = a - relu(a - b), where x = relu(x) - relu(-x).
@@ -97,12 +97,12 @@ TEST(Sorting, TheProductIsAttainedByOrthogonalLayersAndBelowTheBoundThatReluGive
     for (std::size_t j = 0; j < 2; ++j) into.push_back(a * turned[j] + b * turned[2 + j]);
   const files::Weights relu =
       tests::weights({tests::layer(5, 2, into), tests::layer(2, 5, {-1, 1, -1, 0, 0, 1, 0, 0, 1, -1})});
-  EXPECT_GT(certify(tests::plain(relu), quick()).bounds.front().upper.value(), 1.2);
+  EXPECT_GT(certify(tests::plain(relu), few_rounds()).bounds.front().upper.value(), 1.2);
 }
 
 /// Returns the certificate of a network whose file does not state its activation.
 Json certificate_of(const Network& network) {
-  return lipschitz::certificate(network, certify(network, quick()));
+  return lipschitz::certificate(network, certify(network, few_rounds()));
 }
 
 bool accepted(Json certificate, const Network& network) {

@@ -12,7 +12,7 @@
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kPeriod_s = 0.001;
+constexpr double kBankPeriod_s = 0.001;
 constexpr int kVehicles = 5;  ///< enough to share SIMD lanes
 
 Gains bank_gains() {
@@ -56,9 +56,9 @@ void tell(const Told& told, int vehicle, std::uint32_t now_ms, ControllerBank& b
 
 TEST(ControllerBank, AVehicleAmongOthersIsGivenTheCommandsThatItHasAlone) {
   const Swarm swarm(tests::small_vehicle(), kVehicles), one(tests::small_vehicle(), 1);
-  const auto together = make_float_bank(swarm, bank_gains(), kPeriod_s);
+  const auto together = make_float_bank(swarm, bank_gains(), kBankPeriod_s);
   std::vector<std::unique_ptr<ControllerBank>> alone;
-  for (int i = 0; i < kVehicles; ++i) alone.push_back(make_float_bank(one, bank_gains(), kPeriod_s));
+  for (int i = 0; i < kVehicles; ++i) alone.push_back(make_float_bank(one, bank_gains(), kBankPeriod_s));
   Rows rows(lines_for(kVehicles) * kVehicleStateSize), own(kVehicleStateSize);
   std::vector<ControlRecord> records(kVehicles), record(1);
   files::Random random(1);
@@ -86,8 +86,8 @@ TEST(ControllerBank, AVehicleAmongOthersIsGivenTheCommandsThatItHasAlone) {
 
 TEST(ControllerBank, FloatAnswersAsDoubleUpToRounding) {
   const Swarm one(tests::small_vehicle(), 1);
-  const auto in_float = make_float_bank(one, bank_gains(), kPeriod_s);
-  const auto in_double = make_double_bank(one, bank_gains(), kPeriod_s);
+  const auto in_float = make_float_bank(one, bank_gains(), kBankPeriod_s);
+  const auto in_double = make_double_bank(one, bank_gains(), kBankPeriod_s);
   Rows rows(kVehicleStateSize);
   std::vector<ControlRecord> a(1), b(1);
   files::Random random(2);

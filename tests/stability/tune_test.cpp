@@ -10,9 +10,9 @@
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kPeriod_s = 0.002;
+constexpr double kLoopPeriod_s = 0.002;
 
-SampledLoop shipped() { return {{tests::kMass_kg, 10, 5, 10, {0.0575}, 0}, kPeriod_s, kPeriod_s}; }
+SampledLoop shipped() { return {{tests::kMass_kg, 10, 5, 10, {0.0575}, 0}, kLoopPeriod_s, kLoopPeriod_s}; }
 
 TuneOptions options_with(const TuneConstraints& constraints) {
   TuneOptions options;
