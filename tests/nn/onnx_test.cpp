@@ -244,6 +244,22 @@ TEST(Onnx, PiecewiseLinearFunctionsAreTheSameFunctionWithRelu) {
   EXPECT_EQ(prelu({-1.0, -3.0}), (std::vector<double>{-1, 6}));
 }
 
+TEST(Onnx, ASumAddsEveryInputOnceWhereverItsConstantStands) {
+  for (const std::vector<std::string>& inputs :
+       {std::vector<std::string>{"b", "x", "d"}, {"x", "b", "d"}, {"d", "x", "b"}, {"x", "d", "b"}}) {
+    const Weights weights = of_nodes({onnx_node("Gemm", {"x", "w"}, {"d"}), onnx_node("Sum", inputs, {"y"})});
+    ASSERT_EQ(weights.layers.size(), 1u);
+    EXPECT_EQ(weights.layers[0].weights, (std::vector<double>{2, 3, 2, 5}));  // 1 + w'
+    EXPECT_EQ(weights.layers[0].biases, (std::vector<double>{1, -2}));
+  }
+}
+
+TEST(Onnx, NodesWithoutInputsAreRefused) {
+  for (const char* const type :
+       {"Dropout", "BatchNormalization", "Relu", "Add", "Sum", "Concat", "Gemm", "Shape"})
+    EXPECT_TRUE(refuses([&] { of_nodes({onnx_node(type, {}, {"y"})}); }, {"net.onnx: offset ", type}));
+}
+
 TEST(Onnx, ASmallKernelOnALargeImageIsRefusedByItsNode) {
   OnnxModel model;
   model.nodes = {onnx_node("Conv", {"x", "k"}, {"y"}, {onnx_integers("pads", {1, 1, 1, 1})})};

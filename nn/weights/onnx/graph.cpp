@@ -25,7 +25,8 @@ bool is_unread_activation(const std::string& type) {
 }
 
 std::size_t inputs_that_count(const OnnxNode& node) {
-  return node.type == "BatchNormalization" || node.type == "Dropout" ? 1 : node.inputs.size();
+  const bool only_first = node.type == "BatchNormalization" || node.type == "Dropout";
+  return only_first ? std::min<std::size_t>(1, node.inputs.size()) : node.inputs.size();
 }
 
 bool is_part_of_sorting(const std::string& type) {
@@ -300,10 +301,11 @@ OnnxValue OnnxGraph::elementwise(const Node& node) {
   }
   if (node.inputs.size() != 2 && !(node.type == "Sum" && !node.inputs.empty()))
     throw OperatorRefusal{"does not have two inputs"};
-  const bool value_first = is_value(node, 0);
-  OnnxValue result = value(node, value_first ? 0 : 1);
-  for (std::size_t k = 1; k < node.inputs.size(); ++k) {
-    const std::size_t other = value_first ? k : 0;
+  std::size_t base = 0;  // the first value; constants may come before it
+  while (base < node.inputs.size() && !is_value(node, base)) ++base;
+  OnnxValue result = value(node, base);
+  for (std::size_t other = 0; other < node.inputs.size(); ++other) {
+    if (other == base) continue;
     const bool adds = node.type == "Add" || node.type == "Sum" || node.type == "Sub";
     const double sign = node.type == "Sub" ? -1 : 1;
     if (is_value(node, other)) {
@@ -314,12 +316,12 @@ OnnxValue OnnxGraph::elementwise(const Node& node) {
       if (result.name.empty()) result.name = second.name;
       continue;
     }
-    if (node.type == "Div" && !value_first) throw OperatorRefusal{"divides a constant by a value"};
+    if (node.type == "Div" && base > 0) throw OperatorRefusal{"divides a constant by a value"};
     const OnnxTensor& tensor = needed_constant(node, other);
     const std::vector<Enclosed> numbers = broadcast(tensor, result.shape);
     if (adds) {
-      if (!value_first && sign < 0) scale_rows(result.map, {{-1, 0}});
-      shift_rows(result.map, numbers, value_first ? sign : 1);
+      if (base > 0 && sign < 0) scale_rows(result.map, {{-1, 0}});
+      shift_rows(result.map, numbers, base > 0 ? 1 : sign);
     } else if (node.type == "Mul") {
       scale_rows(result.map, numbers);
     } else {
