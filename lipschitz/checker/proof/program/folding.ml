@@ -1,143 +1,188 @@
-(* Graphs with skip connections as chains of layers. Every value is an affine map of the numbers that leave the last
-   layer, each number of it rounded once per operation; an activation makes a layer of its argument, and of what is
-   needed behind it. *)
+(* Graphs of affine maps and activations as chains of layers. Every value is an affine map of the numbers that leave the
+   last layer; an activation makes a layer of its argument, and of what is needed behind it. *)
 
-open Refusal
+open Enclosed
 
-(* Columns in ascending order, without zeros. *)
-type row = (int * float) list
-(* `first`: the weights that are the first ones since the last layer; "": none yet. *)
-type value = { rows : row array; shifts : float array; first : string }
+(* Columns in ascending order, without numbers that are 0 exactly. *)
+type row = (int * Enclosed.t) list
+(* M x + c of x with `inputs` numbers. *)
+type map = { inputs : int; rows : row array; shifts : Enclosed.t array }
 (* The last `kept` outputs of a layer stay as they are. *)
-type layer = { weights : string; map : row array; biases : float array; inputs : int; kept : int }
+type layer = { name : string; map : map; kept : int }
 type t = {
-  path : string;
   mutable layers : layer list;  (* the last one first *)
   mutable activations : Proved.activation list;
   mutable width : int;  (* of what leaves the last layer, or of the input *)
   mutable numbers : int;
-  mutable is_exact : bool;  (* nothing was rounded *)
 }
 
-(* As the C++ reader has it: of all layers together, and of products in one operation. *)
+exception Too_large of string
+
+(* As the C++ reader has it: of all layers together, of one map, and of products in one operation. *)
 let most_numbers = 1 lsl 25
 let most_products = 1 lsl 30
 
-let identity n = Array.init n (fun k -> [ k, 1. ])
-let start path n =
-  { path; layers = []; activations = []; width = n; numbers = 0; is_exact = true },
-  { rows = identity n; shifts = Array.make n 0.; first = "" }
+let start width = { layers = []; activations = []; width; numbers = 0 }
+let size map = Array.length map.rows
+let entries map = Array.fold_left (fun n row -> n + List.length row) 0 map.rows
+let identity n =
+  { inputs = n; rows = Array.init n (fun k -> [ k, one ]); shifts = Array.make n zero }
+let constant inputs shifts = { inputs; rows = Array.map (fun _ -> []) shifts; shifts }
+let is_identity map =
+  let is_unit k = function [ column, x ] -> column = k && is_one x | _ -> false in
+  size map = map.inputs && Array.for_all is_zero map.shifts
+  && Array.for_all Fun.id (Array.mapi is_unit map.rows)
+let is_finite map =
+  Array.for_all (List.for_all (fun (_, x) -> Enclosed.is_finite x)) map.rows
+  && Array.for_all Enclosed.is_finite map.shifts
 
-(* Exact numbers m 2^e, e a machine integer. *)
-let exact x =
-  if x = 0. then Z.zero, 0 else let fraction, e = Float.frexp x in Z.of_float (Float.ldexp fraction 53), e - 53
-let plus (m, e) (n, f) =
-  if Z.sign m = 0 then n, f else if Z.sign n = 0 then m, e
-  else if e <= f then Z.add m (Z.shift_left n (f - e)), e else Z.add (Z.shift_left m (e - f)) n, f
-let times (m, e) (n, f) = Z.mul m n, e + f
-let rounded chain sum =
-  let x = Exact.nearest sum in
-  if not (Float.is_finite x) then bad_input "%s: weights, or what they fold into, are not finite" chain.path;
-  let m, e = exact x in
-  if Z.sign (fst (plus sum (Z.neg m, e))) <> 0 then chain.is_exact <- false;
-  x
-
-(* The sum of these columns and factors, as a row. *)
-let row_of chain terms =
+(* The sum of products, each of them in its column, as a row. *)
+let row_of terms =
   let sums = Hashtbl.create 16 in
-  List.iter (fun (column, factor) ->
-      let before = Option.value (Hashtbl.find_opt sums column) ~default:(Z.zero, 0) in
-      Hashtbl.replace sums column (plus before factor)) terms;
+  List.iter (fun (column, outer, inner) ->
+      let before = Option.value (Hashtbl.find_opt sums column) ~default:empty in
+      Hashtbl.replace sums column (add_product before outer inner)) terms;
   let columns = List.sort compare (Hashtbl.fold (fun column _ found -> column :: found) sums []) in
   List.filter_map (fun column ->
-      let sum = Hashtbl.find sums column in
-      if Z.sign (fst sum) = 0 then None else Some (column, rounded chain sum)) columns
+      let x = value (Hashtbl.find sums column) in if is_zero x then None else Some (column, x)) columns
 
-(* W x + b of a value x; the rows of W with a number for each of x. *)
-let linear chain weights (w : float array array) (b : float array) (x : value) =
-  let sparse row =
-    List.filter (fun (_, factor) -> factor <> 0.) (List.mapi (fun k factor -> k, factor) (Array.to_list row)) in
-  let w = Array.map sparse w in
-  let sizes = Array.map List.length x.rows in
-  let products = Array.fold_left (List.fold_left (fun n (k, _) -> n + sizes.(k))) 0 w in
-  if products > most_products then bad_input "%s: folding these layers takes too long" chain.path;
-  let inner = Array.map (List.map (fun (column, factor) -> column, exact factor)) x.rows in
-  let shifts = Array.map exact x.shifts in
-  let through row =
-    row_of chain (List.concat_map (fun (k, factor) ->
-        let outer = exact factor in
-        List.map (fun (column, factor) -> column, times outer factor) inner.(k)) row) in
-  let shift row bias =
-    rounded chain
-      (List.fold_left (fun sum (k, factor) -> plus sum (times (exact factor) shifts.(k))) (exact bias) row) in
-  { rows = Array.map through w; shifts = Array.map2 shift w b;
-    first = if x.first = "" then weights else x.first }
+(* x -> second (first x). *)
+let composed second first =
+  if is_identity first then second else begin
+    let sizes = Array.map List.length first.rows in
+    let products = Array.fold_left (List.fold_left (fun n (k, _) -> n + sizes.(k))) 0 second.rows in
+    if products > most_products then raise (Too_large "folding these layers takes too long");
+    let row = function
+      | [ k, factor ] when is_one factor -> first.rows.(k)
+      | [ k, factor ] -> List.map (fun (column, x) -> column, times factor x) first.rows.(k)
+      | row -> row_of (List.concat_map (fun (k, outer) ->
+          List.map (fun (column, inner) -> column, outer, inner) first.rows.(k)) row) in
+    let shift own row =
+      value (List.fold_left (fun sum (k, x) -> add_product sum x first.shifts.(k)) (add empty own) row) in
+    let map = { inputs = first.inputs; rows = Array.map row second.rows;
+                shifts = Array.map2 shift second.shifts second.rows } in
+    if entries map > most_numbers then raise (Too_large "the folded layer has more than 2^25 numbers");
+    map
+  end
 
-let negated_row = List.map (fun (column, factor) -> column, -. factor)
-let negated x = { x with rows = Array.map negated_row x.rows; shifts = Array.map Float.neg x.shifts }
-(* Of two values of one size. *)
-let sum chain x y =
-  let terms = List.map (fun (column, factor) -> column, exact factor) in
-  { rows = Array.map2 (fun a b -> row_of chain (terms a @ terms b)) x.rows y.rows;
-    shifts = Array.map2 (fun a b -> rounded chain (plus (exact a) (exact b))) x.shifts y.shifts;
-    first = if x.first = "" then y.first else x.first }
+(* a + b, or a - b, of maps of one size. *)
+let sum ?(minus = false) a b =
+  let signed x = if minus then opposite x else x in
+  let both x y = value (add (add empty x) (signed y)) in
+  let rec merged a b = match a, b with
+    | [], [] -> []
+    | (k, x) :: rest, [] -> entry k (both x zero) (merged rest [])
+    | [], (k, y) :: rest -> entry k (both zero y) (merged [] rest)
+    | (k, x) :: left, (l, y) :: right ->
+      if k < l then entry k (both x zero) (merged left b)
+      else if l < k then entry l (both zero y) (merged a right)
+      else entry k (both x y) (merged left right)
+  and entry k x rest = if is_zero x then rest else (k, x) :: rest in
+  { a with rows = Array.map2 merged a.rows b.rows; shifts = Array.map2 both a.shifts b.shifts }
 
-let append chain weights map biases ~kept =
-  chain.numbers <- chain.numbers + Array.length map * chain.width;
+(* Each row times its factor. *)
+let scaled map factors =
+  let row k row = let factor = factors k in
+    if is_one factor then row else if is_zero factor then []
+    else List.map (fun (column, x) -> column, times factor x) row in
+  let shift k x = let factor = factors k in if is_one factor then x else times factor x in
+  { map with rows = Array.mapi row map.rows; shifts = Array.mapi shift map.shifts }
+let negated map = scaled map (fun _ -> exactly (-1.))
+let divided_by map numbers =
+  { map with rows = Array.mapi (fun k -> List.map (fun (column, x) -> column, divided x numbers.(k))) map.rows;
+             shifts = Array.mapi (fun k x -> divided x numbers.(k)) map.shifts }
+let shifted ?(minus = false) map amounts =
+  let shift k x = value (add (add empty x) (if minus then opposite (amounts k) else amounts k)) in
+  { map with shifts = Array.mapi shift map.shifts }
+
+let stacked = function
+  | [] -> invalid_arg "stacked"
+  | first :: _ as maps ->
+    { first with rows = Array.concat (List.map (fun map -> map.rows) maps);
+                 shifts = Array.concat (List.map (fun map -> map.shifts) maps) }
+(* The rows `which`, in this order. *)
+let selected map which =
+  { map with rows = Array.map (fun k -> map.rows.(k)) which; shifts = Array.map (fun k -> map.shifts.(k)) which }
+
+let append chain name map ~kept =
+  chain.numbers <- chain.numbers + size map * chain.width;
   if chain.numbers > most_numbers then
-    bad_input "%s: the network as a chain of dense layers has more than 2^25 numbers" chain.path;
-  chain.layers <- { weights; map; biases; inputs = chain.width; kept } :: chain.layers;
-  chain.width <- Array.length map
+    raise (Too_large "the network as a chain of dense layers has more than 2^25 numbers");
+  chain.layers <- { name; map = { map with inputs = chain.width }; kept } :: chain.layers;
+  chain.width <- size map
+
+(* The rows of a new layer. Copies of one number, of which rows are made by `shared`, are one. *)
+type taken = { mutable rows_taken : row list; mutable shifts_taken : Enclosed.t list; mutable count : int;
+               copies : (int * Enclosed.t, int) Hashtbl.t }
+let none_taken () = { rows_taken = []; shifts_taken = []; count = 0; copies = Hashtbl.create 16 }
+let shared taken row shift =
+  let add () =
+    taken.rows_taken <- row :: taken.rows_taken;
+    taken.shifts_taken <- shift :: taken.shifts_taken;
+    taken.count <- taken.count + 1;
+    taken.count - 1 in
+  match row with
+  | [ copy ] when is_zero shift ->
+    (match Hashtbl.find_opt taken.copies copy with
+     | Some k -> k
+     | None -> let k = add () in Hashtbl.add taken.copies copy k; k)
+  | _ -> add ()
+let map_of taken inputs =
+  let all found = Array.of_list (List.rev found) in
+  { inputs; rows = all taken.rows_taken; shifts = all taken.shifts_taken }
 
 let is_never_negative chain row shift =
   let is_behind_relu = match chain.activations with a :: _ -> a = Proved.Relu | [] -> row = [] in
-  shift >= 0. && is_behind_relu && List.for_all (fun (_, factor) -> factor > 0.) row
+  is_at_least_0 shift && is_behind_relu && List.for_all (fun (_, x) -> is_at_least_0 x) row
 
-(* A layer of x and what is `needed` behind it, by name; both as maps of what leaves it. Past ReLU those go as
-   relu(y), or relu(y) - relu(-y) where y may be negative; past others as they are. Copies of one number are one. *)
-let activated chain activation (x : value) (needed : (string * value) list) =
-  let is_relu = activation = Proved.Relu in
-  let rows = ref [] and shifts = ref [] and count = ref 0 and copies = Hashtbl.create 16 in
-  let add row shift = rows := row :: !rows; shifts := shift :: !shifts; incr count; !count - 1 in
-  let taken row shift = match row with
-    | [ copy ] when shift = 0. ->
-      (match Hashtbl.find_opt copies copy with
-       | Some k -> k
-       | None -> let k = add row shift in Hashtbl.add copies copy k; k)
-    | _ -> add row shift in
-  let own = Array.map2 (fun row shift -> [ (if is_relu then taken row shift else add row shift), 1. ])
-      x.rows x.shifts in
-  let own_count = !count in
-  let carried row shift =
-    if row = [] then [], shift
-    else
-      let k = taken row shift in
-      let others = if not is_relu || is_never_negative chain row shift then []
-        else [ taken (negated_row row) (-. shift), -1. ] in
-      List.sort compare ((k, 1.) :: others), 0. in
-  let behind = List.map (fun (name, (y : value)) ->
-      let both = Array.map2 carried y.rows y.shifts in
-      name, { rows = Array.map fst both; shifts = Array.map snd both; first = "" }) needed in
-  let of_list found = Array.of_list (List.rev !found) in
-  let kept = if is_relu then 0 else !count - own_count in
-  append chain x.first (of_list rows) (of_list shifts) ~kept;
+(* The maps `carried` past an activation, where `taken` gives a row for one that is no constant. *)
+let carried_past maps taken =
+  let by_column (a, _) (b, _) = compare a b in
+  let row_of row shift = if row = [] then [], shift else List.stable_sort by_column (taken row shift), zero in
+  List.map (fun (map : map) ->
+      let both = Array.map2 row_of map.rows map.shifts in
+      { map with rows = Array.map fst both; shifts = Array.map snd both }) maps
+let behind chain maps = List.map (fun (map : map) -> { map with inputs = chain.width }) maps
+
+(* A layer of relu(x), and what is carried behind it, as maps of what leaves it: y goes as relu(y), or as
+   relu(y) - relu(-y) where it may be negative. *)
+let relu chain name (x : map) carried =
+  let taken = none_taken () in
+  let own = Array.map2 (fun row shift -> [ shared taken row shift, one ]) x.rows x.shifts in
+  let carried = carried_past carried (fun row shift ->
+      let k = shared taken row shift in
+      if is_never_negative chain row shift then [ k, one ]
+      else
+        let opposite_row = List.map (fun (column, y) -> column, opposite y) row in
+        [ k, one; shared taken opposite_row (opposite shift), exactly (-1.) ]) in
+  append chain name (map_of taken chain.width) ~kept:0;
+  chain.activations <- Proved.Relu :: chain.activations;
+  { inputs = chain.width; rows = own; shifts = Array.map (fun _ -> zero) own }, behind chain carried
+
+(* The same with another activation, past which what is carried goes as it is. *)
+let activated chain activation name (x : map) carried =
+  let own = size x and taken = none_taken () in
+  let carried = carried_past carried (fun row shift -> [ own + shared taken row shift, one ]) in
+  append chain name (stacked [ x; map_of taken x.inputs ]) ~kept:taken.count;
   chain.activations <- activation :: chain.activations;
-  { rows = own; shifts = Array.map (fun _ -> 0.) x.shifts; first = "" }, behind
+  { (identity own) with inputs = chain.width }, behind chain carried
 
 (* The layers, with what is between them; the last one gives `output`. *)
-let finished chain (output : value) =
-  append chain output.first output.rows output.shifts ~kept:0;
+let finished chain name output =
+  append chain name output ~kept:0;
   let layers = List.rev chain.layers in
   let between = List.map2 (fun layer activation ->
-      if layer.kept = 0 then activation else Proved.Keeping (Array.length layer.map - layer.kept, activation))
+      if layer.kept = 0 then activation else Proved.Keeping (size layer.map - layer.kept, activation))
       (List.filteri (fun k _ -> k < List.length layers - 1) layers) (List.rev chain.activations) in
   layers, between
 
-let dense (layer : layer) () =
-  let numbers = Array.make (Array.length layer.map * layer.inputs) 0. in
-  Array.iteri (fun i row -> List.iter (fun (j, factor) -> numbers.(i * layer.inputs + j) <- factor) row) layer.map;
+let weights_of (layer : layer) =
+  let columns = layer.map.inputs in
+  let numbers = Array.make (size layer.map * columns) 0. in
+  Array.iteri (fun i row -> List.iter (fun (j, x) -> numbers.(i * columns + j) <- x.value) row) layer.map.rows;
   numbers
-(* Whether every number of a layer is a float32. *)
+let biases_of (layer : layer) = Array.map (fun x -> x.value) layer.map.shifts
+(* Whether every number of a layer is exactly a float32. *)
 let holds_float32 (layer : layer) =
-  let is_float x = let y = Exact.float32 x in Float.is_finite y && y = x in
-  Array.for_all (List.for_all (fun (_, factor) -> is_float factor)) layer.map && Array.for_all is_float layer.biases
+  let is_float x = let y = Exact.float32 x.value in x.radius = 0. && Float.is_finite y && y = x.value in
+  Array.for_all (List.for_all (fun (_, x) -> is_float x)) layer.map.rows && Array.for_all is_float layer.map.shifts

@@ -28,7 +28,7 @@ let load_bytes path bytes ~key ~order =
     if key <> "" then bad_input "%s: safetensors files are not nested: leave --key out" path;
     Safetensors.read path bytes ~order
   end
-  else if Onnx.looks_like bytes then begin
+  else if Onnx_model.looks_like bytes then begin
     if key <> "" then bad_input "%s: ONNX files are not nested: leave --key out" path;
     Onnx.read path bytes ~order
   end

@@ -1,489 +1,438 @@
-(* ONNX models that are a chain of linear layers with an activation behind each, the last one possibly not, MaxMin and
-   GroupSort as exporters write them, in several nodes; and graphs of such layers with skip connections. *)
+(* ONNX models as chains of layers: every value of the graph is followed as an affine map of what leaves the last layer,
+   and piecewise linear functions are written with ReLU. *)
 
 open Refusal
+open Enclosed
+open Onnx_model
+module Operators = Onnx_operators
 
-type stored = { name : string; shape : int list; kind : int; raw : string; integers : int list }
-type attribute = { number : float option; word : string; tensor : stored option; listed : int list }
-(* `parts`: the nodes that this one stands for. *)
-type node = { op : string; inputs : string list; outputs : string list; attributes : (string * attribute) list;
-              parts : node list }
-(* Column k of the weights takes number `order.(k)` of the layer before; no order: number k. *)
-type affine = { weight : stored; transposed : bool; order : int array option; mutable bias : stored option }
-
-(* Field 1, the IR version, and the tag of another field of a model. *)
-let looks_like bytes =
-  String.length bytes >= 3 && bytes.[0] = '\x08' && bytes.[1] >= '\001' && bytes.[1] <= '\031'
-  && String.contains "\x12\x1a\x22\x28\x32\x3a\x42" bytes.[2]
-
-let all number fields = List.filter_map (fun (n, value) -> if n = number then Some value else None) fields
-let texts path number fields = List.map (Protobuf.bytes path) (all number fields)
-(* The last one counts, as in every protobuf reader. *)
-let text path number fields = match List.rev (texts path number fields) with t :: _ -> t | [] -> ""
-let integer path number fields = match List.rev (all number fields) with
-  | Protobuf.Number n :: _ -> Int64.to_int n | [] -> 0 | _ -> bad_input "%s: a number of another type" path
-
-(* min_int where a number is beyond the range of sizes. *)
-let small n = if Int64.compare n (-0x7FFFFFFFL) > 0 && Int64.compare n 0x7FFFFFFFL < 0 then Int64.to_int n else min_int
-
-let int64s path fields =
-  let of_raw raw = List.init (String.length raw / 8) (fun k -> small (String.get_int64_le raw (8 * k))) in
-  List.concat_map (fun (number, value) -> match number, value with
-      | 7, value -> List.map small (Protobuf.integers path value)
-      | 9, Protobuf.Bytes raw -> of_raw raw
-      | _ -> []) fields
-
-let tensor path message =
-  let fields = Protobuf.fields path message in
-  let name = text path 8 fields and kind = integer path 2 fields in
-  let size n = if Int64.compare n 0L < 0 || Int64.compare n 0x7FFFFFFFL > 0 then
-      bad_input "%s: %s has an impossible shape" path (shown name) else Int64.to_int n in
-  let shape = List.map size (List.concat_map (Protobuf.integers path) (all 1 fields)) in
-  if all 13 fields <> [] || integer path 14 fields <> 0 then bad_input
-      "%s: %s: its numbers lie in another file" path (shown name);
-  let data = List.filter (fun (n, _) -> n = 4 || n = 9 || n = 10) fields in
-  let width = match kind with 1 -> 4 | 11 -> 8 | _ -> 0 in
-  let raw = match data with
-    | [ (n, Protobuf.Bytes raw) ] when n = 9 || n = (if kind = 1 then 4 else 10) -> raw
-    | _ when width = 0 -> ""
-    | [] -> ""
-    | _ -> bad_input "%s: %s: its numbers are not in one piece" path (shown name) in
-  let count = List.fold_left (fun product n -> if n > 0 && product > Weights.most_numbers / n then
-      bad_input "%s: %s is too large" path (shown name) else product * n) 1 shape in
-  if width > 0 && String.length raw <> count * width then bad_input
-      "%s: %s holds another number of numbers than its shape" path (shown name);
-  { name; shape; kind; raw; integers = if kind = 7 then int64s path fields else [] }
-
-let attribute path message =
-  let fields = Protobuf.fields path message in
-  let number = match all 2 fields, all 3 fields with
-    | Protobuf.Fixed four :: _, _ when String.length four = 4 -> Some (Int32.float_of_bits (String.get_int32_le four 0))
-    | _, Protobuf.Number n :: _ -> Some (Int64.to_float n)
-    | _ -> None in
-  let tensor = match texts path 5 fields with t :: _ -> Some (tensor path t) | [] -> None in
-  let listed = List.concat_map (Protobuf.integers path) (all 8 fields) in
-  text path 1 fields, { number; word = text path 4 fields; tensor; listed = List.map small listed }
-
-let node path message =
-  let fields = Protobuf.fields path message in
-  let domain = text path 7 fields in
-  if domain <> "" && domain <> "ai.onnx" then bad_input "%s: a node is of an operator set that cannot be read" path;
-  match texts path 2 fields with
-  | [] -> bad_input "%s: a node has no output" path
-  | outputs -> { op = text path 4 fields; inputs = texts path 1 fields; outputs;
-                 attributes = List.map (attribute path) (texts path 5 fields); parts = [] }
-
-let refuse_node path node what = bad_input "%s: node %s: %s" path (shown node.op) what
-let output node = List.hd node.outputs
-let integer_of node name otherwise = match List.assoc_opt name node.attributes with
-  | Some { number = Some x; _ } -> if Float.abs x < 0x1p31 then int_of_float x else min_int
-  | Some _ -> 0
-  | None -> otherwise
-
-type state = {
-  mutable layers : affine list;
-  mutable is_activated : bool;
-  mutable activations : Proved.activation list;  (* the last one first *)
-  mutable shape : int list;  (* of the value; the last size is 0 where the file leaves that of the input open *)
-  mutable order : int array option;  (* in which the next layer takes what is sorted, where it is another *)
+(* `first`: the weights that are the first ones since the last layer; "": none yet. *)
+type value = { map : Folding.map; shape : int list; first : string }
+type graph = {
+  model : Onnx_model.t;
+  chain : Folding.t;
+  values : (string, value) Hashtbl.t;  (* that later nodes take *)
+  uses : (string, int) Hashtbl.t;  (* by later nodes *)
+  names : (string, unit) Hashtbl.t;  (* of layers *)
 }
 
-let size shape = List.fold_left ( * ) 1 shape
-let last shape = List.nth shape (List.length shape - 1)
-let rec but_last = function [] | [ _ ] -> [] | x :: rest -> x :: but_last rest
-(* Whether the whole value lies along this axis. *)
-let is_last_axis axis shape = (axis = -1 || axis = List.length shape - 1) && size (but_last shape) = 1
+let operators =
+  "is none of the operators that are read: Gemm, MatMul, Conv, BatchNormalization, AveragePool, MaxPool, Add, Sub, \
+   Mul, Div, Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, Tanh, Sigmoid, Softplus, Elu, Gelu, TopK, \
+   Split with Max and Min for MaxMin, Flatten, Reshape, Transpose, Concat and the like"
 
-(* Only with the parameters that the activations have here. Selu has float32 constants, with which it is 3e-9 steeper
-   than with the decimals of the statement: another function. *)
-let activation_of node =
-  let is name expected = match List.assoc_opt name node.attributes with
-    | None -> true | Some { number; _ } -> number = Some expected in
-  let is_exact = match List.assoc_opt "approximate" node.attributes with
-    | None -> true | Some { word; _ } -> word = "none" in
-  match node.op with
-  | "Relu" -> Some Proved.Relu
-  | "Tanh" -> Some Tanh
-  | "Sigmoid" -> Some Sigmoid
-  | "Softplus" -> Some Softplus
-  | "Elu" | "Celu" when is "alpha" 1. -> Some Elu
-  | "Swish" when is "alpha" 1. -> Some Silu
-  | "Gelu" when is_exact -> Some Gelu
-  | _ -> None
-
-(* Exporters write SiLU as the product of x and Sigmoid(x), GELU as x (1 + Erf(x / sqrt 2)) 0.5, MaxMin as Split, Max,
-   Min and Concat of halves, or as ReduceMax, ReduceMin and Concat of pairs. Each group becomes one node. What else
-   takes a value from inside of it takes one that is not known any more, and is refused. *)
-let joined op first last parts =
-  { op; inputs = [ List.hd first.inputs ]; outputs = last.outputs; attributes = []; parts }
-(* Whether a stored number, and the only one of its tensor, is off `wanted` by `error` at most. *)
-let holds kept name wanted error = match Hashtbl.find_opt kept name with
-  | Some { shape; kind = (1 | 11) as kind; raw; _ } when size shape = 1 ->
-    Float.abs (Weights.number_at (if kind = 1 then "float32" else "float64") raw 0 0 -. wanted) <= error
-  | _ -> false
-(* SiLU and GELU, whose nodes need not follow one another beside skip connections. The last one of a group takes its
-   place. *)
-let with_smooth kept nodes =
-  let ( let* ) = Option.bind in
-  let writers = Hashtbl.create 64 and takers = Hashtbl.create 64 in
-  List.iter (fun node ->
-      List.iter (fun name -> Hashtbl.replace writers name node) node.outputs;
-      List.iter (fun name -> Hashtbl.add takers name ()) node.inputs) nodes;
-  (* The node that computes a value which one other node takes, and once. *)
-  let inner op name = match Hashtbl.find_opt writers name with
-    | Some node when node.op = op && List.length (Hashtbl.find_all takers name) = 1 -> Some node
-    | _ -> None in
-  let some op node found = match node with
-    | { inputs = [ a; b ]; outputs = [ _ ]; _ } when node.op = op -> List.find_map found [ a, b; b, a ]
-    | _ -> None in
-  let when_ condition result = if condition then Some result else None in
-  let silu last = some "Mul" last (fun (s, x) ->
-      let* sigmoid = inner "Sigmoid" s in
-      when_ (sigmoid.inputs = [ x ]) ("Swish", sigmoid, [ s ])) in
-  let gelu last = some "Mul" last (fun (p, half) ->
-      let* product = when_ (holds kept half 0.5 0.) p in
-      let* product = inner "Mul" product in
-      some "Mul" product (fun (q, x) ->
-          let* sum = inner "Add" q in
-          some "Add" sum (fun (r, one) ->
-              let* erf = when_ (holds kept one 1. 0.) r in
-              let* erf = inner "Erf" erf in
-              match erf.inputs with
-              | [ from ] ->
-                let* quotient = inner "Div" from in
-                (match quotient.inputs with
-                 | [ divided; root ] when divided = x && holds kept root (sqrt 2.) 1e-7 ->
-                   Some ("Gelu", quotient, [ p; q; r; from ])
-                 | _ -> None)
-              | _ -> None))) in
-  let group node = match silu node with Some group -> Some group | None -> gelu node in
-  let inside = Hashtbl.create 16 in
-  List.iter (fun node ->
-      let forget (_, _, names) = List.iter (fun name -> Hashtbl.replace inside name ()) names in
-      Option.iter forget (group node)) nodes;
-  List.filter_map (fun node ->
-      if List.exists (Hashtbl.mem inside) node.outputs then None else match group node with
-        | Some (op, first, _) -> Some (joined op first node [])
-        | None -> Some node) nodes
-let take a b c d = (a = c && b = d) || (a = d && b = c)
-let rec with_sorting nodes =
-  let joined op first last parts rest = joined op first last parts :: with_sorting rest in
-  match nodes with
-  | ({ op = "Split"; inputs = _ :: _; outputs = [ p; q ]; _ } as split)
-    :: { op = one; inputs = [ a; b ]; outputs = [ c ]; _ } :: { op = two; inputs = [ a'; b' ]; outputs = [ d ]; _ }
-    :: ({ op = "Concat"; inputs = [ e; f ]; outputs = [ _ ]; _ } as concat) :: rest
-    when p <> q && take a b p q && take a' b' p q
-         && ((one = "Max" && two = "Min" && e = c && f = d) || (one = "Min" && two = "Max" && e = d && f = c)) ->
-    joined "MaxMin" split concat [ split; concat ] rest
-  | ({ op = one; inputs = r :: _; outputs = [ c ]; _ } as first)
-    :: ({ op = two; inputs = r' :: _; outputs = [ d ]; _ } as second)
-    :: ({ op = "Concat"; inputs = [ e; f ]; outputs = [ _ ]; _ } as concat) :: rest
-    when r = r' && ((one = "ReduceMax" && two = "ReduceMin" && e = c && f = d)
-                    || (one = "ReduceMin" && two = "ReduceMax" && e = d && f = c)) ->
-    joined "PairsMaxMin" first concat [ first; second; concat ] rest
-  | node :: rest -> node :: with_sorting rest
-  | [] -> []
-let with_groups_joined kept nodes = with_sorting (with_smooth kept nodes)
-
-(* "Reshape" and "Flatten": the sizes of the same numbers. *)
-let reshaped path stored shape node =
-  let refuse what = refuse_node path node what in
-  if last shape = 0 then refuse "reshapes what has no known shape";
-  let count = size shape in
-  let sizes = match node.op, node.inputs with
-    | "Flatten", _ ->
-      let axis = integer_of node "axis" 1 and rank = List.length shape in
-      let axis = if axis < 0 then axis + rank else axis in
-      if axis < 0 || axis > rank then refuse "flattens at no axis";
-      let front = size (List.filteri (fun k _ -> k < axis) shape) in
-      [ front; count / front ]
-    | _, [ _; sizes ] when integer_of node "allowzero" 0 = 0 ->
-      let kept k n = if n <> 0 then n else match List.nth_opt shape k with
-          | Some n -> n | None -> refuse "reshapes to a size that is not there" in
-      let sizes = List.mapi kept (stored sizes).integers in
-      let known = List.fold_left (fun product n -> if n = -1 then product else
-                                     if n < 1 || product > Weights.most_numbers / n
-                                     then refuse "reshapes to another size" else product * n) 1 sizes in
-      (match List.filter (( = ) (-1)) sizes with
-       | [] -> sizes
-       | [ _ ] -> List.map (fun n -> if n = -1 then count / known else n) sizes
-       | _ -> refuse "leaves two sizes open")
-    | _ -> refuse "reshapes to a size of 0" in
-  if sizes = [] || size sizes <> count then refuse "reshapes to another size";
-  sizes
-
-(* What a node that sorts a layer is, the shape of its result, and the order of its numbers where it is another. *)
-let sorting path stored shape node =
-  let refuse what = refuse_node path node what in
-  let integers node k name = match List.assoc_opt name node.attributes, List.nth_opt node.inputs k with
-    | Some { listed; _ }, _ -> listed
-    | None, Some input when input <> "" -> (stored input).integers
-    | None, _ -> [] in
-  let n = last shape and rank = List.length shape in
-  match node.op, node.parts with
-  | "MaxMin", [ split; concat ] ->
-    if not (is_last_axis (integer_of split "axis" 0) shape && is_last_axis (integer_of concat "axis" 0) shape)
-    || n mod 2 <> 0 || not (List.mem (integers split 1 "split") [ []; [ n / 2; n / 2 ] ])
-    then refuse "is no MaxMin of halves";
-    Proved.Halves, shape, None
-  | "PairsMaxMin", [ first; second; concat ] ->
-    let of_pairs node = integer_of node "keepdims" 1 = 0
-                        && List.mem (integers node 1 "axes") [ [ -1 ]; [ rank - 1 ] ] in
-    if not (rank >= 2 && n = 2 && of_pairs first && of_pairs second
-            && is_last_axis (integer_of concat "axis" 0) (but_last shape))
-    then refuse "is no MaxMin of pairs";
-    Proved.Pairs, but_last (but_last shape) @ [ 2 * last (but_last shape) ], None
-  | _ ->
-    let sizes = match List.assoc_opt "k" node.attributes with
-      | Some _ -> [ integer_of node "k" 0 ] | None -> integers node 1 "k" in
-    if not (List.mem (integer_of node "axis" (-1)) [ -1; rank - 1 ] && sizes = [ n ] && integer_of node "sorted" 1 = 1
-            && n >= 2 && n <= 64) then refuse "does not sort groups of 2 to 64 numbers";
-    let largest_first k = k - k mod n + n - 1 - k mod n in
-    Proved.Groups n, shape,
-    if integer_of node "largest" 1 = 0 then None else Some (Array.init (size shape) largest_first)
-
-let stored_by path kept node name = match Hashtbl.find_opt kept name with
-  | Some t -> t | None -> refuse_node path node "lacks its weights or biases"
-(* Whether the node is a constant, or another name of one, which is stored from now on. *)
-let stores path kept node =
-  let keep tensor = let name = output node in Hashtbl.add kept name { tensor with name }; true in
-  match node.op, node.inputs with
-  | "Constant", [] ->
-    (match List.assoc_opt "value" node.attributes with
-     | Some { tensor = Some t; _ } -> keep t | _ -> refuse_node path node "holds no tensor")
-  | "Identity", [ input ] when Hashtbl.mem kept input -> keep (stored_by path kept node input)
-  | _ -> false
-let require_no_factors path node =
-  let number name otherwise = match List.assoc_opt name node.attributes with
-    | None -> otherwise | Some { number = Some x; _ } -> x | Some _ -> -1. in
-  if number "alpha" 1. <> 1. || number "beta" 1. <> 1. || number "transA" 0. <> 0. then
-    refuse_node path node "scales or transposes"
-(* Whether y = x W, and not x W'. *)
-let is_transposed node = node.op = "MatMul" || integer_of node "transB" 0 = 0
-let sizes_of_matrix path node (weight : stored) = match weight.shape with
-  | [ a; b ] -> if is_transposed node then a, b else b, a | _ -> refuse_node path node "its weights are no matrix"
-let no_operator = "is not Gemm, MatMul of the input with weights, Add, Reshape, Flatten, Identity, MaxMin, TopK or an \
-                   activation that is known"
-
-let follow path kept state current node =
-  let refuse what = refuse_node path node what in
-  let stored = stored_by path kept node in
-  let start (weight : stored) =
-    if state.layers <> [] && not state.is_activated then refuse "two linear layers without an activation between them";
-    let inputs, outputs = sizes_of_matrix path node weight in
-    let sizes = but_last state.shape @ [ if last state.shape = 0 then inputs else last state.shape ] in
-    if size (but_last sizes) <> 1 || last sizes <> inputs then refuse "takes no single row of numbers that fits";
-    state.layers <- { weight; transposed = is_transposed node; order = state.order; bias = None } :: state.layers;
-    state.shape <- but_last sizes @ [ outputs ];
-    state.is_activated <- false;
-    state.order <- None in
-  let add_bias (bias : stored) = match state.layers with
-    | ({ bias = None; _ } as layer) :: _ when not state.is_activated && size (but_last state.shape) = 1 ->
-      layer.bias <- Some (match bias.shape with [ 1; n ] -> { bias with shape = [ n ] } | _ -> bias)
-    | _ -> refuse "adds where no layer takes a bias" in
-  let activate activation =
-    if state.layers = [] || state.is_activated then refuse "does not follow a linear layer";
-    state.activations <- activation :: state.activations;
-    state.is_activated <- true in
-  if node.op <> "TopK" && List.length node.outputs <> 1 then refuse "has not exactly one output";
-  if stores path kept node then current
-  else begin
-    let op = node.op and inputs = node.inputs in
-    if List.length (List.filter (( = ) current) inputs) <> 1 then refuse "does not take the value before it once";
-    List.iter (fun name -> if name <> current && name <> "" && not (Hashtbl.mem kept name) then
-                  refuse "takes what is neither the value before it nor stored") inputs;
-    (match op, inputs with
-     | "Gemm", (first :: weight :: rest) when first = current && weight <> "" && List.length rest <= 1 ->
-       require_no_factors path node;
-       start (stored weight);
-       (match rest with [ bias ] when bias <> "" -> add_bias (stored bias) | _ -> ())
-     | "MatMul", [ first; weight ] when first = current -> start (stored weight)
-     | "Add", [ a; b ] -> add_bias (stored (if a = current then b else a))
-     | "Identity", [ _ ] -> ()
-     | ("Reshape" | "Flatten"), first :: _ when first = current ->
-       state.shape <- reshaped path stored state.shape node
-     | ("MaxMin" | "PairsMaxMin" | "TopK"), first :: _ when first = current ->
-       let sorting, shape, order = sorting path stored state.shape node in
-       activate (Proved.Sorted sorting);
-       state.shape <- shape;
-       state.order <- order
-     | _, [ _ ] when activation_of node <> None -> activate (Option.get (activation_of node))
-     | _ -> refuse no_operator);
-    output node
-  end
-
-let layer_name names k weight =
+let layer_name graph weight =
   let name = if String.length weight > 7 && Weights.ends_with ".weight" weight then
       String.sub weight 0 (String.length weight - 7) else weight in
+  let number = Hashtbl.length graph.names + 1 in
   let rec free name =
-    if name <> "" && not (Hashtbl.mem names name) then name
-    else free (Printf.sprintf "layer%d%s" (k + 1) (if name = "" then "" else "_" ^ name)) in
+    if name <> "" && not (Hashtbl.mem graph.names name) then name
+    else free (Printf.sprintf "layer%d%s" number (if name = "" then "" else "_" ^ name)) in
   let name = free name in
-  Hashtbl.add names name (); name
+  Hashtbl.add graph.names name (); name
 
-let declared ?order (tensor : stored) name transposed =
-  let kind = match tensor.kind with 1 -> "float32" | 11 -> "float64" | n -> Printf.sprintf "data type %d" n in
-  let at k = Weights.number_at kind tensor.raw 0 k in
-  let taken k = match order with Some order -> order.(k) | None -> k in
-  match tensor.shape with
-  | [ rows; columns ] when transposed ->
-    let numbers () = Array.init (rows * columns) (fun k -> at (taken (k mod rows) * columns + k / rows)) in
-    { Weights.tensor = name; shape = [ columns; rows ]; kind; numbers }
-  | [ _; columns ] as shape ->
-    let numbers () = Array.init (size shape) (fun k -> at (k - k mod columns + taken (k mod columns))) in
-    { Weights.tensor = name; shape; kind; numbers }
-  | shape -> { Weights.tensor = name; shape; kind; numbers = (fun () -> Array.init (size shape) at) }
+let is_stored graph name = Hashtbl.mem graph.model.tensors name
+let is_value graph name = Hashtbl.mem graph.values name
+let count graph name = Option.value (Hashtbl.find_opt graph.uses name) ~default:0
+(* Further inputs of these two are no values. *)
+let inputs_that_count node = match node.op, node.inputs with
+  | ("BatchNormalization" | "Dropout"), first :: _ -> [ first ]
+  | _, inputs -> inputs
 
-(* Of the graph's input. Without one it is a row of any size; the first size is that of the batch. *)
-let input_shape path message =
-  let parts number messages = List.concat_map (fun m -> texts path number (Protobuf.fields path m)) messages in
-  let sizes = List.map (fun d -> integer path 1 (Protobuf.fields path d))
-      (parts 1 (parts 2 (parts 1 (parts 2 [ message ])))) in
-  let sizes = match sizes with [] -> [ 1; 0 ] | 0 :: (_ :: _ as rest) -> 1 :: rest | sizes -> sizes in
-  let product = List.fold_left (fun product n -> if n < 0 || product * max n 1 > Weights.most_numbers then
-                                   Weights.most_numbers + 1 else product * max n 1) 1 sizes in
-  if List.length sizes > 8 || product > Weights.most_numbers || List.mem 0 (but_last sizes) then
-    bad_input "%s: the shape of the input is unknown or too large" path;
-  sizes
+let input node k = Option.value (List.nth_opt node.inputs k) ~default:""
+let value graph node k = match Hashtbl.find_opt graph.values (input node k) with
+  | Some value -> value | None -> refuse "does not use the output of the preceding node"
+(* Input k if it is stored; None if the node leaves it out. *)
+let constant graph node k = match input node k with
+  | "" -> None
+  | name -> match Hashtbl.find_opt graph.model.tensors name with
+    | Some tensor -> Some tensor
+    | None -> refuse "uses \"%s\" as an input that must be stored" (shown name)
+let needed_constant graph node k = match constant graph node k with
+  | Some tensor -> tensor | None -> refuse "lacks its weights or biases"
+(* An attribute of older models, and input k of newer ones. *)
+let integers graph node k name =
+  if has name node then listed node name [] else match constant graph node k with
+    | Some tensor -> tensor.integers | None -> []
 
-(* With skip connections: the layers that Folding makes of the graph, as tensors, and what is between them. *)
-let folded path kept nodes input shape outputs =
-  let refuse node what = refuse_node path node what in
-  let nodes = List.filter (fun node -> not (stores path kept node)) nodes in
-  let inputs = match last shape, List.find_opt (fun node -> node.op = "Gemm" || node.op = "MatMul") nodes with
-    | 0, Some ({ inputs = _ :: weight :: _; _ } as node) ->
-      fst (sizes_of_matrix path node (stored_by path kept node weight))
-    | 0, _ -> bad_input "%s: the model does not state the size of its input" path
-    | n, _ -> n in
-  let shape = but_last shape @ [ inputs ] in
-  if size shape > 1 lsl 20 then bad_input "%s: the input has more than 2^20 entries" path;
-  let chain, first = Folding.start path (size shape) in
-  let values = Hashtbl.create 16 and uses = Hashtbl.create 64 in
-  let count name = Option.value (Hashtbl.find_opt uses name) ~default:0 in
-  List.iter (fun name -> Hashtbl.replace uses name (count name + 1))
-    (List.concat_map (fun node -> node.inputs) nodes @ outputs);
-  Hashtbl.add values input (first, shape);
-  let numbers node (t : stored) =
-    let kind = match t.kind with 1 -> "float32" | 11 -> "float64" | _ -> refuse node "takes numbers of another type" in
-    Array.init (size t.shape) (fun k ->
-        let x = Weights.number_at kind t.raw 0 k in
-        if Float.is_finite x then x else refuse node "a number is not finite") in
-  (* Added to a row of n numbers. *)
-  let added_to_row node n (t : stored) =
-    if List.mem t.shape [ [ n ]; [ 1; n ] ] then numbers node t else refuse node "adds numbers of another shape" in
-  let computed node =
-    let stored = stored_by path kept node in
-    let value name = match Hashtbl.find_opt values name with
-      | Some value -> value | None -> refuse node "takes what is neither computed before it nor stored" in
-    let is_value = Hashtbl.mem values in
-    let linear from weight bias =
-      let x, shape = value from and weight = stored weight in
-      let inputs, outputs = sizes_of_matrix path node weight in
-      if size (but_last shape) <> 1 || last shape <> inputs then refuse node "takes no single row of numbers that fits";
-      let w = numbers node weight and transposed = is_transposed node in
-      let at i j = if transposed then w.(j * outputs + i) else w.(i * inputs + j) in
-      let rows = Array.init outputs (fun i -> Array.init inputs (at i)) in
-      Folding.linear chain weight.name rows bias x, but_last shape @ [ outputs ] in
-    let outputs_of weight = snd (sizes_of_matrix path node (stored weight)) in
-    match node.op, node.inputs with
-    | "Gemm", (from :: weight :: rest) when weight <> "" && List.length rest <= 1 ->
-      require_no_factors path node;
-      let n = outputs_of weight in
-      linear from weight (match rest with
-          | [ bias ] when bias <> "" -> added_to_row node n (stored bias) | _ -> Array.make n 0.)
-    | "MatMul", [ from; weight ] -> linear from weight (Array.make (outputs_of weight) 0.)
-    | ("Add" | "Sub"), [ a; b ] when is_value a && is_value b ->
-      let (x, shape), (y, other) = value a, value b in
-      if shape <> other then refuse node "its inputs are of different shapes";
-      Folding.sum chain x (if node.op = "Sub" then Folding.negated y else y), shape
-    | ("Add" | "Sub"), [ a; b ] ->
-      let x, shape = value (if is_value a then a else b) in
-      if size (but_last shape) <> 1 then refuse node "takes no single row of numbers";
-      let shifts = added_to_row node (last shape) (stored (if is_value a then b else a)) in
-      let constant = { Folding.rows = Array.map (fun _ -> []) shifts; shifts; first = "" } in
-      let negated_if condition = if condition then Folding.negated else Fun.id in
-      let is_sub = node.op = "Sub" in
-      Folding.sum chain (negated_if (is_sub && is_value b) x) (negated_if (is_sub && is_value a) constant), shape
-    | "Identity", [ from ] -> value from
-    | ("Reshape" | "Flatten"), from :: _ ->
-      let x, shape = value from in
-      x, reshaped path stored shape node
-    | _, [ from ] when activation_of node <> None ->
-      let x, shape = value from in
-      let is_needed name = count name > List.length (List.filter (( = ) name) node.inputs) in
-      let needed = List.sort compare (List.filter is_needed (List.of_seq (Hashtbl.to_seq_keys values))) in
-      let y, behind = Folding.activated chain (Option.get (activation_of node)) x
-          (List.map (fun name -> name, fst (value name)) needed) in
-      List.iter (fun (name, y) -> Hashtbl.replace values name (y, snd (value name))) behind;
-      y, shape
-    | ("MaxMin" | "PairsMaxMin" | "TopK"), _ -> refuse node "has a skip connection beside it"
-    | _ -> refuse node no_operator in
-  List.iter (fun node ->
-      if List.length node.outputs <> 1 then refuse node "has not exactly one output";
-      let result = computed node in
-      List.iter (fun name ->
-          Hashtbl.replace uses name (count name - 1);
-          if count name = 0 then Hashtbl.remove values name) node.inputs;
-      if count (output node) > 0 then Hashtbl.replace values (output node) result) nodes;
-  let output = match outputs with
-    | [ name ] when Hashtbl.mem values name -> fst (Hashtbl.find values name)
-    | _ -> bad_input "%s: the graph's output is not where its nodes end" path in
-  if chain.layers = [] && output.rows = Folding.identity (size shape) then bad_input "%s: has no linear layer" path;
-  let layers, between = Folding.finished chain output in
-  let is_double = Hashtbl.fold (fun _ (t : stored) found -> found || t.kind = 11) kept false in
-  let kind = if not is_double && chain.is_exact && List.for_all Folding.holds_float32 layers then "float32"
-    else "float64" in
-  let names = Hashtbl.create 16 in
-  let tensors k (layer : Folding.layer) =
-    let name = layer_name names k layer.weights and outputs = Array.length layer.map in
-    [ { Weights.tensor = name ^ ".weight"; shape = [ outputs; layer.inputs ]; kind; numbers = Folding.dense layer };
-      { Weights.tensor = name ^ ".bias"; shape = [ outputs ]; kind; numbers = (fun () -> layer.biases) } ] in
-  List.concat (List.mapi tensors layers), between
+(* The names of the values computed so far that nodes behind this one take. *)
+let needed_behind graph node =
+  let own name = List.length (List.filter (( = ) name) node.inputs) in
+  List.sort compare (List.filter (fun name -> count graph name > own name)
+                       (List.of_seq (Hashtbl.to_seq_keys graph.values)))
+(* A new layer, which `add` makes of maps that are carried past it: `also`, and what is needed later. *)
+let with_layer graph node also add =
+  let needed = needed_behind graph node in
+  let maps = List.map (fun name -> (Hashtbl.find graph.values name).map) needed in
+  let result, behind = add (also @ maps) in
+  let count = List.length also in
+  let also, maps = Operators.first_of count behind, Operators.from count behind in
+  List.iter2 (fun name map ->
+      Hashtbl.replace graph.values name { (Hashtbl.find graph.values name) with map }) needed maps;
+  Hashtbl.filter_map_inplace (fun _ value -> Some { value with first = "" }) graph.values;
+  result, also
+let relu graph node map first also =
+  let name = layer_name graph first in
+  with_layer graph node also (Folding.relu graph.chain name map)
 
-let require_single_names path names =
-  let names = List.filter (( <> ) "") names in
-  if List.length (List.sort_uniq compare names) <> List.length names then
-    bad_input "%s: two values have the same name" path
+let parts_of map n =
+  List.init (Folding.size map / n) (fun k -> Folding.selected map (Array.init n (fun i -> k * n + i)))
+(* shift + the sum of factors relu(terms). *)
+let sum_of_relus graph node x terms ?shift () =
+  let rectified, _ = relu graph node (Folding.stacked (List.map fst terms)) x.first [] in
+  let parts = List.map2 Folding.scaled (parts_of rectified (size x.shape)) (List.map snd terms) in
+  let map = List.fold_left (fun sum part -> Folding.sum sum part) (List.hd parts) (List.tl parts) in
+  { map = (match shift with Some amounts -> Folding.shifted map amounts | None -> map); shape = x.shape; first = "" }
+let once _ = one
+let minus_once _ = exactly (-1.)
+
+(* min(max(x, least), most) = least + relu(x - least) - relu(x - most); each limit may be missing. *)
+let clipped graph node x least most =
+  let limits = function
+    | None -> None
+    | Some tensor ->
+      let numbers = Operators.broadcast tensor x.shape in
+      (* The largest float32 means none. *)
+      if Array.exists (fun n -> not (Float.abs n.value <= 0x1p127)) numbers then None else Some (Array.get numbers) in
+  match limits least, limits most with
+  | None, None -> x
+  | Some low, None -> sum_of_relus graph node x [ Folding.shifted ~minus:true x.map low, once ] ~shift:low ()
+  | None, Some high ->
+    sum_of_relus graph node x [ Folding.shifted (Folding.negated x.map) high, minus_once ] ~shift:high ()
+  | Some low, Some high ->
+    if List.exists (fun k -> (low k).value > (high k).value) (List.init (size x.shape) Fun.id) then
+      refuse "its minimum is above its maximum";
+    sum_of_relus graph node x
+      [ Folding.shifted ~minus:true x.map low, once; Folding.shifted ~minus:true x.map high, minus_once ] ~shift:low ()
+let a_number x = { name = ""; shape = []; kind = float64; numbers = [| x |]; integers = [] }
+
+(* The largest entry of each window, by max(a, b) = b + relu(a - b) of two and two. *)
+let rec largest graph node x windows shape =
+  if Array.for_all (fun window -> List.length window = 1) windows then
+    { map = Folding.selected x.map (Array.map List.hd windows); shape; first = x.first }
+  else begin
+    let rec paired = function
+      | a :: b :: rest -> let pairs, alone = paired rest in (a, b) :: pairs, alone
+      | alone -> [], alone in
+    let halved = Array.map paired windows in
+    let pairs = List.concat_map fst (Array.to_list halved) and alone = List.concat_map snd (Array.to_list halved) in
+    let rows which = Folding.selected x.map (Array.of_list which) in
+    let base = rows (List.map snd pairs) and rest = rows alone in
+    let difference = Folding.sum ~minus:true (rows (List.map fst pairs)) base in
+    let rectified, also = relu graph node difference x.first [ base; rest ] in
+    let larger = Folding.sum rectified (List.hd also) in
+    let map = Folding.stacked [ larger; List.nth also 1 ] in
+    let pair = ref 0 and single = ref (List.length pairs) in
+    let next counter = let k = !counter in incr counter; k in
+    let windows = Array.map (fun (pairs, alone) ->
+        let larger = List.map (fun _ -> next pair) pairs in
+        larger @ List.map (fun _ -> next single) alone) halved in
+    largest graph node { x with map; first = "" } windows shape
+  end
+let largest_of_inputs graph node =
+  let is_least = node.op = "Min" in
+  let first = match List.find_opt (is_value graph) node.inputs with
+    | Some name -> Hashtbl.find graph.values name | None -> refuse "does not use the output of the preceding node" in
+  let n = size first.shape in
+  let part k name =
+    let map = match Hashtbl.find_opt graph.values name with
+      | Some value ->
+        if value.shape <> first.shape then refuse "its inputs are of different shapes";
+        value.map
+      | None -> Folding.constant graph.chain.width (Operators.broadcast (needed_constant graph node k) first.shape) in
+    if is_least then Folding.negated map else map in
+  let parts = List.mapi part node.inputs in
+  let windows = Array.init n (fun i -> List.mapi (fun k _ -> k * n + i) parts) in
+  let x = largest graph node { first with map = Folding.stacked parts } windows first.shape in
+  if is_least then { x with map = Folding.negated x.map } else x
+
+(* Piecewise linear functions, written with ReLU. *)
+let piecewise_linear graph node = match node.op with
+  | "Max" | "Min" -> largest_of_inputs graph node
+  | op ->
+    let x = value graph node 0 in
+    let both_sides below = sum_of_relus graph node x [ x.map, once; Folding.negated x.map, below ] () in
+    match op with
+    | "Relu" -> sum_of_relus graph node x [ x.map, once ] ()
+    | "MaxPool" | "GlobalMaxPool" ->
+      let windows, shape = Operators.max_windows node x.shape in
+      largest graph node x windows shape
+    | "Abs" -> both_sides once
+    | "LeakyRelu" ->
+      let slope = exactly (-. number node "alpha" (Exact.float32 0.01)) in
+      both_sides (fun _ -> slope)
+    | "PRelu" ->
+      let slopes = Operators.broadcast (needed_constant graph node 1) x.shape in
+      both_sides (fun k -> opposite slopes.(k))
+    | "HardSigmoid" ->
+      let alpha = exactly (number node "alpha" (Exact.float32 0.2)) and beta = exactly (number node "beta" 0.5) in
+      let line = Folding.shifted (Folding.scaled x.map (fun _ -> alpha)) (fun _ -> beta) in
+      clipped graph node { x with map = line } (Some (a_number 0.)) (Some (a_number 1.))
+    | _ ->
+      let limit k name = if has name node then Some (a_number (number node name 0.)) else constant graph node k in
+      let least = limit 1 "min" in
+      clipped graph node x least (limit 2 "max")
+
+let activation_of node =
+  let with_1 activation =
+    if number node "alpha" 1. <> 1. then
+      refuse ~hint:"use the activation with its default parameters" "alpha is not 1";
+    activation in
+  match node.op with
+  | "Tanh" -> Proved.Tanh
+  | "Sigmoid" -> Sigmoid
+  | "Softplus" -> Softplus
+  | "Elu" | "Celu" -> with_1 Proved.Elu
+  | "Swish" -> with_1 Proved.Silu
+  | "Selu" ->
+    refuse ~hint:"save the state dict, and certify it with --activation selu"
+      "uses float32 constants whose product exceeds the slope of SELU"
+  | _ ->
+    if word node "approximate" "none" <> "none" then
+      refuse ~hint:"use the activation with its default parameters" "approximate is not none";
+    Gelu
+let smooth graph node =
+  let x = value graph node 0 in
+  let activation = activation_of node in
+  let name = layer_name graph x.first in
+  let map, _ = with_layer graph node [] (Folding.activated graph.chain activation name x.map) in
+  { map; shape = x.shape; first = "" }
+let sorted graph node =
+  let x = value graph node 0 in
+  let sorting, shape, which = Operators.sorting (integers graph) node x.shape in
+  if needed_behind graph node <> [] then
+    refuse ~hint:"leave the skip connection out, or train with ReLU"
+      "has a parallel skip connection, which is supported only for other activations";
+  let name = layer_name graph x.first in
+  let map, _ = with_layer graph node [] (Folding.activated graph.chain (Proved.Sorted sorting) name x.map) in
+  { map = Folding.selected map which; shape; first = "" }
+
+let applied graph node (map, shape) weight =
+  let x = value graph node (if is_value graph (input node 0) then 0 else 1) in
+  { map = Folding.composed map x.map; shape; first = if x.first = "" then weight else x.first }
+
+let rec take_while f = function x :: rest when f x -> x :: take_while f rest | _ -> []
+(* Add, Sub, Mul, Div, Neg and Sum, of two values, or of a value and a constant. *)
+let elementwise graph node =
+  if List.length node.inputs <> 2 && node.op <> "Sum" then refuse "does not have two inputs";
+  let base = List.length (take_while (fun name -> not (is_value graph name)) node.inputs) in
+  let adds = List.mem node.op [ "Add"; "Sum"; "Sub" ] and minus = node.op = "Sub" in
+  let with_other x k =
+    if is_value graph (input node k) then begin
+      if not adds then refuse "is not an affine function of the network's input";
+      let y = value graph node k in
+      if y.shape <> x.shape then refuse "its inputs are of different shapes";
+      { x with map = Folding.sum ~minus x.map y.map; first = if x.first = "" then y.first else x.first }
+    end else begin
+      if node.op = "Div" && base > 0 then refuse "divides a constant by a value";
+      let numbers = Operators.broadcast (needed_constant graph node k) x.shape in
+      let map =
+        if adds then
+          let x = if minus && base > 0 then Folding.negated x.map else x.map in
+          Folding.shifted ~minus:(minus && base = 0) x (Array.get numbers)
+        else if node.op = "Mul" then Folding.scaled x.map (Array.get numbers)
+        else if Array.exists (fun n -> n.value = 0.) numbers then refuse "divides by 0"
+        else Folding.divided_by x.map numbers in
+      { x with map }
+    end in
+  let others = List.filter (( <> ) base) (List.mapi (fun k _ -> k) node.inputs) in
+  List.fold_left with_other (value graph node base) others
+
+let affine graph node =
+  let weights k = needed_constant graph node k in
+  match node.op with
+  | "Gemm" ->
+    if List.length node.inputs < 2 || List.length node.inputs > 3 || not (is_value graph (input node 0))
+    || input node 1 = "" then refuse "is not the input times weights plus biases";
+    let w = weights 1 in
+    applied graph node (Operators.gemm node w (constant graph node 2) (value graph node 0).shape) w.name
+  | "MatMul" ->
+    let weight_is_left = not (is_value graph (input node 0)) in
+    let w = weights (if weight_is_left then 0 else 1) in
+    let shape = (value graph node (if weight_is_left then 1 else 0)).shape in
+    applied graph node (Operators.matmul w ~weight_is_left shape) w.name
+  | "Conv" ->
+    let w = weights 1 in
+    applied graph node (Operators.convolution node w (constant graph node 2) (value graph node 0).shape) w.name
+  | "AveragePool" | "GlobalAveragePool" ->
+    applied graph node (Operators.average node (value graph node 0).shape) ""
+  | "BatchNormalization" ->
+    let x = value graph node 0 in
+    let factors, amounts = Operators.normalization node (List.map weights [ 1; 2; 3; 4 ]) x.shape in
+    { x with map = Folding.shifted (Folding.scaled x.map factors) amounts }
+  | "Neg" -> let x = value graph node 0 in { x with map = Folding.negated x.map }
+  | _ -> elementwise graph node
+
+(* What rearranges numbers. *)
+let layout graph node =
+  let x = value graph node 0 and integers = integers graph node in
+  let selected (shape, which) = { x with map = Folding.selected x.map which; shape } in
+  match node.op with
+  | "Flatten" -> { x with shape = Operators.flattened x.shape (whole node "axis" 1) }
+  | "Reshape" ->
+    let zero_is_zero = number node "allowzero" 0. <> 0. in
+    { x with shape = Operators.reshaped x.shape (integers 1 "shape") ~zero_is_zero }
+  | "Squeeze" | "Unsqueeze" ->
+    { x with shape = Operators.squeezed x.shape (integers 1 "axes") ~adds:(node.op = "Unsqueeze") }
+  | "Transpose" -> selected (Operators.transposition x.shape (listed node "perm" []))
+  | "Cast" ->
+    let kind = whole node "to" 0 in
+    if kind <> float32 && kind <> float64 then refuse "casts to a type that is neither float32 nor float64";
+    x
+  | "Pad" ->
+    let filler = match constant graph node 2 with
+      | Some { numbers; _ } when numbers <> [||] -> numbers.(0) | _ -> number node "value" 0. in
+    let shape, copied = Operators.padding node (integers 1 "pads") x.shape in
+    let row = function Some k -> x.map.rows.(k) | None -> [] in
+    let shift = function Some k -> x.map.shifts.(k) | None -> exactly filler in
+    { x with map = { x.map with rows = Array.map row copied; shifts = Array.map shift copied }; shape }
+  | "Concat" ->
+    let parts = List.mapi (fun k _ -> value graph node k) node.inputs in
+    let shape, which = Operators.concatenation (List.map (fun x -> x.shape) parts) (whole node "axis" 0) in
+    { (selected (shape, [||])) with map = Folding.selected (Folding.stacked (List.map (fun x -> x.map) parts)) which }
+  | _ -> x
+
+let computed graph node =
+  let names = inputs_that_count node in
+  List.iter (fun name -> if name <> "" && not (is_value graph name || is_stored graph name) then
+                refuse "uses \"%s\", which is neither stored nor computed before it" (shown name)) names;
+  if not (List.exists (is_value graph) names) then refuse "does not use the output of the preceding node";
+  match node.op with
+  | "MaxMin" | "PairsMaxMin" | "TopK" -> sorted graph node
+  | "Gemm" | "MatMul" | "Conv" | "BatchNormalization" | "AveragePool" | "GlobalAveragePool" | "Add" | "Sub" | "Mul"
+  | "Div" | "Neg" | "Sum" -> affine graph node
+  | "Identity" | "Dropout" | "Cast" | "Flatten" | "Reshape" | "Squeeze" | "Unsqueeze" | "Transpose" | "Concat"
+  | "Pad" -> layout graph node
+  | "Relu" | "LeakyRelu" | "PRelu" | "Clip" | "Abs" | "Max" | "Min" | "HardSigmoid" | "MaxPool" | "GlobalMaxPool" ->
+    piecewise_linear graph node
+  | "Tanh" | "Sigmoid" | "Softplus" | "Elu" | "Celu" | "Selu" | "Gelu" | "Swish" -> smooth graph node
+  | "Softmax" | "LogSoftmax" when output node = graph.model.output -> value graph node 0  (* of the logits *)
+  | _ -> refuse "%s" operators
+
+(* What a node computes from constants, or from the shape of a value. *)
+let constant_of graph node =
+  let hint = "fold constants: torch.onnx.export(..., do_constant_folding=True)" in
+  let of_integers integers =
+    { name = ""; shape = [ List.length integers ]; kind = int64; numbers = [||]; integers } in
+  let first () = needed_constant graph node 0 in
+  match node.op with
+  | "Constant" ->
+    (match found "value" node with Some { tensor = Some t; _ } -> t | _ -> refuse ~hint "holds no tensor")
+  | "Identity" | "Cast" -> first ()
+  | "Shape" ->
+    of_integers (if is_value graph (input node 0) then (value graph node 0).shape else (first ()).shape)
+  | "Reshape" when (first ()).numbers <> [||] ->
+    let t = first () in
+    { t with shape = Operators.reshaped t.shape (integers graph node 1 "shape") ~zero_is_zero:false }
+  | ("Reshape" | "Squeeze" | "Unsqueeze" | "Flatten") when (first ()).integers <> [] -> first ()
+  | "Transpose" when (first ()).numbers <> [||] ->
+    let t = first () in
+    let shape, which = Operators.transposition t.shape (listed node "perm" []) in
+    { t with shape; numbers = Array.map (Array.get t.numbers) which }
+  | "Gather" when (first ()).integers <> [] ->
+    let sizes = (first ()).integers in
+    of_integers (List.map (fun k -> List.nth sizes (Operators.axis_of k (List.length sizes)))
+                   (needed_constant graph node 1).integers)
+  | "Concat" when (first ()).integers <> [] ->
+    let all = List.concat (List.mapi (fun k _ -> (needed_constant graph node k).integers) node.inputs) in
+    if List.length all > 64 then refuse ~hint "its result has too many entries";
+    of_integers all
+  | _ -> refuse ~hint "is not computed from constants by this reader"
+let is_constant graph node = match node.op, node.inputs with
+  | "Constant", _ -> true
+  | "Shape", [ name ] when is_value graph name -> true
+  | _, first :: _ -> first <> "" && List.for_all (fun name -> name = "" || is_stored graph name) node.inputs
+  | _, [] -> false
+let store graph node =
+  let tensor = constant_of graph node and name = output node in
+  (* Weights keep their own name through Transpose and the like. *)
+  let is_named_anew = List.mem node.op [ "Constant"; "Identity"; "Shape" ] || tensor.name = "" in
+  Hashtbl.add graph.model.tensors name (if is_named_anew then { tensor with name } else tensor)
+
+let follow graph node =
+  let take_inputs () =
+    List.iter (fun name ->
+        Hashtbl.replace graph.uses name (count graph name - 1);
+        if count graph name = 0 then Hashtbl.remove graph.values name) (inputs_that_count node) in
+  if is_constant graph node then begin store graph node; take_inputs () end
+  else begin
+    let result = computed graph node in
+    if not (Folding.is_finite result.map) then raise Not_finite;
+    take_inputs ();
+    if count graph (output node) > 0 then Hashtbl.replace graph.values (output node) result
+  end
+
+(* What a node, or the graph's output, is refused for. *)
+let refusing path what work =
+  let refuse reason hint = bad_input "%s: %s: %s; %s" path what reason hint in
+  try work () with
+  | Refused (reason, hint) -> refuse reason hint
+  | Folding.Too_large reason -> refuse reason "certify a smaller network, or fold before exporting"
+  | Not_finite ->
+    refuse "its weights, or their folded values, are not finite"
+      "the training has diverged, or the file is damaged: take an earlier checkpoint"
+
+(* The size of the input by the first weights that it reaches. *)
+let inputs_by_weights path (model : Onnx_model.t) =
+  let rec go current = function
+    | [] -> bad_input "%s: the model does not state the size of its input" path
+    | node :: rest when List.mem current node.inputs && node.outputs <> [] ->
+      let is_first = List.hd node.inputs = current in
+      let other = List.nth_opt node.inputs (if is_first then 1 else 0) in
+      let weight = Option.bind other (Hashtbl.find_opt model.tensors) in
+      (match node.op, weight with
+       | ("Gemm" | "MatMul"), Some { shape = [ a; b ]; _ } ->
+         let outputs_first = if node.op = "Gemm" then number node "transB" 0. <> 0. else not is_first in
+         if outputs_first then b else a
+       | _ -> go (output node) rest)
+    | _ :: rest -> go current rest in
+  go model.input model.nodes
+let input_shape path (model : Onnx_model.t) =
+  let refuse what = bad_input "%s: the shape of the input %s" path what in
+  if List.length model.shape > 8 then refuse "has more than 8 dimensions";
+  let shape = match model.shape with [] -> [ 0 ] | 0 :: (_ :: _ as rest) -> 1 :: rest | shape -> shape in
+  let shape = match List.length (List.filter (( = ) 0) shape) with
+    | 0 -> shape
+    | 1 ->
+      let limit = Folding.most_numbers in
+      let known = Operators.product ~limit (List.filter (( <> ) 0) shape) and inputs = inputs_by_weights path model in
+      if known > limit || inputs mod known <> 0 || inputs < known then refuse "does not fit the first node";
+      List.map (fun n -> if n = 0 then inputs / known else n) shape
+    | _ -> refuse "leaves open more than the size of the batch; export with inputs of a fixed size" in
+  if Operators.product ~limit:Operators.most_rows shape > Operators.most_rows then refuse "has more than 2^20 entries";
+  shape
 
 let read path bytes ~order =
-  let graph = match texts path 7 (Protobuf.fields path bytes) with
-    | [ graph ] -> Protobuf.fields path graph | _ -> bad_input "%s: has not one graph" path in
-  if all 15 graph <> [] then bad_input "%s: sparse tensors cannot be read" path;
-  let kept = Hashtbl.create 16 in
-  List.iter (fun message ->
-      let t = tensor path message in
-      if Hashtbl.mem kept t.name then bad_input "%s: %s appears twice" path (shown t.name);
-      Hashtbl.add kept t.name t) (texts path 5 graph);
-  let name_of message = text path 1 (Protobuf.fields path message) in
-  let inputs = List.filter (fun m -> not (Hashtbl.mem kept (name_of m))) (texts path 11 graph) in
-  let input = match inputs with [ one ] -> one | _ -> bad_input "%s: the graph has not one input" path in
-  let nodes = List.map (node path) (texts path 1 graph) in
-  if List.length nodes > 10_000 then bad_input "%s: the graph has more than 10000 nodes" path;
-  require_single_names path
-    (name_of input :: Hashtbl.fold (fun name _ names -> name :: names) kept []
-     @ List.concat_map (fun node -> node.outputs) nodes);
-  let constants, others = List.partition (fun node -> node.op = "Constant") nodes in
-  List.iter (fun node -> ignore (stores path kept node)) constants;
-  let others = with_groups_joined kept others and shape = input_shape path input and input = name_of input in
-  let outputs = List.map name_of (texts path 12 graph) in
-  let assembled = Weights.assemble ~path ~sha256:(Sha256.to_hex (Sha256.string bytes)) Layer_order.Evaluation ~order in
-  let taken = List.filter (fun name -> name <> "" && not (Hashtbl.mem kept name))
-      (List.concat_map (fun node -> node.inputs) others) in
-  if List.length (List.sort_uniq compare taken) < List.length taken then begin
-    let tensors, between = folded path kept others input shape outputs in
-    { (assembled tensors) with activations = Some between }
-  end else begin
-    let state = { layers = []; is_activated = false; activations = []; shape; order = None } in
-    let end_of_chain = List.fold_left (follow path kept state) input others in
-    if outputs <> [ end_of_chain ] then bad_input "%s: the graph's output is not where its chain of nodes ends" path;
-    if state.layers = [] then bad_input "%s: has no linear layer" path;
-    let names = Hashtbl.create 16 in
-    let tensors = List.concat (List.mapi (fun k layer ->
-        let name = layer_name names k layer.weight.name in
-        declared ?order:layer.order layer.weight (name ^ ".weight") layer.transposed
-        :: (match layer.bias with Some b -> [ declared b (name ^ ".bias") false ] | None -> []))
-            (List.rev state.layers)) in
-    let w = assembled tensors in
-    let w = if state.is_activated then Weights.with_identity ?order:state.order w else w in
-    { w with activations = Some (List.rev state.activations) }
-  end
+  let model = Onnx_model.read path bytes in
+  let values = Hashtbl.create 16 and uses = Hashtbl.create 64 in
+  let graph_of model chain = { model; chain; values; uses; names = Hashtbl.create 16 } in
+  (* Stored numbers under all their names, before the groups of nodes that take them are looked for. *)
+  let without_values = graph_of model (Folding.start 0) in
+  let is_number node = node.op = "Constant" || (node.op = "Identity" && is_constant without_values node) in
+  let nodes = List.filter (fun node ->
+      not (is_number node && (refusing path ("node " ^ node.label) (fun () -> store without_values node); true)))
+      model.nodes in
+  let model = { model with nodes } in
+  let model = { model with nodes = Onnx_groups.joined model } in
+  let shape = input_shape path model in
+  let graph = graph_of model (Folding.start (size shape)) in
+  Hashtbl.add values model.input { map = Folding.identity (size shape); shape; first = "" };
+  List.iter (fun name -> Hashtbl.replace uses name (count graph name + 1))
+    (model.output :: List.concat_map inputs_that_count model.nodes);
+  List.iter (fun node -> refusing path ("node " ^ node.label) (fun () -> follow graph node)) model.nodes;
+  let last = match Hashtbl.find_opt values model.output with
+    | Some value -> value | None -> bad_input "%s: the graph's output is not where its nodes end" path in
+  if graph.chain.layers = [] && Folding.is_identity last.map then bad_input "%s: has no linear layer" path;
+  let layers, between = refusing path "the graph's output" (fun () ->
+      Folding.finished graph.chain (layer_name graph last.first) last.map) in
+  let is_double = Hashtbl.fold (fun _ (t : tensor) found -> found || t.kind = float64) model.tensors false in
+  let kind = if not is_double && List.for_all Folding.holds_float32 layers then "float32" else "float64" in
+  let tensors (layer : Folding.layer) =
+    let outputs = Folding.size layer.map in
+    [ { Weights.tensor = layer.name ^ ".weight"; shape = [ outputs; layer.map.inputs ]; kind;
+        numbers = (fun () -> Folding.weights_of layer) };
+      { Weights.tensor = layer.name ^ ".bias"; shape = [ outputs ]; kind;
+        numbers = (fun () -> Folding.biases_of layer) } ] in
+  let w = Weights.assemble ~path ~sha256:(Sha256.to_hex (Sha256.string bytes)) Layer_order.Evaluation ~order
+      (List.concat_map tensors layers) in
+  { w with activations = Some between }
