@@ -14,6 +14,7 @@ from pathlib import Path
 from struct import pack
 
 import check_certificate as second
+import onnx_models
 
 SWARMCERT, SOURCE = Path(sys.argv[1]).resolve(), Path(sys.argv[2])
 MUTATIONS = int(sys.argv[3]) if len(sys.argv) > 3 else 100
@@ -580,6 +581,10 @@ def run():
                                        ("selu",), ("silu",), ("gelu",), ("tanh,relu",), ("relu,silu,sigmoid",),
                                        ("selu,gelu,relu", "--method", "product"))]
         nets += [([str(square), *order], ["--activation", "groupsort:3", "--domain", str(folder / "cube.toml")])]
+        for name, make, options in (("image", onnx_models.image_model, []),
+                                    ("series", onnx_models.series_model, ["--domain", str(folder / "cube.toml")])):
+            (folder / f"{name}.onnx").write_bytes(make(random.Random(37)))
+            nets.append(([str(folder / f"{name}.onnx")], options))
         (folder / "cube.toml").write_text('schema = "swarmcert/box/1"\nlower = [-1, -1, 0]\nupper = [1, 0, 0.5]\n')
         tried = rejected = 0
         fixed = set()
