@@ -345,7 +345,9 @@ class Weights:
         which case an identity layer is appended."""
         if len(names) == 1:
             names = names * (len(self.layers) - 1)
-        require_input(all(name in STEEPEST for name in names), f"an activation of {names} is unknown")
+        written = [onnx_graphs.written_with_relu(name) for name in names]
+        require_input(all(name in STEEPEST or terms for name, terms in zip(names, written)),
+                      f"an activation of {names} is unknown")
         if self.activations is not None and len(self.layers) > 1:
             require_input(names == self.activations, f"others are stated already: {self.activations}")
             return
@@ -359,6 +361,24 @@ class Weights:
                 name = f"{numbered}_{name}"
             self.layers.append(identity_layer(name, self.layers[-1].outputs))
         self.activations = names
+        if any(written):
+            self.write_with_relu(written)
+
+    def write_with_relu(self, written):
+        """Replaces the activations for which `written` has terms by ReLU."""
+        names = [layer.name for layer in self.layers]
+        layers = [(layer.inputs, [dict(enumerate(layer.weights[i * layer.inputs:(i + 1) * layer.inputs]))
+                                  for i in range(layer.outputs)], layer.biases) for layer in self.layers]
+        try:
+            found, self.activations, precision = onnx_graphs.rewritten(layers, self.activations, written)
+        except onnx_graphs.Refused as refused:
+            raise BadInput(str(refused)) from None
+        self.layers = []
+        for name, (_, inputs, rows, biases, _) in zip(names, found):
+            weights = [row.get(column, 0.0) for row in rows for column in range(inputs)]
+            self.layers.append(Layer(name, len(rows), inputs, weights, biases))
+        if self.precision == "float32":
+            self.precision = precision
 
     def round_to_float32(self):
         self.layers = [layer.rounded() for layer in self.layers]
@@ -567,6 +587,8 @@ class Network:
             def part(entry):
                 stated = entry.get("activation")
                 stated = ",".join(stated) if isinstance(stated, list) else stated
+                require_input(stated is None or not any(map(onnx_graphs.written_with_relu, stated.split(","))),
+                              f"network.toml cannot state {stated}, at most --activation")
                 weights = read_weights(Path(net).parent / entry["weights"], key, entry.get("order"), stated)
                 if activation is not None:
                     weights.state(activation.split(","))

@@ -405,7 +405,8 @@ def arguments(net):
     """Returns the arguments of second.Network()."""
     if net[0].startswith("--"):
         return dict(zip((a[2:] for a in net[::2]), net[1::2]))
-    return {"net": net[0], "orders": {"network": net[2].split(",")} if "--order" in net else {}}
+    return {"net": net[0], "orders": {"network": net[2].split(",")} if "--order" in net else {},
+            "activation": net[2] if "--activation" in net else None}
 
 
 def check_orders(folder, square, order):
@@ -581,6 +582,7 @@ def run():
                                        ("selu",), ("silu",), ("gelu",), ("tanh,relu",), ("relu,silu,sigmoid",),
                                        ("selu,gelu,relu", "--method", "product"))]
         nets += [([str(square), *order], ["--activation", "groupsort:3", "--domain", str(folder / "cube.toml")])]
+        nets += [([str(tiny), "--activation", "leaky_relu:0.25,hardtanh"], [])]
         for name, make, options in (("image", onnx_models.image_model, []),
                                     ("series", onnx_models.series_model, ["--domain", str(folder / "cube.toml")])):
             (folder / f"{name}.onnx").write_bytes(make(random.Random(37)))

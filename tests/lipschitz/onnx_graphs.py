@@ -4,6 +4,7 @@ operation, with a bound on its error, which decides how a value that may be nega
 functions are written with ReLU."""
 import itertools
 import math
+import re
 import struct
 
 MOST_NUMBERS, MOST_PRODUCTS, MOST_ROWS, MOST_WINDOW_NUMBERS, MOST_STEP = 2 ** 25, 2 ** 30, 2 ** 20, 2 ** 23, 2 ** 20
@@ -1115,6 +1116,58 @@ def inputs_by_weights(current, nodes, stored):
     raise Refused("the model does not state the size of its input")
 
 
+DECIMAL = re.compile(r"-?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+
+
+def written_with_relu(name):
+    """Returns (terms, constant) of a piecewise linear activation that is the constant plus the sum of factor
+    relu(scale x + shift), for terms (scale, shift, factor); None for others."""
+    if name == "relu6":
+        return [(1.0, 0.0, 1.0), (1.0, -6.0, -1.0)], 0.0
+    if name == "hardtanh":
+        return [(1.0, 1.0, 1.0), (1.0, -1.0, -1.0)], -1.0
+    kind, colon, text = name.partition(":")
+    if kind != "leaky_relu" or colon and not (DECIMAL.fullmatch(text) and abs(float(text)) <= 1e6):
+        return None
+    return [(1.0, 0.0, 1.0), (-1.0, 0.0, -float(text) if colon else -0.01)], 0.0
+
+
+def rewritten(layers, activations, written):
+    """Returns layers, activations and precision, as read(), of a network with `layers` as (inputs, rows, biases) and
+    these activations, those with an entry of `written` replaced by ReLU."""
+    exact_rows = lambda rows: [{column: exactly(x) for column, x in row.items() if x != 0} for row in rows]
+    maps = [Map(exact_rows(rows), list(map(exactly, shifts))) for _, rows, shifts in layers]
+    chain = Layers(layers[0][0])
+
+    def behind(own, op, terms):
+        if op != "relu" and not terms:
+            return chain.activated(op, own, "", [])[0]
+        parts, constant = terms or ([(1.0, 0.0, 1.0)], 0.0)
+        size, result = len(own.rows), None
+        arguments = [own.scaled([exactly(scale)]).shifted([exactly(shift)] * size) for scale, shift, _ in parts]
+        rectified, _ = chain.activated("relu", stacked(arguments), "", [])
+        for k, (_, _, factor) in enumerate(parts):
+            part = rectified.selected(range(k * size, (k + 1) * size)).scaled([exactly(factor)])
+            result = part if result is None else result.plus(part)
+        return result.shifted([exactly(constant)] * size)
+
+    def run():
+        current = maps[0]
+        for one, op, terms in zip(maps[1:], activations, written):
+            current = one.of(behind(current, op, terms), chain.width)
+        chain.append("", current.rows, current.shifts, 0)
+    naming("the activation", run)
+    return layers_of(chain)
+
+
+def layers_of(chain):
+    """Returns what read() returns."""
+    numbers = [x for _, rows, shifts in chain.maps for x in itertools.chain(shifts, *(row.values() for row in rows))]
+    found = [(name, width, [{column: x[0] for column, x in row.items()} for row in rows], [x[0] for x in shifts], kept)
+             for name, (width, rows, shifts), kept in zip(chain.names, chain.maps, chain.kept)]
+    return found, chain.ops, "float32" if all(map(is_float32, numbers)) else "float64"
+
+
 def only(values, what):
     if len(values) != 1:
         raise Refused(f"the model has {len(values)} {what}, not one")
@@ -1154,12 +1207,9 @@ def read(data):
     if not layers.names and last.map.is_identity(inputs):
         raise Refused("the graph has no linear layer")
     naming("the graph's output", layers.append, last.first, last.map.rows, last.map.shifts, 0)
-    numbers = [x for _, rows, shifts in layers.maps for x in itertools.chain(shifts, *(row.values() for row in rows))]
+    found, ops, precision = layers_of(layers)
     is_double = any(tensor.kind == "float64" for tensor in stored.values())
-    precision = "float64" if is_double or not all(map(is_float32, numbers)) else "float32"
-    found = [(name, width, [{column: x[0] for column, x in row.items()} for row in rows], [x[0] for x in shifts], kept)
-             for name, (width, rows, shifts), kept in zip(layers.names, layers.maps, layers.kept)]
-    return found, layers.ops, precision
+    return found, ops, "float64" if is_double else precision
 
 
 def is_float32(number):

@@ -593,6 +593,36 @@ def random_graphs(folder, count):
     print(f"{accepted} random graphs read alike")
 
 
+def piecewise_activations(folder, generator):
+    """Piecewise linear activations that --activation states are written with ReLU alike by all, of a file and of the
+    parts of a network.toml; a certificate of another slope is refused by all."""
+    net, path = folder / "piecewise.safetensors", folder / "piecewise.json"
+    net.write_bytes(common.safetensors([2, 5, 4, 1], generator))
+    nets = [[net, "--activation", name] for name in
+            ("leaky_relu", "relu6", "hardtanh,tanh", "silu,relu6,relu6", "relu,leaky_relu:0.25")]
+    nets.append([common.heterogeneous(folder, generator), "--activation", "leaky_relu:-0.3"])
+    for given in nets:
+        run([common.SWARMCERT, "certify", *given, "--nodes", "1", "-q", "--force", "-o", path])
+        one, three = first(path, given), proved(path, given)
+        assert one.returncode == three.returncode == 0 and one.stdout == three.stdout, f"{given}: {one} {three}"
+        assert not second.check(second.parse(path.read_text()), second.Network(**arguments(given)))
+    run([common.SWARMCERT, "certify", *nets[4], "--nodes", "1", "-q", "--force", "-o", path])
+    other = [net, "--activation", "relu,leaky_relu:0.3"]
+    assert first(path, other).returncode == proved(path, other).returncode == 1
+    assert second.check(second.parse(path.read_text()), second.Network(**arguments(other)))
+    nets[-1][0].write_text(nets[-1][0].read_text().replace(
+        'weights = "small.safetensors"', 'weights = "small.safetensors"\nactivation = "leaky_relu"'))
+    assert first(path, nets[-1][:1]).returncode == proved(path, nets[-1][:1]).returncode == 3
+    try:
+        second.Network(str(nets[-1][0]))
+        raise SystemExit("network.toml states leaky_relu, and the second checker takes it")
+    except second.BadInput as refused:
+        assert "at most --activation" in str(refused), refused
+    for unknown in "relu7", "leaky_relu:", "leaky_relu:1e7", "leaky_relu:0x1":
+        wrong = [net, "--activation", unknown]
+        assert first(path, wrong).returncode == proved(path, wrong).returncode == 2, unknown
+
+
 def main():
     generator = random.Random(23)
     with tempfile.TemporaryDirectory() as name:
@@ -601,6 +631,7 @@ def main():
         graphs_that_are_not_read(folder, random.Random(29))
         folded_numbers(folder, random.Random(31))
         random_graphs(folder, 20 + MUTATIONS // 100)
+        piecewise_activations(folder, random.Random(43))
         everything = kinds(folder, generator)
         laws_in_a_box(folder, next(net for name, net, _, _ in everything if name == "pair"))
         total, mutated = 0, set()

@@ -176,11 +176,13 @@ let finished chain name output =
       (List.filteri (fun k _ -> k < List.length layers - 1) layers) (List.rev chain.activations) in
   layers, between
 
-let weights_of (layer : layer) =
-  let columns = layer.map.inputs in
-  let numbers = Array.make (size layer.map * columns) 0. in
-  Array.iteri (fun i row -> List.iter (fun (j, x) -> numbers.(i * columns + j) <- x.value) row) layer.map.rows;
-  numbers
+(* Rows with all their numbers. *)
+let rows_of (layer : layer) =
+  let dense row =
+    let numbers = Array.make layer.map.inputs 0. in
+    List.iter (fun (column, x) -> numbers.(column) <- x.value) row;
+    numbers in
+  Array.map dense layer.map.rows
 let biases_of (layer : layer) = Array.map (fun x -> x.value) layer.map.shifts
 (* Whether every number of a layer is exactly a float32. *)
 let holds_float32 (layer : layer) =

@@ -38,7 +38,7 @@ let rec options (args : Network.arguments) mode positional = function
   | "--rho" :: file :: rest -> options { args with rho = file } mode positional rest
   | "--key" :: key :: rest -> options { args with key } mode positional rest
   | "--activation" :: activation :: rest ->
-    let known name = if Activation.called name = None then
+    let known name = if Piecewise.called name = None then
         raise (Usage ("--activation: there is no activation " ^ shown name)) in
     List.iter known (String.split_on_char ',' activation);
     options { args with activation } mode positional rest

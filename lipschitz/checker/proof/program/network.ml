@@ -113,16 +113,20 @@ let read_gamma path members =
   | Some (Json.Number { value; _ }) when value > 0. -> ()
   | _ -> bad_input "%s: gamma.value must be positive" path
 
-(* What `field` states beside the weights. *)
-let with_activations field (weights : Weights.t) names =
-  let called name = match Activation.called name with
+(* What `field` states beside the weights, in names that `called` knows. *)
+let with_activations field called (weights : Weights.t) names =
+  let called name = match called name with
     | Some activation -> activation | None -> bad_input "%s: there is no activation %s" field (shown name) in
   if names = [] then bad_input "%s: names no activation" field;
-  match Weights.with_activations weights (List.map called names), weights.activations with
-  | Some weights, _ -> weights
-  | None, Some (_ :: _ as others) ->
+  let stated = List.map called names in
+  let is_written = not (List.for_all Piecewise.is_itself stated) in
+  let within = List.map (fun (a : Piecewise.t) -> a.within) stated in
+  match Weights.with_activations weights within, weights.activations with
+  | Some found, (None | Some []) -> if is_written then Piecewise.written found stated else found
+  | Some found, Some _ when not is_written -> found
+  | _, Some (_ :: _ as others) ->
     bad_input "%s: %s: %s is stated already" weights.path field (String.concat ", " (List.map Activation.name others))
-  | None, _ ->
+  | _, _ ->
     bad_input "%s: %s: %d activations do not fit the %d layers, or a group the size of its layer" weights.path field
       (List.length names) (List.length weights.layers)
 
@@ -145,7 +149,8 @@ let read_kinds path ~key role members =
         | Some json ->
           let here = where ^ ".activation" in
           let names = match json with Json.Array _ -> texts path here json | _ -> [ text path here (Some json) ] in
-          with_activations (path ^ ": " ^ here) weights names in
+          let called name = Option.map Piecewise.that_is (Activation.called name) in
+          with_activations (path ^ ": " ^ here) called weights names in
       role ^ ":" ^ kind, weights) members
 
 let check_sizes path ~order ~invariants ~clamp ~components phis rhos =
@@ -222,7 +227,7 @@ let read_stated { net; phi; rho; key; orders; _ } =
 let read arguments =
   let net = read_stated arguments in
   let names = String.split_on_char ',' arguments.activation in
-  let stated (name, weights) = name, with_activations "--activation" weights names in
+  let stated (name, weights) = name, with_activations "--activation" Piecewise.called weights names in
   if arguments.activation = "" then net else { net with parts = List.map stated net.parts }
 
 let as_float32 net = { net with parts = List.map (fun (name, w) -> name, Weights.as_float32 w) net.parts }

@@ -430,7 +430,7 @@ let read path bytes ~order =
   let tensors (layer : Folding.layer) =
     let outputs = Folding.size layer.map in
     [ { Weights.tensor = layer.name ^ ".weight"; shape = [ outputs; layer.map.inputs ]; kind;
-        numbers = (fun () -> Folding.weights_of layer) };
+        numbers = (fun () -> Array.concat (Array.to_list (Folding.rows_of layer))) };
       { Weights.tensor = layer.name ^ ".bias"; shape = [ outputs ]; kind;
         numbers = (fun () -> Folding.biases_of layer) } ] in
   let w = Weights.assemble ~path ~sha256:(Sha256.to_hex (Sha256.string bytes)) Layer_order.Evaluation ~order
