@@ -147,15 +147,18 @@ class Assembler {
   void find_bias(std::size_t i) {
     std::string layer;
     if (is_part(i, "weight", layer)) return;
-    LayerParts* owner = nullptr;
-    if (is_part(i, "bias", layer)) {
-      for (LayerParts& parts : parts_) {
-        if (parts.name == layer) owner = &parts;
-      }
-    }
-    if (owner == nullptr) {
+    if (!is_part(i, "bias", layer)) {
       refuse(i, shape_text(tensors_[i].shape), "is neither the weight nor the bias of a linear layer",
              kOnlyLinear);
+    }
+    LayerParts* owner = nullptr;
+    for (LayerParts& parts : parts_)
+      if (parts.name == layer) owner = &parts;
+    if (owner == nullptr) {
+      refuse(
+          i, shape_text(tensors_[i].shape),
+          "is a bias without its weight: " + (layer.empty() ? "weight" : layer + ".weight") + " is missing",
+          "save the whole state dict of the network");
     }
     if (owner->bias != kNone) refuse(i, "", "appears twice");
     const DeclaredTensor& weight = tensors_[owner->weight];

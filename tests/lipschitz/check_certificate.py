@@ -323,6 +323,12 @@ class Weights:
                 layer = name[:-7] if "." in name else ""
                 self.layers.append(Layer(layer, shape[0], shape[1], numbers, biases.get(layer, [0.0] * shape[0])))
         require_input(self.layers, "the file holds no layer")
+        names = {layer.name for layer in self.layers}
+        for name, _, _ in tensors:
+            layer, _, part = name.rpartition(".")
+            require_input(part in ("weight", "bias"), f"{name} is neither the weight nor the bias of a linear layer")
+            require_input(layer in names, f"{name} is a bias without its weight: "
+                          f"{layer + '.weight' if layer else 'weight'} is missing")
         require_input(all(math.isfinite(x) for layer in self.layers for x in layer.weights + layer.biases),
                       "a weight is not finite")
         self.layers = in_order(self.layers, listing, order)

@@ -84,7 +84,9 @@ TEST(PthRefusal, NamesTensorsThatAreNotPartOfALayer) {
   tensors.push_back({"bn.running_mean", "1", 3, {3}, {1}});
   EXPECT_TRUE(pth_is_refused(tensors, {"bn.running_mean = [3]", "batch normalisation"}));
   tensors.back().name = "fc3.bias";
-  EXPECT_TRUE(pth_is_refused(tensors, {"fc3.bias = [3]", "neither the weight nor the bias"}));
+  EXPECT_TRUE(pth_is_refused(tensors, {"fc3.bias = [3]", "fc3.weight is missing"}));
+  tensors.back().name = "fc3.scale";
+  EXPECT_TRUE(pth_is_refused(tensors, {"fc3.scale = [3]", "neither the weight nor the bias"}));
   tensors.back() = {"n_averaged", "3", 1, {}, {}};
   EXPECT_TRUE(pth_is_refused(tensors, {"n_averaged", "AveragedModel", "averaged.module.state_dict()"}));
 }

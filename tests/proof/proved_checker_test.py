@@ -476,6 +476,16 @@ def every_format(folder, generator):
         file.write_bytes(truncated)
         assert first(path, net).returncode == proved(path, net).returncode == 3, name
     assert len(bounds) == 1, bounds
+    file = folder / "biases.safetensors"
+    data = common.safetensors([3, 4, 2], generator).replace(b'"fc2.weight"', b'"fc3.weight"')
+    file.write_bytes(data)
+    for said in run([common.SWARMCERT, "certify", file, "-q"]), proved(path, [file]):
+        assert said.returncode == 3 and "fc2.weight is missing" in said.stderr, said
+    try:
+        second.read_weights(file)
+        raise SystemExit("a bias without its weight is read")
+    except second.BadInput as refused:
+        assert "fc2.weight is missing" in str(refused), refused
     print(f"{len(files)} formats of weight files read alike")
 
 

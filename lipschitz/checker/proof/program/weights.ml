@@ -104,8 +104,13 @@ let assemble ~path ~sha256 listing ~order tensors =
         | Some w -> if t.shape <> [ List.hd w.shape ] then refuse t "does not fit the weight"; true
         | None -> false)
     | None -> false in
-  List.iter (fun t -> if layer_of "weight" t.tensor = None && not (owned t) then
-                refuse t "is neither the weight nor the bias of a linear layer") tensors;
+  List.iter (fun t -> match layer_of "weight" t.tensor, layer_of "bias" t.tensor with
+      | Some _, _ -> ()
+      | None, Some layer when not (owned t) ->
+        refuse t (Printf.sprintf "is a bias without its weight: %s is missing"
+                    (if layer = "" then "weight" else shown layer ^ ".weight"))
+      | None, Some _ -> ()
+      | None, None -> refuse t "is neither the weight nor the bias of a linear layer") tensors;
   let shapes = List.map (fun (name, t) ->
       { Layer_order.name; outputs = List.nth t.shape 0; inputs = List.nth t.shape 1 }) weights in
   let finite t = Array.map (fun x -> if not (Float.is_finite x) then refuse t "a number is not finite";
