@@ -908,13 +908,44 @@ class Graph:
         result, _ = self.with_layer(node, SMOOTH[node.kind], x.map, x.first)
         return Value(result, x.shape)
 
+    def ordered(self, node, own, first, pairs):
+        """Orders the rows of each pair, the larger one at its second place, by max(a, b) = b + relu(a - b) and
+        min(a, b) = b - relu(b - a)."""
+        smaller, larger = [list(some) for some in zip(*pairs)]
+        others = [k for k in range(len(own.rows)) if k not in smaller and k not in larger]
+        difference = own.selected(larger).plus(own.selected(smaller), -1)
+        rectified, (base, rest) = self.with_layer(node, "relu", stacked([difference, difference.scaled([MINUS_ONE])]),
+                                                  first, (own.selected(smaller), own.selected(others)))
+        size = len(pairs)
+        above, below = rectified.selected(range(size)), rectified.selected(range(size, 2 * size))
+        found = dict(zip(smaller + larger + others, range(len(own.rows))))
+        return stacked([base.plus(below, -1), base.plus(above), rest]).selected(
+            [found[k] for k in range(len(own.rows))])
+
+    def sorted_with_relu(self, node, x, op):
+        """Returns the sorted value beside a skip connection, past which the sorting itself is not known."""
+        size, name = len(x.map.rows), op.split(":")[1]
+        if name == "halves":
+            return self.ordered(node, x.map, x.first, [(size // 2 + k, k) for k in range(size // 2)])
+        if name == "pairs":
+            result = self.ordered(node, x.map, x.first, [(k + 1, k) for k in range(0, size, 2)])
+            return result.selected([*range(0, size, 2), *range(1, size, 2)])
+        need(int(name) <= 8, "sorts groups of more than 8 numbers beside a skip connection",
+             "leave the skip connection out, or train with MaxMin or ReLU")
+        result, first = x.map, x.first
+        for turn in range(int(name)):  # odd-even transposition sort
+            pairs = [(k, k + 1) for k in range(size) if k % int(name) in range(turn % 2, int(name) - 1, 2)]
+            if pairs:
+                result, first = self.ordered(node, result, first, pairs), ""
+        return result
+
     def sorted(self, node):
         x = self.value(node, 0)
         op, shape, which = sorting(node, x.shape, self.integers)
-        need(not self.needed_after(node),
-             "has a parallel skip connection, which is supported only for other activations",
-             "leave the skip connection out, or train with ReLU")
-        result, _ = self.with_layer(node, op, x.map, x.first)
+        if self.needed_after(node):
+            result = self.sorted_with_relu(node, x, op)
+        else:
+            result, _ = self.with_layer(node, op, x.map, x.first)
         return Value(result.selected(which), shape)
 
     def applied(self, x, map_and_shape, weight=""):

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "nn/weights/onnx/model.h"
@@ -69,6 +70,9 @@ class OnnxGraph {
   std::vector<OnnxNode*> users_of(const std::string& name);
   OnnxNode* joined_by_concat(const std::vector<OnnxNode*>& pair);
   void join_sorting();
+  AffineMap ordered(const Node& node, const AffineMap& map, const std::string& name,
+                    const std::vector<std::pair<int, int>>& pairs);
+  AffineMap sorted_with_relu(const Node& node, const OnnxValue& x, Activation activation);
   OnnxValue sorted(const Node& node, const OnnxValue& x, Activation activation);
   OnnxValue sorted_by_concat(const Node& node);
   OnnxValue sorted_by_top(const Node& node);

@@ -18,7 +18,7 @@ bool looks_like_onnx(const std::string& bytes);
 /// - piecewise linear: Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, MaxPool; they are rewritten with
 ///   ReLU as the same function;
 /// - smooth activations: Tanh, Sigmoid, Softplus, Elu, Gelu, x Sigmoid(x); skip connections past them are kept;
-/// - MaxMin and GroupSort, without parallel skip connections;
+/// - MaxMin and GroupSort; beside a skip connection they are written with ReLU, groups of up to 8 numbers;
 /// - nodes that only rearrange.
 /// A final Softmax is omitted. Any other final activation is followed by an identity layer. Weights must be stored in
 /// the file itself, as float16, bfloat16, float32 or float64. The batch size is 1. A layer is named after its first

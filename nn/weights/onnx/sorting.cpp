@@ -19,6 +19,9 @@ std::int64_t integer(const OnnxNode& node, const char* attribute, std::int64_t o
   return static_cast<std::int64_t>(number);
 }
 
+/// Each number of a group takes a layer of ReLU.
+constexpr int kLargestGroupWithRelu = 8;
+
 void require_sorting(bool condition, const char* what) {
   if (!condition) throw OperatorRefusal{what, kReadSorting};
 }
@@ -76,11 +79,72 @@ void OnnxGraph::join_sorting() {
   }
 }
 
+/// Orders the rows of each pair with ReLU, the larger one at its second place: max(a, b) = b + relu(a - b) and
+/// min(a, b) = b - relu(b - a). Rows in no pair are carried.
+AffineMap OnnxGraph::ordered(const Node& node, const AffineMap& map, const std::string& name,
+                             const std::vector<std::pair<int, int>>& pairs) {
+  std::vector<int> smaller_at, larger_at, others, place(static_cast<std::size_t>(map.outputs()), -1);
+  for (const auto& [smaller, larger] : pairs) {
+    place[static_cast<std::size_t>(smaller)] = static_cast<int>(smaller_at.size());
+    place[static_cast<std::size_t>(larger)] = static_cast<int>(pairs.size() + larger_at.size());
+    smaller_at.push_back(smaller);
+    larger_at.push_back(larger);
+  }
+  for (int i = 0; i < map.outputs(); ++i) {
+    int& at = place[static_cast<std::size_t>(i)];
+    if (at >= 0) continue;
+    at = static_cast<int>(2 * pairs.size() + others.size());
+    others.push_back(i);
+  }
+  AffineMap base = selected(map, smaller_at), rest = selected(map, others);
+  const AffineMap difference = sum_of(selected(map, larger_at), base, -1);
+  AffineMap opposite = difference;
+  scale_rows(opposite, {{-1, 0}});
+  const AffineMap rectified = relu(node, stacked({&difference, &opposite}), name, {&base, &rest});
+  std::vector<int> first, second;
+  for (int k = 0; k < difference.outputs(); ++k) {
+    first.push_back(k);
+    second.push_back(difference.outputs() + k);
+  }
+  const AffineMap larger = sum_of(base, selected(rectified, first), 1);
+  const AffineMap smaller = sum_of(base, selected(rectified, second), -1);
+  return selected(stacked({&smaller, &larger, &rest}), place);
+}
+
+/// Returns the sorted value beside a skip connection, past which the sorting itself cannot be stated.
+AffineMap OnnxGraph::sorted_with_relu(const Node& node, const OnnxValue& x, Activation activation) {
+  const int size = x.map.outputs();
+  notes_.insert(
+      "MaxMin and GroupSort beside a skip connection are written with ReLU: max(a, b) = b + relu(a - b)");
+  std::vector<std::pair<int, int>> pairs;
+  std::vector<int> which;
+  if (activation == Activation::kMaxMinHalves) {
+    for (int i = 0; i < size / 2; ++i) pairs.emplace_back(size / 2 + i, i);
+    return ordered(node, x.map, x.name, pairs);
+  }
+  if (activation == Activation::kMaxMinPairs) {
+    for (int i = 0; i < size; i += 2) pairs.emplace_back(i + 1, i);
+    for (int i = 0; i < size; i += 2) which.push_back(i);
+    for (int i = 1; i < size; i += 2) which.push_back(i);
+    return selected(ordered(node, x.map, x.name, pairs), which);
+  }
+  const int group = function_of(activation).group;
+  if (group > kLargestGroupWithRelu)
+    throw OperatorRefusal{"sorts groups of more than 8 numbers beside a skip connection",
+                          "leave the skip connection out, or train with MaxMin or ReLU"};
+  AffineMap result = x.map;
+  for (int round = 0; round < group; ++round) {  // neighbours in turn: odd-even transposition sort
+    pairs.clear();
+    for (int i = 0; i + 1 < size; ++i)
+      if (i % group + 1 < group && i % group % 2 == round % 2) pairs.emplace_back(i, i + 1);
+    if (!pairs.empty()) result = ordered(node, result, round == 0 ? x.name : "", pairs);
+  }
+  return result;
+}
+
 /// Applies the activation to the whole value `x`, in memory order.
 OnnxValue OnnxGraph::sorted(const Node& node, const OnnxValue& x, Activation activation) {
-  if (!needed_after(node).empty())
-    throw OperatorRefusal{"has a parallel skip connection, which is supported only for other activations",
-                          "leave the skip connection out, or train with ReLU"};
+  if (!needed_after(node).empty()) return {sorted_with_relu(node, x, activation), x.shape, ""};
   const AffineMap result = chain_.activated(x.map, activation, {}, layer_name(x.name));
   for (auto& [value_name, value] : values_) value.name.clear();
   return {result, x.shape, ""};

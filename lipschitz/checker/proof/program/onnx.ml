@@ -197,14 +197,59 @@ let smooth graph node =
   let name = layer_name graph x.first in
   let map, _ = with_layer graph node [] (Folding.activated graph.chain activation name x.map) in
   { map; shape = x.shape; first = "" }
+
+(* The rows of each pair in order, the larger one at its second place: max(a, b) = b + relu(a - b) and
+   min(a, b) = b - relu(b - a). Rows in no pair are carried. *)
+let ordered graph node map first pairs =
+  let pairs = Array.of_list pairs in
+  let smaller_at = Array.map fst pairs and larger_at = Array.map snd pairs and n = Array.length pairs in
+  let place = Array.make (Folding.size map) (-1) in
+  Array.iteri (fun k at -> place.(at) <- k) smaller_at;
+  Array.iteri (fun k at -> place.(at) <- n + k) larger_at;
+  let others = List.filter (fun k -> place.(k) < 0) (List.init (Folding.size map) Fun.id) in
+  List.iteri (fun k at -> place.(at) <- 2 * n + k) others;
+  let base = Folding.selected map smaller_at and rest = Folding.selected map (Array.of_list others) in
+  let difference = Folding.sum ~minus:true (Folding.selected map larger_at) base in
+  let both = Folding.stacked [ difference; Folding.negated difference ] in
+  match relu graph node both first [ base; rest ] with
+  | rectified, [ base; rest ] ->
+    let part k = Folding.selected rectified (Array.init n (fun i -> k * n + i)) in
+    let larger = Folding.sum base (part 0) and smaller = Folding.sum ~minus:true base (part 1) in
+    Folding.selected (Folding.stacked [ smaller; larger; rest ]) place
+  | _ -> assert false
+
+let largest_group_with_relu = 8
+(* Beside a skip connection, past which the sorting itself is not known. *)
+let sorted_with_relu graph node x sorting =
+  let n = Folding.size x.map in
+  let every condition = List.filter condition (List.init n Fun.id) in
+  match sorting with
+  | Proved.Halves ->
+    ordered graph node x.map x.first (List.map (fun k -> n / 2 + k, k) (every (fun k -> k < n / 2)))
+  | Proved.Pairs ->
+    let even = every (fun k -> k mod 2 = 0) and odd = every (fun k -> k mod 2 = 1) in
+    let pairs = List.map (fun k -> k + 1, k) even in
+    Folding.selected (ordered graph node x.map x.first pairs) (Array.of_list (even @ odd))
+  | Proved.Groups group ->
+    if group > largest_group_with_relu then
+      refuse ~hint:"leave the skip connection out, or train with MaxMin or ReLU"
+        "sorts groups of more than 8 numbers beside a skip connection";
+    (* Neighbours in turn: odd-even transposition sort. *)
+    let in_round round k = k mod group + 1 < group && k mod group mod 2 = round mod 2 in
+    let step map round = match every (in_round round) with
+      | [] -> map
+      | firsts ->
+        let first = if round = 0 then x.first else "" in
+        ordered graph node map first (List.map (fun k -> k, k + 1) firsts) in
+    List.fold_left step x.map (List.init group Fun.id)
 let sorted graph node =
   let x = value graph node 0 in
   let sorting, shape, which = Operators.sorting (integers graph) node x.shape in
-  if needed_behind graph node <> [] then
-    refuse ~hint:"leave the skip connection out, or train with ReLU"
-      "has a parallel skip connection, which is supported only for other activations";
-  let name = layer_name graph x.first in
-  let map, _ = with_layer graph node [] (Folding.activated graph.chain (Proved.Sorted sorting) name x.map) in
+  let map =
+    if needed_behind graph node <> [] then sorted_with_relu graph node x sorting
+    else
+      let name = layer_name graph x.first in
+      fst (with_layer graph node [] (Folding.activated graph.chain (Proved.Sorted sorting) name x.map)) in
   { map = Folding.selected map which; shape; first = "" }
 
 let applied graph node (map, shape) weight =
