@@ -1340,9 +1340,13 @@ def over(a, n):
 
 
 def exponential_of_minus(x):
-    """e^-x for a fraction x >= 0: 1 - y + y^2/2 - ..., y = x / 2^k <= 1/2, whose terms decrease, squared k times."""
+    """e^-x for a fraction x >= 0: 1 - y + y^2/2 - ..., y = x / 2^k <= 1/2, whose terms decrease, squared k times. At 0
+    it is no tighter than elsewhere, so that a range that ends at tanh(0) = 0 does not end at 0: the other checkers
+    enclose e^0 like this, and the slope of a ReLU behind it depends on that."""
     if x >= 267:
         return 0, 1
+    if x == 0:
+        return ONE - 1, ONE
     halvings = max(0, math.ceil(x)).bit_length() + 8
     y = enclosed(Fraction(x) / 2 ** halvings)
     total = term = (ONE, ONE)
