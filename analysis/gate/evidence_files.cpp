@@ -87,8 +87,8 @@ std::vector<EvidenceFile> evidence_files(const Policy& policy, const std::string
   }
   for (const std::string& path : release.flights) {
     try {
-      for (const residuals::FlightFiles& flight : residuals::find_flights({path}).flights)
-        for (const auto& [vehicle, log] : flight.logs) list.add("log", log);
+      for (const std::string& log : residuals::log_files(residuals::find_flights({path})))
+        list.add("log", log);
     } catch (const files::InputError&) {
       list.add("log", path);
     }

@@ -13,6 +13,7 @@
 #include "analysis/logs/formats/formats.h"
 #include "analysis/logs/interpretation.h"
 #include "analysis/logs/variable_names.h"
+#include "analysis/logs/vehicles_in_file.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
@@ -107,9 +108,14 @@ Log parse_log(std::istream& in, const std::string& path, const SignalMap& map) {
 
 Log read_log(const std::string& path, const SignalMap& map) {
   RawLog raw;
-  if (std::filesystem::is_directory(path)) {
+  const LogAddress address = address_of(path);
+  if (!address.vehicle.empty()) {
+    std::istringstream in(table_of(address));
+    raw = raw_of(in, path, map);
+  } else if (std::filesystem::is_directory(path)) {
     raw = read_raw(path);
   } else {
+    refuse_several_vehicles(path, map.empty());
     std::ifstream in = open_log(path);
     raw = raw_of(in, path, map);
   }
@@ -127,6 +133,7 @@ Log read_log(const std::string& path, const SignalMap& map) {
 }
 
 bool looks_like_log(const std::string& path) {
+  if (!address_of(path).vehicle.empty()) return true;
   if (std::filesystem::is_directory(path)) return is_log_folder(path);
   if (is_log_name(std::filesystem::path(path).filename().string())) return true;
   if (std::filesystem::path(path).extension() == ".csv") return true;

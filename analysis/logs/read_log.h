@@ -13,15 +13,17 @@ namespace swarmcert::logs {
 
 /// Reads a log. The format is recognised by its content: micro-SD binary (old, versions 1 and 2), those of
 /// formats/formats.h, else CSV.
+/// @param path a file, a folder that holds one log, or FILE#VEHICLE (vehicles_in_file.h)
 /// @param map meaning of the columns of a CSV file; with known_columns() they are recognised by name
 /// @throws files::InputError if the file cannot be read at all; states the offset or line. Damage inside a file is not
-///   an error: it is skipped and counted in Log::health.
+///   an error: it is skipped and counted in Log::health. Also if the file holds the logs of several vehicles and neither
+///   `path` nor `map` selects one of them.
 Log read_log(const std::string& path, const SignalMap& map = known_columns());
 
 /// Like read_log() for a stream; `path` is used only in messages.
 Log parse_log(std::istream& in, const std::string& path, const SignalMap& map = known_columns());
 
-/// Returns true if the file is named like a log or a CSV file, or starts like a micro-SD log.
+/// Returns true if the file is named like a log or a CSV file, starts like a micro-SD log, or is FILE#VEHICLE.
 bool looks_like_log(const std::string& path);
 
 /// Returns true if a CSV file can be read and its header names a time and a position, velocity or acceleration.

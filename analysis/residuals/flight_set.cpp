@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "analysis/logs/read_log.h"
+#include "analysis/logs/vehicles_in_file.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
@@ -48,7 +49,8 @@ bool is_table(const fs::path& path) {
 /// a time and a motion.
 bool is_log(const std::string& file) {
   if (parse_name(fs::path(file).filename().string()).run >= 0) return true;
-  return is_table(file) ? logs::is_flight_table(file) : logs::looks_like_log(file);
+  if (!is_table(file)) return logs::looks_like_log(file);
+  return logs::is_flight_table(file) || !logs::vehicles_in(file).empty();
 }
 
 struct Candidates {
@@ -61,6 +63,7 @@ std::string without_slash(const std::string& folder) {
 }
 
 Candidates candidates_below(const std::string& path) {
+  if (!logs::address_of(path).vehicle.empty()) return {{path}, {}};
   if (!fs::exists(path))
     throw files::InputError({path, "", "", "", "does not exist", "name files or folders of flights"});
   if (!fs::is_directory(path)) {
@@ -127,7 +130,12 @@ FoundLog named(const std::string& file, const LogRule& rule) {
     log.vehicle = vehicle_of(file);
     log.why = "one file";
   }
-  log.csv = is_table(file);
+  const logs::LogAddress address = logs::address_of(file);
+  if (!address.vehicle.empty()) {
+    log.vehicle = address.vehicle;
+    log.why = "one file of several vehicles";
+  }
+  log.csv = is_table(address.file);
   log.position_only = rule.use == LogRule::Use::kPosition;
   if (!rule.vehicle.empty()) log.vehicle = rule.vehicle;
   if (!rule.flight.empty()) {
@@ -231,7 +239,7 @@ LogRule rule_for(const LogRules& rules, const std::string& path) {
   return all;
 }
 
-FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules& rules) {
+FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules& rules, bool by_columns) {
   FoundFlights result;
   std::vector<FoundLog> logs;
   std::set<std::string> seen;
@@ -239,12 +247,14 @@ FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules&
     const Candidates found = candidates_below(path);
     result.skipped.insert(result.skipped.end(), found.skipped.begin(), found.skipped.end());
     for (const std::string& file : found.logs) {
-      if (!seen.insert(file).second) continue;
-      const LogRule rule = rule_for(rules, file);
-      if (rule.use == LogRule::Use::kNone)
-        result.left_out.push_back(file + ": excluded by flights.toml");
-      else
-        logs.push_back(named(file, rule));
+      for (const std::string& address : logs::addresses_in(file, by_columns)) {
+        if (!seen.insert(address).second) continue;
+        const LogRule rule = rule_for(rules, address);
+        if (rule.use == LogRule::Use::kNone)
+          result.left_out.push_back(address + ": excluded by flights.toml");
+        else
+          logs.push_back(named(address, rule));
+      }
     }
   }
   group_by_clock(logs);
@@ -284,6 +294,18 @@ FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules&
                              "'swarmcert inspect FILE' identifies a file"});
   }
   return result;
+}
+
+std::vector<std::string> log_files(const FoundFlights& found) {
+  std::vector<std::string> files;
+  for (const FlightFiles& flight : found.flights) {
+    for (const auto& [vehicle, path] : flight.logs) {
+      // The vehicles of one file follow one another.
+      const std::string file = logs::address_of(path).file;
+      if (files.empty() || files.back() != file) files.push_back(file);
+    }
+  }
+  return files;
 }
 
 Fleet read_fleet(const std::string& path) {

@@ -14,8 +14,9 @@ struct FlightFiles {
   std::string name;      ///< "21_swap_ss/00": folder, prefix and run
   std::string scenario;  ///< "21_swap_ss": folder and prefix
   int run = 0;
-  std::vector<std::pair<std::string, std::string>> logs;  ///< vehicle ("cf50") and path, in order of vehicles
-  std::string why;                                        ///< why these files form one flight
+  /// Vehicle ("cf50") and path, or FILE#VEHICLE, in order of vehicles.
+  std::vector<std::pair<std::string, std::string>> logs;
+  std::string why;  ///< why these files form one flight
   /// By path of a log: how far its clock is ahead of the first log's clock, if found from the flight itself.
   std::map<std::string, double> clock_offsets_s;
   std::set<std::string> position_only;  ///< paths of logs that flights.toml marks as position only
@@ -49,11 +50,18 @@ std::vector<std::string> patterns_without_log(const LogRules& rules, const Found
 /// content. Each log is one flight of one vehicle, unless
 /// - files are named `[<prefix>_]cf<id>_<run>`, with or without ".csv": folder, prefix and run identify the flight, and
 ///   if a vehicle has both a binary log and a CSV, the binary log is used;
+/// - a CSV file holds the logs of several vehicles, which get the addresses FILE#VEHICLE (logs/vehicles_in_file.h);
 /// - `rules` assign them to one flight;
 /// - logs of one folder have absolute times (of their clock or of a satellite receiver) that overlap by more than half.
 /// A vehicle without a given name is named after its file, `<vehicle>_log07`, or else after its folder.
 /// @throws files::InputError if a path does not exist, a given file is not a log, or no log is left.
-FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules& rules = {});
+/// @param by_columns false: a columns.toml names the columns, so that none belong to one of several vehicles by their
+///   names
+FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules& rules = {},
+                          bool by_columns = true);
+
+/// Returns the files that hold the logs of `found`, each once.
+std::vector<std::string> log_files(const FoundFlights& found);
 
 /// The entry of a vehicle in flights.toml.
 struct VehicleUse {

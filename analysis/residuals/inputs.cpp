@@ -158,7 +158,7 @@ Inputs read_inputs(const InputArguments& arguments) {
     inputs.named_files.push_back(arguments.fleet);
   }
   inputs.words = arguments.flights;
-  inputs.found = find_flights(arguments.flights, inputs.log_rules);
+  inputs.found = find_flights(arguments.flights, inputs.log_rules, inputs.map.empty());
   read_models(arguments.models, inputs);
   const std::map<std::string, std::string> flown = flown_models(inputs);
   for (const auto& [vehicle, use] : inputs.fleet) {
@@ -240,9 +240,8 @@ std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& pro
 
 std::vector<std::string> Inputs::files() const {
   std::vector<std::string> all = named_files;
-  for (const FlightFiles& flight : found.flights) {
-    for (const auto& [vehicle, path] : flight.logs) all.push_back(path);
-  }
+  const std::vector<std::string> logs = log_files(found);
+  all.insert(all.end(), logs.begin(), logs.end());
   return all;
 }
 

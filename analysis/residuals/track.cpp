@@ -9,6 +9,7 @@
 
 #include "analysis/logs/flight_story.h"
 #include "analysis/logs/read_log.h"
+#include "analysis/logs/vehicles_in_file.h"
 #include "analysis/residuals/published_vehicle.h"
 #include "analysis/residuals/smoothing_window.h"
 #include "nn/base/input_error.h"
@@ -328,8 +329,10 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
     track.health = log.health;
     onsets.push_back(onsets_s(log));
     track.has_reference_clock = all.empty();
-    track.has_absolute_clock =
-        !rules.published && !all.empty() && log.epoch_s > 0 && all.front().cached->log.epoch_s > 0;
+    const bool is_of_one_file =
+        !all.empty() && logs::address_of(path).file == logs::address_of(tracks.front().path).file;
+    track.has_absolute_clock = !rules.published && !all.empty() &&
+                               (is_of_one_file || (log.epoch_s > 0 && all.front().cached->log.epoch_s > 0));
     if (track.has_absolute_clock)
       track.clock_offset_s = all.front().cached->log.epoch_s - log.epoch_s;
     else if (flight.clock_offsets_s.count(path) == 1)

@@ -65,7 +65,7 @@ struct TrackHead {
   double clock_offset_s = 0;        ///< relative to the clock of the first vehicle
   int clock_onsets = 0;  ///< number of common starts of a trajectory it is based on; 0: not estimated
   bool has_reference_clock = false;  ///< the first log of its flight
-  bool has_absolute_clock = false;   ///< the offset is the difference of two absolute clocks
+  bool has_absolute_clock = false;  ///< the offset is the difference of two absolute clocks, or 0 in one file
 };
 
 struct Track : TrackHead {

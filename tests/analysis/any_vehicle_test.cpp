@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <sstream>
 
 #include "analysis/residuals/inputs.h"
 #include "analysis/run.h"
@@ -181,6 +182,33 @@ TEST(Clocks, OffsetsOfLogsWithAbsoluteTimesAreTheDifferencesOfTheirClocks) {
   const files::Json json = json_of(folder, "compare .", "compare");
   EXPECT_EQ(json["clocks"]["absolute"], 1);
   EXPECT_EQ(json["flights"][1]["clock"], "absolute");
+}
+
+TEST(SeveralVehicles, OneFileIsTheFlightThatFilesOfTheirOwnAre) {
+  const ScratchFolder folder;
+  write_text(folder / "m.toml", hexacopter());
+  std::filesystem::create_directory(folder.path() / "own");
+  std::string all;
+  for (int v = 1; v <= 2; ++v) {
+    const std::string own = hexacopter_csv(1, 0, 0.7 * v);
+    write_text(folder / ("own/cf" + std::to_string(v) + "_00.csv"), own);
+    std::istringstream lines(own);
+    bool is_header = true;
+    for (std::string line; std::getline(lines, line); is_header = false) {
+      if (!is_header || v == 1) all += (is_header ? "cf," : std::to_string(v) + ",") + line + "\n";
+    }
+  }
+  std::filesystem::create_directory(folder.path() / "one");
+  write_text(folder / "one/run.csv", all);
+  files::Json own = json_of(folder, "compare m.toml own", "compare"),
+              one = json_of(folder, "compare m.toml one", "compare");
+  EXPECT_EQ(one["overall"], own["overall"]);
+  EXPECT_EQ(one["compositions"], own["compositions"]) << "each vehicle is the neighbour of the other";
+  EXPECT_EQ(one["clocks"]["absolute"], 1) << "one file has one clock";
+  EXPECT_EQ(one["inputs"].size() + 1, own["inputs"].size()) << "the file counts once";
+  const files::Json seen = json_of(folder, "inspect one/run.csv", "inspect");
+  ASSERT_EQ(seen["flights"].size(), 1u);
+  EXPECT_EQ(seen["flights"][0]["logs"][1]["file"], "one/run.csv#cf2");
 }
 
 TEST(Keep, DamagedLogsAreLeftOutOfFitsAndNamedUnlessTheyAreKept) {

@@ -19,6 +19,7 @@
 #include "analysis/commands/shared/collection_table.h"
 #include "analysis/logs/columns_draft.h"
 #include "analysis/logs/read_log.h"
+#include "analysis/logs/vehicles_in_file.h"
 #include "analysis/residuals/flight_set.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
@@ -267,16 +268,17 @@ files::Json inspect_other(const std::string& path, const InspectOptions& options
   }
 }
 
-/// Returns files unchanged and folders as the logs below them, and reports which logs were taken as one flight and why.
-std::vector<std::string> expanded(const std::vector<std::string>& words, files::Json& flights,
-                                  files::Json& skipped) {
+/// Returns files of one log unchanged, folders as the logs below them, and files of several vehicles as their logs, and
+/// reports which logs were taken as one flight and why.
+std::vector<std::string> expanded(const std::vector<std::string>& words, bool by_columns,
+                                  files::Json& flights, files::Json& skipped) {
   std::vector<std::string> paths;
   for (const std::string& word : words) {
-    if (!std::filesystem::is_directory(word)) {
+    if (!std::filesystem::is_directory(word) && logs::vehicles_in(word, by_columns).empty()) {
       paths.push_back(word);
       continue;
     }
-    const residuals::FoundFlights found = residuals::find_flights({word});
+    const residuals::FoundFlights found = residuals::find_flights({word}, {}, by_columns);
     for (const residuals::FlightFiles& flight : found.flights) {
       files::Json members = files::Json::array();
       for (const auto& [vehicle, path] : flight.logs) {
@@ -327,9 +329,10 @@ int run_inspect(InspectOptions options, const CommonOptions& common) {
   refuse_folder(common, options.report);
   if (!options.columns_draft.empty()) write_draft(options, common);
   files::Json found = files::Json::array(), flights = files::Json::array(), skipped = files::Json::array();
-  const std::vector<std::string> paths = expanded(options.files, flights, skipped);
+  const std::vector<std::string> paths = expanded(options.files, options.columns.empty(), flights, skipped);
   const bool in_table = paths.size() > options.files.size();
-  std::vector<std::string> readable;
+  std::vector<std::string> readable;  ///< files
+  std::size_t num_readable = 0;       ///< logs and other files
   Seen seen;
   LogsInOrder in_order(paths, options, common.jobs);
   for (std::size_t i = 0; i < paths.size(); ++i) {
@@ -345,7 +348,9 @@ int run_inspect(InspectOptions options, const CommonOptions& common) {
       found.push_back({{"file", path}, {"kind", "unreadable"}, {"reason", error.what()}});
       continue;
     }
-    readable.push_back(path);
+    const std::string file = logs::address_of(path).file;
+    if (readable.empty() || readable.back() != file) readable.push_back(file);
+    ++num_readable;
   }
   const std::vector<CollectionRow> rows = collection_rows(options.files, seen.outcomes);
   if (common.prints_text()) {
@@ -365,7 +370,7 @@ int run_inspect(InspectOptions options, const CommonOptions& common) {
     if (common.prints_text()) fmt::print("Report: {}\n", page);
   }
   write_result(common, result);
-  return readable.size() == paths.size() ? kDone : kBadInput;
+  return num_readable == paths.size() ? kDone : kBadInput;
 }
 
 }  // namespace

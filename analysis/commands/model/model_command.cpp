@@ -30,13 +30,12 @@ int run_model(const ModelOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, options.output);
   residuals::LogRules rules;
   if (!options.fleet.empty()) rules = residuals::read_log_rules(options.fleet);
-  const residuals::FoundFlights found =
-      residuals::find_flights({options.words.begin() + 1, options.words.end()}, rules);
+  const residuals::FoundFlights found = residuals::find_flights(
+      {options.words.begin() + 1, options.words.end()}, rules, options.columns.empty());
   std::map<std::string, double> masses_kg;
-  std::vector<std::string> inputs;
+  std::vector<std::string> inputs = residuals::log_files(found);
   for (const residuals::FlightFiles& flight : found.flights) {
     for (const auto& [vehicle, path] : flight.logs) {
-      inputs.push_back(path);
       const residuals::LogRule rule = residuals::rule_for(rules, path);
       if (rule.mass_kg > 0) masses_kg[path] = rule.mass_kg;
     }
