@@ -302,6 +302,11 @@ void print_grouping(const files::Json& flights, const files::Json& skipped) {
                flight["name"].get<std::string>(), flight["logs"].size());
   }
   for (const auto& [why, count] : reasons) fmt::print("{}: {}\n", counted(count, "flight"), why);
+  if (reasons["one file"] > 1) {
+    fmt::print(
+        "(If some of these vehicles flew together, effects of neighbours need their logs as one flight: name "
+        "them [<prefix>_]cf<id>_<run>, or group them in a flights.toml.)\n");
+  }
   if (!skipped.empty()) fmt::print("Skipped, no flight logs: {}\n", counted(skipped.size(), "file"));
 }
 
