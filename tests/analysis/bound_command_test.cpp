@@ -1,4 +1,5 @@
 // bound as a user runs it: theorem, biases, estimates, float32, report.
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -364,6 +365,18 @@ TEST(BoundCommand, OptionsThatWouldChangeNothingAreRefused) {
     const Outcome outcome = run_shell("swarmcert bound" + kFlown + options, folder.path());
     EXPECT_EQ(outcome.exit_code, 2) << options << outcome.output;
     EXPECT_NE(outcome.output.find("--"), std::string::npos) << options << outcome.output;
+  }
+}
+
+TEST(BoundCommand, ThePageShowsTheTotalsOfTheResultWithEveryPart) {
+  const ScratchFolder folder;
+  const Json json = json_of(folder, "bound" + kFlown + " --amplitude 0.1 --report r");
+  const std::string page = read_text(folder / "r/report.html");
+  ASSERT_FALSE(json["bounds"].empty());
+  for (const Json& row : json["bounds"]) {
+    EXPECT_GT(row["total"].get<double>(), row["minimum"].get<double>())
+        << "float32 arithmetic adds something";
+    EXPECT_NE(page.find(fmt::format(">{:.6g}<", row["total"].get<double>())), std::string::npos) << row;
   }
 }
 

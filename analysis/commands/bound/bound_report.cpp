@@ -140,15 +140,22 @@ std::string write_bound_report(const Tracking& input, const LoadedDisturbance& d
     for (const AxisBounds& row : tracking.bounds) {
       rows.push_back({axis_name(row.axis), name(row.channel), name(row.loop), cell(row.bounds.by_rate),
                       cell(row.bounds.by_amplitude), cell(row.bounds.by_edges), cell(row.bounds.by_impulse),
-                      cell(row.bounds.by_both), row.clamp.never_acts ? "no" : "may", cell(row.least())});
+                      cell(row.bounds.by_both), row.clamp.never_acts ? "no" : "may",
+                      cell(row.staircase_m + row.float32_m), cell(row.total_m())});
     }
-    report.table(
-        {"axis", "channel", "loop", "rate", "amplitude", "edge", "impulse", "both", "clamp acts", "least"},
-        rows);
-    std::vector<Bar> least;
+    report.table({"axis", "channel", "loop", "rate", "amplitude", "edge", "impulse", "amplitude and rate",
+                  "clamp acts", "staircase and float32", "total"},
+                 rows);
+    report.paragraph(
+        "The total is the smallest bound that holds, plus the errors due to a learned force that is updated "
+        "in steps "
+        "and to float32 arithmetic. If the integrator's clamp may act, only bounds that allow for it hold; "
+        "they are in "
+        "the result, not in this table.");
+    std::vector<Bar> totals;
     for (const AxisBounds& row : tracking.bounds)
-      if (std::isfinite(row.least())) least.push_back({label(row), row.least(), kNone, kNone});
-    report.bars("bounds", least, "bound on the error [m]", "The smallest bound of each row above.");
+      if (std::isfinite(row.total_m())) totals.push_back({label(row), row.total_m(), kNone, kNone});
+    report.bars("bounds", totals, "bound on the error [m]", "The total of each row above.");
     for (int axis = 0; axis < 3; ++axis) add_tube_plot(report, input, disturbance.source.axis[axis], axis);
   }
   if (local_tube) add_local_tube_plot(report, *local_tube, result["local_tube"]);
