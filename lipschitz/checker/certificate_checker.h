@@ -19,7 +19,7 @@ class CertificateChecker {
  public:
   CertificateChecker(const files::Json& certificate, const files::Network& network)
       : certificate_(certificate),
-        network_(certificate.at("network").at("as") == "float32" ? files::as_float32(network) : network),
+        network_(is_of_float32(certificate) ? files::as_float32(network) : network),
         parts_(files::parts(network_)) {}
   CheckResult run();
 
@@ -30,6 +30,8 @@ class CertificateChecker {
   static constexpr long kMostNeighbours = 1000000;
 
   // check.cpp
+  /// Returns whether the certificate states that the weights are rounded to float32.
+  static bool is_of_float32(const Json& certificate);
   void check_weights(const Json& named);
   /// Requires null, or for each named network one interval per input, whether or not a bound uses it.
   void check_boxes(const Json& boxes) const;

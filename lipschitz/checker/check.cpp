@@ -72,18 +72,26 @@ CheckResult CertificateChecker::run() {
   return {true, reason, spectral_norms_, upper_bounds_, lower_bounds_, on_boxes_, values_};
 }
 
+bool CertificateChecker::is_of_float32(const Json& certificate) {
+  require(certificate.contains("network"), "certificate lacks field network");
+  const Json& named = certificate["network"];
+  require(named.is_object(), "network is not an object");
+  require(named.contains("as"), "network lacks field as");
+  return named["as"] == "float32";
+}
+
 void CertificateChecker::check_weights(const Json& named) {
   files::require_keys(named, {"description_sha256", "weights", "as"}, "network");
   require(named["as"].is_null() || named["as"] == "float32", "network.as is unknown");
   require(named["description_sha256"] == network_.sha256,
-          "network.description_sha256 is of another network.toml");
+          "network.description_sha256 differs: the certificate was made for another network");
   require(named["weights"].size() == parts_.size(), "network.weights lists another number of networks");
   for (const auto& [part, weights] : parts_) {
     const Json& entry = named["weights"].at(part.name());
     const std::string where = "network.weights." + part.name();
     files::require_keys(entry, {"sha256", "precision", "chain", "samples"}, where);
     require(entry["sha256"] == weights->sha256 && entry["precision"] == files::name(weights->precision),
-            where + " is of another file than " + weights->path);
+            where + " differs: the certificate was made for other weights than " + weights->path);
     check_chain(entry["chain"], part);
     check_samples(entry["samples"], where + ".samples");
   }
@@ -383,6 +391,11 @@ files::Network with_stated_activations(const files::Json& certificate, files::Ne
 CheckResult check(const files::Json& certificate, const files::Network& network) {
   try {
     return CertificateChecker(certificate, network).run();
+  } catch (const files::Json::exception& fault) {
+    // "[json.exception.type_error.302] type must be string, but is null"
+    const std::string text = fault.what();
+    return {false, "a field is missing or of another type: " + text.substr(text.find("] ") + 2), 0, 0, 0, 0,
+            0};
   } catch (const std::exception& fault) {
     return {false, fault.what(), 0, 0, 0, 0, 0};
   }

@@ -224,7 +224,10 @@ def number(decimal, text, where):
 
 def require_keys(value, keys, where):
     require(isinstance(value, dict), f"{where} is not an object")
-    require(set(value) == set(keys), f"{where} has other fields: {sorted(set(value) ^ set(keys))}")
+    for key in sorted(set(value) - set(keys)):
+        raise Rejected(f"{where} has unknown field {key}")
+    for key in sorted(set(keys) - set(value)):
+        raise Rejected(f"{where} lacks field {key}")
 
 
 def encode(value):
@@ -1679,13 +1682,14 @@ class Checker:
         if named["as"] == "float32":
             for weights in self.network.parts.values():
                 weights.round_to_float32()
-        require(named["description_sha256"] == self.network.sha256, "another network.toml")
+        require(named["description_sha256"] == self.network.sha256,
+                "network.description_sha256 differs: the certificate was made for another network")
         require(set(named["weights"]) == set(self.network.parts), "other networks")
         for name, weights in self.network.parts.items():
             entry, where = named["weights"][name], f"network.weights.{name}"
             require_keys(entry, ["sha256", "precision", "chain", "samples"], where)
             require((entry["sha256"], entry["precision"]) == (weights.sha256, weights.precision),
-                    f"{where} is of another file")
+                    f"{where} differs: the certificate was made for other weights")
             if weights.activations is None and len(weights.layers) > 1:  # the file does not state them: the chain does
                 ops = [step["op"] for step in entry["chain"] if step["op"] not in ("clamp", "linear")]
                 try:

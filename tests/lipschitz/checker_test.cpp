@@ -213,7 +213,7 @@ TEST(Checker, RejectsOtherWeightsPhiForRhoAndAnotherDescription) {
   rejects([](Network& net) { net.rho["large"].precision = files::Precision::kFloat64; },
           "network.weights.rho:large");
   rejects([](Network& net) { std::swap(net.rho["small"], net.rho["large"]); }, "network.weights.rho");
-  rejects([](Network& net) { net.sha256[0] ^= 1; }, "description_sha256");
+  rejects([](Network& net) { net.sha256[0] ^= 1; }, "made for another network");
   rejects([](Network& net) { net.rho.erase("large"); }, "another number of networks");
   rejects([](Network& net) { net.output_unit = "N"; }, "unit");
 }
@@ -267,6 +267,9 @@ TEST(Checker, RejectsAnotherShapeOfEveryPart) {
   rejects([](Json& c) { c["laws"][0].erase("rho"); }, "lacks field rho");
   rejects([](Json& c) { c["extra"] = 1; });
   rejects([](Json& c) { c.erase("statement"); });
+  rejects([](Json& c) { c.erase("network"); }, "certificate lacks field network");
+  rejects([](Json& c) { c["network"] = Json::array(); }, "network is not an object");
+  rejects([](Json& c) { c["bounds"][0]["lower"] = Json::object(); }, "a field is missing or of another type");
   rejects([](Json& c) { c["layers"] = Json::array(); });
   rejects([](Json& c) { c["layers"].push_back(c["layers"][0]); });
   rejects([](Json& c) { std::swap(c["layers"][0], c["layers"][1]); });
@@ -293,7 +296,7 @@ TEST(Checker, RejectsAnotherShapeOfEveryPart) {
   rejects([](Json& c) { c["bounds"].back()["lower_witness"]["others"][0]["network"] = "rho:small"; });
   rejects([](Json& c) { c["layers"][0]["proof"]["lower_vector"].erase(0); });
   rejects([](Json& c) { c["schema"] = "swarmcert/certificate/2"; });
-  EXPECT_EQ(tried, 45);
+  EXPECT_EQ(tried, 48);
 }
 
 TEST(Checker, RoundsToFloat32WhereTheCertificateSaysSo) {

@@ -55,7 +55,7 @@ let check_weights (net : Network.t) named =
   let as_ = find "network" "as" named in
   require (as_ = Null || as_ = Text "float32") "network.as is unknown";
   require (find "network" "description_sha256" named = Text net.sha256)
-      "network.description_sha256 is of another network.toml";
+      "network.description_sha256 differs: the certificate was made for another network";
   let weights = find "network" "weights" named in
   require (List.length (members "network.weights" weights) = List.length net.parts)
       "network.weights lists another number of networks";
@@ -64,7 +64,7 @@ let check_weights (net : Network.t) named =
       let entry = find "network.weights" name weights in
       require_keys where [ "sha256"; "precision"; "chain"; "samples" ] entry;
       require (find where "sha256" entry = Text w.sha256 && find where "precision" entry = Text w.precision)
-        "%s is of another file than %s" where w.path;
+        "%s differs: the certificate was made for other weights than %s" where w.path;
       check_chain net name (find where "chain" entry) where;
       check_samples (find where "samples" entry) (where ^ ".samples")) net.parts
 
