@@ -13,7 +13,8 @@ std::string one_line(const InputFault& fault) {
     text += piece;
   };
   part(fault.where);
-  part(fault.value.empty() ? fault.field : fault.field + " = " + fault.value);
+  part(fault.field.empty() || fault.value.empty() ? fault.field + fault.value
+                                                  : fault.field + " = " + fault.value);
   part(fault.what);
   if (!fault.hint.empty()) text += "; " + fault.hint;
   for (char& c : text) {

@@ -1,5 +1,7 @@
 #include "stability/simulation/sampled_flight.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -12,9 +14,9 @@ int periods(double control_hz, double slow_hz, const char* what) {
   const double ratio = control_hz / slow_hz;
   const double whole = std::round(ratio);
   if (whole < 1 || std::abs(ratio - whole) > 1e-6 * whole) {
-    throw std::invalid_argument(std::string("the ") + what + " loop at " + std::to_string(slow_hz) +
-                                " Hz does not divide the attitude loop's rate of " +
-                                std::to_string(control_hz) + " Hz");
+    throw std::invalid_argument(
+        fmt::format("the rate of the {} loop, {:g} Hz, does not divide that of the attitude loop, {:g} Hz",
+                    what, slow_hz, control_hz));
   }
   return static_cast<int>(whole);
 }

@@ -98,6 +98,7 @@ TEST(Sha256, AgreesWithTheStandardsExamples) {  // FIPS 180-2, appendix B
 TEST(InputErrorMessage, IsOneLineOfTheFilledParts) {
   EXPECT_STREQ(InputError({"f", "line 2", "k", "3", "rule", "hint"}).what(), "f: line 2: k = 3: rule; hint");
   EXPECT_STREQ(InputError({"f", "", "", "", "rule", ""}).what(), "f: rule");
+  EXPECT_STREQ(InputError({"f", "", "", "448 bytes", "rule", ""}).what(), "f: 448 bytes: rule");
   EXPECT_STREQ(InputError({"", "", "k", "", "a\nb\x1b", ""}).what(), "k: a?b?");
   EXPECT_EQ(InputError({"f", "line 2", "k", "3", "rule", "hint"}).fault().value, "3");
   EXPECT_EQ(in_quotes(std::string(100, 'x')), "\"" + std::string(80, 'x') + "...\"");

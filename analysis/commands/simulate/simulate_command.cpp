@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 
@@ -222,7 +223,9 @@ int run_simulate(SimulateOptions options, const CommonOptions& common) {
 
 /// Empty if a simulation may last that long.
 std::string refusal_of_duration(const std::string& seconds) {
-  if (std::strtod(seconds.c_str(), nullptr) <= kLongestFlight_s) return {};
+  const double value_s = std::strtod(seconds.c_str(), nullptr);
+  if (value_s <= kLongestFlight_s) return {};
+  if (std::isnan(value_s)) return seconds + " is not a number of seconds";
   return fmt::format(
       "{} s is longer than a day ({:g} s); batteries last minutes, and the duration is in seconds", seconds,
       kLongestFlight_s);
@@ -232,7 +235,8 @@ void declare_swarm(CLI::App& app, SimulateOptions& options) {
   app.add_option("TASK", options.task, "Task to fly, see Tasks below")
       ->type_name(fmt::format("{{{}}}", fmt::join(stability::task_names(), ",")))
       ->required();
-  app.add_option("--vehicles", options.vehicles, "Number of vehicles")->check(CLI::Range(1, 1000));
+  app.add_option("--vehicles", options.vehicles, "Number of vehicles (default 1)")
+      ->check(CLI::Range(1, 1000));
   app.add_option("--model", options.models, "model.toml: one for all vehicles, or one for each")->required();
   app.add_option("--gains", options.gains, "gains.toml")->required();
   app.add_option("--network", options.network.file, "network.toml whose prediction the controller uses");
