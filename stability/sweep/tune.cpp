@@ -62,6 +62,42 @@ std::array<double, kNumConstraints> excesses(const TunedPoint& p, const TuneCons
 constexpr std::array<const char*, kNumConstraints> kConstraintNames = {"noise", "lag_limit", "rate", "effort",
                                                                        "limit_cycle"};
 
+/// Returns true if some oscillation keeps more than half of its amplitude over 10 cycles. Such a loop is no candidate,
+/// and its norms are expensive.
+bool rings(const AxisLoop& loop) {
+  const TransferFunction y = impulse_transfer(loop, Channel::kForce);
+  for (const std::complex<double>& pole : poles(sum(y.denominator, y.feedback))) {
+    if (std::abs(pole.imag()) > 90 * -pole.real()) return true;
+  }
+  return false;
+}
+
+/// Returns the effort gain of gains with finite norms; infinite for others. Costs as much as all norms together.
+double effort_of(const SampledLoop& loop, const GainNorms& norms) {
+  if (!std::isfinite(norms.amplitude)) return kInfinity;
+  AxisLoop acting = loop.plant;
+  acting.Ki = effective_Ki(loop);
+  return effort_gain(acting);
+}
+
+/// Returns everything of evaluate_gains() but the effort, which is infinite.
+TunedPoint without_effort(const SampledLoop& loop, TuneObjective objective) {
+  TunedPoint point;
+  point.Kp = loop.plant.Kp;
+  point.Kd = loop.plant.Kd;
+  point.Ki = loop.plant.Ki;
+  AxisLoop acting = loop.plant;
+  acting.Ki = effective_Ki(loop);
+  const bool is_candidate = spectral_radius(loop) < 1 && !rings(acting);
+  point.norms = is_candidate ? continuous_norms(acting, Channel::kForce)
+                             : GainNorms{kInfinity, kInfinity, kInfinity, kInfinity};
+  point.objective = objective_of(point.norms, objective);
+  point.noise_m_s2 = noise_deviation(loop, 1e-3, 0.05).command_m_s2;
+  point.lag_limit_s = lag_limit(acting);
+  point.effort = kInfinity;
+  return point;
+}
+
 class Search {
  public:
   Search(const SampledLoop& loop, const TuneOptions& options) : loop_(loop), options_(options) {}
@@ -71,7 +107,8 @@ class Search {
     loop.plant.Kp = std::exp(log_gains[0]);
     loop.plant.Kd = std::exp(log_gains[1]);
     loop.plant.Ki = dimension() == 3 ? std::exp(log_gains[2]) : 0;
-    TunedPoint point = evaluate_gains(loop, options_.objective);
+    TunedPoint point = without_effort(loop, options_.objective);
+    if (options_.constraints.most_effort > 0) point.effort = effort_of(loop, point.norms);
     if (options_.attitude) point.margins = margins_of(loop, *options_.attitude);
     return judged(std::move(point));
   }
@@ -163,34 +200,9 @@ const char* name(TuneObjective objective) {
   return "unknown";
 }
 
-namespace {
-
-/// Returns true if some oscillation keeps more than half of its amplitude over 10 cycles. Such a loop is no candidate,
-/// and its norms are expensive.
-bool rings(const AxisLoop& loop) {
-  const TransferFunction y = impulse_transfer(loop, Channel::kForce);
-  for (const std::complex<double>& pole : poles(sum(y.denominator, y.feedback))) {
-    if (std::abs(pole.imag()) > 90 * -pole.real()) return true;
-  }
-  return false;
-}
-
-}  // namespace
-
 TunedPoint evaluate_gains(const SampledLoop& loop, TuneObjective objective) {
-  TunedPoint point;
-  point.Kp = loop.plant.Kp;
-  point.Kd = loop.plant.Kd;
-  point.Ki = loop.plant.Ki;
-  AxisLoop acting = loop.plant;
-  acting.Ki = effective_Ki(loop);
-  const bool is_candidate = spectral_radius(loop) < 1 && !rings(acting);
-  point.norms = is_candidate ? continuous_norms(acting, Channel::kForce)
-                             : GainNorms{kInfinity, kInfinity, kInfinity, kInfinity};
-  point.objective = objective_of(point.norms, objective);
-  point.noise_m_s2 = noise_deviation(loop, 1e-3, 0.05).command_m_s2;
-  point.lag_limit_s = lag_limit(acting);
-  point.effort = is_candidate ? effort_gain(acting) : kInfinity;
+  TunedPoint point = without_effort(loop, objective);
+  point.effort = effort_of(loop, point.norms);
   return point;
 }
 
@@ -236,6 +248,7 @@ TuneResult tune(const SampledLoop& loop, const TuneOptions& options) {
   tuned.plant.Kp = result.best.Kp;
   tuned.plant.Kd = result.best.Kd;
   tuned.plant.Ki = result.best.Ki;
+  result.best.effort = effort_of(tuned, result.best.norms);
   result.best_sampled = sampled_norms(tuned, Channel::kForce, Instants::kSampling);
   const auto e = excesses(result.best, options.constraints);
   for (std::size_t i = 0; i < e.size(); ++i) {
