@@ -267,7 +267,7 @@ std::string write_bundle(const std::string& folder, const Policy& policy, const 
 
 BundleVerdict verify_bundle(const std::string& folder, bool rerun, const GateSettings& settings) {
   if (!fs::is_directory(folder))
-    throw InputError({folder, "", "", "", "is no folder", "name the folder that gate --bundle wrote"});
+    throw InputError({folder, "", "", "", "is not a folder", "name the folder that gate --bundle wrote"});
   BundleVerdict verdict;
   try {
     verify(fs::path(folder).lexically_normal(), rerun, settings, verdict);

@@ -191,13 +191,14 @@ std::optional<files::InputFault> read_csv(std::istream& in, const std::string& p
       ++health.damaged_lines;
       if (damage) return;
       const bool is_cell = fault->column < names.size();
-      damage = files::InputFault{path,
-                                 "line " + std::to_string(number),
-                                 is_cell ? names[fault->column] : "cells",
-                                 is_cell ? files::in_quotes(std::string(fault->cell)) : "",
-                                 is_cell ? "is no number" : "do not match the number of names in the header",
-                                 "times may be seconds, or dates like 2026-03-02T12:34:56.7; numbers have a "
-                                 "decimal point, or a decimal comma if commas do not separate cells"};
+      damage =
+          files::InputFault{path,
+                            "line " + std::to_string(number),
+                            is_cell ? names[fault->column] : "cells",
+                            is_cell ? files::in_quotes(std::string(fault->cell)) : "",
+                            is_cell ? "is not a number" : "do not match the number of names in the header",
+                            "times may be seconds, or dates like 2026-03-02T12:34:56.7; numbers have a "
+                            "decimal point, or a decimal comma if commas do not separate cells"};
     }
   };
   if (header.first_record) {

@@ -209,7 +209,7 @@ void recognise_by_map(const RawLog& log, const SignalMap& map, Recognition& foun
     }
     if (carried.columns[0] < 0) {
       throw files::InputError({log.path, "line 1", "column", files::in_quotes(source.column),
-                               "is no column of this log, but columns.toml names it",
+                               "is not a column of this log, but columns.toml names it",
                                files::did_you_mean(source.column, names)});
     }
     if (found.find(source.signal) == nullptr) found.groups.push_back(std::move(carried));

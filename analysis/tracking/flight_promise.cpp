@@ -83,7 +83,8 @@ std::vector<FlightClass> read_flight_classes(const std::string& path) {
   };
   if (!document.contains("flights") || !document["flights"].is_array()) refuse("flights", "is missing");
   if (document.value("unit", "N") != "N") {
-    throw files::InputError({path, "", "unit", files::in_quotes(document.value("unit", "")), "is no force",
+    throw files::InputError({path, "", "unit", files::in_quotes(document.value("unit", "")),
+                             "is not a unit of force",
                              "name vehicles with a mass, so that compare judges forces"});
   }
   const Json* const summary = document.contains("learning_error") ? &document["learning_error"] : nullptr;

@@ -39,7 +39,7 @@ void unite(Ranges& a, const Ranges& b) {
 
 double number(const Json& of, const char* key, const std::string& path, const std::string& field) {
   if (!of.is_object() || !of.contains(key) || !of[key].is_number())
-    refuse(path, field + "." + key, "", "is no number");
+    refuse(path, field + "." + key, "", "is not a number");
   return of[key].get<double>();
 }
 
@@ -211,7 +211,7 @@ double best_floor(const std::vector<const CellsOfFlight*>& flights, double level
 MeasuredTruth read_measured_truth(const std::string& path, const std::string& kind, double level) {
   const Json document = files::read_json(path, "swarmcert/compare/1");
   if (document.value("unit", "N") != "N")
-    refuse(path, "unit", files::in_quotes(document.value("unit", "")), "is no force");
+    refuse(path, "unit", files::in_quotes(document.value("unit", "")), "is not a unit of force");
   MeasuredTruth result;
   result.envelope = empty_envelope(document, path);
   result.mean_s = number(document["place_grid"], "mean_s", path, "place_grid");

@@ -103,7 +103,8 @@ void CertificateChecker::check_boxes(const Json& boxes) const {
   for (const auto& [part, box] : boxes.items()) {
     const std::optional<files::FunctionId> named = files::FunctionId::parse(part);
     const auto found = named ? parts_.find(*named) : parts_.end();
-    require(found != parts_.end() && !named->is_rho(), "box." + part + " is of no network with a box");
+    require(found != parts_.end() && !named->is_rho(),
+            "box." + part + " does not belong to a network with a box");
     files::require_keys(box, {"lower", "upper"}, "box." + part);
     const auto inputs = static_cast<std::size_t>(found->second->inputs());
     const std::vector<double> lower = files::parse_hex_floats(box["lower"]);
@@ -139,7 +140,7 @@ void CertificateChecker::check_samples(const Json& samples, const std::string& w
     const std::string text = json.get<std::string>();
     return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
   };
-  require(is_hash(samples["sha256"]), where + ".sha256 is no hash");
+  require(is_hash(samples["sha256"]), where + ".sha256 is not a hash");
   require(samples["count"].is_number_integer() && samples["count"] >= 1, where + ".count is not positive");
   const double tolerance = number(samples["tolerance"], samples["tolerance_hex"], where + ".tolerance");
   require(number(samples["largest_deviation"], samples["largest_deviation_hex"],
@@ -212,7 +213,7 @@ void CertificateChecker::check_bound(const Json& bound) {
   ++upper_bounds_;
   if (bound["lower_witness"].is_null())
     return require(bound["lower"].is_null() && bound["lower_hex"].is_null(),
-                   where + ": lower without a witness");
+                   where + ": lower has no witness");
   const double lower = number(bound["lower"], bound["lower_hex"], where + " lower");
   check_lower(bound, lower, scale, where + ": lower_witness");
   ++lower_bounds_;
@@ -280,14 +281,14 @@ CertificateChecker::Neighbours CertificateChecker::neighbours_of(const Json& bou
   const Neighbours neighbours = bound["neighbours"].get<Neighbours>();
   const files::FunctionId function = bound["function"].get<std::string>();
   require(function.is_set() && bound["domain"] == "box",
-          where + ": neighbours only of a set function on a box");
+          where + ": neighbours may be given only for a set function on a box");
   for (const auto& [kind, count] : neighbours)
     require(kind != files::kGroundKind && parts_.count(files::FunctionId::phi(kind)) == 1 && 1 <= count &&
                 count <= kMostNeighbours,
             where + ": impossible neighbours");
   require(!neighbours.empty() &&
               (function.input_part().is_ground_phi() || neighbours.count(function.phi_kind()) == 1),
-          where + ": the neighbour that moves is none of those listed");
+          where + ": the neighbour that moves is not among those listed");
   return neighbours;
 }
 
@@ -305,7 +306,7 @@ void CertificateChecker::check_law(const Json& law) {
   const double upper = number(law["upper"], law["upper_hex"], where + " upper");
   const Neighbours neighbours = law["neighbours"].get<Neighbours>();
   Neighbours terms = neighbours;
-  require(terms.count(files::kGroundKind) == 0, where + ": the ground is no neighbour");
+  require(terms.count(files::kGroundKind) == 0, where + ": the ground is not a neighbour");
   if (parts_.count(files::FunctionId::ground_phi()) == 1) terms[files::kGroundKind] = 1;
   require(law["domain"] == "box" || law["domain"] == "global", where + ": unknown domain");
   Dyadic sum, sum_of_squares;
@@ -315,7 +316,7 @@ void CertificateChecker::check_law(const Json& law) {
     const files::FunctionId function = files::FunctionId::set(kind, rho);
     const std::string any_number = key(function, block, {});
     require(proved_.count(any_number) == 1,
-            where + ": rests on a bound of " + function.name() + " that is not there");
+            where + ": rests on a bound of " + function.name() + " that is missing");
     Dyadic k = proved_.at(any_number);
     if (law["domain"] == "box") {
       const auto fewer = proved_.find(key(function, block, neighbours));

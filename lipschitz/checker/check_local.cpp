@@ -31,7 +31,8 @@ void CertificateChecker::check_others(const Json& others, const std::vector<file
     if (--counts.at(names[0].kind()) == 0) counts.erase(names[0].kind());
     if (parts_.count(files::FunctionId::ground_phi()) == 1) counts[files::kGroundKind] = 1;
   }
-  require(others.is_object() && others.size() == counts.size(), where + ": others lists other kinds");
+  require(others.is_object() && others.size() == counts.size(),
+          where + ": others does not list the kinds of the other neighbours");
   const auto rows = static_cast<std::size_t>(parts_.at(names[1])->layers.front().outputs);
   least.assign(rows, 0.0);
   most.assign(rows, 0.0);
@@ -83,7 +84,7 @@ void CertificateChecker::check_local(const Json& bound, double upper, const std:
     f = coupled_function(network_, function, block, scale, least, most);
   } else {
     require(proof["form"].is_null() == (names.size() == 1),
-            where + ": a form for set functions, and only for those");
+            where + ": a form must be given for set functions, and only for them");
     Matrix q(0, 0);
     if (names.size() == 2) q = checked_form(proof["form"], names.back(), where + ".form");
     f = local_function(network_, moved, block, scale, q);

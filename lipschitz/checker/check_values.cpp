@@ -24,7 +24,7 @@ bool at_most(const std::vector<Dyadic>& a, const std::vector<Dyadic>& b) {
 Bounded stated(const files::Json& json, std::size_t size, bool with_error, const std::string& where) {
   files::require_keys(json, {"lower", "upper", "error"}, where);
   require(json["error"].is_null() != with_error,
-          where + ": an error where there are input errors, and only there");
+          where + ": an error must be given if there are input errors, and only then");
   Bounded result{{exact(hex_floats_in(json["lower"])), exact(hex_floats_in(json["upper"]))}, {}};
   if (with_error) result.error = exact(hex_floats_in(json["error"]));
   require(result.values.lower.size() == size && result.values.upper.size() == size &&
@@ -55,7 +55,7 @@ Bounded check_layers(const files::Weights& weights, const files::Json& json, Bou
   require(json.is_array() && json.size() == weights.layers.size(), where + ": needs one entry per layer");
   const bool with_error = !input.error.empty();
   if (!weights.is_relu()) {
-    require(!with_error, where + ": a float32 error of a network with other activations than ReLU");
+    require(!with_error, where + ": a float32 error of a network with activations other than ReLU");
     check_enclosed_layers(weights, json, input.values, where);
     return stated(json.back(), static_cast<std::size_t>(weights.outputs()), false, where);
   }
@@ -97,7 +97,7 @@ void CertificateChecker::check_values(const Json& entry) {
     require(parts_.count(part) == 1, where + ": there is no network " + part.name());
   require(!network_.invariants, where + ": values of a function of rotation invariants");
   require(is_set ? !names[0].is_ground_phi() : function.is_plain(),
-          where + ": only of the network, or of a sum over neighbours");
+          where + ": possible only for the network, or for a sum over neighbours");
   const bool has_ground = is_set && parts_.count(files::FunctionId::ground_phi()) == 1;
   require(entry["neighbours"].is_number_integer(), where + ": neighbours is not an integer");
   const long neighbours = entry["neighbours"].get<long>();
@@ -106,7 +106,7 @@ void CertificateChecker::check_values(const Json& entry) {
   std::vector<files::FunctionId> inputs = {names[0]};
   if (has_ground) inputs.push_back(files::FunctionId::ground_phi());
   require(entry["networks"].is_object() && entry["networks"].size() == inputs.size() + (is_set ? 1 : 0),
-          where + ": networks lists others than the function has");
+          where + ": networks does not list the networks of the function");
   const bool with_error = !entry["input_error"].is_null();
   if (with_error)
     require(entry["input_error"].is_object() && entry["input_error"].size() == inputs.size(),
@@ -121,7 +121,8 @@ void CertificateChecker::check_values(const Json& entry) {
     const bool is_ground = part.is_ground_phi();
     terms.push_back({result, is_ground ? 1 : 0, is_ground ? 1 : neighbours});
   }
-  require(entry["sum"].is_null() != is_set, where + ": a sum of set functions, and only of those");
+  require(entry["sum"].is_null() != is_set,
+          where + ": a sum must be given for set functions, and only for them");
   if (is_set) result = check_sum(entry, terms, *parts_.at(names[1]), names[1].name(), where);
   const std::vector<Dyadic> lower = exact(files::parse_hex_floats(entry["lower"]));
   const std::vector<Dyadic> upper = exact(files::parse_hex_floats(entry["upper"]));
@@ -130,14 +131,14 @@ void CertificateChecker::check_values(const Json& entry) {
   const long silent = files::silent_up_to(network_, function, neighbours);
   const std::vector<Dyadic> zeros(lower.size());
   require(silent == 0 || (at_most(lower, zeros) && at_most(zeros, upper)),
-          where + ": the range lacks the 0 of neighbours among which the network is silent");
+          where + ": the range lacks 0, the output for neighbours for which the network is silent");
   require(silent == neighbours + 1 ||
               (at_most(lower, result.values.lower) && at_most(result.values.upper, upper)),
           where + ": the values leave the range");
   check_jump(entry, terms.front(), names, where);
   require(
       entry["float32_error"].is_null() != with_error && entry["float32_error_hex"].is_null() != with_error,
-      where + ": a float32 error where there are input errors, and only there");
+      where + ": a float32 error must be given if there are input errors, and only then");
   if (with_error) {
     const Dyadic claimed =
         number(entry["float32_error"], entry["float32_error_hex"], where + " float32_error");
@@ -151,16 +152,16 @@ void CertificateChecker::check_jump(const Json& entry, const Bounded& moved,
                                     const std::string& where) const {
   const bool is_set = names.size() == 2;
   require(entry["jump"].is_null() != is_set && entry["jump_hex"].is_null() != is_set,
-          where + ": a jump of set functions, and only of those");
+          where + ": a jump must be given for set functions, and only for them");
   if (!is_set) return;
   const Dyadic jump = number(entry["jump"], entry["jump_hex"], where + " jump");
   const auto bound = proved_.find(key(names[1], "all", {}));
-  require(bound != proved_.end(), where + ": rests on a bound of " + names[1].name() + " that is not there");
+  require(bound != proved_.end(), where + ": rests on a bound of " + names[1].name() + " that is missing");
   require(jump * jump >= bound->second * bound->second * largest_square(moved.values),
           where + ": claims less than the jump");
   const auto inputs = [&](const files::FunctionId& part) { return values_box(entry, part, where); };
   require(jump * jump >= silent_step_square(network_, entry["function"].get<std::string>(), inputs),
-          where + ": claims less than the step to neighbours among which the network is silent");
+          where + ": claims less than the step to neighbours for which the network is silent");
 }
 
 Intervals CertificateChecker::values_box(const Json& entry, const files::FunctionId& part,

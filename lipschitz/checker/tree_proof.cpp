@@ -56,7 +56,7 @@ class FormChecker {
     if (!forms_.empty() && inputs == 0) return "there are forms, but no rho";
     for (const Form& form : forms_) {
       if (form.q.size() != inputs * (inputs + 1) / 2 || form.t.size() != neurons)
-        return "a form is of another size";
+        return "a form has another size";
       const auto usable = [](double x) { return std::abs(x) <= 0x1p400; };
       if (!std::all_of(form.q.begin(), form.q.end(), usable) ||
           !std::all_of(form.t.begin(), form.t.end(), [&](double x) { return x >= 0 && usable(x); }))
@@ -209,7 +209,7 @@ TreeVerdict walk(const std::vector<HiddenLayer>& layers, const std::vector<Sides
     }
     const Part part = std::move(open.back());
     open.pop_back();
-    if (!part.decisions.empty()) return fails("a neuron is decided that nothing looks at");
+    if (!part.decisions.empty()) return fails("a neuron is decided, but the decision is not used");
     if (word.kind == 's') {
       if (open.size() > kDeepest + boxes.size()) return fails("the tree is too deep");
       fault = halve(part, word.index, open);
@@ -283,7 +283,7 @@ TreeVerdict check_range(const std::vector<HiddenLayer>& layers, const Row& lower
   const auto outputs = static_cast<std::size_t>(layers.back().outputs);
   if (layers.back().without_relu != layers.back().outputs || least.size() != outputs ||
       most.size() != outputs)
-    return {false, "the range is of something else", 0};
+    return {false, "the range belongs to something else", 0};
   const auto leaf = [&](std::size_t index, const Part& part) -> std::string {
     if (index != 0) return "a leaf of a range has no multipliers";
     for (std::size_t i = 0; i < outputs; ++i)

@@ -292,7 +292,7 @@ SlopeFunction slope_function(const files::Network& network, const files::Functio
   const files::FunctionId ground = files::FunctionId::ground_phi();
   std::size_t grounds = names[0] == ground ? 1 : 0;
   for (const files::FunctionId& part : others) {
-    if (!part.is_phi()) refuse(part.name() + " is no neighbour");
+    if (!part.is_phi()) refuse(part.name() + " is not a neighbour");
     grounds += part == ground ? 1 : 0;
     f.others.push_back(term(part));
   }

@@ -198,7 +198,7 @@ class SourceReader {
       Member* member = nullptr;
       for (Member& candidate : members)
         if (candidate.name == field) member = &candidate;
-      if (member == nullptr) scanner_.refuse(name + "." + field, "is no member of its type");
+      if (member == nullptr) scanner_.refuse(name + "." + field, "is not a member of its type");
       if (!member->values.empty()) scanner_.refuse(name + "." + field, "is initialised twice");
       scanner_.expect('=', field);
       const std::optional<std::uint64_t> count = element_count(member->shape);

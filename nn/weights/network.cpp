@@ -217,7 +217,7 @@ class NetworkReader {
     for (const std::string& name : names) {
       const std::size_t arrow = name.find('>');
       if (arrow == std::string::npos)
-        top_.refuse("silent", in_quotes(name), "is no composition",
+        top_.refuse("silent", in_quotes(name), "is not a composition",
                     "write the kinds of the neighbours and of the vehicle, e.g. \"large+small>small\"");
       const std::string own = name.substr(arrow + 1);
       if (network_.rho.count(own) == 0)

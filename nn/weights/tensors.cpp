@@ -86,7 +86,7 @@ class Assembler {
         if (is_part(i, hint.ending, layer))
           refuse(i, shape_text(tensors_[i].shape),
                  std::string("belongs to ") + hint.kind +
-                     ", so the network is no chain of linear layers and ReLU",
+                     ", so the network is not a chain of linear layers and ReLU",
                  hint.hint);
       }
     }

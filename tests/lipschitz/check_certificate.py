@@ -1220,7 +1220,7 @@ def tree_fails(layers, boxes, text, proves, forms=None):
         part = open_parts.pop()
         low, high = part.low, part.high
         if part.decisions:
-            return f"before {word}: a neuron is decided that nothing looks at"
+            return f"before {word}: a neuron is decided, but the decision is not used"
         if word[0] == "t":
             if not proves(part, index):
                 return f"{word} does not prove its part"
@@ -1726,7 +1726,7 @@ class Checker:
         require(isinstance(boxes, dict) and boxes, "box is neither null nor an object with boxes")
         for part, box in boxes.items():
             require(part in self.network.parts and not part.startswith("rho:"),
-                    f"box.{part} is of no network with a box")
+                    f"box.{part} does not belong to a network with a box")
             require_keys(box, ["lower", "upper"], f"box.{part}")
             low, high = hex_floats(box["lower"]), hex_floats(box["upper"])
             require(len(low) == len(high) == self.network.parts[part].layers[0].inputs, f"box.{part} has another size")
@@ -1823,7 +1823,7 @@ class Checker:
             if bound["upper_method"] in ("branch", "local_sdp", "local_product") and boxed:
                 self.local.add(key)
         if bound["lower_witness"] is None:
-            require(bound["lower"] is None and bound["lower_hex"] is None, f"{where}: lower without a witness")
+            require(bound["lower"] is None and bound["lower_hex"] is None, f"{where}: lower has no witness")
             return
         lower = number(bound["lower"], bound["lower_hex"], where)
         self.check_lower(bound, Fraction(lower), scale, boxed, where)
@@ -1843,11 +1843,12 @@ class Checker:
         names = networks_of(bound["function"])
         require(isinstance(bound["neighbours"], dict), f"{where}: neighbours is not an object")
         neighbours = {kind: integer(count) for kind, count in bound["neighbours"].items()}
-        require(len(names) == 2 and bound["domain"] == "box", f"{where}: neighbours only of a set function on a box")
+        require(len(names) == 2 and bound["domain"] == "box",
+                f"{where}: neighbours may be given only for a set function on a box")
         require(all(kind != "ground" and f"phi:{kind}" in self.network.parts and 1 <= count <= 1000000
                     for kind, count in neighbours.items()), f"{where}: impossible neighbours")
         require(neighbours and (names[0] == "phi:ground" or names[0][4:] in neighbours),
-                f"{where}: the neighbour that moves is none of those listed")
+                f"{where}: the neighbour that moves is not among those listed")
         return neighbours
 
     def box_of(self, part, where, limited=True):
@@ -1877,14 +1878,15 @@ class Checker:
             counts = {kind: count for kind, count in counts.items() if count > 0}
             if "phi:ground" in self.network.parts:
                 counts["ground"] = 1
-        require(isinstance(others, dict) and len(others) == len(counts), f"{where}: others lists other kinds")
+        require(isinstance(others, dict) and len(others) == len(counts),
+                f"{where}: others does not list the kinds of the other neighbours")
         rows = self.network.parts[names[1]].layers[0].outputs
         least, most = [Fraction(0)] * rows, [Fraction(0)] * rows
         for kind, count in counts.items():
             part, here = f"phi:{kind}", f"{where} {kind}"
             require_keys(others[part], ["tree", "least", "most"], here)
             low, high = ([Fraction(x) for x in hex_floats(others[part][end])] for end in ("least", "most"))
-            require(len(low) == len(high) == rows, f"{here}: the range is of something else")
+            require(len(low) == len(high) == rows, f"{here}: the range belongs to something else")
             require(isinstance(others[part]["tree"], str), f"{here}: the tree is not text")
             layers = self.term_layers(part, names[1])
             reason = tree_fails(layers, [self.box_of(part, here)], others[part]["tree"],
@@ -1977,7 +1979,7 @@ class Checker:
             values.append([Fraction(x) for x in hex_floats([w for w in re.split("[ \t\n\v\f\r]+", form[key]) if w])])
         q, t = values
         require(len(q) == size * (size + 1) // 2 and len(t) == sum(len(layer.biases) for layer in rho_layers),
-                f"{where}: a form is of another size")
+                f"{where}: a form has another size")
         require(min(t) >= 0 and max(map(abs, q + t)) <= 2 ** 400,
                 f"{where}: a form is out of range, or a t of it negative")
         return [[q[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for j in range(size)] for i in range(size)], t
@@ -2071,7 +2073,7 @@ class Checker:
         require(law["status"] in ("finished", "interrupted"), f"{where}: unknown status")
         upper = Fraction(number(law["upper"], law["upper_hex"], where))
         require(isinstance(law["neighbours"], dict), f"{where}: neighbours is not an object")
-        require("ground" not in law["neighbours"], f"{where}: the ground is no neighbour")
+        require("ground" not in law["neighbours"], f"{where}: the ground is not a neighbour")
         terms = {kind: integer(count) for kind, count in law["neighbours"].items()}
         listed_ = frozenset(terms.items())
         if "phi:ground" in self.network.parts:
@@ -2102,7 +2104,7 @@ class Checker:
         require(not self.network.invariants, f"{where}: of a function of rotation invariants")
         is_set, is_float32 = len(names) == 2, entry["input_error"] is not None
         require(names[0] != "phi:ground" if is_set else names == ["network"],
-                f"{where}: only of the network, or of a sum")
+                f"{where}: possible only for the network, or for a sum")
         count = entry["neighbours"]
         require(type(count) is int, f"{where}: neighbours is not an integer")
         require(1 <= count <= 1000000 if is_set else count == 0, f"{where}: impossible number of neighbours")
@@ -2118,7 +2120,8 @@ class Checker:
                     f"{where}: a float32 error of weights that are not float32")
             require(all(self.network.parts[name].is_relu() for name in used),
                     f"{where}: a float32 error is for ReLU only")
-        require((entry["sum"] is not None) == is_set, f"{where}: a sum of set functions, and only of those")
+        require((entry["sum"] is not None) == is_set,
+                f"{where}: a sum must be given for set functions, and only for them")
         terms = []
         for name in inputs:
             result = self.follow_layers(name, entry, self.values_input(name, entry, where), where)
@@ -2146,7 +2149,7 @@ class Checker:
                 require(jump ** 2 >= self.largest_square(kinds, names[1], entry, where),
                         f"{where}: claims less than the step to a 0")
         require((entry["float32_error"] is not None) == (entry["float32_error_hex"] is not None) == is_float32,
-                f"{where}: a float32 error where there are input errors, and only there")
+                f"{where}: a float32 error must be given if there are input errors, and only then")
         if is_float32:
             error = Fraction(number(entry["float32_error"], entry["float32_error_hex"], where))
             require(error ** 2 >= sum(x * x for x in result.error), f"{where}: claims less than the float32 error")
@@ -2182,7 +2185,7 @@ class Checker:
         """Returns the bounds stated for a vector, which must enclose the computed ones."""
         require_keys(stated, ["lower", "upper", "error"], where)
         require((stated["error"] is not None) == is_float32,
-                f"{where}: an error where there are input errors, and only there")
+                f"{where}: an error must be given if there are input errors, and only then")
         values = []
         for key in ["lower", "upper"] + ["error"] * is_float32:
             require(isinstance(stated[key], str), f"{where}: {key} is not text")

@@ -262,7 +262,7 @@ TEST(Checker, RejectsAnotherShapeOfEveryPart) {
   rejects([](Json& c) { c["laws"][0]["neighbours"] = Json{{"nobody", 2}}; });
   rejects([](Json& c) { c["laws"][0]["neighbours"] = Json{{"small", 0}}; }, "impossible number");
   rejects([](Json& c) { c["laws"][0]["neighbours"] = Json{{"small", -2}}; }, "impossible number");
-  rejects([](Json& c) { c["laws"][0]["neighbours"]["ground"] = 1; }, "the ground is no neighbour");
+  rejects([](Json& c) { c["laws"][0]["neighbours"]["ground"] = 1; }, "the ground is not a neighbour");
   rejects([](Json& c) { c["laws"][0]["rho"] = "nobody"; });
   rejects([](Json& c) { c["laws"][0].erase("rho"); }, "lacks field rho");
   rejects([](Json& c) { c["extra"] = 1; });

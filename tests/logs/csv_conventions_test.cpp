@@ -105,10 +105,10 @@ std::string refusal_of_csv(const std::string& text) {
 
 TEST(CsvConventions, ATableOfWhichNoLineCanBeReadIsRefusedWithTheFirstOfThem) {
   EXPECT_EQ(refusal_of_csv("t,px,py,pz\nnoon,1,2,3\n1,2,3,oops\n").substr(0, 45),
-            "flight.csv: line 2: t = \"noon\": is no number;");
+            "flight.csv: line 2: t = \"noon\": is not a number;");
   EXPECT_EQ(refusal_of_csv("# a\n# t,px,py,pz\n1,2,3\n2,3,4\n").substr(0, 73),
             "flight.csv: line 3: cells: do not match the number of names in the header");
-  EXPECT_NE(refusal_of_csv("time,px,py,pz\n2026-13-02T10:15:07,1,2,3\n").find("is no number"),
+  EXPECT_NE(refusal_of_csv("time,px,py,pz\n2026-13-02T10:15:07,1,2,3\n").find("is not a number"),
             std::string::npos);
   EXPECT_NE(refusal_of_csv(std::string("\x1F\x8B\x08\x00", 4)).find("is compressed; unpack it"),
             std::string::npos);

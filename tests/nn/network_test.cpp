@@ -113,7 +113,7 @@ TEST(NetworkToml, SilentCompositionsAreOfKindsThatItHasInAnyOrderAndEachOnce) {
     return network_is_refused(silent(list), pieces);
   };
   EXPECT_TRUE(refused("[]", {"line 2: silent", "names no composition"}));
-  EXPECT_TRUE(refused("[\"small\"]", {"line 2: silent", "\"small\"", "is no composition"}));
+  EXPECT_TRUE(refused("[\"small\"]", {"line 2: silent", "\"small\"", "is not a composition"}));
   EXPECT_TRUE(refused("[\"small>tiny\"]", {"there is no rho.tiny"}));
   EXPECT_TRUE(refused("[\"tiny>small\"]", {"there is no phi.tiny"}));
   EXPECT_TRUE(refused("[\"ground>small\"]", {"there is no phi.ground of a neighbour"}));

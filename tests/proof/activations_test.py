@@ -189,7 +189,7 @@ def refuses_what_only_relu_has(folder, generator):
     lower = certify(net, "--activation", "tanh", rounds=1)
     assert check(lower, net).returncode == 0 and lower["bounds"][0]["lower_witness"]
     for keys, reason in ((["lower_witness"], "lower: expected text"),
-                         (["lower", "lower_hex"], "lower without a witness")):
+                         (["lower", "lower_hex"], "lower has no witness")):
         changed = copy.deepcopy(lower)
         for key in {"lower", "lower_hex", "lower_witness"} - set(keys):
             changed["bounds"][0][key] = None

@@ -312,7 +312,7 @@ def among_neighbours(certificate, net, folder):
 
     def more_neighbours(changed):
         changed["bounds"][places[-1]]["neighbours"][moved] += 1
-    refused(more_neighbours, "others lists other kinds", "of the tree", "is not decided")
+    refused(more_neighbours, "others does not list the kinds of the other neighbours", "of the tree", "is not decided")
     for k in range(3):
         def less(changed):
             law = changed["laws"][k]

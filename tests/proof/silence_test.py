@@ -152,7 +152,7 @@ def always_silent(folder):
 
 def descriptions(folder):
     certificate = folder / "certificate.json"
-    for silent, reason in (([], "names no composition"), (["small"], "is no composition"),
+    for silent, reason in (([], "names no composition"), (["small"], "is not a composition"),
                            (["small>large"], "there is no rho.large"), (["tiny>small"], "there is no phi.tiny"),
                            (["ground>small"], "there is no phi.ground"), (["+small>small"], "there is no phi."),
                            (["large+small>small", "small+large>small"], "twice")):

@@ -163,7 +163,7 @@ class RosbagReader {
   void demand_table(const std::string& name) {
     if (is_plain_table(name)) return;
     throw files::InputError({path_, "", "table", files::in_quotes(name), "is missing or cannot be read",
-                             "this SQLite database is no rosbag2, or it is damaged"});
+                             "this SQLite database is not a rosbag2 log, or it is damaged"});
   }
 
   void read_definitions() {
@@ -218,7 +218,7 @@ class RosbagReader {
   [[noreturn]] void refuse_columns(const std::string& table) const {
     throw files::InputError({path_, "", "table", files::in_quotes(table),
                              "does not have the columns of a rosbag2",
-                             "this SQLite database is no rosbag2, or it is damaged"});
+                             "this SQLite database is not a rosbag2 log, or it is damaged"});
   }
 
   void read_messages() {

@@ -151,7 +151,7 @@ class Written:
         os.mkdir(folder)
         for vehicle, signals in vehicles.items():
             if not (vehicle.startswith("cf") and vehicle[2:].isdigit()):
-                _refuse("vehicle", repr(vehicle), "is no name of a vehicle", "name it cf1, cf2, ...")
+                _refuse("vehicle", repr(vehicle), "is not the name of a vehicle", "name it cf1, cf2, ...")
             self._write_csv(os.path.join(folder, f"{vehicle}_00.csv"), signals)
         self.words.append(folder)
         self.columns = os.path.join(self._folder.name, "columns.toml")
@@ -176,7 +176,7 @@ class Written:
                 self._names[column] = unit
         lengths = {len(column) for column in columns.values()}
         if len(lengths) != 1:
-            _refuse("signals", str(sorted(lengths)), "must all have as many records", "")
+            _refuse("signals", str(sorted(lengths)), "must all have the same number of records", "")
         with open(path, "w", encoding="utf-8") as file:
             file.write(",".join(columns) + "\n")
             for row in zip(*(column.tolist() for column in columns.values())):

@@ -188,7 +188,7 @@ let trees_of ~where ~(layers : Weights.layer list) ~passes ~multipliers ~boxes t
     | Of_rho | Form _ -> fails reader here "there is no rho"
     | Decided (neuron, is_on, corner) ->
       (match place neuron 0 sizes with
-       | None -> fails reader here "a neuron is decided that nothing looks at"
+       | None -> fails reader here "a neuron is decided, but the decision is not used"
        | Some place when Array.length low > most_inputs_of_a_corner || passes place ->
          fails reader here "a neuron is not decided by its slopes"
        | Some (layer, neuron) ->
@@ -284,7 +284,8 @@ let read (net : Network.t) certificate bound ~where ~names ~moves ~scale ~upper 
   let weights = Functions.weights net moved in
   require (List.length weights.layers > 1) "%s: no hidden layer" where;
   let form_json = find where "form" json in
-  require ((form_json = Null) = (List.length names = 1)) "%s: a form for set functions, and only for those" where;
+  require ((form_json = Null) = (List.length names = 1))
+    "%s: a form must be given for set functions, and only for them" where;
   let radius = if is_global then begin
       let radius = Exact.hex_floats where (find where "radius" json) in
       require (List.length radius = Functions.inputs net moved && List.for_all (fun r -> r > 0.) radius)

@@ -112,7 +112,7 @@ let objects path text =
         expect '.';
         let field = word () in
         let member = match List.find_opt (fun m -> m.name = field) members with Some m -> m | None ->
-            fail "is no member of its type" in
+            fail "is not a member of its type" in
         if member.values <> [] then fail "is initialised twice";
         expect '='; array member member.shape;
         if accept ',' then fill () else expect '}'

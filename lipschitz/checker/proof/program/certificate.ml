@@ -41,7 +41,7 @@ let check_samples samples where =
   if samples <> Null then begin
     require_keys where [ "sha256"; "count"; "tolerance"; "tolerance_hex"; "largest_deviation";
         "largest_deviation_hex" ] samples;
-    require (is_hash (find where "sha256" samples)) "%s.sha256 is no hash" where;
+    require (is_hash (find where "sha256" samples)) "%s.sha256 is not a hash" where;
     let positive = match find where "count" samples with Number { value; is_integer = true } -> value >= 1. | _ ->
         false in
     require positive "%s.count is not positive" where;
@@ -75,7 +75,7 @@ let check_boxes net boxes =
     List.iter (fun (part, box) ->
         let where = "box." ^ shown part in
         require (List.mem_assoc part net.Network.parts && not (Functions.starts_with "rho:" part))
-            "%s is of no network with a box" where;
+            "%s does not belong to a network with a box" where;
         require_keys where [ "lower"; "upper" ] box;
         let lower = Exact.hex_floats where (find where "lower" box) and upper =
             Exact.hex_floats where (find where "upper" box) in

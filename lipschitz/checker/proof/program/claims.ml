@@ -123,13 +123,13 @@ let neighbours_of state where bound =
     let counts = List.sort compare (counts where (find where "neighbours" bound)) in
     let names = Functions.networks_of (text where (find where "function" bound)) in
     require (List.length names = 2 && find where "domain" bound = Text "box")
-        "%s: neighbours only of a set function on a box" where;
+        "%s: neighbours may be given only for a set function on a box" where;
     List.iter (fun (kind, n) ->
         require (kind <> "ground" && List.mem_assoc ("phi:" ^ kind) state.net.parts && 1 <= n && n <= most_neighbours)
           "%s: impossible neighbours" where) counts;
     let moves kind = List.hd names = "phi:" ^ kind in
     require (counts <> [] && (moves "ground" || List.exists (fun (kind, _) -> moves kind) counts))
-      "%s: the neighbour that moves is none of those listed" where;
+      "%s: the neighbour that moves is not among those listed" where;
     counts
   end
 
@@ -268,7 +268,7 @@ let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~
   state.upper_bounds <- state.upper_bounds + 1;
   match find where "lower_witness" bound with
   | Null -> require (find where "lower" bound = Null && find where "lower_hex" bound = Null)
-      "%s: lower without a witness" where
+      "%s: lower has no witness" where
   | witness ->
     let lower = Exact.of_float (Exact.number (where ^ " lower") (find where "lower" bound)
         (find where "lower_hex" bound)) in
@@ -308,7 +308,7 @@ let check_law state law =
   check_status where law;
   let upper = Exact.of_float (Exact.number (where ^ " upper") (find where "upper" law) (find where "upper_hex" law)) in
   let neighbours = List.sort compare (counts where (find where "neighbours" law)) in
-  require (not (List.mem_assoc "ground" neighbours)) "%s: the ground is no neighbour" where;
+  require (not (List.mem_assoc "ground" neighbours)) "%s: the ground is not a neighbour" where;
   let terms = List.sort compare (neighbours @ if Functions.has_ground state.net then [ "ground", 1 ] else []) in
   let domain = text where (find where "domain" law) in
   require (domain = "box" || domain = "global") "%s: unknown domain" where;
@@ -316,7 +316,7 @@ let check_law state law =
     require (1 <= count && count <= most_neighbours) "%s: impossible number of neighbours" where;
     let f = Printf.sprintf "set:%s:%s" kind rho in
     let any, source = match Hashtbl.find_opt state.uppers (f, block, []) with
-      | Some found -> found | None -> rejected "%s: rests on a bound of %s that is not there" where (shown f) in
+      | Some found -> found | None -> rejected "%s: rests on a bound of %s that is missing" where (shown f) in
     require (domain = "box" || not (Hashtbl.mem state.in_box (f, block)))
       "%s: rests on a bound that holds on a box only" where;
     match Hashtbl.find_opt state.uppers (f, block, neighbours) with

@@ -51,7 +51,8 @@ let others_of (net : Network.t) certificate ~where ~neighbours moved rho json =
       let n = if moved = "phi:" ^ kind then n - 1 else n in
       if n > 0 then Some (kind, 0, n) else None) neighbours in
   let counts = counts @ if moved <> "phi:ground" && Functions.has_ground net then [ "ground", 1, 1 ] else [] in
-  require (List.length (members where json) = List.length counts) "%s: others lists other kinds" where;
+  require (List.length (members where json) = List.length counts)
+    "%s: others does not list the kinds of the other neighbours" where;
   let rows = Weights.outputs (Weights.first_layer (Functions.weights net rho)) in
   List.map (fun (kind, fewest, most) ->
       let part = "phi:" ^ kind in
@@ -60,7 +61,7 @@ let others_of (net : Network.t) certificate ~where ~neighbours moved rho json =
       require_keys here [ "tree"; "least"; "most" ] range;
       let list key = List.map Exact.of_float (Exact.hex_floats here (find here key range)) in
       let least = list "least" and greatest = list "most" in
-      require (List.length least = rows && List.length greatest = rows) "%s: the range is of something else" here;
+      require (List.length least = rows && List.length greatest = rows) "%s: the range belongs to something else" here;
       let box, low, high = box_of net certificate part here in
       let tree = range_of here (Functions.weights net part) low high (text here (find here "tree" range)) in
       { Proved.phi = Functions.index net part; inputs_in = box; fewest = Z.of_int fewest; most = Z.of_int most },
@@ -109,7 +110,7 @@ let tree_of ~where ~(phi : Weights.t) ~(rho : Weights.t) ~added ~multipliers ~fo
     let of_rho = List.filter (fun (layer, _) -> layer >= before) waiting in
     let nothing_waits () =
       if of_rho <> [] || (not is_first && waiting <> []) then
-        fails reader here "a neuron is decided that nothing looks at" in
+        fails reader here "a neuron is decided, but the decision is not used" in
     match word with
     | Decided (neuron, is_on, corner) ->
       tree pending low high form said ~is_first found (decide low high here (neuron, is_on, corner) :: waiting)
@@ -184,7 +185,7 @@ let forms_of where (rho : Weights.t) json =
     require_keys (where ^ ".forms") [ "q"; "t" ] json;
     let q = hex_words where (find where "q" json) and t = hex_words where (find where "t" json) in
     require (List.length q = inputs * (inputs + 1) / 2 && List.length t = neurons)
-      "%s: a form is of another size" where;
+      "%s: a form has another size" where;
     require (List.for_all (fun x -> Float.abs x <= 0x1p400) q && List.for_all (fun x -> 0. <= x && x <= 0x1p400) t)
       "%s: a form is out of range, or a t of it negative" where;
     let rec rows k q = if k > inputs then [] else
@@ -212,7 +213,7 @@ let read (net : Network.t) certificate bound ~where ~names ~moves ~scale ~neighb
   let terms = List.map fst others and ranges = List.map snd others in
   let rows = Weights.outputs (Weights.first_layer rho) in
   let sums = match Proved.ends_of_terms rows terms (List.map fst ranges) with
-    | Some ends -> ends | None -> rejected "%s: the range is of something else" here in
+    | Some ends -> ends | None -> rejected "%s: the range belongs to something else" here in
   let middle (low, high) = (Proposal.to_float low +. Proposal.to_float high) /. 2. in
   let added = Array.of_list (List.map middle sums) in
   let tree, stated, leaves =

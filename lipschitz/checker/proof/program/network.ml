@@ -178,7 +178,7 @@ let read_silent path phis rhos json =
   let composition name =
     let refuse what = bad_input "%s: silent: %s: %s" path (shown name) what in
     match String.index_opt name '>' with
-    | None -> refuse "is no composition"
+    | None -> refuse "is not a composition"
     | Some arrow ->
       let own = String.sub name (arrow + 1) (String.length name - arrow - 1) in
       if not (List.mem_assoc ("rho:" ^ own) rhos) then refuse ("there is no rho." ^ own);

@@ -92,7 +92,7 @@ let parse path text =
     let count c = List.length (List.filter (( = ) c) (List.of_seq (String.to_seq (String.lowercase_ascii body)))) in
     let is_integer = String.for_all (fun c -> is_digit c || c = '_') body in
     if not (digit 0 && digit (String.length body - 1) && count 'e' <= 1) then fail "is no value that is read here";
-    String.iteri (fun k c -> if not (well_formed k c) then fail "is no number") body;
+    String.iteri (fun k c -> if not (well_formed k c) then fail "is not a number") body;
     if digit 1 && body.[0] = '0' then fail "a number begins with 0";
     let value = float_of_string (String.concat "" (String.split_on_char '_' word)) in
     if not (Float.is_finite value) then fail "a number is out of range";

@@ -13,7 +13,7 @@ let texts where ~size json =
 let stated where ~size ~with_error json =
   require_keys where [ "lower"; "upper"; "error" ] json;
   let error = find where "error" json in
-  require ((error <> Null) = with_error) "%s: an error where there are input errors, and only there" where;
+  require ((error <> Null) = with_error) "%s: an error must be given if there are input errors, and only then" where;
   let lower = texts where ~size (find where "lower" json) in
   let upper = texts where ~size (find where "upper" json) in
   List.combine lower upper, if with_error then texts where ~size error else []
@@ -59,7 +59,7 @@ let input (state : Claims.t) where name entry =
 let optional where entry key ~given =
   let decimal = find where key entry and hex = find where (key ^ "_hex") entry in
   require ((decimal <> Null) = given && (hex <> Null) = given)
-    "%s: %s where it has a meaning, and only there" where key;
+    "%s: %s must be given where it has a meaning, and only there" where key;
   if given then Some (Exact.of_float (Exact.number (where ^ " " ^ key) decimal hex)) else None
 
 let keys = [ "function"; "neighbours"; "domain"; "input_error"; "networks"; "sum"; "lower"; "upper"; "jump"; "jump_hex";
@@ -73,7 +73,7 @@ let check_jump (state : Claims.t) where phi ~box ~values rho jump =
   let reason = where ^ ": claims less than the jump" in
   let slope = match Hashtbl.find_opt state.uppers (rho, "all", []) with
     | Some (slope, Claims.Proved_here) -> slope
-    | _ -> rejected "%s: rests on a bound of %s that is not there" where (shown rho) in
+    | _ -> rejected "%s: rests on a bound of %s that is missing" where (shown rho) in
   require (Claims.at_most (Claims.times (Claims.times slope slope) (sum_of_squares values)) (Claims.times jump jump))
     "%s" reason;
   Claims.prove state (Jump_at_most (phi, box, Functions.index state.net rho, jump)) Proved.By_norm reason
@@ -103,7 +103,7 @@ let check_step (state : Claims.t) where entry ~silent phi rho jump =
     match Option.bind (Proved.terms_of boxes composition) (Proved.sum_ends state.accepted size) with
     | Some sum -> sum | None -> rejected "%s: no range of a term" where in
   let sums = List.map sum_of compositions in
-  let reason = where ^ ": claims less than the step to neighbours among which the network is silent" in
+  let reason = where ^ ": claims less than the step to neighbours for which the network is silent" in
   List.iter (fun sum ->
       let values = prove_exact state where rho sum in
       let square = sum_of_squares values in
@@ -117,7 +117,7 @@ let check (state : Claims.t) entry =
   require (not state.net.invariants) "%s: of a function of rotation invariants" where;
   let is_set = List.length names = 2 in
   require (if is_set then List.hd names <> "phi:ground" else f = "network")
-    "%s: only of the network, or of a sum over neighbours" where;
+    "%s: possible only for the network, or for a sum over neighbours" where;
   let count = match find where "neighbours" entry with
     | Number { value; is_integer = true } when Float.abs value <= 1e15 -> int_of_float value
     | _ -> rejected "%s: neighbours is not an integer" where in
@@ -128,7 +128,7 @@ let check (state : Claims.t) entry =
   let weights name = Functions.weights state.net name in
   let networks = find where "networks" entry in
   require (List.length (members where networks) = List.length (inputs @ rho))
-    "%s: networks lists others than the function has" where;
+    "%s: networks does not list the networks of the function" where;
   let with_error = find where "input_error" entry <> Null in
   if with_error then begin
     require (List.length (members where (find where "input_error" entry)) = List.length inputs)
@@ -136,7 +136,7 @@ let check (state : Claims.t) entry =
     require (List.for_all (fun name -> (weights name).precision = "float32") (inputs @ rho))
       "%s: a float32 error of weights that are not float32" where;
     require (List.for_all (Functions.is_relu state.net) (inputs @ rho))
-      "%s: a float32 error of a network with other activations than ReLU" where
+      "%s: a float32 error of a network with activations other than ReLU" where
   end;
   let bounds name = layers (where ^ ": " ^ name) (weights name) ~with_error (find where name networks) in
   let numbers key = List.map Exact.of_float (Exact.hex_floats where (find where key entry)) in
@@ -148,7 +148,7 @@ let check (state : Claims.t) entry =
   let jump = optional where entry "jump" ~given:is_set in
   let norm = Option.value ~default:Exact.zero (optional where entry "float32_error" ~given:with_error) in
   let sum = find where "sum" entry in
-  require ((sum <> Null) = is_set) "%s: a sum of set functions, and only of those" where;
+  require ((sum <> Null) = is_set) "%s: a sum must be given for set functions, and only for them" where;
   (match rho with
    | [] ->
      let p = Functions.index state.net f in
@@ -177,7 +177,7 @@ let check (state : Claims.t) entry =
      let silent = Functions.silent state.net rho and summed = List.map (fun (t, _, _) -> t) terms in
      let zeros = List.map (fun _ -> Exact.zero, Exact.zero) range in
      require (not (Proved.may_be_silent silent summed) || Proved.contains range zeros)
-       "%s: the range lacks the 0 of neighbours among which the network is silent" where;
+       "%s: the range lacks 0, the output for neighbours for which the network is silent" where;
      Claims.prove state (Sum_within (silent, summed, r, range)) (Proved.By_sum sums)
        (where ^ ": the values leave the range");
      let first, _, values = List.hd terms in

@@ -31,7 +31,7 @@ let read net certificate where names ~in_box ~neighbours ~moves json =
     require_keys (where ^ ".others") [ "network"; "x" ] json;
     let part = text where (find where "network" json) in
     require (List.length names = 2) "%s: slope: terms can only be summed in front of a rho" where;
-    require (Functions.starts_with "phi:" part) "%s: slope: %s is no neighbour" where (shown part);
+    require (Functions.starts_with "phi:" part) "%s: slope: %s is not a neighbour" where (shown part);
     part, point net certificate where ~in_box part (find where "x" json) in
   let others = List.map other (list where (find where "others" json)) in
   let here = moved :: List.map fst others in
