@@ -275,6 +275,19 @@ int Kinds::index(const std::string& kind) const {
   return found == names.end() ? -1 : static_cast<int>(found - names.begin());
 }
 
+namespace {
+
+/// Returns true if two logs have the same times and positions: no two vehicles do.
+bool have_same_records(const logs::Log& a, const logs::Log& b) {
+  return a.signals.position && b.signals.position && !a.samples.empty() &&
+         std::equal(a.samples.begin(), a.samples.end(), b.samples.begin(), b.samples.end(),
+                    [](const logs::Sample& one, const logs::Sample& other) {
+                      return one.time_us == other.time_us && one.position_m == other.position_m;
+                    });
+}
+
+}  // namespace
+
 std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
                                const std::string& fallback_kind, const Kinds& kinds,
                                const logs::SignalMap& map, const CutRules& rules, LogCache& cache,
@@ -291,6 +304,13 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
       continue;
     }
     const logs::Log& log = read->log;
+    const auto original = std::find_if(all.begin(), all.end(), [&](const LoadedLog& other) {
+      return have_same_records(other.cached->log, log);
+    });
+    if (original != all.end()) {
+      problems.push_back(path + ": left out: a copy of " + tracks[original->track].path);
+      continue;
+    }
     Track track;
     track.flight = flight.name;
     track.scenario = flight.scenario;

@@ -211,6 +211,19 @@ TEST(SeveralVehicles, OneFileIsTheFlightThatFilesOfTheirOwnAre) {
   EXPECT_EQ(seen["flights"][0]["logs"][1]["file"], "one/run.csv#cf2");
 }
 
+TEST(SeveralVehicles, ACopyOfALogIsNotASecondVehicle) {
+  const ScratchFolder folder;
+  write_text(folder / "m.toml", hexacopter());
+  std::filesystem::create_directory(folder.path() / "flights");
+  write_text(folder / "flights/cf1_00.csv", hexacopter_csv(1));
+  const files::Json alone = json_of(folder, "compare m.toml flights", "compare");
+  write_text(folder / "flights/cf01_00.csv", hexacopter_csv(1));
+  const files::Json json = json_of(folder, "compare m.toml flights", "compare");
+  EXPECT_EQ(json["overall"], alone["overall"]) << "counted twice, each at the place of the other";
+  ASSERT_EQ(json["problems"].size(), 1u);
+  EXPECT_NE(json["problems"][0].get<std::string>().find("a copy of"), std::string::npos);
+}
+
 TEST(Keep, DamagedLogsAreLeftOutOfFitsAndNamedUnlessTheyAreKept) {
   const ScratchFolder folder;
   write_text(folder / "sound.csv", hexacopter_csv(1));

@@ -167,8 +167,11 @@ void print_verdict(const IssCheckOptions& options, const IssCheck& check) {
                check.is_refuted() ? "VIOLATED" : "Exceeded", check.violations, run.kind, run.largest_m,
                run.at_s, shown_ratio(run), is_about_ball(run) ? "ball" : "transient bound");
   } else {
-    fmt::print("No violation found in {}{}.{}\n", counted(options.check.runs, "run"),
-               check.cancelled ? ", which were interrupted" : "",
+    const std::string runs = check.cancelled
+                                 ? fmt::format("{} finished before the interruption, of {}",
+                                               counted(check.runs.size(), "run"), options.check.runs)
+                                 : counted(options.check.runs, "run");
+    fmt::print("No violation found in {}.{}\n", runs,
                check.why_inconclusive().empty() ? " This is not a proof." : "");
   }
   const std::vector<std::string> why = check.why_inconclusive();
@@ -193,7 +196,8 @@ void print(const IssCheckOptions& options, const IssCheck& check,
       check.duration_s);
   if (check.delay_left_out_s > 0) {
     fmt::print(
-        "Not integrated: the delay of {} s. A loop with it may violate more; simulate and bound have it\n",
+        "Not integrated: the delay of {} s. A loop with the delay may violate more; simulate and bound "
+        "include it\n",
         check.delay_left_out_s);
   }
   fmt::print("  {:<14} {:>6} {:>11} {:>12} {:>16}\n", "disturbance", "runs", "violations", "worst ratio",
