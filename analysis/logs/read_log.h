@@ -16,8 +16,8 @@ namespace swarmcert::logs {
 /// @param path a file, a folder that holds one log, or FILE#VEHICLE (vehicles_in_file.h)
 /// @param map meaning of the columns of a CSV file; with known_columns() they are recognised by name
 /// @throws files::InputError if the file cannot be read at all; states the offset or line. Damage inside a file is not
-///   an error: it is skipped and counted in Log::health. Also if the file holds the logs of several vehicles and neither
-///   `path` nor `map` selects one of them.
+///   an error: it is skipped and counted in Log::health. Also if the file holds the logs of several vehicles and
+///   neither `path` nor `map` selects one of them.
 Log read_log(const std::string& path, const SignalMap& map = known_columns());
 
 /// Like read_log() for a stream; `path` is used only in messages.

@@ -362,10 +362,10 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
     const bool is_clock_known = track.has_reference_clock || track.has_absolute_clock ||
                                 track.clock_onsets > 0 || flight.clock_offsets_s.count(path) == 1;
     if (rules.fits && !rules.published && !is_clock_known) {
-      problems.push_back(fmt::format(
-          "{}: its clock could not be related to that of {} and is taken to be equal: no commanded movement "
-          "starts within 0.1 s of one there; effects of neighbours are judged with it",
-          path, tracks.front().path));
+      problems.push_back(
+          path +
+          ": its clock could not be related to that of the first log of its flight and is taken to be equal: "
+          "no commanded movement starts within 0.1 s of one there; effects of neighbours are judged with it");
     }
     tracks.push_back(std::move(track));
     all.push_back({std::move(read), tracks.size() - 1});

@@ -148,10 +148,8 @@ std::string write_bound_report(const Tracking& input, const LoadedDisturbance& d
                  rows);
     report.paragraph(
         "The total is the smallest bound that holds, plus the errors due to a learned force that is updated "
-        "in steps "
-        "and to float32 arithmetic. If the integrator's clamp may act, only bounds that allow for it hold; "
-        "they are in "
-        "the result, not in this table.");
+        "in steps and to float32 arithmetic. If the integrator's clamp may act, only bounds that allow for "
+        "it hold; they are in the result, not in this table.");
     std::vector<Bar> totals;
     for (const AxisBounds& row : tracking.bounds)
       if (std::isfinite(row.total_m())) totals.push_back({label(row), row.total_m(), kNone, kNone});

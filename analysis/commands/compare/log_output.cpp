@@ -44,8 +44,10 @@ void print_clocks(const Comparison& comparison) {
     return;
   }
   if (clocks.absolute > 0)
-    fmt::print("Clocks: {} of {} logs have absolute times, as the first of their flight.\n", clocks.absolute,
-               others);
+    fmt::print(
+        "Clocks: {} of {} logs have absolute times, or their file, in common with the first of their "
+        "flight.\n",
+        clocks.absolute, others);
   if (clocks.estimated > 0) {
     fmt::print(
         "Clocks: offsets of {} of {} logs estimated against the first of their flight, up to {:.1f} ms.\n",

@@ -354,7 +354,7 @@ int run_inspect(InspectOptions options, const CommonOptions& common) {
       continue;
     }
     const std::string file = logs::address_of(path).file;
-    if (readable.empty() || readable.back() != file) readable.push_back(file);
+    if (path == file || readable.empty() || readable.back() != file) readable.push_back(file);
     ++num_readable;
   }
   const std::vector<CollectionRow> rows = collection_rows(options.files, seen.outcomes);
