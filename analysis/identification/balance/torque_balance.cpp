@@ -19,8 +19,15 @@ constexpr double kTorqueBlock_s = 1;
 constexpr std::size_t kFewestTorqueBlocks = 10;
 
 /// Decides which of the two explains the data, and lists alternative explanations.
-void decide_torque_cause(double longest_m, double weight_N, TorqueBalance& balance) {
+/// @param is_surely_constant the torque explains most of the means, and surely more than the offset
+void decide_torque_cause(double longest_m, double weight_N, bool is_surely_constant, TorqueBalance& balance) {
   constexpr double kSurely_z = 2, kDiagonal = 0.5;
+  if (is_surely_constant &&
+      balance.torque_Nm.norm() - balance.torque_half_Nm.norm() > balance.least_torque_Nm &&
+      balance.torque_Nm.norm() <= longest_m * weight_N) {
+    balance.effect = "torque_bias";
+    return;
+  }
   const bool is_constant = balance.z < -kSurely_z;
   const Eigen::Vector2d size_m =
       is_constant ? Eigen::Vector2d(balance.torque_Nm / weight_N) : balance.offset_m;
@@ -33,6 +40,8 @@ void decide_torque_cause(double longest_m, double weight_N, TorqueBalance& balan
   if (!is_constant && both.minCoeff() > kDiagonal * both.maxCoeff())
     balance.rivals.emplace_back("rotor_thrust");
 }
+
+}  // namespace
 
 void fit_torques(const std::vector<TorqueBlock>& blocks, const stability::Model& model,
                  TorqueBalance& balance) {
@@ -49,7 +58,7 @@ void fit_torques(const std::vector<TorqueBlock>& blocks, const stability::Model&
   balance.offset_half_m = {offset_x.half, offset_y.half};
   balance.torque_Nm = {torque_x.value, torque_y.value};
   balance.torque_half_Nm = {torque_x.half, torque_y.half};
-  std::vector<double> gains;
+  std::vector<double> gains, losses;
   double before = 0, by_offset = 0, by_torque = 0;
   for (const TorqueBlock& block : blocks) {
     const Eigen::Vector2d tau = block.torque_B_Nm.head<2>();
@@ -58,6 +67,7 @@ void fit_torques(const std::vector<TorqueBlock>& blocks, const stability::Model&
     const double with_offset = (tau - lever).squaredNorm(),
                  with_torque = (tau - balance.torque_Nm).squaredNorm();
     gains.push_back(with_torque - with_offset);
+    losses.push_back(with_offset - with_torque);
     before += tau.squaredNorm();
     by_offset += with_offset;
     by_torque += with_torque;
@@ -68,10 +78,11 @@ void fit_torques(const std::vector<TorqueBlock>& blocks, const stability::Model&
   balance.rmse_before_N = std::sqrt(before / count) / (4 * lever_m);
   balance.rmse_after_N = std::sqrt(std::min(by_offset, by_torque) / count) / (4 * lever_m);
   balance.least_offset_m = kBatteryPlay_m + kRotorSpread * lever_m;
-  decide_torque_cause(model.arm_m, model.weight_N(), balance);
+  balance.least_torque_Nm = kConstantPartOfSpread * kRotorSpread * lever_m * model.weight_N();
+  constexpr double kQuarter = 0.25;  // of the mean square: the torque halves the imbalance
+  const bool is_surely_constant = by_torque <= kQuarter * before && surely_positive(losses, 1);
+  decide_torque_cause(model.arm_m, model.weight_N(), is_surely_constant, balance);
 }
-
-}  // namespace
 
 std::vector<TorqueBalance> torque_balances(const residuals::Inputs& inputs, const std::string& kind,
                                            int jobs) {

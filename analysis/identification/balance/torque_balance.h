@@ -7,6 +7,11 @@
 ///
 /// A centre of mass is reported only if its offset is larger than the play of a battery (kBatteryPlay_m) and larger
 /// than the apparent offset caused by rotors that differ by kRotorSpread between the sides.
+///
+/// A constant torque is reported already below this size if it halves the imbalance and explains more than the offset
+/// (one-sided test at 1 %): the torque of a battery grows with the thrust. That of unequal rotors need not: if they
+/// differ by a constant duty, their forces differ by a multiple of the derivative f' of the thrust map, which grows at
+/// least like the root of the force, so at most kConstantPartOfSpread of their torque is constant.
 #pragma once
 
 #include <string>
@@ -14,11 +19,14 @@
 #include <vector>
 
 #include "analysis/residuals/inputs.h"
+#include "analysis/residuals/torque_blocks.h"
 
 namespace swarmcert::identification {
 
 /// Relative spread of the thrust of rotors of the same type at the same command.
 inline constexpr double kRotorSpread = 0.05;
+/// If a force differs by d f^(1/2) near f_0, it differs by d f_0^(1/2) (1/2 + f / (2 f_0)): half of it is constant.
+inline constexpr double kConstantPartOfSpread = 0.5;
 
 struct TorqueBalance {
   std::string kind, vehicle;
@@ -27,7 +35,8 @@ struct TorqueBalance {
   /// Estimates with the offset alone and with the torque alone; 90 % intervals from blocks of 1 s.
   Eigen::Vector2d offset_m = Eigen::Vector2d::Zero(), torque_Nm = Eigen::Vector2d::Zero();
   Eigen::Vector2d offset_half_m = Eigen::Vector2d::Zero(), torque_half_Nm = Eigen::Vector2d::Zero();
-  double least_offset_m = 0;  ///< smallest offset that is reported
+  double least_offset_m = 0;   ///< smallest offset that is reported
+  double least_torque_Nm = 0;  ///< smallest torque that is reported if it is surely constant
   /// Imbalance of the rotor forces, rms over blocks and rotors: as measured, and with the better explanation.
   double rmse_before_N = 0, rmse_after_N = 0;
   double z = 0;                     ///< of the offset over the torque, from the squared errors of the blocks
@@ -36,6 +45,10 @@ struct TorqueBalance {
 
   bool is_named() const { return !effect.empty(); }
 };
+
+/// Fits both explanations to the blocks of one vehicle, in their order, and decides. Precondition: at least two blocks.
+void fit_torques(const std::vector<residuals::TorqueBlock>& blocks, const stability::Model& model,
+                 TorqueBalance& balance);
 
 /// Returns the balance of each vehicle of `kind` whose logs give the force of each rotor, over all of its flights. The
 /// model's own effects are removed first. Vehicles with fewer than 10 blocks are skipped. Independent of `jobs`.
