@@ -10,6 +10,7 @@
 #include "analysis/identification/balance/torque_balance.h"
 #include "analysis/identification/closed_loop.h"
 #include "analysis/identification/column_memory.h"
+#include "analysis/identification/rotors/lone_rotor.h"
 #include "analysis/identification/scan/named_forms.h"
 #include "analysis/identification/swinging_load.h"
 #include "nn/base/doubles.h"
@@ -221,7 +222,9 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
 std::vector<Missing> missing_effects(const residuals::Inputs& inputs, const std::string& kind,
                                      const std::vector<int>& which, int jobs,
                                      const residuals::Progress& progress) {
-  return diagnose(inputs, kind, which, jobs, progress).ranking;
+  std::vector<Missing> ranking = diagnose(inputs, kind, which, jobs, progress).ranking;
+  name_lone_rotor(inputs, kind, which, jobs, ranking);
+  return ranking;
 }
 
 std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::string& kind,

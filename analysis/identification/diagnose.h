@@ -49,7 +49,8 @@ inline constexpr std::size_t kMostSearched = 500;
 Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, const std::vector<int>& which,
                    int jobs, const residuals::Progress& progress, std::size_t most_searched = kMostSearched);
 
-/// Like diagnose(), but returns only the ranking.
+/// Like diagnose(), but returns only the ranking, with a weak rotor instead of the thrust_ratio that it explains
+/// (rotors/lone_rotor.h).
 std::vector<Missing> missing_effects(const residuals::Inputs& inputs, const std::string& kind,
                                      const std::vector<int>& which, int jobs,
                                      const residuals::Progress& progress);

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <random>
 
+#include "analysis/identification/rotors/lone_rotor.h"
 #include "analysis/identification/rotors/rotor_balance.h"
 #include "analysis/identification/rotors/rotor_fit.h"
 #include "data.h"
@@ -100,6 +102,71 @@ TEST(RotorFit, OfOneFlightIsAsUncertainAsTheBatterysPlace) {
   for (const RotorFactor& factor : one)
     EXPECT_NEAR((factor.interval.upper - factor.interval.lower) / 2, factor.value * kBatteryPlay_m / lever_m,
                 1e-12);
+}
+
+/// Loads of a vehicle whose rotors give these fractions of the mapped thrust, with an offset centre of mass.
+RotorLoads loads_with(const Eigen::Vector4d& factors, double weight_N,
+                      const Eigen::Vector2d& offset_m = {0, 0}) {
+  const double lever_m = small().arm_m * std::sqrt(0.5);
+  const Eigen::Vector4d along_x(1, -1, -1, 1), along_y(-1, -1, 1, 1);
+  const Eigen::Vector4d shares =
+      Eigen::Vector4d::Ones() + (offset_m.x() * along_x + offset_m.y() * along_y) / lever_m;
+  return loads((weight_N / 4 * shares).cwiseQuotient(factors));
+}
+
+TEST(LoneRotor, IsTheWeakOneOfABalancedVehicle) {
+  for (int weak = 0; weak < 4; ++weak) {
+    for (const double factor : {0.87, 0.75}) {
+      Eigen::Vector4d factors = Eigen::Vector4d::Ones();
+      factors[weak] = factor;
+      const LoneRotor found = lone_rotor({loads_with(factors, small().weight_N())}, small());
+      EXPECT_EQ(found.rotor, weak + 1);
+      EXPECT_TRUE(found.is_sure);
+      EXPECT_NEAR(found.share, 1, 1e-12);
+    }
+  }
+}
+
+TEST(LoneRotor, IsNotSureOfWhatAnotherCauseMayBe) {
+  const double weight_N = small().weight_N();
+  const Eigen::Vector4d ones = Eigen::Vector4d::Ones();
+  const auto rotor_of = [](const RotorLoads& flight) {
+    const LoneRotor found = lone_rotor({flight}, small());
+    EXPECT_FALSE(found.is_sure) << flight.mean_N.transpose();
+    return found.rotor;
+  };
+  EXPECT_EQ(rotor_of(loads_with(0.9 * ones, weight_N)), 0) << "a scale";
+  EXPECT_EQ(rotor_of(loads_with(ones, weight_N, {0.003, 0.003})), 0) << "an offset without a scale";
+  EXPECT_EQ(rotor_of(loads_with({0.85, 1, 0.85, 1}, weight_N)), 0) << "two rotors";
+  EXPECT_EQ(rotor_of(loads_with({0.95, 1, 1, 1}, weight_N)), 0) << "as much as a battery's position";
+  const double load_N = 0.04, place_m = small().arm_m * std::sqrt(0.5) * load_N / (weight_N + load_N);
+  EXPECT_EQ(rotor_of(loads_with(ones, weight_N + load_N, {place_m, place_m})), 4) << "a load under rotor 4";
+  EXPECT_EQ(rotor_of(loads(kHealthy_N * weight_N / kHealthy_N.sum())), 0) << "as recorded in healthy flights";
+}
+
+TEST(LoneRotor, IsSureOfOneRandomDirectionInAHundred) {
+  constexpr int kDirections = 40'000;
+  const stability::Model model = small();
+  std::mt19937 generator(3);
+  std::normal_distribution<double> normal;
+  int sure = 0;
+  for (int i = 0; i < kDirections; ++i) {
+    Eigen::Vector4d direction;
+    for (double& value : direction) value = normal(generator);
+    const Eigen::Vector4d excess = 0.4 * direction.normalized();
+    sure += lone_rotor({loads(model.weight_N() / 4 * (1 + excess.array()))}, model).is_sure ? 1 : 0;
+  }
+  const double rate = static_cast<double>(sure) / kDirections;
+  EXPECT_NEAR(rate, 0.01, 4 * std::sqrt(0.01 / kDirections));
+}
+
+TEST(LoneRotor, OfTheModelIsNotFoundAgain) {
+  stability::Model model = small();
+  stability::EffectSpec spec;
+  spec.name = kRotorThrust;
+  spec.parameters = {{"rotor_2", 0.8}};
+  model.effects.push_back(spec);
+  EXPECT_EQ(lone_rotor({loads_with({1, 0.8, 1, 1}, model.weight_N())}, model).rotor, 0);
 }
 
 /// CrazyPAD, vehicle E8: propellers with the stated length in mm cut off both blades, and flights with whole

@@ -10,6 +10,7 @@
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/identification/balance/accelerometer_balance.h"
 #include "analysis/identification/balance/torque_balance.h"
+#include "analysis/identification/candidates.h"
 #include "analysis/identification/verdict.h"
 #include "stability/effects/registry.h"
 
@@ -97,6 +98,15 @@ files::Json ranking_entry_of(const AccelerometerBalance& balance) {
        is_ambiguous ? std::vector<std::string>{"constant_force"} : std::vector<std::string>{}});
 }
 
+/// A weak rotor that is in the ranking explains an offset towards it.
+bool is_of_named_rotor(const TorqueBalance& balance, const files::Json& ranking) {
+  const auto& rivals = balance.rivals;
+  if (std::find(rivals.begin(), rivals.end(), identification::kRotorThrust) == rivals.end()) return false;
+  return std::any_of(ranking.begin(), ranking.end(), [&](const files::Json& entry) {
+    return entry["effect"] == identification::kRotorThrust && entry["kind"] == balance.kind;
+  });
+}
+
 /// The force residual of a flight shows an accelerometer scale error as a thrust ratio.
 bool is_explained_ratio(const files::Json& entry, const AccelerometerBalance& balance) {
   constexpr double kAlike = 0.02;
@@ -157,7 +167,7 @@ bool judge_torques(const residuals::Inputs& inputs, int jobs, bool prints, files
                                           {"torque_bias", torque_json(balance)},
                                           {"least_offset_m", balance.least_offset_m},
                                           {"statement", identification::in_words(balance)}});
-      if (!balance.is_named()) continue;
+      if (!balance.is_named() || is_of_named_rotor(balance, result["ranking"])) continue;
       is_named = true;
       result["ranking"].push_back(ranking_entry_of(balance));
       if (prints) fmt::print("  {}: {}\n", balance.vehicle, identification::in_words(balance));

@@ -17,6 +17,7 @@
 #include "analysis/commands/shared/label_output.h"
 #include "analysis/commands/shared/plausibility_output.h"
 #include "analysis/identification/diagnose.h"
+#include "analysis/identification/rotors/lone_rotor.h"
 #include "analysis/identification/verdict.h"
 
 namespace swarmcert::analysis {
@@ -77,6 +78,10 @@ Answers answer(const DiagnoseOptions& options, const CommonOptions& common, cons
       answers.each.push_back(
           identification::each_flight(inputs, model.kind, common_effects, common.jobs, show));
     }
+    // With --against the rotors are compared one by one with those of the healthy flights, see judge_rotors().
+    if (others == nullptr)
+      identification::name_lone_rotor(inputs, model.kind, identification::every_flight(inputs), common.jobs,
+                                      answers.diagnoses[first].ranking);
   }
   return answers;
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "analysis/identification/rotors/lone_rotor.h"
+
 namespace swarmcert::identification {
 namespace {
 
@@ -47,7 +49,9 @@ Study study(const residuals::Inputs& inputs, const std::optional<Split>& split, 
   progress(0, kSteps, "errors of the given model");
   result.before = errors_of(inputs, chosen, jobs);
   progress(1, kSteps, "missing effects");
-  result.diagnosis = diagnose(inputs, kind, not_for_test(inputs, chosen), jobs, silent);
+  const std::vector<int> seen = not_for_test(inputs, chosen);
+  result.diagnosis = diagnose(inputs, kind, seen, jobs, silent);
+  name_lone_rotor(inputs, kind, seen, jobs, result.diagnosis.ranking);
   progress(2, kSteps, "adding effects");
   LadderOptions options;
   options.split = chosen;
