@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -208,13 +209,19 @@ void drop_doubtful_names(const Passes& passes, Explained& explained) {
 /// Returns whether a lag or delay removes little and may be spurious: its interval reaches its lower bound; or it was
 /// found beside an effect or formula without which the remainder, to which the thrust reacts, dominates; or it removes
 /// no more than such a reaction leaves.
-bool may_be_no_lag(const Missing& missing, const Remainder& rest) {
+/// @param kept times of lags without the reaction of the thrust, relative to those by least squares
+bool may_be_no_lag(const Missing& missing, const Remainder& rest, const std::map<std::string, double>& kept) {
   constexpr double kLittle = 0.1;  // of the mean square, or of what exceeds the noise
   if (!is_of_library(missing.effect)) return false;
   const stability::EffectInfo& info = stability::effect_info(missing.effect);
   const double before = missing.finding.rmse_before_N;
-  if (!info.remembers || info.shape.empty() || taken_N2(missing) >= kLittle * before * before) return false;
-  if (rest.ratio > kLoudRatio || (rest.flag && taken_N2(missing) < kLittle * rest.excess_N2)) return true;
+  if (!info.remembers || info.shape.empty()) return false;
+  // Thrust that follows a vibration may remove much of it. What a short lag removes is proportional to its time.
+  const auto time = kept.find(missing.effect);
+  const double share = rest.line.is_found() && time != kept.end() ? std::min(time->second, 1.0) : 1;
+  const double taken = share * taken_N2(missing);
+  if (taken >= kLittle * before * before) return false;
+  if (rest.ratio > kLoudRatio || (rest.flag && taken < kLittle * rest.excess_N2)) return true;
   const auto interval = missing.intervals.find(info.shape[0].name);
   return interval != missing.intervals.end() && interval->second.lower <= info.shape[0].lower;
 }
@@ -385,28 +392,33 @@ void set_numbers(const Passes& passes, std::vector<Refined>& refined, const Gram
 
 /// Fits lags and delays to the innovations of the residual, with the other values fitted and checked beside them as in
 /// fit_effects(). If a time changes, the remainder is scanned again.
-void correct_memories(const Passes& passes, Explained& explained) {
+/// @return the new times of lags and delays divided by the old ones
+std::map<std::string, double> correct_memories(const Passes& passes, Explained& explained) {
   constexpr double kMoved = 0.1;
   std::vector<Missing>& ranking = explained.settled.ranking;
   const std::vector<Refined> refined = refined_of(explained.settled);
   std::vector<Refined> corrected = with_innovations(passes, refined);
+  std::map<std::string, double> kept;
   bool is_other = false, has_moved = false;
   for (std::size_t i = 0; i < corrected.size(); ++i) {
     if (!corrected[i].candidate.info.remembers) continue;
+    if (refined[i].theta[0] > 0)
+      kept[corrected[i].candidate.name] = corrected[i].theta[0] / refined[i].theta[0];
     const double moved = std::abs(corrected[i].theta[0] - refined[i].theta[0]);
     is_other = is_other || moved > 0;
     has_moved = has_moved || moved > kMoved * refined[i].theta[0];
   }
-  if (!is_other) return;  // no lag, or white noise: values and intervals stay
+  if (!is_other) return kept;  // no lag, or white noise: values and intervals stay
   set_numbers(passes, corrected, explained.settled.selected.grams, ranking);
   for (const Refined& effect : corrected) {
     for (Refined& known : explained.settled.selected.refined) {
       if (known.candidate.name == effect.candidate.name) known = effect;
     }
   }
-  if (!has_moved) return;
+  if (!has_moved) return kept;
   explained.settled.rest = remainder(passes, specs_of(ranking));
   scan_what_is_left(passes, explained);
+  return kept;
 }
 
 }  // namespace
@@ -414,9 +426,9 @@ void correct_memories(const Passes& passes, Explained& explained) {
 Explained explain(const Passes& passes, const Coverage& covered) {
   Explained explained = explain_by_formulas(passes, covered);
   drop_doubtful_names(passes, explained);
-  correct_memories(passes, explained);
+  const std::map<std::string, double> kept = correct_memories(passes, explained);
   drop_names(passes, explained,
-             [&](const Missing& missing) { return may_be_no_lag(missing, explained.settled.rest); });
+             [&](const Missing& missing) { return may_be_no_lag(missing, explained.settled.rest, kept); });
   return explained;
 }
 

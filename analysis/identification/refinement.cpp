@@ -7,6 +7,8 @@
 #include "analysis/identification/box_least_squares.h"
 #include "analysis/identification/column_memory.h"
 #include "analysis/identification/covariance.h"
+#include "analysis/identification/remainder.h"
+#include "analysis/residuals/comparison.h"
 #include "analysis/residuals/force_residual.h"
 #include "nn/base/parallel.h"
 
@@ -306,7 +308,24 @@ class Refinement {
   std::vector<std::vector<double>> start_;
 };
 
-/// Returns the noise of the vertical residual beside `refined`.
+/// Returns the vertical residual without a band about `line_hz`, if that is positive.
+std::vector<double> vertical_without(double line_hz, const std::vector<Eigen::Vector3d>& residual_N,
+                                     const residuals::Track& track) {
+  Notch notch(line_hz);
+  std::vector<double> vertical;
+  for (std::size_t i = 0; i < residual_N.size(); ++i) {
+    if (!(line_hz > 0)) {
+      vertical.push_back(residual_N[i].z());
+      continue;
+    }
+    const bool restart = i == 0 || track.restarts[i] != 0;
+    const double dt_s = restart ? 0 : track.instants[i].time_s - track.instants[i - 1].time_s;
+    vertical.push_back(notch.advance(residual_N[i], dt_s, restart)(2, 0));
+  }
+  return vertical;
+}
+
+/// Returns the noise beside `refined`: gusts of the vertical residual, and a line of any axis.
 Noise noise_beside(const Passes& passes, const std::vector<Refined>& refined) {
   const residuals::Inputs& inputs = passes.inputs;
   std::vector<stability::EffectSpec> specs;
@@ -315,6 +334,7 @@ Noise noise_beside(const Passes& passes, const std::vector<Refined>& refined) {
                                                 effect.linear_intervals, effect.shape_intervals))
       specs.push_back(std::move(spec));
   }
+  const double line_hz = residuals::left_over(inputs_with(passes, specs), passes.jobs).line.frequency_hz;
   std::vector<Autocovariance> parts(passes.flights.size());
   files::parallel_for(static_cast<int>(passes.flights.size()), passes.jobs, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
@@ -322,9 +342,8 @@ Noise noise_beside(const Passes& passes, const std::vector<Refined>& refined) {
     for (const residuals::Track& track : inputs.load(static_cast<std::size_t>(passes.flights[k]), problems)) {
       if (track.position_only || track.kind != passes.kind || track.instants.size() < 2) continue;
       const stability::Model model = with_effects(inputs.model_for(track), specs);
-      std::vector<double> vertical;
-      for (const Eigen::Vector3d& r : residuals::force_residual(model, inputs.kinds, inputs.rules, track))
-        vertical.push_back(r.z());
+      const std::vector<double> vertical = vertical_without(
+          line_hz, residuals::force_residual(model, inputs.kinds, inputs.rules, track), track);
       const double span_s = track.instants.back().time_s - track.instants.front().time_s;
       const double records_per_s = static_cast<double>(track.instants.size() - 1) / span_s;
       parts[k].add(vertical, {track.restarts.begin(), track.restarts.end()},
@@ -338,7 +357,9 @@ Noise noise_beside(const Passes& passes, const std::vector<Refined>& refined) {
       sum.counts[k] += part.counts[k];
     }
   }
-  return sum.noise();
+  Noise noise = sum.noise();
+  noise.line_hz = line_hz;
+  return noise;
 }
 
 /// The controller knows the velocity, and thus more about a gust than past residuals show, so part of its reaction is
@@ -432,8 +453,9 @@ std::vector<Refined> with_innovations(const Passes& passes, std::vector<Refined>
   Noise before;
   for (int round = 0; round < kMostRounds; ++round) {
     const Noise noise = noise_beside(passes, refined);
-    if (!(noise.forget_s > 0)) break;
-    if (std::abs(noise.forget_s - before.forget_s) <= kSettledNoise * noise.forget_s &&
+    if (noise.is_white()) break;
+    if (noise.line_hz == before.line_hz &&
+        std::abs(noise.forget_s - before.forget_s) <= kSettledNoise * noise.forget_s &&
         std::abs(noise.white_share - before.white_share) <= kSettledNoise * noise.white_share)
       break;
     refined = with_whitened_memories(passes, noise, refined);
@@ -447,7 +469,7 @@ std::vector<Refined> refit(const Passes& all, const Passes& seen, const std::vec
   const std::vector<Refined> refined = freed(found);
   if (refined.empty()) return {};
   const Noise noise = has_memory(refined) ? noise_beside(seen, refined) : Noise();
-  if (!(noise.forget_s > 0)) return fitted_from(all, refined, kStepsOfRefit);
+  if (noise.is_white()) return fitted_from(all, refined, kStepsOfRefit);
   std::vector<Refined> whitened = with_whitened_memories(all, noise, refined, kStepsOfRefit);
   // The change due to whitening is known well enough from the excerpt.
   std::vector<Refined> by_squares = fitted_from(seen, refined);

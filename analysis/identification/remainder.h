@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "analysis/identification/refinement.h"
+#include "analysis/residuals/statistics.h"
 
 namespace swarmcert::identification {
 
@@ -15,6 +16,7 @@ struct Remainder {
   bool flag = false;
   double ratio = 0;  ///< maximum over the axes of Spectrum::low_band_to_floor(); 0 if there is no spectrum
   double excess_N2 = 0;                 ///< mean square of the force vector above the noise floor
+  residuals::SpectralLine line;         ///< a vibration
   std::vector<std::string> depends_on;  ///< variables over which its mean varies most
 };
 

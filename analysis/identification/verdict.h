@@ -21,8 +21,8 @@ const char* name(Verdict verdict);
 /// A scan result is significant if it explains more than this fraction of the mean square of the force error.
 inline constexpr double kMuchOfForce = 0.1;
 
-/// Returns whether something stands out after the effects found: slow disturbances in the spectrum, a variable that
-/// explains a tenth of the remaining mean square, or half of that of a torque or rotor.
+/// Returns whether something stands out after the effects found: slow disturbances or a vibration in the spectrum, a
+/// variable that explains a tenth of the remaining mean square, or half of that of a torque or rotor.
 bool leaves_something(const Diagnosis& diagnosis);
 
 /// Returns the first value of the enumeration that applies to `diagnoses`.

@@ -39,7 +39,25 @@ void Whitening::tune(double dt_s) {
   theta_ = half - std::sqrt(half * half - 1);
 }
 
-const Eigen::Matrix3Xd& Whitening::advance(const Eigen::Matrix3Xd& x, double dt_s, bool restart) {
+const Eigen::Matrix3Xd& Notch::advance(const Eigen::Matrix3Xd& x, double dt_s, bool restart) {
+  constexpr double kPi = 3.14159265358979323846, kWidth_hz = 1;
+  if (restart || x_[0].cols() != x.cols()) {
+    // The filter nearly passes constants, so the state is that after a long time of x.
+    for (int i = 0; i < 2; ++i) x_[i] = y_[i] = x;
+    return out_ = x;
+  }
+  const double zero = 2 * std::cos(2 * kPi * frequency_hz_ * dt_s), pole = std::exp(-kPi * kWidth_hz * dt_s);
+  out_ = x - zero * x_[0] + x_[1] + pole * zero * y_[0] - pole * pole * y_[1];
+  x_[1].swap(x_[0]);
+  x_[0] = x;
+  y_[1].swap(y_[0]);
+  y_[0] = out_;
+  return out_;
+}
+
+const Eigen::Matrix3Xd& Whitening::advance(const Eigen::Matrix3Xd& sample, double dt_s, bool restart) {
+  const Eigen::Matrix3Xd& x = noise_.line_hz > 0 ? notch_.advance(sample, dt_s, restart) : sample;
+  if (!(noise_.forget_s > 0)) return x;
   if (restart || last_.cols() != x.cols()) {
     innovation_ = Eigen::Matrix3Xd::Zero(3, x.cols());
   } else {

@@ -8,6 +8,9 @@
 /// past disturbances, so it is uncorrelated with later innovations: least squares of filtered residuals on filtered
 /// columns are consistent in closed loop if the noise is of this kind (direct identification: Ljung, System
 /// Identification, 1999, 13.4).
+///
+/// A vibration is not of this kind: the past predicts it, and the thrust follows it through the measured velocity.
+/// Columns and residual then pass a notch filter at its frequency first.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,6 +21,25 @@ namespace swarmcert::identification {
 struct Noise {
   double forget_s = 0;     ///< correlation time of the gusts
   double white_share = 0;  ///< variance of the white noise over that of the gusts
+  double line_hz = 0;      ///< frequency of a vibration; 0: none
+
+  bool is_white() const { return !(forget_s > 0) && !(line_hz > 0); }
+};
+
+/// Removes a band of 1 Hz about a frequency from many signals at once: a filter of second order with zeros on the unit
+/// circle and poles at the distance exp(-pi (1 Hz) dt) from the origin.
+class Notch {
+ public:
+  explicit Notch(double frequency_hz) : frequency_hz_(frequency_hz) {}
+  /// Advances the filter by one sample.
+  /// @param x       one sample of each signal
+  /// @param dt_s    time since the previous sample
+  /// @param restart the past is unknown: x is taken for a constant
+  const Eigen::Matrix3Xd& advance(const Eigen::Matrix3Xd& x, double dt_s, bool restart);
+
+ private:
+  double frequency_hz_;
+  Eigen::Matrix3Xd x_[2], y_[2], out_;  ///< the last two samples, newest first
 };
 
 /// Sums of products of a residual with itself, undelayed and delayed by one and two tenths of a second.
@@ -35,17 +57,18 @@ struct Autocovariance {
 /// The whitening filter for many signals at once.
 class Whitening {
  public:
-  explicit Whitening(const Noise& noise) : noise_(noise) {}
+  explicit Whitening(const Noise& noise) : noise_(noise), notch_(noise.line_hz) {}
   /// Advances the filter by one sample and returns the innovations.
   /// @param x       one sample of each signal
   /// @param dt_s    time since the previous sample
-  /// @param restart the past is unknown: the innovation is 0
+  /// @param restart the past is unknown: the innovation is 0, or the sample without gusts in the noise
   const Eigen::Matrix3Xd& advance(const Eigen::Matrix3Xd& x, double dt_s, bool restart);
 
  private:
   void tune(double dt_s);
 
   Noise noise_;
+  Notch notch_;
   double dt_s_ = 0, phi_ = 0, theta_ = 0;
   Eigen::Matrix3Xd last_, innovation_;
 };

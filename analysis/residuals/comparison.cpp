@@ -170,6 +170,7 @@ Leftover left_over(const Inputs& inputs, int jobs) {
   left.rmse_N = records > 0 ? std::sqrt(squares.sum() / records) : 0;
   left.low_band_to_floor = spectrum.low_band_to_floor();
   left.noise_floor_N = spectrum.noise_floor_N();
+  left.line = spectrum.line();
   for (std::size_t v = 0; v < regions.size(); ++v) {
     for (const Sum& sum : regions[v]) {
       if (sum.count < kFewestOfRegion) continue;

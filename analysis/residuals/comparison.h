@@ -116,10 +116,12 @@ Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, con
 struct Leftover {
   double rmse_N = 0;                                     ///< of all axes together
   Eigen::Vector3d low_band_to_floor, noise_floor_N;      ///< as in GroupErrors
+  SpectralLine line;                                     ///< Spectrum::line()
   std::array<double, kNumVariables> region_shares = {};  ///< sum of RegionErrors::share, by variable
 };
 
-/// Returns the same numbers as compare() for the same inputs (shares up to round-off), without the rest of its work.
+/// Returns the same numbers as compare() for the same inputs (shares up to round-off), without the rest of its work,
+/// and the line of the spectrum.
 Leftover left_over(const Inputs& inputs, int jobs);
 
 }  // namespace swarmcert::residuals

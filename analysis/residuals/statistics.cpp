@@ -154,6 +154,28 @@ Eigen::Vector3d Spectrum::low_band_to_floor() const {
   return bands.col(0).cwiseQuotient(bands.col(1));
 }
 
+SpectralLine Spectrum::line() const {
+  constexpr double kLowest_hz = 4, kLeastShare = 0.25, kClearly = 10;
+  constexpr int kWidth = 5, kLast = kWindow / 2;
+  SpectralLine line;
+  if (windows_ == 0) return line;
+  const double step_hz = windows_ / (period_sum_s_ * kWindow);
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::RowVectorXd power = power_.row(axis);
+    std::vector<double> all(power.data() + 1, power.data() + kLast);
+    const double median = quantile(all, 0.5), total = power.tail(kLast - 1).sum();
+    for (int k = 1; k + kWidth <= kLast; ++k) {
+      const double sum = power.segment(k, kWidth).sum(), share = total > 0 ? sum / total : 0;
+      if (k * step_hz < kLowest_hz || share < std::max(kLeastShare, line.share)) continue;
+      if (sum < kClearly * kWidth * median) continue;
+      const double middle =
+          power.segment(k, kWidth).dot(Eigen::RowVectorXd::LinSpaced(kWidth, k, k + kWidth - 1)) / sum;
+      line = {middle * step_hz, axis, share};
+    }
+  }
+  return line;
+}
+
 Eigen::Vector3d Spectrum::noise_floor_N() const {
   constexpr double kHannPower = 0.375 * kWindow;  // sum of the squared window
   const double passed = windows_ > 0 ? passed_.tail(kWindow / 2 - 1).mean() / windows_ : 1;

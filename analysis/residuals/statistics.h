@@ -41,6 +41,15 @@ std::array<Interval, 4> bootstrap_rmse(const std::vector<BlockSum>& blocks, std:
 double quantile(std::vector<double>& values, double p);
 double quantile(std::vector<float>& values, double p);
 
+/// A frequency at which much of a residual is concentrated, as in a vibration.
+struct SpectralLine {
+  double frequency_hz = 0;  ///< 0: none
+  int axis = 0;
+  double share = 0;  ///< of the power of this axis
+
+  bool is_found() const { return frequency_hz > 0; }
+};
+
 /// Average power spectrum of a residual per axis, from Hann windows of 256 records.
 class Spectrum {
  public:
@@ -57,6 +66,10 @@ class Spectrum {
   Eigen::Vector3d low_band_to_floor() const;
   /// Returns the root of the power of the white noise floor over all frequencies, N rms: what no model can explain.
   Eigen::Vector3d noise_floor_N() const;
+  /// Returns the frequency above the low band, 4 Hz, whose five neighbouring frequencies of the spectrum hold the
+  /// largest share of the power of their axis, if that is a quarter or more and they exceed the median of the axis
+  /// tenfold. In white noise they hold 4 %.
+  SpectralLine line() const;
 
  private:
   static constexpr int kWindow = 256;

@@ -82,6 +82,33 @@ TEST(ResidualStatistics, ResampledBlocksCoverTheRootMeanSquareAsOftenAsStated) {
   EXPECT_LT(held, kRuns);
 }
 
+/// A minute at 100 Hz: white noise of variance 1, a slow drift, and a vibration of this amplitude along z.
+Spectrum spectrum_with(double amplitude, double frequency_hz) {
+  constexpr double kStep_s = 0.01, kTurn = 2 * 3.14159265358979323846;
+  std::mt19937_64 random(2);
+  std::normal_distribution<double> normal;
+  std::vector<Eigen::Vector3d> residual;
+  for (int i = 0; i < 6000; ++i) {
+    const double time_s = i * kStep_s, drift = std::sin(kTurn * 0.4 * time_s);
+    residual.emplace_back(normal(random) + drift, normal(random),
+                          normal(random) + amplitude * std::sin(kTurn * frequency_hz * time_s));
+  }
+  Spectrum spectrum;
+  spectrum.add(residual, kStep_s);
+  return spectrum;
+}
+
+TEST(ResidualStatistics, AVibrationIsALineOfTheSpectrumAndADriftIsNone) {
+  for (const double frequency_hz : {4.6, 7.3, 12.25, 31.0}) {
+    const SpectralLine line = spectrum_with(2, frequency_hz).line();
+    EXPECT_NEAR(line.frequency_hz, frequency_hz, 0.05);
+    EXPECT_EQ(line.axis, 2);
+    EXPECT_NEAR(line.share, 2.0 / 3, 0.05) << "2 N^2 of 3 N^2";
+  }
+  EXPECT_FALSE(spectrum_with(0.3, 7.3).line().is_found());
+  EXPECT_FALSE(spectrum_with(2, 1.5).line().is_found()) << "within the low band";
+}
+
 TEST(ResidualStatistics, OneBlockHasNoScatter) {
   const auto intervals = bootstrap_rmse({{Eigen::Vector3d(4, 9, 36), 1}}, 1);
   EXPECT_EQ(intervals[0].lower, 2);

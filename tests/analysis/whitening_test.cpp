@@ -66,6 +66,24 @@ TEST(Whitening, WhiteNoiseNeedsNoFilter) {
   EXPECT_EQ(noise_of(r).forget_s, 0);
 }
 
+TEST(Whitening, AVibrationIsRemovedAndTheRestIsKept) {
+  constexpr double kVibration_hz = 7.3, kTurn = 2 * 3.14159265358979323846;
+  const auto power_after = [&](double frequency_hz) {
+    Notch notch(kVibration_hz);
+    double power = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const double x = std::sin(kTurn * frequency_hz * i * kStep_s);
+      const double y = notch.advance(Eigen::Vector3d(x, 0, 0), i == 0 ? 0 : kStep_s, i == 0)(0, 0);
+      if (i >= 1000) power += 2 * y * y / 1000;
+    }
+    return power;
+  };
+  EXPECT_LT(power_after(kVibration_hz), 1e-6);
+  EXPECT_LT(power_after(kVibration_hz + 0.05), 0.02) << "the frequency is not known exactly";
+  for (const double other_hz : {0.5, 2.0, 4.5, 11.0, 25.0})
+    EXPECT_NEAR(power_after(other_hz), 1, 0.1) << other_hz;
+}
+
 TEST(Whitening, NothingIsTakenFromBeforeARestart) {
   Autocovariance sums;
   std::vector<char> restarts(40, 0);

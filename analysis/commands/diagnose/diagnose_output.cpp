@@ -168,6 +168,9 @@ void print_diagnosis(const Diagnosis& diagnosis) {
   for (std::size_t i = 0; i < rest.depends_on.size(); ++i)
     fmt::print("{}{}", i == 0 ? ", depends on " : ", ", rest.depends_on[i]);
   fmt::print("\n");
+  if (rest.line.is_found())
+    fmt::print("  A vibration at {:.1f} Hz is {:.0f} % of what is left along {}.\n", rest.line.frequency_hz,
+               100 * rest.line.share, "xyz"[rest.line.axis]);
   print_remainder(diagnosis);
   fmt::print("  Shown in 9 of 10 injections (open loop), if at least as large as:\n");
   for (const identification::Detectable& entry : diagnosis.detectable) {
@@ -194,7 +197,7 @@ void add_diagnoses(const std::vector<Diagnosis>& diagnoses, files::Json& result)
     for (const identification::Detectable& entry : diagnosis.detectable)
       detectable.push_back(json_of(entry, diagnosis.kind));
     const identification::Remainder& rest = diagnosis.remainder;
-    flag = flag || rest.flag;
+    flag = flag || rest.flag || rest.line.is_found();
     ratio = std::max(ratio, rest.ratio);
     for (const std::string& variable : rest.depends_on) depends_on.push_back(variable);
     for (files::Json& entry : remainder_json(diagnosis)) left.push_back(std::move(entry));
