@@ -259,6 +259,30 @@ bool vanishes_somewhere(const Nominal& nominal) {
   });
 }
 
+/// Returns whether setpoints deny each thrust scale that `by_names` has and `by_formulas` has not: beside the formulas,
+/// most of it is surely not there. Thrust that hardly varies denies nothing, because the formulas may have an offset.
+bool deny_scales(const Passes& passes, const Settled& by_names, const Settled& by_formulas) {
+  constexpr double kMost = 0.5, kSurely = 2;  // of the scale; half-widths of the 90 % interval
+  const auto is_in = [&](const std::string& name) {
+    return std::any_of(by_formulas.selected.refined.begin(), by_formulas.selected.refined.end(),
+                       [&](const Refined& effect) { return effect.candidate.name == name; });
+  };
+  std::vector<Refined> lost;
+  for (const Refined& effect : by_names.selected.refined) {
+    if (is_scale(effect.candidate.name) && !is_in(effect.candidate.name)) lost.push_back(effect);
+  }
+  std::vector<Refined> together = by_formulas.selected.refined;
+  together.insert(together.end(), lost.begin(), lost.end());
+  const std::vector<std::vector<InstrumentedValue>> checks = instrument(passes, candidates_of(together));
+  if (lost.empty() || checks.empty()) return false;
+  for (std::size_t i = 0; i < lost.size(); ++i) {
+    const InstrumentedValue& value = checks[checks.size() - lost.size() + i][0];
+    const double half = (value.interval.upper - value.interval.lower) / 2, named = lost[i].coefficients[0];
+    if (!(std::abs(value.instrument) + kSurely * half < kMost * std::abs(named))) return false;
+  }
+  return true;
+}
+
 /// Like settle(), without formulas that merely compensate an overestimated thrust scale.
 Settled settle_with_formulas(const Passes& passes, const Coverage& covered, std::vector<Candidate> rivals,
                              const std::vector<std::string>& names,
@@ -360,9 +384,14 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   const double left = Selection(again.selected.grams).mean_square(again.selected.members);
   if (!(left < kClearlyLess * left_by_names)) return result;
   const bool loses_scale = has_plain_scale(result.settled.ranking) && !has_plain_scale(again.ranking);
-  const bool is_other = is_only_thrust_ratio(result.settled.ranking) || left < kMuchLess * left_by_names;
-  if (loses_scale && !(is_other && vanishes_somewhere(*nominal))) return result;
-  return accept(std::move(again));
+  if (!loses_scale) return accept(std::move(again));
+  // What no model can explain is not counted, else noise would decide.
+  const double floor = std::isfinite(again.rest.floor_N2) ? again.rest.floor_N2 : 0;
+  const bool is_much_less = left - floor < kMuchLess * (left_by_names - floor);
+  const bool is_other = is_only_thrust_ratio(result.settled.ranking) || is_much_less;
+  const bool is_denied =
+      is_other && (vanishes_somewhere(*nominal) || deny_scales(passes, result.settled, again));
+  return is_denied ? accept(std::move(again)) : result;
 }
 
 /// Returns the refined effects in their order.

@@ -35,7 +35,8 @@ Remainder remainder(const Passes& passes, const std::vector<stability::EffectSpe
   }
   result.flag = result.ratio > kFlagRatio;
   result.line = left.line;
-  result.excess_N2 = std::max(left.rmse_N * left.rmse_N - left.noise_floor_N.squaredNorm(), 0.0);
+  result.floor_N2 = left.noise_floor_N.squaredNorm();
+  result.excess_N2 = std::max(left.rmse_N * left.rmse_N - result.floor_N2, 0.0);
   if (result.line.is_found()) result.depends_on.emplace_back("vibration");
   if (!result.flag) return result;
   std::array<double, residuals::kNumVariables> shares = left.region_shares;

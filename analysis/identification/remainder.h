@@ -14,7 +14,8 @@ residuals::Inputs inputs_with(const Passes& passes, const std::vector<stability:
 
 struct Remainder {
   bool flag = false;
-  double ratio = 0;  ///< maximum over the axes of Spectrum::low_band_to_floor(); 0 if there is no spectrum
+  double ratio = 0;     ///< maximum over the axes of Spectrum::low_band_to_floor(); 0 if there is no spectrum
+  double floor_N2 = 0;  ///< mean square of the noise floor
   double excess_N2 = 0;                 ///< mean square of the force vector above the noise floor
   residuals::SpectralLine line;         ///< a vibration
   std::vector<std::string> depends_on;  ///< variables over which its mean varies most
