@@ -18,7 +18,10 @@ struct Remainder {
   double floor_N2 = 0;  ///< mean square of the noise floor
   double excess_N2 = 0;                 ///< mean square of the force vector above the noise floor
   residuals::SpectralLine line;         ///< a vibration
-  std::vector<std::string> depends_on;  ///< variables over which its mean varies most
+  std::vector<std::string> depends_on;  ///< "vibration", and variables over which its mean varies most
+
+  /// Returns whether the spectrum has slow disturbances or a vibration.
+  bool stands_out() const { return flag || line.is_found(); }
 };
 
 /// Returns the remainder of the models with `specs` added. It is flagged if its low frequencies exceed three times the

@@ -28,8 +28,8 @@ bool leaves_something(const Diagnosis& diagnosis) {
   const auto explains = [](const Scan& scan, double share) {
     return !scan.entries.empty() && scan.entries[0].share >= share;
   };
-  return diagnosis.remainder.flag || diagnosis.remainder.line.is_found() ||
-         explains(diagnosis.scan, kMuchOfForce) || explains(diagnosis.balance, kMostOfTorque);
+  return diagnosis.remainder.stands_out() || explains(diagnosis.scan, kMuchOfForce) ||
+         explains(diagnosis.balance, kMostOfTorque);
 }
 
 Verdict verdict_of(const std::vector<Diagnosis>& diagnoses, std::string& reason) {

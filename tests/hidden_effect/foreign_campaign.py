@@ -67,7 +67,8 @@ def case(options, name, effect, seed):
     first = [entry["variable"] for entry in remainder[:2]]
     wrong = [n for n in named if n not in effect.get("names", set())]
     right_name = any(n in effect.get("names", set()) for n in named)
-    right = bool(set(first) & effect.get("variables", set())) or right_name
+    said = bool(set(result["unexplained"]["depends_on"]) & effect.get("left", set()))
+    right = bool(set(first) & effect.get("variables", set())) or right_name or said
     answer = {"name": name, "seed": seed, "named": named, "wrong": wrong, "right": right,
               "first": [f"{e['variable']}/{e['frame']}.{e['axis']} {e['share']:.2f}" for e in remainder[:4]]}
     if options.add and effect.get("variables"):

@@ -1,8 +1,8 @@
 """Hidden effects whose forms are not in the tool's registry, with the correct answers.
 
 Each entry has force, torque or rotor as accepted by foreign_simulator.fly(); `variables`, any of which is correct;
-`names`, effects of the same kind that may be reported; `formula`, the true form as [effect.expression] with its true
-values.
+`names`, effects of the same kind that may be reported; `left`, words of unexplained.depends_on, any of which is correct;
+`formula`, the true form as [effect.expression] with its true values.
 """
 
 import math
@@ -112,6 +112,14 @@ def leak(rate=0.0012):
 
 def hose(a=0.035, free=0.6):
     return lambda s: (0, 0, -a * max(0.0, s.p[2] - free))
+
+
+def lifted_cable(a=0.045):
+    return lambda s: (0, 0, -a * s.p[2])
+
+
+def vibration(a=0.06, frequency_hz=6.3):
+    return lambda s: (0, 0, a * math.sin(2 * math.pi * frequency_hz * s.t))
 
 
 def weak_cells(knee=3.95, slope=0.6):
@@ -228,6 +236,8 @@ EFFECTS = {
         "force_y_N", "a_N * sin(9 * y)", a_N=0.015)),
     "tilted board": dict(force=board(), variables={"body_constant"}, names={"constant_force", "imu_tilt"},
                          yaw_reach=3.0),
+    "lifted cable": dict(force=lifted_cable(), variables={"z"}, formula=expression("force_z_N", "a_N * z", a_N=-0.045)),
+    "vibration": dict(force=vibration(), left={"vibration"}),
     "leak": dict(force=leak(), variables={"time", "battery"}),
     "hose": dict(force=hose(), variables={"z"}, formula=expression(
         "force_z_N", "a_N * max(0, z - 0.6)", a_N=-0.035)),

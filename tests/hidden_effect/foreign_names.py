@@ -77,6 +77,8 @@ NAMED = {
                    values={"stiffness_N_m": 0.15, "slack_m": 0.9}),
     "torque_bias": dict(truth=dict(torque=lambda s: (8e-4, 1.2e-3, 0.0)),
                         values={"torque_x_Nm": 8e-4, "torque_y_Nm": 1.2e-3}),
+    "slight torque_bias": dict(effect="torque_bias", truth=dict(torque=lambda s: (4e-4, -3e-4, 0.0)),
+                               values={"torque_x_Nm": 4e-4, "torque_y_Nm": -3e-4}),
 }
 
 

@@ -141,7 +141,7 @@ void print_diagnosis(const Diagnosis& diagnosis) {
     return;
   }
   if (diagnosis.ranking.empty()) {
-    fmt::print("  {}\n", diagnosis.remainder.flag
+    fmt::print("  {}\n", diagnosis.remainder.stands_out()
                              ? "No effect of the library explains the remainder."
                              : "No effect of the library is missing above the sizes below.");
   }
@@ -164,7 +164,7 @@ void print_diagnosis(const Diagnosis& diagnosis) {
   }
   const identification::Remainder& rest = diagnosis.remainder;
   fmt::print("  Left: {:.5f} N; low frequencies {:.1f} times the noise floor{}", diagnosis.rmse_after_N,
-             rest.ratio, rest.flag ? ": not everything is explained" : "");
+             rest.ratio, rest.stands_out() ? ": not everything is explained" : "");
   for (std::size_t i = 0; i < rest.depends_on.size(); ++i)
     fmt::print("{}{}", i == 0 ? ", depends on " : ", ", rest.depends_on[i]);
   fmt::print("\n");
@@ -197,7 +197,7 @@ void add_diagnoses(const std::vector<Diagnosis>& diagnoses, files::Json& result)
     for (const identification::Detectable& entry : diagnosis.detectable)
       detectable.push_back(json_of(entry, diagnosis.kind));
     const identification::Remainder& rest = diagnosis.remainder;
-    flag = flag || rest.flag || rest.line.is_found();
+    flag = flag || rest.stands_out();
     ratio = std::max(ratio, rest.ratio);
     for (const std::string& variable : rest.depends_on) depends_on.push_back(variable);
     for (files::Json& entry : remainder_json(diagnosis)) left.push_back(std::move(entry));

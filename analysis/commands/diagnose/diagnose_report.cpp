@@ -71,7 +71,7 @@ void add_left(Report& report, const Diagnosis& diagnosis, const residuals::Force
   report.paragraph(
       fmt::format("Left: {:.4g} {}; low frequencies {:.1f} times the noise floor: {}{}",
                   unit.per_newton() * diagnosis.rmse_after_N, unit.name, rest.ratio,
-                  rest.flag ? "not everything is explained" : "nothing stands out",
+                  rest.stands_out() ? "not everything is explained" : "nothing stands out",
                   rest.depends_on.empty() ? "." : ". It depends on " + joined(rest.depends_on) + "."));
   if (!diagnosis.contradicted.empty()) {
     report.paragraph(
