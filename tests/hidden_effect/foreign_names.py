@@ -79,6 +79,8 @@ NAMED = {
                         values={"torque_x_Nm": 8e-4, "torque_y_Nm": 1.2e-3}),
     "slight torque_bias": dict(effect="torque_bias", truth=dict(torque=lambda s: (4e-4, -3e-4, 0.0)),
                                values={"torque_x_Nm": 4e-4, "torque_y_Nm": -3e-4}),
+    "rotor_thrust": dict(truth=dict(rotor=lambda s, k, f: 0.85 * f if k == 2 else f), values={"rotor_3": 0.85},
+                         rivals=["thrust_ratio"]),
 }
 
 
