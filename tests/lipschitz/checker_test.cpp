@@ -269,7 +269,7 @@ TEST(Checker, RejectsAnotherShapeOfEveryPart) {
   rejects([](Json& c) { c.erase("statement"); });
   rejects([](Json& c) { c.erase("network"); }, "certificate lacks field network");
   rejects([](Json& c) { c["network"] = Json::array(); }, "network is not an object");
-  rejects([](Json& c) { c["bounds"][0]["lower"] = Json::object(); }, "a field is missing or of another type");
+  rejects([](Json& c) { c["laws"][0]["neighbours"] = 3; }, "a field is missing or of another type");
   rejects([](Json& c) { c["layers"] = Json::array(); });
   rejects([](Json& c) { c["layers"].push_back(c["layers"][0]); });
   rejects([](Json& c) { std::swap(c["layers"][0], c["layers"][1]); });

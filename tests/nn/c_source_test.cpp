@@ -148,7 +148,7 @@ TEST(CSource, EverythingElseIsRefusedWithItsLine) {
   EXPECT_TRUE(source_is_refused(changed("-4.5", "1e999"), {"beyond the range"}));
   EXPECT_TRUE(source_is_refused(changed("-4.5", "1e39f"), {"beyond the range"}));
   EXPECT_TRUE(source_is_refused(changed(",{-4.5,.5,6f}", ""), {"expected ','"}));
-  EXPECT_TRUE(source_is_refused(changed(".fc1_bias =", ".fc2_bias ="), {"weights_A.fc2_bias", "no member"}));
+  EXPECT_TRUE(source_is_refused(changed(".fc1_bias =", ".fc2_bias ="), {"weights_A.fc2_bias", "not a member"}));
   EXPECT_TRUE(source_is_refused(changed(".fc1_bias =", ".fc1_weight ="), {"initialised twice"}));
   EXPECT_TRUE(
       source_is_refused(changed(",\n.fc1_bias = {0,1.e-05,-0.}", ""), {"fc1_bias", "is not initialised"}));
@@ -161,7 +161,7 @@ TEST(CSource, EverythingElseIsRefusedWithItsLine) {
   EXPECT_TRUE(source_is_refused(std::string(kSmall) + "int main() {}", {"expected a struct"}));
   EXPECT_TRUE(source_is_refused("struct A { float a_weight[1][1]; };", {"holds no network"}));
   EXPECT_TRUE(source_is_refused("struct A { float a_weight[1][1]; ", {"neither float nor double"}));
-  EXPECT_TRUE(source_is_refused(changed("fc1_weight[2]", "gain[2]").replace(0, 0, ""), {"no member"}));
+  EXPECT_TRUE(source_is_refused(changed("fc1_weight[2]", "gain[2]").replace(0, 0, ""), {"not a member"}));
 }
 
 TEST(CSource, EveryTruncationIsRefused) {

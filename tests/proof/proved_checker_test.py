@@ -312,7 +312,8 @@ def among_neighbours(certificate, net, folder):
 
     def more_neighbours(changed):
         changed["bounds"][places[-1]]["neighbours"][moved] += 1
-    refused(more_neighbours, "others does not list the kinds of the other neighbours", "of the tree", "is not decided")
+    refused(more_neighbours, "others does not list the kinds of the other neighbours", "of the tree", "is not decided",
+            "less than the law gives")
     for k in range(3):
         def less(changed):
             law = changed["laws"][k]

@@ -120,9 +120,9 @@ def ranges_and_jumps(folder):
         jump = max(entry["jump"] for entry in certificate["values"] if entry["function"] == function)
         assert jump > 90, jump  # the step
         refused(with_values(certificate, function, **one_unit_less(jump)), net,
-                "less than the step to neighbours among", "less than the step to a 0")
+                "less than the step to neighbours for which", "less than the step to a 0")
     refused(with_values(certificate, "set:small:small", lower=["0x1p-1000"]), net,
-            "lacks the 0 of neighbours", "lacks a 0")
+            "lacks 0, the output for neighbours", "lacks a 0")
     # With only large neighbours there is no 0, only values near 100.
     accepted(with_values(certificate, "set:large:small", lower=["-0x1p+8"]), net)
     lower = {entry["function"]: float.fromhex(entry["lower"][0]) for entry in certificate["values"]}
