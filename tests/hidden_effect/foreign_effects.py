@@ -1,8 +1,8 @@
 """Hidden effects whose forms are not in the tool's registry, with the correct answers.
 
 Each entry has force, torque or rotor as accepted by foreign_simulator.fly(); `variables`, any of which is correct;
-`names`, effects of the same kind that may be reported; `left`, words of unexplained.depends_on, any of which is correct;
-`formula`, the true form as [effect.expression] with its true values.
+`names`, effects of the same kind that may be reported; `left`, words of unexplained.depends_on, any of which is
+correct; `formula`, the true form as [effect.expression] with its true values.
 """
 
 import math
