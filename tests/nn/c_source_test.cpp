@@ -148,7 +148,8 @@ TEST(CSource, EverythingElseIsRefusedWithItsLine) {
   EXPECT_TRUE(source_is_refused(changed("-4.5", "1e999"), {"beyond the range"}));
   EXPECT_TRUE(source_is_refused(changed("-4.5", "1e39f"), {"beyond the range"}));
   EXPECT_TRUE(source_is_refused(changed(",{-4.5,.5,6f}", ""), {"expected ','"}));
-  EXPECT_TRUE(source_is_refused(changed(".fc1_bias =", ".fc2_bias ="), {"weights_A.fc2_bias", "not a member"}));
+  EXPECT_TRUE(
+      source_is_refused(changed(".fc1_bias =", ".fc2_bias ="), {"weights_A.fc2_bias", "not a member"}));
   EXPECT_TRUE(source_is_refused(changed(".fc1_bias =", ".fc1_weight ="), {"initialised twice"}));
   EXPECT_TRUE(
       source_is_refused(changed(",\n.fc1_bias = {0,1.e-05,-0.}", ""), {"fc1_bias", "is not initialised"}));
