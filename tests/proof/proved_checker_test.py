@@ -268,7 +268,7 @@ def laws_in_a_box(folder, pair):
 
 def among_neighbours(certificate, net, folder):
     """Bounds for a number of neighbours, and laws: slightly stronger claims are refused by all; so are a form or a
-    range of the others that is too small, another number of neighbours, and a leaf without a valid form."""
+    range of the others that is too small, a proof for other kinds of neighbours, and a leaf without a valid form."""
     def refused(change, *words):
         changed = json.loads(json.dumps(certificate))
         change(changed)
@@ -310,10 +310,10 @@ def among_neighbours(certificate, net, folder):
         refused(smaller_range, "the range is larger there")
     moved = certificate["bounds"][places[-1]]["function"].split(":")[1]
 
-    def more_neighbours(changed):
-        changed["bounds"][places[-1]]["neighbours"][moved] += 1
-    refused(more_neighbours, "others does not list the kinds of the other neighbours", "of the tree", "is not decided",
-            "less than the law gives")
+    def without_a_kind(changed):
+        neighbours = changed["bounds"][places[-1]]["neighbours"]
+        del neighbours[next(kind for kind in neighbours if kind != moved)]
+    refused(without_a_kind, "others does not list the kinds of the other neighbours")
     for k in range(3):
         def less(changed):
             law = changed["laws"][k]
