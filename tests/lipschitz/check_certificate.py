@@ -11,6 +11,7 @@ Exit 0: accepted; 1: rejected, with the reason; 2: usage; 3: a weight file or ne
 Every finite double is an integer times a power of two. A matrix is held as rows of integers with one exponent for all
 of them, so that sums and products of matrices are exact.
 """
+import functools
 import hashlib
 import json
 import math
@@ -1342,6 +1343,7 @@ def over(a, n):
     return a[0] // n, -(-a[1] // n)
 
 
+@functools.lru_cache(maxsize=1 << 14)  # ends of intervals are asked for several times
 def exponential_of_minus(x):
     """e^-x for a fraction x >= 0: 1 - y + y^2/2 - ..., y = x / 2^k <= 1/2, whose terms decrease, squared k times. At 0
     it is no tighter than elsewhere, so that a range that ends at tanh(0) = 0 does not end at 0: the other checkers
@@ -1369,6 +1371,7 @@ def sigmoid_of(t):
     return times((ONE, ONE) if t >= 0 else e, inverse(plus((ONE, ONE), e)))
 
 
+@functools.lru_cache(maxsize=1 << 14)
 def log_of_one_plus(e):
     """-ln(1 - u) = u + u^2/2 + ..., u = e / (1 + e) <= 1/2; the rest is at most twice the next power."""
     u = times(e, inverse(plus((ONE, ONE), e)))
@@ -1396,6 +1399,7 @@ def normal_density(t):
     return times(exponential_of_minus(Fraction(t) ** 2 / 2), inverse(ROOT_OF_TWO_PI))
 
 
+@functools.lru_cache(maxsize=1 << 14)
 def normal_probability(t):
     """1/2 + (t - t^3/(2 3) + t^5/(4 2! 5) - ...) / sqrt(2 pi); for |t| >= 14 it is within e^-98 / 2 of 0 or 1."""
     if t <= -14:
