@@ -24,6 +24,7 @@ import sys
 import tomllib
 from fractions import Fraction
 from math import factorial, isqrt
+from operator import mul
 from pathlib import Path
 
 STATEMENT = (
@@ -353,12 +354,12 @@ class Loop:
         state, error = [fixed_below(x) for x in start], product_above(spread, 1)
 
         def size(largest):
-            square = sum(x * sum(p * y for p, y in zip(row, state)) for x, row in zip(state, P))
+            square = sum(x * sum(map(mul, row, state)) for x, row in zip(state, P))
             return root_above((square >> 96) + 1) + error
 
         def above(form, plus, largest):
             row, norm = form
-            value = abs((plus << BITS) + sum(r * x for r, x in zip(row, state)))
+            value = abs((plus << BITS) + sum(map(mul, row, state)))
             return (value >> BITS) + (n * largest >> BITS) + 3 + product_above(norm, error)
 
         largest = max(map(abs, state))
@@ -370,7 +371,7 @@ class Loop:
             curved = [above(forms[f + 2], 0, largest) + (product_above(forms[f + 3][1], length) >> cell) + 1
                       for f in (0, 1)]
             error += product_above(spread, product_above(missed, largest) + 1)
-            state = [sum(s * x for s, x in zip(row, state)) >> BITS for row in step]
+            state = [sum(map(mul, row, state)) >> BITS for row in step]
             largest = max(map(abs, state))
             for f in (0, 1):
                 now = above(forms[f], offsets[f], largest)
