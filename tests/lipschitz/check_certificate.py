@@ -6,7 +6,8 @@ reads the weight files itself, and must accept and reject the same certificates.
     check_certificate.py CERTIFICATE NET | --phi F --rho F  [--key KEY] [--order A,B,C | PART=A,B,C]
         [--activation OP,...]
 
-Exit 0: accepted; 1: rejected, with the reason; 2: usage; 3: a weight file or network.toml that cannot be read.
+Exit 0: accepted; 1: rejected, with the reason; 2: usage; 3: a weight file or network.toml that cannot be read, or a
+file that is no certificate.
 
 Every finite double is an integer times a power of two. A matrix is held as rows of integers with one exponent for all
 of them, so that sums and products of matrices are exact.
@@ -35,6 +36,7 @@ try:
 except ImportError:  # without numpy
     parts_in_double = None
 
+SCHEMA = "swarmcert/certificate/1"
 STATEMENT = (
     "The functions are the operations listed under chain, in that order, with the weights stored in the files named by "
     "sha256, rounded to float32 where `as` says so: linear is W x + b; of each number t, relu is the positive part, "
@@ -1656,7 +1658,7 @@ class Checker:
     def run(self):
         require_keys(self.c, ["schema", "tool", "statement", "network", "box", "layers", "bounds", "laws",
                               "values", "content_sha256"], "certificate")
-        require(self.c["schema"] == "swarmcert/certificate/1", "another schema")
+        require(self.c["schema"] == SCHEMA, "another schema")
         sorting = any(step["op"] in SORTING for weights in self.c["network"]["weights"].values()
                       for step in weights["chain"])
         keeping = any(layer.kept for weights in self.network.parts.values() for layer in weights.layers)
@@ -2248,6 +2250,16 @@ def parse(text):
     return json.loads(text, object_pairs_hook=unique, parse_constant=refuse_constant)
 
 
+def read_certificate(path):
+    """Returns the JSON object of a certificate file. Raises ValueError for another kind of file."""
+    certificate = parse(Path(path).read_bytes().decode())
+    if not isinstance(certificate, dict):
+        raise ValueError("is not a JSON object")
+    if certificate.get("schema") != SCHEMA:
+        raise ValueError(f'schema must be "{SCHEMA}": is this the right file?')
+    return certificate
+
+
 def main(arguments):
     options, positional = {}, []
     while arguments:
@@ -2264,7 +2276,7 @@ def main(arguments):
         return 2
     try:
         network = Network(*positional[1:], **options)
-        certificate = parse(Path(positional[0]).read_bytes().decode())
+        certificate = read_certificate(positional[0])
     except Exception as fault:  # any exception means that the file cannot be read
         print(f"cannot be read: {type(fault).__name__} {fault}", file=sys.stderr)
         return 3

@@ -92,6 +92,18 @@ def refuses_contradictory_input(folder):
     assert refused == 10
 
 
+def refuses_files_of_another_kind(folder):
+    """JSON that is no certificate is bad input (3) and not a rejected certificate (1), for either checker."""
+    net = written(folder / "any.safetensors", common.safetensors([2, 3, 1], random.Random(8)))
+    text = certified([net], folder / "any.json").read_text()
+    newer = text.replace('"swarmcert/certificate/1"', '"swarmcert/certificate/9"')
+    for other in "[]", "3", "{}", '{"schema": 5}', newer:
+        path = written(folder / "other.json", other.encode())
+        for code, words in (optimized(path, [net]),
+                            code_and_words([common.SWARMCERT, "check", path, net, "-q"])):
+            assert code == 3 and ("schema" in words or "JSON object" in words), f"{other[:50]}: exit {code}, {words}"
+
+
 def no_checker_rests_on_assert():
     sources = [path for folder in ("lipschitz", "stability")
                for path in sorted((common.SOURCE / "tests" / folder).glob("*.py"))
@@ -106,3 +118,4 @@ if __name__ == "__main__":
     no_checker_rests_on_assert()
     with tempfile.TemporaryDirectory() as name:
         refuses_contradictory_input(Path(name))
+        refuses_files_of_another_kind(Path(name))
