@@ -2,7 +2,22 @@
 
 #include <fmt/core.h>
 
+#include <utility>
+
 namespace swarmcert::gate {
+namespace {
+
+/// The two numbers with six digits, or with as many as tell them apart.
+std::pair<std::string, std::string> told_apart(double a, double b) {
+  std::pair<std::string, std::string> texts;
+  for (int digits = 6; digits <= 17; ++digits) {
+    texts = {fmt::format("{:.{}g}", a, digits), fmt::format("{:.{}g}", b, digits)};
+    if (texts.first != texts.second) break;
+  }
+  return texts;
+}
+
+}  // namespace
 
 const char* name(Verdict verdict) {
   return verdict == Verdict::kPass ? "pass" : verdict == Verdict::kFail ? "fail" : "inconclusive";
@@ -31,11 +46,13 @@ void judge(Check& row, const Limit& limit, double proved, double attained) {
     row.verdict = Verdict::kPass;
   } else if (breaks) {
     row.verdict = Verdict::kFail;
-    row.reason = fmt::format("{:.6g} is {} {:.6g}", proved, limit.is_most ? "above" : "below", limit.value);
+    const auto [value, bound] = told_apart(proved, limit.value);
+    row.reason = fmt::format("{} is {} {}", value, limit.is_most ? "above" : "below", bound);
   } else {
     row.verdict = Verdict::kInconclusive;
-    row.reason = fmt::format("{:.6g} does not prove {} {:.6g}, and nothing refutes it", proved,
-                             limit.is_most ? "at most" : "at least", limit.value);
+    const auto [value, bound] = told_apart(proved, limit.value);
+    row.reason = fmt::format("{} does not prove {} {}, and nothing refutes it", value,
+                             limit.is_most ? "at most" : "at least", bound);
   }
 }
 

@@ -1,5 +1,7 @@
 #include "analysis/gate/evidence.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -194,8 +196,8 @@ void Evidence::load_comparison(bool with_loop) {
   for (const std::string& problem : found->problems) damaged += (damaged.empty() ? "" : "; ") + problem;
   for (const residuals::TrackErrors& track : found->tracks) {
     if (track.is_sound) continue;
-    damaged += (damaged.empty() ? "" : "; ") + track.path + ":";
-    for (const std::string& finding : track.findings) damaged += " " + finding;
+    damaged +=
+        (damaged.empty() ? "" : "; ") + track.path + fmt::format(": {}", fmt::join(track.findings, ", "));
   }
   if (!damaged.empty()) {
     throw files::InputError({release().flights.front(), "", "flights", "",

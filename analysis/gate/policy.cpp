@@ -31,7 +31,10 @@ std::vector<std::string> read_order(const TomlTable& table, const char* key, boo
 
 /// Reads the flights and the number of their logs.
 void read_recordings(const TomlTable& table, const std::string& policy, Release& release) {
-  if (!table.has("flights")) return;
+  if (!table.has("flights")) {
+    if (table.has("logs")) table.refuse("logs", "", "belongs to flights, which are not named here");
+    return;
+  }
   const std::vector<std::string> words =
       table.is_list("flights") ? table.texts("flights") : std::vector<std::string>{table.text("flights")};
   if (words.empty()) table.refuse("flights", "[]", "names no flight");

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "nn/base/file_io.h"
+#include "nn/base/json.h"
 #include "nn/base/toml.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
@@ -66,8 +67,8 @@ Box read_box(const files::TomlTable& table, std::size_t inputs) {
   }
   for (std::size_t k = 0; k < inputs; ++k) {
     if (box.lower[k] > box.upper[k])
-      table.refuse("lower", std::to_string(box.lower[k]),
-                   "entry " + std::to_string(k) + " is above upper, " + std::to_string(box.upper[k]));
+      table.refuse("lower", files::Json(box.lower[k]).dump(),
+                   "entry " + std::to_string(k) + " is above upper, " + files::Json(box.upper[k]).dump());
   }
   return box;
 }

@@ -6,6 +6,7 @@
 
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
+#include "nn/base/json.h"
 #include "nn/base/toml.h"
 #include "nn/weights/activation.h"
 #include "nn/weights/functions.h"
@@ -84,8 +85,8 @@ class NetworkReader {
     check_length(clamp, "upper", box.upper, inputs, "inputs");
     for (std::size_t i = 0; i < box.lower.size(); ++i) {
       if (box.lower[i] > box.upper[i]) {
-        clamp.refuse("lower", std::to_string(box.lower[i]),
-                     "entry " + std::to_string(i) + " is above upper, " + std::to_string(box.upper[i]));
+        clamp.refuse("lower", files::Json(box.lower[i]).dump(),
+                     "entry " + std::to_string(i) + " is above upper, " + files::Json(box.upper[i]).dump());
       }
     }
     network_.clamp = std::move(box);

@@ -51,6 +51,12 @@ TEST(GatePolicy, IsRefusedWithLineValueAndMend) {
        {"line 8", "negative"}},
       {head + "gains = \"g\"\nmodel = \"m\"\n[tracking]\nmax_error_m = 1\nrate_N_s = 1\nguard_factor = 0.9\n",
        {"line 9", "at least 1"}},
+      {head + "gains = \"g\"\nmodel = \"m\"\nflights = [\"f\"]\nlogs = 1\n[tracking]\nmax_error_m = 1\n" +
+           "guard_factor = 1\nguard_quantile = \"max\"\n",
+       {"line 11", "guard_quantile", "conflicts"}},
+      {head + "gains = \"g\"\nmodel = \"m\"\n[theorem]\nrate_N_s = 1\n",
+       {"line 7", "rate_N_s", "max_ball_m"}},
+      {head + "logs = 2\n[spectral_norms]\n", {"line 4", "logs", "flights"}},
       {head + "[hashes]\n\"n.toml\" = \"12\"\n", {"line 5", "SHA-256", "sha256sum"}},
       {head + "[regression]\n", {"line 4", "max_increase_percent"}},
       {"schema = \"swarmcert/policy/1\"\n[spectral_norms]\n", {"release", "is missing"}},
@@ -60,6 +66,35 @@ TEST(GatePolicy, IsRefusedWithLineValueAndMend) {
     for (const std::string& word : one.words)
       EXPECT_NE(message.find(word), std::string::npos) << word << " in\n" << message << "\nfor\n" << one.text;
   }
+}
+
+TEST(GateChecks, AValueJustBeyondItsLimitIsToldApartFromIt) {
+  const auto reason = [](double attained) {
+    gate::Limit limit;
+    limit.value = 0.2573;
+    gate::Check row = gate::row("lipschitz", limit);
+    gate::judge(row, limit, 0.25730001, attained);
+    EXPECT_NE(row.verdict, gate::Verdict::kPass);
+    return row.reason;
+  };
+  EXPECT_EQ(reason(1), "0.25730001 is above 0.2573");
+  EXPECT_EQ(reason(0), "0.25730001 does not prove at most 0.2573, and nothing refutes it");
+}
+
+TEST(GateChecks, APercentageOfARowThatDoesNotExistIsRefused) {
+  const ReleaseFolder release;
+  const auto outcome = [&](const std::string& row) {
+    release.policy_of({"firmware_facts\nmax_flash_bytes = 40000",
+                       "regression\nmax_increase_percent = 5\npercent_of = { \"" + row + "\" = 0 }"});
+    return release.run("swarmcert gate policy.toml -q --baseline " + release.path() + "/baseline.json");
+  };
+  release.policy_of({"firmware_facts\nmax_flash_bytes = 40000", "regression\nmax_increase_percent = 5"});
+  ASSERT_EQ(release.run("swarmcert gate policy.toml -q --baseline baseline.json --update-baseline").exit_code,
+            0);
+  EXPECT_EQ(outcome("firmware_facts.flash").exit_code, 0);
+  const Outcome typo = outcome("firmware_facts.flahs");
+  EXPECT_EQ(typo.exit_code, 3) << typo.output;
+  EXPECT_NE(typo.output.find("did you mean \"firmware_facts.flash\"?"), std::string::npos) << typo.output;
 }
 
 TEST(GatePolicy, TheExampleThatShipsIsUnderstood) {

@@ -27,7 +27,7 @@ void require_certified_box(Evidence& evidence) {
   const files::Json& certified = evidence.certificate()["box"];
   for (const auto& [part, box] : evidence.domain()) {
     if (!certified.is_object() || !certified.contains(part.name()))
-      throw Unfounded("the certificate has no box for " + part.name());
+      throw Unfounded("the certificate has no box for " + part.name() + ": certify with --domain");
     const std::vector<double> lower = files::parse_hex_floats(certified[part.name()]["lower"]);
     const std::vector<double> upper = files::parse_hex_floats(certified[part.name()]["upper"]);
     bool is_inside = lower.size() == box.lower.size();

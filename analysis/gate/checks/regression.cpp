@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -7,6 +8,7 @@
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
 #include "nn/base/input_error.h"
+#include "nn/base/suggest.h"
 #include "nn/base/toml.h"
 
 namespace swarmcert::gate {
@@ -17,6 +19,20 @@ double worse_percent(const Check& check, double baseline) {
   const double change = (check.more_is_worse ? 1 : -1) * (*check.value - baseline);
   if (change <= 0) return 0;
   return baseline == 0 ? std::numeric_limits<double>::infinity() : 100 * change / std::abs(baseline);
+}
+
+/// Requires that every row with a percentage of its own exists, unless its table could not be judged.
+void require_rows(const std::map<std::string, Limit>& own, const Checks& checks, const std::string& policy) {
+  std::vector<std::string> rows;
+  for (const Check& check : checks) rows.push_back(check.name);
+  for (const auto& [name, limit] : own) {
+    const auto stands_for = [&name = name](const Check& check) {
+      return check.name == name || (check.stands_for_table && name.rfind(check.name + ".", 0) == 0);
+    };
+    if (std::any_of(checks.begin(), checks.end(), stands_for)) continue;
+    throw files::InputError({policy, "line " + std::to_string(limit.line), "regression.percent_of." + name,
+                             "", "is not a row of this policy's checks", files::did_you_mean(name, rows)});
+  }
 }
 
 }  // namespace
@@ -42,6 +58,7 @@ Run read_regression(const files::TomlTable& table, Policy& policy) {
                                "has no baseline to compare with",
                                "give --baseline FILE; --update-baseline writes the first one"});
     }
+    require_rows(own, checks, evidence.policy().path);
     Check check = row("regression", most);
     double worst = 0, excess = -std::numeric_limits<double>::infinity();
     int compared = 0;

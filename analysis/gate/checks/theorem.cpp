@@ -17,6 +17,9 @@ Run read_theorem(const files::TomlTable& table, Policy& policy) {
   const std::optional<Limit> ball = limit(table, "max_ball_m", "m");
   if (ball && !declared.is_declared() && policy.release.flights.empty())
     table.refuse("max_ball_m", "", "needs a force error", "state rate_N_s, or name flights in [release]");
+  for (const std::string& key : disturbance_keys())
+    if (!ball && table.has(key))
+      table.refuse(key, "", "has no effect without a limit on the ball", "add max_ball_m");
   return [declared, ball, line = table.line()](Evidence& evidence, Checks& checks) {
     const stability::TrackingSetup& setup = evidence.tracking();
     stability::DisturbanceSource source = declared.declared;

@@ -152,6 +152,8 @@ Run read_tracking(const files::TomlTable& table, Policy& policy) {
   const DisturbanceTable declared = read_disturbance(table);
   const EstimateTable estimates = read_estimates(table);
   Guard guard;
+  if (table.has("guard_factor") && table.has("guard_quantile"))
+    table.refuse("guard_quantile", "", "conflicts with a declared guard_factor", "give one");
   if (table.has("guard_factor")) {
     guard.declared = table.number("guard_factor");
     if (!(*guard.declared >= 1))
