@@ -180,7 +180,7 @@ void print_training(const TrainOptions& options, const LearningData& data, const
     fmt::print("Lipschitz constants at most {}: {}\n", options.run.max_lipschitz,
                outcome.certified.largest() <= options.run.max_lipschitz ? "proved" : "inconclusive");
   print_support(outcome, target.unit);
-  for (const std::string& problem : few_of_each(data.problems)) fmt::print("left out: {}\n", problem);
+  for (const std::string& problem : few_of_each(data.problems)) fmt::print("note: {}\n", problem);
   print_worse_than_none(outcome, target.unit);
   fmt::print("written: {}/network.toml, weights, certificate.json, models\n", options.output);
 }
