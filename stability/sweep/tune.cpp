@@ -113,6 +113,8 @@ class Search {
     return judged(std::move(point));
   }
 
+  bool is_cancelled() const { return options_.cancelled != nullptr && *options_.cancelled; }
+
   /// Two without an integrator.
   std::size_t dimension() const { return loop_.plant.Ki > 0 ? 3 : 2; }
 
@@ -138,6 +140,7 @@ class Search {
         best_x_ = last_;
         has_best_ = true;
       }
+      if (is_cancelled() && running_ != nullptr) nlopt_force_stop(running_);
     }
     return point_;
   }
@@ -154,6 +157,7 @@ class Search {
 
   std::string run(nlopt_algorithm algorithm, std::array<double, 3> start, const std::array<double, 3>& low,
                   const std::array<double, 3>& high, int evaluations) {
+    if (is_cancelled()) return "not run";
     const std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)> optimiser(
         nlopt_create(algorithm, static_cast<unsigned>(dimension())), nlopt_destroy);
     if (optimiser == nullptr) throw std::bad_alloc();
@@ -166,7 +170,9 @@ class Search {
     require(nlopt_set_maxeval(optimiser.get(), evaluations));
     require(nlopt_set_xtol_rel(optimiser.get(), 1e-7));
     double value = 0;
+    running_ = optimiser.get();
     const nlopt_result result = nlopt_optimize(optimiser.get(), start.data(), &value);
+    running_ = nullptr;
     return nlopt_result_to_string(result);
   }
 
@@ -178,6 +184,7 @@ class Search {
   TuneOptions options_;
   std::array<double, 3> last_{};
   int evaluations_ = 0;
+  nlopt_opt running_ = nullptr;
   bool has_last_ = false;
   bool has_best_ = false;
   TunedPoint point_, best_;
@@ -242,7 +249,8 @@ TuneResult tune(const SampledLoop& loop, const TuneOptions& options) {
   search.run(NLOPT_LN_COBYLA, search.best_x(), low, high, options.local_evaluations);
   search.run(NLOPT_LN_COBYLA, given, low, high, options.local_evaluations);
   result.best = search.best();
-  result.stopped = "global " + global + ", local " + local;
+  result.stopped =
+      search.is_cancelled() ? "interrupted: the best gains so far" : "global " + global + ", local " + local;
   result.shipped_sampled = sampled_norms(loop, Channel::kForce, Instants::kSampling);
   SampledLoop tuned = loop;
   tuned.plant.Kp = result.best.Kp;

@@ -1,6 +1,7 @@
 /// @file Optimises the PID gains of one axis under constraints.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -33,6 +34,7 @@ struct TuneOptions {
   int local_evaluations = 600;
   std::uint64_t seed = 1;
   std::function<void(int done, int total)> progress = {};  ///< called after every evaluation
+  const std::atomic<bool>* cancelled = nullptr;            ///< once set, the best gains so far are returned
 };
 
 struct TunedPoint {

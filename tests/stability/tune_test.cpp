@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -72,6 +73,19 @@ TEST(Tune, ARateBelowWhatTheLargestIntegratorGainAllowsIsProvedInfeasible) {
   EXPECT_FALSE(result.best.feasible);
   EXPECT_FALSE(result.infeasible.empty());
   EXPECT_FALSE(result.violated.empty());
+}
+
+TEST(Tune, AnInterruptedSearchReturnsTheBestGainsSoFar) {
+  TuneOptions options = options_with(slack_of(evaluate_gains(shipped(), TuneObjective::kImpulse)));
+  std::atomic<bool> cancelled{false};
+  int evaluations = 0;
+  options.cancelled = &cancelled;
+  options.progress = [&](int, int) { cancelled = ++evaluations >= 150; };
+  const TuneResult result = tune(shipped(), options);
+  EXPECT_LE(evaluations, 151);
+  EXPECT_NE(result.stopped.find("interrupted"), std::string::npos) << result.stopped;
+  ASSERT_TRUE(result.best.feasible);
+  EXPECT_LT(result.best.objective, result.shipped.objective);
 }
 
 TEST(Tune, TheSameSeedGivesTheSameGains) {

@@ -207,6 +207,8 @@ int run_tune(TuneOptions options, const CommonOptions& common) {
   set_limits(loop, input, axis, options);
   Progress progress(common.quiet);
   options.tune.progress = [&progress](int done, int total) { progress.show(done, total, "evaluations"); };
+  const CancelOnInterrupt interrupt;
+  options.tune.cancelled = interrupt.flag();
   const TuneResult found = stability::tune(loop, options.tune);
 
   const files::Json result = result_of(options, found);
@@ -236,7 +238,7 @@ Command tune_command() {
       "limits on the command's noise, the lag that must be tolerated, the rate gain, and the effort. Reports "
       "the active\nlimits and the changes relative to the gains given. Exit code 4: no gains found; 1: "
       "proved that there "
-      "are none.\n\n"
+      "are none. Ctrl-C ends the search with the best gains so far.\n\n"
       "Example: swarmcert tune --gains controller/gains/crazyflie-small.toml --model "
       "stability/models/crazyflie-small.toml",
       [](CLI::App& app) {
