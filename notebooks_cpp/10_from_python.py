@@ -21,7 +21,7 @@ pd.set_option("display.width", 100)
 # ## Certify in a training loop
 #
 # A network 2 -> 16 -> 16 -> 1 learns a downwash: the force on a vehicle over the lateral distance and the height of
-# another one. Plain numpy; a `state_dict` or an `nn.Sequential` of PyTorch would be passed to `certify` just so.
+# another one. Plain numpy; a `state_dict` or an `nn.Sequential` of PyTorch is passed to `certify` in the same way.
 
 # %%
 random = np.random.default_rng(1)

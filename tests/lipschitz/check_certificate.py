@@ -453,7 +453,10 @@ def from_state_dict(state, key, storages, data, order):
 
 def read_zip(data, key, order):
     archive = zipfile.ZipFile(BytesIO(data))
-    root = next(n for n in archive.namelist() if n.endswith("/data.pkl"))[:-8]
+    roots = [n[:-8] for n in archive.namelist() if n.endswith("/data.pkl")]
+    if not roots:
+        raise ValueError("the zip archive has no <folder>/data.pkl; of zip archives, only those of torch.save are read")
+    root = roots[0]
     state = TorchUnpickler(BytesIO(archive.read(root + "data.pkl"))).load()
     return from_state_dict(state, key, lambda storage: archive.read(f"{root}data/{storage[1]}"), data, order)
 

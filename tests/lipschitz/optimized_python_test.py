@@ -10,6 +10,8 @@ import random
 import subprocess
 import sys
 import tempfile
+import zipfile
+from io import BytesIO
 from pathlib import Path
 
 import check_certificate_test as common
@@ -61,6 +63,10 @@ def contradictory_inputs(folder, generator):
 
     first, second = common.safetensors([2, 3], generator, ["a"]), common.safetensors([5, 1], generator, ["b"])
     yield [plain], [written(folder / "apart.safetensors", joined(first, second))], "no order of the layers fits"
+    archive = BytesIO()
+    with zipfile.ZipFile(archive, "w") as other:
+        other.writestr("a.txt", "not written by torch.save")
+    yield [plain], [written(folder / "archive.pth", archive.getvalue())], "torch.save"
     data = plain.read_bytes()
     yield [plain], [written(folder / "nan.safetensors", data[:-8] + common.pack("<d", math.nan))], "not finite"
     yield [plain], [written(folder / "none.safetensors", data.replace(b".weight", b".wait__"))], "no layer"
@@ -89,7 +95,7 @@ def refuses_contradictory_input(folder):
         code, words = code_and_words([common.SWARMCERT, "check", path, *arguments, "-q"])
         assert code == 3, f"{arguments}: exit {code}, {words}"
         refused += 1
-    assert refused == 10
+    assert refused == 11
 
 
 def refuses_files_of_another_kind(folder):
