@@ -8,6 +8,7 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/host.h"
+#include "nn/base/file_hash.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/activation.h"
@@ -137,7 +138,7 @@ std::vector<std::string> regular_files(const std::vector<std::string>& paths) {
 files::Json result_head(const std::string& command, const std::vector<std::string>& input_files) {
   files::Json inputs = files::Json::array();
   for (const std::string& path : regular_files(input_files)) {
-    inputs.push_back({{"file", path}, {"sha256", files::sha256(files::read_file(path))}});
+    inputs.push_back({{"file", path}, {"sha256", files::sha256_of_file(path)}});
   }
   return {{"schema", "swarmcert/" + command + "/1"},
           {"tool", "swarmcert " SWARMCERT_VERSION},

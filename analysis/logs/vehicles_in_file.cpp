@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "analysis/logs/collector.h"
+#include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/crazyflie_csv.h"
 #include "analysis/logs/formats/formats.h"
 #include "nn/base/csv.h"
@@ -308,7 +309,7 @@ std::vector<std::string> vehicles_in(const std::string& path, bool by_columns) {
   if (!vehicles.empty() || std::none_of(header->names.begin(), header->names.end(), may_name_vehicles))
     return vehicles;
   try {
-    const std::string text = files::read_file(path);
+    const std::string text = files::read_file(path, kLargestLog_bytes);
     const std::optional<TableHeader> whole = header_of(text);
     const std::optional<VehicleColumn> found = whole ? vehicle_column(text, *whole) : std::nullopt;
     if (!found) return vehicles;
@@ -328,7 +329,7 @@ std::vector<std::string> addresses_in(const std::string& path, bool by_columns) 
 
 std::string table_of(const LogAddress& address) {
   std::string table;
-  const std::string text = files::read_file(address.file);
+  const std::string text = files::read_file(address.file, kLargestLog_bytes);
   const std::optional<TableHeader> header = header_of(text);
   if (header && may_hold_several(address.file)) {
     const VehicleColumns columns = prefixed_columns(*header);

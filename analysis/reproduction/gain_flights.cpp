@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "analysis/logs/read_log.h"
+#include "nn/base/file_hash.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
@@ -162,7 +163,7 @@ ReadFlight read_gain_flight(const fs::path& path, const FlownGains& gains) {
   if (!problem.empty()) return {std::nullopt, problem};
   GainFlight flight;
   flight.log = path.filename().string();
-  flight.sha256 = files::sha256(files::read_file(path.string()));
+  flight.sha256 = files::sha256_of_file(path.string());
   flight.gains = gains;
   double thrust_N = 0;
   for (std::size_t k = first; k < log.samples.size(); ++k) thrust_N += log.samples[k].given_thrust;

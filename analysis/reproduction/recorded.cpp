@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "nn/base/file_hash.h"
 #include "nn/base/file_io.h"
 
 namespace swarmcert::reproduction {
@@ -110,7 +111,7 @@ std::string recorded_key(const Setting& setting, const Recorded& recorded) {
   std::string key = setting.full ? "full" : "small";
   for (const residuals::Inputs* inputs : {&recorded.fit, &recorded.select, &recorded.test}) {
     for (const residuals::FlightFiles& flight : inputs->found.flights) {
-      for (const auto& [vehicle, path] : flight.logs) key += files::sha256(files::read_file(path));
+      for (const auto& [vehicle, path] : flight.logs) key += files::sha256_of_file(path);
     }
     key += ";";
   }

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "analysis/tracking/conformal.h"
-#include "nn/base/file_io.h"
+#include "nn/base/file_hash.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
 #include "stability/bounds/tracking_bounds.h"
@@ -77,7 +77,7 @@ KeptPromise kept_promise(const Promise& promise, const std::vector<residuals::Fl
   const std::set<std::string> made_from(promise.made_from.begin(), promise.made_from.end());
   std::set<std::string> used_flights;
   for (const residuals::FlightPeak& peak : peaks) {
-    if (made_from.count(files::sha256(files::read_file(peak.path))) == 0) continue;
+    if (made_from.count(files::sha256_of_file(peak.path)) == 0) continue;
     kept.used.push_back(peak.path);
     used_flights.insert(peak.flight);
   }

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -83,6 +84,14 @@ TEST(VehiclesInFile, AColumnNamesTheVehicleOfEachRow) {
       EXPECT_NEAR(log.samples[0].time_us, 1e6 * time_s(1, 0), 1) << "all logs have the clock of the file";
     }
   }
+}
+
+TEST(VehiclesInFile, ALargeFileOfSeveralIsNotTakenForThatOfOneVehicle) {
+  const TempFolder folder;
+  const std::string path = folder / "large.csv";
+  files::write_file(path, by_rows("drone_id", {"1", "2"}, false), false);
+  std::filesystem::resize_file(path, files::kLargestFile_bytes + 1);
+  EXPECT_EQ(logs::vehicles_in(path), (Strings{"vehicle1", "vehicle2"}));
 }
 
 TEST(VehiclesInFile, ColumnsBeginWithTheNameOfTheirVehicle) {

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "nn/base/file_hash.h"
 #include "nn/base/suggest.h"
 #include "refusal.h"
 #include "temp_folder.h"
@@ -34,6 +35,16 @@ TEST_F(FileIo, WhatIsWrittenIsRead) {
   EXPECT_EQ(files(), 1u) << "a temporary file is left behind";
   write_file(path("empty"), "", false);
   EXPECT_EQ(read_file(path("empty")), "");
+}
+
+TEST_F(FileIo, FilesLargerThanAnyThatIsReadAsAWholeHaveAHash) {
+  write_file(path("x"), "abc", false);
+  EXPECT_EQ(sha256_of_file(path("x")), sha256("abc"));
+  fs::resize_file(path("x"), 0);
+  fs::resize_file(path("x"), kLargestFile_bytes + 3);
+  // truncate -s 268435459 z; sha256sum z
+  EXPECT_EQ(sha256_of_file(path("x")), "4eaf48af4ee6b10004ffed3fa5def5c7e15ee120b7ddd3cea6bad9b5746ca833");
+  EXPECT_TRUE(refuses([&] { sha256_of_file(path("none")); }, {path("none"), "No such file"}));
 }
 
 TEST_F(FileIo, FilesThatCannotBeReadAreNamedWithTheReason) {

@@ -14,6 +14,7 @@
 #include "analysis/gate/gate.h"
 #include "analysis/gate/outputs.h"
 #include "analysis/gate/text.h"
+#include "nn/base/file_hash.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 
@@ -62,8 +63,8 @@ void print_hashes(const gate::Policy& policy) {
                                      .lexically_normal()
                                      .lexically_relative(folder.lexically_normal())
                                      .string();
-    fmt::print("{} = \"{}\"  # {}\n", files::Json(relative).dump(),
-               files::sha256(files::read_file(file.path)), file.role);
+    fmt::print("{} = \"{}\"  # {}\n", files::Json(relative).dump(), files::sha256_of_file(file.path),
+               file.role);
   }
 }
 

@@ -8,7 +8,7 @@
 #include "analysis/cli/command_line.h"
 #include "analysis/gate/text.h"
 #include "analysis/report/report.h"
-#include "nn/base/file_io.h"
+#include "nn/base/file_hash.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -62,7 +62,7 @@ std::string write_gate_report(const gate::GateResult& result, const files::Json&
   report.heading("Files that the release rests on");
   std::vector<std::vector<std::string>> rows;
   for (const gate::EvidenceFile& file : result.files)
-    rows.push_back({file.role, file.path, files::sha256(files::read_file(file.path)).substr(0, 16)});
+    rows.push_back({file.role, file.path, files::sha256_of_file(file.path).substr(0, 16)});
   report.table({"role", "file", "SHA-256, first 16 digits"}, rows);
   return report.write(folder, overwrite);
 }

@@ -1,7 +1,7 @@
 #include <filesystem>
 
 #include "analysis/gate/checks/checks.h"
-#include "nn/base/file_io.h"
+#include "nn/base/file_hash.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
 
@@ -26,7 +26,7 @@ Run read_hashes(const files::TomlTable& table, Policy& policy) {
     Check check = row("hashes", line);
     pass(check);
     for (const Approved& file : all) {
-      const std::string found = files::sha256(files::read_file(file.path));
+      const std::string found = files::sha256_of_file(file.path);
       if (found == file.sha256) continue;
       fail(check, file.path + " is not the approved file");
       check.line = file.line;
