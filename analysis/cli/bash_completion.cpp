@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <sstream>
 #include <vector>
+
+#include "nn/base/text.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -26,14 +27,10 @@ std::vector<std::string> names_of(const CLI::Option& option) {
 
 /// Returns the values of an option that has a fixed list of them, which CLI11 writes as "TEXT:{auto,sdp}".
 std::vector<std::string> choices_of(const CLI::Option& option) {
-  std::vector<std::string> choices;
   const std::string type = option.get_type_name();
   const std::size_t open = type.find('{'), close = type.rfind('}');
-  if (option.get_expected_max() == 0 || open == std::string::npos || close == std::string::npos)
-    return choices;
-  std::istringstream list(type.substr(open + 1, close - open - 1));
-  for (std::string choice; std::getline(list, choice, ',');) choices.push_back(choice);
-  return choices;
+  if (option.get_expected_max() == 0 || open == std::string::npos || close == std::string::npos) return {};
+  return files::split_at_commas(type.substr(open + 1, close - open - 1));
 }
 
 }  // namespace

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <sstream>
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/host.h"
 #include "nn/base/file_hash.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
+#include "nn/base/text.h"
 #include "nn/weights/activation.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
@@ -28,8 +28,7 @@ void add_order(files::NetworkArguments& arguments, const std::string& text) {
                                     : part == "rho" ? arguments.rho_order
                                                     : arguments.order;
   if (!order.empty()) throw UsageError("--order " + text + ": the order of these layers was already given");
-  std::istringstream list(names_part ? text.substr(equals + 1) : text);
-  for (std::string layer; std::getline(list, layer, ',');) order.push_back(layer);
+  order = files::split_at_commas(names_part ? text.substr(equals + 1) : text);
   if (order.empty()) throw UsageError("--order names no layer: give them as in fc1,fc2,fc3");
 }
 

@@ -8,6 +8,7 @@
 
 #include "analysis/firmware/flight_headers.h"
 #include "nn/base/file_io.h"
+#include "nn/base/text.h"
 
 namespace swarmcert::firmware {
 namespace {
@@ -93,10 +94,7 @@ ExportOptions stated_parameters(const std::string& text) {
 std::string generated_name(const std::string& path, const std::string& bytes) {
   const std::string whole = normal(path);
   for (const std::string& name : generated_names()) {
-    const std::string ending = "/" + name;
-    if (whole.size() > ending.size() &&
-        whole.compare(whole.size() - ending.size(), ending.size(), ending) == 0)
-      return name;
+    if (files::ends_with(whole, "/" + name)) return name;
   }
   const std::string first_line = bytes.substr(0, bytes.find('\n'));
   if (first_line.find(kGeneratedMark) == std::string::npos) return "";
@@ -107,10 +105,6 @@ std::string folder_of(const std::string& path, const std::string& name) {
   std::string folder = path.substr(0, path.size() - name.size());
   while (folder.size() > 1 && folder.back() == '/') folder.pop_back();
   return folder.empty() ? "." : folder;
-}
-
-bool has_name(const std::string& path, const std::string& name) {
-  return path.size() >= name.size() && path.compare(path.size() - name.size(), name.size(), name) == 0;
 }
 
 std::optional<FileDifference> additional_file(const std::string& folder,
@@ -198,7 +192,7 @@ std::vector<std::string> files_of_export(const std::string& path) {
   std::string folder = path;
   if (!fs::is_directory(path)) {
     const std::string name = generated_name(path, "");
-    if (name.empty() || !has_name(path, name)) return {};
+    if (name.empty() || !files::ends_with(path, name)) return {};
     folder = folder_of(path, name);
   }
   std::vector<std::string> paths;
@@ -217,7 +211,7 @@ ExportMatch match_export(const files::Network& network, const std::string& path,
     const std::string bytes = files::read_file(path);
     named = generated_name(path, bytes);
     comparison.add(named, path, bytes);
-    if (!has_name(path, named)) {  // a copy under another name: no related files next to it
+    if (!files::ends_with(path, named)) {  // a copy under another name: no related files next to it
       for (const std::string& name : generated_names())
         if (name != named) comparison.absent(name);
       if (options.needs_all)

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "analysis/identification/scan/formulas.h"
+#include "nn/base/text.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -48,9 +49,7 @@ bool has_doubtful_slope(const std::vector<Refined>& refined,
 }
 
 bool is_vertical_push(const stability::Parameter& parameter) {
-  constexpr std::string_view kEnd = "force_z_N";
-  const std::string& name = parameter.name;
-  return name.size() >= kEnd.size() && name.compare(name.size() - kEnd.size(), kEnd.size(), kEnd) == 0;
+  return files::ends_with(parameter.name, "force_z_N");
 }
 
 /// Removes the vertical component from the constant forces of `candidates`.

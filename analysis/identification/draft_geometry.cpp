@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "nn/base/pi.h"
+
 namespace swarmcert::identification {
 namespace {
 
@@ -47,7 +49,7 @@ DraftedGeometry geometry_of(const std::map<std::string, double>& parameters, std
     return geometry;
   }
   for (std::size_t k = 0; k < motors; ++k) {
-    const double angle = (static_cast<double>(k) + 0.5) * 2 * M_PI / static_cast<double>(motors);
+    const double angle = (static_cast<double>(k) + 0.5) * 2 * kPi / static_cast<double>(motors);
     geometry.rotors.push_back({arm_m * std::cos(angle), arm_m * std::sin(angle), 0, k % 2 == 0});
   }
   geometry.source = fmt::format(

@@ -11,6 +11,7 @@
 #include "analysis/logs/plausibility.h"
 #include "analysis/logs/read_log.h"
 #include "nn/base/input_error.h"
+#include "nn/base/median.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -95,12 +96,6 @@ LogFit fit(const logs::Log& log, const stability::Model& base) {
     result.mass_kg.pop_back();
   }
   return result;
-}
-
-double middle(std::vector<double> values) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 /// Scales for bodies of the same shape and density: lengths with the cube root of the mass, inertia with mass times
@@ -257,7 +252,7 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
       continue;
     }
     if (log.mass_kg.empty()) continue;
-    const double of_log_kg = middle(log.mass_kg);
+    const double of_log_kg = upper_median(log.mass_kg);
     const auto known = masses_kg.find(log.path);
     const double true_kg = known != masses_kg.end() ? known->second : mass_kg;
     if (true_kg > 0) ratios.push_back(true_kg / of_log_kg);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nn/base/pi.h"
+
 namespace swarmcert::identification {
 
 void Autocovariance::add(const std::vector<double>& values, const std::vector<char>& restarts,
@@ -40,7 +42,7 @@ void Whitening::tune(double dt_s) {
 }
 
 const Eigen::Matrix3Xd& Notch::advance(const Eigen::Matrix3Xd& x, double dt_s, bool restart) {
-  constexpr double kPi = 3.14159265358979323846, kWidth_hz = 1;
+  constexpr double kWidth_hz = 1;
   if (restart || x_[0].cols() != x.cols()) {
     // The filter nearly passes constants, so the state is that after a long time of x.
     for (int i = 0; i < 2; ++i) x_[i] = y_[i] = x;

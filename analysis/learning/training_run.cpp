@@ -13,13 +13,12 @@
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
+#include "nn/base/pi.h"
 
 namespace swarmcert::learning {
 namespace {
 
 using training::Vector;
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// The state from which a run can be resumed.
 struct State {

@@ -3,9 +3,10 @@
 
 #include <limits>
 
+#include "nn/base/pi.h"
+
 namespace swarmcert::logs {
 
-inline constexpr double kPi = 3.14159265358979323846;
 /// One degree in radians.
 inline constexpr double kDegree_rad = kPi / 180;
 /// Marks a value that the log does not have.

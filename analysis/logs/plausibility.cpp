@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <utility>
+
+#include "nn/base/median.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -34,9 +37,7 @@ void check_time(const Log& log, std::vector<Doubt>& doubts) {
   std::vector<double> steps_s;
   for (std::size_t i = 1; i < samples.size(); ++i)
     steps_s.push_back(1e-6 * (samples[i].time_us - samples[i - 1].time_us));
-  std::nth_element(steps_s.begin(), steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2),
-                   steps_s.end());
-  const double step_s = steps_s[steps_s.size() / 2];
+  const double step_s = upper_median(std::move(steps_s));
   if (step_s >= kShortest_s && step_s <= kLongest_s) return;
   doubts.push_back({"time", step_s,
                     fmt::format("time: records are {:.3g} s apart; {}", step_s,
@@ -109,8 +110,7 @@ void check_battery(const Log& log, std::vector<Doubt>& doubts) {
   constexpr double kLargest_V = 100, kSmallest_V = 0.1;
   std::vector<double> volts;
   for (const Sample& sample : log.samples) volts.push_back(sample.battery_V);
-  std::nth_element(volts.begin(), volts.begin() + static_cast<std::ptrdiff_t>(volts.size() / 2), volts.end());
-  const double median_V = volts[volts.size() / 2];
+  const double median_V = upper_median(std::move(volts));
   if (median_V <= kLargest_V && median_V >= kSmallest_V) return;
   doubts.push_back({"battery", median_V,
                     fmt::format("battery: {:.4g} V in the median; {}", median_V,
@@ -141,9 +141,7 @@ void check_height(const Log& log, std::vector<Doubt>& doubts) {
   std::vector<double> heights;
   for (const Sample& sample : log.samples) heights.push_back(sample.position_m[2]);
   const double highest_m = *std::max_element(heights.begin(), heights.end());
-  std::nth_element(heights.begin(), heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2),
-                   heights.end());
-  const double median_m = heights[heights.size() / 2];
+  const double median_m = upper_median(std::move(heights));
   if (median_m > kDeep_m || highest_m > kGround_m) return;
   doubts.push_back(
       {"position", median_m,

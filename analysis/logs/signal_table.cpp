@@ -5,8 +5,11 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "analysis/logs/angles.h"
+#include "nn/base/median.h"
+#include "nn/base/pi.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -15,17 +18,10 @@ constexpr double kLongestPause_us = 10e6;
 constexpr double kTickRange_us = 4294967296.0;
 constexpr double kInt16Range = 65536;
 
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 double median_step(const std::vector<double>& times) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
-  return median_of(std::move(steps));
+  return upper_median(std::move(steps));
 }
 
 /// Undoes wraps of positions stored as 16-bit integers, where neighbours differ by almost the whole range. (Velocities
@@ -286,7 +282,7 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, cons
       for (std::size_t i = 0; i < signs.size(); ++i) values[i] *= signs[i];
       const int signal = carried.signal + static_cast<int>(k);
       if (carried.topic != recognition.clock) {
-        if (carried.signal == kEuler) unwrap(values, 2 * 3.14159265358979323846);
+        if (carried.signal == kEuler) unwrap(values, 2 * kPi);
         values = resampled(topic_s, values, clock_s, signal == kBattery);
       }
       all[static_cast<std::size_t>(signal)] = std::move(values);

@@ -20,6 +20,7 @@
 #include "nn/base/csv.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
+#include "nn/base/text.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -90,9 +91,7 @@ bool may_name_vehicles(std::string_view column) {
   std::string name = joined_words(column);
   if (name == "id" || name == "name" || kThings.count(name) != 0) return true;
   for (const std::string_view ending : {"id", "name", "number"}) {
-    if (name.size() > ending.size() &&
-        name.compare(name.size() - ending.size(), ending.size(), ending) == 0 &&
-        kThings.count(name.substr(0, name.size() - ending.size())) != 0)
+    if (files::ends_with(name, ending) && kThings.count(name.substr(0, name.size() - ending.size())) != 0)
       return true;
   }
   return false;

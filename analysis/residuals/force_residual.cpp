@@ -7,12 +7,12 @@
 
 #include "analysis/residuals/published_lag.h"
 #include "analysis/residuals/thrust_stage.h"
+#include "nn/base/pi.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::residuals {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kLargestPublishedForce_gf = 50;
 
 stability::EffectContext context_of(const stability::Model& model, const Kinds& kinds) {

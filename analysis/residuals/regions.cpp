@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nn/base/pi.h"
+
 namespace swarmcert::residuals {
 namespace {
 
@@ -60,7 +62,7 @@ std::int16_t neighbour_region(const stability::Instant& now, double sign) {
 const char* variable_name(int variable) { return variables()[static_cast<std::size_t>(variable)].name; }
 
 void regions_of(const stability::Instant& now, double time_in_log_s, RegionIndices indices) {
-  constexpr double kDegree = 180 / 3.14159265358979323846;
+  constexpr double kDegree = 180 / kPi;
   const auto& v = variables();
   indices[kHeight] = find(v[kHeight].edges, std::max(0.0, now.p_W_m.z()));
   indices[kSpeed] = find(v[kSpeed].edges, now.v_W_m_s.norm());

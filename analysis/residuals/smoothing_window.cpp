@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "nn/base/pi.h"
+
 namespace swarmcert::residuals {
 namespace {
 
@@ -25,7 +27,7 @@ WindowVector derivative_weights(const WindowVector& times_s, int order) {
 
 // Fourier transforms of 3/4 (1 - u^2) and 15/16 (1 - u^2)^2 on [-1, 1]: 3 j1(x) / x and 15 j2(x) / x^2.
 double power_passed(logs::ForceSource source, double length_s, double frequency_hz) {
-  constexpr double kPi = 3.14159265358979323846, kSeries = 0.05;
+  constexpr double kSeries = 0.05;
   if (source != logs::ForceSource::kVelocity && source != logs::ForceSource::kPosition) return 1;
   const double x = kPi * frequency_hz * length_s;
   if (x < kSeries) return 1;

@@ -5,6 +5,8 @@
 #include <limits>
 #include <random>
 
+#include "nn/base/pi.h"
+
 namespace swarmcert::residuals {
 namespace {
 
@@ -90,7 +92,7 @@ std::array<Interval, 4> bootstrap_rmse(const std::vector<BlockSum>& blocks, std:
 void Spectrum::add(const std::vector<Eigen::Vector3d>& residual, double period_s,
                    const std::function<double(double)>& passes) {
   static const auto kTables = [] {
-    constexpr double kTurn = 2 * 3.14159265358979323846;
+    constexpr double kTurn = 2 * kPi;
     std::array<std::array<double, kWindow>, 3> tables{};  // cosine, sine, Hann window
     for (std::size_t i = 0; i < kWindow; ++i) {
       const double angle = kTurn * static_cast<double>(i) / kWindow;

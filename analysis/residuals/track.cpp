@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "analysis/logs/flight_story.h"
 #include "analysis/logs/read_log.h"
@@ -13,6 +14,7 @@
 #include "analysis/residuals/published_vehicle.h"
 #include "analysis/residuals/smoothing_window.h"
 #include "nn/base/input_error.h"
+#include "nn/base/median.h"
 
 namespace swarmcert::residuals {
 namespace {
@@ -64,9 +66,7 @@ double clock_offset_s(const std::vector<double>& reference, const std::vector<do
     }
   }
   *matched = static_cast<int>(differences.size());
-  if (differences.empty()) return 0;
-  std::nth_element(differences.begin(), differences.begin() + differences.size() / 2, differences.end());
-  return differences[differences.size() / 2];
+  return upper_median(std::move(differences));
 }
 
 struct State {

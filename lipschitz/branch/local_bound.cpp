@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "lipschitz/base/rounding.h"
 #include "lipschitz/branch/search_tree.h"
 #include "lipschitz/checker/projective_cover.h"
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/upper/lmi_proof.h"
+#include "nn/base/median.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
@@ -39,8 +41,7 @@ double cover_radius(const files::Layer& layer) {
     if (distance > 1e-20 && distance < 1e20) distances.push_back(distance);
   }
   if (distances.empty()) return 1;
-  std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
-  return std::exp2(std::ceil(std::log2(distances[distances.size() / 2])));
+  return std::exp2(std::ceil(std::log2(upper_median(std::move(distances)))));
 }
 
 /// The ranges of the other terms, and the range of their sum before the first ReLU of rho.

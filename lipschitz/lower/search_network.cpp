@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "nn/base/interval.h"
+#include "nn/base/median.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -143,12 +145,7 @@ void normalise_open(const SearchStage& first, SearchNetwork& network) {
   for (Eigen::Index i = 0; i < w.rows(); ++i) {
     if (w.row(i).squaredNorm() > 0.5) distances.push_back(std::abs(residual[i]));
   }
-  double radius = 0;
-  if (!distances.empty()) {
-    std::nth_element(distances.begin(), distances.begin() + static_cast<long>(distances.size() / 2),
-                     distances.end());
-    radius = distances[distances.size() / 2];
-  }
+  double radius = upper_median(std::move(distances));
   if (!(radius > 0)) radius = 1;
   for (Eigen::Index v = 0; v < w.cols(); ++v) {
     network.centre[open[static_cast<std::size_t>(v)]] = centre[v] / length[v];

@@ -7,6 +7,7 @@
 
 #include "nn/base/input_error.h"
 #include "nn/base/suggest.h"
+#include "nn/base/text.h"
 #include "nn/weights/tensors.h"
 
 namespace swarmcert::files {
@@ -18,9 +19,6 @@ bool is_word(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool has_ending(const std::string& text, std::string_view suffix) {
-  return text.size() > suffix.size() && text.compare(text.size() - suffix.size(), suffix.size(), suffix) == 0;
-}
 
 /// Tokenizes C text into words, numbers and single characters, skipping comments and preprocessor lines.
 class Scanner {
@@ -255,7 +253,7 @@ class SourceReader {
     for (const Member& member : members) {
       std::string name = member.name;
       for (const std::string_view part : {"weight", "bias"}) {
-        if (has_ending(name, "_" + std::string(part)))
+        if (name.size() > part.size() + 1 && ends_with(name, "_" + std::string(part)))
           name = name.substr(0, name.size() - part.size() - 1) + "." + std::string(part);
       }
       DeclaredTensor tensor{name, member.precision, "", member.shape};

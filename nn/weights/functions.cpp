@@ -3,15 +3,11 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "nn/base/text.h"
 #include "nn/weights/invariants.h"
 
 namespace swarmcert::files {
 namespace {
-
-bool ends_with(const std::string& text, const std::string& suffix) {
-  return text.size() >= suffix.size() &&
-         text.compare(text.size() - suffix.size(), suffix.size(), suffix) == 0;
-}
 
 /// Returns the unit implied by the names of the inputs: "dp_x_m" is in m, "dv_x_m_s" in m/s.
 std::string input_unit(const std::vector<std::string>& order) {

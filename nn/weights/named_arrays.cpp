@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "nn/base/input_error.h"
+#include "nn/base/text.h"
 #include "nn/weights/npy.h"
 #include "nn/weights/tensors.h"
 #include "nn/weights/zip_archive.h"
@@ -15,11 +16,6 @@ namespace {
 constexpr char kNames[] =
     "name the arrays W1, b1, W2, b2, ... or fc1.weight, fc1.bias, ..., matrices as [outputs, inputs]";
 constexpr std::size_t kMostArrays = 4096;
-
-bool name_ends_with(const std::string& text, const std::string& ending) {
-  return text.size() >= ending.size() &&
-         text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
-}
 
 /// Returns "fc1.weight" for "fc1_weight", "layer1.bias" for "b1"; nothing if the name is not that of a weight or bias.
 std::optional<std::string> tensor_name_of(const std::string& name) {
@@ -35,14 +31,14 @@ std::optional<std::string> tensor_name_of(const std::string& name) {
   const std::string number = name.substr(digits);
   std::string stem = name.substr(0, digits);
   if (!number.empty()) {  // W1, weights_1
-    if (name_ends_with(stem, "_")) stem.pop_back();
+    if (ends_with(stem, "_")) stem.pop_back();
     for (const Word& word : kWords)
       if (stem == word.word) return "layer" + number + word.part;
   }
   for (const Word& word : kWords) {  // fc1.weight, fc1_weight
     for (const char* const mark : {".", "_", "/"}) {
       const std::string ending = std::string(mark) + word.word;
-      if (name_ends_with(name, ending) && name.size() > ending.size())
+      if (ends_with(name, ending) && name.size() > ending.size())
         return name.substr(0, name.size() - ending.size()) + word.part;
     }
     if (name == word.word) return std::string(word.part).substr(1);
@@ -109,7 +105,7 @@ Weights network_of_arrays(const std::vector<NamedArray>& arrays, const std::stri
   for (std::size_t i = 0; i < listed.size(); ++i) {
     DeclaredTensor tensor{names[i], is_float32 ? Precision::kFloat32 : Precision::kFloat64, "",
                           listed[i]->shape};
-    const bool is_bias = name_ends_with(names[i], "bias");
+    const bool is_bias = ends_with(names[i], "bias");
     if (is_bias && is_vector(*listed[i])) tensor.shape = {listed[i]->numbers.size()};
     tensors.push_back(std::move(tensor));
   }
@@ -132,7 +128,7 @@ Weights parse_npz(const std::string& bytes, const std::string& path, const std::
   if (archive.names().size() > kMostArrays)
     throw InputError({path, "", "", "", "holds more than " + std::to_string(kMostArrays) + " arrays", ""});
   for (const std::string& entry : archive.names()) {
-    if (!name_ends_with(entry, ".npy"))
+    if (!ends_with(entry, ".npy"))
       throw InputError({path, "", in_quotes(entry), "", "is not a .npy array", "save with numpy.savez"});
     const std::string contents = archive.read(entry, room_bytes);
     room_bytes -= contents.size();

@@ -7,6 +7,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
+#include "nn/base/text.h"
 #include "nn/base/toml.h"
 #include "nn/weights/activation.h"
 #include "nn/weights/functions.h"
@@ -250,11 +251,7 @@ class NetworkReader {
 };
 
 bool is_network_toml(const std::string& path, const std::string& bytes) {
-  constexpr std::string_view kSuffix = ".toml";
-  if (path.size() >= kSuffix.size() &&
-      path.compare(path.size() - kSuffix.size(), kSuffix.size(), kSuffix) == 0) {
-    return true;
-  }
+  if (files::ends_with(path, ".toml")) return true;
   const std::string_view beginning = std::string_view(bytes).substr(0, 1024);
   return beginning.find("swarmcert/network/") != std::string_view::npos &&
          beginning.find('\0') == std::string_view::npos;
@@ -328,7 +325,8 @@ Network load_as_stated(const NetworkArguments& arguments) {
   const std::string bytes = read_file(arguments.file);
   if (is_network_toml(arguments.file, bytes)) {
     if (!arguments.order.empty())
-      throw InputError({arguments.file, "", "--order", "", "is of one weight file, and this names several",
+      throw InputError({arguments.file, "", "--order", "",
+                        "is of one weight file, and this names several",
                         "write order = [...] beside weights"});
     const WeightsLoader load = [&](const std::string& path, const std::vector<std::string>& order) {
       return load_weights(path, arguments.key, order);

@@ -3,16 +3,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nn/base/pi.h"
+
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kPiRad = 3.14159265358979323846;
 constexpr double kMagnitude = 511;  ///< nine bits
 
 }  // namespace
 
 LowPass::LowPass(double cutoff_hz, double rate_hz) {
-  const double k = std::tan(kPiRad * cutoff_hz / rate_hz);
+  const double k = std::tan(kPi * cutoff_hz / rate_hz);
   const double norm = 1 / (1 + std::sqrt(2.0) * k + k * k);
   b0_ = k * k * norm;
   b1_ = 2 * b0_;

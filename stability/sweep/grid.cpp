@@ -10,6 +10,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/suggest.h"
+#include "nn/base/text.h"
 #include "nn/base/toml.h"
 
 namespace swarmcert::stability {
@@ -47,7 +48,7 @@ GridAxis read_axis(const TomlTable& axes, const std::string& name) {
                                  : from + share * (to - from));
   }
   if (steps > 1) axis.values.back() = to;  // exactly
-  const bool is_time = name.size() > 2 && name.compare(name.size() - 2, 2, "_s") == 0;
+  const bool is_time = files::ends_with(name, "_s");
   if (is_time && to > 1) {
     table.refuse("to", fmt::format("{:g}", to), "is longer than 1 s",
                  "the value is in seconds: 20 ms are 0.02");

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nn/base/pi.h"
 #include "stability/tasks/polynomial.h"
 #include "stability/tasks/polynomial_range.h"
 #include "stability/tasks/task.h"
@@ -13,7 +14,6 @@ namespace {
 // Published experiment: a swap takes 3 s and starts every 4.5 s; in between the vehicles wait.
 constexpr double kPeriod_s = 4.5;
 constexpr double kSwap_s = 3;
-constexpr double kPi = 3.14159265358979323846;
 
 struct Geometry {
   double lowest_m, step_m, radius_m;

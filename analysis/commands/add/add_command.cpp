@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
-#include <sstream>
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/host.h"
@@ -22,6 +21,7 @@
 #include "analysis/identification/scan/proposal.h"
 #include "nn/base/file_io.h"
 #include "nn/base/suggest.h"
+#include "nn/base/text.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -35,11 +35,8 @@ struct AddOptions {
 };
 
 std::vector<std::string> split_names(const std::string& text) {
-  std::vector<std::string> names;
-  std::istringstream words(text);
-  for (std::string name; std::getline(words, name, ',');) {
-    if (!name.empty()) names.push_back(name);
-  }
+  std::vector<std::string> names = files::split_at_commas(text);
+  names.erase(std::remove(names.begin(), names.end(), std::string()), names.end());
   return names;
 }
 

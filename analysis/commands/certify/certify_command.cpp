@@ -5,7 +5,6 @@
 #include <charconv>
 #include <limits>
 #include <memory>
-#include <sstream>
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/host.h"
@@ -19,6 +18,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
+#include "nn/base/text.h"
 #include "nn/weights/chain.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/invariants.h"
@@ -99,8 +99,7 @@ void parse_neighbours(const std::string& text, lipschitz::ClaimOptions& claims) 
     claims.neighbours = number(text);
     return;
   }
-  std::istringstream list(text);
-  for (std::string item; std::getline(list, item, ',');) {
+  for (const std::string& item : files::split_at_commas(text)) {
     const std::size_t equals = item.rfind('=');
     if (equals == std::string::npos ||
         !claims.mixture.emplace(item.substr(0, equals), number(item.substr(equals + 1))).second)
@@ -116,9 +115,7 @@ bool is_block(const std::string& word) {
 /// The value of --blocks is optional and NET may follow it: if NET is missing, a value that is not a list of blocks
 /// is NET.
 void parse_blocks(CertifyOptions& options) {
-  std::istringstream list(options.blocks);
-  std::vector<std::string> blocks;
-  for (std::string item; std::getline(list, item, ',');) blocks.push_back(item);
+  std::vector<std::string> blocks = files::split_at_commas(options.blocks);
   if (!std::all_of(blocks.begin(), blocks.end(), is_block)) {
     if (!options.network.file.empty() || !options.network.phi.empty())
       throw UsageError("--blocks " + options.blocks +

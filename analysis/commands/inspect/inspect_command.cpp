@@ -24,6 +24,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
+#include "nn/base/text.h"
 #include "nn/base/toml.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
@@ -140,7 +141,7 @@ files::Json inspect_network(const std::string& path, files::NetworkArguments arg
 }
 
 bool is_model(const std::string& path) {
-  if (path.size() < 5 || path.compare(path.size() - 5, 5, ".toml") != 0) return false;
+  if (!files::ends_with(path, ".toml")) return false;
   const toml::table document = files::parse_toml(files::read_file(path), path);
   return document["schema"].value_or(std::string()).rfind("swarmcert/model/", 0) == 0;
 }

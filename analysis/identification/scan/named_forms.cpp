@@ -4,10 +4,11 @@
 #include <cmath>
 #include <optional>
 
+#include "nn/base/pi.h"
+
 namespace swarmcert::identification {
 namespace {
 
-constexpr double kHalfTurn = 3.141592653589793;
 constexpr double kReach = 0.3;  ///< in metres
 
 /// Returns the parameter of a formula whose name, without its unit, begins with `word`.
@@ -131,7 +132,7 @@ std::vector<Candidate> walls(const Formula& formula, Candidate candidate) {
   const double middle_m = 0.5 * (range->lower_m + range->upper_m);
   const bool is_above = range->at_m > middle_m;
   const double end_m = is_above ? range->upper_m : range->lower_m;
-  const double bearing = is_x ? (is_above ? 0 : kHalfTurn) : (is_above ? 0.5 : -0.5) * kHalfTurn;
+  const double bearing = is_x ? (is_above ? 0 : kPi) : (is_above ? 0.5 : -0.5) * kPi;
   candidate.thetas.clear();
   for (const double place_m : {end_m, range->at_m}) {
     for (const double share : {0.06, 0.1, 0.15, 0.25})

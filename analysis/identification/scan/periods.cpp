@@ -5,10 +5,11 @@
 #include <cmath>
 #include <random>
 
+#include "nn/base/pi.h"
+
 namespace swarmcert::identification {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kPiece_s = 100, kFastest_hz = 2;
 constexpr int kMostFrequencies = 400, kDraws = 20;
 constexpr Eigen::Index kManySamples_ = 20'000;

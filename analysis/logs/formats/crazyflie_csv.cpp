@@ -9,12 +9,14 @@
 #include <optional>
 #include <regex>
 #include <set>
+#include <utility>
 
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/formats.h"
 #include "analysis/logs/formats/merge.h"
 #include "analysis/logs/record_source.h"
 #include "nn/base/input_error.h"
+#include "nn/base/median.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -71,11 +73,10 @@ std::string unit_of_steps(const std::vector<double>& times) {
   for (std::size_t i = 1; i < times.size(); ++i)
     if (times[i] > times[i - 1]) steps.push_back(times[i] - times[i - 1]);
   if (steps.empty()) return "ms";
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  if (*middle < 0.5) return "s";
-  if (*middle < 1500) return "ms";
-  return *middle < 1.5e6 ? "us" : "ns";
+  const double middle = upper_median(std::move(steps));
+  if (middle < 0.5) return "s";
+  if (middle < 1500) return "ms";
+  return middle < 1.5e6 ? "us" : "ns";
 }
 
 /// Receives the records of one file.

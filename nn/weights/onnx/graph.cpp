@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "nn/base/input_error.h"
+#include "nn/base/text.h"
 #include "nn/weights/tensors.h"
 
 namespace swarmcert::files {
@@ -203,9 +204,7 @@ std::vector<std::int64_t> OnnxGraph::integers(const Node& node, std::size_t k, c
 std::string OnnxGraph::layer_name(const std::string& weight) {
   constexpr std::string_view kSuffix = ".weight";
   std::string name = weight;
-  if (name.size() > kSuffix.size() &&
-      name.compare(name.size() - kSuffix.size(), kSuffix.size(), kSuffix) == 0)
-    name.resize(name.size() - kSuffix.size());
+  if (name.size() > kSuffix.size() && ends_with(name, kSuffix)) name.resize(name.size() - kSuffix.size());
   const std::string number = std::to_string(layers_ + 1);
   ++layers_;
   while (name.empty() || !names_.insert(name).second)

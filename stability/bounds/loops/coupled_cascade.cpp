@@ -6,6 +6,7 @@
 #include <complex>
 
 #include "nn/base/doubles.h"
+#include "nn/base/pi.h"
 #include "stability/gains_matrices.h"
 
 namespace swarmcert::stability {
@@ -217,7 +218,7 @@ double delay_margin(const CutAt& loop, const std::vector<Complex>& closed_poles)
         ((std::abs(loop.at(middle)[k]) < 1) == was_below ? low : high) = middle;
       }
       double phase = std::arg(-loop.at(low)[k]);
-      if (phase < 0) phase += 2 * M_PI;
+      if (phase < 0) phase += 2 * kPi;
       least_s = std::min(least_s, phase / low);
     }
     from = to;
