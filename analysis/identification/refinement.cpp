@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <utility>
 
 #include "analysis/identification/box_least_squares.h"
 #include "analysis/identification/column_memory.h"
@@ -89,14 +90,19 @@ class Refinement {
         std::any_of(unknowns_.begin(), unknowns_.end(), [](const Unknown& u) { return u.is_shape; });
     const int steps = !moves ? 0 : passes_.records > kTooManyToRefine ? 1 : most_steps;
     double radius = kLargestStep;
+    std::vector<std::vector<double>> refused;  // a step shorter than the radius is proposed again
     for (int i = 0; i < steps; ++i) {
       const Step next = step(best, radius);
       if (next.size < 1) break;
-      Point point = evaluate(next.thetas);
-      if (point.error < best.error)
-        best = std::move(point);
-      else
-        radius *= 0.3;
+      if (next.thetas != refused) {
+        Point point = evaluate(next.thetas);
+        if (point.error < best.error) {
+          best = std::move(point);
+          continue;
+        }
+        refused = next.thetas;
+      }
+      radius *= 0.3;
     }
     return result(best);
   }
