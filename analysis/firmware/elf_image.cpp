@@ -71,7 +71,7 @@ ElfImage read_arm_image(const std::string& bytes) {
     } else {
       read_segments(bytes, header, image);
       read_functions(bytes, header, image);
-      if (image.segments.empty()) image.why_not = "it has no segment that is loaded";
+      if (image.segments.empty()) image.why_not = "it has no loadable segment";
     }
   } catch (const Damaged&) {
     image.why_not = "its program headers or symbols are damaged";

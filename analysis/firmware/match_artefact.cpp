@@ -145,7 +145,7 @@ ArtefactMatch match_artefact(const files::Network& network, const std::string& p
   ArtefactMatch result;
   const bool is_folder = std::filesystem::is_directory(path);
   if (is_folder && !holds_export(path)) {
-    throw files::InputError({path, "", "", "", "holds no file that swarmcert export writes",
+    throw files::InputError({path, "", "", "", "contains no file written by swarmcert export",
                              "name the folder of -o, or the file to compare"});
   }
   const std::string bytes = is_folder ? "" : files::read_file(path);

@@ -53,7 +53,7 @@ DraftedGeometry geometry_of(const std::map<std::string, double>& parameters, std
     geometry.rotors.push_back({arm_m * std::cos(angle), arm_m * std::sin(angle), 0, k % 2 == 0});
   }
   geometry.source = fmt::format(
-      "assumption: {} evenly on a circle; their order is not known, so torques mean nothing yet", motors);
+      "assumption: {} evenly on a circle; their order is not known, so torques cannot be judged yet", motors);
   return geometry;
 }
 

@@ -107,7 +107,7 @@ void limit_joint_bounds(double limit, const training::Layout& layout, int jobs, 
   for (int tries = 0; tries < kMostScalings; ++tries) {
     if (scale_to(limit, layout, jobs, theta, invariants).largest <= limit) return;
   }
-  throw std::runtime_error("no proof that the joint Lipschitz bounds keep their limit");
+  throw std::runtime_error("the limit of the joint Lipschitz bounds could not be proved");
 }
 
 }  // namespace swarmcert::learning

@@ -47,7 +47,7 @@ training::Vector mean_network(const training::Layout& one, const std::vector<tra
   training::Vector theta = training::Vector::Zero(wide.size());
   for (std::size_t k = 0; k < members.size(); ++k) {
     if (members[k].size() != one.size())
-      throw std::invalid_argument("mean_network: a network of another layout");
+      throw std::invalid_argument("mean_network: the networks have different layouts");
     for (std::size_t p = 0; p < one.parts().size(); ++p) {
       for (int layer = 0; layer < one.parts()[p].layers(); ++layer)
         place(one, members[k], wide, static_cast<int>(p), layer, static_cast<Index>(k),

@@ -41,7 +41,7 @@ void project(const training::Layout& layout, const files::GammaStatement& gamma,
     int tries = 0;
     while (!improve(layout, gamma, static_cast<int>(p), tries, theta)) {
       if (++tries == kMostTries)
-        throw std::runtime_error(layout.parts()[p].id.name() + ": no proof that it keeps gamma");
+        throw std::runtime_error(layout.parts()[p].id.name() + ": its limit gamma could not be proved");
     }
   }
 }

@@ -72,7 +72,7 @@ void write_checkpoint(const State& state, const std::string& key, const std::str
 State read_checkpoint(const std::string& key, const std::string& path) {
   const files::Json file = files::read_json(path, kSchema);
   const auto refuse = [&](const std::string& field, const std::string& what) {
-    throw files::InputError({path, "", field, "", what, "begin anew with --force"});
+    throw files::InputError({path, "", field, "", what, "start again with --force"});
   };
   State state;
   try {
@@ -134,7 +134,7 @@ Run run_training(const LearningData& data, const RunOptions& options) {
     if (state.best.size() != data.layout.size() || state.shares.size() != data.layout.parts().size() ||
         state.epochs.empty())
       throw files::InputError(
-          {options.checkpoint, "", "best", "", "not a whole checkpoint", "begin anew with --force"});
+          {options.checkpoint, "", "best", "", "not a whole checkpoint", "start again with --force"});
     trainer.restore(state.trainer);
   }
   Run run;

@@ -180,14 +180,14 @@ std::vector<std::string> name_variables(RawLog& log) {
   const fs::path path = yaml_beside(log.path);
   if (path.empty()) {
     notes.emplace_back(
-        "the values of LogDataGeneric have no names here: put the crazyflies.yaml beside the log");
+        "the values of LogDataGeneric have no names here: put crazyflies.yaml into the folder of the log");
     return notes;
   }
   CustomTopics topics;
   try {
     topics = parse_custom_topics(files::read_file(path.string(), kLargestYaml_bytes));
   } catch (const files::InputError& error) {
-    notes.push_back("crazyflies.yaml beside the log " + error.fault().what);
+    notes.push_back("crazyflies.yaml in the folder of the log " + error.fault().what);
     return notes;
   }
   for (RawTopic& topic : log.topics) {

@@ -249,7 +249,7 @@ GainFolder read_gain_folder(const std::string& path, const Setting& setting) {
   std::sort(folder.inputs.begin(), folder.inputs.end());
   folder.inputs.erase(std::unique(folder.inputs.begin(), folder.inputs.end()), folder.inputs.end());
   if (folder.flights.empty()) {
-    throw files::InputError({path, "", "", "", "holds no flight that can be judged",
+    throw files::InputError({path, "", "", "", "contains no usable flight",
                              folder.left_out.empty()
                                  ? "logs/ is empty"
                                  : folder.left_out.front().first + " " + folder.left_out.front().second});

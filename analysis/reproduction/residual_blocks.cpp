@@ -100,7 +100,7 @@ double rms_gf(const std::vector<ResidualBlock>& blocks) {
 Estimate change(const std::vector<ResidualBlock>& before, const std::vector<ResidualBlock>& after) {
   bool same = before.size() == after.size();
   for (std::size_t k = 0; same && k < before.size(); ++k) same = before[k].count == after[k].count;
-  if (!same) throw std::invalid_argument("blocks of other records");
+  if (!same) throw std::invalid_argument("the blocks have different records");
   return {rms_gf(before) - rms_gf(after),
           bootstrap(before.size(), [&](const std::vector<std::size_t>& drawn) {
             return rms_of(before, drawn) - rms_of(after, drawn);

@@ -326,8 +326,8 @@ Network load_as_stated(const NetworkArguments& arguments) {
   if (is_network_toml(arguments.file, bytes)) {
     if (!arguments.order.empty())
       throw InputError({arguments.file, "", "--order", "",
-                        "is of one weight file, and this names several",
-                        "write order = [...] beside weights"});
+                        "applies to one weight file, and this file names several",
+                        "write order = [...] after weights = ..."});
     const WeightsLoader load = [&](const std::string& path, const std::vector<std::string>& order) {
       return load_weights(path, arguments.key, order);
     };

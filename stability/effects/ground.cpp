@@ -16,10 +16,9 @@ class Ground : public Effect {
       : Effect({"ground",
                 "f = a T exp(-(z - z0) / b) b3",
                 "fits published flights better than Cheeseman and Bennett 1955 with the radius of one rotor, "
-                "and "
-                "equals it where amplitude, radius and height are free",
+                "and equals it if amplitude, radius and height are free",
                 "ground",
-                "at least a fifth of the time below two rotor radii over the height at which it stands",
+                "at least a fifth of the time below two rotor radii above the height on the ground",
                 {{"amplitude", "relative thrust gained at the height z0", 0, 0, 1}},
                 {{"decay_m", "b", 0.0268, 0.005, 0.5, {0.015, 0.02, 0.027, 0.035, 0.05, 0.07, 0.1, 0.14}},
                  {"height_reference_m", "z0: about the height at which the vehicle stands", 0.06, 0, 1}}}) {}

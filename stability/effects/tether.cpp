@@ -17,17 +17,17 @@ Eigen::Vector3d from_anchor(const Instant& now, const double* shape) {
 class Tether : public Effect {
  public:
   Tether()
-      : Effect(
-            {"tether",
-             "f = -k max(0, |p - a| - l) (p - a) / |p - a|",
-             "an elastic line, or a cable whose slope grows as it is drawn up",
-             "tether",
-             "slow flight in all directions from the anchor, to where the line is taut and half as far again",
-             {{"stiffness_N_m", "k", 0, 0, 10}},
-             {{"anchor_x_m", "a", 0, -1000, 1000, {}},
-              {"anchor_y_m", "", 0, -1000, 1000, {}},
-              {"anchor_z_m", "", 0, -1000, 1000, {}},
-              {"slack_m", "l: the line's free length", 1, 0, 1000, {}}}}) {}
+      : Effect({"tether",
+                "f = -k max(0, |p - a| - l) (p - a) / |p - a|",
+                "an elastic line, or a cable whose slope grows as it is drawn up",
+                "tether",
+                "slow flight in all directions from the anchor, up to 1.5 times the distance at which the "
+                "line is taut",
+                {{"stiffness_N_m", "k", 0, 0, 10}},
+                {{"anchor_x_m", "a", 0, -1000, 1000, {}},
+                 {"anchor_y_m", "", 0, -1000, 1000, {}},
+                 {"anchor_z_m", "", 0, -1000, 1000, {}},
+                 {"slack_m", "l: the line's free length", 1, 0, 1000, {}}}}) {}
   void columns(const Instant& now, const double* shape, Wrench* columns) const override {
     const Eigen::Vector3d out_m = from_anchor(now, shape);
     const double length_m = out_m.norm(), taut_m = length_m - shape[kSlack];

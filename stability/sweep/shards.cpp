@@ -198,7 +198,7 @@ MergedSweep read_shards(const std::string& folder) {
         Cell cell = cell_of(json);
         const long index = cell.index;
         if (!cells.emplace(index, std::move(cell)).second) {
-          throw InputError({path, "", "cells", std::to_string(index), "is also a cell of another shard",
+          throw InputError({path, "", "cells", std::to_string(index), "is a cell of two shards",
                             "keep only shards with the same number of shards"});
         }
       }

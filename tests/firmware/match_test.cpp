@@ -125,7 +125,7 @@ TEST_F(Match, FindsWhatIsMissingOrAdditional) {
   expect_match(kSource, 0, {"not covered: out/nn/mlp.h, which is not there"});
   EXPECT_EQ(run("swarmcert match network.toml flights").exit_code, 3);
   fs::create_directory(folder_ / "empty");
-  expect_match("empty", 3, {"holds no file that swarmcert export writes"});
+  expect_match("empty", 3, {"contains no file written by swarmcert export"});
 }
 
 TEST_F(Match, OneFileAwayFromTheOthersIsComparedAloneAndSaysSo) {

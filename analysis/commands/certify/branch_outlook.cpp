@@ -49,12 +49,11 @@ std::string branch_outlook_words(const lipschitz::CertifiedBound& bound) {
         "{:.3g} %)",
         bound.nodes, 100 * outlook->gap_halfway, 100 * outlook->gap);
   }
-  return words +
-         fmt::format(
-             "; where the bound is largest {} of {} neurons are undecided and no slope above {:.6g} was "
-             "seen: their relaxation is about {:.0f} % of the gap",
-             bound.outlook.undecided, bound.outlook.neurons, bound.outlook.slope_in_part,
-             100 * outlook->relaxation_share);
+  return words + fmt::format(
+                     "; in the part with the largest bound, {} of {} neurons are undecided and the largest "
+                     "slope found is {:.6g}: their relaxation is about {:.0f} % of the gap",
+                     bound.outlook.undecided, bound.outlook.neurons, bound.outlook.slope_in_part,
+                     100 * outlook->relaxation_share);
 }
 
 }  // namespace swarmcert::analysis

@@ -82,7 +82,7 @@ std::vector<std::string> explain(const lipschitz::Comparison& comparison, double
   if (floor > 0)
     words.push_back(fmt::format(
         "The relaxation accounts for at most {:.2g} % of the bound: some ReLU pattern has the slope {:.8g}, "
-        "and no method that ignores which patterns are reachable can prove a smaller bound.",
+        "and a method that ignores which patterns are reachable cannot prove a smaller bound.",
         100 * (upper / floor - 1), floor));
   if (lower > 0 && floor > lower)
     words.push_back(
@@ -212,8 +212,7 @@ void print_bounds(const files::Network& network, const CertifyOutput& output) {
                files::unit(network, bound.function, bound.block));
     const bool unproved = !bound.proof && !bound.sdp.proof && !bound.local;
     if (unproved && bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun && !is_interrupted(bound.sdp.stop)) {
-      fmt::print("    the semidefinite program gave no bound that could be proved: {}\n",
-                 name(bound.sdp.stop));
+      fmt::print("    no bound from the semidefinite program could be proved: {}\n", name(bound.sdp.stop));
     }
     if (const auto estimate = slope_estimate_of(output, i)) {
       fmt::print("    steepest slope of sampled pairs, in double: {:.6g} (estimate)", estimate->value());
@@ -271,7 +270,7 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
     fmt::print(
         "\nRange over the box, of the exact function, proved (attained by points in brackets), in {}{}\n",
         output_unit(network),
-        output.ranges_cut_short ? "; interrupted: one part of the box, so that it is wide" : "");
+        output.ranges_cut_short ? "; interrupted before the box was divided, so the range is wide" : "");
   for (const lipschitz::CertifiedRange& range : output.ranges) {
     const std::string many =
         range.neighbours_at_most > 0 ? " up to " + counted(range.neighbours_at_most, "neighbour") : "";

@@ -124,7 +124,7 @@ std::string write_page(const Study& study, const Notes& notes, const Changes* ch
   add_remainder(report, study.diagnosis, 1, unit);
   const std::vector<std::string> next = next_flights(study.diagnosis);
   if (next.empty())
-    report.paragraph("These flights leave no question open that another flight would answer.");
+    report.paragraph("Another flight would not answer any of the questions that are still open.");
   for (const std::string& flight : next) report.paragraph("Fly " + flight + ".");
   if (changes != nullptr) add_changes(report, *changes, unit);
   add_time_series(report, study.after.all, &study.before.all, unit.name, unit.per_newton());

@@ -36,7 +36,7 @@ Run read_float32_error(const files::TomlTable& table, Policy& policy) {
       check.witness = fmt::format("{}, up to {} neighbours", error.function.name(), error.neighbours_at_most);
     }
     if (errors.empty()) {
-      check.reason = "the network has no function that is used in flight";
+      check.reason = "none of the functions of the network is used in flight";
     } else {
       judge(check, limit, worst, nothing_attained(limit));
     }

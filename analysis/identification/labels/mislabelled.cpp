@@ -169,12 +169,12 @@ std::string in_words(const Mislabelled& label) {
     case What::kPath:
       return fmt::format(
           "the path in {} is that of {}: its velocity and that vehicle's accelerometer differ by {:.3f} "
-          "m/s^2, and by {:.3f} m/s^2 from the accelerometer beside it",
+          "m/s^2, and by {:.3f} m/s^2 from the accelerometer of the same log",
           log, label.belongs_to, label.after, label.before);
     case What::kSensors:
       return fmt::format(
           "the sensors and duties in {} are those of {}: the accelerometer and that vehicle's velocity "
-          "differ by {:.3f} m/s^2, and by {:.3f} m/s^2 from the velocity beside it",
+          "differ by {:.3f} m/s^2, and by {:.3f} m/s^2 from the velocity in the same log",
           log, label.belongs_to, label.after, label.before);
     case What::kName:
       return fmt::format(
