@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "analysis/identification/box_least_squares.h"
+#include "analysis/identification/passes.h"
 #include "nn/base/doubles.h"
 
 namespace swarmcert::identification {
