@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "analysis/identification/clocks/clock_placement.h"
 #include "analysis/identification/clocks/clock_search.h"
 #include "analysis/residuals/force_residual.h"
 #include "nn/base/parallel.h"
@@ -48,6 +49,72 @@ Clocks clocks_of(const std::vector<Track>& tracks) {
     for (int& clock : clocks.of) --clock;
   clocks.count += has_first ? 1 : 0;
   return clocks;
+}
+
+/// A flight, read with the clock offsets known so far.
+struct Reading {
+  std::vector<Track> tracks;
+  Clocks clocks;
+  std::vector<std::vector<Eigen::Vector3d>> r;  ///< residuals of clocks.tracks, in W
+};
+
+Reading read_flight(const residuals::Inputs& inputs, std::size_t flight) {
+  std::vector<std::string> problems;  // reported by the diagnosis
+  Reading reading;
+  reading.tracks = inputs.load(flight, problems);
+  reading.clocks = clocks_of(reading.tracks);
+  if (reading.clocks.count < 2) return reading;
+  for (const Track* track : reading.clocks.tracks)
+    reading.r.push_back(force_residual(inputs.model_for(*track), inputs.kinds, inputs.rules, *track));
+  return reading;
+}
+
+/// @param without the clock whose vehicles are left out, and after which the clocks are numbered anew; -1: none
+ClockSearch search_of(const Reading& reading, int without = -1) {
+  const Clocks& clocks = reading.clocks;
+  std::vector<Interplay> interplays;
+  std::vector<int> of;
+  for (std::size_t v = 0; v < clocks.tracks.size(); ++v) {
+    if (clocks.of[v] == without) continue;
+    std::vector<const Track*> others;
+    for (std::size_t other = 0; other < clocks.tracks.size(); ++other)
+      if (other != v && clocks.of[other] != without) others.push_back(clocks.tracks[other]);
+    interplays.emplace_back(*clocks.tracks[v], reading.r[v], others);
+    of.push_back(without >= 0 && clocks.of[v] > without ? clocks.of[v] - 1 : clocks.of[v]);
+  }
+  return {std::move(interplays), std::move(of), clocks.count - (without < 0 ? 0 : 1)};
+}
+
+/// @param ahead_s of each clock
+std::vector<ClockedVehicle> clocked_vehicles(const Reading& reading, const std::vector<double>& ahead_s) {
+  std::vector<ClockedVehicle> vehicles;
+  for (std::size_t v = 0; v < reading.clocks.tracks.size(); ++v) {
+    const int clock = reading.clocks.of[v];
+    vehicles.push_back(
+        {reading.clocks.tracks[v], &reading.r[v], clock, ahead_s[static_cast<std::size_t>(clock)]});
+  }
+  return vehicles;
+}
+
+/// Returns whether the offset of `clock` from `reference` stands out from its rivals. The other clocks are estimated
+/// without `clock`, so that they do not favour the offset that the search found.
+bool offset_stands_out(const Reading& reading, const ClockSteps& steps, int clock, int reference) {
+  const auto count = static_cast<std::size_t>(reading.clocks.count);
+  std::vector<double> ahead_s(count, 0);
+  double delay_s = 0;
+  const auto others = static_cast<int>(reading.clocks.tracks.size()) - reading.clocks.logs(clock);
+  if (others > 1) {
+    const ClockSteps found = search_of(reading, clock).best();
+    for (std::size_t k = 0; k < count; ++k) {
+      const int index = static_cast<int>(k) - (static_cast<int>(k) > clock ? 1 : 0);
+      if (static_cast<int>(k) != clock)
+        ahead_s[k] = kClockStep_s * found.clock[static_cast<std::size_t>(index)];
+    }
+    delay_s = kClockStep_s * found.delay;
+  }
+  const auto at = [&](int k) { return kClockStep_s * steps.clock[static_cast<std::size_t>(k)]; };
+  const double expected_s = ahead_s[static_cast<std::size_t>(reference)] + at(clock) - at(reference);
+  return is_related(clocked_vehicles(reading, ahead_s), clock, delay_s, expected_s);
 }
 
 /// Returns the largest set of clocks whose vehicles feel one another in a cycle, which separates delays and offsets.
@@ -166,8 +233,11 @@ ClockOffset offset_of(const Clocks& clocks, ClockSearch& search, const Estimate&
   return found;
 }
 
-std::vector<ClockOffset> offsets_of(const Clocks& clocks, ClockSearch search) {
+/// Returns the offsets within the range of the search.
+std::vector<ClockOffset> offsets_of(const Reading& reading) {
+  ClockSearch search = search_of(reading);
   if (!search.is_rich()) return {};
+  const Clocks& clocks = reading.clocks;
   Estimate estimate = {search.best(), {}, {}};
   const std::vector<int> around = circle(search, estimate.steps, clocks.count);
   if (around.size() < 2) return {};
@@ -178,22 +248,78 @@ std::vector<ClockOffset> offsets_of(const Clocks& clocks, ClockSearch search) {
     for (const Suspect& suspect : suspects(search, estimate.steps, around, reference, clocks.count)) {
       if (estimate.without_s[0].size() == 0) estimate.without_s = left_out(search, estimate.steps);
       ClockOffset found = offset_of(clocks, search, estimate, suspect, reference);
-      if (found.z > kLeastZ) result.push_back(std::move(found));
+      if (found.z > kLeastZ && offset_stands_out(reading, estimate.steps, suspect.clock, reference))
+        result.push_back(std::move(found));
     }
-    if (!result.empty()) return result;
+    if (result.empty()) continue;
+    const bool is_related = clocks.count == 2 || offset_stands_out(reading, estimate.steps, reference,
+                                                                   around[around[0] == reference ? 1 : 0]);
+    if (is_related) return result;
   }
   return {};
 }
 
-ClockSearch search_of(const residuals::Inputs& inputs, const Clocks& clocks) {
-  std::vector<Interplay> interplays;
-  for (const Track* track : clocks.tracks) {
-    std::vector<const Track*> others = clocks.tracks;
-    others.erase(std::find(others.begin(), others.end(), track));
-    const auto r = force_residual(inputs.model_for(*track), inputs.kinds, inputs.rules, *track);
-    interplays.emplace_back(*track, r, others);
+/// Returns the fraction of the sum of squares that is explained if all clocks are equal.
+double explained_if_equal(const Reading& reading) {
+  ClockSearch search = search_of(reading);
+  double most_N2 = 0;
+  for (int delay = 0; delay <= kWakeSteps; ++delay)
+    most_N2 = std::max(
+        most_N2, search.value({std::vector<int>(static_cast<std::size_t>(reading.clocks.count), 0), delay}));
+  return search.records() > 0 ? most_N2 / search.squares_N2() : 0;
+}
+
+/// Returns the offsets from the first of the related clocks, after reading the flight with `places_s`.
+/// @param places_s from placed_clocks(); clocks within the range of the search are at 0
+std::vector<ClockOffset> offsets_beyond(const Reading& reading,
+                                        const std::vector<std::optional<double>>& places_s,
+                                        double explained_before) {
+  ClockSearch search = search_of(reading);
+  if (!search.is_rich()) return {};
+  Estimate estimate = {search.best(), {}, {}};
+  const std::vector<int> around = circle(search, estimate.steps, reading.clocks.count);
+  const auto place = [&](int clock) { return places_s[static_cast<std::size_t>(clock)]; };
+  const int reference = static_cast<int>(
+      std::find_if(places_s.begin(), places_s.end(), [](const auto& one) { return one.has_value(); }) -
+      places_s.begin());
+  if (std::find(around.begin(), around.end(), reference) == around.end()) return {};
+  estimate.offsets_s = search.offsets_s(estimate.steps, -1);
+  estimate.without_s = left_out(search, estimate.steps);
+  std::vector<ClockOffset> result;
+  for (const int clock : around) {
+    if (clock == reference || !place(clock)) continue;
+    const Suspect suspect = {clock, explained_before * search.squares_N2()};
+    ClockOffset found = offset_of(reading.clocks, search, estimate, suspect, reference);
+    const double deviation_s = std::abs(found.offset_s) / found.z;
+    found.offset_s += *place(clock);
+    found.interval = {found.interval.lower + *place(clock), found.interval.upper + *place(clock)};
+    found.z = std::abs(found.offset_s) / deviation_s;
+    if (found.z > kLeastZ) result.push_back(std::move(found));
   }
-  return {std::move(interplays), clocks.of, clocks.count};
+  return result;
+}
+
+/// Searches all offsets at which the logs overlap. Returns nothing if all related clocks are within the range of the
+/// search.
+std::vector<ClockOffset> distant_offsets(const residuals::Inputs& inputs, std::size_t flight,
+                                         const Reading& reading) {
+  const std::vector<double> equal_s(static_cast<std::size_t>(reading.clocks.count), 0.0);
+  std::vector<std::optional<double>> places_s =
+      placed_clocks(clocked_vehicles(reading, equal_s), reading.clocks.count);
+  bool is_beyond = false;
+  for (std::optional<double>& place_s : places_s) {
+    if (place_s && std::abs(*place_s) < kSearched_s) place_s = 0;
+    is_beyond = is_beyond || (place_s && *place_s != 0);
+  }
+  if (!is_beyond) return {};
+  residuals::Inputs placed = inputs;
+  for (std::size_t v = 0; v < reading.clocks.tracks.size(); ++v) {
+    const Track& track = *reading.clocks.tracks[v];
+    const auto& place_s = places_s[static_cast<std::size_t>(reading.clocks.of[v])];
+    if (place_s && *place_s != 0)
+      placed.found.flights[flight].clock_offsets_s[track.path] = track.clock_offset_s + *place_s;
+  }
+  return offsets_beyond(read_flight(placed, flight), places_s, explained_if_equal(reading));
 }
 
 }  // namespace
@@ -204,10 +330,10 @@ std::vector<ClockOffset> clock_offsets(const residuals::Inputs& inputs, int jobs
   files::parallel_for(static_cast<int>(count), jobs, [&](int index) {
     const auto i = static_cast<std::size_t>(index);
     if (inputs.found.flights[i].logs.size() < 2) return;
-    std::vector<std::string> problems;  // reported by the diagnosis
-    const std::vector<Track> tracks = inputs.load(i, problems);
-    const Clocks clocks = clocks_of(tracks);
-    if (clocks.count > 1) found[i] = offsets_of(clocks, search_of(inputs, clocks));
+    const Reading reading = read_flight(inputs, i);
+    if (reading.clocks.count < 2) return;
+    found[i] = distant_offsets(inputs, i, reading);
+    if (found[i].empty()) found[i] = offsets_of(reading);
   });
   std::vector<ClockOffset> result;
   for (std::vector<ClockOffset>& some : found)

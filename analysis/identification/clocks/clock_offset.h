@@ -32,8 +32,10 @@ struct ClockOffset {
 /// Estimates offsets for flights of two or more vehicles whose clocks are not all related by absolute times or common
 /// starts of their setpoints. All clocks of a flight are estimated together and compared with the clock that most logs
 /// share, else with the middle one, else with the next one from which another significantly differs. Returns nothing
-/// for a flight if the vehicles hardly disturb each other, if one of them feels no other one or is felt by none, or if
-/// no two clocks differ by more than three standard deviations and by enough to matter for the disturbances.
+/// for a flight if the vehicles hardly disturb each other, if one of them feels no other one or is felt by none, if
+/// no two clocks differ by more than three standard deviations and by enough to matter for the disturbances, or if the
+/// offset does not stand out from those at which the disturbances fit by chance (`clock_relation.h`). Clocks may differ
+/// by as much as leaves half of the logs in common; beyond kSearched_s they are placed first (`clock_placement.h`).
 std::vector<ClockOffset> clock_offsets(const residuals::Inputs& inputs, int jobs);
 
 /// Makes `inputs` read its logs with these offsets.
