@@ -7,7 +7,6 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/host.h"
-#include "nn/base/file_hash.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/text.h"

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "analysis/gate/baseline.h"
-#include "nn/base/file_hash.h"
+#include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::gate {

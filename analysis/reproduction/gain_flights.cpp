@@ -10,7 +10,6 @@
 #include <sstream>
 
 #include "analysis/logs/read_log.h"
-#include "nn/base/file_hash.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "nn/base/file_hash.h"
 #include "nn/base/file_io.h"
 
 namespace swarmcert::reproduction {

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "analysis/tracking/conformal.h"
-#include "nn/base/file_hash.h"
+#include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
 #include "stability/bounds/tracking_bounds.h"

@@ -7,8 +7,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
+#include <memory>
 #include <stdexcept>
 
 #include "nn/base/input_error.h"
@@ -39,6 +41,30 @@ class Descriptor {
  private:
   int number_;
 };
+
+/// Returns a descriptor that the caller closes.
+int open_to_read(const std::string& path) {
+  const int number = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (number < 0) refuse_with_errno(path, "cannot be opened");
+  return number;
+}
+
+struct stat status_of(const Descriptor& file, const std::string& path) {
+  struct stat status = {};
+  if (::fstat(file.number(), &status) != 0) refuse_with_errno(path, "cannot be read");
+  if (S_ISDIR(status.st_mode)) refuse(path, "is a folder", "name a file in it");
+  return status;
+}
+
+/// Returns the next bytes of the file, in `block`; none at its end.
+std::string_view read_block(const Descriptor& file, const std::string& path,
+                            std::array<char, 1 << 16>& block) {
+  ssize_t count;
+  do count = ::read(file.number(), block.data(), block.size());
+  while (count < 0 && errno == EINTR);
+  if (count < 0) refuse_with_errno(path, "cannot be read");
+  return {block.data(), static_cast<std::size_t>(count)};
+}
 
 bool write_all(int descriptor, std::string_view contents) {
   while (!contents.empty()) {
@@ -73,29 +99,49 @@ int move_into_place(const std::string& temporary, const std::string& path, bool 
   return std::rename(temporary.c_str(), path.c_str()) == 0 ? 0 : errno;
 }
 
+class Sha256 {
+ public:
+  Sha256() { require(EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr)); }
+  void add(std::string_view bytes) { require(EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size())); }
+  /// Ends the hash.
+  std::string hex() {
+    unsigned char digest[EVP_MAX_MD_SIZE];
+    unsigned int size = 0;
+    require(EVP_DigestFinal_ex(context_.get(), digest, &size));
+    static constexpr char kDigits[] = "0123456789abcdef";
+    std::string text;
+    for (unsigned int i = 0; i < size; ++i) {
+      text += kDigits[digest[i] >> 4];
+      text += kDigits[digest[i] & 15];
+    }
+    return text;
+  }
+
+ private:
+  static void require(int result) {
+    if (result != 1) throw std::runtime_error("sha256: OpenSSL has no SHA-256 in this configuration");
+  }
+
+  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_{EVP_MD_CTX_new(), EVP_MD_CTX_free};
+};
+
 }  // namespace
 
 std::string read_file(const std::string& path, std::size_t limit_bytes) {
-  const Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!descriptor.is_open()) refuse_with_errno(path, "cannot be opened");
-  struct stat status = {};
-  if (::fstat(descriptor.number(), &status) != 0) refuse_with_errno(path, "cannot be read");
-  if (S_ISDIR(status.st_mode)) refuse(path, "is a folder", "name a file in it");
-
+  const Descriptor file(open_to_read(path));
+  const struct stat status = status_of(file, path);
   const auto refuse_size = [&] { refuse(path, "is larger than " + std::to_string(limit_bytes) + " bytes"); };
   std::string contents;
   if (S_ISREG(status.st_mode)) {
     if (static_cast<std::uintmax_t>(status.st_size) > limit_bytes) refuse_size();
     contents.reserve(static_cast<std::size_t>(status.st_size));
   }
-  char block[1 << 16];
+  std::array<char, 1 << 16> block;
   for (;;) {  // to the end, not to st_size: a pipe has no size, and a log may still grow
-    const ssize_t count = ::read(descriptor.number(), block, sizeof block);
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) refuse_with_errno(path, "cannot be read");
-    if (count == 0) return contents;
-    if (static_cast<std::size_t>(count) > limit_bytes - contents.size()) refuse_size();
-    contents.append(block, static_cast<std::size_t>(count));
+    const std::string_view bytes = read_block(file, path, block);
+    if (bytes.empty()) return contents;
+    if (bytes.size() > limit_bytes - contents.size()) refuse_size();
+    contents += bytes;
   }
 }
 
@@ -143,18 +189,21 @@ void write_file(const std::string& path, std::string_view contents, bool overwri
 }
 
 std::string sha256(std::string_view bytes) {
-  unsigned char digest[EVP_MAX_MD_SIZE];
-  unsigned int size = 0;
-  if (EVP_Digest(bytes.data(), bytes.size(), digest, &size, EVP_sha256(), nullptr) != 1) {
-    throw std::runtime_error("sha256: OpenSSL has no SHA-256 in this configuration");
+  Sha256 hash;
+  hash.add(bytes);
+  return hash.hex();
+}
+
+std::string sha256_of_file(const std::string& path) {
+  const Descriptor file(open_to_read(path));
+  status_of(file, path);
+  Sha256 hash;
+  std::array<char, 1 << 16> block;
+  for (;;) {
+    const std::string_view bytes = read_block(file, path, block);
+    if (bytes.empty()) return hash.hex();
+    hash.add(bytes);
   }
-  static constexpr char kDigits[] = "0123456789abcdef";
-  std::string text;
-  for (unsigned int i = 0; i < size; ++i) {
-    text += kDigits[digest[i] >> 4];
-    text += kDigits[digest[i] & 15];
-  }
-  return text;
 }
 
 }  // namespace swarmcert::files

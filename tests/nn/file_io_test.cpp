@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "nn/base/file_hash.h"
 #include "nn/base/suggest.h"
 #include "refusal.h"
 #include "temp_folder.h"

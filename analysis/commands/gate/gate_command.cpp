@@ -14,7 +14,6 @@
 #include "analysis/gate/gate.h"
 #include "analysis/gate/outputs.h"
 #include "analysis/gate/text.h"
-#include "nn/base/file_hash.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 

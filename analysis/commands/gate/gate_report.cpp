@@ -8,7 +8,7 @@
 #include "analysis/cli/command_line.h"
 #include "analysis/gate/text.h"
 #include "analysis/report/report.h"
-#include "nn/base/file_hash.h"
+#include "nn/base/file_io.h"
 
 namespace swarmcert::analysis {
 namespace {

@@ -1,7 +1,7 @@
 #include <filesystem>
 
 #include "analysis/gate/checks/checks.h"
-#include "nn/base/file_hash.h"
+#include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
 
