@@ -116,6 +116,7 @@ class Sensors:
         self.rng = rng
         self.late_s, self.skew = rng.uniform(0, 0.03), rng.uniform(-1e-4, 1e-4)
         self.ahead_s, self.from_s = 0.0, 0.0  # of the clock; when the log begins
+        self.velocity_scale, self.heading_rad = 1.0, 0.0  # faults of the estimates
         self.y, self.dy = None, [0.0, 0.0, 0.0]
         self.records = []
 
@@ -138,10 +139,12 @@ class Sensors:
         tick = int(1e6 * ((state.t + self.ahead_s - self.late_s) * (1 + self.skew)) + noise(0, 60))
         if tick < 0:
             return
-        a = state.to_world([self.y[i] + noise(0, 0.1) for i in range(3)])
+        a = turned(state.to_world([self.y[i] + noise(0, 0.1) for i in range(3)]), self.heading_rad)
         values = [tick]
-        values += [milli(x + noise(0, 2e-4)) for x in state.p] + [milli(x + noise(0, 4e-3)) for x in state.v]
-        values += [milli(x) for x in a] + [compressed(state.q)] + [milli(x) for x in state.w]
+        values += [milli(x + noise(0, 2e-4)) for x in state.p]
+        values += [milli(self.velocity_scale * x + noise(0, 4e-3)) for x in state.v]
+        values += [milli(x) for x in a] + [compressed(turned_attitude(state.q, self.heading_rad))]
+        values += [milli(x) for x in state.w]
         values += [milli(x) for x in target[0]] + [milli(x) for x in target[1]]
         values += [commanded_N, 0.0, 0.0, 0.0] + [commanded_N / 4] * 4
         values += [int(65535 * d + 0.5) for d in duties] + [20.0, int(1000 * state.battery + 0.5), 0.0]
@@ -160,6 +163,16 @@ RECORD = "<" + "".join(name[-2] for name in VARIABLES)
 
 def milli(value):
     return max(-32768, min(32767, int(value * 1000)))
+
+
+def turned(u, heading_rad):
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    return [c * u[0] - s * u[1], s * u[0] + c * u[1], u[2]]
+
+
+def turned_attitude(q, heading_rad):
+    c, s = math.cos(heading_rad / 2), math.sin(heading_rad / 2)
+    return [c * q[0] - s * q[3], c * q[1] - s * q[2], c * q[2] + s * q[1], c * q[3] + s * q[0]]
 
 
 def compressed(q):
@@ -262,8 +275,9 @@ def wrapped(angle):
 def fly(truth, seed, folder, run=0, vehicles=1, duration_s=30.0):
     """Simulates a flight and writes folder/cf<1 ...>_<run>. `truth`: force(state) in the world, torque(state) in the
     body, both in SI units; rotor(state, index, thrust_N), what a rotor gives; discharge_V_s; accelerometer_scale;
-    clocks_s, by how much each log's clock is ahead; from_s, when the logs begin; apart_m, how far the others' paths are
-    to the side. Returns how far the clock of each log is truly ahead, s."""
+    velocity_scale; heading_rad, by which attitudes and accelerations are turned about the vertical; clocks_s, by how
+    much each log's clock is ahead; from_s, when the logs begin; apart_m, how far the others' paths are to the side.
+    Returns how far the clock of each log is truly ahead, s."""
     rng = random.Random(seed * 1000 + run)
     scale = truth.get("speed", 1.0)
     fleet = []
@@ -278,6 +292,8 @@ def fly(truth, seed, folder, run=0, vehicles=1, duration_s=30.0):
     for k, vehicle in enumerate(fleet):
         vehicle.sensors.ahead_s = truth.get("clocks_s", (0.0,) * vehicles)[k]
         vehicle.sensors.from_s = truth.get("from_s", 0.0)
+        vehicle.sensors.velocity_scale = truth.get("velocity_scale", 1.0)
+        vehicle.sensors.heading_rad = truth.get("heading_rad", 0.0)
         vehicle.state.others = [ago(other) for j, other in enumerate(fleet) if j != k]
     for step in range(int(duration_s / STEP_S)):
         targets = [vehicle.path.at(vehicle.state.t) for vehicle in fleet]

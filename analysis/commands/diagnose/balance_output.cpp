@@ -9,6 +9,7 @@
 
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/identification/balance/accelerometer_balance.h"
+#include "analysis/identification/balance/motion_balance.h"
 #include "analysis/identification/balance/torque_balance.h"
 #include "analysis/identification/candidates.h"
 #include "analysis/identification/verdict.h"
@@ -115,6 +116,12 @@ bool is_explained_ratio(const files::Json& entry, const AccelerometerBalance& ba
   return ratio.is_number() && std::abs(ratio.get<double>() - balance.scale.value) < kAlike;
 }
 
+/// Such a model already describes why signals contradict each other.
+bool corrects_a_sensor(const stability::Model& model) {
+  return std::any_of(model.effects.begin(), model.effects.end(),
+                     [](const stability::EffectSpec& spec) { return is_sensor_error(spec.name); });
+}
+
 void name_missing(files::Json& result) {
   if (result["verdict"] == identification::name(identification::Verdict::kInconclusive)) return;
   result["verdict"] = identification::name(identification::Verdict::kMissingEffect);
@@ -153,6 +160,20 @@ bool judge_accelerometers(const residuals::Inputs& inputs, int jobs, bool prints
   result["ranking"] = std::move(ranking);
   name_missing(result);
   return true;
+}
+
+bool judge_motions(const residuals::Inputs& inputs, int jobs, files::Json& result) {
+  bool is_unexplained = false;
+  for (const stability::Model& model : inputs.models) {
+    for (const identification::MotionFault& fault : identification::motion_faults(inputs, model.kind, jobs)) {
+      is_unexplained = is_unexplained || !corrects_a_sensor(model);
+      result["problems"].push_back(
+          fmt::format("{}: signals contradict each other: {}", fault.vehicle, fault.words));
+    }
+  }
+  if (is_unexplained && result["verdict"] == identification::name(identification::Verdict::kNothingMissing))
+    result["verdict"] = identification::name(identification::Verdict::kUnexplained);
+  return is_unexplained;
 }
 
 bool judge_torques(const residuals::Inputs& inputs, int jobs, bool prints, files::Json& result) {

@@ -123,6 +123,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
       !others && judge_accelerometers(inputs, common.jobs, common.prints_text(), result);
   const bool names_clock = judge_clocks(clocks, common.prints_text(), result);
   const bool names_label = judge_labels(labels, common.prints_text(), result);
+  const bool is_unexplained = judge_motions(inputs, common.jobs, result);
   if (options.each) add_each(answers.each, result);
   if (options.next) add_next(answers.diagnoses, result);
   if (options.next && common.prints_text()) print_next(answers.diagnoses);
@@ -134,6 +135,8 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   if (names_rotor || ((names_torque || names_sensor || names_clock || names_label) &&
                       verdict != identification::Verdict::kInconclusive))
     verdict = identification::Verdict::kMissingEffect;
+  if (is_unexplained && verdict == identification::Verdict::kNothingMissing)
+    verdict = identification::Verdict::kUnexplained;
   if (common.prints_text()) fmt::print("verdict: {}\n", name(verdict));
   if (!options.report.empty()) {
     std::vector<std::string> notes;
