@@ -14,13 +14,14 @@
 #include "analysis/residuals/log_cache.h"
 #include "analysis/residuals/over_tracks.h"
 #include "analysis/residuals/velocity_error.h"
+#include "nn/base/pi.h"
 
 namespace swarmcert::identification {
 namespace {
 
 using residuals::Track;
 
-constexpr double kDegrees = 180 / M_PI;
+constexpr double kDegrees = 180 / kPi;
 constexpr std::size_t kFlightsAsUnits = 5, kFewestUnits = 3;
 
 /// Least contradictions that are said.

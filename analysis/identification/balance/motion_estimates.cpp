@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "analysis/identification/balance/force_means.h"
+#include "nn/base/pi.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -172,7 +173,7 @@ void compare_turns(const Track& track, const Stretches& stretches, MotionEstimat
         turned_rad += (track.instants[i].time_s - track.instants[i - 1].time_s) / 2 *
                       (track.instants[i].omega_B_rad_s + track.instants[i - 1].omega_B_rad_s);
       const Eigen::AngleAxisd seen(a->q.conjugate() * b->q);
-      const double angle_rad = seen.angle() > M_PI ? seen.angle() - 2 * M_PI : seen.angle();
+      const double angle_rad = seen.angle() > kPi ? seen.angle() - 2 * kPi : seen.angle();
       for (int axis = 0; axis < 2; ++axis) {
         VectorXd row(4);
         row << turned_rad(axis) / duration_s(track, one), axis == 0 ? 1 : 0, axis == 1 ? 1 : 0,
