@@ -7,6 +7,7 @@
 #include <set>
 
 #include "analysis/identification/closed_loop.h"
+#include "analysis/identification/doubts.h"
 #include "analysis/identification/scan/named_forms.h"
 #include "analysis/identification/swinging_load.h"
 #include "nn/base/doubles.h"
@@ -75,6 +76,11 @@ Settled settle(const Passes& passes, const Coverage& covered, const std::vector<
 
 bool is_named(const Missing& missing) { return !is_formula(missing.effect); }
 
+bool is_ranked(const std::string& name, const Settled& settled) {
+  return std::any_of(settled.ranking.begin(), settled.ranking.end(),
+                     [&](const Missing& missing) { return missing.effect == name; });
+}
+
 /// Returns whether a payload may be missing, i.e. whether part of the weight is.
 bool may_be_load(const Settled& settled) {
   const auto is_of_weight = [](const std::string& name) {
@@ -103,9 +109,7 @@ std::vector<Candidate> name_swinging_load(const Passes& passes, const Coverage& 
   const std::optional<Candidate> load = visible_pendulum(passes, covered, beside);
   if (!load) return {};
   Settled swinging = settle(passes, covered, {*load}, {kPendulum});
-  const bool is_named = std::any_of(swinging.ranking.begin(), swinging.ranking.end(),
-                                    [](const Missing& missing) { return missing.effect == kPendulum; });
-  if (!is_named) return {};
+  if (!is_ranked(kPendulum, swinging)) return {};
   settled = std::move(swinging);
   return {*load};
 }
@@ -141,52 +145,6 @@ void scan_what_is_left(const Passes& passes, Explained& explained) {
   explained.formulas = find_formulas(left, explained.scan, kMostFormulas, passes.jobs);
 }
 
-bool is_of_library(const std::string& effect) {
-  const std::vector<std::string> library = stability::effect_names();
-  return std::find(library.begin(), library.end(), effect) != library.end();
-}
-
-bool is_answer_of_thrust(const Missing& missing) {
-  if (!is_of_library(missing.effect)) return false;
-  const stability::EffectInfo& info = stability::effect_info(missing.effect);
-  return info.remembers || is_scale(missing.effect) || is_of_load(missing.effect) ||
-         missing.effect == "inflow";
-}
-
-/// Returns the mean square that an effect removes, N^2.
-double taken_N2(const Missing& missing) {
-  const Finding& finding = missing.finding;
-  return finding.rmse_before_N * finding.rmse_before_N - finding.rmse_after_N * finding.rmse_after_N;
-}
-
-/// Returns whether an effect may be only the mean, the edge or a side effect of something else: a force at a place or
-/// time, which few vehicles meet; thrust that depends on the climb rate, which any force along the velocity resembles;
-/// or a fraction of the thrust below two percent of the weight. Drag and a lag are not suspect: every vehicle has them.
-bool may_be_part(const Missing& missing, double weight_N) {
-  constexpr double kSmall = 0.02;
-  const std::string& effect = missing.effect;
-  if (effect == "thrust_ratio" || effect == "constant_force")
-    return taken_N2(missing) < kSmall * weight_N * (kSmall * weight_N);
-  return needs_scan(effect) || effect == "ground" || effect == "ceiling" || effect == "inflow";
-}
-
-/// Returns whether an effect is too small beside the remainder.
-bool is_doubtful(const Missing& missing, const Explained& explained, double weight_N) {
-  constexpr double kMost = 0.5, kOfSameVariable = 0.5, kLittle = 0.1;
-  const double taken = taken_N2(missing);
-  const Remainder& rest = explained.settled.rest;
-  // Formulas selected beside the effect are part of the remainder again; the effect may be part of what they explain.
-  if (rest.ratio > kLoudRatio && taken < kLittle * rest.excess_N2) return true;
-  if (rest.flag && may_be_part(missing, weight_N) && taken < rest.excess_N2) return true;
-  if (explained.scan.entries.empty() || explained.scan.entries[0].share < kMost) return false;
-  const ScanEntry& first = explained.scan.entries[0];
-  const double left = first.rmse_before * first.rmse_before - first.rmse_after * first.rmse_after;
-  // If one variable explains most of the remainder, thrust and its history react to it.
-  if (is_answer_of_thrust(missing) && taken <= left) return true;
-  // An effect of this variable that leaves most of the dependence on it has the wrong form.
-  return points_to(first.variable, missing.effect) && kOfSameVariable * taken < left;
-}
-
 /// Moves effects to the suspects and scans the remainder again.
 template <typename IsDropped>
 void drop_names(const Passes& passes, Explained& explained, const IsDropped& is_dropped) {
@@ -202,8 +160,9 @@ void drop_names(const Passes& passes, Explained& explained, const IsDropped& is_
 
 void drop_doubtful_names(const Passes& passes, Explained& explained) {
   const double weight_N = passes.inputs.model_of(passes.kind)->weight_N();
-  drop_names(passes, explained,
-             [&](const Missing& missing) { return is_doubtful(missing, explained, weight_N); });
+  drop_names(passes, explained, [&](const Missing& missing) {
+    return is_doubtful(missing, explained.settled.rest, explained.scan, weight_N);
+  });
 }
 
 /// Returns whether a lag or delay removes little and may be spurious: its interval reaches its lower bound; or it was

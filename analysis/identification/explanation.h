@@ -13,10 +13,6 @@
 
 namespace swarmcert::identification {
 
-/// Above this Remainder::ratio, small effects cannot be distinguished from parts of the unexplained remainder. Source:
-/// 20 simulated flights with gusts and external forces had 56 .. 320, recorded flights of two vehicles 9 .. 21.
-inline constexpr double kLoudRatio = 25;
-
 /// A selection without suspect effects.
 struct Settled {
   Selected selected;

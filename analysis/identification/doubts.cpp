@@ -1,0 +1,68 @@
+#include "analysis/identification/doubts.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "analysis/identification/closed_loop.h"
+#include "analysis/identification/scan/named_forms.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::identification {
+namespace {
+
+bool is_answer_of_thrust(const Missing& missing) {
+  if (!is_of_library(missing.effect)) return false;
+  const stability::EffectInfo& info = stability::effect_info(missing.effect);
+  return info.remembers || is_scale(missing.effect) || is_of_load(missing.effect) ||
+         missing.effect == "inflow";
+}
+
+/// Returns whether a curve over this variable is a drag.
+bool is_drag_over(const std::string& variable, const std::string& effect) {
+  const bool is_drag = is_fixed_drag(effect) || effect == "drag_rotor";
+  return is_drag && (variable == "vx" || variable == "vy" || variable == "vz" || variable == "speed" ||
+                     variable == "airspeed");
+}
+
+}  // namespace
+
+bool is_of_library(const std::string& effect) {
+  const std::vector<std::string> library = stability::effect_names();
+  return std::find(library.begin(), library.end(), effect) != library.end();
+}
+
+std::set<std::string> fixed_drags() { return {"drag_linear", "drag_quadratic"}; }
+
+bool is_fixed_drag(const std::string& effect) { return fixed_drags().count(effect) > 0; }
+
+double taken_N2(const Missing& missing) {
+  const Finding& finding = missing.finding;
+  return finding.rmse_before_N * finding.rmse_before_N - finding.rmse_after_N * finding.rmse_after_N;
+}
+
+bool may_be_part(const Missing& missing, double weight_N) {
+  constexpr double kSmall = 0.02;
+  const std::string& effect = missing.effect;
+  if (effect == "thrust_ratio" || effect == "constant_force")
+    return taken_N2(missing) < kSmall * weight_N * (kSmall * weight_N);
+  return needs_scan(effect) || effect == "ground" || effect == "ceiling" || effect == "inflow";
+}
+
+bool is_doubtful(const Missing& missing, const Remainder& rest, const Scan& scan, double weight_N) {
+  constexpr double kMost = 0.5, kOfSameVariable = 0.5, kLittle = 0.1;
+  const double taken = taken_N2(missing);
+  // Formulas selected beside the effect are part of the remainder again; the effect may be part of what they explain.
+  if (rest.ratio > kLoudRatio && taken < kLittle * rest.excess_N2) return true;
+  if (rest.flag && may_be_part(missing, weight_N) && taken < rest.excess_N2) return true;
+  if (scan.entries.empty() || scan.entries[0].share < kMost) return false;
+  const ScanEntry& first = scan.entries[0];
+  const double left = first.rmse_before * first.rmse_before - first.rmse_after * first.rmse_after;
+  // If one variable explains most of the remainder, thrust and its history react to it.
+  if (is_answer_of_thrust(missing) && taken <= left) return true;
+  // An effect of this variable that leaves most of the dependence on it has the wrong form.
+  const bool is_same =
+      points_to(first.variable, missing.effect) || is_drag_over(first.variable, missing.effect);
+  return is_same && kOfSameVariable * taken < left;
+}
+
+}  // namespace swarmcert::identification

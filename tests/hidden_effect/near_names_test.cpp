@@ -1,0 +1,70 @@
+/// Hidden forces that resemble effects of the registry but have another form: diagnose does not give them the name of
+/// the effect they resemble, or says what else they may be. The effects themselves keep their names.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "analysis/run.h"
+#include "data.h"
+#include "hidden_effect/other_simulator.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::tests {
+namespace {
+
+using Eigen::Vector3d;
+
+using HiddenForce = std::function<Vector3d(const Moment&)>;
+
+const std::string& model_path() {
+  static const std::string path = source_path("stability/models/crazyflie-small.toml");
+  return path;
+}
+
+/// Flies four times with a hidden force.
+void fly_with(const HiddenForce& force_N, int vehicles, std::uint64_t seed, const std::string& folder) {
+  Truth truth;
+  truth.force_N = force_N;
+  for (int run = 0; run < 4; ++run)
+    fly(truth, {Program::kRich, vehicles, 40, seed + static_cast<std::uint64_t>(run)}, folder, run);
+}
+
+/// Returns the answer of diagnose on such flights.
+files::Json answer_to(const HiddenForce& force_N, std::uint64_t seed, int vehicles = 1) {
+  const ScratchFolder folder;
+  fly_with(force_N, vehicles, seed, folder / "flights");
+  const Outcome outcome =
+      run_shell("swarmcert diagnose '" + model_path() + "' flights -q --json result.json", folder.path());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  return files::read_json(folder / "result.json", "swarmcert/diagnose/1");
+}
+
+std::vector<std::string> names_in(const files::Json& answer) {
+  std::vector<std::string> names;
+  for (const files::Json& named : answer["ranking"]) names.push_back(named["effect"]);
+  return names;
+}
+
+TEST(DragOfTheNamedExponents, StaysNamed) {
+  const auto quadratic = [](const Moment& now) { return Vector3d(-0.05 * now.v_m_s.norm() * now.v_m_s); };
+  EXPECT_EQ(names_in(answer_to(quadratic, 910)), std::vector<std::string>{"drag_quadratic"});
+  const auto linear = [](const Moment& now) { return Vector3d(-0.03 * now.v_m_s); };
+  EXPECT_EQ(names_in(answer_to(linear, 920)), std::vector<std::string>{"drag_linear"});
+}
+
+TEST(DragThatDiffersBetweenBodyAxes, IsNotNamedAsADragOfAllAxes) {
+  const auto drag = [](const Moment& now) {
+    return Vector3d(-0.06 * now.b1.dot(now.v_m_s) * now.b1 - 0.03 * now.b2.dot(now.v_m_s) * now.b2);
+  };
+  const files::Json answer = answer_to(drag, 936);
+  EXPECT_EQ(names_in(answer), std::vector<std::string>());
+  EXPECT_EQ(answer["verdict"], "unexplained");
+  EXPECT_EQ(answer["remainder"].at(0)["variable"], "vx");
+}
+
+}  // namespace
+}  // namespace swarmcert::tests
