@@ -8,6 +8,7 @@
 
 #include "analysis/identification/closed_loop.h"
 #include "analysis/identification/doubts.h"
+#include "analysis/identification/scan/drag_law.h"
 #include "analysis/identification/scan/named_forms.h"
 #include "analysis/identification/swinging_load.h"
 #include "nn/base/doubles.h"
@@ -15,6 +16,9 @@
 
 namespace swarmcert::identification {
 namespace {
+
+/// A formula replaces named effects if it leaves less than this fraction of the mean square, which favours names.
+constexpr double kClearlyLess = 0.9;
 
 /// Returns the effects whose shape ended at a bound other than its start, i.e. that really fit something else. Shapes
 /// of effects of neighbours may end anywhere, because nothing else acts where neighbours are.
@@ -139,10 +143,47 @@ std::vector<Formula> rivals_of_names(const Passes& passes, const Explained& expl
   return rivals;
 }
 
-void scan_what_is_left(const Passes& passes, Explained& explained) {
-  const ScanSamples left = scan_samples(passes, specs_of(explained.settled.ranking));
+FixedDrag fixed_drag(const std::vector<Missing>& ranking) {
+  FixedDrag drag;
+  for (const Missing& missing : ranking) {
+    if (missing.effect == "drag_linear") drag.linear_N_s_m = missing.parameters.at("drag_N_s_m");
+    if (missing.effect == "drag_quadratic") drag.quadratic_N_s2_m2 = missing.parameters.at("drag_N_s2_m2");
+  }
+  return drag;
+}
+
+/// Returns the drag law for the samples beside the effects of `ranking`, if it clearly explains more than their drags.
+std::optional<DragLaw> better_drag_law(const ScanSamples& left, const std::vector<Missing>& ranking) {
+  const bool has_drag = std::any_of(ranking.begin(), ranking.end(),
+                                    [](const Missing& missing) { return is_fixed_drag(missing.effect); });
+  if (!has_drag) return std::nullopt;
+  std::optional<DragLaw> law = drag_law(left, fixed_drag(ranking));
+  if (law && !(law->mean_square_N2 < kClearlyLess * mean_square_N2(left))) law.reset();
+  return law;
+}
+
+/// Adds the drag law that replaces named drags as the first formula, and its curve, whose entries stay sorted by share.
+void add_drag_law(const ScanSamples& left, Explained& explained) {
+  std::optional<DragLaw> law = drag_law(left, {});
+  ScanEntry entry = along_velocity(left);
+  if (!law || entry.curve.empty()) return;
+  std::vector<ScanEntry>& entries = explained.scan.entries;
+  const auto place = std::find_if(entries.begin(), entries.end(),
+                                  [&](const ScanEntry& other) { return other.share < entry.share; });
+  law->formula.entry = static_cast<std::size_t>(place - entries.begin());
+  for (Formula& formula : explained.formulas) formula.entry += formula.entry >= law->formula.entry ? 1 : 0;
+  entries.insert(place, std::move(entry));
+  explained.formulas.insert(explained.formulas.begin(), std::move(law->formula));
+}
+
+/// Scans the remainder beside the effects found.
+/// @return the samples of that remainder
+ScanSamples scan_what_is_left(const Passes& passes, Explained& explained) {
+  ScanSamples left = scan_samples(passes, specs_of(explained.settled.ranking));
   explained.scan = scan(left, passes.jobs);
   explained.formulas = find_formulas(left, explained.scan, kMostFormulas, passes.jobs);
+  if (explained.has_drag_law) add_drag_law(left, explained);
+  return left;
 }
 
 /// Moves effects to the suspects and scans the remainder again.
@@ -296,15 +337,27 @@ bool may_saturate(const Explained& explained, const stability::Model& model,
          std::none_of(rivals.begin(), rivals.end(), is_it);
 }
 
+/// Returns a selection with a drag law in place of drags of fixed exponents, if held-out blocks clearly prefer it.
+/// @param rivals candidates beside it
+std::optional<Settled> settle_with_drag_law(const Passes& passes, const Coverage& covered, const DragLaw& law,
+                                            std::vector<Candidate> rivals, double left_by_names) {
+  rivals.push_back(candidate_of(law.formula, *passes.inputs.model_of(passes.kind)));
+  Settled other = settle_with_formulas(passes, covered, std::move(rivals), {kDragLaw}, fixed_drags());
+  const double left = Selection(other.selected.grams).mean_square(other.selected.members);
+  if (!is_ranked(kDragLaw, other) || !(left < kClearlyLess * left_by_names)) return std::nullopt;
+  return other;
+}
+
 /// Accepts an effect only if it explains about as much as the best formula would in its place. If formulas win, the
 /// selection is repeated with them as candidates, and they become part of the remainder. Effects that only formulas
 /// suggest take part as well.
 Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
-  constexpr double kClearlyLess = 0.9, kMuchLess = 0.7;  // of the mean square: favours named effects
+  constexpr double kMuchLess = 0.7;  // of the mean square
   Explained result;
   result.settled = settle(passes, covered, {}, {});
   const std::vector<Candidate> loads = name_swinging_load(passes, covered, result.settled);
-  scan_what_is_left(passes, result);
+  const std::optional<DragLaw> law =
+      better_drag_law(scan_what_is_left(passes, result), result.settled.ranking);
   std::optional<Nominal> nominal;
   if (!result.settled.ranking.empty()) {
     nominal.emplace(Nominal{scan_samples(passes, {}), {}});
@@ -314,7 +367,8 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
   std::vector<Candidate> rivals = named_forms(formulas, model, covered);
   if (may_saturate(result, model, rivals)) rivals.push_back(candidate("thrust_saturation", model, covered));
-  if (rivals.empty() && (formulas.empty() || result.settled.ranking.empty())) return result;
+  const bool has_rivals = !rivals.empty() || law;
+  if (!has_rivals && (formulas.empty() || result.settled.ranking.empty())) return result;
   for (const Formula& formula : formulas) rivals.push_back(candidate_of(formula, model));
   rivals.insert(rivals.end(), loads.begin(), loads.end());
   const Selection by_names(result.settled.selected.grams);
@@ -332,6 +386,12 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
     Settled other = settle_with_formulas(passes, covered, rivals, {}, refuted);
     if (Selection(other.selected.grams).mean_square(other.selected.members) < left_by_names)
       return accept(std::move(other));
+  }
+  if (law) {
+    if (std::optional<Settled> other = settle_with_drag_law(passes, covered, *law, rivals, left_by_names)) {
+      result.has_drag_law = true;
+      return accept(std::move(*other));
+    }
   }
   std::vector<std::string> names;
   for (const Missing& missing : result.settled.ranking) names.push_back(missing.effect);

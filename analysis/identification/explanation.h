@@ -26,6 +26,8 @@ struct Explained {
   Settled settled;
   Scan scan;
   std::vector<Formula> formulas;
+  /// A drag with a free exponent replaces named drags. It is part of the remainder.
+  bool has_drag_law = false;
 };
 
 /// Selects effects for the residual of the flights of `passes`. A named effect is accepted only if it explains about as

@@ -10,6 +10,7 @@
 
 #include "analysis/identification/instrument.h"
 #include "analysis/identification/scan/curve_fit.h"
+#include "analysis/identification/scan/drag_law.h"
 #include "analysis/identification/scan/forms.h"
 #include "analysis/identification/scan/formulas.h"
 #include "analysis/identification/scan/proposal.h"
@@ -250,6 +251,43 @@ TEST(Scan, CommandedRatesAreThoseThatTheSetPointsAskFor) {
     }
     EXPECT_GT(fastest, 0.3);
   }
+}
+
+/// Adds the force -0.01 |v|^exponent against the velocity.
+void add_drag(double exponent, Flights& flights) {
+  for (Eigen::Index i = 0; i < flights.samples.size(); ++i) {
+    const Eigen::Vector3f v_m_s =
+        flights.samples.values.row(i).segment<3>(static_cast<int>(V::kVx)).transpose();
+    const double factor = -0.01 * std::pow(v_m_s.norm(), exponent - 1);
+    flights.samples.residual.row(i).head(3) += static_cast<float>(factor) * v_m_s.transpose();
+  }
+}
+
+TEST(DragLaw, FindsTheExponentBesideOrWithoutAFixedDrag) {
+  for (const double exponent : {1.0, 1.5, 2.0, 3.0}) {
+    Flights flights(7);
+    add_drag(exponent, flights);
+    const std::optional<DragLaw> law = drag_law(flights.samples, {});
+    ASSERT_TRUE(law.has_value()) << exponent;
+    EXPECT_NEAR(law->exponent, exponent, 0.1);
+    EXPECT_NEAR(law->formula.effect.parameters.at("drag_N"), 0.01, 0.0005) << exponent;
+    // The noise has three components.
+    EXPECT_NEAR(law->mean_square_N2, 3 * kNoise_N * kNoise_N, 0.2 * kNoise_N * kNoise_N) << exponent;
+  }
+  // A drag that the model already has counts as part of the law.
+  Flights flights(8);
+  add_drag(1, flights);
+  const std::optional<DragLaw> doubled = drag_law(flights.samples, {0.01, 0});
+  ASSERT_TRUE(doubled.has_value());
+  EXPECT_NEAR(doubled->exponent, 1, 0.1);
+  EXPECT_NEAR(doubled->formula.effect.parameters.at("drag_N"), 0.02, 0.001);
+}
+
+TEST(DragLaw, IsNotFoundForAForceAlongTheVelocity) {
+  Flights flights(9);
+  add_drag(2, flights);
+  flights.samples.residual *= -1;
+  EXPECT_FALSE(drag_law(flights.samples, {}).has_value());
 }
 
 TEST(Instrument, LagsReachDownToWhatWeakSetPointsLeavePossible) {

@@ -49,6 +49,32 @@ std::vector<std::string> names_in(const files::Json& answer) {
   return names;
 }
 
+Vector3d cubic_drag(const Moment& now) { return -0.06 * now.v_m_s.squaredNorm() * now.v_m_s; }
+
+TEST(DragOfAnotherExponent, IsAFormulaOfTheSpeedAndNotNamedQuadratic) {
+  const files::Json answer = answer_to(cubic_drag, 900);
+  EXPECT_EQ(names_in(answer), std::vector<std::string>());
+  EXPECT_EQ(answer["verdict"], "unexplained");
+  const files::Json& first = answer["remainder"].at(0);
+  EXPECT_EQ(first["variable"], "speed");
+  EXPECT_EQ(first["frame"], "velocity");
+  EXPECT_EQ(first["form"], "power");
+}
+
+TEST(DragOfAnotherExponent, IsAddedAsAFormulaThatLeavesLessThanQuadraticDrag) {
+  const ScratchFolder folder;
+  fly_with(cubic_drag, 1, 950, folder / "flights");
+  const auto left_N = [&](const std::string& effect) {
+    const Outcome outcome = run_shell("swarmcert add " + effect + " --model '" + model_path() +
+                                          "' flights -o fitted.toml -q --force --json result.json",
+                                      folder.path());
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    const files::Json result = files::read_json(folder / "result.json", "swarmcert/add/1");
+    return result["ladder"].back()["select_rmse"].get<double>();
+  };
+  EXPECT_LT(left_N("formula"), 0.9 * left_N("drag_quadratic"));
+}
+
 TEST(DragOfTheNamedExponents, StaysNamed) {
   const auto quadratic = [](const Moment& now) { return Vector3d(-0.05 * now.v_m_s.norm() * now.v_m_s); };
   EXPECT_EQ(names_in(answer_to(quadratic, 910)), std::vector<std::string>{"drag_quadratic"});

@@ -121,6 +121,7 @@ files::Json json_of(const ScanEntry& entry, const std::string& kind) {
 
 std::string place_of(const ScanEntry& entry) {
   if (entry.frame == "neighbour") return words_of(entry) + " towards the nearest neighbour, over its place";
+  if (entry.frame == "velocity") return words_of(entry) + " along the velocity over " + entry.variable;
   std::string text = fmt::format("{} {} over {}", words_of(entry), entry.axis, entry.variable);
   if (entry.frame == "body" && entry.quantity == "force") text += " (body axes)";
   if (entry.over_ground) text += " over ground";

@@ -226,8 +226,7 @@ stability::EffectSpec spec_of(const ScanEntry& entry, const char* target, const 
 
 /// Returns a constant along each axis of the body.
 Formula body_constant(const ScanSamples& samples, const ScanEntry& entry) {
-  constexpr double kIndependent = 0.2;  // fraction of the samples
-  const double independent = std::max(kIndependent * static_cast<double>(samples.size()), 4.0);
+  const double independent = std::max(kIndependentSamples * static_cast<double>(samples.size()), 4.0);
   Formula formula;
   formula.form = "constant";
   formula.variable = kBodyConstant;

@@ -32,6 +32,9 @@ Candidate candidate_of(const Formula& formula, const stability::Model& model);
 /// Returns [[effect]] with [effect.expression], as in a model file.
 std::string to_toml(const Formula& formula);
 
+/// The fraction of samples that is counted as independent where their correlation is not estimated.
+inline constexpr double kIndependentSamples = 0.2;
+
 /// Number of formulas that are searched on request.
 inline constexpr std::size_t kMostFormulas = 8;
 

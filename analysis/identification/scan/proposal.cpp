@@ -8,6 +8,7 @@
 
 #include "analysis/identification/box_least_squares.h"
 #include "analysis/identification/scan/curve_fit.h"
+#include "analysis/identification/scan/drag_law.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -111,7 +112,8 @@ std::optional<stability::EffectSpec> proposal(const Passes& passes,
     }
     return std::nullopt;
   }
-  const std::vector<Formula> formulas = find_formulas(samples, found, kMostFormulas, passes.jobs);
+  std::vector<Formula> formulas = find_formulas(samples, found, kMostFormulas, passes.jobs);
+  prefer_drag_law(samples, formulas);
   if (formulas.size() < place) return std::nullopt;
   return formulas[place - 1].effect;
 }

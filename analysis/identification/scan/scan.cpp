@@ -436,4 +436,30 @@ Scan scan(const ScanSamples& samples, int jobs, Judges judges) {
   return result;
 }
 
+ScanEntry along_velocity(const ScanSamples& samples) {
+  ScanSamples along =
+      samples;  // with the force along the velocity in the column of the force towards a neighbour
+  for (Eigen::Index i = 0; i < along.size(); ++i) {
+    const auto v_m_s = along.values.row(i).segment<3>(static_cast<Eigen::Index>(ScanVariable::kVx));
+    along.residual(i, kTowardColumn) =
+        along.residual.row(i).head<3>().dot(v_m_s) / std::max(v_m_s.norm(), 1e-3F);
+  }
+  const Judged judged(along, along.residual);
+  const std::vector<Abscissa> all = abscissas(along);
+  const auto speed =
+      std::find_if(all.begin(), all.end(), [](const Abscissa& a) { return a.name == "speed"; });
+  ScanEntry best;
+  for (const int knots : speed == all.end() ? std::vector<int>{} : speed->knots) {
+    if (curve_over(along, *speed, knots).columns == 0) continue;
+    ScanEntry entry = entry_of(judged, *speed, kTowardColumn, knots);
+    if (best.curve.empty() || entry.share > best.share) best = std::move(entry);
+  }
+  if (best.curve.empty()) return best;
+  set_errors(judged, best);
+  best.frame = "velocity";
+  best.axis = "along";
+  best.column = kTowardColumn;
+  return best;
+}
+
 }  // namespace swarmcert::identification

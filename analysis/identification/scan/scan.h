@@ -32,7 +32,7 @@ struct CurvePoint {
 
 /// A variable on which a component of the remainder depends.
 struct ScanEntry {
-  std::string variable, frame, axis;  ///< "climb"; for the others see ScanColumn
+  std::string variable, frame, axis;  ///< "climb"; for the others see ScanColumn and along_velocity()
   std::string quantity = "force", unit = "N";
   /// Corrected share of the mean square about the mean: of the force vector, of the torque about the one axis, or of
   /// the four rotors together.
@@ -69,5 +69,9 @@ enum class Judges {
 /// Scans the samples. The result depends only on the samples and `judges`.
 /// @param samples see scan_samples()
 Scan scan(const ScanSamples& samples, int jobs, Judges judges = Judges::kThisScan);
+
+/// Returns the curve over the speed of the force along the velocity, as an entry with the frame "velocity" and the axis
+/// "along"; without a curve if the speed hardly varies. scan() does not try it.
+ScanEntry along_velocity(const ScanSamples& samples);
 
 }  // namespace swarmcert::identification
