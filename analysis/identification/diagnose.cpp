@@ -8,6 +8,7 @@
 #include <set>
 
 #include "analysis/identification/balance/torque_balance.h"
+#include "analysis/identification/battery_rival.h"
 #include "analysis/identification/closed_loop.h"
 #include "analysis/identification/column_memory.h"
 #include "analysis/identification/rotors/lone_rotor.h"
@@ -211,6 +212,7 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   result.ranking = std::move(settled.ranking);
   result.thrust_scale = thrust_scale(all, covered);
   name_hidden_scale(*inputs.model_of(kind), result.thrust_scale, result.ranking);
+  name_time_beside_battery(all, result.ranking);
   result.remainder = std::move(settled.rest);
   result.scan = std::move(explained.scan);
   result.formulas = std::move(explained.formulas);
