@@ -35,6 +35,26 @@ std::set<std::string> fixed_drags() { return {"drag_linear", "drag_quadratic"}; 
 
 bool is_fixed_drag(const std::string& effect) { return fixed_drags().count(effect) > 0; }
 
+std::set<std::string> wakes_without_delay(const Selected& selected) {
+  const auto place_of = [&](const char* name) {
+    return std::find_if(selected.refined.begin(), selected.refined.end(),
+                        [&](const Refined& refined) { return refined.candidate.name == name; });
+  };
+  const auto delayed = place_of("wake_delay"), at_once = place_of("downwash");
+  if (delayed == selected.refined.end()) return {};
+  const stability::Parameter& delay = delayed->candidate.info.shape[0];
+  const double least_s =
+      delayed->shape_intervals.empty() ? delayed->theta[0] : delayed->shape_intervals[0].lower;
+  if (std::min(least_s, delayed->theta[0]) <= delay.lower) return {delayed->candidate.name};
+  if (at_once == selected.refined.end()) return {};
+  const Selection selection(selected.grams);
+  const auto loss_without = [&](auto place) {
+    return selection.loss_without(selected.members,
+                                  static_cast<std::size_t>(place - selected.refined.begin()));
+  };
+  return {(loss_without(delayed) < loss_without(at_once) ? delayed : at_once)->candidate.name};
+}
+
 double taken_N2(const Missing& missing) {
   const Finding& finding = missing.finding;
   return finding.rmse_before_N * finding.rmse_before_N - finding.rmse_after_N * finding.rmse_after_N;

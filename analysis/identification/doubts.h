@@ -21,6 +21,11 @@ bool is_of_library(const std::string& effect);
 std::set<std::string> fixed_drags();
 bool is_fixed_drag(const std::string& effect);
 
+/// Returns wakes that the flights do not show beside the others: a delayed wake whose delay may be zero within its
+/// interval, which is a downwash; and of a delayed wake beside a downwash the one that explains less, because the wake
+/// of a vehicle has one delay.
+std::set<std::string> wakes_without_delay(const Selected& selected);
+
 /// Returns the mean square that an effect removes, N^2.
 double taken_N2(const Missing& missing);
 

@@ -56,6 +56,7 @@ Settled settle(const Passes& passes, const Coverage& covered, const std::vector<
         doubts_slope ? without_slope(passes, candidates, {}) : select(passes, candidates, start);
     std::set<std::string> doubtful = out_of_bounds(result.selected);
     doubtful.merge(unconfirmed_loads(result.selected));
+    doubtful.merge(wakes_without_delay(result.selected));
     if (!doubtful.empty() && round + 1 < kMostRounds) {
       result.suspected.insert(result.suspected.end(), doubtful.begin(), doubtful.end());
       erase(candidates, doubtful);

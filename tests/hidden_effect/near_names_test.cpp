@@ -102,5 +102,21 @@ TEST(ThrustThatFadesWithTime, IsARivalOfABattery) {
   EXPECT_NE(std::find(rivals.begin(), rivals.end(), "formula_thrust_over_time"), rivals.end());
 }
 
+/// A wake of another form than those of the registry, twice as wide as its default, which arrives at once.
+Vector3d wide_wake(const Moment& now) {
+  double force_N = 0;
+  for (const Moment::Other& other : now.others) {
+    const double below_m = other.dp_m.z();
+    if (below_m < 0.05) continue;
+    const double width_m = 0.07 + 0.1 * below_m, beside_m = other.dp_m.head<2>().norm();
+    force_N -= 0.085 * (0.07 / width_m) * std::exp(-beside_m * beside_m / (2 * width_m * width_m));
+  }
+  return {0, 0, force_N};
+}
+
+TEST(WideWake, ThatArrivesAtOnceIsADownwashAndNotDelayed) {
+  EXPECT_EQ(names_in(answer_to(wide_wake, 700, 3)), std::vector<std::string>{"downwash"});
+}
+
 }  // namespace
 }  // namespace swarmcert::tests
