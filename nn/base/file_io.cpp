@@ -196,7 +196,7 @@ std::string sha256(std::string_view bytes) {
 
 std::string sha256_of_file(const std::string& path) {
   const Descriptor file(open_to_read(path));
-  status_of(file, path);
+  status_of(file, path);  // refuses a folder
   Sha256 hash;
   std::array<char, 1 << 16> block;
   for (;;) {

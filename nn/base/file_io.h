@@ -21,7 +21,7 @@ void write_file(const std::string& path, std::string_view contents, bool overwri
 
 /// Returns the SHA-256 of `bytes` as 64 lower-case hex digits (FIPS 180-4; computed by OpenSSL).
 std::string sha256(std::string_view bytes);
-/// Returns the same of the contents of a file of any size, without holding them in memory.
+/// Returns the SHA-256 of the contents of a file of any size, without holding them in memory.
 /// @throws InputError if it cannot be read or is a folder.
 std::string sha256_of_file(const std::string& path);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "nn/base/doubles.h"
 #include "stability/bounds/sampled_bounds.h"
@@ -285,6 +286,11 @@ void add_theorem(const Plant& plant, const DisturbanceSource& source, const Init
 }  // namespace
 
 const char* axis_name(int axis) { return axis == 0 ? "x" : axis == 1 ? "y" : "z"; }
+int axis_of_name(const std::string& name) {
+  for (const int axis : {0, 1, 2})
+    if (name == axis_name(axis)) return axis;
+  throw std::invalid_argument("axis_of_name: no axis is called " + name);
+}
 const char* name(Channel channel) { return channel == Channel::kForce ? "force" : "command"; }
 const char* name(Estimate estimate) { return estimate == Estimate::kVelocity ? "velocity" : "position"; }
 const char* name(Loop loop) { return loop == Loop::kContinuous ? "continuous" : "sampled"; }

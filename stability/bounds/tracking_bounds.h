@@ -152,6 +152,9 @@ TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const Dis
 
 /// "x", "y", "z"; "force", "command"; "velocity", "position"; "continuous", "sampled".
 const char* axis_name(int axis);
+/// Returns the axis of a name that axis_name() gives.
+/// @throws std::invalid_argument for any other name.
+int axis_of_name(const std::string& name);
 const char* name(Channel channel);
 const char* name(Estimate estimate);
 const char* name(Loop loop);

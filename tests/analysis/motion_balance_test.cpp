@@ -106,38 +106,32 @@ std::vector<MotionFault> faults_of_flights(const Faults& faults) {
   return motion_faults(tracks);
 }
 
-/// Expects exactly this fault.
-void expect_only(const Faults& faults, const std::string& quantity, double value) {
-  const std::vector<MotionFault> found = faults_of_flights(faults);
-  ASSERT_EQ(found.size(), 1U) << quantity;
-  EXPECT_EQ(found[0].quantity, quantity);
-  EXPECT_NEAR(found[0].value, value, 0.02 * std::abs(value) + found[0].half) << found[0].words;
-}
-
 TEST(MotionBalance, SoundLogsContradictNothing) {
   const std::vector<MotionFault> found = faults_of_flights({});
   EXPECT_TRUE(found.empty()) << found[0].words;
 }
 
-TEST(MotionBalance, EachFaultOfALogIsSaidWithItsSize) {
-  Faults faults;
-  faults.position_lag_s = 0.04;
-  expect_only(faults, "position_lag_s", 0.04);
-  faults = {};
-  faults.velocity_lag_s = 0.04;
-  expect_only(faults, "velocity_lag_s", 0.04);
-  faults = {};
-  faults.attitude_lag_s = 0.04;
-  expect_only(faults, "attitude_lag_s", 0.04);
-  faults = {};
-  faults.velocity_scale = 1.06;
-  expect_only(faults, "velocity_scale", 1.06);
-  faults = {};
-  faults.heading_rad = 8 * kDegree_rad;
-  expect_only(faults, "heading_rad", -8 * kDegree_rad);
-  faults = {};
-  faults.tilt_rad = 3 * kDegree_rad;
-  expect_only(faults, "tilt_rad", 3 * kDegree_rad);
+TEST(MotionBalance, EachFaultOfALogIsSaidAloneWithItsSizeAndInterval) {
+  const struct {
+    double Faults::*fault;
+    double size;
+    const char* quantity;
+    double value;
+  } cases[] = {{&Faults::position_lag_s, 0.04, "position_lag_s", 0.04},
+               {&Faults::velocity_lag_s, 0.04, "velocity_lag_s", 0.04},
+               {&Faults::attitude_lag_s, 0.04, "attitude_lag_s", 0.04},
+               {&Faults::velocity_scale, 1.06, "velocity_scale", 1.06},
+               {&Faults::heading_rad, 8 * kDegree_rad, "heading_rad", -8 * kDegree_rad},
+               {&Faults::tilt_rad, 3 * kDegree_rad, "tilt_rad", 3 * kDegree_rad}};
+  for (const auto& one : cases) {
+    Faults faults;
+    faults.*one.fault = one.size;
+    const std::vector<MotionFault> found = faults_of_flights(faults);
+    ASSERT_EQ(found.size(), 1U) << one.quantity;
+    EXPECT_EQ(found[0].quantity, one.quantity);
+    EXPECT_NEAR(found[0].value, one.value, 0.02 * std::abs(one.value) + found[0].half) << found[0].words;
+    EXPECT_NE(found[0].words.find("99 % interval"), std::string::npos) << found[0].words;
+  }
 }
 
 TEST(MotionBalance, NoiseOfVelocitiesOrPositionsIsNoScale) {

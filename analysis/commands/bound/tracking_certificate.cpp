@@ -140,12 +140,6 @@ class Entries {
   Json continuous = Json::array(), sampled = Json::array(), left_out = Json::array();
 };
 
-int axis_of(const Json& row) {
-  int axis = 0;
-  while (stability::axis_name(axis) != row["axis"].get<std::string>()) ++axis;
-  return axis;
-}
-
 std::string numbers_of(const stability::AxisLoop& loop) {
   return Json({loop.mass_kg, loop.Kp, loop.Kd, loop.Ki, loop.lags_s, loop.delay_s}).dump();
 }
@@ -155,7 +149,8 @@ void add_continuous(const Tracking& input, const Json& verified, Entries& entrie
   std::map<std::string, Json> known;
   for (const Json& row : verified) {
     if (row["loop"] != "continuous") continue;
-    const stability::AxisLoop loop = *axis_loop(input.gains, input.plant, axis_of(row));
+    const stability::AxisLoop loop =
+        *axis_loop(input.gains, input.plant, stability::axis_of_name(row["axis"].get<std::string>()));
     const auto [place, is_new] = known.try_emplace(numbers_of(loop) + row["channel"].get<std::string>());
     if (is_new) place->second = entry_or_reason(loop, row);
     entries.add(row, place->second);
@@ -165,7 +160,8 @@ void add_continuous(const Tracking& input, const Json& verified, Entries& entrie
 void add_sampled(const Tracking& input, const Json& verified, Entries& entries) {
   std::map<int, std::map<std::string, Json>> rows;
   for (const Json& row : verified) {
-    if (row["loop"] == "sampled") rows[axis_of(row)][row["channel"].get<std::string>()] = row;
+    if (row["loop"] == "sampled")
+      rows[stability::axis_of_name(row["axis"].get<std::string>())][row["channel"].get<std::string>()] = row;
   }
   std::map<std::string, Json> known;
   for (const auto& [axis, inputs] : rows) {

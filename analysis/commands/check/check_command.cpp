@@ -52,11 +52,6 @@ bool states(const files::Json& entry, const stability::AxisLoop& loop) {
          std::equal(stated.begin(), stated.end(), derived.begin(), derived.end(), is_close);
 }
 
-int axis_of(const files::Json& entry) {
-  const std::string axis = entry["axis"].get<std::string>();
-  return axis == "x" ? 0 : axis == "y" ? 1 : 2;
-}
-
 /// The same for an entry of a sampled loop.
 bool states(const files::Json& entry, const stability::SampledLoop& loop) {
   return states(entry, loop.plant) && fits(entry, "period_s", loop.period_s) &&
@@ -69,7 +64,8 @@ void compare_loops(const CheckOptions& options, const files::Json& certificate,
   const stability::TrackingSetup setup = stability::load_tracking_setup(options.gains, options.model);
   const auto compare = [&](const char* kind, const auto& loop_of) {
     for (const files::Json& entry : certificate[kind]) {
-      const auto loop = loop_of(setup.gains, setup.plant, axis_of(entry));
+      const auto loop =
+          loop_of(setup.gains, setup.plant, stability::axis_of_name(entry["axis"].get<std::string>()));
       if (loop && states(entry, *loop)) continue;
       const std::string axis = entry["axis"].get<std::string>();
       verdict = {false, std::string(kind) + ": that of axis " + axis + " is not the one of the files given",

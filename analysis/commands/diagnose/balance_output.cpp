@@ -171,8 +171,6 @@ bool judge_motions(const residuals::Inputs& inputs, int jobs, files::Json& resul
           fmt::format("{}: signals contradict each other: {}", fault.vehicle, fault.words));
     }
   }
-  if (is_unexplained && result["verdict"] == identification::name(identification::Verdict::kNothingMissing))
-    result["verdict"] = identification::name(identification::Verdict::kUnexplained);
   return is_unexplained;
 }
 

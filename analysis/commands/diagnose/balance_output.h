@@ -17,9 +17,8 @@ bool judge_torques(const residuals::Inputs& inputs, int jobs, bool prints, files
 /// @return whether an entry was added to the ranking.
 bool judge_accelerometers(const residuals::Inputs& inputs, int jobs, bool prints, files::Json& result);
 
-/// Adds the signals of logs that contradict each other to `problems`. They turn the verdict nothing_missing into
-/// unexplained, unless the model has an effect that corrects a sensor.
-/// @return whether the verdict must not be nothing_missing.
+/// Adds the signals of logs that contradict each other to `problems`, with estimates and their 99 % intervals.
+/// @return whether the verdict must not be nothing_missing: a model has no effect that corrects a sensor.
 bool judge_motions(const residuals::Inputs& inputs, int jobs, files::Json& result);
 
 }  // namespace swarmcert::analysis

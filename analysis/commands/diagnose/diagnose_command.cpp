@@ -129,14 +129,16 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   if (options.next && common.prints_text()) print_next(answers.diagnoses);
   for (const std::string& problem : few_of_each(result["problems"].get<std::vector<std::string>>()))
     note("warning: " + problem);
-  write_result(common, result);
   std::string reason;
   identification::Verdict verdict = identification::verdict_of(answers.diagnoses, reason);
   if (names_rotor || ((names_torque || names_sensor || names_clock || names_label) &&
                       verdict != identification::Verdict::kInconclusive))
     verdict = identification::Verdict::kMissingEffect;
-  if (is_unexplained && verdict == identification::Verdict::kNothingMissing)
+  if (is_unexplained && verdict == identification::Verdict::kNothingMissing) {
     verdict = identification::Verdict::kUnexplained;
+    result["verdict"] = name(verdict);
+  }
+  write_result(common, result);
   if (common.prints_text()) fmt::print("verdict: {}\n", name(verdict));
   if (!options.report.empty()) {
     std::vector<std::string> notes;

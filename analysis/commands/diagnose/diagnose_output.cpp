@@ -154,7 +154,9 @@ void print_diagnosis(const Diagnosis& diagnosis) {
   }
   for (const std::string& effect : diagnosis.suspected)
     fmt::print(
-        "  Not counted: {} fits, but explains little of the remainder, or set points do not confirm it\n",
+        "  Not counted: {} fits, but explains little of the remainder, another form explains more, or set "
+        "points "
+        "do not confirm it\n",
         effect);
   if (diagnosis.thrust_scale.is_known) {
     const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;

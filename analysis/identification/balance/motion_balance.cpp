@@ -72,37 +72,46 @@ void add_velocity_scale(const VehicleMotion& motion, std::vector<MotionFault>& f
   const double from = least->value - least->half, to = largest->value + largest->half;
   if (from < 1 + kLeastScaleError && to > 1 - kLeastScaleError) return;
   const double value = (from + to) / 2;
-  faults.push_back({"", "", "velocity_scale", value, (to - from) / 2,
-                    fmt::format("velocities are {:.3f} times the differences of positions", value)});
+  faults.push_back(
+      {"", "", "velocity_scale", value, (to - from) / 2,
+       fmt::format("velocities are {:.3f} times the differences of positions, 99 % interval {:.3f} "
+                   "to {:.3f}",
+                   value, from, to)});
 }
 
 /// What is said about a quantity that should be 0.
 struct MotionRule {
   const char* quantity;
   double least;              ///< size that is said
-  double unit;               ///< of the number in words
+  double unit;               ///< of the numbers in words
   const char *plus, *minus;  ///< words for either sign, with the absolute value
+  const char* interval;      ///< words for the 99 % interval of the absolute value
 };
+
+constexpr char kLagInterval[] = ", 99 % interval {:.0f} to {:.0f} ms";
+constexpr char kAngleInterval[] = ", 99 % interval {:.1f} to {:.1f} degrees";
 
 const MotionRule kMotionRules[] = {
     {"position_lag_s", kLeastLag_s, 1e-3, "positions are {:.0f} ms later than velocities",
-     "positions are {:.0f} ms earlier than velocities"},
+     "positions are {:.0f} ms earlier than velocities", kLagInterval},
     {"velocity_lag_s", kLeastLag_s, 1e-3, "velocities are {:.0f} ms later than attitudes and specific forces",
-     "velocities are {:.0f} ms earlier than attitudes and specific forces"},
+     "velocities are {:.0f} ms earlier than attitudes and specific forces", kLagInterval},
     {"attitude_lag_s", kLeastLag_s, 1e-3, "attitudes are {:.0f} ms later than rates",
-     "attitudes are {:.0f} ms earlier than rates"},
+     "attitudes are {:.0f} ms earlier than rates", kLagInterval},
     {"heading_rad", kLeastHeading_rad, 1 / kDegrees,
      "attitudes are turned by {:.1f} degrees about the vertical (clockwise seen from above) against "
      "velocities",
      "attitudes are turned by {:.1f} degrees about the vertical (anticlockwise seen from above) against "
-     "velocities"}};
+     "velocities",
+     kAngleInterval}};
 
 void add_fault(const VehicleMotion& motion, const MotionRule& rule, std::vector<MotionFault>& faults) {
   const auto found = motion.mean(rule.quantity);
   if (!found || !(std::abs(found->value) - found->half > rule.least)) return;
+  const double size = std::abs(found->value) / rule.unit, half = found->half / rule.unit;
   faults.push_back({"", "", rule.quantity, found->value, found->half,
-                    fmt::format(fmt::runtime(found->value > 0 ? rule.plus : rule.minus),
-                                std::abs(found->value) / rule.unit)});
+                    fmt::format(fmt::runtime(found->value > 0 ? rule.plus : rule.minus), size) +
+                        fmt::format(fmt::runtime(rule.interval), size - half, size + half)});
 }
 
 /// Adds the tilt in the frame in which a constant one leaves less.
@@ -118,13 +127,14 @@ void add_tilt(const VehicleMotion& motion, std::vector<MotionFault>& faults) {
   if (!(tilt_rad - half_rad > kLeastTilt_rad)) return;
   const double larger = std::max(square_W->value, square_B->value),
                smaller = std::min(square_W->value, square_B->value);
+  const double size = kDegrees * tilt_rad, half = kDegrees * half_rad;
   const char* const cause = larger < kClearly * smaller ? "a frame or a sensor is tilted"
                             : is_in_body                ? "a sensor is tilted on the vehicle"
                                                         : "the frame of positions or attitudes is tilted";
   faults.push_back(
       {"", "", "tilt_rad", tilt_rad, half_rad,
-       fmt::format("specific forces are tilted by {:.1f} degrees against changes of velocities: {}",
-                   kDegrees * tilt_rad, cause)});
+       fmt::format("specific forces are tilted by {:.1f} degrees against changes of velocities", size) +
+           fmt::format(fmt::runtime(kAngleInterval), size - half, size + half) + ": " + cause});
 }
 
 std::vector<MotionFault> faults_of(const VehicleMotion& motion) {

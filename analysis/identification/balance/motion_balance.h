@@ -17,8 +17,8 @@ struct MotionFault {
   std::string kind, vehicle;
   std::string quantity;  ///< "velocity_scale", "position_lag_s", ...: see motion_faults()
   double value = 0;
-  double half = 0;  ///< of its 99 % interval
-  std::string words;
+  double half = 0;    ///< of its 99 % interval
+  std::string words;  ///< the estimate and its interval, with units
 };
 
 /// Returns the contradictions per vehicle of `kind` whose 99 % interval is beyond the size that matters:

@@ -40,6 +40,32 @@ std::optional<MotionState> state_at(const Track& track, double time_s) {
                      Eigen::Quaterniond(a.R_WB).slerp(share, Eigen::Quaterniond(b.R_WB))};
 }
 
+/// The states at the ends of a stretch, read later by a lag.
+struct MotionEnds {
+  MotionState from, to;
+};
+
+std::optional<MotionEnds> ends_of(const Track& track, const ForceMean& stretch, double lag_s) {
+  const auto from = state_at(track, track.instants[stretch.first].time_s + lag_s),
+             to = state_at(track, track.instants[stretch.last].time_s + lag_s);
+  if (!from || !to) return std::nullopt;
+  return MotionEnds{*from, *to};
+}
+
+double duration_s(const Track& track, const ForceMean& stretch) {
+  return track.instants[stretch.last].time_s - track.instants[stretch.first].time_s;
+}
+
+/// Returns the mean of a signal over a stretch, by the trapezoidal rule.
+Vector3d mean_over(const Track& track, const ForceMean& stretch, Vector3d stability::Instant::*signal) {
+  Vector3d sum = Vector3d::Zero();
+  for (std::size_t i = stretch.first + 1; i <= stretch.last; ++i) {
+    const stability::Instant &before = track.instants[i - 1], &now = track.instants[i];
+    sum += (now.time_s - before.time_s) / 2 * (now.*signal + before.*signal);
+  }
+  return sum / duration_s(track, stretch);
+}
+
 /// Rows of a least squares problem. The last parameter is the lag of the left side.
 struct MotionRows {
   std::vector<VectorXd> rows;
@@ -88,10 +114,6 @@ MotionSolution solve_with_lag(const RowsAt& rows_at) {
 /// Stretches of a part of a track.
 using Stretches = std::vector<ForceMean>;
 
-double duration_s(const Track& track, const ForceMean& one) {
-  return track.instants[one.last].time_s - track.instants[one.first].time_s;
-}
-
 Vector3d turned_left(const Vector3d& a) { return {-a.y(), a.x(), 0}; }
 
 /// Fits dp/dt = c (v + psi e3 x v - lag dv/dt). Noise of the velocity makes c too small. Noise of the position makes
@@ -101,15 +123,13 @@ void compare_positions(const Track& track, const Stretches& stretches, MotionEst
   const auto rows_at = [&](double lag_s) {
     MotionRows read;
     for (const ForceMean& one : stretches) {
+      const std::optional<MotionEnds> ends = ends_of(track, one, lag_s);
+      if (!ends) continue;
       const stability::Instant &from = track.instants[one.first], &to = track.instants[one.last];
-      const auto a = state_at(track, from.time_s + lag_s), b = state_at(track, to.time_s + lag_s);
-      if (!a || !b) continue;
-      Vector3d moved_m = Vector3d::Zero();
-      for (std::size_t i = one.first + 1; i <= one.last; ++i)
-        moved_m += (track.instants[i].time_s - track.instants[i - 1].time_s) / 2 *
-                   (track.instants[i].v_W_m_s + track.instants[i - 1].v_W_m_s);
-      const Vector3d seen = (b->p_m - a->p_m) / duration_s(track, one), v = moved_m / duration_s(track, one),
-                     turned = turned_left(v), change = (to.v_W_m_s - from.v_W_m_s) / duration_s(track, one);
+      const double time_s = duration_s(track, one);
+      const Vector3d seen = (ends->to.p_m - ends->from.p_m) / time_s,
+                     v = mean_over(track, one, &stability::Instant::v_W_m_s), turned = turned_left(v),
+                     change = (to.v_W_m_s - from.v_W_m_s) / time_s;
       for (int axis = 0; axis < 3; ++axis)
         read.add(seen(axis), Vector3d(v(axis), turned(axis), -change(axis)));
     }
@@ -129,13 +149,13 @@ void compare_horizontally(const Track& track, const Stretches& stretches, Motion
     return solve_with_lag([&](double lag_s) {
       MotionRows read;
       for (const ForceMean& one : stretches) {
-        const stability::Instant &from = track.instants[one.first], &to = track.instants[one.last];
-        const auto a = state_at(track, from.time_s + lag_s), b = state_at(track, to.time_s + lag_s);
-        if (!a || !b) continue;
-        const Vector3d seen = (b->v_m_s - a->v_m_s) / duration_s(track, one), x = one.mean_m_s2,
+        const std::optional<MotionEnds> ends = ends_of(track, one, lag_s);
+        if (!ends) continue;
+        const double time_s = duration_s(track, one);
+        const Vector3d seen = (ends->to.v_m_s - ends->from.v_m_s) / time_s, x = one.mean_m_s2,
                        turned = turned_left(x),
                        change = (track.specific_force_m_s2[one.last] - track.specific_force_m_s2[one.first]) /
-                                duration_s(track, one);
+                                time_s;
         const Eigen::Matrix3d axes =
             is_in_body ? track.instants[(one.first + one.last) / 2].R_WB : Eigen::Matrix3d::Identity();
         for (int axis = 0; axis < 2; ++axis) {
@@ -165,20 +185,18 @@ void compare_turns(const Track& track, const Stretches& stretches, MotionEstimat
   const MotionSolution solution = solve_with_lag([&](double lag_s) {
     MotionRows read;
     for (const ForceMean& one : stretches) {
+      const std::optional<MotionEnds> ends = ends_of(track, one, lag_s);
+      if (!ends) continue;
       const stability::Instant &from = track.instants[one.first], &to = track.instants[one.last];
-      const auto a = state_at(track, from.time_s + lag_s), b = state_at(track, to.time_s + lag_s);
-      if (!a || !b) continue;
-      Vector3d turned_rad = Vector3d::Zero();
-      for (std::size_t i = one.first + 1; i <= one.last; ++i)
-        turned_rad += (track.instants[i].time_s - track.instants[i - 1].time_s) / 2 *
-                      (track.instants[i].omega_B_rad_s + track.instants[i - 1].omega_B_rad_s);
-      const Eigen::AngleAxisd seen(a->q.conjugate() * b->q);
+      const double time_s = duration_s(track, one);
+      const Vector3d omega_rad_s = mean_over(track, one, &stability::Instant::omega_B_rad_s),
+                     change = (to.omega_B_rad_s - from.omega_B_rad_s) / time_s;
+      const Eigen::AngleAxisd seen(ends->from.q.conjugate() * ends->to.q);
       const double angle_rad = seen.angle() > kPi ? seen.angle() - 2 * kPi : seen.angle();
       for (int axis = 0; axis < 2; ++axis) {
         VectorXd row(4);
-        row << turned_rad(axis) / duration_s(track, one), axis == 0 ? 1 : 0, axis == 1 ? 1 : 0,
-            -(to.omega_B_rad_s - from.omega_B_rad_s)(axis) / duration_s(track, one);
-        read.add(angle_rad * seen.axis()(axis) / duration_s(track, one), row);
+        row << omega_rad_s(axis), axis == 0 ? 1 : 0, axis == 1 ? 1 : 0, -change(axis);
+        read.add(angle_rad * seen.axis()(axis) / time_s, row);
       }
     }
     return read;

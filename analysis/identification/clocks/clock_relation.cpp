@@ -6,6 +6,7 @@
 #include <string>
 
 #include "nn/base/doubles.h"
+#include "nn/base/median.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -158,12 +159,11 @@ std::vector<std::vector<double>> ratios_of(const std::vector<ClockedVehicle>& ve
 }  // namespace
 
 double chance_of_peak(const std::vector<double>& values, std::size_t narrowest) {
-  std::vector<double> sorted;
+  std::vector<double> finite;
   for (const double value : values)
-    if (std::isfinite(value)) sorted.push_back(value);
-  if (sorted.empty()) return 1;
-  std::sort(sorted.begin(), sorted.end());
-  const double median = sorted[sorted.size() / 2], most = sorted.back();
+    if (std::isfinite(value)) finite.push_back(value);
+  if (finite.empty()) return 1;
+  const double median = upper_median(finite), most = *std::max_element(finite.begin(), finite.end());
   const auto top = static_cast<std::size_t>(std::find(values.begin(), values.end(), most) - values.begin());
   std::size_t first = top, last = top;
   const auto is_hill = [&](std::size_t i) { return values[i] > (most + median) / 2; };

@@ -437,8 +437,8 @@ Scan scan(const ScanSamples& samples, int jobs, Judges judges) {
 }
 
 ScanEntry along_velocity(const ScanSamples& samples) {
-  ScanSamples along =
-      samples;  // with the force along the velocity in the column of the force towards a neighbour
+  // The force along the velocity takes the column of the force towards a neighbour.
+  ScanSamples along = samples;
   for (Eigen::Index i = 0; i < along.size(); ++i) {
     const auto v_m_s = along.values.row(i).segment<3>(static_cast<Eigen::Index>(ScanVariable::kVx));
     along.residual(i, kTowardColumn) =
