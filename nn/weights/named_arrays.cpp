@@ -133,11 +133,8 @@ Weights parse_npz(const std::string& bytes, const std::string& path, const std::
     const std::string contents = archive.read(entry, room_bytes);
     room_bytes -= contents.size();
     NpyArray array = parse_npy(contents, path, entry);
-    NamedArray named{entry.substr(0, entry.size() - 4), std::move(array.shape), std::move(array.numbers),
-                     false};
-    const std::string header = contents.substr(0, std::min<std::size_t>(contents.size(), 128));
-    named.is_float32 = header.find("'<f8'") == std::string::npos;
-    arrays.push_back(std::move(named));
+    arrays.push_back({entry.substr(0, entry.size() - 4), std::move(array.shape), std::move(array.numbers),
+                      array.is_float32});
   }
   return network_of_arrays(arrays, path, order);
 }

@@ -155,6 +155,7 @@ NpyArray parse_npy(const std::string& bytes, const std::string& path, const std:
            "does not fit the " + std::to_string(bytes.size() - data) + " bytes of its data", kCopyAgain);
   NpyArray array;
   array.shape = header.shape;
+  array.is_float32 = precision != Precision::kFloat64;
   array.numbers.reserve(*count);
   append_numbers(bytes.data() + data, *count, 1, precision, array.numbers);
   return array;
