@@ -21,7 +21,6 @@ import re
 import struct
 import sys
 import tomllib
-import zipfile
 from collections import OrderedDict
 from fractions import Fraction
 from io import BytesIO
@@ -29,7 +28,11 @@ from itertools import islice
 from operator import mul
 from pathlib import Path
 
+import mat_file
+import named_arrays
+import nnet_file
 import onnx_graphs
+from effective_weights import Tensor, with_effective_weights
 
 try:
     import parts_in_double
@@ -319,28 +322,59 @@ def in_order(layers, listing, stated):
     return by_number[0]
 
 
+MOST_NUMBERS, MOST_TENSORS = 2 ** 25, 4096
+
+
+def layers_of(tensors):
+    """Returns the layers of named tensors, W as [outputs x inputs], and the precision of their numbers."""
+    require_input(len(tensors) <= MOST_TENSORS, "the file holds more than 4096 tensors")
+    by_name = {tensor.name: tensor for tensor in tensors}
+    require_input(len(by_name) == len(tensors), "a tensor appears twice")
+    require_input(any(name.rpartition(".")[2] == "weight" for name in by_name), "the file holds no layer")
+    layers, precision, total = [], None, 0
+    for name, tensor in by_name.items():
+        layer, _, part = name.rpartition(".")
+        require_input(part in ("weight", "bias"), f"{name} is neither the weight nor the bias of a linear layer")
+        weight = f"{layer}.weight" if layer else "weight"
+        require_input(weight in by_name, f"{name} is a bias without its weight: {weight} is missing")
+        require_input(tensor.precision is not None,
+                      f"{name}: weights must be float16, bfloat16, float32 or float64; model.float() before saving")
+        precision = precision or tensor.precision
+        require_input(tensor.precision == precision, f"{name} is {tensor.precision}, and one file has one type, here "
+                      f"{precision}; model.float() or model.double() before saving")
+        owner = by_name[weight].shape
+        require_input(len(owner) == 2 and min(owner) > 0,
+                      f"{weight} of shape {owner}: a linear layer's weight has two dimensions, [outputs, inputs]")
+        require_input(part == "weight" or tensor.shape == owner[:1], f"{name} does not fit {weight} of shape {owner}")
+        total += math.prod(tensor.shape)
+    require_input(total <= 2 * MOST_NUMBERS, "the network has more than 2^25 numbers")
+
+    def numbers(tensor):
+        result = tensor.numbers()
+        require_input(len(result) == math.prod(tensor.shape), f"{tensor.name} does not fit its shape {tensor.shape}")
+        require_input(all(map(math.isfinite, result)),
+                      f"{tensor.name}: a weight is not finite; take an earlier checkpoint")
+        return result
+    for name, tensor in by_name.items():
+        layer, _, part = name.rpartition(".")
+        if part == "weight":
+            bias = by_name.get(f"{layer}.bias" if layer else "bias")
+            layers.append(Layer(layer, *tensor.shape, numbers(tensor),
+                                numbers(bias) if bias else [0.0] * tensor.shape[0]))
+    return layers, precision
+
+
 class Weights:
-    def __init__(self, tensors, precision, data, listing, order):
-        """tensors: (name, shape, numbers), W as [outputs x inputs]."""
-        biases = {name[:-5].rstrip("."): numbers for name, shape, numbers in tensors if name.split(".")[-1] == "bias"}
-        self.layers = []
-        for name, shape, numbers in tensors:
-            if name.split(".")[-1] == "weight":
-                layer = name[:-7] if "." in name else ""
-                self.layers.append(Layer(layer, shape[0], shape[1], numbers, biases.get(layer, [0.0] * shape[0])))
-        require_input(self.layers, "the file holds no layer")
-        names = {layer.name for layer in self.layers}
-        for name, _, _ in tensors:
-            layer, _, part = name.rpartition(".")
-            require_input(part in ("weight", "bias"), f"{name} is neither the weight nor the bias of a linear layer")
-            require_input(layer in names, f"{name} is a bias without its weight: "
-                          f"{layer + '.weight' if layer else 'weight'} is missing")
-        require_input(all(math.isfinite(x) for layer in self.layers for x in layer.weights + layer.biases),
-                      "a weight is not finite")
+    def __init__(self, tensors, data, listing, order):
+        """`listing`: meaning of the order of the tensors, see in_order()."""
+        tensors, are_computed = with_effective_weights(tensors)
+        self.layers, precision = layers_of(tensors)
         self.layers = in_order(self.layers, listing, order)
         require_input(all(a.outputs == b.inputs for a, b in zip(self.layers, self.layers[1:])),
                       "a layer does not take what the one before gives")
         self.precision = "float32" if precision in ("float16", "bfloat16") else precision
+        if are_computed and not all(tensor.is_float32 for tensor in tensors):
+            self.precision = "float64"
         # Activations of all layers but the last. None: the file does not state them. A file that states the order of
         # the layers states ReLU unless its reader finds other activations.
         self.activations = ["relu"] * (len(self.layers) - 1) if listing == "evaluation" else None
@@ -407,15 +441,27 @@ def unpack(precision, data):
                               f"{'f' if precision == 'float32' else 'd'}", data))
 
 
+# Bytes of the numbers of PyTorch's storages; those without a precision are not read as weights.
+STORAGES = {"FloatStorage": 4, "DoubleStorage": 8, "HalfStorage": 2, "BFloat16Storage": 2, "LongStorage": 8,
+            "IntStorage": 4, "ShortStorage": 2, "CharStorage": 1, "ByteStorage": 1, "BoolStorage": 1}
+
+
 class StorageType:
     def __init__(self, name):
+        require_input(name in STORAGES, f"torch.{name}: numbers of this type are not read; model.float() before saving")
+        self.bytes = STORAGES[name]
         self.precision = {"FloatStorage": "float32", "DoubleStorage": "float64", "HalfStorage": "float16",
-                          "BFloat16Storage": "bfloat16"}[name]
+                          "BFloat16Storage": "bfloat16"}.get(name)
 
 
-class Tensor:
+class View:
+    """A tensor of a pickle: a view of a storage."""
+
     def __init__(self, storage, offset, shape, strides, *_):
         self.storage, self.offset, self.shape, self.strides = storage, offset, shape, strides
+        require_input(all(type(n) is int and n >= 0 for n in (offset, *shape, *strides)) and len(shape) == len(strides),
+                      "the shape of a tensor is damaged")
+        require_input(math.prod(shape) <= MOST_NUMBERS, "a tensor has more than 2^25 numbers")
 
     def numbers(self, data):
         """Returns the numbers in row-major order from the bytes of the storage."""
@@ -433,7 +479,7 @@ class TorchUnpickler(pickle.Unpickler):
         if (module, name) == ("collections", "OrderedDict"):
             return OrderedDict
         if module == "torch._utils" and name == "_rebuild_tensor_v2":
-            return Tensor
+            return View
         if module == "torch._utils" and name == "_rebuild_parameter":
             return lambda tensor, *_: tensor
         if module == "torch" and name.endswith("Storage"):
@@ -447,15 +493,16 @@ class TorchUnpickler(pickle.Unpickler):
 def from_state_dict(state, key, storages, data, order):
     for part in filter(None, key.split(".")):
         state = state[part]
-    tensors = [(name, tensor.shape, tensor.numbers(storages(tensor.storage))) for name, tensor in state.items()]
-    return Weights(tensors, next(iter(state.values())).storage[0].precision, data, "registration", order)
+    numbers = lambda view: lambda: view.numbers(storages(view.storage))
+    tensors = [Tensor(name, view.shape, view.storage[0].precision, numbers(view)) for name, view in state.items()]
+    return Weights(tensors, data, "registration", order)
 
 
 def read_zip(data, key, order):
-    archive = zipfile.ZipFile(BytesIO(data))
-    roots = [n[:-8] for n in archive.namelist() if n.endswith("/data.pkl")]
-    if not roots:
-        raise ValueError("the zip archive has no <folder>/data.pkl; of zip archives, only those of torch.save are read")
+    archive, entries = named_arrays.entries_of(data, "the archive")
+    roots = [name[:-8] for name in entries if name.endswith("/data.pkl")]
+    require_input(roots, "the zip archive has no <folder>/data.pkl; of zip archives, those of torch.save and "
+                  "numpy.savez are read")
     root = roots[0]
     state = TorchUnpickler(BytesIO(archive.read(root + "data.pkl"))).load()
     return from_state_dict(state, key, lambda storage: archive.read(f"{root}data/{storage[1]}"), data, order)
@@ -474,7 +521,7 @@ def read_legacy(data, key, order):
             if isinstance(tensor, dict):
                 collect(tensor)
             else:
-                widths[tensor.storage[1]] = 4 if tensor.storage[0].precision == "float32" else 8
+                widths[tensor.storage[1]] = tensor.storage[0].bytes
     collect(state)
     storages = {}
     for name in names:
@@ -497,21 +544,21 @@ def read_safetensors(data, stated):
     tensors = []
     for name in names:
         begin, end = header[name]["data_offsets"]
-        precision = {"F32": "float32", "F64": "float64"}[header[name]["dtype"]]
-        tensors.append((name, header[name]["shape"], unpack(precision, data[8 + length + begin:8 + length + end])))
-    return Weights(tensors, precision, data, "none" if order is None else "evaluation", stated)
+        precision = {"F16": "float16", "BF16": "bfloat16", "F32": "float32", "F64": "float64"}[header[name]["dtype"]]
+        numbers = unpack(precision, data[8 + length + begin:8 + length + end])
+        tensors.append(Tensor(name, header[name]["shape"], precision, lambda numbers=numbers: numbers))
+    return Weights(tensors, data, "none" if order is None else "evaluation", stated)
 
 
-def read_onnx(data, order):
-    try:
-        layers, activations, precision = onnx_graphs.read(data)
-    except onnx_graphs.Refused as refused:
-        raise BadInput(str(refused)) from None
+def read_chain(read, data, order):
+    """Reads a file that states the whole chain with `read`, which returns what onnx_graphs.read() returns."""
+    layers, activations, precision = read(data)
     tensors = []
     for name, inputs, rows, biases, _ in layers:
         numbers = [row.get(column, 0.0) for row in rows for column in range(inputs)]
-        tensors += [(f"{name}.weight", [len(rows), inputs], numbers), (f"{name}.bias", [len(rows)], biases)]
-    result = Weights(tensors, precision, data, "evaluation", order)
+        tensors += [Tensor(f"{name}.weight", [len(rows), inputs], precision, lambda numbers=numbers: numbers),
+                    Tensor(f"{name}.bias", [len(rows)], precision, lambda biases=biases: biases)]
+    result = Weights(tensors, data, "evaluation", order)
     for layer, (*_, kept) in zip(result.layers, layers):
         layer.kept = kept
     result.activations = activations
@@ -520,6 +567,8 @@ def read_onnx(data, order):
 
 def read_c_source(data, key, order):
     text = re.sub(r"/\*.*?\*/|//[^\n]*|^\s*#[^\n]*", " ", data.decode("latin-1"), flags=re.S | re.M)
+    require_input(re.match(r"\s*(struct|static|const)\b", text), "is neither a PyTorch state dict (.pth), safetensors, "
+                  "ONNX, .npz, .mat, .nnet nor generated C weights; torch.save(model.state_dict(), ...)")
     types = {m[1]: re.findall(r"(float|double)\s+(\w+)((?:\s*\[\s*\d+\s*\])+)\s*;", m[2])
              for m in re.finditer(r"struct\s+(\w+)\s*\{([^{}]*)\}\s*;", text)}
     objects = {m[2].removeprefix("weights_"): (m[1], m[3])
@@ -536,8 +585,9 @@ def read_c_source(data, key, order):
         if len(shape) == 2:
             numbers = [numbers[i * shape[1] + j] for j in range(shape[1]) for i in range(shape[0])]
             shape.reverse()
-        tensors.append((re.sub(r"_(weight|bias)$", r".\1", member), shape, numbers))
-    return Weights(tensors, precision, data, "registration", order)
+        tensors.append(Tensor(re.sub(r"_(weight|bias)$", r".\1", member), shape, precision,
+                              lambda numbers=numbers: numbers))
+    return Weights(tensors, data, "registration", order)
 
 
 def read_weights(path, key="", order=None, activation=None):
@@ -553,14 +603,40 @@ def read_file(path, key, order):
     if "#" in path and not Path(path).exists():
         path, key = path.rsplit("#", 1)
     data = Path(path).read_bytes()
-    if data[:2] == b"PK":
+    try:
+        return parse_weights(data, key, order)
+    except (BadInput, onnx_graphs.Refused) as refused:
+        raise BadInput(f"{path}: {refused}") from None
+    except Exception as fault:  # any other one means that the file is not as its format requires
+        raise BadInput(f"{path}: is damaged, or written by another program than those whose files are read "
+                       f"({type(fault).__name__} {fault}); copy it again, or save it again as a state dict") from None
+
+
+def looks_like_safetensors(data):
+    return len(data) >= 10 and struct.unpack("<Q", data[:8])[0] <= 4 * 2 ** 20 and data[8:9] == b"{"
+
+
+def looks_like_onnx(data):
+    return len(data) >= 3 and data[0] == 8 and 1 <= data[1] <= 31 and data[2:3] in b"\x12\x1a\x22\x28\x32\x3a\x42"
+
+
+def parse_weights(data, key, order):
+    """Detects the format by the content, in the order in which all checkers do."""
+    is_npz = named_arrays.looks_like_npz(data)
+    if not is_npz and data[:4] in (b"PK\3\4", b"PK\5\6"):
         return read_zip(data, key, order)
     if data[:1] == b"\x80":
         return read_legacy(data, key, order)
-    if data[8:9] == b"{":
-        return read_safetensors(data, order)
-    if data[:1] == b"\x08":
-        return read_onnx(data, order)
+    formats = (
+        (is_npz, lambda: Weights(named_arrays.read_npz(data), data, "none", order)),
+        (looks_like_safetensors(data), lambda: read_safetensors(data, order)),
+        (looks_like_onnx(data), lambda: read_chain(onnx_graphs.read, data, order)),
+        (mat_file.looks_like_mat(data), lambda: Weights(mat_file.read_mat(data), data, "none", order)),
+        (nnet_file.looks_like_nnet(data), lambda: read_chain(nnet_file.read_nnet, data, order)))
+    for is_this, read in formats:
+        if is_this:
+            require_input(not key, f"the file is not nested: it has no key {key}; leave --key out")
+            return read()
     return read_c_source(data, key, order)
 
 

@@ -67,8 +67,35 @@ def signed(value):
     return value - 2 ** 64 if value >= 2 ** 63 else value
 
 
+FLOATS = ("float16", "bfloat16", "float32", "float64")
+# Types by their number in the file: name, code of struct, bytes, field of numbers that are not raw.
+TYPES = {1: ("float32", "f", 4, 4), 6: ("int32", "i", 4, 5), 7: ("int64", "q", 8, 7), 10: ("float16", "e", 2, 5),
+         11: ("float64", "d", 8, 10), 16: ("bfloat16", "H", 2, 5)}
+
+
+def bfloat16(bits):
+    return struct.unpack("<f", struct.pack("<I", bits << 16))[0]
+
+
+def stored_numbers(kind, code, width, data):
+    if len(data) % width:
+        raise Refused("a tensor contradicts its shape; export the model again")
+    numbers = list(struct.unpack(f"<{len(data) // width}{code}", data))
+    return list(map(bfloat16, numbers)) if kind == "bfloat16" else numbers
+
+
+def listed_numbers(kind, value):
+    """Returns numbers that are stored as protobuf integers: halves by their bits."""
+    numbers = integers_of(value)
+    if kind == "float16":
+        return [struct.unpack("<e", struct.pack("<H", bits & 0xffff))[0] for bits in numbers]
+    if kind == "bfloat16":
+        return [bfloat16(bits & 0xffff) for bits in numbers]
+    return list(map(signed, numbers))
+
+
 class Tensor:
-    """`numbers`: floats or, for int64, integers; None for other types."""
+    """`numbers`: floats or, for int32 and int64, integers; None for other types."""
 
     def __init__(self, name, shape, kind, numbers):
         self.name, self.shape, self.kind, self.numbers = name, shape, kind, numbers
@@ -76,27 +103,31 @@ class Tensor:
     @staticmethod
     def of(message):
         fields = list(protobuf(message))
-        shape = [d for n, v in fields if n == 1 for d in integers_of(v)]
-        kind = {1: "float32", 7: "int64", 11: "float64"}.get(next((v for n, v in fields if n == 2), 0))
-        raw = [v for n, v in fields if n in (4, 9, 10)]
-        if len(raw) > 1 or any(n == 13 or n == 14 and v for n, v in fields):
-            raise Refused("the numbers of a tensor are not in one piece")
-        numbers = None
-        if kind is not None:
-            data = raw[0] if raw else b""
-            code, width = {"float32": ("f", 4), "int64": ("q", 8), "float64": ("d", 8)}[kind]
-            numbers = list(struct.unpack(f"<{len(data) // width}{code}", data))
-            if kind == "int64" and not raw:
-                numbers = [signed(k) for n, v in fields if n == 7 for k in integers_of(v)]
-            if len(numbers) != math.prod(shape):
-                raise Refused("a tensor contradicts its shape")
-        return Tensor(next((v.decode() for n, v in fields if n == 8), ""), shape, kind, numbers)
+        name = next((v.decode() for n, v in fields if n == 8), "")
+        shape = [signed(d) for n, v in fields if n == 1 for d in integers_of(v)]
+        stored = [(n, v) for n, v in fields if n in (4, 5, 7, 9, 10)]
+        if any(n == 13 or n == 14 and v for n, v in fields):
+            raise Refused(f'the numbers of "{name}" are in another file; onnx.save(..., save_as_external_data=False)')
+        if len({n for n, _ in stored}) < len(stored) or any(isinstance(v, int) for _, v in stored):
+            raise Refused(f'the numbers of "{name}" are not in one piece; export the model again')
+        number = next((v for n, v in reversed(fields) if n == 2), 0)
+        if number not in TYPES:
+            return Tensor(name, shape, None, None)
+        kind, code, width, field = TYPES[number]
+        numbers = []
+        if stored and stored[0][0] == field and field in (5, 7):
+            numbers = listed_numbers(kind, stored[0][1])
+        elif stored and stored[0][0] in (9, field):
+            numbers = stored_numbers(kind, code, width, stored[0][1])
+        if len(stored) > 1 or any(size < 0 for size in shape) or len(numbers) != math.prod(shape):
+            raise Refused(f'"{name}" contradicts its shape; export the model again')
+        return Tensor(name, shape, kind, numbers)
 
     def is_float(self):
-        return self.kind in ("float32", "float64")
+        return self.kind in FLOATS
 
     def integers(self):
-        return self.numbers if self.kind == "int64" else []
+        return self.numbers if self.kind in ("int32", "int64") else []
 
 
 class Node:

@@ -26,7 +26,8 @@ def index_of(place, shape):
 
 def broadcast(tensor, shape):
     """Returns the numbers of a tensor, one per entry of `shape`."""
-    need(tensor.is_float(), "its constant must be float32 or float64", "convert before exporting: model.float()")
+    need(tensor.is_float(), "its constant must be float16, bfloat16, float32 or float64",
+         "convert before exporting: model.float()")
     own = list(tensor.shape)
     while len(own) > len(shape) and own[0] == 1:
         own.pop(0)
