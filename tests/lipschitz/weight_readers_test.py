@@ -18,7 +18,7 @@ import check_certificate as second
 import written_files
 
 PRINT_LAYERS, SOURCE = sys.argv[1], Path(sys.argv[2])
-MUTATIONS = int(sys.argv[3]) if len(sys.argv) > 3 else 60
+MUTATIONS = int(sys.argv[3]) if len(sys.argv) > 3 else 25
 NOT_READ = "HDF5"  # what the second checker says of files that only the first one reads
 COMPRESSED = "the entry is compressed or encrypted"
 

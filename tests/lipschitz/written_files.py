@@ -188,9 +188,16 @@ def matrix(name, shape, contents, kind=6):
                    + element(1, name.encode(), True) + contents)
 
 
-def mat(variables, packed=False):
-    pack = lambda data: struct.pack("<2I", 15, len(zlib.compress(data))) + zlib.compress(data)
-    return b"MATLAB 5.0 MAT-file, test".ljust(124) + b"\0\1IM" + b"".join(map(pack if packed else bytes, variables))
+def packed_by(data, level, strategy):
+    stream = zlib.compressobj(level, strategy=strategy)
+    result = stream.compress(data) + stream.flush()
+    return struct.pack("<2I", 15, len(result)) + result
+
+
+def mat(variables, packed=None):
+    """packed: level and strategy of zlib."""
+    pack = (lambda data: packed_by(data, *packed)) if packed else bytes
+    return b"MATLAB 5.0 MAT-file, test".ljust(124) + b"\0\1IM" + b"".join(map(pack, variables))
 
 
 def mat_files(generator):
@@ -210,8 +217,13 @@ def mat_files(generator):
     struct_ = matrix("net", (1, 1), element(5, struct.pack("<i", 8), True) + element(1, names) + inner, 2)
     small = [array("W1", 0, "b", 1), array("W2", 2, "h", 3), array("W3", 4, "i", 5)]
     text = matrix("comment", (1, 3), element(4, struct.pack("<3H", *b"abc")), 4)
-    return {"named.mat": mat(named[::-1]), "single.mat": mat(single, True), "cells.mat": mat([*cells, text]),
-            "struct.mat": mat([text, struct_], True), "small.mat": mat(small)}
+    repeated = (uniform(7, generator) * 6000)[:40 * 1000]  # back references of all distances
+    wide = [matrix("W1", (40, 1000), element(9, struct.pack("<40000d", *repeated)))]
+    usual = zlib.Z_DEFAULT_STRATEGY
+    return {"named.mat": mat(named[::-1]), "single.mat": mat(single, (9, usual)), "cells.mat": mat([*cells, text]),
+            "struct.mat": mat([text, struct_], (6, usual)), "small.mat": mat(small, (0, usual)),
+            "fixed.mat": mat(small, (6, zlib.Z_FIXED)), "huffman.mat": mat(named, (6, zlib.Z_HUFFMAN_ONLY)),
+            "wide.mat": mat(wide, (6, usual))}
 
 
 def numpy_files(folder, generator):

@@ -119,7 +119,7 @@ let objects path text =
       end in
     fill (); expect ';';
     if List.exists (fun m -> m.values = []) members then fail "a member is not initialised";
-    let key = if Weights.starts_with "weights_" name then String.sub name 8 (String.length name - 8) else name in
+    let key = if Tensor.starts_with "weights_" name then String.sub name 8 (String.length name - 8) else name in
     if List.mem_assoc key !found then fail "is defined twice";
     found := (key, members) :: !found in
   skip ();
@@ -138,15 +138,15 @@ let objects path text =
 
 let tensor member =
   let named part = let suffix = "_" ^ part in
-    if String.length member.name > String.length suffix && Weights.ends_with suffix member.name
+    if String.length member.name > String.length suffix && Tensor.ends_with suffix member.name
     then Some (String.sub member.name 0 (String.length member.name - String.length suffix) ^ "." ^ part) else None in
   let name = match named "weight", named "bias" with Some n, _ | None, Some n -> n | None, None -> member.name in
   let flat = Array.of_list (List.rev member.values) in
   match member.shape with
   | [ rows; columns ] ->
     let numbers () = Array.init (rows * columns) (fun k -> flat.((k mod rows) * columns + k / rows)) in
-    { Weights.tensor = name; shape = [ columns; rows ]; kind = member.kind; numbers }
-  | shape -> { Weights.tensor = name; shape; kind = member.kind; numbers = (fun () -> flat) }
+    { Tensor.tensor = name; shape = [ columns; rows ]; kind = member.kind; numbers }
+  | shape -> { Tensor.tensor = name; shape; kind = member.kind; numbers = (fun () -> flat) }
 
 let read path bytes ~key ~order =
   let found = objects path bytes in
@@ -176,4 +176,4 @@ let looks_like bytes =
         if at + 1 >= String.length beginning then "" else if beginning.[at] = '*' && beginning.[at + 1] = '/' then
             first (at + 2) else comment (at + 1) in
       let word = first 0 in
-      List.exists (fun w -> Weights.starts_with (w ^ " ") word) [ "struct"; "static"; "const" ])
+      List.exists (fun w -> Tensor.starts_with (w ^ " ") word) [ "struct"; "static"; "const" ])

@@ -13,6 +13,7 @@ let is_zero x = x.value = 0. && x.radius = 0.
 let is_one x = x.value = 1. && x.radius = 0.
 let is_at_least_0 x = x.value >= x.radius
 let is_finite x = Float.is_finite x.value && Float.is_finite x.radius
+let is_float32 x = x.radius = 0. && (let y = Exact.float32 x.value in Float.is_finite y && y = x.value)
 let opposite x = { x with value = -. x.value }
 
 let up = 1. +. 0x1p-26

@@ -186,5 +186,4 @@ let rows_of (layer : layer) =
 let biases_of (layer : layer) = Array.map (fun x -> x.value) layer.map.shifts
 (* Whether every number of a layer is exactly a float32. *)
 let holds_float32 (layer : layer) =
-  let is_float x = let y = Exact.float32 x.value in x.radius = 0. && Float.is_finite y && y = x.value in
-  Array.for_all (List.for_all (fun (_, x) -> is_float x)) layer.map.rows && Array.for_all is_float layer.map.shifts
+  Array.for_all (List.for_all (fun (_, x) -> is_float32 x)) layer.map.rows && Array.for_all is_float32 layer.map.shifts

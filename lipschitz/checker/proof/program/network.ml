@@ -22,18 +22,30 @@ type arguments = {
   activation : string;  (* names, separated by commas; "": not stated *)
 }
 
+let sha256_of bytes = Sha256.to_hex (Sha256.string bytes)
+(* Formats that hold one network and no keys, in the order in which every checker looks for them. *)
+let flat_formats = [
+  "safetensors", Safetensors.looks_like, (fun path bytes ~order -> Safetensors.read path bytes ~order);
+  "ONNX", Onnx_model.looks_like, (fun path bytes ~order -> Onnx.read path bytes ~order);
+  ".mat", Mat_file.looks_like, (fun path bytes ~order ->
+      Weights.assemble ~path ~sha256:(sha256_of bytes) Layer_order.Unordered ~order (Mat_file.read path bytes));
+  ".nnet", Nnet.looks_like, (fun path bytes ~order ->
+      Weights.assemble ~path ~sha256:(sha256_of bytes) Layer_order.Evaluation ~order (Nnet.read path bytes)) ]
+let npz = ".npz", Named_arrays.looks_like_npz, (fun path bytes ~order ->
+    Weights.assemble ~path ~sha256:(sha256_of bytes) Layer_order.Unordered ~order (Named_arrays.read_npz path bytes))
+
 let load_bytes path bytes ~key ~order =
-  if Pth.looks_like bytes then Pth.read path bytes ~key ~order
-  else if Safetensors.looks_like bytes then begin
-    if key <> "" then bad_input "%s: safetensors files are not nested: leave --key out" path;
-    Safetensors.read path bytes ~order
-  end
-  else if Onnx_model.looks_like bytes then begin
-    if key <> "" then bad_input "%s: ONNX files are not nested: leave --key out" path;
-    Onnx.read path bytes ~order
-  end
-  else if C_source.looks_like bytes then C_source.read path bytes ~key ~order
-  else bad_input "%s: is no weight file: neither a PyTorch state dict, safetensors, ONNX nor generated C source" path
+  let is_of (_, looks_like, _) = looks_like bytes in
+  let read (format, _, read) =
+    if key <> "" then bad_input "%s: %s files are not nested: leave --key out" path format;
+    read path bytes ~order in
+  if is_of npz then read npz
+  else if Pth.looks_like bytes then Pth.read path bytes ~key ~order
+  else match List.find_opt is_of flat_formats with
+    | Some format -> read format
+    | None when C_source.looks_like bytes -> C_source.read path bytes ~key ~order
+    | None -> bad_input "%s: is no weight file: neither a PyTorch state dict, safetensors, ONNX, .npz, .mat, .nnet nor \
+                         generated C source" path
 let load path ~key ~order =
   match String.rindex_opt path '#' with
   | Some mark when mark + 1 < String.length path && not (Sys.file_exists path) ->

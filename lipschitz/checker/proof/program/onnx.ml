@@ -22,7 +22,7 @@ let operators =
    Split with Max and Min for MaxMin, Flatten, Reshape, Transpose, Concat and the like"
 
 let layer_name graph weight =
-  let name = if String.length weight > 7 && Weights.ends_with ".weight" weight then
+  let name = if String.length weight > 7 && Tensor.ends_with ".weight" weight then
       String.sub weight 0 (String.length weight - 7) else weight in
   let number = Hashtbl.length graph.names + 1 in
   let rec free name =
@@ -447,6 +447,13 @@ let input_shape path (model : Onnx_model.t) =
   if Operators.product ~limit:Operators.most_rows shape > Operators.most_rows then refuse "has more than 2^20 entries";
   shape
 
+let tensors kind (layer : Folding.layer) =
+  let outputs = Folding.size layer.map in
+  [ { Tensor.tensor = layer.name ^ ".weight"; shape = [ outputs; layer.map.inputs ]; kind;
+      numbers = (fun () -> Array.concat (Array.to_list (Folding.rows_of layer))) };
+    { Tensor.tensor = layer.name ^ ".bias"; shape = [ outputs ]; kind;
+      numbers = (fun () -> Folding.biases_of layer) } ]
+
 let read path bytes ~order =
   let model = Onnx_model.read path bytes in
   let values = Hashtbl.create 16 and uses = Hashtbl.create 64 in
@@ -472,12 +479,6 @@ let read path bytes ~order =
       Folding.finished graph.chain (layer_name graph last.first) last.map) in
   let is_double = Hashtbl.fold (fun _ (t : tensor) found -> found || t.kind = float64) model.tensors false in
   let kind = if not is_double && List.for_all Folding.holds_float32 layers then "float32" else "float64" in
-  let tensors (layer : Folding.layer) =
-    let outputs = Folding.size layer.map in
-    [ { Weights.tensor = layer.name ^ ".weight"; shape = [ outputs; layer.map.inputs ]; kind;
-        numbers = (fun () -> Array.concat (Array.to_list (Folding.rows_of layer))) };
-      { Weights.tensor = layer.name ^ ".bias"; shape = [ outputs ]; kind;
-        numbers = (fun () -> Folding.biases_of layer) } ] in
   let w = Weights.assemble ~path ~sha256:(Sha256.to_hex (Sha256.string bytes)) Layer_order.Evaluation ~order
-      (List.concat_map tensors layers) in
+      (List.concat_map (tensors kind) layers) in
   { w with activations = Some between }

@@ -11,7 +11,10 @@ type node = { op : string; label : string; inputs : string list; outputs : strin
 (* Of the input; a size is 0 where the file leaves it open. *)
 type t = { nodes : node list; tensors : (string, tensor) Hashtbl.t; input : string; shape : int list; output : string }
 
-let float32 = 1 and int64 = 7 and float64 = 11
+let float32 = 1 and int32 = 6 and int64 = 7 and float64 = 11
+(* By their number: the name, and the field of numbers that are not raw. *)
+let floats = [ float32, ("float32", 4); float64, ("float64", 10); 10, ("float16", 5); 16, ("bfloat16", 5) ]
+let is_float kind = List.mem_assoc kind floats
 let export = "export a plain chain of linear layers with ReLU between them: torch.onnx.export(model, ...)"
 (* What a node is refused for, and what to do. *)
 exception Refused of string * string
@@ -33,12 +36,24 @@ let integer path number fields = match last_of (all number fields) with
 (* min_int where a number is beyond the range of sizes. *)
 let small n = if Int64.compare n (-0x7FFFFFFFL) > 0 && Int64.compare n 0x7FFFFFFFL < 0 then Int64.to_int n else min_int
 
-let int64s path fields =
-  let of_raw raw = List.init (String.length raw / 8) (fun k -> small (String.get_int64_le raw (8 * k))) in
-  List.concat_map (fun (number, value) -> match number, value with
-      | 7, value -> List.map small (Protobuf.integers path value)
-      | 9, Protobuf.Bytes raw -> of_raw raw
-      | _ -> []) fields
+(* What a tensor holds in its only field of numbers. *)
+let integers path kind data = match data with
+  | Some (9, Protobuf.Bytes raw) when kind = int64 ->
+    List.init (String.length raw / 8) (fun k -> small (String.get_int64_le raw (8 * k)))
+  | Some (9, Protobuf.Bytes raw) when kind = int32 ->
+    List.init (String.length raw / 4) (fun k -> Int32.to_int (String.get_int32_le raw (4 * k)))
+  | Some (number, listed) when number = (if kind = int64 then 7 else 5) && (kind = int64 || kind = int32) ->
+    List.map small (Protobuf.integers path listed)
+  | _ -> []
+let numbers path (kind, field) data =
+  let raw data = Array.init (String.length data / Tensor.width kind) (Tensor.number_at kind data 0) in
+  match data with
+  | Some (9, Protobuf.Bytes data) -> raw data
+  | Some (number, Protobuf.Bytes data) when number = field && field <> 5 -> raw data
+  | Some (5, listed) when field = 5 ->
+    let half bits = Tensor.of_half kind (Int64.to_int bits land 0xffff) in
+    Array.of_list (List.map half (Protobuf.integers path listed))
+  | _ -> [||]
 
 let size shape = List.fold_left ( * ) 1 shape
 
@@ -50,22 +65,18 @@ let tensor path message =
   let shape = List.map size_of (List.concat_map (Protobuf.integers path) (all 1 fields)) in
   if all 13 fields <> [] || integer path 14 fields <> 0 then bad_input
       "%s: %s: its numbers lie in another file" path (shown name);
-  let data = List.filter (fun (n, _) -> n = 4 || n = 9 || n = 10) fields in
-  let width = if kind = float32 then 4 else if kind = float64 then 8 else 0 in
-  let raw = match data with
-    | [ (n, Protobuf.Bytes raw) ] when n = 9 || n = (if kind = float32 then 4 else 10) -> raw
-    | _ when width = 0 -> ""
-    | [] -> ""
-    | _ -> bad_input "%s: %s: its numbers are not in one piece" path (shown name) in
-  let count = List.fold_left (fun product n -> if n > 0 && product > Weights.most_numbers / n then
-      bad_input "%s: %s is too large" path (shown name) else product * n) 1 shape in
-  if width > 0 && String.length raw <> count * width then bad_input
-      "%s: %s holds another number of numbers than its shape" path (shown name);
-  let integers = if kind = int64 then int64s path fields else [] in
-  if kind = int64 && List.length integers <> count then bad_input
-      "%s: %s holds another number of integers than its shape" path (shown name);
-  let at k = Weights.number_at (if width = 4 then "float32" else "float64") raw 0 k in
-  { name; shape; kind; numbers = Array.init (if width = 0 then 0 else count) at; integers }
+  let refuse what = bad_input "%s: %s %s; export the model again" path (shown name) what in
+  let data = match List.filter (fun (n, _) -> List.mem n [ 4; 5; 7; 9; 10 ]) fields with
+    | [] -> None
+    | [ (n, Protobuf.Bytes data) ] -> Some (n, Protobuf.Bytes data)
+    | _ -> refuse "holds numbers that are not in one piece" in
+  let count = Tensor.count shape in
+  if count > Tensor.most_numbers then refuse "is too large";
+  let numbers = match List.assoc_opt kind floats with Some float -> numbers path float data | None -> [||] in
+  let integers = integers path kind data in
+  if is_float kind && Array.length numbers <> count || (kind = int32 || kind = int64) && List.length integers <> count
+  then refuse "holds another number of numbers than its shape";
+  { name; shape; kind; numbers; integers }
 
 let attribute path message =
   let fields = Protobuf.fields path message in

@@ -28,9 +28,9 @@ let places_of shape k =
 let index_of shape places = List.fold_left2 (fun index size at -> index * size + at) 0 shape places
 
 let require_numbers (t : tensor) =
-  if t.kind <> float32 && t.kind <> float64 then
+  if not (is_float t.kind) then
     refuse ~hint:"convert before exporting: model.float()"
-      "its constant has data type %d, but weights must be float32 or float64" t.kind
+      "its constant has data type %d, but weights must be float16, bfloat16, float32 or float64" t.kind
 let require_matrix (t : tensor) =
   require_numbers t;
   if List.length t.shape <> 2 || t.numbers = [||] then

@@ -53,7 +53,7 @@ let parse path bytes start =
   let global name = match name with
     | "collections.OrderedDict" | "torch._utils._rebuild_tensor_v2" | "torch._utils._rebuild_parameter" ->
         push (Global name)
-    | _ when Weights.ends_with "Storage" name && String.length name < 40 && String.sub name 0 6 = "torch." ->
+    | _ when Tensor.ends_with "Storage" name && String.length name < 40 && String.sub name 0 6 = "torch." ->
         push (Global name)
     | _ -> fail ("names " ^ shown name ^ ", which is not part of a state dict") in
   let persistent = function

@@ -28,7 +28,7 @@ let called name = match name, Activation.called name with
   | _, None ->
     let prefix = "leaky_relu:" in
     let n = String.length prefix in
-    if not (Weights.starts_with prefix name) then None
+    if not (Tensor.starts_with prefix name) then None
     else Option.map leaky (slope (String.sub name n (String.length name - n)))
 
 let map_of (layer : Weights.layer) =

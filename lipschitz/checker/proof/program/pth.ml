@@ -45,7 +45,7 @@ let rec select path root key = match root, key with
         | _ -> bad_input "%s: a key that is not text" path) !entries
   | Pickle.Dict entries, _ ->
     let fits = function
-      | Pickle.Text name, value when name <> "" && (name = key || Weights.starts_with (name ^ ".") key) ->
+      | Pickle.Text name, value when name <> "" && (name = key || Tensor.starts_with (name ^ ".") key) ->
           Some (String.length name, value)
       | _ -> None in
     (match List.sort (fun (a, _) (b, _) -> compare b a) (List.filter_map fits !entries) with
@@ -54,17 +54,19 @@ let rec select path root key = match root, key with
      | [] -> bad_input "%s: the file has no key \"%s\"" path (shown key))
   | _ -> bad_input "%s: is not a state dict (names and tensors)" path
 
-let kind_of = function "torch.FloatStorage" -> "float32" | "torch.DoubleStorage" -> "float64" | other -> other
+let kind_of = function
+  | "torch.FloatStorage" -> "float32" | "torch.DoubleStorage" -> "float64" | "torch.HalfStorage" -> "float16"
+  | "torch.BFloat16Storage" -> "bfloat16" | other -> other
 
 (* A view of one or two dimensions, row by row. *)
 let numbers path name data kind ~offset ~sizes ~strides ~elements () =
   let last = List.fold_left2 (fun sum n stride -> sum + (n - 1) * stride) offset sizes strides in
-  if String.length data <> elements * Weights.width kind || last >= elements then
+  if String.length data <> elements * Tensor.width kind || last >= elements then
     bad_input "%s: %s: the view does not fit its storage" path (shown name);
   let rec indices base sizes strides = match sizes, strides with
     | n :: sizes, stride :: strides -> List.concat (List.init n (fun k -> indices (base + k * stride) sizes strides))
     | _ -> [ base ] in
-  Array.of_list (List.map (Weights.number_at kind data 0) (indices offset sizes strides))
+  Array.of_list (List.map (Tensor.number_at kind data 0) (indices offset sizes strides))
 
 let tensors path root key storage_data =
   let small n = n < 1 lsl 31 in
@@ -74,7 +76,7 @@ let tensors path root key storage_data =
             bad_input "%s: %s is too large" path (shown name);
         let kind = kind_of kind in
         let read () = numbers path name (storage_data key) kind ~offset ~sizes ~strides ~elements () in
-        { Weights.tensor = name; shape = sizes; kind; numbers = read }
+        { Tensor.tensor = name; shape = sizes; kind; numbers = read }
       | name, _ -> bad_input "%s: %s is not a tensor" path (shown name)) (select path root key)
 
 let read_zip path bytes ~key =
@@ -87,7 +89,7 @@ let read_zip path bytes ~key =
   let entry name = match List.assoc_opt name entries with Some read -> read () | None ->
       bad_input "%s: the archive has no %s" path (shown name) in
   if List.exists (fun (name, _) -> name = folder ^ "constants.pkl" ||
-      Weights.starts_with (folder ^ "code/") name) entries then
+      Tensor.starts_with (folder ^ "code/") name) entries then
     bad_input "%s: is a TorchScript program, not a state dict" path;
   if List.mem_assoc (folder ^ "byteorder") entries && entry (folder ^ "byteorder") <> "little" then
     bad_input "%s: the numbers are not little-endian" path;

@@ -50,28 +50,29 @@ let read path bytes ~order =
     List.iter (fun (key, _) -> if not (List.mem key [ "dtype"; "shape"; "data_offsets" ]) then
                   bad_input "%s: %s: %s is not a known key" path (shown name) (shown key)) members;
     let kind = match List.assoc_opt "dtype" members with
-      | Some (Json.Text "F32") -> "float32" | Some (Json.Text "F64") -> "float64" | Some (Json.Text other) -> other
+      | Some (Json.Text "F32") -> "float32" | Some (Json.Text "F64") -> "float64"
+      | Some (Json.Text "F16") -> "float16" | Some (Json.Text "BF16") -> "bfloat16" | Some (Json.Text other) -> other
       | _ -> bad_input "%s: %s has no dtype" path (shown name) in
     let shape = counts path (shown name ^ ".shape") (List.assoc_opt "shape" members) in
     match counts path (shown name ^ ".data_offsets") (List.assoc_opt "data_offsets" members) with
     | [ b; e ] when b <= e && e <= size ->
       let numbers () =
         let count = List.fold_left ( * ) 1 shape in
-        if count * Weights.width kind <> e - b then bad_input "%s: %s.shape does not fit its data" path (shown name);
-        Array.init count (Weights.number_at kind bytes (first + b)) in
-      { Weights.tensor = name; shape; kind; numbers }, (b, e)
+        if count * Tensor.width kind <> e - b then bad_input "%s: %s.shape does not fit its data" path (shown name);
+        Array.init count (Tensor.number_at kind bytes (first + b)) in
+      { Tensor.tensor = name; shape; kind; numbers }, (b, e)
     | _ -> bad_input "%s: %s.data_offsets is no range in the data" path (shown name) in
   let found = List.map tensor (List.filter (fun (name, _) -> name <> "__metadata__") header) in
   check_layout path (List.map snd found) size;
   let stated = stated_order path header in
-  let layer (t : Weights.tensor) = match String.rindex_opt t.tensor '.' with Some dot ->
+  let layer (t : Tensor.t) = match String.rindex_opt t.tensor '.' with Some dot ->
       String.sub t.tensor 0 dot | None -> "" in
   let rank t =
     let rec go k = function [] -> k | name :: rest -> if name = layer t then k else go (k + 1) rest in go 0 stated in
   let before a b =
     let by_rank = compare (rank a) (rank b) in
     if by_rank <> 0 then by_rank
-    else if Layer_order.naturally_before a.Weights.tensor b.Weights.tensor then -1 else 1 in
+    else if Layer_order.naturally_before a.Tensor.tensor b.Tensor.tensor then -1 else 1 in
   let tensors = List.stable_sort before (List.map fst found) in
   let listing = if List.for_all (fun t -> rank t < List.length stated) tensors then
       Layer_order.Evaluation else Unordered in

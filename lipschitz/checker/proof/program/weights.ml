@@ -54,11 +54,6 @@ let as_float32 w =
   let rounded l = { l with weights = Array.map (Array.map round) l.weights; biases = Array.map round l.biases } in
   { w with precision = "float32"; layers = List.map rounded w.layers }
 
-(* A named tensor; `numbers` are read once its shape is known to be that of a layer. *)
-type tensor = { tensor : string; shape : int list; kind : string; numbers : unit -> float array }
-
-let most_numbers = 1 lsl 26
-
 (* "<layer>.<part>" or just "<part>". *)
 let layer_of part tensor =
   if tensor = part then Some ""
@@ -67,44 +62,34 @@ let layer_of part tensor =
         Some (String.sub tensor 0 dot)
     | _ -> None
 
-let starts_with prefix text = String.length text >= String.length prefix &&
-    String.sub text 0 (String.length prefix) = prefix
-let ends_with suffix text = String.length text >= String.length suffix
-  && String.sub text (String.length text - String.length suffix) (String.length suffix) = suffix
-let contains part text =
-  let n = String.length part in
-  let rec go k = k + n <= String.length text && (String.sub text k n = part || go (k + 1)) in
-  go 0
-
 (* A chain of linear layers of what a file holds, `listing` being what the order of the tensors in it means. A file that
    states the order of evaluation states ReLU unless its reader says more. *)
 let assemble ~path ~sha256 listing ~order tensors =
-  let refuse t what = bad_input "%s: %s: %s" path (shown t.tensor) what in
+  let refuse t what = bad_input "%s: %s: %s" path (shown t.Tensor.tensor) what in
   if List.length tensors > 4096 then bad_input "%s: holds more than 4096 tensors" path;
+  let tensors, are_float32 = Parametrized.effective path tensors in
   let check t =
-    if contains "parametrizations." t.tensor then
-        refuse t "the weight is parametrised, so the file does not hold the weight itself";
-    if t.kind <> "float32" && t.kind <> "float64" then refuse t "weights must be float32 or float64";
+    if not (Tensor.is_float t.Tensor.kind) then refuse t "weights must be float16, bfloat16, float32 or float64";
     if List.exists (fun n -> n <= 0) t.shape then refuse t "has a dimension of size 0";
-    if List.fold_left (fun product n -> if product > most_numbers / n then
-        most_numbers + 1 else product * n) 1 t.shape > most_numbers
-    then refuse t "has too many numbers" in
+    if Tensor.count t.shape > Tensor.most_numbers then refuse t "has too many numbers" in
   List.iter check tensors;
-  let names = List.map (fun t -> t.tensor) tensors in
+  let names = List.map (fun t -> t.Tensor.tensor) tensors in
   if List.length (List.sort_uniq compare names) <> List.length names then bad_input "%s: a tensor appears twice" path;
-  let of_part part t = Option.map (fun layer -> layer, t) (layer_of part t.tensor) in
+  let of_part part t = Option.map (fun layer -> layer, t) (layer_of part t.Tensor.tensor) in
   let weights = List.filter_map (of_part "weight") tensors and biases = List.filter_map (of_part "bias") tensors in
   if weights = [] then bad_input "%s: holds no tensor named \"<layer>.weight\"" path;
-  let precision = (snd (List.hd weights)).kind in
-  List.iter (fun t -> if t.kind <> precision then refuse t "one file has one type") tensors;
-  List.iter (fun (_, t) -> if List.length t.shape <> 2 then refuse t "a linear layer's weight has two dimensions")
+  let kind = (snd (List.hd weights)).kind in
+  List.iter (fun t -> if t.Tensor.kind <> kind then refuse t "one file has one type") tensors;
+  let precision = if kind <> "float64" && are_float32 then "float32" else "float64" in
+  List.iter (fun (_, t) ->
+      if List.length t.Tensor.shape <> 2 then refuse t "a linear layer's weight has two dimensions")
       weights;
-  let owned t = match layer_of "bias" t.tensor with
+  let owned t = match layer_of "bias" t.Tensor.tensor with
     | Some layer -> (match List.assoc_opt layer weights with
         | Some w -> if t.shape <> [ List.hd w.shape ] then refuse t "does not fit the weight"; true
         | None -> false)
     | None -> false in
-  List.iter (fun t -> match layer_of "weight" t.tensor, layer_of "bias" t.tensor with
+  List.iter (fun t -> match layer_of "weight" t.Tensor.tensor, layer_of "bias" t.tensor with
       | Some _, _ -> ()
       | None, Some layer when not (owned t) ->
         refuse t (Printf.sprintf "is a bias without its weight: %s is missing"
@@ -112,9 +97,9 @@ let assemble ~path ~sha256 listing ~order tensors =
       | None, Some _ -> ()
       | None, None -> refuse t "is neither the weight nor the bias of a linear layer") tensors;
   let shapes = List.map (fun (name, t) ->
-      { Layer_order.name; outputs = List.nth t.shape 0; inputs = List.nth t.shape 1 }) weights in
+      { Layer_order.name; outputs = List.nth t.Tensor.shape 0; inputs = List.nth t.Tensor.shape 1 }) weights in
   let finite t = Array.map (fun x -> if not (Float.is_finite x) then refuse t "a number is not finite";
-      x) (t.numbers ()) in
+      x) (t.Tensor.numbers ()) in
   let layer { Layer_order.name; inputs; outputs } =
     let flat = finite (List.assoc name weights) in
     { name;
@@ -123,9 +108,3 @@ let assemble ~path ~sha256 listing ~order tensors =
   let layers = List.map layer (Layer_order.decide path listing ~stated:order shapes) in
   let relu = List.map (fun _ -> Proved.Relu) (List.tl layers) in
   { path; sha256; precision; layers; activations = if listing = Layer_order.Evaluation then Some relu else None }
-
-let width = function "float32" -> 4 | _ -> 8
-(* The k-th little-endian number. *)
-let number_at kind data first k =
-  if kind = "float32" then Int32.float_of_bits (String.get_int32_le data (first + 4 * k))
-  else Int64.float_of_bits (String.get_int64_le data (first + 8 * k))
