@@ -112,6 +112,17 @@ files::Network load_any_net(const files::NetworkArguments& arguments) {
   return files::load_any_network(arguments);
 }
 
+std::vector<std::string> reading_notes(const files::Weights& weights) {
+  std::vector<std::string> notes = weights.notes;
+  const double rounding = files::rounding_of_slope(weights);
+  if (rounding > 0)
+    notes.push_back(
+        fmt::format("folded weights that are not doubles are rounded to nearest; the bounds for all inputs "
+                    "plus {:.2g} hold for the exact ones",
+                    rounding));
+  return notes;
+}
+
 namespace {
 
 /// Returns `paths` with each folder, such as a rosbag2 bag, replaced by the files in it.

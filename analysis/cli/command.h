@@ -67,6 +67,10 @@ files::Network load_evaluated_net(const files::NetworkArguments& arguments);
 /// The same for networks with any activation.
 files::Network load_any_net(const files::NetworkArguments& arguments);
 
+/// Returns what was assumed or computed when a weight file was read, one sentence each: the reader's notes, and by how
+/// much rounding of folded weights can change slopes.
+std::vector<std::string> reading_notes(const files::Weights& weights);
+
 /// Returns the head of a result: schema "swarmcert/<command>/1", tool version, SHA-256 of every input file,
 /// and the command line without options that cannot change the result (--jobs, -q, --force, output paths).
 /// `seed` is null until it is set.

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "analysis/run.h"
+#include "data.h"
 #include "nn/base/json.h"
 #include "nn/pth_writer.h"
 #include "nn/weights/weights.h"
@@ -52,6 +53,18 @@ TEST_F(CertifiedChain, AFileWithSeveralOrdersIsRefusedAndTheGivenOrderIsCertifie
   // 10^4.
   EXPECT_GE(upper("steep.json"), 1e4);
   EXPECT_LT(upper("turned.json"), 1);  // the other order is constant
+}
+
+TEST_F(CertifiedChain, CheckSaysHowTheFileWasReadAsCertifyDoes) {
+  const std::string relu6 = tests::source_path("tests/nn/files/torch_half.pth") + " --activation relu6";
+  const std::string piecewise = "piecewise linear activations of relu6 are written with ReLU";
+  expect("certify " + relu6 + " --nodes 1 -o cert.json", 0,
+         {"\n    stored as float16", "\n    " + piecewise});
+  expect("check cert.json " + relu6, 0, {"\n  network: stored as float16", "\n  network: " + piecewise});
+  const std::string folded = tests::source_path("tests/nn/files/torch_weight_norm.pth");
+  const std::string rounded = "hold for the exact ones";
+  expect("certify " + folded + " --nodes 1 -o folded.json", 0, {"g v / |v|", rounded});
+  expect("check folded.json " + folded, 0, {"network: fc1.weight is computed from its weight_norm", rounded});
 }
 
 TEST_F(CertifiedChain, JsonAndCertificateListTheOperationsAndCheckInsistsOnThem) {

@@ -125,13 +125,7 @@ void print_chains(const files::Network& network, const Certification& found) {
       remark += weights->activation_is_given ? "; activation as given, --samples compares"
                                              : "; ReLU is assumed, --samples compares";
     fmt::print("  {}  {}  ({})\n", part.name(), files::chain_words(files::chain(network, part)), remark);
-    for (const std::string& note : weights->notes) fmt::print("    {}\n", note);
-    const double rounding = files::rounding_of_slope(*weights);
-    if (rounding > 0)
-      fmt::print(
-          "    folded weights that are not doubles are rounded to nearest; the bounds for all inputs plus "
-          "{:.2g} hold for the exact ones\n",
-          rounding);
+    for (const std::string& note : reading_notes(*weights)) fmt::print("    {}\n", note);
     if (samples == found.samples.end()) continue;
     const files::SampleAgreement& agreement = samples->second;
     fmt::print("    reproduces {} samples of {}: largest deviation {:.3g}, tolerance {:.3g}\n",

@@ -12,6 +12,7 @@
 #include "lipschitz/checker/check.h"
 #include "nn/base/file_io.h"
 #include "nn/weights/chain.h"
+#include "nn/weights/functions.h"
 #include "stability/bounds/tracking_setup.h"
 #include "stability/checker/check_tracking.h"
 
@@ -145,6 +146,8 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
                  verdict.spectral_norms, verdict.upper_bounds, verdict.lower_bounds,
                  verdict.values > 0 ? fmt::format(", values of {}", verdict.values) : "");
       fmt::print("for {}\n", files::chain_words(network));
+      for (const auto& [part, weights] : files::parts(network))
+        for (const std::string& note : reading_notes(*weights)) fmt::print("  {}: {}\n", part.name(), note);
     } else {
       fmt::print("rejected: {}\n", verdict.reason);
     }
