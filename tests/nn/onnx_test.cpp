@@ -299,7 +299,7 @@ TEST(Onnx, ModelsWithoutOneGraphInputAndOutputAreRefused) {
   EXPECT_EQ(parse_weights(other.bytes(), "net.onnx").layers.size(), 1u);
   other = model;
   other.outputs = {"y", "z"};
-  EXPECT_TRUE(onnx_is_refused(other.bytes(), {"more than one output"}));
+  EXPECT_TRUE(onnx_is_refused(other.bytes(), {"graph", "two outputs, \"y\" and \"z\""}));
   other = model;
   other.graph_extra = onnx_text(15, "");
   EXPECT_TRUE(onnx_is_refused(other.bytes(), {"sparse"}));

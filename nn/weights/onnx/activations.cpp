@@ -25,6 +25,56 @@ std::vector<Enclosed> negated(std::vector<Enclosed> numbers) {
   return numbers;
 }
 
+/// Refuses a cast of stored numbers that would change one of them.
+void require_exact_cast(const OnnxNode& node, const std::vector<double>& numbers) {
+  const double to = node.number("to", 0);
+  const auto is_kept = [to](double number) {
+    if (to == static_cast<double>(kOnnxDouble)) return true;
+    if (to == static_cast<double>(kOnnxFloat))
+      return static_cast<double>(static_cast<float>(number)) == number;
+    const bool is_integer = to == static_cast<double>(kOnnxInt32) || to == static_cast<double>(kOnnxInt64);
+    return is_integer && std::fabs(number) < 0x1p31 && std::trunc(number) == number;
+  };
+  if (!std::all_of(numbers.begin(), numbers.end(), is_kept))
+    throw OperatorRefusal{"rounds stored numbers",
+                          "fold constants: torch.onnx.export(..., do_constant_folding=True)"};
+}
+
+/// Returns the tensor of a Constant node, which states it in one of five attributes.
+OnnxTensor stated_tensor(const OnnxNode& node) {
+  OnnxTensor result;
+  result.is_read = true;
+  result.type = node.has("value_int") || node.has("value_ints") ? kOnnxInt64 : kOnnxFloat;
+  if (node.has("value") && node.attributes.at("value").tensor) return *node.attributes.at("value").tensor;
+  if (node.has("value_float")) {
+    result.numbers = {node.number("value_float", 0)};
+  } else if (node.has("value_floats")) {
+    result.numbers = node.attributes.at("value_floats").floats;
+    result.shape = {result.numbers.size()};
+  } else if (node.has("value_int")) {
+    const double number = node.number("value_int", 0);
+    if (!(std::fabs(number) < 0x1p53)) throw OperatorRefusal{"value_int is out of range"};
+    result.integers = {static_cast<std::int64_t>(number)};
+  } else if (node.has("value_ints")) {
+    result.integers = node.integers("value_ints", {});
+    result.shape = {result.integers.size()};
+  } else {
+    throw OperatorRefusal{"holds no tensor"};
+  }
+  return result;
+}
+
+/// Returns the sizes `start` to `end` - 1 of a shape, both counted from the end if negative and limited to the rank.
+OnnxShape stated_sizes(const OnnxNode& node, const OnnxShape& shape) {
+  const auto rank = static_cast<double>(shape.size());
+  const auto place = [&](const char* attribute, double otherwise) {
+    const double at = node.number(attribute, otherwise);
+    return static_cast<std::ptrdiff_t>(std::min(rank, std::max(0.0, at < 0 ? at + rank : at)));
+  };
+  const std::ptrdiff_t start = place("start", 0), end = std::max(start, place("end", rank));
+  return {shape.begin() + start, shape.begin() + end};
+}
+
 }  // namespace
 
 /// Adds a ReLU layer and carries along every value that a later node uses.
@@ -75,6 +125,7 @@ OnnxValue OnnxGraph::computed_activation(const Node& node) {
   }
   if (node.type == "Abs") return sum_of_relus(node, x, {x.map, scaled(x.map, -1)}, {{one}, {one}}, {});
   if (node.type == "LeakyRelu" || node.type == "PRelu") {
+    if (node.type == "PRelu") require_trailing_axes(node, needed_constant(node, 1), x.shape);
     const std::vector<Enclosed> slopes =
         node.type == "PRelu" ? broadcast(needed_constant(node, 1), x.shape)
                              : std::vector<Enclosed>{{node.number("alpha", static_cast<double>(0.01F)), 0}};
@@ -109,15 +160,21 @@ OnnxValue OnnxGraph::computed_activation(const Node& node) {
 OnnxValue OnnxGraph::clipped(const Node& node, const OnnxValue& x, const OnnxTensor* least,
                              const OnnxTensor* most) {
   const Enclosed one{1, 0}, minus_one{-1, 0};
-  const auto limits = [&x](const OnnxTensor* tensor) {
+  const auto limits = [&x](const OnnxTensor* tensor, double outwards) {
     std::vector<Enclosed> numbers;
     if (tensor != nullptr) numbers = broadcast(*tensor, x.shape);
-    const bool is_open = std::any_of(numbers.begin(), numbers.end(), [](const Enclosed& number) {
-      return !(std::fabs(number.value) <= 0x1p127);  // the largest float32 means no limit
-    });
-    return is_open ? std::vector<Enclosed>{} : numbers;
+    const auto is_open = [outwards](const Enclosed& number) {
+      return outwards * number.value > 0x1p127;  // the largest float32 means no limit
+    };
+    if (!numbers.empty() && std::all_of(numbers.begin(), numbers.end(), is_open))
+      return std::vector<Enclosed>{};
+    for (const Enclosed& number : numbers)
+      if (!(std::fabs(number.value) <= 0x1p127))
+        throw OperatorRefusal{"its minimum or maximum is not a number within 2^127",
+                              "leave out a limit that no value reaches"};
+    return numbers;
   };
-  const std::vector<Enclosed> low = limits(least), high = limits(most);
+  const std::vector<Enclosed> low = limits(least, -1), high = limits(most, 1);
   for (std::size_t i = 0; i < std::min(low.size(), high.size()); ++i)
     if (low[i].value > high[i].value) throw OperatorRefusal{"its minimum is above its maximum"};
   if (low.empty() && high.empty()) return x;
@@ -212,12 +269,9 @@ void OnnxGraph::compute_constant(const Node& node) {
   const OnnxTensor* const first = node.type == "Shape" ? nullptr : constant(node, 0);
   if (first != nullptr) result = *first;
   if (node.type == "Constant") {
-    const auto attribute = node.attributes.find("value");
-    if (attribute == node.attributes.end() || !attribute->second.tensor)
-      throw OperatorRefusal{"holds no tensor"};
-    result = *attribute->second.tensor;
+    result = stated_tensor(node);
   } else if (node.type == "Shape") {
-    if (first == nullptr && is_value(node, 0)) result.integers = value(node, 0).shape;
+    if (first == nullptr && is_value(node, 0)) result.integers = stated_sizes(node, value(node, 0).shape);
     result.type = kOnnxInt64;
     result.is_read = true;
     result.shape = {result.integers.size()};
@@ -253,7 +307,9 @@ void OnnxGraph::compute_constant(const Node& node) {
       if (result.integers.size() > 64) throw OperatorRefusal{"its result has too many entries"};
     }
     result.shape = {result.integers.size()};
-  } else if (node.type != "Identity" && node.type != "Cast") {
+  } else if (node.type == "Cast") {
+    require_exact_cast(node, result.numbers);
+  } else if (node.type != "Identity") {
     throw OperatorRefusal{
         "does not use the output of the preceding node; constants are not computed with this operator",
         "fold constants: torch.onnx.export(..., do_constant_folding=True)"};

@@ -246,6 +246,33 @@ OnnxValue OnnxGraph::computed(const Node& node) {
                                                                     : kReexportOnnx};
 }
 
+/// Refuses Dropout and BatchNormalization in training mode, which is stated by an attribute, an input, or, for
+/// BatchNormalization before operator set 14, by the number of outputs.
+void OnnxGraph::require_inference(const Node& node) const {
+  bool trains = node.number("training_mode", 0) != 0 || node.number("is_test", 1) == 0;
+  if (node.type == "Dropout") {
+    const OnnxTensor* const mode = constant(node, 2);
+    trains = trains || (mode != nullptr && mode->integers != std::vector<std::int64_t>{0});
+  } else if (!node.has("is_test")) {
+    const auto named = std::count_if(node.outputs.begin(), node.outputs.end(),
+                                     [](const std::string& name) { return !name.empty(); });
+    trains = trains || named > 1;
+  }
+  if (trains) throw OperatorRefusal{"is in training mode", "export the model after model.eval()"};
+}
+
+/// Refuses a constant that operator sets before 7 align with other axes than the last ones of the value.
+void OnnxGraph::require_trailing_axes(const Node& node, const OnnxTensor& tensor,
+                                      const OnnxShape& shape) const {
+  const std::size_t own = tensor.shape.size(), rank = shape.size();
+  if (tensor.numbers.size() == 1 || own >= rank) return;
+  const bool is_by_channel = node.type == "PRelu" && model_.operator_set > 0 && model_.operator_set < 7;
+  const double axis = node.number("axis", is_by_channel ? 1 : static_cast<double>(rank - own));
+  if (axis != static_cast<double>(rank - own) && axis != -static_cast<double>(own))
+    throw OperatorRefusal{"aligns its constant with other axes than the last ones, as before operator set 7",
+                          "export with operator set 7 or newer: torch.onnx.export(..., opset_version=17)"};
+}
+
 OnnxValue OnnxGraph::applied(const Node& node, const AffineMap& map, const OnnxShape& shape,
                              const OnnxTensor* weight) {
   const OnnxValue& x = value(node, is_value(node, 0) ? 0 : 1);
@@ -278,6 +305,7 @@ OnnxValue OnnxGraph::computed_affine(const Node& node) {
   if (node.type == "AveragePool" || node.type == "GlobalAveragePool")
     return applied(node, average_map(node, value(node, 0).shape, shape), shape, nullptr);
   if (node.type == "BatchNormalization") {
+    require_inference(node);
     OnnxValue result = value(node, 0);
     std::vector<const OnnxTensor*> parameters;
     for (std::size_t k = 1; k <= 4; ++k) parameters.push_back(&needed_constant(node, k));
@@ -317,6 +345,7 @@ OnnxValue OnnxGraph::elementwise(const Node& node) {
     }
     if (node.type == "Div" && base > 0) throw OperatorRefusal{"divides a constant by a value"};
     const OnnxTensor& tensor = needed_constant(node, other);
+    require_trailing_axes(node, tensor, result.shape);
     const std::vector<Enclosed> numbers = broadcast(tensor, result.shape);
     if (adds) {
       if (base > 0 && sign < 0) scale_rows(result.map, {{-1, 0}});

@@ -56,6 +56,8 @@ class OnnxGraph {
   OnnxValue padded(const Node& node, const OnnxValue& x) const;
   OnnxValue concatenated(const Node& node) const;
   OnnxValue elementwise(const Node& node);
+  void require_inference(const Node& node) const;
+  void require_trailing_axes(const Node& node, const OnnxTensor& tensor, const OnnxShape& shape) const;
   OnnxValue largest(const Node& node, OnnxValue from, std::vector<std::vector<int>> windows, OnnxShape shape);
   OnnxValue largest_of_inputs(const Node& node);
   OnnxValue clipped(const Node& node, const OnnxValue& x, const OnnxTensor* least, const OnnxTensor* most);

@@ -56,7 +56,11 @@ void require_cast_to_float(const OnnxNode& node) {
 OnnxValue OnnxGraph::padded(const Node& node, const OnnxValue& x) const {
   const std::vector<std::int64_t> pads = integers(node, 1, "pads");
   const OnnxTensor* const filler = constant(node, 2);
+  const OnnxTensor* const axes = constant(node, 3);
   const std::size_t rank = x.shape.size();
+  for (std::size_t d = 0; axes != nullptr && d < rank; ++d)
+    if (axes->integers.size() != rank || axis_of(axes->integers[d], rank) != d)
+      throw OperatorRefusal{"its axes are not all axes of its input in order", "state pads for every axis"};
   if (node.text("mode", "constant") != "constant") throw OperatorRefusal{"its mode is not constant"};
   if (pads.size() != 2 * rank) throw OperatorRefusal{"pads does not fit its input"};
   OnnxValue result{{}, {}, x.name};
@@ -127,7 +131,9 @@ OnnxValue OnnxGraph::computed_layout(const Node& node) {
   OnnxValue result = value(node, 0);
   if (node.type == "Pad") return padded(node, result);
   if (node.type == "Concat") return concatenated(node);
-  if (node.type == "Cast") {
+  if (node.type == "Dropout") {
+    require_inference(node);
+  } else if (node.type == "Cast") {
     require_cast_to_float(node);
   } else if (node.type == "Flatten") {
     result.shape = flattened(result.shape, integer_attribute(node, "axis", 1));

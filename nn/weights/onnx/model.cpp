@@ -36,7 +36,7 @@ std::uint32_t typed_field(std::uint64_t type) {
     case kOnnxDouble:
       return 10;
     default:
-      return 5;  // int32 and both half-precision types
+      return 5;  // int32, bool and both half-precision types
   }
 }
 
@@ -48,6 +48,7 @@ class OnnxModelReader {
     ProtobufReader model(bytes_, 0, path_);
     bool has_graph = false;
     for (ProtobufField field; model.next(field);) {
+      if (field.number == 8) read_operator_set(field);
       if (field.number != 7) continue;  // 7: graph; the other fields only say who wrote the file and when
       if (std::exchange(has_graph, true)) refuse(field.offset, "graph", "appears twice");
       read_graph(field);
@@ -75,6 +76,17 @@ class OnnxModelReader {
     return std::string(field.bytes);
   }
 
+  void read_operator_set(const ProtobufField& message) {
+    std::string domain;
+    std::int64_t version = 0;
+    ProtobufReader reader = fields(message);
+    for (ProtobufField field; reader.next(field);) {
+      if (field.number == 1) domain = text(field);
+      if (field.number == 2 && !field.is_bytes) version = static_cast<std::int64_t>(field.value);
+    }
+    if (domain.empty() || domain == "ai.onnx") model_.operator_set = version;
+  }
+
   void read_graph(const ProtobufField& message) {
     ProtobufReader graph = fields(message);
     for (ProtobufField field; graph.next(field);) {
@@ -82,8 +94,12 @@ class OnnxModelReader {
       if (field.number == 5) keep(tensor(field));
       if (field.number == 11) inputs_.push_back(value_info(field));
       if (field.number == 12) {
-        if (!model_.output.empty()) refuse(field.offset, "", "the graph has more than one output");
-        model_.output = value_info(field).name;
+        const std::string name = value_info(field).name;
+        if (!model_.output.empty())
+          refuse(field.offset, "graph",
+                 "has two outputs, " + in_quotes(model_.output) + " and " + in_quotes(name),
+                 "export the model with the output that is to be certified alone");
+        model_.output = name;
       }
       if (field.number == 15) refuse(field.offset, "", "sparse tensors cannot be read");
       if (model_.nodes.size() > kMostNodes) refuse(field.offset, "", "the graph has more than 10000 nodes");
@@ -145,6 +161,7 @@ class OnnxModelReader {
   OnnxNode node(const ProtobufField& message) const {
     OnnxNode node;
     node.offset = message.offset;
+    std::string domain;
     ProtobufReader reader = fields(message);
     for (ProtobufField field; reader.next(field);) {
       if (field.number == 1) node.inputs.push_back(text(field));
@@ -152,9 +169,12 @@ class OnnxModelReader {
       if (field.number == 3) node.name = text(field);
       if (field.number == 4) node.type = text(field);
       if (field.number == 5) read_attribute(field, node);
-      if (field.number == 7 && !text(field).empty() && text(field) != "ai.onnx")
-        refuse(field.offset, in_quotes(text(field)), "the node is of an operator set that cannot be read");
+      if (field.number == 7) domain = text(field);
     }
+    if (!domain.empty() && domain != "ai.onnx")
+      refuse(node.offset, node.label(),
+             "is of the operator set " + in_quotes(domain) + ", which cannot be read",
+             "export with the operators of ONNX itself");
     // Dropout and BatchNormalization may have further outputs, unused in inference; TopK also returns indices.
     const bool may_have_more = node.type == "Dropout" || node.type == "BatchNormalization" ||
                                node.type == "TopK" || node.type == "Split";
@@ -216,9 +236,13 @@ class OnnxModelReader {
   /// Rejects data that do not match the shape. A tensor of an unsupported type is rejected when a node uses it.
   void read_numbers(const std::map<std::uint32_t, ProtobufField>& data, OnnxTensor& tensor) const {
     const std::optional<Precision> precision = onnx_precision(tensor.type);
-    const bool is_integer = tensor.type == kOnnxInt64 || tensor.type == kOnnxInt32;
+    const bool is_bool = tensor.type == kOnnxBool;
+    const bool is_integer = tensor.type == kOnnxInt64 || tensor.type == kOnnxInt32 || is_bool;
     if (!precision && !is_integer) return;
-    const std::size_t bytes_each = precision ? width(*precision) : tensor.type == kOnnxInt64 ? 8 : 4;
+    const std::size_t bytes_each = precision                   ? width(*precision)
+                                   : is_bool                   ? 1
+                                   : tensor.type == kOnnxInt64 ? 8
+                                                               : 4;
     const std::optional<std::uint64_t> count = element_count(tensor.shape);
     const auto raw = data.find(9), typed = data.find(typed_field(tensor.type));
     const bool is_varint = typed != data.end() && raw == data.end() && typed_field(tensor.type) != 4 &&

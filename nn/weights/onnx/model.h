@@ -18,7 +18,7 @@ struct OnnxTensor {
   std::uint64_t type = 0;  ///< TensorProto.data_type
   std::size_t offset = 0;
   std::vector<double> numbers;         ///< for float16, bfloat16, float32 and float64; row-major
-  std::vector<std::int64_t> integers;  ///< for int32 and int64
+  std::vector<std::int64_t> integers;  ///< for int32, int64 and bool
   bool is_read = false;                ///< false: the type is none of these
 };
 
@@ -56,11 +56,12 @@ struct OnnxModel {
   std::map<std::string, OnnxTensor> tensors;
   OnnxInput input;
   std::string output;
+  std::int64_t operator_set = 0;  ///< version of the operators of ONNX itself; 0: not stated
 };
 
 /// Number types in TensorProto.data_type.
-inline constexpr std::uint64_t kOnnxFloat = 1, kOnnxInt32 = 6, kOnnxInt64 = 7, kOnnxFloat16 = 10,
-                               kOnnxDouble = 11, kOnnxBfloat16 = 16;
+inline constexpr std::uint64_t kOnnxFloat = 1, kOnnxInt32 = 6, kOnnxInt64 = 7, kOnnxBool = 9,
+                               kOnnxFloat16 = 10, kOnnxDouble = 11, kOnnxBfloat16 = 16;
 inline constexpr char kReexportOnnx[] =
     "export a plain chain of linear layers with ReLU between them: torch.onnx.export(model, ...)";
 

@@ -171,6 +171,17 @@ void set_rows(MapBuilder& builder, const OnnxTensor& weight, bool outputs_first,
   }
 }
 
+void require_row(const OnnxShape& shape, std::size_t axis, std::int64_t inputs) {
+  if (!shape.empty() && shape[axis] == inputs && count_of(shape) == inputs) return;
+  const std::string got = "takes " + std::to_string(inputs) + " inputs, but gets the shape " +
+                          shape_text({shape.begin(), shape.end()});
+  if (shape.size() == 2 && shape[axis] == inputs)
+    throw OperatorRefusal{got + ", a batch of several",
+                          "export with a batch of one, or of open size: torch.onnx.export(..., "
+                          "dynamic_axes={\"x\": {0: \"batch\"}})"};
+  throw OperatorRefusal{got};
+}
+
 void require_matrix(const OnnxTensor& weight) {
   require_numbers(weight);
   if (weight.shape.size() != 2 || weight.numbers.empty())
@@ -277,9 +288,7 @@ AffineMap gemm_map(const OnnxNode& node, const OnnxTensor& weight, const OnnxTen
   const bool outputs_first = node.number("transB", 0) != 0;
   const auto inputs = static_cast<std::int64_t>(weight.shape[outputs_first ? 1 : 0]);
   const auto outputs = static_cast<std::int64_t>(weight.shape[outputs_first ? 0 : 1]);
-  if (shape.empty() || shape.back() != inputs || count_of(shape) != inputs)
-    throw OperatorRefusal{"takes " + std::to_string(inputs) + " inputs, but gets the shape " +
-                          shape_text({shape.begin(), shape.end()})};
+  require_row(shape, shape.size() - 1, inputs);
   MapBuilder builder(inputs, outputs);
   set_rows(builder, weight, outputs_first, {node.number("alpha", 1), 0});
   if (bias != nullptr) add_shift(builder.map, *bias, node.number("beta", 1), 1);
@@ -294,9 +303,7 @@ AffineMap matmul_map(const OnnxTensor& weight, bool weight_is_left, const OnnxSh
   const auto outputs = static_cast<std::int64_t>(weight.shape[weight_is_left ? 0 : 1]);
   const std::size_t rank = shape.size();
   const std::size_t axis = weight_is_left && rank >= 2 ? rank - 2 : rank - 1;
-  if (shape.empty() || shape[axis] != inputs || count_of(shape) != inputs)
-    throw OperatorRefusal{"takes " + std::to_string(inputs) + " inputs, but gets the shape " +
-                          shape_text({shape.begin(), shape.end()})};
+  require_row(shape, axis, inputs);
   MapBuilder builder(inputs, outputs);
   set_rows(builder, weight, weight_is_left, {1, 0});
   result = shape;
@@ -379,8 +386,6 @@ std::vector<std::vector<int>> max_windows(const OnnxNode& node, const OnnxShape&
 void batch_normalization(const OnnxNode& node, const std::vector<const OnnxTensor*>& parameters,
                          const OnnxShape& shape, std::vector<Enclosed>& factors,
                          std::vector<Enclosed>& amounts) {
-  if (node.number("training_mode", 0) != 0)
-    throw OperatorRefusal{"is in training mode", "export the model after model.eval()"};
   const std::int64_t channels = shape.size() > 1 ? shape[1] : 0;
   for (const OnnxTensor* tensor : parameters) {
     require_numbers(*tensor);
