@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "stability/bounds/sampled_bounds.h"
 #include "stability/bounds/theorem.h"
@@ -76,15 +77,21 @@ bool repeats(const Gains& pid, const DisturbanceSource& source, int axis) {
          source.position_error[axis] == source.position_error[axis - 1];
 }
 
+std::pair<Gains, Plant> at_point(const TrackingSetup& setup, const Gains& pid,
+                                 const std::array<double, 4>& point) {
+  Gains gains = pid;
+  gains.motor_lag_s = point[2];
+  gains.delay_s = point[3];
+  Plant plant = setup.plant;
+  plant.mass_kg = point[0];
+  plant.thrust_scale = point[1] * setup.plant.mass_kg / point[0];
+  return {gains, plant};
+}
+
 void add_reached(const TrackingSetup& setup, const Gains& pid, const UncertainPlant& box,
                  const DisturbanceSource& source, BoxBound& result) {
   for (const std::array<double, 4>& point : points_of(box)) {
-    Gains gains = pid;
-    gains.motor_lag_s = point[2];
-    gains.delay_s = point[3];
-    Plant plant = setup.plant;
-    plant.mass_kg = point[0];
-    plant.thrust_scale = point[1] * setup.plant.mass_kg / point[0];
+    const auto [gains, plant] = at_point(setup, pid, point);
     for (int axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<std::size_t>(axis);
       if (repeats(pid, source, axis)) {
@@ -103,6 +110,20 @@ void add_reached(const TrackingSetup& setup, const Gains& pid, const UncertainPl
       }
     }
   }
+}
+
+/// Least margin to saturation at the corners and the centre of the box; infinite if it is unknown.
+double least_thrust_margin_N(const TrackingSetup& setup, const Gains& pid, const UncertainPlant& box,
+                             const DisturbanceSource& source) {
+  double least_N = std::numeric_limits<double>::infinity();
+  for (const std::array<double, 4>& point : points_of(box)) {
+    const auto [gains, plant] = at_point(setup, pid, point);
+    Plant rotors = plant;
+    rotors.thrust_scale = point[1];  // of the maximum thrust, whatever mass the law is told
+    const std::optional<double> margin_N = thrust_margin_N(rotors, *axis_loop(gains, plant, 2), source, {});
+    least_N = std::min(least_N, margin_N.value_or(least_N));
+  }
+  return least_N;
 }
 
 double times(double gain, double size) { return size == 0 ? 0 : gain * size; }  // avoids infinity times zero
@@ -185,6 +206,7 @@ BoxBound bound_over(const TrackingSetup& setup, const UncertainPlant& box, const
     return result;
   }
   add_reached(setup, pid, box, source, result);
+  result.thrust_margin_N = least_thrust_margin_N(setup, pid, box, source);
   result.is_enclosed = pid.rate_hz == 0 || !(has_clamp(pid, 0) || has_clamp(pid, 1) || has_clamp(pid, 2));
   const FloatErrors float32 = float_errors(setup, tracking_bounds(setup.gains, setup.plant, {}, {}));
   for (int axis = 0; axis < 3; ++axis) {

@@ -1,6 +1,7 @@
 /// @file The tracking bound over intervals of the vehicle's parameters.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,9 @@ struct BoxBound {
   double reached_m[3] = {0, 0, 0};
   double enclosed_m[3] = {0, 0, 0};  ///< no plant in the box has a larger bound; infinite: not proved stable
   std::string where[3];              ///< location of `reached_m`
+  /// Least stability::thrust_margin_N() at the corners and the centre. Negative: the thrust saturates, and no bound
+  /// holds. Infinite: unknown.
+  double thrust_margin_N = std::numeric_limits<double>::infinity();
 };
 
 /// Bounds for `source` over the box. The enclosure by uncertain_norms() is the smallest of the bounds by rate, by

@@ -212,26 +212,6 @@ void add_bounds(const Gains& gains, const Plant& plant, const AxisLoop& loop,
   }
 }
 
-/// Sets the margin, about hover, to the maximum thrust and to zero thrust.
-void add_thrust_margin(const Plant& plant, const AxisLoop& loop, const DisturbanceSource& source,
-                       const InitialError& initial, TrackingReport& report) {
-  const double amplitude_N = source.axis[2].amplitude_N;
-  if (!(plant.largest_thrust_N > 0) || !std::isfinite(amplitude_N)) return;
-  if (source.has_moving_reference()) return;  // the feedforward also uses thrust, and is not bounded
-  OtherErrors other = source.other(2, initial, plant);
-  if (source.classes_contain_bias) other.bias_N = other.start_N = 0;
-  const double weight_N = plant.mass_kg * kGravity_m_s2;
-  const double effort = report.facts.back().effort_gain;
-  const double ratio = other.thrust_ratio_error;
-  double needed_N = effort * amplitude_N + effort_N(loop, with_hover_share(other));
-  // d u is an additional force on the loop of the model; see thrust_ratio.h.
-  if (ratio > 0) needed_N = ratio * effort < 1 ? needed_N / (1 - ratio * effort) : kInfinity;
-  if (!std::isfinite(needed_N)) return;
-  report.thrust_margin_N =
-      std::min((1 - ratio) * plant.thrust_scale * plant.largest_thrust_N - weight_N, (1 - ratio) * weight_N) -
-      needed_N;
-}
-
 /// Largest row sum of absolute values, an upper bound on the 2-norm of a symmetric matrix.
 double row_sum_norm(const Matrix3& m) {
   const auto sum = [](const controller::Vector3<double>& row) {
@@ -362,6 +342,26 @@ AxisBounds axis_bounds(const SampledLoop& loop, Channel channel, const GainNorms
                    classes_contain_bias, limit_m_s);
 }
 
+std::optional<double> thrust_margin_N(const Plant& plant, const AxisLoop& vertical,
+                                      const DisturbanceSource& source, const InitialError& initial) {
+  const double amplitude_N = source.axis[2].amplitude_N;
+  if (!(plant.largest_thrust_N > 0) || !std::isfinite(amplitude_N)) return std::nullopt;
+  if (source.has_moving_reference())
+    return std::nullopt;  // the feedforward also uses thrust, and is not bounded
+  OtherErrors other = source.other(2, initial, plant);
+  if (source.classes_contain_bias) other.bias_N = other.start_N = 0;
+  const double weight_N = plant.mass_kg * kGravity_m_s2;
+  const double effort = effort_gain(vertical);
+  const double ratio = other.thrust_ratio_error;
+  double needed_N = effort * amplitude_N + effort_N(vertical, with_hover_share(other));
+  // d u is an additional force on the loop of the model; see thrust_ratio.h.
+  if (ratio > 0) needed_N = ratio * effort < 1 ? needed_N / (1 - ratio * effort) : kInfinity;
+  if (!std::isfinite(needed_N)) return std::nullopt;
+  return std::min((1 - ratio) * plant.thrust_scale * plant.largest_thrust_N - weight_N,
+                  (1 - ratio) * weight_N) -
+         needed_N;
+}
+
 TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const DisturbanceSource& source,
                                const InitialError& initial) {
   TrackingReport report;
@@ -390,7 +390,7 @@ TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const Dis
     if (source.kind != "none") {
       add_bounds(gains, plant, *loop, sampled, axis, is_same, source, initial, report);
     }
-    if (axis == 2) add_thrust_margin(plant, *loop, source, initial, report);
+    if (axis == 2) report.thrust_margin_N = thrust_margin_N(plant, *loop, source, initial);
   }
   report.theorem = check_theorem(gains, plant.mass_kg,
                                  needs_known ? std::optional<PerAxis>(integrator_needs) : std::nullopt);

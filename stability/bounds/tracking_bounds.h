@@ -141,14 +141,19 @@ struct TrackingReport {
   std::vector<AxisBounds> bounds;
   std::vector<AxisFacts> facts;
   std::optional<VectorGain> vector;
-  /// Margin to saturation: the smaller of the thrust left on the z axis up to the maximum and down to zero, N; nothing
-  /// if unknown.
-  std::optional<double> thrust_margin_N;
+  std::optional<double> thrust_margin_N;  ///< thrust_margin_N() of the z axis
   std::vector<Assumption> assumptions;
 };
 
 TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const DisturbanceSource& source,
                                const InitialError& initial);
+
+/// Returns the margin to saturation about hover, N: the smaller of the thrust left up to the maximum and down to zero
+/// under every disturbance of the source, by the effort gain of the continuous loop `vertical` of the z axis. Negative:
+/// a disturbance of the source saturates the linear loop, so that its bounds do not hold. Nothing if the maximum
+/// thrust or the amplitude is unknown, or the set point moves.
+std::optional<double> thrust_margin_N(const Plant& plant, const AxisLoop& vertical,
+                                      const DisturbanceSource& source, const InitialError& initial);
 
 /// "x", "y", "z"; "force", "command"; "velocity", "position"; "continuous", "sampled".
 const char* axis_name(int axis);

@@ -7,6 +7,9 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/gate/gate.h"
+#include "analysis/run.h"
+#include "nn/temp_folder.h"
 #include "stability/vehicle.h"
 
 namespace swarmcert::gate {
@@ -98,6 +101,34 @@ TEST(PlantBox, ErrorsOfTheEstimatesWidenTheBound) {
     // The vehicle follows the erroneous position.
     EXPECT_GT(position.reached_m[axis], without.reached_m[axis] + 0.01);
   }
+}
+
+TEST(PlantBox, TheThrustMarginIsNegativeExactlyIfTheForceErrorSaturatesTheThrust) {
+  TrackingSetup setup = continuous_setup(2.0);
+  EXPECT_TRUE(
+      std::isinf(bound_over(setup, box_about(setup), force_and_estimates(0.02, 0, 0)).thrust_margin_N));
+  setup.plant.largest_thrust_N = 0.84;  // of which the weight takes 0.33
+  EXPECT_GT(bound_over(setup, box_about(setup), force_and_estimates(0.02, 0, 0)).thrust_margin_N, 0);
+  EXPECT_LT(bound_over(setup, box_about(setup), force_and_estimates(0.5, 0, 0)).thrust_margin_N, 0);
+}
+
+TEST(PlantBox, TheGateDoesNotPassATrackingLimitWhoseForceErrorSaturatesTheThrust) {
+  const tests::TempFolder folder;
+  tests::write_text(folder / "gains.toml",
+                    tests::read_text(tests::source_path("controller/gains/crazyflie-small.toml")));
+  tests::write_text(folder / "model.toml",
+                    tests::read_text(tests::source_path("stability/models/crazyflie-small.toml")));
+  const auto judged = [&folder](const std::string& amplitude_N) {
+    tests::write_text(folder / "policy.toml",
+                      "schema = \"swarmcert/policy/1\"\n[release]\ngains = \"gains.toml\"\nmodel = "
+                      "\"model.toml\"\n[tracking]\nguard_factor = 1\nover = \"corners\"\nmax_error_m = 1000\n"
+                      "amplitude_N = " +
+                          amplitude_N + "\n");
+    return run_gate(read_policy(folder / "policy.toml"), {}).checks.at(0);
+  };
+  EXPECT_EQ(judged("0.05").verdict, Verdict::kPass) << judged("0.05").reason;
+  EXPECT_EQ(judged("5").verdict, Verdict::kInconclusive);
+  EXPECT_NE(judged("5").reason.find("the thrust saturates"), std::string::npos) << judged("5").reason;
 }
 
 }  // namespace

@@ -102,6 +102,14 @@ void judge_tracking(Evidence& evidence, const DisturbanceTable& declared, const 
       check.reason =
           "there is no bound on the error: the loop is unstable in the box, the integrator's clamp may act, "
           "or the force error's amplitude is unknown";
+  } else if (bound.thrust_margin_N < 0 && !(attained > limit.value)) {
+    judge(check, limit, std::numeric_limits<double>::infinity(), -1);
+    check.value.reset();
+    check.reason = fmt::format(
+        "the thrust saturates under this force error: about hover, {:.4g} N are lacking at a corner of the "
+        "box, so "
+        "that no bound holds",
+        -bound.thrust_margin_N);
   } else if (over == Over::kBox && !bound.is_enclosed && !(attained > limit.value)) {
     judge(check, limit, std::numeric_limits<double>::infinity(), attained);
     check.value.reset();
