@@ -39,7 +39,7 @@ class SilentRelease {
 
   void certify_and_export() const {
     const Outcome outcome =
-        run("swarmcert certify net/network.toml --domain box.toml --nodes 1 -q --force -o "
+        run("swarmcert certify net/network.toml --domain box.toml --nodes 1 --range-nodes 100 -q --force -o "
             "box-cert.json --json certify.json && swarmcert certify net/network.toml --nodes 1 -q --force -o "
             "cert.json && swarmcert export net/network.toml --certificate cert.json -q --force -o firmware");
     EXPECT_EQ(outcome.exit_code, 0) << outcome.output;

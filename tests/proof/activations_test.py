@@ -24,6 +24,7 @@ SWARMCERT, SOURCE, CHECKER = Path(sys.argv[1]).resolve(), Path(sys.argv[2]), Pat
 sys.path.insert(0, str(SOURCE / "tests/lipschitz"))
 import check_certificate as second  # noqa: E402
 import weight_files  # noqa: E402
+from check_certificate_test import QUICKLY  # noqa: E402
 
 LARGEST_SLOPE = {"relu": 1.0, "tanh": 1.0, "sigmoid": 0.25, "softplus": 1.0, "elu": 1.0,
                  "selu": float.fromhex("0x1.c212cc640f031p+0"),
@@ -75,7 +76,7 @@ def folded(network, b):
 def certify(net, *options, rounds=0):
     """Without lower bounds, unless search rounds are requested."""
     path = Path(net).parent / "certificate.json"
-    done = run(SWARMCERT, "certify", net, *options, "--nodes", rounds, "-q", "--force", "-o", path)
+    done = run(SWARMCERT, "certify", net, *options, "--nodes", rounds, *QUICKLY, "--force", "-o", path)
     assert done.returncode == 0, done
     return second.parse(path.read_text())
 

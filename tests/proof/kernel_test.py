@@ -37,8 +37,8 @@ def main():
         certificate = folder / "certificate.json"
         net = ["--phi", folder / "small.safetensors", "--rho", folder / "rho.safetensors"]
         subprocess.run([SWARMCERT, "certify", *net, "--neighbours", "2", "--nodes", "1", "--method", "sdp",
-                        "--as", "float32", "--domain", folder / "box.toml", "-q", "-o", certificate], check=True,
-                       capture_output=True)
+                        "--as", "float32", "--domain", folder / "box.toml", *common.QUICKLY, "-o", certificate],
+                       check=True, capture_output=True)
         text = subprocess.run([CHECKER, "--coq", certificate, *net], check=True, capture_output=True, text=True).stdout
         done = kernel(folder / "Sound.v", text)
         accepted(done)

@@ -158,7 +158,7 @@ def kinds(folder, generator):
         ("cover by parts", [tiny], parts, 0.03),
         ("pair and cover by parts", pair, parts, 0.02),
         ("kinds by parts for a number of neighbours", hetero,
-         ["--neighbours", "large=2,small=1", "--domain", folder / "part.toml", "--range-nodes", "20", *parts],
+         ["--neighbours", "large=2,small=1", "--domain", folder / "part.toml", *parts],
          0.01),
     ]
 
@@ -251,7 +251,7 @@ def laws_in_a_box(folder, pair):
     or validity outside the box, is refused by all."""
     path = folder / "laws.json"
     run([common.SWARMCERT, "certify", *pair, "--neighbours", "2", "--domain", folder / "part.toml",
-         "--method", "branch", "--nodes", "1", "-q", "-o", path])
+         "--method", "branch", "--nodes", "1", *common.QUICKLY, "-o", path])
     certificate = second.parse(path.read_text())
     certificate["bounds"] = [b for b in certificate["bounds"] if "neighbours" not in b]
     assert [law["domain"] for law in certificate["laws"]] == 3 * ["box"], "the laws must depend on bounds on the box"
@@ -653,7 +653,7 @@ def main():
         for index, (name, net, options, share) in enumerate(everything):
             path = folder / f"certificate{index}.json"
             nodes = "12" if "parts" in name else "1"
-            run([common.SWARMCERT, "certify", *net, *options, "--nodes", nodes, "-q", "-o", path])
+            run([common.SWARMCERT, "certify", *net, *options, "--nodes", nodes, *common.QUICKLY, "-o", path])
             certificate = second.parse(path.read_text())
             one, three = first(path, net), proved(path, net)
             assert one.returncode == 0, one

@@ -73,7 +73,7 @@ def network(folder, name, silent):
 
 def certify(net, *options):
     path = net.parent / "certificate.json"
-    done = run(common.SWARMCERT, "certify", net, *options, "--nodes", "1", "-q", "--force", "-o", path)
+    done = run(common.SWARMCERT, "certify", net, *options, "--nodes", "1", *common.QUICKLY, "--force", "-o", path)
     assert done.returncode == 0, done
     return second.parse(path.read_text())
 

@@ -33,8 +33,8 @@ const Reader kReaders[] = {
     {"network.toml",
      "simulate swap --vehicles 2 --duration 0.5 --model model.toml --gains gains.toml --network "
      "network.toml -o out --force"},
-    {"box.toml", "certify phi.safetensors --nodes 0 --domain box.toml"},
-    {"box.toml", "certify phi.safetensors --method branch --nodes 3 --domain box.toml"},
+    {"box.toml", "certify phi.safetensors --nodes 0 --range-nodes 20 --domain box.toml"},
+    {"box.toml", "certify phi.safetensors --method branch --nodes 3 --range-nodes 20 --domain box.toml"},
     {"cert.json", "check cert.json phi.safetensors"},
     {"cert.json", "inspect cert.json"},
     {"set.json", "export network.toml --certificate set.json -o out --force"},

@@ -213,7 +213,7 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Pr
   float32.input_step = options.input_step;
   float32.jobs = range.jobs;
   float32.stop = stop;
-  if (output.ranges_cut_short) float32.nodes = 1;
+  float32.nodes = range.nodes;
   output.float32_errors = lipschitz::float32_errors(network, domain, bounds, float32);
 }
 
@@ -454,7 +454,8 @@ void declare_limits(CLI::App& app, CertifyOptions& options) {
                "network.toml lists silent compositions, ranges and jumps include their output 0");
   app.add_option("--range-nodes", options.range_nodes,
                  "Maximum number of boxes of branch and bound per search for an end of a range, twice that "
-                 "for linear forms over several neighbours (default: 16000, fewer for large networks)")
+                 "for linear forms over several neighbours, and of parts of the box for a float32 error "
+                 "(default: 16000, fewer for large networks)")
       ->check(CLI::Range(1, 10'000'000));
   app.add_option("--input-step", options.input_step,
                  "Inputs are quantised to multiples of this (float32 error)")
