@@ -69,8 +69,8 @@ def signed(value):
 
 FLOATS = ("float16", "bfloat16", "float32", "float64")
 # Types by their number in the file: name, code of struct, bytes, field of numbers that are not raw.
-TYPES = {1: ("float32", "f", 4, 4), 6: ("int32", "i", 4, 5), 7: ("int64", "q", 8, 7), 10: ("float16", "e", 2, 5),
-         11: ("float64", "d", 8, 10), 16: ("bfloat16", "H", 2, 5)}
+TYPES = {1: ("float32", "f", 4, 4), 6: ("int32", "i", 4, 5), 7: ("int64", "q", 8, 7), 9: ("bool", "B", 1, 5),
+         10: ("float16", "e", 2, 5), 11: ("float64", "d", 8, 10), 16: ("bfloat16", "H", 2, 5)}
 
 
 def bfloat16(bits):
@@ -95,7 +95,7 @@ def listed_numbers(kind, value):
 
 
 class Tensor:
-    """`numbers`: floats or, for int32 and int64, integers; None for other types."""
+    """`numbers`: floats or, for int32, int64 and bool, integers; None for other types."""
 
     def __init__(self, name, shape, kind, numbers):
         self.name, self.shape, self.kind, self.numbers = name, shape, kind, numbers
@@ -127,7 +127,7 @@ class Tensor:
         return self.kind in FLOATS
 
     def integers(self):
-        return self.numbers if self.kind in ("int32", "int64") else []
+        return self.numbers if self.kind in ("int32", "int64", "bool") else []
 
 
 class Node:
@@ -174,6 +174,10 @@ class Node:
         if name not in self.attributes:
             return list(otherwise)
         return [signed(k) for n, v in self.attributes[name] if n == 8 for k in integers_of(v)]
+
+    def floats(self, name):
+        packed = [v for n, v in self.attributes[name] if n == 7 and isinstance(v, bytes) and len(v) % 4 == 0]
+        return [x for v in packed for (x,) in struct.iter_unpack("<f", v)]
 
 
 # --- activations in several nodes ----------------------------------------------------------------------------------

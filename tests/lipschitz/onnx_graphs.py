@@ -7,11 +7,12 @@ import math
 import re
 import struct
 
-from onnx_file import MOST_NUMBERS, MOST_ROWS, need, Node, protobuf, Refused, Tensor, Unread, with_groups_joined
+from onnx_file import MOST_NUMBERS, MOST_ROWS, need, Node, protobuf, Refused, signed, Tensor, Unread, with_groups_joined
 from onnx_maps import exactly, Map, MINUS_ONE, ONE, opposite, stacked, Value, ZERO
 from onnx_operators import (
-    average_map, axis_of, broadcast, concatenated, convolution_map, flattened, gemm_map, matmul_map, normalization,
-    padded, pooling, reshaped, sorting, squeezed, transposition, unsqueezed)
+    average_map, axis_of, broadcast, concatenated, convolution_map, flattened, gemm_map, matmul_map, need_exact_cast,
+    need_inference, need_trailing_axes, normalization, padded, pooling, reshaped, sizes_between, sorting, squeezed,
+    transposition, unsqueezed)
 
 SMOOTH = {"Tanh": "tanh", "Sigmoid": "sigmoid", "Softplus": "softplus", "Elu": "elu", "Celu": "elu", "Gelu": "gelu",
           "Swish": "silu"}
@@ -79,8 +80,8 @@ class Layers:
 
 
 class Graph:
-    def __init__(self, nodes, stored, name, shape, output):
-        self.stored, self.output = stored, output
+    def __init__(self, nodes, stored, name, shape, output, operator_set):
+        self.stored, self.output, self.operator_set = stored, output, operator_set
         self.layers, self.values = Layers(math.prod(shape)), {}
         self.values[name] = Value(Map.identity(self.layers.width), shape)
         self.uses = {output: 1}
@@ -107,6 +108,12 @@ class Graph:
     def needed_constant(self, node, k):
         need(self.input(node, k), "lacks its weights or biases")
         return self.constant(node, k)
+
+    def broadcast(self, node, k, shape):
+        """Returns the numbers of the constant input `k` of an elementwise node, one per entry of `shape`."""
+        tensor = self.needed_constant(node, k)
+        need_trailing_axes(node, tensor, shape, self.operator_set)
+        return broadcast(tensor, shape)
 
     def integers(self, node, k, attribute):
         """Returns integers that older operator sets store in an attribute and newer ones in input `k`."""
@@ -139,10 +146,14 @@ class Graph:
 
     def clipped(self, node, x, least, most):
         """Returns min(max(x, least), most); each limit may be None, or without bound."""
-        def limits(tensor):
+        def limits(tensor, outwards):
             numbers = broadcast(tensor, x.shape) if tensor else []
-            return numbers if all(abs(value) <= 2.0 ** 127 for value, _ in numbers) else []
-        low, high = limits(least), limits(most)
+            if all(outwards * value > 2.0 ** 127 for value, _ in numbers):  # the largest float32 means no limit
+                return []
+            need(all(abs(value) <= 2.0 ** 127 for value, _ in numbers),
+                 "its minimum or maximum is not a number within 2^127", "leave out a limit that no value reaches")
+            return numbers
+        low, high = limits(least, -1), limits(most, 1)
         need(not low or not high or all(a <= b for a, b in zip(low, high)), "its minimum is above its maximum")
         if low and high:
             return self.sum_of_relus(node, x, [(x.map.shifted(low, -1), [ONE]), (x.map.shifted(high, -1), [MINUS_ONE])],
@@ -196,15 +207,15 @@ class Graph:
             return self.largest(node, x, windows, shape)
         if node.kind in ("Abs", "LeakyRelu", "PRelu"):
             slopes = {"Abs": lambda: [MINUS_ONE], "LeakyRelu": lambda: [exactly(node.number("alpha", f32(0.01)))],
-                      "PRelu": lambda: broadcast(self.needed_constant(node, 1), x.shape)}[node.kind]()
+                      "PRelu": lambda: self.broadcast(node, 1, x.shape)}[node.kind]()
             return self.sum_of_relus(node, x, [(x.map, [ONE]),
                                                (x.map.scaled([MINUS_ONE]), [opposite(slope) for slope in slopes])])
         if node.kind == "HardSigmoid":
             line = x.map.scaled([exactly(node.number("alpha", f32(0.2)))])
             line = line.shifted([exactly(node.number("beta", 0.5))] * len(line.rows))
             return self.clipped(node, Value(line, x.shape, x.first), scalar(0.0), scalar(1.0))
-        limits = [scalar(node.number(name, 0)) if name in node.attributes else self.constant(node, k)
-                  for k, name in ((1, "min"), (2, "max"))]
+        limits = [(self.constant(node, k), name) for k, name in ((1, "min"), (2, "max"))]
+        limits = [scalar(node.number(name, 0)) if name in node.attributes else limit for limit, name in limits]
         return self.clipped(node, x, *limits)
 
     def activation(self, node):
@@ -291,7 +302,7 @@ class Graph:
                 need(other.shape == x.shape, "its inputs are of different shapes")
                 result, first = result.plus(other.map, sign), first or other.first
                 continue
-            numbers = broadcast(self.needed_constant(node, k), x.shape)
+            numbers = self.broadcast(node, k, x.shape)
             if node.kind == "Mul":
                 result = result.scaled(numbers)
             elif node.kind == "Div":
@@ -311,12 +322,14 @@ class Graph:
         if node.kind == "Pad":
             filler = self.constant(node, 2)
             filler = filler.numbers[0] if filler and filler.is_float() and filler.numbers else node.number("value", 0)
-            return padded(node, x, self.integers(node, 1, "pads"), filler)
+            return padded(node, x, self.integers(node, 1, "pads"), filler, self.constant(node, 3))
         if node.kind == "Transpose":
             shape, which = transposition(x.shape, node.listed("perm"))
             return Value(x.map.selected(which), shape, x.first)
         shape = x.shape
-        if node.kind == "Cast":
+        if node.kind == "Dropout":
+            need_inference(node, self.constant(node, 2))
+        elif node.kind == "Cast":
             need(node.whole("to", 0) in (1, 11), "casts to a type that is neither float32 nor float64")
         elif node.kind == "Flatten":
             shape = flattened(shape, node.whole("axis", 1))
@@ -372,6 +385,21 @@ def is_constant(node, stored):
         not name or name in stored for name in node.inputs)
 
 
+def stated(node):
+    """Returns the tensor of a Constant node, which states it in one of five attributes."""
+    tensors = [v for n, v in node.attributes.get("value", []) if n == 5]
+    if tensors:
+        return Tensor.of(tensors[-1])
+    name = next((name for name in ("value_float", "value_floats", "value_int", "value_ints")
+                 if name in node.attributes), None)
+    need(name is not None, "holds no tensor")
+    if name == "value_int":
+        need(abs(node.number(name, 0)) < 2 ** 53, "value_int is out of range")
+    numbers = {"value_float": lambda: [node.number(name, 0)], "value_floats": lambda: node.floats(name),
+               "value_int": lambda: [int(node.number(name, 0))], "value_ints": lambda: node.listed(name)}[name]()
+    return Tensor("", [len(numbers)] if name.endswith("s") else [], "int64" if "int" in name else "float32", numbers)
+
+
 def store(node, stored, sizes=None):
     """Adds what a node computes from constants, or from the shape of a value, `sizes`."""
     remedy = "fold constants: torch.onnx.export(..., do_constant_folding=True)"
@@ -379,13 +407,13 @@ def store(node, stored, sizes=None):
     first = stored[node.inputs[0]] if node.inputs and sizes is None else None
     integers = lambda k: stored[node.inputs[k]].integers()
     if node.kind == "Constant":
-        fields = [v for n, v in node.attributes.get("value", []) if n == 5]
-        need(fields, "holds no tensor")
-        result = Tensor.of(fields[-1])
+        result = stated(node)
     elif node.kind == "Shape":
-        result = of_integers(list(first.shape if sizes is None else sizes))
+        result = of_integers(sizes_between(node, list(first.shape if sizes is None else sizes)))
     elif node.kind in ("Identity", "Cast"):
         result = first
+        if node.kind == "Cast" and first.is_float():
+            need_exact_cast(node.number("to", 0), first.numbers)
     elif node.kind == "Reshape" and first.is_float() and first.numbers:
         shape = node.listed("shape") if "shape" in node.attributes else integers(1)
         result = Tensor(first.name, reshaped(first.shape, shape), first.kind, first.numbers)
@@ -512,10 +540,21 @@ def only(values, what):
     return values[0]
 
 
+def operator_set_of(model):
+    """Returns the version of the operators of ONNX itself, and 0 if the model does not state it."""
+    version = 0
+    for fields in (list(protobuf(v)) for n, v in model if n == 8):
+        domain = next((v for n, v in reversed(fields) if n == 1), b"")
+        if domain in (b"", b"ai.onnx"):
+            version = signed(next((v for n, v in reversed(fields) if n == 2 and isinstance(v, int)), 0))
+    return version
+
+
 def read(data):
     """Returns (layers, activations, precision): layers as (name, inputs, rows {column: number}, biases, kept), and
     activations behind all layers but the last, by their names in chains."""
-    graph = list(protobuf(only([v for n, v in protobuf(data) if n == 7], "graphs")))
+    model = list(protobuf(data))
+    graph = list(protobuf(only([v for n, v in model if n == 7], "graphs")))
     if any(n == 15 for n, _ in graph):
         raise Refused("sparse tensors are not read")
     tensors = [Tensor.of(value) for n, value in graph if n == 5]
@@ -535,7 +574,7 @@ def read(data):
         else:
             rest.append(node)
     nodes = with_groups_joined(rest, stored, output)
-    followed = Graph(nodes, stored, name, input_shape(message, name, nodes, stored), output)
+    followed = Graph(nodes, stored, name, input_shape(message, name, nodes, stored), output, operator_set_of(model))
     inputs, layers = followed.layers.width, followed.layers
     for node in nodes:
         naming(f"node {node.label()}", followed.follow, node)

@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 import check_certificate as second
+import exporter_models
 import onnx_models
 
 
@@ -65,6 +66,23 @@ def refusals_name_operator_and_node(folder):
             raise SystemExit(f"{words} is read")
 
 
+def models_of_exporters_are_decided(folder):
+    path, counts = folder / "exported.onnx", [0, 0]
+    for name, data, decision in exporter_models.exporter_models():
+        path.write_bytes(data)
+        is_refused = bool(decision) and isinstance(decision[0], str)
+        try:
+            weights = second.read_weights(path)
+        except second.BadInput as refused:
+            assert is_refused and all(word in str(refused) for word in decision), f"{name}: {decision}: {refused}"
+        else:
+            assert not is_refused, f"{name} is read"
+            found = [x for layer in weights.layers for x in (*layer.weights, *layer.biases)]
+            assert decision in (None, found), f"{name}: {found}"
+        counts[is_refused] += 1
+    return counts
+
+
 def damaged_files_are_refused(folder):
     path, generator = folder / "damaged.onnx", random.Random(3)
     good = onnx_models.RandomModel(3).bytes()
@@ -85,5 +103,6 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as name:
         refusals_name_operator_and_node(Path(name))
         damaged_files_are_refused(Path(name))
+        print("{} models of exporters are read, {} are refused".format(*models_of_exporters_are_decided(Path(name))))
         print("{} random graphs of {} operators are read as what they compute".format(
             *random_graphs_have_their_outputs(Path(name), 300)))

@@ -38,6 +38,46 @@ def broadcast(tensor, shape):
             for place in places(shape)]
 
 
+def need_trailing_axes(node, tensor, shape, operator_set):
+    """Refuses a constant that operator sets before 7 align with other axes than the last ones of `shape`."""
+    own, rank = len(tensor.shape), len(shape)
+    if own >= rank or tensor.is_float() and len(tensor.numbers) == 1:
+        return
+    is_by_channel = node.kind == "PRelu" and 0 < operator_set < 7
+    need(node.number("axis", 1 if is_by_channel else rank - own) in (rank - own, -own),
+         "aligns its constant with other axes than the last ones, as before operator set 7",
+         "export with operator set 7 or newer")
+
+
+def need_inference(node, mode=None):
+    """Refuses training mode, which is stated by an attribute, the input `mode` of Dropout, or, for BatchNormalization
+    before operator set 14, by the number of outputs."""
+    trains = node.number("training_mode", 0) != 0 or node.number("is_test", 1) == 0 or \
+        mode is not None and mode.integers() != [0]
+    if node.kind == "BatchNormalization" and "is_test" not in node.attributes:
+        trains = trains or sum(name != "" for name in node.outputs) > 1
+    need(not trains, "is in training mode", "export the model after model.eval()")
+
+
+def need_exact_cast(to, numbers):
+    """Refuses a cast of stored numbers that would change one of them."""
+    def is_kept(x):
+        if to == 1:
+            return math.isinf(x) or abs(x) <= 2.0 ** 128 - 2.0 ** 104 and \
+                struct.unpack("<f", struct.pack("<f", x))[0] == x
+        return to == 11 or to in (6, 7) and abs(x) < 2.0 ** 31 and x == int(x)
+    need(all(map(is_kept, numbers)), "rounds stored numbers",
+         "fold constants: torch.onnx.export(..., do_constant_folding=True)")
+
+
+def sizes_between(node, shape):
+    """Returns the sizes `start` to `end` - 1 of a shape, both counted from the end if negative, limited to the rank."""
+    rank = len(shape)
+    start, end = (int(min(rank, max(0.0, at + rank if at < 0 else at)))
+                  for at in (node.number("start", 0), node.number("end", rank)))
+    return shape[start:end]
+
+
 def reshaped(shape, wanted, zero_is_zero=False):
     count = math.prod(shape)
     sizes = [shape[k] if size == 0 and not zero_is_zero and k < len(shape) else size for k, size in enumerate(wanted)]
@@ -209,7 +249,7 @@ def average_map(node, shape):
 
 def normalization(node, parameters, shape):
     """Returns for each entry factor and amount of batch normalization in inference, factor x + amount."""
-    need(node.number("training_mode", 0) == 0, "is in training mode", "export the model after model.eval()")
+    need_inference(node)
     channels = shape[1] if len(shape) > 1 else 0
     need(all(tensor.is_float() and len(tensor.numbers) == channels for tensor in parameters),
          "its parameters do not fit its channels")
@@ -224,8 +264,10 @@ def normalization(node, parameters, shape):
     return factors, amounts
 
 
-def padded(node, x, pads, filler):
+def padded(node, x, pads, filler, axes):
     rank = len(x.shape)
+    need(axes is None or [axis_of(axis, rank) for axis in axes.integers()] == list(range(rank)),
+         "its axes are not all axes of its input in order", "state pads for every axis")
     need(node.text("mode", "constant") == "constant", "its mode is not constant")
     need(len(pads) == 2 * rank and all(a >= 0 and b >= 0 and a + b <= MOST_STEP for a, b in zip(pads, pads[rank:])),
          "pads does not fit its input")

@@ -144,6 +144,29 @@ TEST(OnnxExporters, PartsOfAShapeAndConstantsWithoutATensorAreRead) {
   EXPECT_EQ(weights.layers[0].biases, (std::vector<double>{8, 10}));
 }
 
+TEST(OnnxExporters, GeluIsFoundWithConstantsWithoutATensor) {
+  const auto number = [](const char* name, double x) {
+    return onnx_node("Constant", {}, {name}, {onnx_float("value_float", static_cast<float>(x))});
+  };
+  const OnnxModel model =
+      exported({gemm(), number("root", std::sqrt(2.0)), number("one", 1), number("half", 0.5),
+                onnx_node("Div", {"h", "root"}, {"q"}), onnx_node("Erf", {"q"}, {"e"}),
+                onnx_node("Add", {"e", "one"}, {"p"}), onnx_node("Mul", {"h", "p"}, {"g"}),
+                onnx_node("Mul", {"g", "half"}, {"t"}), onnx_node("MatMul", {"t", "w"}, {"y"})});
+  EXPECT_EQ(parse_weights(model.bytes(), "net.onnx").layers.size(), 2u);
+}
+
+TEST(OnnxExporters, TheShapeOfAStoredTensorIsItsOwn) {
+  const OnnxModel model = exported({onnx_node("Shape", {"w"}, {"n"}), onnx_node("Reshape", {"x", "n"}, {"f"}),
+                                    onnx_node("Mul", {"f", "b"}, {"y"})});
+  OnnxModel square = model;
+  square.shape = {1, 4};
+  EXPECT_TRUE(export_is_refused(model, {"Reshape: its shape does not fit its input"}));
+  const Weights weights = parse_weights(square.bytes(), "net.onnx");
+  EXPECT_EQ(weights.layers[0].weights,
+            (std::vector<double>{1, 0, 0, 0, 0, -2, 0, 0, 0, 0, 1, 0, 0, 0, 0, -2}));
+}
+
 TEST(OnnxExporters, ABatchOfSeveralIsRefusedWithItsMend) {
   OnnxModel model = exported({onnx_node("Gemm", {"x", "w"}, {"y"})});
   model.shape = {4, 2};

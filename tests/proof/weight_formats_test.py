@@ -16,6 +16,7 @@ SWARMCERT, SOURCE, MUTATIONS, CHECKER = sys.argv[1], Path(sys.argv[2]), int(sys.
 sys.argv[1:] = ["", str(SOURCE)]
 sys.path.insert(0, str(SOURCE / "tests" / "lipschitz"))
 import check_certificate as second  # noqa: E402
+import exporter_models  # noqa: E402
 import weight_readers_test as readers  # noqa: E402
 import written_files  # noqa: E402
 
@@ -54,6 +55,26 @@ def is_read_alike(path, certificate):
     return "", said.returncode == 0 and found == expected, (said, found, expected)
 
 
+def models_of_exporters_are_decided_alike(folder):
+    """Counts models that all three read with the same numbers, and that all three refuse, for the same reason."""
+    path, some, counts = folder / "exported.onnx", folder / "some.json", [0, 0]
+    path.write_bytes(exporter_models.on_row(exporter_models.LAYER, exporter_models.node("Neg", ["h"], ["y"])))
+    written = run(SWARMCERT, "certify", path, "--nodes", "0", "-q", "-o", some)
+    assert written.returncode == 0, written
+    for name, data, decision in exporter_models.exporter_models():
+        path.write_bytes(data)
+        if is_refused := bool(decision) and isinstance(decision[0], str):
+            for said in (run(SWARMCERT, "certify", path, "--nodes", "0", "-q", "-o", folder / "none.json"),
+                         run(CHECKER, some, path)):
+                assert said.returncode == 3 and decision[0] in said.stderr, f"{name}: {said}"
+        else:
+            refused, is_alike, said = is_read_alike(path, folder / "exported.json")
+            is_read = not refused and is_alike and isinstance(said, tuple) and said[0].returncode == 0
+            assert is_read, f"{name}: {refused} {said}"
+        counts[is_refused] += 1
+    return counts
+
+
 def run_all():
     generator, counts = random.Random(11), collections.Counter()
     with tempfile.TemporaryDirectory() as folder:
@@ -82,6 +103,8 @@ def run_all():
                 refused, is_alike, said = is_read_alike(target, Path(folder) / "damaged.json")
                 assert is_alike, f"{path}: {said}"
                 counts["damaged, refused" if refused else "damaged, read"] += 1
+        counts["models of exporters, read"], counts["models of exporters, refused"] = (
+            models_of_exporters_are_decided_alike(Path(folder)))
     print(", ".join(f"{what}: {count}" for what, count in counts.items()))
     assert counts["read"] > 5 * counts["refused"], counts
 

@@ -40,30 +40,6 @@ void require_exact_cast(const OnnxNode& node, const std::vector<double>& numbers
                           "fold constants: torch.onnx.export(..., do_constant_folding=True)"};
 }
 
-/// Returns the tensor of a Constant node, which states it in one of five attributes.
-OnnxTensor stated_tensor(const OnnxNode& node) {
-  OnnxTensor result;
-  result.is_read = true;
-  result.type = node.has("value_int") || node.has("value_ints") ? kOnnxInt64 : kOnnxFloat;
-  if (node.has("value") && node.attributes.at("value").tensor) return *node.attributes.at("value").tensor;
-  if (node.has("value_float")) {
-    result.numbers = {node.number("value_float", 0)};
-  } else if (node.has("value_floats")) {
-    result.numbers = node.attributes.at("value_floats").floats;
-    result.shape = {result.numbers.size()};
-  } else if (node.has("value_int")) {
-    const double number = node.number("value_int", 0);
-    if (!(std::fabs(number) < 0x1p53)) throw OperatorRefusal{"value_int is out of range"};
-    result.integers = {static_cast<std::int64_t>(number)};
-  } else if (node.has("value_ints")) {
-    result.integers = node.integers("value_ints", {});
-    result.shape = {result.integers.size()};
-  } else {
-    throw OperatorRefusal{"holds no tensor"};
-  }
-  return result;
-}
-
 /// Returns the sizes `start` to `end` - 1 of a shape, both counted from the end if negative and limited to the rank.
 OnnxShape stated_sizes(const OnnxNode& node, const OnnxShape& shape) {
   const auto rank = static_cast<double>(shape.size());
@@ -269,9 +245,16 @@ void OnnxGraph::compute_constant(const Node& node) {
   const OnnxTensor* const first = node.type == "Shape" ? nullptr : constant(node, 0);
   if (first != nullptr) result = *first;
   if (node.type == "Constant") {
-    result = stated_tensor(node);
+    result = *node.attributes.at("value").tensor;  // the reader of the file states it here
   } else if (node.type == "Shape") {
-    if (first == nullptr && is_value(node, 0)) result.integers = stated_sizes(node, value(node, 0).shape);
+    OnnxShape shape;
+    if (is_value(node, 0)) {
+      shape = value(node, 0).shape;
+    } else {
+      const OnnxTensor& stored = needed_constant(node, 0);
+      shape.assign(stored.shape.begin(), stored.shape.end());
+    }
+    result.integers = stated_sizes(node, shape);
     result.type = kOnnxInt64;
     result.is_read = true;
     result.shape = {result.integers.size()};

@@ -104,8 +104,7 @@ const OnnxTensor* OnnxGraph::stored_anywhere(const std::string& name) const {
   std::string wanted = name;
   for (auto node = model_.nodes.rbegin(); node != model_.nodes.rend(); ++node) {
     if (node->outputs[0] != wanted) continue;
-    if (node->type == "Constant" && node->has("value") && node->attributes.at("value").tensor)
-      return &*node->attributes.at("value").tensor;
+    if (node->type == "Constant") return &*node->attributes.at("value").tensor;
     if (node->type != "Identity" || node->inputs.size() != 1) return nullptr;
     wanted = node->inputs[0];
     const auto found = model_.tensors.find(wanted);

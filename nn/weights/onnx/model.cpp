@@ -1,5 +1,6 @@
 #include "nn/weights/onnx/model.h"
 
+#include <cmath>
 #include <utility>
 
 #include "nn/base/input_error.h"
@@ -175,12 +176,37 @@ class OnnxModelReader {
       refuse(node.offset, node.label(),
              "is of the operator set " + in_quotes(domain) + ", which cannot be read",
              "export with the operators of ONNX itself");
+    if (node.type == "Constant") state_tensor(node);
     // Dropout and BatchNormalization may have further outputs, unused in inference; TopK also returns indices.
     const bool may_have_more = node.type == "Dropout" || node.type == "BatchNormalization" ||
                                node.type == "TopK" || node.type == "Split";
     if (node.outputs.empty() || (node.outputs.size() > 1 && !may_have_more))
       refuse(node.offset, node.label(), "has not exactly one output");
     return node;
+  }
+
+  /// Sets the attribute `value` of a Constant node to its tensor, which one of five attributes states.
+  void state_tensor(OnnxNode& node) const {
+    if (node.has("value") && node.attributes.at("value").tensor) return;
+    OnnxTensor tensor;
+    tensor.is_read = true;
+    tensor.type = node.has("value_int") || node.has("value_ints") ? kOnnxInt64 : kOnnxFloat;
+    if (node.has("value_float")) {
+      tensor.numbers = {node.number("value_float", 0)};
+    } else if (node.has("value_floats")) {
+      tensor.numbers = node.attributes.at("value_floats").floats;
+      tensor.shape = {tensor.numbers.size()};
+    } else if (node.has("value_int")) {
+      const double number = node.number("value_int", 0);
+      if (!(std::fabs(number) < 0x1p53)) refuse(node.offset, node.label(), "value_int is out of range");
+      tensor.integers = {static_cast<std::int64_t>(number)};
+    } else if (node.has("value_ints")) {
+      tensor.integers = node.integers("value_ints", {});
+      tensor.shape = {tensor.integers.size()};
+    } else {
+      refuse(node.offset, node.label(), "holds no tensor", kReexportOnnx);
+    }
+    node.attributes["value"].tensor = std::move(tensor);
   }
 
   void read_attribute(const ProtobufField& message, OnnxNode& node) const {

@@ -50,6 +50,11 @@ let constant graph node k = match input node k with
     | None -> refuse "uses \"%s\" as an input that must be stored" (shown name)
 let needed_constant graph node k = match constant graph node k with
   | Some tensor -> tensor | None -> refuse "lacks its weights or biases"
+(* The numbers of input k of an elementwise node, one for each entry of `shape`. *)
+let broadcast graph node k shape =
+  let tensor = needed_constant graph node k in
+  Operators.require_trailing_axes node tensor shape ~operator_set:graph.model.operator_set;
+  Operators.broadcast tensor shape
 (* An attribute of older models, and input k of newer ones. *)
 let integers graph node k name =
   if has name node then listed node name [] else match constant graph node k with
@@ -88,13 +93,16 @@ let minus_once _ = exactly (-1.)
 
 (* min(max(x, least), most) = least + relu(x - least) - relu(x - most); each limit may be missing. *)
 let clipped graph node x least most =
-  let limits = function
+  let limits outwards = function
     | None -> None
     | Some tensor ->
       let numbers = Operators.broadcast tensor x.shape in
       (* The largest float32 means none. *)
-      if Array.exists (fun n -> not (Float.abs n.value <= 0x1p127)) numbers then None else Some (Array.get numbers) in
-  match limits least, limits most with
+      if Array.for_all (fun n -> outwards *. n.value > 0x1p127) numbers then None
+      else if Array.for_all (fun n -> Float.abs n.value <= 0x1p127) numbers then Some (Array.get numbers)
+      else
+        refuse ~hint:"leave out a limit that no value reaches" "its minimum or maximum is not a number within 2^127" in
+  match limits (-1.) least, limits 1. most with
   | None, None -> x
   | Some low, None -> sum_of_relus graph node x [ Folding.shifted ~minus:true x.map low, once ] ~shift:low ()
   | None, Some high ->
@@ -162,14 +170,16 @@ let piecewise_linear graph node = match node.op with
       let slope = exactly (-. number node "alpha" (Exact.float32 0.01)) in
       both_sides (fun _ -> slope)
     | "PRelu" ->
-      let slopes = Operators.broadcast (needed_constant graph node 1) x.shape in
+      let slopes = broadcast graph node 1 x.shape in
       both_sides (fun k -> opposite slopes.(k))
     | "HardSigmoid" ->
       let alpha = exactly (number node "alpha" (Exact.float32 0.2)) and beta = exactly (number node "beta" 0.5) in
       let line = Folding.shifted (Folding.scaled x.map (fun _ -> alpha)) (fun _ -> beta) in
       clipped graph node { x with map = line } (Some (a_number 0.)) (Some (a_number 1.))
     | _ ->
-      let limit k name = if has name node then Some (a_number (number node name 0.)) else constant graph node k in
+      let limit k name =
+        let stored = constant graph node k in
+        if has name node then Some (a_number (number node name 0.)) else stored in
       let least = limit 1 "min" in
       clipped graph node x least (limit 2 "max")
 
@@ -270,7 +280,7 @@ let elementwise graph node =
       { x with map = Folding.sum ~minus x.map y.map; first = if x.first = "" then y.first else x.first }
     end else begin
       if node.op = "Div" && base > 0 then refuse "divides a constant by a value";
-      let numbers = Operators.broadcast (needed_constant graph node k) x.shape in
+      let numbers = broadcast graph node k x.shape in
       let map =
         if adds then
           let x = if minus && base > 0 then Folding.negated x.map else x.map in
@@ -320,6 +330,7 @@ let layout graph node =
   | "Squeeze" | "Unsqueeze" ->
     { x with shape = Operators.squeezed x.shape (integers 1 "axes") ~adds:(node.op = "Unsqueeze") }
   | "Transpose" -> selected (Operators.transposition x.shape (listed node "perm" []))
+  | "Dropout" -> Operators.require_inference ?mode:(constant graph node 2) node; x
   | "Cast" ->
     let kind = whole node "to" 0 in
     if kind <> float32 && kind <> float64 then refuse "casts to a type that is neither float32 nor float64";
@@ -327,7 +338,7 @@ let layout graph node =
   | "Pad" ->
     let filler = match constant graph node 2 with
       | Some { numbers; _ } when numbers <> [||] -> numbers.(0) | _ -> number node "value" 0. in
-    let shape, copied = Operators.padding node (integers 1 "pads") x.shape in
+    let shape, copied = Operators.padding node (integers 1 "pads") ?axes:(constant graph node 3) x.shape in
     let row = function Some k -> x.map.rows.(k) | None -> [] in
     let shift = function Some k -> x.map.shifts.(k) | None -> exactly filler in
     { x with map = { x.map with rows = Array.map row copied; shifts = Array.map shift copied }; shape }
@@ -354,18 +365,32 @@ let computed graph node =
   | "Softmax" | "LogSoftmax" when output node = graph.model.output -> value graph node 0  (* of the logits *)
   | _ -> refuse "%s" operators
 
+let of_integers integers = { name = ""; shape = [ List.length integers ]; kind = int64; numbers = [||]; integers }
+(* Of a Constant node, which states it in one of five attributes. *)
+let stated_tensor node ~hint =
+  let of_floats numbers shape = { name = ""; shape; kind = float32; numbers; integers = [] } in
+  let number name = number node name 0. in
+  match found "value" node, found "value_floats" node with
+  | Some { tensor = Some t; _ }, _ -> t
+  | _ when has "value_float" node -> of_floats [| number "value_float" |] []
+  | _, Some { floats; _ } -> of_floats floats [ Array.length floats ]
+  | _ when has "value_int" node ->
+    let x = number "value_int" in
+    if not (Float.abs x < 0x1p53) then refuse ~hint "value_int is out of range";
+    { (of_integers [ small (Int64.of_float x) ]) with shape = [] }
+  | _ when has "value_ints" node -> of_integers (listed node "value_ints" [])
+  | _ -> refuse ~hint "holds no tensor"
 (* What a node computes from constants, or from the shape of a value. *)
 let constant_of graph node =
   let hint = "fold constants: torch.onnx.export(..., do_constant_folding=True)" in
-  let of_integers integers =
-    { name = ""; shape = [ List.length integers ]; kind = int64; numbers = [||]; integers } in
   let first () = needed_constant graph node 0 in
   match node.op with
-  | "Constant" ->
-    (match found "value" node with Some { tensor = Some t; _ } -> t | _ -> refuse ~hint "holds no tensor")
-  | "Identity" | "Cast" -> first ()
+  | "Constant" -> stated_tensor node ~hint
+  | "Identity" -> first ()
+  | "Cast" -> Operators.require_exact_cast node (first ()).numbers ~hint; first ()
   | "Shape" ->
-    of_integers (if is_value graph (input node 0) then (value graph node 0).shape else (first ()).shape)
+    let shape = if is_value graph (input node 0) then (value graph node 0).shape else (first ()).shape in
+    of_integers (Operators.sizes_between node shape)
   | "Reshape" when (first ()).numbers <> [||] ->
     let t = first () in
     { t with shape = Operators.reshaped t.shape (integers graph node 1 "shape") ~zero_is_zero:false }

@@ -4,17 +4,20 @@ open Refusal
 
 (* `numbers` and `integers`: of a type that is read, row by row; otherwise none. *)
 type tensor = { name : string; shape : int list; kind : int; numbers : float array; integers : int list }
-type attribute = { number : float option; word : string option; tensor : tensor option; listed : int list }
+type attribute = { number : float option; word : string option; tensor : tensor option; listed : int list;
+                   floats : float array }
 (* `parts`: the nodes that this one stands for. *)
 type node = { op : string; label : string; inputs : string list; outputs : string list;
               attributes : (string * attribute) list; parts : node list }
 (* Of the input; a size is 0 where the file leaves it open. *)
-type t = { nodes : node list; tensors : (string, tensor) Hashtbl.t; input : string; shape : int list; output : string }
+type t = { nodes : node list; tensors : (string, tensor) Hashtbl.t; input : string; shape : int list; output : string;
+           operator_set : int  (* of ONNX itself; 0: not stated *) }
 
-let float32 = 1 and int32 = 6 and int64 = 7 and float64 = 11
+let float32 = 1 and int32 = 6 and int64 = 7 and boolean = 9 and float64 = 11
 (* By their number: the name, and the field of numbers that are not raw. *)
 let floats = [ float32, ("float32", 4); float64, ("float64", 10); 10, ("float16", 5); 16, ("bfloat16", 5) ]
 let is_float kind = List.mem_assoc kind floats
+let is_integer kind = List.mem kind [ int32; int64; boolean ]
 let export = "export a plain chain of linear layers with ReLU between them: torch.onnx.export(model, ...)"
 (* What a node is refused for, and what to do. *)
 exception Refused of string * string
@@ -42,7 +45,8 @@ let integers path kind data = match data with
     List.init (String.length raw / 8) (fun k -> small (String.get_int64_le raw (8 * k)))
   | Some (9, Protobuf.Bytes raw) when kind = int32 ->
     List.init (String.length raw / 4) (fun k -> Int32.to_int (String.get_int32_le raw (4 * k)))
-  | Some (number, listed) when number = (if kind = int64 then 7 else 5) && (kind = int64 || kind = int32) ->
+  | Some (9, Protobuf.Bytes raw) when kind = boolean -> List.init (String.length raw) (fun k -> Char.code raw.[k])
+  | Some (number, listed) when number = (if kind = int64 then 7 else 5) && is_integer kind ->
     List.map small (Protobuf.integers path listed)
   | _ -> []
 let numbers path (kind, field) data =
@@ -74,7 +78,7 @@ let tensor path message =
   if count > Tensor.most_numbers then refuse "is too large";
   let numbers = match List.assoc_opt kind floats with Some float -> numbers path float data | None -> [||] in
   let integers = integers path kind data in
-  if is_float kind && Array.length numbers <> count || (kind = int32 || kind = int64) && List.length integers <> count
+  if is_float kind && Array.length numbers <> count || is_integer kind && List.length integers <> count
   then refuse "holds another number of numbers than its shape";
   { name; shape; kind; numbers; integers }
 
@@ -87,7 +91,12 @@ let attribute path message =
       | _ -> None) fields) in
   let tensor = Option.map (tensor path) (last_of (texts path 5 fields)) in
   let listed = List.concat_map (Protobuf.integers path) (all 8 fields) in
-  text path 1 fields, { number; word = last_of (texts path 4 fields); tensor; listed = List.map small listed }
+  let floats = function
+    | Protobuf.Fixed data | Protobuf.Bytes data when String.length data mod 4 = 0 ->
+      numbers path ("float32", 4) (Some (9, Protobuf.Bytes data))
+    | _ -> [||] in
+  text path 1 fields, { number; word = last_of (texts path 4 fields); tensor; listed = List.map small listed;
+                        floats = Array.concat (List.map floats (all 7 fields)) }
 
 let node path message =
   let fields = Protobuf.fields path message in
@@ -122,13 +131,20 @@ let input_shape path message =
   let tensors = parts 1 (parts 2 [ message ]) in
   match parts 2 tensors with [] -> [ 1; 0 ] | shapes -> List.map size_of (parts 1 shapes)
 
+let operator_set path model =
+  let version found message =
+    let fields = Protobuf.fields path message in
+    if List.mem (text path 1 fields) [ ""; "ai.onnx" ] then integer path 2 fields else found in
+  List.fold_left version 0 (texts path 8 model)
+
 let require_single_names path names =
   let names = List.filter (( <> ) "") names in
   if List.length (List.sort_uniq compare names) <> List.length names then
     bad_input "%s: two values have the same name" path
 
 let read path bytes =
-  let graph = match texts path 7 (Protobuf.fields path bytes) with
+  let model = Protobuf.fields path bytes in
+  let graph = match texts path 7 model with
     | [ graph ] -> Protobuf.fields path graph | _ -> bad_input "%s: has not one graph" path in
   if all 15 graph <> [] then bad_input "%s: sparse tensors cannot be read" path;
   let tensors = Hashtbl.create 16 in
@@ -147,4 +163,5 @@ let read path bytes =
   require_single_names path
     (name_of input :: Hashtbl.fold (fun name _ names -> name :: names) tensors []
      @ List.concat_map (fun node -> node.outputs) nodes);
-  { nodes; tensors; input = name_of input; shape = input_shape path input; output }
+  { nodes; tensors; input = name_of input; shape = input_shape path input; output;
+    operator_set = operator_set path model }

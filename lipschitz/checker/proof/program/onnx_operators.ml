@@ -51,6 +51,44 @@ let broadcast (t : tensor) shape =
       let places = List.map2 (fun n at -> if n = 1 then 0 else at) own (places_of shape k) in
       exactly t.numbers.(index_of own places))
 
+(* Refuses a constant that operator sets before 7 align with other axes than the last ones of `shape`. *)
+let require_trailing_axes node (t : tensor) shape ~operator_set =
+  let own = List.length t.shape and rank = List.length shape in
+  let is_by_channel = node.op = "PRelu" && operator_set > 0 && operator_set < 7 in
+  let last = float_of_int (rank - own) in
+  let axis = number node "axis" (if is_by_channel then 1. else last) in
+  if Array.length t.numbers <> 1 && own < rank && axis <> last && axis <> float_of_int (-own) then
+    refuse ~hint:"export with operator set 7 or newer: torch.onnx.export(..., opset_version=17)"
+      "aligns its constant with other axes than the last ones, as before operator set 7"
+
+(* Refuses training mode, which is stated by an attribute, the input `mode` of Dropout, or, for BatchNormalization
+   before operator set 14, by the number of outputs. *)
+let require_inference ?mode node =
+  let by_outputs = node.op = "BatchNormalization" && not (has "is_test" node)
+                   && List.length (List.filter (( <> ) "") node.outputs) > 1 in
+  if number node "training_mode" 0. <> 0. || number node "is_test" 1. = 0. || by_outputs
+  || (match mode with Some (t : tensor) -> t.integers <> [ 0 ] | None -> false) then
+    refuse ~hint:"export the model after model.eval()" "is in training mode"
+
+(* Refuses a cast of stored numbers that would change one of them. *)
+let require_exact_cast node numbers ~hint =
+  let kind = number node "to" 0. in
+  let is_to some = List.exists (fun k -> kind = float_of_int k) some in
+  let is_kept x =
+    is_to [ float64 ] || (is_to [ float32 ] && Int32.float_of_bits (Int32.bits_of_float x) = x)
+    || (is_to [ int32; int64 ] && Float.abs x < 0x1p31 && Float.trunc x = x) in
+  if not (Array.for_all is_kept numbers) then refuse ~hint "rounds stored numbers"
+
+(* The sizes `start` to `end` - 1 of a shape, both counted from the end if negative, and limited to the rank. *)
+let sizes_between node shape =
+  let rank = List.length shape in
+  let place name otherwise =
+    let stated = number node name (float_of_int otherwise) in
+    let at = if stated < 0. then stated +. float_of_int rank else stated in
+    if at >= float_of_int rank then rank else if at > 0. then int_of_float at else 0 in
+  let start = place "start" 0 in
+  from start (first_of (place "end" rank) shape)
+
 (* Of Reshape: 0 copies a size, -1 is what is left. *)
 let reshaped shape wanted ~zero_is_zero =
   let count = size shape in
@@ -252,8 +290,7 @@ let max_windows node shape =
 
 (* Of batch normalization in inference: factor and amount of each entry, y = factor x + amount. *)
 let normalization node parameters shape =
-  if number node "training_mode" 0. <> 0. then
-    refuse ~hint:"export the model after model.eval()" "is in training mode";
+  require_inference node;
   let channels = match shape with _ :: n :: _ -> n | _ -> 0 in
   List.iter (fun (t : tensor) ->
       require_numbers t;
@@ -270,8 +307,12 @@ let normalization node parameters shape =
   (fun k -> fst each.(k / repeats)), (fun k -> snd each.(k / repeats))
 
 (* Places and shape of Pad, and what each entry of the result copies; None: the filler. *)
-let padding node pads shape =
+let padding node pads ?axes shape =
   let rank = List.length shape in
+  (match axes with
+   | Some (t : tensor) when List.map (fun axis -> axis_of axis rank) t.integers <> List.init rank Fun.id ->
+     refuse ~hint:"state pads for every axis" "its axes are not all axes of its input in order"
+   | _ -> ());
   if word node "mode" "constant" <> "constant" then refuse "its mode is not constant";
   if List.length pads <> 2 * rank then refuse "pads does not fit its input";
   let before = first_of rank pads and after = from rank pads in
