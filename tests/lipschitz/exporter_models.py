@@ -139,7 +139,9 @@ def shapes_and_constants():
 def others():
     several = model([node("Gemm", ["x", "w"], ["y"]), STORED], [4, 2])
     domain = on_row(LAYER, field(1, field(1, "h") + field(2, "y") + field(4, "Relu") + field(7, "com.microsoft")))
-    return [(several, ["takes 2 inputs, but gets the shape [4, 2]"]), (domain, ["operator set"])]
+    damaged = on_row(LAYER, node("Neg", ["h"], ["y"])) + b"\0\1"  # field number 0
+    return [(damaged, ["protobuf field"]),
+            (several, ["takes 2 inputs, but gets the shape [4, 2]"]), (domain, ["operator set"])]
 
 
 def exporter_models():

@@ -39,12 +39,12 @@ def protobuf(data):
     at = 0
     while at < len(data):
         tag, at = varint(data, at)
+        if not 0 < tag >> 3 < 2 ** 29 or tag & 7 not in (0, 1, 2, 5):
+            raise Refused("the file is damaged: there is no such protobuf field")
         if tag & 7 == 0:
             value, at = varint(data, at)
             yield tag >> 3, value
         else:
-            if not 0 < tag >> 3 < 2 ** 29 or tag & 7 not in (1, 2, 5):
-                raise Refused("the file is damaged: there is no such protobuf field")
             length, at = {1: (8, at), 5: (4, at)}.get(tag & 7) or varint(data, at)
             if length > len(data) - at:
                 raise Refused("the file is damaged: a protobuf field is longer than what holds it")
