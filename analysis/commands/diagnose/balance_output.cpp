@@ -108,6 +108,22 @@ bool is_of_named_rotor(const TorqueBalance& balance, const files::Json& ranking)
   });
 }
 
+/// Returns whether the ranking has a thrust_ratio that each accelerometer of `kind` explains.
+bool explain_ratio(const std::vector<AccelerometerBalance>& balances, const std::string& kind,
+                   const files::Json& ranking) {
+  const auto ratio = std::find_if(ranking.begin(), ranking.end(), [&](const files::Json& entry) {
+    return entry["effect"] == "thrust_ratio" && entry["kind"] == kind;
+  });
+  if (ratio == ranking.end()) return false;
+  const files::Json& value = (*ratio)["parameters"]["ratio"];
+  const files::Json& interval = value["interval_90"];
+  if (!value["value"].is_number() || !interval.is_array()) return false;
+  const double half = (interval[1].get<double>() - interval[0].get<double>()) / 2;
+  return std::all_of(balances.begin(), balances.end(), [&](const AccelerometerBalance& balance) {
+    return identification::explains_ratio(balance, value["value"].get<double>(), half);
+  });
+}
+
 /// The force residual of a flight shows an accelerometer scale error as a thrust ratio.
 bool is_explained_ratio(const files::Json& entry, const AccelerometerBalance& balance) {
   constexpr double kAlike = 0.02;
@@ -135,13 +151,16 @@ bool judge_accelerometers(const residuals::Inputs& inputs, int jobs, bool prints
   std::vector<AccelerometerBalance> named;
   result["sensors"] = files::Json::array();
   for (const stability::Model& model : inputs.models) {
-    for (AccelerometerBalance& balance : identification::accelerometer_balances(inputs, model.kind, jobs)) {
+    std::vector<AccelerometerBalance> balances =
+        identification::accelerometer_balances(inputs, model.kind, jobs);
+    const bool are_of_ratio = explain_ratio(balances, model.kind, result["ranking"]);
+    for (AccelerometerBalance& balance : balances) {
       result["sensors"].push_back({{"vehicle", balance.vehicle},
                                    {"flights", balance.flights},
                                    {"blocks", balance.blocks},
                                    {"accelerometer_scale", scale_json(balance)},
                                    {"statement", identification::in_words(balance)}});
-      if (!balance.is_named) continue;
+      if (!balance.is_named && !are_of_ratio) continue;
       ranking.push_back(ranking_entry_of(balance));
       if (prints) fmt::print("  {}: {}\n", balance.vehicle, identification::in_words(balance));
       named.push_back(std::move(balance));

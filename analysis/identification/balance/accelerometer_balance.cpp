@@ -85,6 +85,14 @@ void fit_scale(const std::vector<MotionBlock>& blocks, double mass_kg, Accelerom
 
 bool AccelerometerBalance::may_be_offset() const { return z < kOffset_z; }
 
+bool explains_ratio(const AccelerometerBalance& balance, double ratio, double half) {
+  constexpr double kErrorOfGravity = 0.005;  // from the equator to the poles it varies by 0.0053 of itself
+  const double off = std::abs(balance.scale.value - 1) - balance.scale.half - balance.of_lag;
+  const double apart = std::abs(ratio - balance.scale.value);
+  return off > kErrorOfGravity && balance.z >= -kOffset_z &&
+         apart <= std::hypot(half, balance.scale.half) + balance.of_lag;
+}
+
 double modelled_accelerometer_scale(const stability::Model& model, const std::string& vehicle) {
   double scale = 1;
   for (const stability::EffectSpec& spec : model.effects) {

@@ -34,6 +34,12 @@ struct AccelerometerBalance {
   bool may_be_offset() const;
 };
 
+/// Returns whether the accelerometer explains a thrust_ratio of the force in flight, because it reads that much too
+/// much: the difference is within both intervals and `of_lag`, and velocities surely show an error beyond that of the
+/// assumed gravity, however ordinary it is for an accelerometer. A flawless vehicle would have such a ratio.
+/// @param half of the ratio's 90 % interval
+bool explains_ratio(const AccelerometerBalance& balance, double ratio, double half);
+
 /// Returns the product of the scales of the model's accelerometer_scale effects for `vehicle`.
 double modelled_accelerometer_scale(const stability::Model& model, const std::string& vehicle);
 
