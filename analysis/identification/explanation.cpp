@@ -11,6 +11,7 @@
 #include "analysis/identification/scan/drag_law.h"
 #include "analysis/identification/scan/named_forms.h"
 #include "analysis/identification/swinging_load.h"
+#include "analysis/identification/thrust_doubts.h"
 #include "nn/base/doubles.h"
 #include "stability/effects/registry.h"
 
@@ -475,6 +476,8 @@ std::map<std::string, double> correct_memories(const Passes& passes, Explained& 
 Explained explain(const Passes& passes, const Coverage& covered) {
   Explained explained = explain_by_formulas(passes, covered);
   drop_doubtful_names(passes, explained);
+  if (is_mean_of_a_force(passes, explained.settled.ranking, explained.formulas))
+    drop_names(passes, explained, [](const Missing& missing) { return missing.effect == "thrust_ratio"; });
   const std::map<std::string, double> kept = correct_memories(passes, explained);
   drop_names(passes, explained,
              [&](const Missing& missing) { return may_be_no_lag(missing, explained.settled.rest, kept); });
