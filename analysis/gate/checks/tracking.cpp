@@ -107,8 +107,7 @@ void judge_tracking(Evidence& evidence, const DisturbanceTable& declared, const 
     check.value.reset();
     check.reason = fmt::format(
         "the thrust saturates under this force error: about hover, {:.4g} N are lacking at a corner of the "
-        "box, so "
-        "that no bound holds",
+        "box, so that no bound holds",
         -bound.thrust_margin_N);
   } else if (over == Over::kBox && !bound.is_enclosed && !(attained > limit.value)) {
     judge(check, limit, std::numeric_limits<double>::infinity(), attained);
