@@ -21,7 +21,7 @@ let rec next_line lines = match lines.rest with
     let line = String.sub line 0 (last (String.length line)) in
     if line = "" || Tensor.starts_with "//" line then next_line lines else line
 
-(* Where the decimal that begins at `first` ends; `first` where there is none. *)
+(* The index after the decimal number that begins at `first`, or `first` if no number begins there. *)
 let end_of_decimal line first =
   let size = String.length line in
   let is_at k c = k < size && String.contains c line.[k] in
