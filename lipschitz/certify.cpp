@@ -26,7 +26,7 @@ check::Dyadic power(double base, std::size_t exponent) {
   return result;
 }
 
-/// Requires that bounds on a box are about relative states, and that branch and bound is used for ReLU only.
+/// Requires that bounds on a box are about relative states, and branch and bound without a box about ReLU networks.
 /// @throws std::invalid_argument otherwise.
 void require_what_is_bounded(const Network& network, const files::Parts& parts,
                              const CertifyOptions& options) {
@@ -34,11 +34,11 @@ void require_what_is_bounded(const Network& network, const files::Parts& parts,
   if (network.invariants)
     throw std::invalid_argument(std::string(options.domain.empty() ? "--method branch" : "bounds on a box") +
                                 ": only for networks of relative states, not of rotation invariants");
-  if (options.method != UpperMethod::kBranch) return;
+  if (options.method != UpperMethod::kBranch || !options.domain.empty()) return;
   for (const auto& [part, weights] : parts) {
     if (weights->is_relu()) continue;
-    throw std::invalid_argument("--method branch: for ReLU networks only; " + part.name() + " has " +
-                                weights->activation_names() + " between its layers");
+    throw std::invalid_argument("--method branch without a box: for ReLU networks only; " + part.name() +
+                                " has " + weights->activation_names() + " between its layers");
   }
 }
 

@@ -24,15 +24,15 @@
 namespace swarmcert::lipschitz {
 
 enum class UpperMethod {
-  /// The smallest bound by kProduct, kEclipseFast and kSdp; on a box, for activations other than ReLU, also by
-  /// kLocalProduct and kLocalSdp.
+  /// The smallest bound by kProduct, kEclipseFast and kSdp; on a box also by kLocalProduct, kLocalSdp and kBranch.
   kAuto,
   kProduct,       ///< product of the layers' spectral norms
   kEclipseFast,   ///< layer by layer in closed form; the starting point of the semidefinite program
   kSdp,           ///< LipSDP-Neuron
   kLocalProduct,  ///< kProduct with the largest slopes of the activations on the box
   kLocalSdp,      ///< LipSDP-Neuron with the range of slopes of the activations on the box
-  kBranch,  ///< branch and bound on the claim's box, or on a projective cover of all inputs; for rho: as kAuto
+  /// Branch and bound on the claim's box or, of ReLU networks, on a projective cover of all inputs; for rho: as kAuto.
+  kBranch,
 };
 
 struct CertifyOptions : ClaimOptions {
@@ -59,8 +59,9 @@ struct CertifiedLayer {
 
 struct CertifiedBound : Claim {
   bool has_witness = true;  ///< false for functions of invariants, which get no lower bound
-  bool is_relu = true;      ///< all activations are ReLU and `has_witness`; else no branch and bound
-  bool has_slopes = true;   ///< activations act entry by entry; false: a layer sorts, product bound only
+  bool is_relu =
+      true;  ///< all activations are ReLU and `has_witness`; else no branch and bound without a box
+  bool has_slopes = true;  ///< activations act entry by entry; false: a layer sorts, product bound only
   bool has_local_slopes = false;  ///< a box, and an activation other than ReLU: slopes may be smaller there
   bool is_monotone = true;        ///< false: the layer-wise bound is the product of norms
   UpperBound upper{0};
@@ -124,10 +125,10 @@ std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const st
 /// rho(sum phi) times the Lipschitz constant of the map to invariants. If NET is silent in some compositions, bounds
 /// hold while the neighbours stay the same, and lower bounds use compositions in which it is not silent.
 ///
-/// Branch and bound supports ReLU only. It runs on the image of the box under the clamp, or on a projective cover of
-/// all inputs if there is no box.
-/// @throws std::invalid_argument if gamma is not positive; if branch and bound is requested and an activation is not
-///   ReLU; if NET has invariants and there is a domain or branch and bound is requested; or as claims() and
+/// Branch and bound runs on the image of the box under the clamp or, of ReLU networks and if requested, on a projective
+/// cover of all inputs.
+/// @throws std::invalid_argument if gamma is not positive; if branch and bound is requested without a box and an
+///   activation is not ReLU; if NET has invariants and there is a domain or branch and bound is requested; or as claims() and
 ///   law_claims().
 Certification certify(const files::Network& network, const CertifyOptions& options);
 

@@ -28,8 +28,15 @@ bool has_program(UpperMethod method, const CertifiedBound& bound) {
   return method != UpperMethod::kProduct && bound.neighbours.empty() && bound.has_slopes;
 }
 
+bool searches_boxes(const CertifyOptions& options) {
+  return options.method == UpperMethod::kBranch ||
+         (options.method == UpperMethod::kAuto && !options.domain.empty());
+}
+
+/// Whether branch and bound runs: over a box for all activations that act entry by entry, else for ReLU only.
 bool is_branched(const CertifyOptions& options, const CertifiedBound& bound) {
-  return options.method == UpperMethod::kBranch && !bound.function.is_rho() && bound.is_relu;
+  if (!searches_boxes(options) || bound.function.is_rho() || !bound.has_witness) return false;
+  return bound.is_relu || (bound.domain == "box" && bound.has_slopes && bound.neighbours.empty());
 }
 
 /// Returns the smaller of `own` (0: none) and the time until `stop`, in seconds; 0: no limit.
@@ -177,8 +184,11 @@ void branch_all(const Network& network, const CertifyOptions& options, const Sto
   }
 }
 
-}  // namespace
-
+/// Replaces `bound` by a smaller bound for inputs in `box` if the slopes of the activations there give one, by the
+/// product of norms or by the matrix inequality.
+/// @param box range of the moving input after the clamp. @param method kProduct: use the product only.
+/// @param options `known` is taken from the bound.
+/// @returns whether the matrix inequality was proved, whether or not its bound is smaller.
 bool bound_by_slopes_on_box(const Network& network, const Box& box, const std::vector<CertifiedLayer>& layers,
                             UpperMethod method, SdpOptions options, CertifiedBound& bound) {
   const check::Intervals inputs = {{box.lower.begin(), box.lower.end()},
@@ -197,8 +207,10 @@ bool bound_by_slopes_on_box(const Network& network, const Box& box, const std::v
   return true;
 }
 
+}  // namespace
+
 int pieces_of_work(const CertifyOptions& options, int bounds) {
-  return (options.method == UpperMethod::kBranch ? 4 : 3) * bounds;
+  return (searches_boxes(options) ? 4 : 3) * bounds;
 }
 
 void find_bounds(const Network& network, const CertifyOptions& options, const Stop& stop,
@@ -213,7 +225,7 @@ void find_bounds(const Network& network, const CertifyOptions& options, const St
   });
 
   // Semidefinite programs and lower-bound searches form one flat list of independent tasks.
-  const bool branches = options.method == UpperMethod::kBranch;
+  const bool branches = searches_boxes(options);
   TimeShares shares(branches ? stop.after_share(kShareBeforeBranch) : stop, 2 * count, options.jobs);
   files::parallel_for(2 * count, options.jobs, [&](int i) {
     CertifiedBound& bound = bounds[static_cast<std::size_t>(i % count)];

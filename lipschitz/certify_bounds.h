@@ -14,20 +14,11 @@ int pieces_of_work(const CertifyOptions& options, int bounds);
 ///
 /// The order is: eclipse_fast(), which takes seconds at any size; then the semidefinite programs, with the slopes on
 /// the box if activations other than ReLU have smaller slopes there, and the searches for lower bounds; then branch and
-/// bound if requested. Every bound is proved no matter when `stop` ends the work; bounds whose search was cut short are
+/// bound, on a box or if requested. Every bound is proved no matter when `stop` ends the work; bounds whose search was cut short are
 /// marked as interrupted.
 /// @param layers all layers of the network, with their norms.
 void find_bounds(const files::Network& network, const CertifyOptions& options, const Stop& stop,
                  WorkProgress& progress, const std::vector<CertifiedLayer>& layers,
                  std::vector<CertifiedBound>& bounds);
-
-/// Replaces `bound` by a smaller bound for inputs in `box` if the slopes of the activations there give one, by the
-/// product of norms or by the matrix inequality.
-/// @param box range of the moving input after the clamp. @param method kProduct: use the product only.
-/// @param options `known` is taken from the bound.
-/// @returns whether the matrix inequality was proved, whether or not its bound is smaller.
-bool bound_by_slopes_on_box(const files::Network& network, const Box& box,
-                            const std::vector<CertifiedLayer>& layers, UpperMethod method, SdpOptions options,
-                            CertifiedBound& bound);
 
 }  // namespace swarmcert::lipschitz

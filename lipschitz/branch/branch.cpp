@@ -63,6 +63,7 @@ bool BranchSearch::sharpen(Part& part) const {
     renew_form(part);
     if (part.rho < before) return true;
   }
+  if (set_ != nullptr && part.form == nullptr) return false;
   if (part.undecided < kLazy * part.undecided_then) {
     solve(part);
     return true;
@@ -77,9 +78,9 @@ bool BranchSearch::sharpen(Part& part) const {
 
 BranchSearch::Step BranchSearch::advanced(Part part) const {
   Step step;
-  if (share_of_time() < 1 && !is_cancelled() && !sharpen(part)) {
-    step.is_stuck = !part.multipliers ||
-                    !(relative_width(part.reach->box(), static_cast<std::size_t>(part.split)) > kThin);
+  if (is_over()) return step;
+  if (!sharpen(part)) {
+    step.is_stuck = !(relative_width(part.reach->box(), static_cast<std::size_t>(part.split)) > kThin);
     if (!step.is_stuck) {
       const auto [lower, upper] = halves(part.reach->box(), part.split);
       step.halves = {this->part(lower, &part), this->part(upper, &part)};
@@ -91,7 +92,6 @@ BranchSearch::Step BranchSearch::advanced(Part part) const {
 
 void BranchSearch::count(const Part& part) {
   ++result_.nodes;
-  look_at_centre(part.reach->box());
   result_.undecided_per_box += (part.undecided - result_.undecided_per_box) / result_.nodes;
 }
 
@@ -106,6 +106,7 @@ void BranchSearch::record(Part& part) {
 void BranchSearch::commit(Step step, std::priority_queue<Part>& queue) {
   record(step.part);
   if (step.halves.empty()) {
+    count(step.part);
     queue.push(std::move(step.part));
     return;
   }
@@ -116,6 +117,7 @@ void BranchSearch::commit(Step step, std::priority_queue<Part>& queue) {
     half.index = static_cast<int>(nodes_.size());
     nodes_.push_back({});
     count(half);
+    look_at_centre(half.reach->box());
     record(half);
     queue.push(std::move(half));
   }
@@ -129,7 +131,10 @@ std::vector<BranchSearch::Part> BranchSearch::roots() {
     parts[k] = part(boxes_[k], nullptr);
     parts[k].index = i;
   });
-  for (const Part& root : parts) count(root);
+  for (const Part& root : parts) {
+    count(root);
+    look_at_centre(root.reach->box());
+  }
   files::parallel_for(static_cast<int>(boxes_.size()), options_.jobs, [&](int i) {
     Part& root = parts[static_cast<std::size_t>(i)];
     if (set_ == nullptr) {
@@ -146,8 +151,7 @@ std::vector<BranchSearch::Part> BranchSearch::next_batch(std::priority_queue<Par
   const std::size_t size = std::clamp<std::size_t>(queue.size() / kPartsPerStep, 1, kMostSteps);
   std::vector<Part> batch;
   while (!queue.empty() && batch.size() < size) {
-    const int nodes_after = result_.nodes + 2 * (static_cast<int>(batch.size()) + 1);
-    if (!batch.empty() && (bound(queue.top()) <= enough() || nodes_after > options_.nodes)) break;
+    if (!batch.empty() && bound(queue.top()) <= enough()) break;
     batch.push_back(queue.top());
     queue.pop();
   }
@@ -168,7 +172,7 @@ BranchStop BranchSearch::why_stop(const std::priority_queue<Part>& queue) const 
   if (bound(queue.top()) <= enough()) return BranchStop::kCloseEnough;
   if (share_of_time() >= 1) return BranchStop::kTimeLimit;
   if (is_cancelled()) return BranchStop::kCancelled;
-  return result_.nodes + 2 <= options_.nodes ? BranchStop::kNothingRun : BranchStop::kNodes;
+  return result_.nodes < options_.nodes ? BranchStop::kNothingRun : BranchStop::kNodes;
 }
 
 BranchResult BranchSearch::run() {
@@ -181,8 +185,12 @@ BranchResult BranchSearch::run() {
     std::vector<Step> steps(batch.size());
     files::parallel_for(static_cast<int>(batch.size()), options_.jobs, [&](int i) {
       const auto k = static_cast<std::size_t>(i);
-      steps[k] = advanced(std::move(batch[k]));
+      steps[k] = advanced(batch[k]);
     });
+    if (is_over()) {  // a round that is cut short counts for nothing, so that the result depends on `nodes` alone
+      for (Part& part : batch) queue.push(std::move(part));
+      continue;
+    }
     const bool is_stuck = steps.front().is_stuck;
     std::size_t halvings = 0;
     for (Step& step : steps) {
@@ -204,9 +212,9 @@ BranchResult BranchSearch::run() {
 }
 
 BranchResult BranchSearch::finished(std::priority_queue<Part>& queue) {
-  if (!options_.boxes_only) polish(queue);
+  polish(queue);
   const double rho = queue.top().rho * (1 + kRhoMargin);
-  if (!options_.boxes_only) look_ahead(queue.top());
+  look_ahead(queue.top());
   for (; !queue.empty(); queue.pop()) {
     const std::shared_ptr<const Multipliers>& multipliers = queue.top().multipliers;
     if (multipliers)
@@ -270,8 +278,7 @@ BranchResult search(const LocalChain& chain, const SetChain* set, const std::vec
   BranchResult found = BranchSearch(chain, set, boxes, options).run();
   BranchOptions uncut = options;
   uncut.nodes = static_cast<int>(boxes.size());
-  if (options.boxes_only || found.nodes <= uncut.nodes || found.nodes > 2 * static_cast<int>(kFewParts))
-    return found;
+  if (found.nodes <= uncut.nodes || found.nodes > 2 * static_cast<int>(kFewParts)) return found;
   BranchResult whole = BranchSearch(chain, set, boxes, uncut).run();
   if (whole.tree.rho < found.tree.rho) found.tree = std::move(whole.tree);
   return found;

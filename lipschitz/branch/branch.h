@@ -32,8 +32,10 @@ struct BranchTree {
 };
 
 struct BranchOptions {
-  int nodes = 20000;        ///< number of boxes to examine
-  double seconds = 0;       ///< wall-clock limit; the search stops at the next node; 0: no limit
+  /// The search ends after the first round in which it has examined this many boxes, so that the number that a search
+  /// with a time limit reached gives the same result again.
+  int nodes = 0;
+  double seconds = 0;       ///< wall-clock limit: the search ends with the last round within it; 0: no limit
   double known = 0;         ///< a lower bound on the Lipschitz constant: no need to go below
   double tolerance = 1e-3;  ///< stop when the relative distance of the bound to `known` is at most this
   /// Largest number of conflict cuts per box. A conflict cut is a pair of neurons that cannot be in given states at
@@ -45,9 +47,6 @@ struct BranchOptions {
   /// Initial multipliers, one per hidden neuron of the network, in its own units, taken from a global bound. Empty:
   /// none.
   std::vector<double> start;
-  /// Spends all time on boxes, for callers that run many searches: the parts that dominate at the end are not solved
-  /// more accurately, and no outlook is computed.
-  bool boxes_only = false;
   int jobs = 1;  ///< number of threads; does not affect the result
   const std::atomic<bool>* cancelled = nullptr;
   /// Called periodically with the used share of the nodes or of the time, and the bound so far.
@@ -61,7 +60,7 @@ enum class BranchStop {
   kNodes,        ///< the limit on the number of boxes was reached
   kTimeLimit,
   kCancelled,
-  /// The dominating box has no side left to halve, or no multipliers were found for it. On a projective cover this
+  /// The dominating box has no side left to halve. On a projective cover this
   /// happens at points at infinity where parallel kinks meet, such as those behind one neuron of the first layer: no
   /// box around such a point, however small, decides the neurons of these kinks.
   kNothingToHalve,
@@ -83,7 +82,7 @@ struct Outlook {
 struct BranchResult {
   BranchTree tree;
   BranchStop stop = BranchStop::kNothingRun;
-  int nodes = 0;                 ///< boxes examined
+  int nodes = 0;                 ///< boxes examined; a box examined again counts again
   double undecided_per_box = 0;  ///< average number of undecided neurons per box
   Outlook outlook;
   /// The box centres with the largest slopes, steepest first, at most kSteepCentres: starting points for a lower-bound

@@ -6,6 +6,7 @@
 
 #include "lipschitz/base/rounding.h"
 #include "lipschitz/branch/search_tree.h"
+#include "lipschitz/branch/slope_parts.h"
 #include "lipschitz/checker/projective_cover.h"
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/upper/lmi_proof.h"
@@ -97,6 +98,7 @@ void prove(const check::LocalFunction& f, const std::vector<check::Sides>& boxes
   result.undecided_per_box = found.undecided_per_box;
   result.outlook = found.outlook;
   result.steep_centres = std::move(found.steep_centres);
+  if (!std::isfinite(found.tree.rho)) return;  // a part without multipliers remains
   proof.tree.tree = words_of(found.tree);
   proof.tree.multipliers = std::move(found.tree.multipliers);
   proof.tree.conflicts = std::move(found.tree.conflicts);
@@ -121,36 +123,50 @@ std::vector<double> beginning(const std::vector<double>& t, const LocalChain& ch
   return {t.begin(), t.begin() + static_cast<std::ptrdiff_t>(size)};
 }
 
-}  // namespace
+/// Returns how many boxes take about ten seconds: those of a program with many neurons cost the most.
+int usual_boxes(Index neurons, Index inputs) {
+  constexpr double kWork = 2e10, kFewest = 60, kMost = 20000;
+  return static_cast<int>(
+      std::clamp(kWork / std::pow(static_cast<double>(neurons + inputs), 3), kFewest, kMost));
+}
 
-LocalBounds::LocalBounds(const files::Network& network, const Claim& claim,
-                         const std::vector<double>& joint_t) {
+/// What the searches of a claim without a number of neighbours start from.
+struct Prepared {
+  std::optional<RhoForm> form;
+  check::LocalFunction f;
+  LocalChain chain;
+};
+
+/// Returns nothing for functions that have no local bound.
+std::optional<Prepared> prepared(const files::Network& network, const Claim& claim,
+                                 const std::vector<double>& joint_t) {
   const std::vector<files::FunctionId> names = claim.function.parts();
   const files::Parts parts = files::parts(network);
-  const std::vector<files::Layer>& layers = parts.at(names.front())->layers;
-  if (layers.size() < 2 || names.front().is_rho()) return;
+  if (parts.at(names.front())->layers.size() < 2 || names.front().is_rho()) return std::nullopt;
+  Prepared result;
   if (names.size() == 2) {
     const std::vector<check::Matrix> rho = check::stages(network, names.back());
     const std::size_t hidden = check::hidden_neurons(rho);
-    if (rho.size() < 2 || joint_t.size() < hidden) return;
-    form_ = rho_form(rho, {joint_t.end() - static_cast<std::ptrdiff_t>(hidden), joint_t.end()});
-    if (!form_) return;
+    if (rho.size() < 2 || joint_t.size() < hidden) return std::nullopt;
+    result.form = rho_form(rho, {joint_t.end() - static_cast<std::ptrdiff_t>(hidden), joint_t.end()});
+    if (!result.form) return std::nullopt;
   }
-  const Eigen::MatrixXd q = form_ ? form_->q : Eigen::MatrixXd();
-  f_ = check::local_function(network, names.front(), claim.block, claim.scale, exact(q));
-  chain_ = local_chain(reach_network(*parts.at(names.front())), q, f_.coordinates, f_.weight);
-  start_ = beginning(joint_t, chain_);
-  cover_radius_ = cover_radius(layers.front());
-  has_bound_ = true;
+  const Eigen::MatrixXd q = result.form ? result.form->q : Eigen::MatrixXd();
+  result.f = check::local_function(network, names.front(), claim.block, claim.scale, exact(q));
+  result.chain =
+      local_chain(reach_network(*parts.at(names.front())), q, result.f.coordinates, result.f.weight);
+  return result;
 }
 
-LocalBound LocalBounds::over(const check::LocalFunction& f, const LocalChain& chain,
-                             const std::vector<check::Sides>& boxes, const std::vector<double>& radius,
-                             BranchOptions options) const {
+/// Bounds the slope over the boxes. @param radius radius of the projective cover if `boxes` are one; else empty.
+LocalBound bound_over(const Prepared& from, const check::LocalFunction& f, const LocalChain& chain,
+                      const std::vector<check::Sides>& boxes, const std::vector<double>& radius,
+                      BranchOptions options, const std::vector<double>& joint_t) {
   LocalBound result;
-  options.start = start_;
+  options.start = beginning(joint_t, from.chain);
+  if (options.nodes == 0) options.nodes = usual_boxes(chain.neurons(), chain.inputs());
   LocalProof proof;
-  proof.form = form_;
+  proof.form = from.form;
   proof.radius = radius;
   prove(
       f, boxes, [&](const std::vector<Box>& roots) { return branch(chain, roots, options); },
@@ -158,16 +174,16 @@ LocalBound LocalBounds::over(const check::LocalFunction& f, const LocalChain& ch
   return result;
 }
 
-LocalBound LocalBounds::on(const Box& box, const BranchOptions& options) const {
-  if (!has_bound_) return {};
-  return over(f_, chain_, {{box.lower, box.upper}}, {}, options);
+LocalBound bound_on(const Prepared& from, const Box& box, const BranchOptions& options,
+                    const std::vector<double>& joint_t) {
+  return bound_over(from, from.f, from.chain, {{box.lower, box.upper}}, {}, options, joint_t);
 }
 
-LocalBound LocalBounds::everywhere(const BranchOptions& options) const {
-  if (!has_bound_) return {};
-  const std::vector<double> radius(static_cast<std::size_t>(chain_.inputs()), cover_radius_);
-  LocalBound result =
-      over(check::homogeneous(f_), homogeneous(chain_), check::projective_cover(radius), radius, options);
+LocalBound bound_everywhere(const Prepared& from, double radius, const BranchOptions& options,
+                            const std::vector<double>& joint_t) {
+  const std::vector<double> radii(static_cast<std::size_t>(from.chain.inputs()), radius);
+  LocalBound result = bound_over(from, check::homogeneous(from.f), homogeneous(from.chain),
+                                 check::projective_cover(radii), radii, options, joint_t);
   for (Eigen::VectorXd& centre : result.steep_centres) {  // (u, s) represents the point u / s
     const double s = centre(centre.size() - 1);
     centre = Eigen::VectorXd(centre.head(centre.size() - 1) / (s > 0 ? s : 1));
@@ -175,21 +191,17 @@ LocalBound LocalBounds::everywhere(const BranchOptions& options) const {
   return result;
 }
 
-LocalBound local_bound(const files::Network& network, const Claim& claim, const Domain& domain,
-                       const std::vector<double>& joint_t, const BranchOptions& given) {
+/// Bounds a set function with a stated number of neighbours.
+LocalBound bound_among(const files::Network& network, const Claim& claim, const Domain& domain,
+                       const std::vector<double>& joint_t, BranchOptions options) {
   const std::vector<files::FunctionId> names = claim.function.parts();
-  if (claim.neighbours.empty()) {
-    const LocalBounds bounds(network, claim, joint_t);
-    return claim.domain == "global" ? bounds.everywhere(given) : bounds.on(domain.at(names.front()), given);
-  }
-  LocalBound result;
   const files::Parts parts = files::parts(network);
+  LocalBound result;
   if (parts.at(names.front())->layers.size() < 2 || names.front().is_rho() ||
       parts.at(names.back())->layers.size() < 2)
     return result;
-  BranchOptions options = given;
   LocalProof proof;
-  Others others = others_of(network, claim, domain, options.nodes);
+  Others others = others_of(network, claim, domain, options.nodes > 0 ? options.nodes : kRangeNodes);
   proof.others = std::move(others.ranges);
   const check::LocalFunction f =
       check::coupled_function(network, claim.function, claim.block, claim.scale, others.least, others.most);
@@ -199,11 +211,27 @@ LocalBound local_bound(const files::Network& network, const Claim& claim, const 
   whole.push_back(reach_network(*parts.at(names.back())).back());
   const SetChain set = set_chain(local_chain(whole, {}, f.coordinates, f.weight), f.hidden.size());
   options.start = beginning(joint_t, set.whole);
+  if (options.nodes == 0) options.nodes = usual_boxes(set.whole.neurons(), set.whole.inputs());
   const Box& box = domain.at(names.front());
   prove(
       f, {{box.lower, box.upper}}, [&](const std::vector<Box>& roots) { return branch(set, roots, options); },
       std::move(proof), result);
   return result;
+}
+
+}  // namespace
+
+LocalBound local_bound(const files::Network& network, const Claim& claim, const Domain& domain,
+                       const std::vector<double>& joint_t, const BranchOptions& options) {
+  if (!claim.neighbours.empty()) return bound_among(network, claim, domain, joint_t, options);
+  const files::FunctionId part = claim.function.input_part();
+  if (!files::is_relu(network, claim.function))
+    return claim.domain == "global" ? LocalBound() : slope_parts(network, claim, domain.at(part), options);
+  const std::optional<Prepared> from = prepared(network, claim, joint_t);
+  if (!from) return {};
+  if (claim.domain != "global") return bound_on(*from, domain.at(part), options, joint_t);
+  return bound_everywhere(*from, cover_radius(files::parts(network).at(part)->layers.front()), options,
+                          joint_t);
 }
 
 LocalBound local_bound(const files::Network& network, const Claim& claim, const Box& box,

@@ -46,34 +46,11 @@ struct LocalBound {
 /// @param domain by part; for all kinds if the claim has a number of neighbours.
 /// @param joint_t multipliers of the claim's global bound (UpperProof::t). Empty: none; then there is no proof for a
 ///   set function with any number of neighbours.
+/// Of functions with other activations than ReLU, on a box only: see slope_parts().
+/// @param options `nodes` 0: as many as take seconds.
 /// @returns no proof for functions without hidden layers and for rho alone.
 LocalBound local_bound(const files::Network& network, const Claim& claim, const Domain& domain,
                        const std::vector<double>& joint_t, const BranchOptions& options);
-
-/// local_bound() on many boxes for a claim without a number of neighbours. The shared data are computed once.
-class LocalBounds {
- public:
-  /// @param network not owned. @param claim may be a claim for all inputs.
-  LocalBounds(const files::Network& network, const Claim& claim, const std::vector<double>& joint_t);
-  /// Bounds the claim on a box.
-  /// @param box range of the moving input after the clamp.
-  LocalBound on(const Box& box, const BranchOptions& options) const;
-  /// Bounds the claim for all inputs by a projective cover.
-  LocalBound everywhere(const BranchOptions& options) const;
-
- private:
-  /// @param radius radius of the projective cover if `boxes` are one; else empty.
-  LocalBound over(const check::LocalFunction& f, const LocalChain& chain,
-                  const std::vector<check::Sides>& boxes, const std::vector<double>& radius,
-                  BranchOptions options) const;
-
-  bool has_bound_ = false;
-  std::optional<RhoForm> form_;
-  check::LocalFunction f_;
-  LocalChain chain_;
-  std::vector<double> start_;
-  double cover_radius_ = 1;
-};
 
 /// The same for a claim without a number of neighbours; `box` is the range of the moving input.
 LocalBound local_bound(const files::Network& network, const Claim& claim, const Box& box,

@@ -54,7 +54,7 @@ VectorXd interior(const LocalChain& chain, const NodeInequality& inequality) {
 }  // namespace
 
 VectorXd root_multipliers(const LocalChain& chain, const NodeInequality& inequality,
-                          const std::vector<double>& start) {
+                          const std::vector<double>& start, const Stop& stop) {
   if (!start.empty()) {
     const VectorXd t = given_multipliers(chain, start)(inequality.undecided());
     DescentOptions descent;
@@ -64,9 +64,11 @@ VectorXd root_multipliers(const LocalChain& chain, const NodeInequality& inequal
   const VectorXd inside = interior(chain, inequality);
   if (inside.size() == 0) return VectorXd::Zero(inequality.neurons());  // proves nothing
   InteriorPointOptions options;
+  options.stop = stop;
   options.relative_gap = kRootGap;
   options.infeasibility = std::numeric_limits<double>::infinity();  // every iterate is a bound
   const InteriorPointResult found = minimise(inequality, inside, options);
+  if (found.points.empty()) return VectorXd::Zero(inequality.neurons());
   return found.points.back().tail(inequality.neurons());
 }
 

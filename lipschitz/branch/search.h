@@ -75,7 +75,7 @@ class BranchSearch {
   struct Step {
     Part part;
     std::vector<Part> halves;
-    bool is_stuck = false;  ///< there is nothing left to halve
+    bool is_stuck = false;  ///< no side can be halved
   };
 
   const Eigen::MatrixXd& gram_of(const Part& part) const {
@@ -90,7 +90,7 @@ class BranchSearch {
   std::vector<Part> roots();
   /// Removes the dominating parts from the queue for the next steps. Their number depends only on the queue.
   std::vector<Part> next_batch(std::priority_queue<Part>& queue) const;
-  /// Performs one step on a part; returns it unchanged if the search is to stop.
+  /// Performs one step on a part; nothing if the search is over.
   Step advanced(Part part) const;
   /// Improves the part's form or multipliers if due. Returns whether it did; the part is then queued by its new rho.
   bool sharpen(Part& part) const;
@@ -98,13 +98,14 @@ class BranchSearch {
   void commit(Step step, std::priority_queue<Part>& queue);
   /// Moves the new decisions and the new form of a part to its node.
   void record(Part& part);
-  /// Counts a new part and evaluates the slope at its centre.
+  /// Counts a part that is examined, for the first time or again.
   void count(const Part& part);
   /// Returns why the search stops now; kNothingRun if it continues.
   BranchStop why_stop(const std::priority_queue<Part>& queue) const;
   /// Returns the share of the time limit that has been used; 0 without a limit.
   double share_of_time() const;
   bool is_cancelled() const { return options_.cancelled != nullptr && *options_.cancelled; }
+  bool is_over() const { return is_cancelled() || share_of_time() >= 1; }
   /// Returns the bound below which the search need not continue: the attained slope plus the tolerance.
   double enough() const;
   /// Returns the result of a search that stopped; empties the queue.

@@ -42,7 +42,7 @@ void BranchSearch::renew_form(Part& part) const {
   const Index m = undecided_in(part.states);
   VectorXd t;
   if (old == nullptr) {
-    t = root_multipliers(set_->whole, joint, options_.start);
+    t = root_multipliers(set_->whole, joint, options_.start, Stop(options_.cancelled));
   } else {
     VectorXd all(set_->whole.neurons());
     all << part.multipliers->t, VectorXd::Zero(set_->last.rows()), old->t;

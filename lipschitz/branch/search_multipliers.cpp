@@ -101,7 +101,7 @@ void BranchSearch::solve(Part& part, const DescentOptions& descent, std::size_t 
   std::vector<NeuronPair> pairs;
   VectorXd t;
   if (!part.multipliers) {
-    t = root_multipliers(chain_, inequality, options_.start);
+    t = root_multipliers(chain_, inequality, options_.start, Stop(options_.cancelled));
   } else {
     pairs = chosen_pairs(part, most_pairs, t);
     for (const NeuronPair& pair : pairs) inequality.add(pair);
@@ -109,7 +109,7 @@ void BranchSearch::solve(Part& part, const DescentOptions& descent, std::size_t 
     if (!std::isfinite(inequality.least_rho(t)) && !pairs.empty()) {
       pairs.clear();
       inequality = NodeInequality(chain_, part.states, gram_of(part));
-      t = root_multipliers(chain_, inequality, options_.start);
+      t = root_multipliers(chain_, inequality, options_.start, Stop(options_.cancelled));
     }
   }
   part.undecided_then = part.undecided;

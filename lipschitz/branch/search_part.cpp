@@ -31,7 +31,7 @@ BranchSearch::Part BranchSearch::part(const Box& box, const Part* parent) const 
   std::vector<MatrixXd> slopes;
   std::vector<LinearForms> forms;
   if (parent != nullptr) part.around = parent->reach;
-  const bool has_pairs = parent != nullptr && !parent->multipliers->pairs.empty();
+  const bool has_pairs = parent != nullptr && parent->multipliers && !parent->multipliers->pairs.empty();
   part.reach = std::make_shared<const Reach>(chain_.hidden, box, part.around.get(), &slopes,
                                              has_pairs ? &forms : nullptr,
                                              options_.better_slopes ? &part.decided : nullptr);
@@ -46,8 +46,8 @@ BranchSearch::Part BranchSearch::part(const Box& box, const Part* parent) const 
     part.in_vain = part.states == parent->states ? parent->in_vain + 1 : 0;
     std::vector<std::size_t> pairs;
     if (has_pairs) pairs = still_shown(part, NeuronForms(forms, box));
-    const bool all_pairs = pairs.size() == part.multipliers->pairs.size();
-    if (part.states != parent->states || !all_pairs) {
+    const bool all_pairs = !has_pairs || pairs.size() == part.multipliers->pairs.size();
+    if (part.multipliers && (part.states != parent->states || !all_pairs)) {
       NodeInequality inequality(chain_, part.states, gram_of(part));
       const double rho = inequality.least_rho(inherited(part, pairs, inequality));
       const bool is_worse = !all_pairs && !(rho <= part.rho);  // because a pair is missing

@@ -247,7 +247,6 @@ void CertificateChecker::check_activations(const Json& bound, const std::vector<
       if (activation == files::Activation::kRelu) continue;
       const files::ActivationFunction& function = files::function_of(activation);
       const std::string with = " of a network with " + function.words;
-      require(bound["upper_method"] != "branch", where + ": a bound by parts of a box" + with);
       require(
           !function.sorts() || bound["upper_method"] == "product" || bound["upper_method"] == "local_product",
           where + ": a bound from slopes of single numbers" + with);

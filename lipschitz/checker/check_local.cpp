@@ -4,6 +4,7 @@
 
 #include "lipschitz/checker/certificate_checker.h"
 #include "lipschitz/checker/projective_cover.h"
+#include "lipschitz/checker/slope_tree.h"
 #include "lipschitz/checker/tree_proof.h"
 #include "nn/weights/function_id.h"
 
@@ -75,6 +76,19 @@ void CertificateChecker::check_local(const Json& bound, double upper, const std:
   require(!moved.is_rho(), where + ": rho has no box");
   const double rho = files::parse_hex_float(proof["rho"].get<std::string>());
   require(rho > 0 && Dyadic(upper) * upper >= Dyadic(rho), where + ": claims less than sqrt(rho)");
+  TreeProof tree{proof["tree"].get<std::string>(), {}, {}, {}};
+  require(proof["multipliers"].is_array(), where + ": multipliers is not an array");
+  for (const Json& words : proof["multipliers"]) tree.multipliers.push_back(hex_floats_in(words));
+  if (!files::is_relu(network_, function)) {
+    require(!is_coupled && !is_global && proof["form"].is_null() && !proof.contains("conflicts"),
+            where + ": a bound by parts for other activations than ReLU is for a box, without a form");
+    Sides box;
+    read_box(moved, box.lower, box.upper, where);
+    const TreeVerdict verdict = check_slope_tree(network_, function, block, scale, box, rho, tree);
+    require(verdict.holds, where + ": " + verdict.reason);
+    ++on_boxes_;
+    return;
+  }
   LocalFunction f;
   if (is_coupled) {
     const Neighbours neighbours = neighbours_of(bound, where);
@@ -100,9 +114,6 @@ void CertificateChecker::check_local(const Json& bound, double upper, const std:
   } else {
     read_box(moved, boxes[0].lower, boxes[0].upper, where);
   }
-  TreeProof tree{proof["tree"].get<std::string>(), {}, {}, {}};
-  require(proof["multipliers"].is_array(), where + ": multipliers is not an array");
-  for (const Json& words : proof["multipliers"]) tree.multipliers.push_back(hex_floats_in(words));
   if (proof.contains("conflicts")) {
     require(proof["conflicts"].is_array(), where + ": conflicts is not an array");
     for (const Json& words : proof["conflicts"]) tree.conflicts.push_back(conflicts_in(words));

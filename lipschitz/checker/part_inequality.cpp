@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <stdexcept>
 
 #include "lipschitz/checker/products.h"
 #include "nn/base/doubles.h"
@@ -29,15 +28,15 @@ Row absolute(const Row& values) {
 
 }  // namespace
 
-Rounded rounded(const Matrix& exact) {
+std::optional<Rounded> rounded(const Matrix& exact) {
   Rounded result(exact.rows, exact.cols);
   for (std::size_t i = 0; i < exact.entries.size(); ++i) {
     const Dyadic& x = exact.entries[i];
     signed long exponent = 0;
     const double fraction = mpz_get_d_2exp(&exponent, x.mantissa.get_mpz_t());  // truncates to 53 bits
     const long total = exponent + x.exponent;
-    if (std::abs(total) > 900)
-      throw std::runtime_error("the output's Gram matrix leaves the range of double");
+    if (x.sign() == 0) continue;
+    if (std::abs(total) > 900) return std::nullopt;
     result.value[i] = std::ldexp(fraction, static_cast<int>(total));
     result.radius[i] = 2 * kUnit * std::abs(result.value[i]) + 0x1p-900;
   }

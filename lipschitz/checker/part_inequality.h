@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "lipschitz/checker/tree_proof.h"
@@ -20,9 +21,8 @@ struct Rounded {
   const double* radius_at(int i) const { return &radius[static_cast<std::size_t>(i) * cols]; }
 };
 
-/// Rounds a matrix to double and bounds the rounding errors.
-/// @throws std::runtime_error if an entry leaves the range of double.
-Rounded rounded(const Matrix& exact);
+/// Rounds a matrix to double and bounds the rounding errors. Nothing if an entry leaves the range of double.
+std::optional<Rounded> rounded(const Matrix& exact);
 
 /// Returns W' Q W, with bounds on the round-off errors, for the lower triangle q of a form; W is exactly as stored.
 Rounded gram_of_form(const std::vector<double>& q, const HiddenLayer& last);

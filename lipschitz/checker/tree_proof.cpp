@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "lipschitz/checker/part_inequality.h"
@@ -54,6 +55,7 @@ class FormChecker {
     std::size_t neurons = 0;
     for (const HiddenLayer& layer : rho_.hidden) neurons += static_cast<std::size_t>(layer.outputs);
     if (!forms_.empty() && inputs == 0) return "there are forms, but no rho";
+    if (!gram_) return "rho's Gram matrix leaves the range of double";
     for (const Form& form : forms_) {
       if (form.q.size() != inputs * (inputs + 1) / 2 || form.t.size() != neurons)
         return "a form has another size";
@@ -94,7 +96,7 @@ class FormChecker {
     Row q(inputs * inputs);
     for (std::size_t i = 0, at = 0; i < inputs; ++i)
       for (std::size_t j = 0; j <= i; ++j, ++at) q[i * inputs + j] = q[j * inputs + i] = form.q[at];
-    if (!PartInequality(rho_, gram_, bounds, q, form.t, {}).is_positive_definite())
+    if (!PartInequality(rho_, *gram_, bounds, q, form.t, {}).is_positive_definite())
       return "its multipliers do not show the form there";
     part.gram = std::make_shared<Rounded>(gram_of_form(form.q, layers_[first_ - 1]));
     return "";
@@ -105,7 +107,7 @@ class FormChecker {
   std::vector<HiddenLayer> layers_;  ///< layers of phi and rho
   std::size_t first_;                ///< index of rho's first layer
   LocalFunction rho_;                ///< rho as a function of v
-  Rounded gram_ = Rounded(0, 0);
+  std::optional<Rounded> gram_ = Rounded(0, 0);
 };
 
 /// Returns layer and output of the n-th neuron.
@@ -258,15 +260,16 @@ TreeVerdict check_tree(const LocalFunction& f, const std::vector<Sides>& boxes, 
     if (!is_usable(box, f.hidden)) return {false, "the box is empty, too large or of another size", 0};
   const FormChecker forms(f, proof.forms);
   if (!forms.fault().empty()) return {false, forms.fault(), 0};
-  const Rounded gram = rounded(f.gram);
+  const std::optional<Rounded> gram = rounded(f.gram);
+  if (!gram) return {false, "the output's Gram matrix leaves the range of double", 0};
   Row square(f.coordinates.size() * f.coordinates.size());
   for (std::size_t i = 0; i < f.coordinates.size(); ++i) square[i * (f.coordinates.size() + 1)] = rho;
   const auto leaf = [&](std::size_t index, const Part& part) -> std::string {
     if (index >= proof.multipliers.size()) return "there are no such multipliers";
-    if (part.gram == nullptr && gram.rows == 0) return "there is no form yet";
+    if (part.gram == nullptr && gram->rows == 0) return "there is no form yet";
     std::vector<const Conflict*> conflicts;
     if (!proof.conflicts.empty()) conflicts = shown(f.hidden, part, proof.conflicts[index]);
-    if (!PartInequality(f, part.gram != nullptr ? *part.gram : gram, *part.bounds, square,
+    if (!PartInequality(f, part.gram != nullptr ? *part.gram : *gram, *part.bounds, square,
                         proof.multipliers[index], conflicts)
              .is_positive_definite())
       return "its multipliers do not show the bound there";

@@ -100,11 +100,8 @@ SlopeWitness search_scaled(const SlopeFunction& f, const Claim& claim, SlopeSear
     search.box->lower[k] /= claim.scale[k];
     search.box->upper[k] /= claim.scale[k];
   }
-  const auto moved_size = static_cast<Eigen::Index>(claim.scale.size());
-  for (std::vector<Eigen::VectorXd>* points : {&search.starts, &search.places})
-    for (Eigen::VectorXd& point : *points)
-      for (Eigen::Index k = 0; k < std::min(point.size(), moved_size); ++k)
-        point(k) /= claim.scale[static_cast<std::size_t>(k)];
+  for (Eigen::VectorXd& point : search.starts)
+    for (Eigen::Index k = 0; k < point.size(); ++k) point(k) /= claim.scale[static_cast<std::size_t>(k)];
   SlopeWitness found = search_slope(scaled, search);
   const auto back = [&](std::vector<float>& x) {
     for (std::size_t k = 0; k < x.size(); ++k) {
@@ -172,7 +169,6 @@ FoundSlope sampled_lower_bound(const Network& network, const Claim& claim, const
   SlopeEstimateOptions search;
   search.seed = options.seed;
   search.domain = boxes;
-  search.moved = options.moved;
   search.starts = rounds;
   search.stop = Stop(options.cancelled, options.seconds);
   const SteepPlace place = steep_place(network, claim, search);
@@ -181,9 +177,7 @@ FoundSlope sampled_lower_bound(const Network& network, const Claim& claim, const
   found.interrupted = place.interrupted;
   if (is_silent(network, claim, place.other_networks)) return found;
   const files::FunctionId moving = claim.function.input_part();
-  Domain box_of_moving = boxes;
-  if (options.moved) box_of_moving[moving] = *options.moved;
-  const FloatPoints points(boxes), moving_points(box_of_moving);
+  const FloatPoints points(boxes);
   SlopePoints pair;
   for (std::size_t j = 0; j < place.others.size(); ++j) {
     std::optional<std::vector<float>> other = points.nearest(place.other_networks[j], place.others[j]);
@@ -192,7 +186,7 @@ FoundSlope sampled_lower_bound(const Network& network, const Claim& claim, const
   }
   found.other_networks = place.other_networks;
   try_pairs(slope_function(network, claim.function, place.other_networks), moving, place, claim,
-            files::block_coordinates(network, claim.function, claim.block), moving_points, pair, found);
+            files::block_coordinates(network, claim.function, claim.block), points, pair, found);
   return found;
 }
 
@@ -227,11 +221,9 @@ FoundSlope lower_bound(const Network& network, const Claim& claim, const Domain&
     search.seconds = options.seconds / cases;
     search.cancelled = options.cancelled;
     search.starts = options.starts;
-    search.places = options.places;
-    search.regions = options.regions;
     if (claim.block != "all") search.block = files::block_coordinates(network, claim.function, claim.block);
     if (claim.domain == "box") {
-      search.box = options.moved ? *options.moved : domain.at(names[0]);
+      search.box = domain.at(names[0]);
       for (const files::FunctionId& name : others) search.other_boxes.emplace_back(domain.at(name));
     }
     SlopeWitness found = claim.scale.empty() ? search_slope(f, search) : search_scaled(f, claim, search);

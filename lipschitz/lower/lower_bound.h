@@ -23,11 +23,7 @@ struct LowerBoundOptions {
   std::optional<int> rounds;
   double seconds = 0;  ///< limit per claim, see SlopeSearchOptions; 0: no limit
   const std::atomic<bool>* cancelled = nullptr;
-  std::optional<Box> moved;             ///< box of x and y that replaces the domain's box
   std::vector<Eigen::VectorXd> starts;  ///< see SlopeSearchOptions
-  /// See SlopeSearchOptions; others are in the order of FoundSlope::other_networks.
-  std::vector<Eigen::VectorXd> places;
-  int regions = kRegionsPerRound;  ///< see SlopeSearchOptions
 };
 
 /// Two points that prove a lower bound for a claim.

@@ -17,8 +17,6 @@ using Eigen::VectorXd;
 constexpr int kPatience = 100;
 /// A walk starts at the steepest of this many random points.
 constexpr int kStarts = 50;
-/// Additional starting points that use the other neighbours of a given place; the first one is the place itself.
-constexpr int kStartsAtPlace = 10;
 /// Maximum number of Newton steps towards the centre of a region, which need not be accurate.
 constexpr int kCentringSteps = 8;
 constexpr double kCentred = 0.3;  ///< Newton decrement below which a point counts as central
@@ -169,14 +167,6 @@ RegionWalk::Candidate RegionWalk::steepest_start(double nearest, double farthest
     if (!starts_.empty()) move_to(starts_.back(), z);
     const double slope = local_slope(network_, z).slope;
     if (slope > start.slope) start = {slope, std::move(z), true};
-  }
-  for (const VectorXd& place : places_) {
-    for (int i = 0; i < kStartsAtPlace; ++i) {
-      VectorXd z = random_point(nearest, farthest);
-      move_to(place, z, i == 0 ? 0 : network_.moved_variables());
-      const double slope = local_slope(network_, z).slope;
-      if (slope > start.slope) start = {slope, std::move(z), true};
-    }
   }
   return start;
 }

@@ -52,10 +52,6 @@ class RegionWalk {
   RegionWalk(const SearchNetwork& network, std::uint64_t seed,
              const std::vector<Eigen::VectorXd>& starts = {}, Where where = Where::kAmongKinks);
 
-  /// Sets additional starting points (x, x_1, ...) of the moved vector and of the first few others. A walk may also
-  /// start elsewhere with these others.
-  void set_places(std::vector<Eigen::VectorXd> places) { places_ = std::move(places); }
-
   /// Enters up to `regions` regions, continuing the current walk and starting new ones.
   /// @returns false if it was stopped before that.
   bool enter(int regions, const Stop& stop);
@@ -97,7 +93,6 @@ class RegionWalk {
   const SearchNetwork& network_;
   files::Random random_;
   std::vector<Eigen::VectorXd> starts_;  ///< unused starts, the next one last
-  std::vector<Eigen::VectorXd> places_;
   bool all_move_;  ///< every neuron depends on the moved vector, so that slopes behind a facet are exact
   std::optional<SearchNetwork> recession_;  ///< for walks far out: the chain without its biases
   int walks_ = 0;

@@ -30,14 +30,13 @@ std::optional<Box> box_in(const Domain& domain, const files::FunctionId& part) {
 
 }  // namespace
 
-SampledFunction::SampledFunction(const files::Network& network, const Claim& claim, Domain domain,
-                                 const std::optional<Box>& moved)
+SampledFunction::SampledFunction(const files::Network& network, const Claim& claim, Domain domain)
     : network_(network), domain_(std::move(domain)), half_step_(kHalfStep) {
   const std::vector<files::FunctionId> names = claim.function.parts();
   const files::Parts parts = files::parts(network);
   for (const auto& [name, weights] : parts) evaluators_.emplace(name, files::Evaluator<double>(*weights));
   first_ = names.front();
-  box_ = moved ? moved : box_in(domain_, first_);
+  box_ = box_in(domain_, first_);
   inputs_ = files::inputs(network, claim.function);
   maps_ = files::maps_to_invariants(network, claim.function);
   if (names.size() == 2) last_ = names.back();

@@ -24,9 +24,8 @@ class SampledFunction {
     Eigen::VectorXd direction;
   };
 
-  /// @param domain boxes after the clamp. @param moved replaces the domain's box for the moving input.
-  SampledFunction(const files::Network& network, const Claim& claim, Domain domain,
-                  const std::optional<Box>& moved = std::nullopt);
+  /// @param domain boxes after the clamp.
+  SampledFunction(const files::Network& network, const Claim& claim, Domain domain);
 
   Eigen::Index inputs() const { return inputs_; }
   /// Returns half the distance of the points of a difference quotient, in units of the scale.

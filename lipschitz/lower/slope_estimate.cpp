@@ -122,12 +122,7 @@ class SteepSearch {
 
 SteepPlace steep_place(const files::Network& network, const Claim& claim,
                        const SlopeEstimateOptions& options) {
-  std::optional<Box> moved = options.moved;
-  if (moved) {
-    const files::FunctionId part = claim.function.input_part();
-    moved = clamped(network, {{part, *moved}}).at(part);
-  }
-  SteepSearch search(SampledFunction(network, claim, clamped(network, options.domain), moved), options);
+  SteepSearch search(SampledFunction(network, claim, clamped(network, options.domain)), options);
   const double most = std::max(options.starts, 1);
   const int starts = static_cast<int>(std::clamp(search.affordable_starts(), 1.0, most));
   SteepPlace best;

@@ -18,8 +18,7 @@ namespace swarmcert::lipschitz {
 
 struct SlopeEstimateOptions {
   std::uint64_t seed = 1;
-  Domain domain;             ///< the claim's domain, by part; empty: all inputs
-  std::optional<Box> moved;  ///< box of the moving input that replaces the domain's box of its part
+  Domain domain;    ///< the claim's domain, by part; empty: all inputs
   int starts = 24;  ///< number of random points from which the slope is ascended; fewer for large networks
   Stop stop;        ///< a start that is cut short is discarded unless it is the first
 };

@@ -46,7 +46,6 @@ std::vector<std::optional<Box>> check(const SlopeFunction& f, const SlopeSearchO
   check_function(f);
   if (!is_relu(f)) refuse("an activation is not ReLU");
   if (options.rounds < 1) refuse("rounds = " + std::to_string(options.rounds) + " is below 1");
-  if (options.regions < 1) refuse("regions = " + std::to_string(options.regions) + " is below 1");
   if (!(options.seconds >= 0)) refuse("seconds = " + std::to_string(options.seconds) + " is negative");
   for (const VectorXd& start : options.starts) {
     if (start.size() != f.moved.network->inputs())
@@ -251,13 +250,12 @@ SlopeWitness search_slope(const SlopeFunction& f, const SlopeSearchOptions& opti
     try_region(network, VectorXd::Zero(network.variables()), witnesses);  // f is affine: a single region
   } else if (!network.block.empty()) {
     RegionWalk walk(network, options.seed, options.starts);
-    walk.set_places(options.places);
     RegionWalk far_out(network, options.seed + 1, {}, RegionWalk::Where::kFarOut);
     const bool is_open = std::count(network.boxed.begin(), network.boxed.end(), 0) == network.variables();
     std::vector<RegionWalk::Found> steepest;
     while (rounds_done < options.rounds) {
       interrupted =
-          !walk.enter(options.regions, stop) || (is_open && !far_out.enter(kFarRegionsPerRound, stop));
+          !walk.enter(kRegionsPerRound, stop) || (is_open && !far_out.enter(kFarRegionsPerRound, stop));
       if (!interrupted || rounds_done == 0) steepest = both(walk.steepest(), far_out.steepest());
       if (interrupted) break;
       ++rounds_done;

@@ -24,7 +24,7 @@ inline constexpr int kFarRegionsPerRound = 50;
 
 struct SlopeSearchOptions {
   std::uint64_t seed = 1;
-  int rounds = kDefaultSearchRounds;  ///< number of rounds of `regions` linear regions, at least 1
+  int rounds = kDefaultSearchRounds;  ///< number of rounds of kRegionsPerRound linear regions, at least 1
   /// Wall-clock limit; 0: no limit. A round that is cut short is discarded unless it is the first, so that the result
   /// depends only on the number of complete rounds.
   double seconds = 0;
@@ -38,10 +38,6 @@ struct SlopeSearchOptions {
 
   /// Points x at which the first walks start instead of at random points, [inputs of the moved network] each.
   std::vector<Eigen::VectorXd> starts;
-  /// Points (x, x_1, x_2, ...) of the moved vector and the first few others at which f was found steep on other boxes.
-  /// Walks also start there, after projection into the boxes.
-  std::vector<Eigen::VectorXd> places;
-  int regions = kRegionsPerRound;  ///< regions per round, at least 1; not counting those far from the kinks
 
   const std::atomic<bool>* cancelled = nullptr;  ///< ends the search early, like `seconds`
   /// Called after each round with the steepest slope so far.
@@ -63,8 +59,8 @@ struct SlopeWitness : SlopePoints {
 /// Runs on one thread. If seconds is not set, equal options give identical bits on the same machine.
 /// The slope is 0 if f does not depend on the block or if the boxes contain no two float32 points that differ in the
 /// block only; in the latter case x and y are empty.
-/// @throws std::invalid_argument if an activation is not ReLU, the sizes of the function do not match, rounds or
-///   regions are below 1, seconds is negative or NaN, a box has the wrong size, is empty, contains NaN or is unbounded
+/// @throws std::invalid_argument if an activation is not ReLU, the sizes of the function do not match, rounds is
+///   below 1, seconds is negative or NaN, a box has the wrong size, is empty, contains NaN or is unbounded
 ///   on one side only, other_boxes is missing or has the wrong size, a start has the wrong size, or block contains a
 ///   coordinate twice or one that does not exist.
 SlopeWitness search_slope(const SlopeFunction& f, const SlopeSearchOptions& options = {});

@@ -184,12 +184,12 @@ VectorXd unscaled(const ScaledBentChain& chain, VectorXd y) {
 
 }  // namespace
 
-SdpBound bent_bound(const check::BentChain& chain, const SdpOptions& options) {
-  SdpBound result;
+BentPoints bent_points(const check::BentChain& chain, const SdpOptions& options) {
+  BentPoints result;
   const LiveChain live(chain.stages);
   if (live.is_constant()) {
     result.stop = LipSdpStop::kGapReached;
-    result.proof = prove(chain, std::numeric_limits<double>::min(), live.multipliers(VectorXd()));
+    result.points = {{std::numeric_limits<double>::min(), live.multipliers(VectorXd())}};
     return result;
   }
   const ScaledBentChain scaled = scaled_to_one(chain, live);
@@ -200,13 +200,23 @@ SdpBound bent_bound(const check::BentChain& chain, const SdpOptions& options) {
   if (!found) return result;
   result.stop = found->stop;
   result.iterations = found->iterations;
-  for (auto point = found->points.rbegin(); point != found->points.rend() && !result.proof; ++point) {
-    const VectorXd y = unscaled(scaled, *point);
-    if (point == found->points.rbegin()) result.optimum = Estimate(std::sqrt(y(0)));
-    if (options.known && !(y(0) < options.known->value() * options.known->value())) break;
-    const std::vector<double> t = live.multipliers(y.tail(y.size() - 1));
+  for (const VectorXd& point : found->points) {
+    const VectorXd y = unscaled(scaled, point);
+    result.points.push_back({y(0), live.multipliers(y.tail(y.size() - 1))});
+  }
+  return result;
+}
+
+SdpBound bent_bound(const check::BentChain& chain, const SdpOptions& options) {
+  const BentPoints found = bent_points(chain, options);
+  SdpBound result;
+  result.stop = found.stop;
+  result.iterations = found.iterations;
+  if (!found.points.empty()) result.optimum = Estimate(std::sqrt(found.points.back().rho));
+  for (auto point = found.points.rbegin(); point != found.points.rend() && !result.proof; ++point) {
+    if (options.known && !(point->rho < options.known->value() * options.known->value())) break;
     for (const double slack : {0.0, 1e-9, 1e-8, 1e-7}) {
-      result.proof = prove(chain, y(0) * (1 + slack), t);
+      result.proof = prove(chain, point->rho * (1 + slack), point->t);
       if (result.proof) break;
     }
   }

@@ -22,4 +22,17 @@ inline constexpr int kMostBentVariables = 1400;
 /// @returns no proof if the slope ranges have another form and the chain has more than kMostBentVariables variables.
 SdpBound bent_bound(const check::BentChain& chain, const SdpOptions& options = {});
 
+/// (rho, t) of a program, in the units of the chain, in floating point: to be proved.
+struct BentPoint {
+  double rho = 0;
+  std::vector<double> t;  ///< one multiplier per hidden neuron
+};
+/// The points that the solver of bent_bound() passes, best last, and how it ended.
+struct BentPoints {
+  std::vector<BentPoint> points;
+  LipSdpStop stop = LipSdpStop::kNothingRun;
+  int iterations = 0;
+};
+BentPoints bent_points(const check::BentChain& chain, const SdpOptions& options = {});
+
 }  // namespace swarmcert::lipschitz

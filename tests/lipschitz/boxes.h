@@ -34,8 +34,9 @@ inline check::Intervals intervals(const lipschitz::Box& box) {
   return {{box.lower.begin(), box.lower.end()}, {box.upper.begin(), box.upper.end()}};
 }
 
+/// By the slopes over the whole box, unless another method is given.
 inline lipschitz::CertifyOptions on_box(const Domain& domain,
-                                        lipschitz::UpperMethod method = lipschitz::UpperMethod::kAuto) {
+                                        lipschitz::UpperMethod method = lipschitz::UpperMethod::kSdp) {
   lipschitz::CertifyOptions options;
   options.domain = domain;
   options.method = method;

@@ -62,26 +62,6 @@ double slope_in(const files::Evaluator<double>& f, const Box& box, std::mt19937&
 
 const Box kBox{{-1, -0.5, 0.2}, {1, 0.5, 0.9}};
 
-TEST(LocalBounds, OfOneBoxAfterTheOtherAreThoseOfEachAloneAndAboveItsSlopes) {
-  std::mt19937 generator(77);
-  const files::Network network = plain(tests::random_network({3, 10, 10, 2}, generator));
-  const SdpBound global = tests::sdp_bound_of(network, "network");
-  ASSERT_TRUE(global.proof.has_value());
-  const LocalBounds bounds(network, claim_of("network"), global.proof->t);
-  const files::Evaluator<double> f(*network.plain);
-  for (const Box& box : {kBox, Box{{0, 0, 0}, {0.5, 0.25, 0.125}}}) {
-    BranchOptions options = boxes(40);
-    EXPECT_EQ(bounds.on(box, options).upper.value(),
-              local_bound(network, claim_of("network"), box, global.proof->t, options).upper.value());
-    options.boxes_only = true;
-    const LocalBound quick = bounds.on(box, options);
-    ASSERT_TRUE(quick.proof.has_value());
-    EXPECT_LE(quick.upper.value(), global.proof->upper.value());
-    EXPECT_EQ(quick.outlook.neurons, 0);
-    for (int i = 0; i < 1000; ++i) EXPECT_LE(slope_in(f, box, generator), quick.upper.value() * (1 + 1e-9));
-  }
-}
-
 TEST(LocalBound, IsAboveEverySampledSlopeAndNoMoreThanTheGlobalBound) {
   std::mt19937 generator(3);
   double closest = 0;

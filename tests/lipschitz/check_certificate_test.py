@@ -563,7 +563,8 @@ def run():
         except second.BadInput as refusal:
             assert "others are stated already" in str(refusal), refusal
         nets += [([smooth_net], ["--blocks=position", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"]),
-                 ([smooth_net], ["--blocks=position", "--neighbours", "2", "--domain", str(folder / "part.toml")])]
+                 ([smooth_net], ["--blocks=position", "--neighbours", "2", "--method", "sdp", "--domain",
+                                 str(folder / "part.toml")])]
         beside_net = str(beside(folder))
         nets += [([beside_net], ["--method", "product"])]
         invariant_net = str(of_invariants(folder, generator))
@@ -573,19 +574,19 @@ def run():
                  ([silent_net], ["--domain", str(folder / "box.toml"), "--neighbours", "2"])]
         nets += [(net, []) for net in smooth_models(folder, generator)]
         nets += [(net, options) for net in skip_models(folder, generator)
-                 for options in ([], ["--domain", str(folder / "cube.toml")])]
+                 for options in ([], ["--method", "sdp", "--domain", str(folder / "cube.toml")])]
         nets += [([str(folder / "around.onnx")], ["--method", "product"])]
         nets += [([str(tiny)], ["--activation", ops])
                  for ops in ("silu", "gelu", "sigmoid", "tanh,relu", "relu,silu,sigmoid", "elu,relu,relu")]
         (folder / "plane.toml").write_text('schema = "swarmcert/box/1"\nlower = [-0.5, 0.25]\nupper = [1, 0.75]\n')
-        nets += [([str(tiny)], ["--activation", ops, "--domain", str(folder / "plane.toml"), *options])
+        nets += [([str(tiny)], ["--activation", ops, "--method", "sdp", "--domain", str(folder / "plane.toml"), *options])
                  for ops, *options in (("tanh",), ("sigmoid", "--method", "product"), ("softplus",), ("elu",),
                                        ("selu",), ("silu",), ("gelu",), ("tanh,relu",), ("relu,silu,sigmoid",),
                                        ("selu,gelu,relu", "--method", "product"))]
         nets += [([str(square), *order], ["--activation", "groupsort:3", "--domain", str(folder / "cube.toml")])]
         nets += [([str(tiny), "--activation", "leaky_relu:0.25,hardtanh"], [])]
         for name, make, options in (("image", onnx_models.image_model, []),
-                                    ("series", onnx_models.series_model, ["--domain", str(folder / "cube.toml")])):
+                                    ("series", onnx_models.series_model, ["--method", "sdp", "--domain", str(folder / "cube.toml")])):
             (folder / f"{name}.onnx").write_bytes(make(random.Random(37)))
             nets.append(([str(folder / f"{name}.onnx")], options))
         (folder / "cube.toml").write_text('schema = "swarmcert/box/1"\nlower = [-1, -1, 0]\nupper = [1, 0, 0.5]\n')

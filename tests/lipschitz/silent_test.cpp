@@ -6,7 +6,6 @@
 #include "lipschitz/checker/check.h"
 #include "lipschitz/checker/witness.h"
 #include "lipschitz/networks.h"
-#include "lipschitz/slope_map.h"
 #include "lipschitz/values/range.h"
 #include "nn/base/content_hash.h"
 #include "nn/base/random.h"
@@ -264,27 +263,6 @@ TEST(Silent, UpperBoundsAndLawsStayOnBoxesAsWellAndWitnessesAreAmongOtherNeighbo
   EXPECT_THROW(lipschitz::slope_function(net, "set:large:small", {"phi:small"}), std::invalid_argument);
   EXPECT_NO_THROW(lipschitz::slope_function(net, "set:small:small", {"phi:small"}));
   EXPECT_NO_THROW(lipschitz::slope_function(net, "set:small:large", {}));
-}
-
-TEST(Silent, CellsOfAMapAreWitnessedAmongOtherNeighbours) {
-  const Network net = two_kinds({{"small"}});
-  lipschitz::CertifyOptions options = one_round();
-  options.domain = cubes(net);
-  lipschitz::SlopeMapOptions map;
-  map.domain = options.domain;
-  map.coordinates = {0, 2};
-  map.cells = {2, 2};
-  map.jobs = 1;
-  int witnesses = 0;
-  for (const lipschitz::SlopeMap& one : lipschitz::slope_maps(net, lipschitz::certify(net, options), map)) {
-    for (const lipschitz::SlopeCell& cell : one.cells) {
-      if (!cell.lower.witness) continue;
-      EXPECT_LE(cell.lower.witness->slope.value(), cell.upper.value());
-      EXPECT_EQ(one.function == "set:small:small" && cell.lower.other_networks.empty(), false);
-      ++witnesses;
-    }
-  }
-  EXPECT_GE(witnesses, 12);
 }
 
 /// Statements about rho of a sum are false if the function is 0 instead.

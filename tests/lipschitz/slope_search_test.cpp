@@ -59,28 +59,6 @@ void expect_within(const std::vector<float>& x, const Box& box) {
   }
 }
 
-TEST(SlopeSearch, StartsAtPlacesAndWithTheirOtherNeighbours) {
-  // f(x) = rho(x + x_1), rho(s) = s + 100 relu(s - 1.999): steep only if both are near 1.
-  const files::Weights phi = chain_of({tests::layer(1, 1, {1})});
-  files::Weights rho = chain_of({tests::layer(3, 1, {1, -1, 1}), tests::layer(1, 3, {1, -1, 100})});
-  rho.layers[0].biases[2] = -1.999;
-  const SlopeFunction f{{&phi, nullptr}, {{&phi, nullptr}}, &rho};
-  SlopeSearchOptions options;
-  options.rounds = 1;
-  options.regions = 1;
-  options.box = cube(1, -1, 1);
-  options.other_boxes = {cube(1, -1, 1)};
-  EXPECT_NEAR(search_slope(f, options).slope.value(), 1, 1e-6);
-  options.places = {Eigen::Vector2d(0.9999, 0.9999)};
-  const SlopeWitness found = search_slope(f, options);
-  EXPECT_NEAR(found.slope.value(), 101, 1e-3);
-  EXPECT_TRUE(proves_its_slope(f, found));
-  options.box = cube(1, -1, 0.9995);  // the place is projected into the box
-  EXPECT_NEAR(search_slope(f, options).slope.value(), 101, 1e-2);
-  options.regions = 0;
-  EXPECT_THROW(search_slope(f, options), std::invalid_argument);
-}
-
 TEST(SlopeSearch, StaysBelowTheProductOfSpectralNorms) {
   std::mt19937 generator(7);
   const std::vector<std::vector<int>> shapes = {

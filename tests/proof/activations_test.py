@@ -200,7 +200,7 @@ def refuses_what_only_relu_has(folder, generator):
     on_box = certify(net, "--domain", box, "--range", "--method", "sdp")
     assert on_box["values"]
     refused(with_activations(on_box, {"network": "softplus"}), net, "the values leave the bounds")
-    local = certify(net, "--activation", "tanh", "--domain", box)
+    local = certify(net, "--activation", "tanh", "--domain", box, "--method", "sdp")
     assert local["bounds"][0]["upper_method"] == "local_sdp" and check(local, net).returncode == 0
     local["bounds"][0]["domain"] = "global"
     refused(local, net, "slopes on a box of a bound without one")
@@ -492,14 +492,14 @@ def inequalities_of_slopes_on_a_box_are_decided_alike(folder, generator):
     every = "tanh", "softplus", "elu,sigmoid", "selu,silu", "relu,tanh", "gelu"
     for ops in every:
         box.write_text('schema = "swarmcert/box/1"\nlower = [1.9, -1.1, 1.4]\nupper = [2.1, -0.9, 1.5]\n')
-        certificate = certify(net, "--activation", ops, "--domain", box, rounds=1)
+        certificate = certify(net, "--activation", ops, "--domain", box, "--method", "sdp", rounds=1)
         assert certificate["bounds"][0]["upper_method"] == "local_sdp" and decided(certificate, net) == 0, ops
         for changed in changed_inequalities(certificate, generator):
             codes[decided(changed, net)] += 1
     assert codes[1] > 4 * len(every) and codes[0] and set(codes) <= {0, 1}, codes
     net.write_bytes(safetensors(layers([3, 34, 34, 2], generator)))
     for ops in "silu", "tanh,gelu":
-        certificate = certify(net, "--activation", ops, "--domain", box)
+        certificate = certify(net, "--activation", ops, "--domain", box, "--method", "sdp")
         bound = certificate["bounds"][0]
         assert bound["upper_method"] == "local_sdp" and bound["proof"]["factor"] is None
         assert decided(certificate, net) == 0, ops
@@ -511,7 +511,7 @@ def inequalities_of_slopes_on_a_box_are_decided_alike(folder, generator):
     net.write_bytes(safetensors(network))
     box.write_text('schema = "swarmcert/box/1"\nlower = [-9, -9, -9]\nupper = [9, 9, 9]\n')
     undecided = certify(net, "--activation", "relu", "--method", "sdp")
-    undecided["box"] = certify(net, "--activation", "tanh", "--domain", box)["box"]
+    undecided["box"] = certify(net, "--activation", "tanh", "--domain", box, "--method", "sdp")["box"]
     undecided["bounds"][0].update(domain="box", upper_method="local_sdp")
     assert decided(undecided, net) == 0
     undecided["box"]["network"]["upper"] = [(-8.5).hex()] * 3  # some neuron is decided: another matrix
@@ -522,7 +522,7 @@ def inequalities_of_slopes_on_a_box_are_decided_alike(folder, generator):
     box.write_text('schema = "swarmcert/box/1"\nlower = [-0.5, -0.5, -0.5, -0.5, -0.5, -0.5]\n'
                    'upper = [-0.25, -0.25, 0.25, 0.5, -0.25, -0.25]\n')
     certificate = certify(net, "--domain", box, "--neighbours", "large=2,small=1", "--blocks=velocity", "--scale",
-                          "1,1,1,2,2,2", rounds=1)
+                          "1,1,1,2,2,2", "--method", "sdp", rounds=1)
     methods = Counter(bound["upper_method"] for bound in certificate["bounds"])
     assert methods["local_sdp"] > 2 and certificate["laws"] and decided(certificate, net) == 0, methods
     with_upper(certificate["laws"][0], 0.999 * certificate["laws"][0]["upper"])

@@ -98,7 +98,7 @@ def kinds(folder, generator):
     clamped.write_text(text.replace('[phi.ground]\nweights = "ground.safetensors"\n', ""))
     float32 = ["--as", "float32"]
     pair = ["--phi", folder / "small.safetensors", "--rho", folder / "rho.safetensors"]
-    parts = ["--method", "branch", "--cuts", "20"]
+    parts, whole, few = ["--method", "branch", "--cuts", "20"], ["--method", "sdp"], ["--nodes", "7"]
     skips, cubed = [common.with_skips(folder, generator)], ["--domain", folder / "cube.toml"]
     invariants = [common.of_invariants(folder, generator)]
     residual, around, _, with_relu = common.skip_models(folder, generator)
@@ -136,23 +136,26 @@ def kinds(folder, generator):
         ("activations of parts, values on a box", [common.smooth(folder)],
          ["--neighbours", "small=2", "--domain", folder / "part.toml", "--range", "--method", "product"], 0.02),
         ("activations of parts, slopes on a box", [common.smooth(folder)],
-         ["--neighbours", "large=2,small=1", "--domain", folder / "part.toml", "--blocks=position"], 0.02),
+         ["--neighbours", "large=2,small=1", "--domain", folder / "part.toml", "--blocks=position", *whole], 0.02),
+        ("activations of parts, slopes on parts of a box", [common.smooth(folder)],
+         ["--neighbours", "2", "--domain", folder / "part.toml", *few], 0.01),
         ("rotation invariants", invariants, ["--neighbours", "large=2,small=1"], 0.03),
         ("rotation invariants, products", invariants, ["--neighbours", "2", "--method", "product"], 0.03),
-        ("gelu, slopes on a box", [tiny], ["--activation", "gelu", "--domain", folder / "plane.toml"], 0.03),
-        ("relu, silu, slopes on a box", [tiny], ["--activation", "relu,silu", "--domain", folder / "plane.toml"], 0.03),
+        ("gelu, slopes on parts of a box", [tiny], ["--activation", "gelu", "--domain", folder / "plane.toml", *few], 0.03),
+        ("relu, silu, slopes on a box", [tiny], ["--activation", "relu,silu", "--domain", folder / "plane.toml", *whole],
+         0.03),
         ("skip connections past tanh", residual, ["--blocks", "--scale", "1,2,4"], 0.03),
-        ("skip connections past silu and tanh, values on a box", around, [*cubed, "--range"], 0.02),
+        ("skip connections past silu and tanh, values on a box", around, [*cubed, *few, "--range"], 0.02),
         ("skip connections past silu and tanh, products on a box", around, [*cubed, "--method", "product"], 0.02),
-        ("skip connections past relu and gelu, slopes on a box", with_relu, cubed, 0.02),
+        ("skip connections past relu and gelu, slopes on a box", with_relu, [*cubed, *whole], 0.02),
         ("skip connections past relu, values on a box", relu_skips, [*float32, *cubed, "--range"], 0.02),
         ("skip connections past relu and parts of a box", relu_skips, ["--method", "branch", *cubed], 0.01),
         ("convolutions, LeakyRelu, ReLU6, averages beside a skip connection", image, [], 0.01),
-        ("convolution, tanh, the largest of pairs beside skip connections, on a box", series, cubed, 0.02),
+        ("convolution, tanh, the largest of pairs beside skip connections, on a box", series, [*cubed, *few], 0.02),
         ("skip connections of parts, laws", skips, ["--blocks=position", "--neighbours", "large=2,small=1"], 0.02),
         ("skip connections of parts, products", skips, ["--neighbours", "2", "--method", "product"], 0.02),
         ("skip connections of parts, slopes on a box", skips,
-         ["--neighbours", "large=2,small=1", "--domain", folder / "part.toml", "--blocks=position"], 0.02),
+         ["--neighbours", "large=2,small=1", "--domain", folder / "part.toml", "--blocks=position", *whole], 0.02),
         ("skip connections of parts, values on a box", skips,
          ["--neighbours", "small=2", "--domain", folder / "part.toml", "--range", "--method", "product"], 0.02),
         ("cover by parts", [tiny], parts, 0.03),

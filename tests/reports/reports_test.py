@@ -99,8 +99,8 @@ def make(r):
     model = r.source / "stability/models/crazyflie-small.toml"
     gains = r.source / "controller/gains/crazyflie-small.toml"
     composite = r.source / "controller/gains/composite.toml"
-    r.report("certify", "certify", demo / "network.toml", "--domain", demo / "box.toml", "--map", "dp_x_m,dp_z_m",
-             "--cells", 2, "--nodes", 1, "--cell-nodes", 2, "--range-nodes", 100)
+    r.report("certify", "certify", demo / "network.toml", "--domain", demo / "box.toml", "--nodes", 1,
+             "--range-nodes", 100)
     r.report("certify-hostile", "certify", network_with_hostile_kinds(r), "--nodes", 1, "--method", "product",
              expect=(0, 4))
     r.report("bound", "bound", "--gains", composite, "--model", model, "--amplitude", 0.097, "--impulse", 0.02,

@@ -15,7 +15,8 @@ constexpr double kMostBoxes = 1e15;
 
 std::optional<BranchOutlook> branch_outlook(const lipschitz::CertifiedBound& bound) {
   const double lower = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
-  if (bound.nodes == 0 || !(lower > 0)) return std::nullopt;
+  const bool is_estimated = bound.outlook.bound > 0 && std::isfinite(bound.outlook.bound_halfway);
+  if (!is_estimated || !(lower > 0)) return std::nullopt;
   const double upper = bound.upper.value();
   BranchOutlook outlook;
   outlook.gap = upper / lower - 1;

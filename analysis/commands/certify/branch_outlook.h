@@ -18,7 +18,7 @@ struct BranchOutlook {
   double relaxation_share = 0;
 };
 
-/// Returns nothing if no boxes were examined or no slope has a witness.
+/// Returns nothing if no boxes were halved, nothing was estimated, or no slope has a witness.
 std::optional<BranchOutlook> branch_outlook(const lipschitz::CertifiedBound& bound);
 
 /// Describes the outlook in one or two sentences; empty if there is none.

@@ -1,7 +1,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <limits>
 #include <memory>
@@ -41,7 +40,6 @@ struct CertifyOptions {
   std::string blocks;
   std::string neighbours;
   std::string domain;
-  std::string map, cells;
   bool range = false;
   bool explain = false;
   double input_step = 0;
@@ -52,7 +50,6 @@ struct CertifyOptions {
   double seconds = 0;
   double gamma = 0;
   double max_lipschitz = 0;
-  lipschitz::SlopeMapOptions slope_map;
   lipschitz::CertifyOptions certify;
 };
 
@@ -217,49 +214,20 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Pr
   output.float32_errors = lipschitz::float32_errors(network, domain, bounds, float32);
 }
 
-/// Parses "dp_x_m,dp_z_m" and "12" or "12,8".
-void parse_map(const CertifyOptions& options, const files::Network& network,
-               lipschitz::SlopeMapOptions& map) {
-  const auto halves = [](const std::string& text, const char* option, const char* form) {
-    const std::size_t comma = text.find(',');
-    if (comma == std::string::npos || text.find(',', comma + 1) != std::string::npos)
-      throw UsageError(fmt::format("{} {}: {}", option, text, form));
-    return std::array<std::string, 2>{text.substr(0, comma), text.substr(comma + 1)};
-  };
-  const auto names = halves(options.map, "--map", "name two inputs, e.g. dp_x_m,dp_z_m");
-  try {
-    for (std::size_t d = 0; d < 2; ++d) map.coordinates[d] = lipschitz::map_coordinate(network, names[d]);
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(std::string("--map: ") + error.what());
-  }
-  if (map.coordinates[0] == map.coordinates[1]) throw UsageError("--map: name two different inputs");
-  if (options.cells.empty()) return;
-  constexpr const char* kForm = "give 2 to 200 cells along each input, e.g. 12 or 12,8";
-  const auto counts = options.cells.find(',') == std::string::npos
-                          ? std::array<std::string, 2>{options.cells, options.cells}
-                          : halves(options.cells, "--cells", kForm);
-  for (std::size_t d = 0; d < 2; ++d) {
-    int& count = map.cells[d];
-    const char* const last = counts[d].data() + counts[d].size();
-    const auto [end, error] = std::from_chars(counts[d].data(), last, count);
-    if (error != std::errc() || end != last || count < 2 || count > 200)
-      throw UsageError(fmt::format("--cells {}: {}", options.cells, kForm));
-  }
-}
-
-/// Branch and bound and float32 errors require ReLU. For rotation invariants only bounds for all inputs are proved.
+/// Float32 errors, and branch and bound without a box, require ReLU. For rotation invariants only bounds for all inputs
+/// are proved.
 void refuse_what_is_for_relu(const files::Network& network, const CertifyOptions& options) {
   struct Asked {
     bool is_asked;
     const char* option;
     bool is_for_relu;
   };
-  const Asked all[] = {{!options.domain.empty(), "--domain", false},
-                       {options.range, "--range", false},
-                       {!options.map.empty(), "--map", false},
-                       {options.explain, "--explain", true},
-                       {options.input_step > 0, "--input-step, for the float32 error,", true},
-                       {options.method == "branch", "--method branch", true}};
+  const Asked all[] = {
+      {!options.domain.empty(), "--domain", false},
+      {options.range, "--range", false},
+      {options.explain, "--explain", true},
+      {options.input_step > 0, "--input-step, for the float32 error,", true},
+      {options.method == "branch" && options.domain.empty(), "--method branch without --domain", true}};
   for (const Asked& one : all) {
     if (!one.is_asked) continue;
     const std::string option = one.option;
@@ -289,13 +257,19 @@ void set_method(CertifyOptions& options) {
                            : options.method == "sdp"     ? lipschitz::UpperMethod::kSdp
                            : options.method == "product" ? lipschitz::UpperMethod::kProduct
                                                          : lipschitz::UpperMethod::kAuto;
-  if (options.method == "branch") {
-    if (options.nodes == 0) throw UsageError("--nodes must be at least 1 with --method branch");
-    if (options.nodes) options.certify.branch.nodes = *options.nodes;
+  const bool searches_boxes =
+      options.method == "branch" || (options.method == "auto" && !options.domain.empty());
+  if (!searches_boxes && (options.certify.branch.pairs > 0 || !options.certify.branch.better_slopes))
+    throw UsageError(
+        "--cuts and --default-slopes are options of branch and bound: they need --method branch, or "
+        "--domain");
+  if (searches_boxes) {
+    if (options.method == "branch" && options.nodes == 0)
+      throw UsageError("--nodes must be at least 1 with --method branch");
+    if (options.nodes) options.certify.branch.nodes = std::max(1, *options.nodes);
     if (!options.nodes && options.seconds > 0) options.certify.branch.nodes = std::numeric_limits<int>::max();
+    if (options.nodes == 0) options.certify.lower.rounds = 0;
   } else {
-    if (options.certify.branch.pairs > 0 || !options.certify.branch.better_slopes)
-      throw UsageError("--cuts and --default-slopes are options of the search: they need --method branch");
     options.certify.lower.rounds = options.nodes;
   }
 }
@@ -311,13 +285,6 @@ CertifyOutput find_all(const files::Network& network, const CertifyOptions& opti
   add_slope_estimates(network, options.certify, output);
   if (options.explain) add_comparisons(network, options.certify, output);
   if (!options.domain.empty() || options.range) add_ranges(network, options, progress, output);
-  if (!options.map.empty()) {
-    output.map = options.slope_map;
-    output.map.progress = [&progress](int done, int total) {
-      progress.show(done, total, "cells of the map");
-    };
-    output.maps = lipschitz::slope_maps(network, output.found, output.map);
-  }
   output.verdict = judge(output.found, options.max_lipschitz);
   return output;
 }
@@ -347,10 +314,6 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   const files::Network network = read_network(options);
   const std::map<files::FunctionId, files::SampleAgreement> samples = compare_samples(network, options);
   if (!options.domain.empty()) options.certify.domain = lipschitz::read_domain(options.domain, network);
-  if (!options.map.empty()) {
-    if (options.domain.empty()) throw UsageError("--map needs the box of --domain");
-    parse_map(options, network, options.slope_map);
-  }
   set_method(options);
   Progress progress(common.quiet);
   options.certify.jobs = common.jobs;
@@ -363,10 +326,6 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   const CancelOnInterrupt interrupt(options.seconds > 0 ? options.seconds + kLater_s : 0);
   options.certify.cancelled = interrupt.flag();
   options.certify.seconds = options.seconds;
-  options.slope_map.domain = options.certify.domain;
-  options.slope_map.seed = options.certify.lower.seed;
-  options.slope_map.jobs = common.jobs;
-  options.slope_map.cancelled = interrupt.flag();
 
   CertifyOutput output = find_all(network, options, progress);
   output.found.samples = samples;
@@ -386,9 +345,10 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
 void declare_function(CLI::App& app, CertifyOptions& options) {
   app.add_option("--method", options.method,
                  "Upper bound: product (of spectral norms), sdp (LipSDP-Neuron; the layer-wise eclipse_fast "
-                 "if its search is interrupted), auto (the smallest of the three), or branch (branch and "
-                 "bound over the box of --domain; without --domain over all inputs; ReLU networks). For "
-                 "other activations, product and sdp use their slopes on the box of --domain")
+                 "if its search is interrupted), branch (branch and bound over the box of --domain; of ReLU "
+                 "networks without --domain over all inputs), or auto (the smallest: of the first three over "
+                 "all inputs, of all four over a box). For activations other than ReLU, product and sdp use "
+                 "their slopes on the box of --domain")
       ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
       ->capture_default_str();
   app.add_option(
@@ -427,25 +387,14 @@ const CLI::Option* declare_inputs(CLI::App& app, CertifyOptions& options) {
 
 void declare_search_on_a_box(CLI::App& app, CertifyOptions& options) {
   app.add_option("--cuts", options.certify.branch.pairs,
-                 "With --method branch: maximum number of constraints per box from pairs of "
+                 "Of branch and bound: maximum number of constraints per box from pairs of "
                  "incompatible activations. Gives fewer boxes and a shorter certificate for the same "
                  "bound, but takes more time")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
   app.add_flag_callback(
       "--default-slopes", [&options] { options.certify.branch.better_slopes = false; },
-      "With --method branch: disable the adaptive lower ReLU slopes (for comparison)");
-  auto* map = app.add_option(
-      "--map", options.map,
-      "Two inputs, e.g. dp_x_m,dp_z_m: their plane in the box of --domain, cell by cell; the slope in a cell "
-      "is proved above and witnessed below, the other inputs range over the box (JSON and report)");
-  app.add_option("--cells", options.cells, "Cells of --map along each input (default: 12), e.g. 12,8")
-      ->needs(map);
-  app.add_option("--cell-nodes", options.slope_map.nodes,
-                 "Maximum number of boxes of branch and bound per cell of --map, of ReLU networks")
-      ->needs(map)
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+      "Of branch and bound: disable the adaptive lower ReLU slopes (for comparison)");
 }
 
 void declare_limits(CLI::App& app, CertifyOptions& options) {
@@ -467,9 +416,12 @@ void declare_limits(CLI::App& app, CertifyOptions& options) {
   app.add_option("--max-lipschitz", options.max_lipschitz,
                  "Limit on the Lipschitz constant of the network, or of every set function")
       ->check(CLI::PositiveNumber);
-  app.add_option("--nodes", options.nodes,
-                 "Rounds of the search for lower bounds, per function; 0: none (default: 40, fewer for large "
-                 "networks). With --method branch: boxes to examine, per bound (default: 20000)")
+  app.add_option(
+         "--nodes", options.nodes,
+         "Where branch and bound runs (--domain, --method branch): boxes to examine, per bound (default: "
+         "as many as take about ten seconds, or until --time); the same number gives the same result. "
+         "Else: rounds of the search for lower bounds, per function; 0: none (default: 40, fewer for "
+         "large networks)")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--time", options.seconds,
                  "Time limit of the whole command in seconds. Bounds are proved all the same; those whose "

@@ -15,7 +15,6 @@ using lipschitz::Attained;
 using lipschitz::Certification;
 using lipschitz::CertifiedBound;
 using lipschitz::CertifiedLayer;
-using lipschitz::coordinate_name;
 using lipschitz::Verdict;
 
 Json attained_json(const Attained& attained) {
@@ -125,36 +124,6 @@ Json samples_result(const Certification& found) {
   return list;
 }
 
-/// The box of a cell contains the two coordinates of the map; the other coordinates are the same for all cells.
-Json map_json(const files::Network& network, const lipschitz::SlopeMapOptions& options,
-              const lipschitz::SlopeMap& map) {
-  const auto [first, second] = options.coordinates;
-  const std::string names[] = {coordinate_name(network, first), coordinate_name(network, second)};
-  const auto interval = [](const lipschitz::Box& box, int k) {
-    return Json{box.lower[static_cast<std::size_t>(k)], box.upper[static_cast<std::size_t>(k)]};
-  };
-  Json others = Json::object(), cells = Json::array();
-  const lipschitz::Box& any = map.cells.front().box;
-  for (int k = 0; k < static_cast<int>(any.lower.size()); ++k) {
-    if (k != first && k != second) others[coordinate_name(network, k)] = interval(any, k);
-  }
-  for (const lipschitz::SlopeCell& cell : map.cells) {
-    cells.push_back({{"box", {{names[0], interval(cell.box, first)}, {names[1], interval(cell.box, second)}}},
-                     {"upper", cell.upper.value()},
-                     {"upper_method", cell.is_local ? lipschitz::name(cell.method) : "everywhere"},
-                     {"lower", cell.lower.witness ? Json(cell.lower.witness->slope.value()) : Json()},
-                     {"lower_witness", witness_json(cell.lower)}});
-  }
-  return {{"function", map.function.name()},
-          {"coordinates", names},
-          {"shape", options.cells},
-          {"others", std::move(others)},
-          {"norm", "l2"},
-          {"unit", files::unit(network, map.function)},
-          {"nodes", options.nodes},
-          {"cells", std::move(cells)}};
-}
-
 Json layer_json(const CertifiedLayer& layer) {
   Json respects;
   if (layer.respects_gamma == Verdict::kProved) respects = true;
@@ -237,9 +206,6 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
   result["samples"] = samples_result(found);
   result["layers"] = list_of(found.layers, layer_json);
   result["bounds"] = std::move(bounds);
-  if (!output.maps.empty())
-    result["slope_maps"] = list_of(
-        output.maps, [&](const lipschitz::SlopeMap& map) { return map_json(network, output.map, map); });
   result["range"] = list_of(output.ranges, [&](const lipschitz::CertifiedRange& range) {
     return range_json(network, output, range);
   });

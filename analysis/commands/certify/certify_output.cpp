@@ -219,8 +219,8 @@ void print_bounds(const files::Network& network, const CertifyOutput& output) {
     const std::string outlook = branch_outlook_words(bound);
     if (!outlook.empty()) fmt::print("    {}\n", outlook);
   }
-  if (std::any_of(found.bounds.begin(), found.bounds.end(),
-                  [](const CertifiedBound& bound) { return !bound.is_relu; }))
+  if (found.domain.empty() && std::any_of(found.bounds.begin(), found.bounds.end(),
+                                          [](const CertifiedBound& bound) { return !bound.is_relu; }))
     fmt::print("  {}\n", kForReluOnly);
   if (std::any_of(found.bounds.begin(), found.bounds.end(),
                   [](const CertifiedBound& bound) { return !bound.has_witness; }))

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "lipschitz/certify.h"
-#include "lipschitz/slope_map.h"
 #include "lipschitz/upper/comparison.h"
 #include "lipschitz/values/float32_error.h"
 #include "lipschitz/values/range.h"
@@ -27,18 +26,15 @@ struct CertifyOutput {
   lipschitz::Verdict verdict = lipschitz::Verdict::kInconclusive;
   double max_lipschitz = 0;  ///< 0: no limit was given
   std::uint64_t seed = 1;
-  std::string domain_file;  ///< box.toml; empty if there is none
-  lipschitz::SlopeMapOptions map;
-  std::vector<lipschitz::SlopeMap> maps;
+  std::string domain_file;        ///< box.toml; empty if there is none
   bool ranges_cut_short = false;  ///< ranges and float32 errors cover only a part of the box
 
   bool is_interrupted() const { return lipschitz::is_interrupted(found) || ranges_cut_short; }
 };
 
-/// Note for bounds of functions with activations other than ReLU or with rotation invariants as inputs.
+/// Note for bounds over all inputs of functions with activations other than ReLU or with rotation invariants as inputs.
 inline constexpr char kForReluOnly[] =
-    "branch and bound is for ReLU networks of relative states: with other activations bounds on a box are "
-    "proved from the slopes that they have there";
+    "branch and bound over all inputs is for ReLU networks of relative states";
 
 /// Note for functions of rotation invariants.
 inline constexpr char kNoLowerBound[] =

@@ -17,9 +17,6 @@ namespace {
 
 using lipschitz::CertifiedBound;
 using lipschitz::CertifiedLayer;
-using lipschitz::coordinate_name;
-using lipschitz::SlopeCell;
-using lipschitz::SlopeMap;
 
 double slope_of(const lipschitz::FoundSlope& found) {
   return found.witness ? found.witness->slope.value() : std::numeric_limits<double>::quiet_NaN();
@@ -82,64 +79,6 @@ void add_layers(Report& report, const CertifyOutput& output) {
   report.table({"network", "layer", "at least", "at most", "within gamma"}, rows);
 }
 
-void add_map(Report& report, const files::Network& network, const CertifyOutput& output, std::size_t index) {
-  const SlopeMap& map = output.maps[index];
-  const auto first = static_cast<std::size_t>(output.map.coordinates[0]);
-  const auto second = static_cast<std::size_t>(output.map.coordinates[1]);
-  const std::string names[] = {coordinate_name(network, output.map.coordinates[0]),
-                               coordinate_name(network, output.map.coordinates[1])};
-  const auto middle = [](const SlopeCell& cell, std::size_t k) {
-    const double at = (cell.box.lower[k] + cell.box.upper[k]) / 2;
-    return std::abs(at) < 1e-12 * (cell.box.upper[k] - cell.box.lower[k]) ? 0.0 : at;
-  };
-  const SlopeCell* steepest = &map.cells.front();
-  int local = 0;
-  std::string by = "branch and bound";
-  std::string data = "# first second upper lower\n";
-  for (std::size_t i = 0; i < map.cells.size(); ++i) {
-    const SlopeCell& cell = map.cells[i];
-    if (cell.upper.value() > steepest->upper.value()) steepest = &cell;
-    local += cell.is_local ? 1 : 0;
-    if (cell.method != lipschitz::UpperMethod::kBranch) by = "the slopes that the activations have there";
-    if (i > 0 && i % static_cast<std::size_t>(output.map.cells[1]) == 0) data += "\n";
-    const double lower = slope_of(cell.lower);
-    data += fmt::format("{:.10g} {:.10g} {:.10g} {}\n", middle(cell, first), middle(cell, second),
-                        cell.upper.value(), std::isfinite(lower) ? fmt::format("{:.10g}", lower) : "NaN");
-  }
-  const std::string file = fmt::format("map_{}", index + 1);
-  const std::string unit = files::unit(network, map.function);
-  std::string others;
-  for (std::size_t k = 0; k < steepest->box.lower.size(); ++k) {
-    if (k == first || k == second) continue;
-    others += fmt::format("{}{} in {:.6g} .. {:.6g}", others.empty() ? "" : ", ",
-                          coordinate_name(network, static_cast<int>(k)), steepest->box.lower[k],
-                          steepest->box.upper[k]);
-  }
-  report.heading("Where " + map.function.name() + " is steep");
-  report.paragraph(fmt::format(
-      "Local slope over {} and {}; {}. {} of {} cells have a bound of their own, proved by {}; the "
-      "others keep the bound of the whole box. The steepest proved cell lies at {} = {:.4g}, {} = {:.4g}: "
-      "at most {:.6g}, witnessed {} {}.",
-      names[0], names[1], others.empty() ? "there are no other inputs" : "the other inputs: " + others, local,
-      map.cells.size(), by, names[0], middle(*steepest, first), names[1], middle(*steepest, second),
-      steepest->upper.value(), number(slope_of(steepest->lower), 6), unit));
-  const auto script = [&](const std::string& figure, int column, const std::string& label) {
-    return "set key off\nset xlabel " + plot_string("input " + names[0]) + "\nset ylabel " +
-           plot_string("input " + names[1]) + "\nset cblabel " + plot_string(label + " [" + unit + "]") +
-           fmt::format(
-               "\nset autoscale xfix\nset autoscale yfix\nset cbrange [0:{:.6g}]\nplot '{}.dat' using "
-               "1:2:{} with image\n",
-               std::max(steepest->upper.value(), 1e-300), figure, column);
-  };
-  report.figure(file + "_upper", data, script(file + "_upper", 3, "slope at most"),
-                "Proved: in no cell is " + map.function.name() + " steeper than this.");
-  report.figure(
-      file + "_lower", data, script(file + "_lower", 4, "slope at least"),
-      "Witnessed: between two points of the cell the slope of " + map.function.name() +
-          " is this large. Colours as above; where both maps are bright the network is steep, where "
-          "only the upper one is, the bound is loose or no steep points were found.");
-}
-
 }  // namespace
 
 std::string write_certify_report(const files::Network& network, const CertifyOutput& output,
@@ -154,7 +93,6 @@ std::string write_certify_report(const files::Network& network, const CertifyOut
       name(output.verdict)));
   add_bounds(report, network, output);
   add_layers(report, output);
-  for (std::size_t i = 0; i < output.maps.size(); ++i) add_map(report, network, output, i);
   report.heading("Inputs");
   std::vector<std::vector<std::string>> rows;
   for (const auto& [part, weights] : files::parts(network))

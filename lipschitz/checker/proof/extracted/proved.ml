@@ -3976,6 +3976,7 @@ type proof =
 | By_steps of box list
 | By_invariants
 | By_parts_among of dyadic * hints * (box * range_tree) list * tree
+| By_halves of int * dyadic
 
 (** val is_nil : 'a1 list -> bool **)
 
@@ -4815,6 +4816,46 @@ let check_law_of_states ps accepted stacked kinds rho u =
      | Some s -> at_most s (if stacked then mul0 u u else u)
      | None -> false)
 
+(** val same_function : function0 -> function0 -> bool **)
+
+let same_function f g =
+  match f with
+  | Alone p -> (match g with
+                | Alone q -> (=) p q
+                | Set_of (_, _) -> false)
+  | Set_of (p, k) ->
+    (match g with
+     | Alone _ -> false
+     | Set_of (q, l) -> (&&) ((=) p q) ((=) k l))
+
+(** val has_slope_in :
+    claim list -> function0 -> bool list -> dyadic list -> box -> dyadic ->
+    bool **)
+
+let rec has_slope_in accepted f moves scale0 b u =
+  match accepted with
+  | [] -> false
+  | c0 :: rest0 ->
+    (match c0 with
+     | Slope_in_box (g, n, s, c, v) ->
+       (||)
+         ((&&)
+           ((&&)
+             ((&&) ((&&) (same_function f g) (same_moves moves n))
+               (same_numbers scale0 s)) (same_box b c)) (at_most v u))
+         (has_slope_in rest0 f moves scale0 b u)
+     | _ -> has_slope_in rest0 f moves scale0 b u)
+
+(** val check_halves :
+    part list -> claim list -> function0 -> bool list -> dyadic list -> box
+    -> dyadic -> int -> dyadic -> bool **)
+
+let check_halves ps accepted f moves scale0 b u k m =
+  (&&)
+    ((&&) (well_formed ps f moves scale0)
+      (has_slope_in accepted f moves scale0 (cut k m false b) u))
+    (has_slope_in accepted f moves scale0 (cut k m true b) u)
+
 (** val find_within : claim list -> int -> box -> box option **)
 
 let rec find_within accepted p b =
@@ -5153,6 +5194,7 @@ let check_claim ps accepted c p =
        check_local_slope ps f moves scale0 b u rho t r
      | By_parts (r, form, o, t) ->
        check_parts_of_box ps f moves scale0 b u r form o t
+     | By_halves (k, m) -> check_halves ps accepted f moves scale0 b u k m
      | _ -> false)
   | Law (stacked, kinds, rho, u) ->
     (match p with

@@ -819,6 +819,7 @@ type proof =
 | By_steps of box list
 | By_invariants
 | By_parts_among of dyadic * hints * (box * range_tree) list * tree
+| By_halves of int * dyadic
 
 val is_nil : 'a1 list -> bool
 
@@ -1004,6 +1005,15 @@ val total_of_states :
 val check_law_of_states :
   part list -> claim list -> bool -> kind_of_states list -> int -> dyadic ->
   bool
+
+val same_function : function0 -> function0 -> bool
+
+val has_slope_in :
+  claim list -> function0 -> bool list -> dyadic list -> box -> dyadic -> bool
+
+val check_halves :
+  part list -> claim list -> function0 -> bool list -> dyadic list -> box ->
+  dyadic -> int -> dyadic -> bool
 
 val find_within : claim list -> int -> box -> box option
 

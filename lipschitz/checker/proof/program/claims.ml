@@ -196,7 +196,6 @@ let check_activations state where bound names =
       if activation <> Proved.Relu then begin
         let of_ = " of a network with " ^ Activation.words activation in
         let by method_ = find where "upper_method" bound = Text method_ in
-        require (not (by "branch")) "%s: a bound by parts of a box%s" where of_;
         require (not (Activation.sorts activation) || by "product" || by "local_product")
           "%s: a bound from slopes of single numbers%s" where of_
       end) activations
@@ -242,6 +241,45 @@ let check_local state where bound names ~func ~moves ~exact_scale ~upper =
   end;
   In_box
 
+(* Part by part of a box, from the slopes that activations have in each. *)
+let check_slope_tree state where bound names ~func ~moves ~exact_scale ~upper =
+  let json = find where "proof" bound and here = where ^ ".proof" and moved = List.hd names in
+  require_keys here [ "rho"; "form"; "tree"; "multipliers" ] json;
+  require (find where "domain" bound = Text "box" && find here "form" json = Null)
+    "%s: a bound by parts for other activations than ReLU is for a box, without a form" where;
+  require (not (Functions.starts_with "rho:" moved)) "%s: rho has no box" where;
+  require (not state.net.invariants) "%s: slopes on a box of a network of rotation invariants" where;
+  let rho = Exact.of_float (Box_parts.rho_of where json ~upper) and neurons = hidden_neurons state names in
+  let multipliers = Array.of_list (List.map (Box_parts.hex_words where) (list where (find here "multipliers" json))) in
+  let reader = Box_parts.reader where (text where (find here "tree" json)) in
+  let rec prove_part pending box low high =
+    let claim = Proved.Slope_in_box (func, moves, exact_scale, box, upper) in
+    let word = Box_parts.next reader in
+    let at = reader.at - 1 in
+    let fails reason = Box_parts.fails reader at reason in
+    match word with
+    | Split k ->
+      let middle = Box_parts.middle_of reader at k low high ~pending ~boxes:1 in
+      let cut is_upper = Proved.cut k (Exact.of_float middle) is_upper box in
+      prove_part (pending + 1) (cut false) low (Box_parts.with_middle high k middle);
+      prove_part pending (cut true) (Box_parts.with_middle low k middle) high;
+      prove_unwritten state claim (By_halves (k, Exact.of_float middle)) (fun () -> where ^ ": the halves do not fit")
+    | Multipliers k ->
+      if k >= Array.length multipliers then fails "there are no such multipliers";
+      let t = multipliers.(k) in
+      if not (List.length t = neurons && List.for_all (fun x -> x >= 0.) t) then
+        fails "multipliers are not one nonnegative number per hidden neuron";
+      let t = List.map Exact.of_float t in
+      let ranges, (hidden, last) = stages state claim in
+      let factors = Proposal.factors (Proved.matrix_inequality ranges hidden last rho t) in
+      prove_unwritten_by state claim (Seq.map (fun factor -> Proved.By_local_inequality (rho, t, factor)) factors)
+        (fun () -> Printf.sprintf "%s: word %d of the tree: its multipliers do not show the bound there" where (at + 1))
+    | _ -> fails "neither a split nor a leaf" in
+  let box, low, high = Box_parts.box_of state.net state.json moved where in
+  prove_part 0 box low high;
+  Box_parts.ends reader;
+  In_box
+
 (* The proof of a bound of function `f`, and of the lower one where there is a witness. *)
 let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~upper =
   let moves = Functions.moves state.net f block and func = function_of state names in
@@ -254,6 +292,8 @@ let check_bound_by_theorems state bound names f block where ~scale ~neighbours ~
       prove_by state claim proofs (no_factor where); Proved_here
     | method_ when List.mem method_ local_methods ->
       check_local state where bound names ~func ~moves ~exact_scale ~upper
+    | Text "branch" when not (List.for_all (Functions.is_relu state.net) names) ->
+      check_slope_tree state where bound names ~func ~moves ~exact_scale ~upper
     | Text "branch" -> check_parts state where bound names ~func ~moves ~scale ~exact_scale ~neighbours ~upper
     | Text "product" when find where "proof" bound = Null ->
       let largest = match scale with [] -> 1. | first :: rest -> List.fold_left Float.max first rest in

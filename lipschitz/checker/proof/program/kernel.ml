@@ -74,7 +74,7 @@ let proof out = function
     Printf.bprintf out "By_points %a %a %a" numbers x numbers y (list (pair natural numbers)) others
   | By_triangle -> Buffer.add_string out "By_triangle"
   | By_invariants -> Buffer.add_string out "By_invariants"
-  | By_parts _ | By_all_parts _ | By_parts_among _ | By_local_product | By_local_inequality _ ->
+  | By_parts _ | By_all_parts _ | By_parts_among _ | By_local_product | By_local_inequality _ | By_halves _ ->
     assert false  (* not written *)
   | By_layers bounds -> Printf.bprintf out "By_layers %a" (list box) bounds
   | By_sum sums -> Printf.bprintf out "By_sum %a" box sums

@@ -21,7 +21,8 @@ Inductive proof :=
 | By_rounded_sum (sums : box) (errors : list dyadic)
 | By_steps (sums : list box)
 | By_invariants
-| By_parts_among (rho : dyadic) (o : hints) (ranges : list (box * range_tree)) (t : tree).
+| By_parts_among (rho : dyadic) (o : hints) (ranges : list (box * range_tree)) (t : tree)
+| By_halves (k : nat) (m : dyadic).
 
 Definition is_nil {A} (l : list A) : bool := match l with [] => true | _ => false end.
 Definition matrix_at (ps : list part) (p layer : nat) : matrixD := fst (nth layer (layers (part_at ps p)) ([], [])).
@@ -421,6 +422,25 @@ Definition check_law_of_states ps accepted (stacked : bool) kinds rho u : bool :
      | None => false
      end.
 
+(** In a box, from bounds in its two parts. *)
+Definition same_function (f g : function) : bool :=
+  match f, g with
+  | Alone p, Alone q => (p =? q)%nat
+  | Set_of p k, Set_of q l => (p =? q)%nat && (k =? l)%nat
+  | _, _ => false
+  end.
+Fixpoint has_slope_in (accepted : list claim) f moves scale (b : box) u : bool :=
+  match accepted with
+  | [] => false
+  | Slope_in_box g n s c v :: rest =>
+      same_function f g && same_moves moves n && same_numbers scale s && same_box b c && at_most v u
+      || has_slope_in rest f moves scale b u
+  | _ :: rest => has_slope_in rest f moves scale b u
+  end.
+Definition check_halves ps accepted f moves scale (b : box) u (k : nat) (m : dyadic) : bool :=
+  well_formed ps f moves scale && has_slope_in accepted f moves scale (cut k m false b) u
+  && has_slope_in accepted f moves scale (cut k m true b) u.
+
 (** Values over boxes. *)
 Fixpoint find_within (accepted : list claim) (p : nat) (b : box) : option box :=
   match accepted with
@@ -581,6 +601,7 @@ Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p :
   | Slope_in_box f moves scale b u, By_local_product => check_local_product ps accepted f moves scale b u
   | Slope_in_box f moves scale b u, By_local_inequality rho t r => check_local_slope ps f moves scale b u rho t r
   | Slope_in_box f moves scale b u, By_parts r form o t => check_parts_of_box ps f moves scale b u r form o t
+  | Slope_in_box f moves scale b u, By_halves k m => check_halves ps accepted f moves scale b u k m
   | Slope_at_least silent f moves scale l, By_points x y others => check_points ps silent f moves scale l x y others
   | Law stacked kinds rho u, By_triangle => check_law ps accepted stacked kinds rho u
   | Law_in_box stacked kinds rho u, By_triangle => check_law_in_box ps accepted stacked kinds rho u

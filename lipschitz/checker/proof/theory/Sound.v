@@ -2,7 +2,7 @@
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
     Values Enclosures Intervals Centred Claims Slopes Witness Laws Ranges Silent Roundings
-    Relaxation Increments Cover Among Laws_among Everywhere Invariants.
+    Relaxation Increments Cover Halves Among Laws_among Everywhere Invariants.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -18,6 +18,7 @@ Proof.
   - now apply local_product_sound in H.
   - now apply local_slope_sound in H.
   - now apply slope_in_box_sound in H.
+  - now apply halves_sound in H.
   - now apply law_sound in H.
   - now apply law_in_box_sound in H.
   - now apply within_sound in H.
