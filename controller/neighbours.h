@@ -166,23 +166,20 @@ struct Prediction {
 
 namespace detail {
 
-template <typename Scalar>
-inline Prediction<Scalar> predict_from_zero(const nn::DeepSet<Scalar>& set,
+/// @param evaluate see predict_with().
+template <typename Scalar, typename Evaluate>
+inline Prediction<Scalar> predict_from_zero(const Evaluate& evaluate,
                                             const PredictionSettings<Scalar>& settings,
                                             const Vector3<Scalar>& own_position_W_m,
                                             const Vector3<Scalar>& own_velocity_W_m_s,
                                             const NeighbourTrack<Scalar>* tracks, int num_tracks,
-                                            std::uint32_t now_ms,
-                                            const nn::DeepSetWorkspace<Scalar>& workspace) {
+                                            std::uint32_t now_ms) {
   Prediction<Scalar> result;
   const auto failed = [&](PredictionStatus status) {
     result.status = status;
     return result;
   };
   if (num_tracks < 0 || num_tracks > kMostNeighbours) return failed(PredictionStatus::kTooManyNeighbours);
-  const bool fits = set.inputs() == kNeighbourInputs && set.outputs() == 1 &&
-                    (set.ground == nullptr || set.own_inputs() == kOwnInputs);
-  if (!fits) return failed(PredictionStatus::kWrongNetwork);
   if (!is_within(own_position_W_m, Scalar(kFarthestPosition_m)) || !is_finite(own_velocity_W_m_s)) {
     return failed(PredictionStatus::kOwnStateInvalid);
   }
@@ -211,7 +208,7 @@ inline Prediction<Scalar> predict_from_zero(const nn::DeepSet<Scalar>& set,
       }
     }
     Scalar output(0);
-    result.network = nn::evaluate(set, own, present, count, &output, workspace);
+    result.network = evaluate(own, present, count, &output);
     if (result.network != nn::DeepSetStatus::kOk) return failed(PredictionStatus::kNetworkFailed);
     sum = sum + product(level - next, output);
     if (!(next > Scalar(0))) break;
@@ -235,7 +232,22 @@ inline Prediction<Scalar> predict_from_zero(const nn::DeepSet<Scalar>& set,
 /// of F, whose size no certificate of the set states; it is limited by largest_force_N. Each distinct weight costs one
 /// more evaluation of the set.
 ///
+/// @param evaluate (own, neighbours, number of them, output) -> nn::DeepSetStatus: the network F for some of the
+///     neighbours. Every evaluation of a vehicle goes through it, so that what is tested is what flies.
 /// @param previous_W_N f_a_hat of the previous execution, for Prediction::jump_N.
+template <typename Scalar, typename Evaluate>
+inline Prediction<Scalar> predict_with(const Evaluate& evaluate, const PredictionSettings<Scalar>& settings,
+                                       const Vector3<Scalar>& own_position_W_m,
+                                       const Vector3<Scalar>& own_velocity_W_m_s,
+                                       const NeighbourTrack<Scalar>* tracks, int num_tracks,
+                                       std::uint32_t now_ms, const Vector3<Scalar>& previous_W_N) {
+  Prediction<Scalar> result = detail::predict_from_zero(evaluate, settings, own_position_W_m,
+                                                        own_velocity_W_m_s, tracks, num_tracks, now_ms);
+  result.jump_N = norm(result.effect_W_N - previous_W_N);
+  return result;
+}
+
+/// The same for the deep set `set`; PredictionStatus::kWrongNetwork unless its inputs and outputs are those of F.
 template <typename Scalar>
 inline Prediction<Scalar> predict(const nn::DeepSet<Scalar>& set, const PredictionSettings<Scalar>& settings,
                                   const Vector3<Scalar>& own_position_W_m,
@@ -243,10 +255,20 @@ inline Prediction<Scalar> predict(const nn::DeepSet<Scalar>& set, const Predicti
                                   const NeighbourTrack<Scalar>* tracks, int num_tracks, std::uint32_t now_ms,
                                   const Vector3<Scalar>& previous_W_N,
                                   const nn::DeepSetWorkspace<Scalar>& workspace) {
-  Prediction<Scalar> result = detail::predict_from_zero(set, settings, own_position_W_m, own_velocity_W_m_s,
-                                                        tracks, num_tracks, now_ms, workspace);
-  result.jump_N = norm(result.effect_W_N - previous_W_N);
-  return result;
+  const bool fits = set.inputs() == kNeighbourInputs && set.outputs() == 1 &&
+                    (set.ground == nullptr || set.own_inputs() == kOwnInputs);
+  if (!fits) {
+    Prediction<Scalar> result;
+    result.status = PredictionStatus::kWrongNetwork;
+    result.jump_N = norm(previous_W_N);
+    return result;
+  }
+  const auto evaluate = [&](const Scalar* own, const nn::Neighbour<Scalar>* present, int count,
+                            Scalar* output) {
+    return nn::evaluate(set, own, present, count, output, workspace);
+  };
+  return predict_with(evaluate, settings, own_position_W_m, own_velocity_W_m_s, tracks, num_tracks, now_ms,
+                      previous_W_N);
 }
 
 }  // namespace swarmcert::controller

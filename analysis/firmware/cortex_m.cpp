@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstring>
 
@@ -83,7 +84,7 @@ CortexM::CortexM() {
   need_ok(fmt::format("Z0,{:x},2", kReturn));
   set_register(0, kControlOfCoprocessors);
   set_register(1, kFullAccess);
-  run_from(kCode);
+  if (run_from(kCode) != kReturn) throw NotRun("the floating-point unit was not switched on");
 }
 
 CortexM::~CortexM() {
@@ -151,13 +152,13 @@ void CortexM::set_register(int number, std::uint32_t value) {
 
 std::uint32_t CortexM::get_register(int number) { return word_of(request(fmt::format("p{:x}", number))); }
 
-void CortexM::run_from(std::uint32_t address) {
+std::uint32_t CortexM::run_from(std::uint32_t address) {
   set_register(kStackPointer, kStackEnd - 8);  // the stack argument, aligned to eight bytes
   set_register(kLink, kReturn | 1u);
   set_register(kCounter, address & ~1u);
   set_register(kStatus, kThumb);
   request("c");
-  if (get_register(kCounter) != kReturn) throw NotRun("the call stopped before it came back");
+  return get_register(kCounter);
 }
 
 void CortexM::write(std::uint32_t address, const std::string& bytes) {
@@ -172,6 +173,20 @@ void CortexM::write(std::uint32_t address, const std::string& bytes) {
   }
 }
 
+std::string CortexM::read(std::uint32_t address, std::uint32_t size) {
+  std::string bytes;
+  for (std::uint32_t at = 0; at < size;) {
+    const std::uint32_t chunk = std::min<std::uint32_t>(size - at, 1024);
+    const std::string digits = request(fmt::format("m{:x},{:x}", address + at, chunk));
+    if (digits.size() != 2 * chunk || digits.find_first_not_of("0123456789abcdef") != std::string::npos)
+      throw NotRun("QEMU answered '" + digits.substr(0, 40) + "' where memory was expected");
+    for (std::size_t i = 0; i < chunk; ++i)
+      bytes += static_cast<char>(std::stoul(digits.substr(2 * i, 2), nullptr, 16));
+    at += chunk;
+  }
+  return bytes;
+}
+
 std::uint32_t CortexM::read_word(std::uint32_t address) {
   return word_of(request(fmt::format("m{:x},4", address)));
 }
@@ -180,8 +195,17 @@ std::uint32_t CortexM::call(std::uint32_t address, const std::uint32_t (&in_regi
                             std::uint32_t on_stack) {
   for (int i = 0; i < 4; ++i) set_register(i, in_registers[i]);
   need_ok(fmt::format("M{:x},4:{}", kStackEnd - 8, hex(word_bytes(on_stack))));
-  run_from(address);
+  if (run_from(address) != kReturn) throw NotRun("the call stopped before it came back");
   return get_register(0);
+}
+
+void CortexM::call_until_second(std::uint32_t address, std::uint32_t callee) {
+  if (watched_ == 0) need_ok(fmt::format("Z0,{:x},2", callee));
+  watched_ = callee;
+  if (run_from(address) != callee) throw NotRun("the task stopped before it waited for its period");
+  set_register(kCounter, get_register(kLink) & ~1u);
+  request("c");
+  if (get_register(kCounter) != callee) throw NotRun("the task stopped before it waited for its next period");
 }
 
 }  // namespace swarmcert::firmware

@@ -34,13 +34,19 @@ class CortexM {
   /// @throws NotRun if the range is outside the memories above.
   void write(std::uint32_t address, const std::string& bytes);
   std::uint32_t read_word(std::uint32_t address);
+  std::string read(std::uint32_t address, std::uint32_t size);
 
   /// Calls the Thumb function at `address` according to the AAPCS, with four words in registers and one on the stack.
   /// @return r0.
   /// @throws NotRun after a fault, or if the function has not returned after kMostSeconds.
   std::uint32_t call(std::uint32_t address, const std::uint32_t (&in_registers)[4], std::uint32_t on_stack);
 
-  static constexpr int kMostSeconds = 60;
+  /// Calls the Thumb function at `address`, which takes nothing, until it calls the function at `callee` for the second
+  /// time; the first call returns at once. Both addresses must stay the same.
+  /// @throws NotRun as call(), and if it returns before.
+  void call_until_second(std::uint32_t address, std::uint32_t callee);
+
+  static constexpr int kMostSeconds = 20;
 
  private:
   std::string request(const std::string& command);
@@ -48,11 +54,13 @@ class CortexM {
   void need_ok(const std::string& command);
   void set_register(int number, std::uint32_t value);
   std::uint32_t get_register(int number);
-  void run_from(std::uint32_t address);
+  /// Runs from `address`, with a return address at which it stops. Returns where it stopped.
+  std::uint32_t run_from(std::uint32_t address);
   char next_byte();
 
   pid_t child_ = -1;
   int socket_ = -1;
+  std::uint32_t watched_ = 0;  ///< callee of call_until_second(), where execution stops
   std::string received_;
   std::size_t taken_ = 0;
 };

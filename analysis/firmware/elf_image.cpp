@@ -36,7 +36,7 @@ void read_segments(const std::string& bytes, const Elf32_Ehdr& header, ElfImage&
   }
 }
 
-void read_functions(const std::string& bytes, const Elf32_Ehdr& header, ElfImage& image) {
+void read_symbols(const std::string& bytes, const Elf32_Ehdr& header, ElfImage& image) {
   for (std::uint64_t i = 0; i < header.e_shnum; ++i) {
     const auto table = get<Elf32_Shdr>(bytes, std::uint64_t{header.e_shoff} + i * sizeof(Elf32_Shdr));
     if (table.sh_type != SHT_SYMTAB) continue;
@@ -45,14 +45,32 @@ void read_functions(const std::string& bytes, const Elf32_Ehdr& header, ElfImage
     const std::string names = slice(bytes, names_of.sh_offset, names_of.sh_size);
     for (std::uint64_t at = 0; at + sizeof(Elf32_Sym) <= table.sh_size; at += sizeof(Elf32_Sym)) {
       const auto symbol = get<Elf32_Sym>(bytes, table.sh_offset + at);
-      if (ELF32_ST_TYPE(symbol.st_info) != STT_FUNC || symbol.st_shndx == SHN_UNDEF) continue;
+      const unsigned type = ELF32_ST_TYPE(symbol.st_info);
+      if ((type != STT_FUNC && type != STT_OBJECT) || symbol.st_shndx == SHN_UNDEF) continue;
       if (symbol.st_name >= names.size()) throw Damaged();
-      image.functions.push_back({names.c_str() + symbol.st_name, symbol.st_value});
+      const bool is_function = type == STT_FUNC, is_thumb = is_function && (symbol.st_value & 1u) != 0;
+      image.symbols.push_back({names.c_str() + symbol.st_name, symbol.st_value - (is_thumb ? 1u : 0u),
+                               symbol.st_size, is_function, is_thumb});
     }
   }
 }
 
 }  // namespace
+
+const Symbol* ElfImage::find(const std::string& name) const {
+  for (const Symbol& symbol : symbols)
+    if (symbol.name == name) return &symbol;
+  return nullptr;
+}
+
+std::string ElfImage::bytes_at(std::uint32_t address, std::uint32_t size) const {
+  for (const Segment& segment : segments) {
+    if (address < segment.address) continue;
+    const std::uint64_t offset = address - segment.address;
+    if (offset + size <= segment.bytes.size()) return segment.bytes.substr(offset, size);
+  }
+  return "";
+}
 
 ElfImage read_arm_image(const std::string& bytes) {
   ElfImage image;
@@ -70,7 +88,7 @@ ElfImage read_arm_image(const std::string& bytes) {
       image.why_not = "it is not a program at fixed addresses, as firmware is";
     } else {
       read_segments(bytes, header, image);
-      read_functions(bytes, header, image);
+      read_symbols(bytes, header, image);
       if (image.segments.empty()) image.why_not = "it has no loadable segment";
     }
   } catch (const Damaged&) {

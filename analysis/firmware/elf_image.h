@@ -1,4 +1,4 @@
-/// @file The memory image that a Cortex-M microcontroller would load from an ELF file, and its function symbols.
+/// @file The memory image that a Cortex-M microcontroller would load from an ELF file, and its symbols.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,24 @@ struct Segment {
   std::string bytes;
 };
 
-struct FunctionSymbol {
+/// A function or object of the symbol table, global or local.
+struct Symbol {
   std::string name;
-  std::uint32_t address = 0;  ///< bit 0 is set for Thumb code
+  std::uint32_t address = 0;  ///< of its first byte
+  std::uint32_t size = 0;
+  bool is_function = false;
+  bool is_thumb = false;  ///< for functions
 };
 
 struct ElfImage {
   std::string why_not;  ///< reason why the program cannot be loaded and run; empty if it can
   std::vector<Segment> segments;
-  std::vector<FunctionSymbol> functions;  ///< functions with an address in the program
+  std::vector<Symbol> symbols;  ///< with an address in the program
+
+  /// Returns the symbol of this name, or null.
+  const Symbol* find(const std::string& name) const;
+  /// Returns `size` bytes at `address`; empty unless the file stores all of them.
+  std::string bytes_at(std::uint32_t address, std::uint32_t size) const;
 };
 
 /// Reads a linked program for Arm (EM_ARM, ET_EXEC, 32-bit, little-endian). Sizes and offsets in the file are not

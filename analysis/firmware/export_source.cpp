@@ -71,12 +71,16 @@ std::vector<float> in_blocks(const files::Layer& layer) {
   return blocks;
 }
 
+std::string object_name(const std::string& id, std::size_t k) {
+  return fmt::format("swarmcert_{}_{}", id, k + 1);
+}
+
 std::string weights_source(const files::Weights& weights, const std::string& id) {
   std::string text = fmt::format("// sha256 of the weight file: {}\n", weights.sha256);
   std::string layers;
   for (std::size_t k = 0; k < weights.layers.size(); ++k) {
     const files::Layer& layer = weights.layers[k];
-    const std::string name = fmt::format("swarmcert_{}_{}", id, k + 1);
+    const std::string name = object_name(id, k);
     text += fmt::format(
         "struct {0}_layer {{ float weight[{1}]; float bias[{2}]; }};\n"
         "extern \"C\" alignas(16) const {0}_layer {0} = {{{3}, {4}}};\n",
@@ -374,6 +378,10 @@ std::string samples_text(const files::Network& network, std::uint64_t seed) {
 }
 
 }  // namespace
+
+std::string weights_object(const files::Network& network, const files::FunctionId& part, std::size_t k) {
+  return object_name(identifiers(network).at(part), k);
+}
 
 long weights_bytes(const files::Network& network) {
   std::size_t numbers = 0;

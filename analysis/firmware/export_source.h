@@ -36,6 +36,9 @@ inline constexpr char kSmallerNetwork[] =
     "train a smaller one: fewer --folds, --teachers in place of them, or narrower --phi, --rho and "
     "--features";
 
+/// Returns the name of the exported object that holds layer `k`, from 0, of a part: "swarmcert_phi_small_1".
+std::string weights_object(const files::Network& network, const files::FunctionId& part, std::size_t k);
+
 struct SourceFile {
   std::string name, contents;
 };

@@ -15,62 +15,47 @@ namespace {
 /// Range of the own state for the ground's phi. Neighbours' states lie in the clamp, or in this range if there is none.
 constexpr float kMostPosition_m = 1, kMostVelocity_m_s = 2;
 
-/// Evaluates the network as the exported source does.
-class FlightEvaluator {
- public:
-  FlightEvaluator(const files::Network& network, int most_neighbours)
-      : network_(network), most_(most_neighbours), scale_(newton_per_unit(network)) {
-    for (const auto& [part, weights] : files::parts(network)) evaluators_.emplace(part, *weights);
-    for (const std::string& kind : files::neighbour_kinds(network))
-      phi_.push_back(evaluators_.at(files::FunctionId::phi(kind)).mlp());
-    if (network.phi.count(files::kGroundKind) != 0) {
-      ground_ = evaluators_.at(files::FunctionId::ground_phi()).mlp();
-      has_ground_ = true;
-    }
-    if (network.clamp) {
-      lower_.assign(network.clamp->lower.begin(), network.clamp->lower.end());
-      upper_.assign(network.clamp->upper.begin(), network.clamp->upper.end());
-    }
-  }
-
-  /// Sets status and force.
-  void run(const std::string& rho_kind, GoldenVector& vector) const {
-    const std::vector<int> silent = files::silent_counts(network_, rho_kind);
-    const nn::DeepSet<float> set{has_ground_ ? &ground_ : nullptr,
-                                 phi_.data(),
-                                 static_cast<int>(phi_.size()),
-                                 evaluators_.at(files::FunctionId::rho(rho_kind)).mlp(),
-                                 lower_.empty() ? nullptr : lower_.data(),
-                                 upper_.empty() ? nullptr : upper_.data(),
-                                 network_.invariants,
-                                 silent.data(),
-                                 static_cast<int>(silent.size() / phi_.size())};
-    std::vector<nn::Neighbour<float>> neighbours;
-    for (std::size_t j = 0; j < vector.inputs.size(); ++j)
-      neighbours.push_back({vector.inputs[j].data(), vector.kinds[j]});
-    std::vector<float> copies(static_cast<std::size_t>(most_ * set.phi_inputs()));
-    std::vector<int> order(static_cast<std::size_t>(most_));
-    std::vector<float> sum(static_cast<std::size_t>(set.hidden()));
-    std::vector<float> scratch(static_cast<std::size_t>(scratch_size(set)));
-    std::vector<float> output(static_cast<std::size_t>(set.outputs()));
-    vector.status = nn::evaluate(
-        set, vector.own.data(), neighbours.data(), static_cast<int>(neighbours.size()), output.data(),
-        nn::DeepSetWorkspace<float>{copies.data(), order.data(), most_, sum.data(), scratch.data()});
-    vector.force_N = nn::rounded(output.front() * scale_);
-  }
-
- private:
-  const files::Network& network_;
-  int most_;
-  float scale_;
-  std::map<files::FunctionId, files::Evaluator<float>> evaluators_;
-  std::vector<nn::Mlp<float>> phi_;
-  nn::Mlp<float> ground_{};
-  bool has_ground_ = false;
-  std::vector<float> lower_, upper_;
-};
-
 }  // namespace
+
+FlightEvaluator::FlightEvaluator(const files::Network& network, int most_neighbours)
+    : network_(network), most_(most_neighbours), scale_(newton_per_unit(network)) {
+  for (const auto& [part, weights] : files::parts(network)) evaluators_.emplace(part, *weights);
+  for (const std::string& kind : files::neighbour_kinds(network))
+    phi_.push_back(evaluators_.at(files::FunctionId::phi(kind)).mlp());
+  if (network.phi.count(files::kGroundKind) != 0) {
+    ground_ = evaluators_.at(files::FunctionId::ground_phi()).mlp();
+    has_ground_ = true;
+  }
+  if (network.clamp) {
+    lower_.assign(network.clamp->lower.begin(), network.clamp->lower.end());
+    upper_.assign(network.clamp->upper.begin(), network.clamp->upper.end());
+  }
+}
+
+void FlightEvaluator::run(const std::string& rho_kind, GoldenVector& vector) const {
+  const std::vector<int> silent = files::silent_counts(network_, rho_kind);
+  const nn::DeepSet<float> set{has_ground_ ? &ground_ : nullptr,
+                               phi_.data(),
+                               static_cast<int>(phi_.size()),
+                               evaluators_.at(files::FunctionId::rho(rho_kind)).mlp(),
+                               lower_.empty() ? nullptr : lower_.data(),
+                               upper_.empty() ? nullptr : upper_.data(),
+                               network_.invariants,
+                               silent.data(),
+                               static_cast<int>(silent.size() / phi_.size())};
+  std::vector<nn::Neighbour<float>> neighbours;
+  for (std::size_t j = 0; j < vector.inputs.size(); ++j)
+    neighbours.push_back({vector.inputs[j].data(), vector.kinds[j]});
+  std::vector<float> copies(static_cast<std::size_t>(most_ * set.phi_inputs()));
+  std::vector<int> order(static_cast<std::size_t>(most_));
+  std::vector<float> sum(static_cast<std::size_t>(set.hidden()));
+  std::vector<float> scratch(static_cast<std::size_t>(scratch_size(set)));
+  std::vector<float> output(static_cast<std::size_t>(set.outputs()));
+  vector.status = nn::evaluate(
+      set, vector.own.data(), neighbours.data(), static_cast<int>(neighbours.size()), output.data(),
+      nn::DeepSetWorkspace<float>{copies.data(), order.data(), most_, sum.data(), scratch.data()});
+  vector.force_N = nn::rounded(output.front() * scale_);
+}
 
 float newton_per_unit(const files::Network& network) {
   files::require_force_z(network);

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "nn/deep_set.h"
+#include "nn/weights/functions.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::firmware {
@@ -17,6 +19,26 @@ struct GoldenVector {
   std::vector<int> kinds;                  ///< one per neighbour: index into files::neighbour_kinds()
   nn::DeepSetStatus status = nn::DeepSetStatus::kOk;
   float force_N = 0;
+};
+
+/// Evaluates a network as the exported source does.
+class FlightEvaluator {
+ public:
+  /// @param network must outlive this; a deep set in which every weight is a float32.
+  FlightEvaluator(const files::Network& network, int most_neighbours);
+
+  /// Sets status and force of `vector` for a vehicle of kind `rho_kind`.
+  void run(const std::string& rho_kind, GoldenVector& vector) const;
+
+ private:
+  const files::Network& network_;
+  int most_;
+  float scale_;
+  std::map<files::FunctionId, files::Evaluator<float>> evaluators_;
+  std::vector<nn::Mlp<float>> phi_;
+  nn::Mlp<float> ground_{};
+  bool has_ground_ = false;
+  std::vector<float> lower_, upper_;
 };
 
 /// Returns newtons per unit of the network's output; gram-force if the network states no unit, as in the published

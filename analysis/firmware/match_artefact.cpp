@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 
-#include "analysis/firmware/match_code.h"
+#include "analysis/firmware/image_checks.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
@@ -30,7 +31,7 @@ std::string in_words(const FileDifference& d) {
 void add_weights(const MatchResult& weights, const std::string& path, ArtefactMatch& result) {
   result.arrays = weights.arrays;
   result.numbers = weights.numbers;
-  if (weights.equal) return;
+  if (weights.equal || result.first_difference) return;
   result.number_difference = weights.first_difference;
   result.first_difference = in_words(*weights.first_difference, path);
 }
@@ -106,23 +107,43 @@ void match_other_source(const files::Network& network, const std::string& path, 
   if (!why.empty()) result.not_checked.push_back("that a compiler takes these weights and no others: " + why);
 }
 
+/// Keeps the blocks of the objects that hold the network's layers, if the image has all of them by name.
+std::vector<FloatBlock> blocks_of(const std::vector<WeightsObject>& objects, std::vector<FloatBlock> blocks) {
+  std::set<std::string> names;
+  for (const WeightsObject& object : objects) {
+    if (object.symbol == nullptr) return blocks;
+    names.insert(object.name);
+  }
+  blocks.erase(std::remove_if(blocks.begin(), blocks.end(),
+                              [&names](const FloatBlock& block) { return names.count(block.name) == 0; }),
+               blocks.end());
+  return blocks;
+}
+
 void match_elf(const files::Network& network, const std::string& path, const std::string& bytes,
-               int most_neighbours, ArtefactMatch& result) {
+               const ArtefactOptions& options, ArtefactMatch& result) {
   result.files = {path};
-  add_weights(match(network, blocks_in_elf(bytes, path)), path, result);
+  std::vector<FloatBlock> blocks = blocks_in_elf(bytes, path);
+  const ElfImage image = read_arm_image(bytes);
+  if (image.why_not.empty() && !network.plain) {
+    const std::vector<WeightsObject> objects = weights_objects(network, image);
+    blocks = blocks_of(objects, std::move(blocks));
+    std::string twice = duplicate_symbol(image);
+    const bool has_names = std::all_of(objects.begin(), objects.end(),
+                                       [](const WeightsObject& object) { return object.symbol != nullptr; });
+    if (twice.empty() && has_names) twice = second_copy(network, objects, image);
+    if (!twice.empty()) result.first_difference = path + " has " + twice;
+  }
+  add_weights(match(network, blocks), path, result);
   result.compared.push_back(fmt::format("{}: all {} weights and biases, in {} arrays, bit for bit", path,
                                         result.numbers, result.arrays));
   if (result.first_difference) return;
-  const CodeMatch code = match_code(network, bytes, most_neighbours);
-  if (code.outcome == CodeMatch::Outcome::kNotChecked) {
-    result.not_checked.push_back("evaluator, clamp and scale in " + path + ": " + code.why_not);
-    return;
-  }
-  result.compared.push_back(
-      fmt::format("{}: evaluator, clamp and scale, by predict_force_z() on QEMU's Cortex-M4 for {} golden "
-                  "vectors, bit for bit",
-                  path, code.vectors));
-  result.not_covered.emplace_back("which code calls predict_force_z(), and with what inputs");
+  const CodeMatch code = match_code(network, image, options.most_neighbours, options.app);
+  for (const std::string& what : code.compared) result.compared.push_back(path + ": " + what);
+  result.not_covered = code.not_covered;
+  result.holds_app = code.holds_app;
+  if (code.outcome == CodeMatch::Outcome::kNotChecked)
+    result.not_checked.push_back("the code in " + path + ": " + code.why_not);
   if (code.outcome == CodeMatch::Outcome::kDifferent) result.first_difference = path + ": " + code.difference;
 }
 
@@ -153,7 +174,7 @@ ArtefactMatch match_artefact(const files::Network& network, const std::string& p
     match_export_files(network, path, options.source, result);
     add_weights_of_export(network, result);
   } else if (is_elf(bytes)) {
-    match_elf(network, path, bytes, options.most_neighbours, result);
+    match_elf(network, path, bytes, options, result);
   } else {
     match_other_source(network, path, bytes, result);
   }

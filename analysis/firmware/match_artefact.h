@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "analysis/firmware/match.h"
+#include "analysis/firmware/match_code.h"
 #include "analysis/firmware/match_export.h"
 
 namespace swarmcert::firmware {
@@ -29,17 +30,20 @@ struct ArtefactMatch {
   std::optional<ExportOptions> parameters;        ///< parameters of an export as stated by its files
   int arrays = 0;           ///< weight matrices and bias vectors compared; 0: the files contain none
   std::size_t numbers = 0;  ///< number of weights and biases in them
+  bool holds_app = false;   ///< an ELF file with the Crazyflie app, which was compared too
 };
 
 struct ArtefactOptions {
   ExportMatchOptions source;
-  int most_neighbours = 10;  ///< of the export that is contained in an ELF file
+  int most_neighbours = 10;                         ///< of the export that is contained in an ELF file
+  ExpectApp app = [] { return AppExpectation(); };  ///< what the app in an ELF file should hold
 };
 
 /// Compares depending on what `path` is:
 ///   the folder or a file of an export   match_export();
 ///   other C or C++ source               the weights, bit for bit; equal only if the file contains nothing else;
-///   an ELF file                         the weights, bit for bit, and match_code().
+///   an ELF file                         the weights, bit for bit, in the objects named as exported if there are these;
+///                                       that there is no second copy and no symbol twice; and match_code().
 /// Precondition: every weight is a float32 (files::as_float32()).
 /// @throws files::InputError if a file cannot be read or is damaged.
 ArtefactMatch match_artefact(const files::Network& network, const std::string& path,

@@ -13,7 +13,7 @@ function(build_app folder network main)
   if(NOT arg_NO_KBUILD_FLAGS)
     list(APPEND flags ${kbuild})
   endif()
-  list(APPEND flags -I${SOURCE} -I${network} -I${SOURCE}/tests/firmware -I${SOURCE}/tests/firmware/crazyflie_stub
+  list(APPEND flags -I${SOURCE} -I${network} -I${SOURCE}/tests/firmware -I${SOURCE}/controller/crazyflie/interface -I${SOURCE}/tests/firmware/crazyflie_stub
        -I${SOURCE}/controller/crazyflie/src ${arg_LAST})
   set(cxx ${arg_COMPILER})
   set(c ${arg_COMPILER} -x c -std=gnu11)

@@ -214,7 +214,11 @@ int check_app() {
 }
 
 #ifdef __arm__
-extern "C" int program() { return check_app(); }
+extern "C" int program() {
+  const int line = check_app();
+  if (line < 0) appMain();  // never: keeps the task in the image
+  return line;
+}
 #else
 int main() {
   const int line = check_app();

@@ -73,7 +73,7 @@ const std::vector<Layer>& layers() {
        {"analysis/logs", "nn/base", "nn/weights", "stability", "stability/simulation", "stability/tasks"}},
       {"analysis/identification/thrust", {"controller", "nn/base"}},
       {"analysis/identification", {"analysis/logs", "analysis/residuals", "nn/base", "stability"}},
-      {"analysis/firmware", {"nn", "nn/base", "nn/weights"}},
+      {"analysis/firmware", {"controller/crazyflie", "nn", "nn/base", "nn/weights"}},
       {"analysis/tracking/tube",
        {"lipschitz/base", "lipschitz/branch", "lipschitz/checker", "lipschitz/upper", "lipschitz/values",
         "nn/base", "nn/weights", "stability", "stability/bounds", "stability/bounds/enclosures",

@@ -1,4 +1,5 @@
 // The controller that the stock firmware calls a thousand times per second: setpoint and state in, PWM out.
+#include <cstddef>
 #include <limits>
 
 #include "controller/flight_controller.h"
@@ -144,12 +145,59 @@ void stop(control_t& control, const state_t& state) {
   for (float& force : control.normalizedForces) force = 0;
 }
 
+// The position of the time stamp in a peer's data differs between firmware versions.
+template <typename Peer>
+constexpr auto stamp_offset(int) -> decltype(Peer::timestamp, std::size_t{}) {
+  return offsetof(Peer, timestamp);
+}
+template <typename Peer>
+constexpr std::size_t stamp_offset(long) {
+  return offsetof(Peer, pos) + offsetof(point_t, timestamp);
+}
+
 }  // namespace
 }  // namespace swarmcert::crazyflie
 
 extern "C" {
 
+// Where the firmware's types have the members that the app uses, so that `match` can call it in the linked image:
+// analysis/firmware/app_layout.h lists them in this order.
+extern const std::uint16_t swarmcert_layout[];
+const std::uint16_t swarmcert_layout[] = {
+    1,
+    sizeof(setpoint_t),
+    offsetof(setpoint_t, attitude.yaw),
+    offsetof(setpoint_t, attitudeRate.roll),
+    offsetof(setpoint_t, attitudeQuaternion.x),
+    offsetof(setpoint_t, thrust),
+    offsetof(setpoint_t, position.x),
+    offsetof(setpoint_t, velocity.x),
+    offsetof(setpoint_t, acceleration.x),
+    offsetof(setpoint_t, mode.x),
+    offsetof(setpoint_t, mode.y),
+    offsetof(setpoint_t, mode.z),
+    offsetof(setpoint_t, mode.yaw),
+    offsetof(setpoint_t, mode.quat),
+    sizeof(setpoint_t{}.mode.x),
+    sizeof(sensorData_t),
+    offsetof(sensorData_t, gyro.x),
+    sizeof(state_t),
+    offsetof(state_t, attitudeQuaternion.x),
+    offsetof(state_t, position.x),
+    offsetof(state_t, velocity.x),
+    sizeof(control_t),
+    offsetof(control_t, normalizedForces),
+    offsetof(control_t, controlMode),
+    sizeof(control_t{}.controlMode),
+    sizeof(peerLocalizationOtherPosition_t),
+    offsetof(peerLocalizationOtherPosition_t, id),
+    offsetof(peerLocalizationOtherPosition_t, pos.x),
+    swarmcert::crazyflie::stamp_offset<peerLocalizationOtherPosition_t>(0),
+    PEER_LOCALIZATION_MAX_NEIGHBORS,
+};
+
 void controllerOutOfTreeInit() {
+  asm volatile("" : : "r"(swarmcert_layout));  // keeps the table in the image
   swarmcert::crazyflie::set_up();
   swarmcert::crazyflie::memory = {};
   swarmcert::crazyflie::heading = {};

@@ -13,6 +13,7 @@ using controller::Vector3;
 
 static_assert(swarmcert_network::kTakesRelativeState,
               "the app provides relative position and velocity, but this network has other inputs");
+static_assert(swarmcert_network::kInputs == controller::kNeighbourInputs);
 static_assert(swarmcert_network::kMostNeighbours >= PEER_LOCALIZATION_MAX_NEIGHBORS,
               "export with --most-neighbours of at least PEER_LOCALIZATION_MAX_NEIGHBORS");
 static_assert(PEER_LOCALIZATION_MAX_NEIGHBORS <= controller::kMostNeighbours);
@@ -136,11 +137,15 @@ void step_network(std::uint32_t now_ms) {
   static controller::NeighbourTrack<float> tracks[kPeers];
   for (int i = 0; i < kPeers; ++i) tracks[i] = peers[i].track;
   controller::PredictionSettings<float> settings;
-  settings.newton_per_unit = swarmcert_network::kNewtonPerUnit;
+  settings.newton_per_unit = 1.0f;
+  // The function that is certified, exported and tested; there is no other evaluation in the image.
+  const auto evaluate = [own_kind](const float* state, const nn::Neighbour<float>* neighbours, int count,
+                                   float* force_N) {
+    return swarmcert_network::predict_force_z(own_kind, state, neighbours, count, force_N);
+  };
   const std::uint64_t begin_us = usecTimestamp();
-  const controller::Prediction<float> prediction = controller::predict(
-      swarmcert_network::deep_set(own_kind), settings, own.position_W_m(), own.velocity_W_m_s(), tracks,
-      kPeers, now_ms, last_effect_W_N, swarmcert_network::workspace());
+  const controller::Prediction<float> prediction = controller::predict_with(
+      evaluate, settings, own.position_W_m(), own.velocity_W_m_s(), tracks, kPeers, now_ms, last_effect_W_N);
   const std::uint64_t took_us = usecTimestamp() - begin_us;
   swarmcert_status.network_us = static_cast<std::uint16_t>(took_us < 65535 ? took_us : 65535);
   publish(prediction, now_ms);

@@ -1,4 +1,4 @@
-/* Stub: see FreeRTOS.h. */
+/* See FreeRTOS.h. */
 #pragma once
 
 #include "stabilizer_types.h"

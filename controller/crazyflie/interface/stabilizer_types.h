@@ -1,4 +1,4 @@
-/* Stub: see FreeRTOS.h. The members that the app reads and writes, with the firmware's units. */
+/* See FreeRTOS.h. The members that the app reads and writes, with the firmware's units. */
 #pragma once
 
 #include <stdbool.h>

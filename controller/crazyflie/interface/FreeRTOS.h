@@ -1,4 +1,4 @@
-/* Stub of the interface that the app in controller/crazyflie uses; written for this project's tests. */
+/* The part of the interface that the app uses; written for this project. */
 #pragma once
 
 #include <stdint.h>

@@ -1,4 +1,4 @@
-/* Stub: see FreeRTOS.h. Groups are visible to the test as stub_log_<group>. */
+/* See FreeRTOS.h. Groups are visible to the test as stub_log_<group>. */
 #pragma once
 
 #include <stdint.h>

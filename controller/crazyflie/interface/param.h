@@ -1,4 +1,4 @@
-/* Stub: see log.h; groups are visible to the test as stub_param_<group>. */
+/* See log.h; groups are visible to the test as stub_param_<group>. */
 #pragma once
 
 #include "log.h"
