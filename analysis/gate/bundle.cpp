@@ -6,14 +6,18 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 #include <system_error>
 
 #include "analysis/gate/checks/checks.h"
-#include "nn/base/content_hash.h"
+#include "analysis/gate/documents.h"
+#include "analysis/gate/envelope.h"
+#include "analysis/gate/outputs.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
@@ -25,7 +29,10 @@ namespace fs = std::filesystem;
 using files::InputError;
 using files::Json;
 
-constexpr char kManifestSchema[] = "swarmcert/manifest/1";
+constexpr char kStatement[] = "statement.json", kEnvelope[] = "statement.dsse.json", kBill[] = "bom.cdx.json",
+               kResult[] = "gate.json";
+/// Values of rows that are derived again agree to this relative error: other processors sum in other orders.
+constexpr double kSameValue = 1e-9;
 
 fs::path normal(const std::string& path) { return fs::absolute(path).lexically_normal(); }
 
@@ -40,29 +47,6 @@ fs::path common_folder(const std::vector<EvidenceFile>& files) {
     common = shared;
   }
   return common;
-}
-
-struct Entry {
-  std::string path, role, sha256;  ///< path relative to the bundle
-  std::size_t bytes = 0;
-};
-
-Json manifest_of(const std::vector<Entry>& entries, const std::string& policy) {
-  Json list = Json::array();
-  for (const Entry& entry : entries) {
-    list.push_back(
-        {{"path", entry.path}, {"role", entry.role}, {"bytes", entry.bytes}, {"sha256", entry.sha256}});
-  }
-  Json manifest = {
-      {"schema", kManifestSchema},
-      {"tool", "swarmcert " SWARMCERT_VERSION},
-      {"statement",
-       "These files, with these SHA-256, are one release that passed its gate: the policy, the weights, "
-       "the certificate of these weights, the source and ELF that hold them, gains, models and logs."},
-      {"policy", policy},
-      {"files", std::move(list)}};
-  manifest["content_sha256"] = files::content_sha256(manifest);
-  return manifest;
 }
 
 /// Removes an unfinished folder on destruction.
@@ -98,38 +82,45 @@ class Unfinished {
 
 [[noreturn]] void reject(const std::string& reason) { throw Unfounded(reason); }
 
-std::vector<Entry> read_manifest(const fs::path& folder, std::string& sha256, std::string& policy) {
-  const std::string path = (folder / "manifest.json").string();
-  const std::string text = files::read_file(path);
-  sha256 = files::sha256(text);
-  const Json manifest = files::parse_json(text, path, kManifestSchema);
-  if (files::to_text(manifest) != text) reject("manifest.json is not as it was written");
-  files::require_keys(manifest, {"schema", "tool", "statement", "policy", "files", "content_sha256"},
-                      "manifest.json");
-  if (manifest["content_sha256"] != files::content_sha256(manifest))
-    reject("manifest.json does not have the hash that it states");
-  policy = manifest["policy"].get<std::string>();
-  std::vector<Entry> entries;
-  for (const Json& one : manifest["files"]) {
-    files::require_keys(one, {"path", "role", "bytes", "sha256"}, "manifest.json, files");
-    Entry entry{one["path"].get<std::string>(), one["role"].get<std::string>(),
-                one["sha256"].get<std::string>(), one["bytes"].get<std::size_t>()};
-    const fs::path relative(entry.path);
-    if (relative.is_absolute() || relative.lexically_normal() != relative || entry.path.empty() ||
+/// Returns the text of one of the bundle's documents, which must be as it was written.
+Json read_document(const fs::path& folder, const char* name) {
+  const std::string path = (folder / name).string(), text = files::read_file(path);
+  Json document = files::parse_json(text, path);
+  if (files::to_text(document) != text) reject(std::string(name) + " is not as it was written");
+  return document;
+}
+
+/// Returns the files that a statement names. Roles are known of the configuration only.
+std::vector<BundledFile> files_of(const Json& statement) {
+  std::vector<BundledFile> files;
+  const auto add = [&files](const Json& described, const std::string& role) {
+    BundledFile file{described.at("name").get<std::string>(), role,
+                     described.at("digest").at("sha256").get<std::string>()};
+    const fs::path relative(file.path);
+    if (relative.is_absolute() || relative.lexically_normal() != relative || file.path.empty() ||
         *relative.begin() == "..")
-      reject("manifest.json names " + files::in_quotes(entry.path) +
+      reject(std::string(kStatement) + " names " + files::in_quotes(file.path) +
              ", which is not a path inside the bundle");
-    entries.push_back(std::move(entry));
-  }
-  return entries;
+    files.push_back(std::move(file));
+  };
+  for (const Json& subject : statement.at("subject")) add(subject, "");
+  for (const Json& one : statement.at("predicate").at("configuration"))
+    add(one, one.at("annotations").at("role").get<std::string>());
+  return files;
+}
+
+std::string path_of_role(const std::vector<BundledFile>& files, const std::string& role) {
+  const auto found = std::find_if(files.begin(), files.end(),
+                                  [&role](const BundledFile& file) { return file.role == role; });
+  return found == files.end() ? "" : found->path;
 }
 
 /// Verifies that the folder contains exactly these files and their folders, as regular files with these hashes.
-void verify_files(const fs::path& folder, const std::vector<Entry>& entries) {
-  std::set<std::string> files = {"manifest.json"}, folders;
-  for (const Entry& entry : entries) {
+void verify_files(const fs::path& folder, const std::vector<BundledFile>& entries) {
+  std::set<std::string> files = {kStatement, kEnvelope}, folders;
+  for (const BundledFile& entry : entries) {
     if (!files.insert(entry.path).second)
-      reject("manifest.json names " + files::in_quotes(entry.path) + " twice");
+      reject(std::string(kStatement) + " names " + files::in_quotes(entry.path) + " twice");
     for (fs::path up = fs::path(entry.path).parent_path(); !up.empty(); up = up.parent_path())
       folders.insert(up.string());
   }
@@ -139,51 +130,60 @@ void verify_files(const fs::path& folder, const std::vector<Entry>& entries) {
     const bool is_known = type == fs::file_type::regular     ? files.count(relative) == 1
                           : type == fs::file_type::directory ? folders.count(relative) == 1
                                                              : false;
-    if (!is_known) reject(files::in_quotes(relative) + " is not in the manifest");
+    if (!is_known) reject(files::in_quotes(relative) + " is not in the statement");
   }
-  for (const Entry& entry : entries) {
+  for (const BundledFile& entry : entries) {
     const fs::path path = folder / entry.path;
     if (!fs::is_regular_file(fs::symlink_status(path))) reject(files::in_quotes(entry.path) + " is missing");
-    const std::string bytes = files::read_file(path.string());
-    if (bytes.size() != entry.bytes || files::sha256(bytes) != entry.sha256)
-      reject(files::in_quotes(entry.path) + " is not the file of the manifest");
+    if (files::sha256_of_file(path.string()) != entry.sha256)
+      reject(files::in_quotes(entry.path) + " is not the file of the statement");
   }
 }
 
-/// Verifies that the policy refers to the files of the manifest: inside the bundle, and with the same roles.
-void verify_roles(const fs::path& folder, const std::vector<Entry>& entries, const Policy& policy) {
-  std::map<std::string, std::string> roles;
-  for (const Entry& entry : entries) roles[entry.path] = entry.role;
-  std::size_t named = 0;
-  for (const EvidenceFile& file : evidence_files(policy, "")) {
-    const std::string relative = normal(file.path).lexically_relative(normal(folder.string())).string();
-    const auto found = roles.find(relative);
-    if (found == roles.end())
-      reject("the policy names " + files::in_quotes(relative) + ", which is not in the bundle");
-    if (found->second != file.role)
-      reject(files::in_quotes(relative) + " is " + file.role + " to the policy, but " + found->second +
-             " in the manifest");
-    ++named;
-  }
-  const auto unnamed = std::count_if(entries.begin(), entries.end(), [](const Entry& entry) {
-    return entry.role == "result" || entry.role == "baseline";
-  });
-  if (named + static_cast<std::size_t>(unnamed) != entries.size())
-    reject("the manifest has files that the policy does not name");
+/// Returns the files of a bundle as they are derived from its policy: every file that this names, in the order of
+/// `list`, with its role and hash.
+/// @param path_of returns the path in the bundle of a file of the release.
+template <class PathInBundle>
+std::vector<BundledFile> derived_files(const std::vector<EvidenceFile>& list, const PathInBundle& path_of) {
+  std::vector<BundledFile> files;
+  for (const EvidenceFile& file : list)
+    files.push_back({path_of(file), file.role, files::sha256_of_file(file.path)});
+  return files;
 }
 
-/// Runs the independent checker and the match on the files of the bundle.
+/// The documents of a bundle, derived from its files and the result of the gate.
+struct Documents {
+  std::string bill, statement;
+};
+Documents documents_of(const Policy& policy, std::vector<BundledFile> files, const Json& gate_json,
+                       const std::string& gate_text) {
+  std::optional<files::Network> network;
+  if (policy.release.has_network()) network = files::load_evaluated_network(policy.release.network);
+  Documents documents;
+  const Json& rows = gate_json.at("checks");
+  documents.bill = files::to_text(bill_of_materials(network ? &*network : nullptr, files, rows));
+  files.push_back({kResult, "result", files::sha256(gate_text)});
+  files.push_back({kBill, "bill of materials", files::sha256(documents.bill)});
+  documents.statement = files::to_text(statement_of(files, rows));
+  return documents;
+}
+
+/// Verifies claims for which the policy may not ask: the independent checker on the certificate, and the match.
 void verify_claims(const Policy& policy, const GateSettings& settings, BundleVerdict& verdict) {
   Evidence evidence(policy, settings);
   const Release& release = policy.release;
-  if (!release.certificate.empty()) {
+  const auto is_asked = [&policy](const char* name) {
+    return std::any_of(policy.checks.begin(), policy.checks.end(),
+                       [name](const PlannedCheck& check) { return check.name == name; });
+  };
+  if (!release.certificate.empty() && !is_asked("certificate")) {
     const std::string why = evidence.why_not_certified();
     if (!why.empty()) reject("the certificate is rejected: " + why);
     verdict.verified.emplace_back("the independent checker accepts the certificate for the bundled weights");
   }
   const auto match = [&](const std::string& path, bool is_elf) {
-    if (path.empty()) return;
-    const Check check = match_row(evidence, "match", 0, path, is_elf);
+    if (path.empty() || is_asked("match")) return;
+    const Check check = match_row(evidence, "match", 0, path, is_elf, false);
     if (check.verdict != Verdict::kPass) reject(check.reason + ": " + check.witness);
     verdict.verified.push_back(std::string(is_elf ? "the ELF: " : "the source: ") + check.witness);
   };
@@ -191,39 +191,98 @@ void verify_claims(const Policy& policy, const GateSettings& settings, BundleVer
   match(release.elf, true);
 }
 
-void verify_again(const Policy& policy, const GateSettings& settings, BundleVerdict& verdict) {
-  const GateResult again = run_gate(policy, settings);
-  for (const Check& check : again.checks) {
-    if (check.verdict != Verdict::kPass) reject(check.name + ", run again: " + check.reason);
-  }
-  verdict.verified.push_back(fmt::format("all {} checks of the policy pass again", again.checks.size()));
+bool is_same_value(const Json& a, const Json& b) {
+  if (!a.is_number() || !b.is_number()) return a == b;
+  const double x = a.get<double>(), y = b.get<double>();
+  return std::abs(x - y) <= kSameValue * std::max(std::abs(x), std::abs(y));
 }
 
-void verify(const fs::path& folder, bool rerun, GateSettings settings, BundleVerdict& verdict) {
-  std::string policy_path;
-  const std::vector<Entry> entries = read_manifest(folder, verdict.manifest_sha256, policy_path);
+/// Compares the stated result with the one derived again; words that explain a row may name paths and are not compared.
+void verify_result(const Json& stated, const GateResult& again, const GateSettings& settings) {
+  Json derived;
+  add_json(again, derived);
+  for (const char* const member : {"verdict", "changes", "not_run"})
+    if (stated.at(member) != derived[member]) reject(fmt::format("gate.json states another {}", member));
+  if (stated.at("updates_baseline") != settings.updates_baseline) reject("gate.json is not of this run");
+  const Json &rows = stated.at("checks"), &own = derived["checks"];
+  if (rows.size() != own.size())
+    reject(fmt::format("gate.json has {} rows, the policy gives {}", rows.size(), own.size()));
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    for (const auto& [member, value] : own[i].items()) {
+      if (member == "witness" || member == "reason") continue;
+      const bool is_number_of_run = member == "value" || member == "baseline" || member == "limit";
+      const Json& other = rows[i].at(member);
+      if (is_number_of_run ? !is_same_value(other, value) : other != value)
+        reject(fmt::format("gate.json states {} {} of {}, the evidence gives {}", member, other.dump(),
+                           own[i]["name"].get<std::string>(), value.dump()));
+    }
+    if (rows[i].size() != own[i].size()) reject("gate.json has a row with other members");
+  }
+  if (stated.at("inputs").size() != again.files.size()) reject("gate.json states other inputs");
+  for (std::size_t i = 0; i < again.files.size(); ++i) {
+    if (stated["inputs"][i].at("sha256") != files::sha256_of_file(again.files[i].path))
+      reject("gate.json was made with another " + again.files[i].role + " than " + again.files[i].path);
+  }
+}
+
+void verify_signature(const fs::path& folder, const std::string& public_key, BundleVerdict& verdict) {
+  const bool is_signed = fs::exists(folder / kEnvelope);
+  if (public_key.empty()) {
+    verdict.not_verified.push_back(fmt::format(
+        "who made it: without --key, whoever can write the bundle can replace policy, evidence and result by "
+        "others that agree. {} Compare the statement's SHA-256 with one that came another way",
+        is_signed ? "Its signature was not verified." : "It is not signed."));
+    return;
+  }
+  if (!is_signed) reject("it is not signed");
+  const std::string why = why_not_signed(read_document(folder, kEnvelope),
+                                         files::read_file((folder / kStatement).string()), public_key);
+  if (!why.empty()) reject(why);
+  verdict.verified.emplace_back("the statement is signed by the key");
+}
+
+void verify(const fs::path& folder, const std::string& public_key, GateSettings settings,
+            BundleVerdict& verdict) {
+  const std::string statement_text = files::read_file((folder / kStatement).string());
+  verdict.statement_sha256 = files::sha256(statement_text);
+  verify_signature(folder, public_key, verdict);
+  const std::vector<BundledFile> entries = files_of(read_document(folder, kStatement));
   verify_files(folder, entries);
   verdict.files = entries.size();
   verdict.verified.push_back(
-      fmt::format("{} files with the hashes of the manifest, none missing or additional", entries.size()));
-  const std::string result = (folder / "gate.json").string();
-  const Json gate_json = files::read_json(result, "swarmcert/gate/1");
-  if (gate_json.value("verdict", "") != "pass") reject("gate.json states that the release did not pass");
-  const Policy policy = read_policy((folder / policy_path).string());
-  verify_roles(folder, entries, policy);
-  verify_claims(policy, settings, verdict);
-  if (!rerun) return;
-  for (const Entry& entry : entries)
-    if (entry.role == "baseline") settings.baseline = (folder / entry.path).string();
-  settings.may_lack_baseline = settings.baseline.empty();
+      fmt::format("{} files with the hashes of the statement, none missing or additional", entries.size()));
+
+  const std::string gate_text = files::read_file((folder / kResult).string());
+  const Json gate_json = files::parse_json(gate_text, (folder / kResult).string(), "swarmcert/gate/1");
+  const Policy policy = read_policy((folder / path_of_role(entries, "policy")).string());
+  const std::string baseline = path_of_role(entries, "baseline");
+  if (!baseline.empty()) settings.baseline = (folder / baseline).string();
   settings.updates_baseline = gate_json.value("updates_baseline", false);
-  verify_again(policy, settings, verdict);
+  settings.may_lack_baseline = settings.updates_baseline && baseline.empty();
+  if (settings.may_lack_baseline) settings.baseline = (folder / "no baseline").string();
+  const std::vector<BundledFile> derived =
+      derived_files(evidence_files(policy, settings.baseline), [&](const EvidenceFile& file) {
+        return normal(file.path).lexically_relative(normal(folder.string())).string();
+      });
+  const Documents documents = documents_of(policy, derived, gate_json, gate_text);
+  if (documents.statement != statement_text)
+    reject("the statement is not that of the files that the policy names and of the rows of gate.json");
+  if (documents.bill != files::read_file((folder / kBill).string()))
+    reject(std::string(kBill) + " is not that of these files");
+  verify_claims(policy, settings, verdict);
+  const GateResult again = run_gate(policy, settings);
+  for (const Check& check : again.checks) {
+    if (check.verdict != Verdict::kPass) reject(check.name + ", derived again: " + check.reason);
+  }
+  verify_result(gate_json, again, settings);
+  verdict.verified.push_back(
+      fmt::format("all {} rows of the result, derived again from the evidence", again.checks.size()));
 }
 
 }  // namespace
 
 std::string write_bundle(const std::string& folder, const Policy& policy, const GateResult& result,
-                         const Json& gate_json, bool overwrite) {
+                         const Json& gate_json, const std::string& private_key, bool overwrite) {
   const fs::path target = normal(folder).has_filename() ? normal(folder) : normal(folder).parent_path();
   if (fs::exists(target) && !overwrite && !(fs::is_directory(target) && fs::is_empty(target)))
     throw InputError({folder, "", "", "", "the folder is not empty", "--force replaces it"});
@@ -233,48 +292,53 @@ std::string write_bundle(const std::string& folder, const Policy& policy, const 
 
   Unfinished unfinished(target.string() + ".part-" + std::to_string(::getpid()));
   const fs::path common = common_folder(result.files);
-  std::vector<Entry> entries;
-  const auto put = [&](const std::string& relative, const std::string& role, const std::string& bytes) {
+  const auto path_of = [&common](const EvidenceFile& file) {
+    return (fs::path("files") / normal(file.path).lexically_relative(common)).string();
+  };
+  const auto put = [&](const std::string& relative, const std::string& bytes) {
     const fs::path path = unfinished.path() / relative;
     fs::create_directories(path.parent_path());
     files::write_file(path.string(), bytes, false);
-    entries.push_back({relative, role, files::sha256(bytes), bytes.size()});
   };
-  std::string policy_path;
   for (const EvidenceFile& file : result.files) {
-    const fs::path from = normal(file.path);
-    const std::string bytes = files::read_file(from.string());
-    const auto hash = judged.find(from.string());
+    const std::string bytes = files::read_file(file.path);
+    const auto hash = judged.find(normal(file.path).string());
     if (hash == judged.end() || hash->second != files::sha256(bytes))
       throw InputError({file.path, "", "", "", "changed while the release was judged", "run the gate again"});
-    const std::string relative = (fs::path("files") / from.lexically_relative(common)).string();
-    if (file.role == "policy") policy_path = relative;
-    put(relative, file.role, bytes);
+    put(path_of(file), bytes);
   }
-  put("gate.json", "result", files::to_text(gate_json));
-  const std::string manifest = files::to_text(manifest_of(entries, policy_path));
-  files::write_file((unfinished.path() / "manifest.json").string(), manifest, false);
+  const std::string gate_text = files::to_text(gate_json);
+  const Documents documents =
+      documents_of(policy, derived_files(result.files, path_of), gate_json, gate_text);
+  put(kResult, gate_text);
+  put(kBill, documents.bill);
+  put(kStatement, documents.statement);
+  if (!private_key.empty()) put(kEnvelope, files::to_text(sign(documents.statement, private_key)));
 
-  try {
-    verify_roles(unfinished.path(), entries, read_policy((unfinished.path() / policy_path).string()));
-  } catch (const Unfounded& error) {
-    throw InputError({policy.path, "", "", "", std::string("cannot be bundled: ") + error.what(),
-                      "name files by paths relative to the file that names them"});
+  const Policy bundled = read_policy((unfinished.path() / path_of(result.files.front())).string());
+  for (const EvidenceFile& file : evidence_files(bundled, "")) {
+    const std::string relative = normal(file.path).lexically_relative(unfinished.path()).string();
+    if (!fs::exists(unfinished.path() / relative) || relative.rfind("..", 0) == 0)
+      throw InputError({policy.path, "", "", "",
+                        "cannot be bundled: it names " + files::in_quotes(file.path) + " outside the bundle",
+                        "name files by paths relative to the file that names them"});
   }
   unfinished.move_to(target);
-  return files::sha256(manifest);
+  return files::sha256(documents.statement);
 }
 
-BundleVerdict verify_bundle(const std::string& folder, bool rerun, const GateSettings& settings) {
+BundleVerdict verify_bundle(const std::string& folder, const std::string& public_key,
+                            const GateSettings& settings) {
   if (!fs::is_directory(folder))
     throw InputError({folder, "", "", "", "is not a folder", "name the folder that gate --bundle wrote"});
+  if (!public_key.empty()) files::read_file(public_key);  // a missing key is no fault of the bundle
   BundleVerdict verdict;
   try {
-    verify(fs::path(folder).lexically_normal(), rerun, settings, verdict);
+    verify(fs::path(folder).lexically_normal(), public_key, settings, verdict);
     verdict.accepted = true;
   } catch (const std::bad_alloc&) {
     throw;
-  } catch (const std::exception& error) {  // damaged files, malformed manifests, unfounded claims
+  } catch (const std::exception& error) {  // damaged files, malformed statements, unfounded claims
     verdict.reason = error.what();
   }
   return verdict;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <limits>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,12 +36,6 @@ struct Check {
 };
 
 using Checks = std::vector<Check>;
-
-/// The limits of the policy's table [regression], in percent.
-struct RegressionLimits {
-  std::optional<double> most;         ///< empty if the policy has no such table
-  std::map<std::string, double> own;  ///< limits of individual rows, by row name
-};
 
 /// Returns a row without a verdict.
 Check row(const std::string& name, int line);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "analysis/gate/baseline.h"
 #include "analysis/residuals/comparison.h"
@@ -225,9 +226,9 @@ const residuals::Comparison& Evidence::residual_comparison() {
 }
 
 const Baseline* Evidence::baseline() {
-  if (!baseline_ && !settings_.baseline.empty()) {
-    baseline_ = read_baseline(settings_.baseline, settings_.may_lack_baseline);
-  }
+  const std::string& path = settings_.baseline;
+  const bool is_there = !path.empty() && !(settings_.may_lack_baseline && !std::filesystem::exists(path));
+  if (!baseline_ && is_there) baseline_ = std::make_unique<Baseline>(read_baseline(path));
   return baseline_.get();
 }
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <cstdio>
 #include <filesystem>
 
 #include "analysis/gate/baseline.h"
@@ -37,25 +37,47 @@ void run(const PlannedCheck& check, Evidence& evidence, Checks& checks) {
   }
 }
 
-/// Checks that no limit is looser than in the baseline and that none of its checks is missing, unless this release
-/// becomes the baseline.
-void judge_limits(const Policy& policy, const Baseline& baseline, bool updates_baseline, Checks& checks) {
+/// Checks that no condition asks for less than in the baseline, unless this release becomes the baseline.
+Check judge_conditions(const Policy& policy, const std::vector<Change>& changes, bool updates_baseline) {
   Check check = row("regression.limits", policy.release_line);
   for (const PlannedCheck& planned : policy.checks)
     if (planned.name == "regression") check.line = planned.line;
-  const std::vector<std::string> all = loosened(baseline, checks, policy.regression);
-  const std::string words = fmt::format("{}", fmt::join(all, "; "));
-  if (all.empty()) {
+  std::string less, more;
+  for (const Change& change : changes) {
+    std::string& list = change.asks_for_less() ? less : more;
+    list += (list.empty() ? "" : "; ") + words(change);
+    if (change.claim == Change::Claim::kOpen) list += " (not known to be stronger)";
+  }
+  const std::string others = more.empty() ? "" : "; also changed: " + more;
+  if (less.empty()) {
     pass(check);
-    check.witness = "no limit is looser than the baseline's, no check was dropped";
+    check.witness = "nothing is asked for less than in the baseline" + others;
   } else if (updates_baseline) {
     pass(check);
-    check.witness = "accepted by --update-baseline: " + words;
+    check.witness = "accepted by --update-baseline: " + less + others;
   } else {
-    fail(check,
-         "the policy asks for less than the baseline's: " + words + ". --update-baseline accepts that");
+    fail(check, "less is asked for than in the baseline: " + less + ". --update-baseline accepts that");
+    check.witness = more;
   }
-  checks.push_back(std::move(check));
+  return check;
+}
+
+Check bad_input(const std::string& name, int line, const std::string& reason) {
+  Check failed = row(name, line);
+  fail(failed, reason);
+  failed.is_bad_input = true;
+  return failed;
+}
+
+/// Code scanning shows places by their path from the root of the repository.
+std::string path_in_repository(const std::string& path) {
+  namespace fs = std::filesystem;
+  const fs::path whole = fs::absolute(path).lexically_normal();
+  for (fs::path folder = whole.parent_path();; folder = folder.parent_path()) {
+    std::error_code ignored;
+    if (fs::exists(folder / ".git", ignored)) return whole.lexically_relative(folder).generic_string();
+    if (!folder.has_relative_path()) return path;
+  }
 }
 
 /// Checks that every file can be read, whether a check needs it or not.
@@ -69,10 +91,7 @@ void judge_files(const std::vector<EvidenceFile>& files, int line, Checks& check
         return check.reason.find(file.path) != std::string::npos;
       };
       if (std::any_of(checks.begin(), checks.end(), says_so)) continue;
-      Check failed = row("release", line);
-      fail(failed, reason);
-      failed.is_bad_input = true;
-      checks.push_back(std::move(failed));
+      checks.push_back(bad_input("release", line, reason));
     }
   }
 }
@@ -96,8 +115,16 @@ Verdict GateResult::verdict() const {
 GateResult run_gate(const Policy& policy, const GateSettings& settings) {
   GateResult result;
   result.policy = policy.path;
+  result.policy_in_repository = path_in_repository(policy.path);
   result.not_run = policy.not_run;
   Evidence evidence(policy, settings);
+  const Baseline* baseline = nullptr;
+  try {
+    baseline = evidence.baseline();
+  } catch (const files::InputError& error) {
+    result.checks.push_back(bad_input("release", policy.release_line, error.what()));
+    return result;
+  }
   int done = 0;
   for (const PlannedCheck& check : policy.checks) {
     if (settings.progress) settings.progress(done++, static_cast<int>(policy.checks.size()), check.name);
@@ -111,24 +138,24 @@ GateResult run_gate(const Policy& policy, const GateSettings& settings) {
                                       return !std::filesystem::is_regular_file(file.path, ignored);
                                     }),
                      result.files.end());
-  try {
-    if (const Baseline* const baseline = evidence.baseline()) {
-      for (Check& check : result.checks) {
-        const auto found = baseline->values.find(check.name);
-        if (found != baseline->values.end()) check.baseline = found->second;
-      }
-      judge_limits(policy, *baseline, settings.updates_baseline, result.checks);
-    }
-  } catch (const files::InputError& error) {
-    // A baseline that was given but cannot be read fails the release, whether or not regressions are judged.
-    const auto says_so = [&](const Check& check) { return check.reason == error.what(); };
-    if (std::none_of(result.checks.begin(), result.checks.end(), says_so)) {
-      Check failed = row("release", policy.release_line);
-      fail(failed, error.what());
-      failed.is_bad_input = true;
-      result.checks.push_back(std::move(failed));
-    }
+  result.conditions = conditions_of(evidence);
+  if (baseline == nullptr) return result;
+  for (Check& check : result.checks) {
+    const auto found = baseline->values.find(check.name);
+    if (found != baseline->values.end()) check.baseline = found->second;
   }
+  result.changes = changes(baseline->conditions, result.conditions);
+  result.checks.push_back(judge_conditions(policy, result.changes, settings.updates_baseline));
+  return result;
+}
+
+GateResult refused_policy(const std::string& policy, const files::InputError& error) {
+  GateResult result;
+  result.policy = policy;
+  result.policy_in_repository = path_in_repository(policy);
+  int line = 1;
+  std::sscanf(error.fault().where.c_str(), "line %d", &line);
+  result.checks.push_back(bad_input("policy", line, error.what()));
   return result;
 }
 

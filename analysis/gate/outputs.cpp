@@ -87,6 +87,13 @@ void add_json(const GateResult& result, files::Json& json) {
          {"reason", printable(check.reason)},
          {"bad_input", check.is_bad_input}});
   }
+  json["changes"] = files::Json::array();
+  for (const Change& change : result.changes) {
+    json["changes"].push_back({{"condition", printable(change.key)},
+                               {"before", change.before},
+                               {"now", change.now},
+                               {"claim", name(change.claim)}});
+  }
   json["not_run"] = result.not_run;
 }
 
@@ -107,7 +114,7 @@ std::string to_junit(const GateResult& result) {
   for (const Check& check : result.checks) {
     text += fmt::format(
         "    <testcase classname=\"swarmcert.gate\" name=\"{}\" file=\"{}\" line=\"{}\" time=\"0\"",
-        xml(check.name), xml(result.policy), check.line);
+        xml(check.name), xml(result.policy_in_repository), check.line);
     if (check.verdict == Verdict::kPass) {
       text += "/>\n";
       continue;
@@ -121,7 +128,7 @@ std::string to_junit(const GateResult& result) {
     text += fmt::format(
         "    <testcase classname=\"swarmcert.gate\" name=\"{}\" file=\"{}\" time=\"0\">\n"
         "      <skipped message=\"the policy does not ask for it\"/>\n    </testcase>\n",
-        xml(kind), xml(result.policy));
+        xml(kind), xml(result.policy_in_repository));
   }
   return text + "  </testsuite>\n</testsuites>\n";
 }
@@ -137,6 +144,7 @@ std::string to_sarif(const GateResult& result, bool allow_inconclusive) {
   };
   for (const CheckKind& kind : check_kinds()) rule(kind.name, kind.summary);
   rule("release", "every file of the release can be read");
+  rule("policy", "the policy can be read");
   Json results = Json::array();
   for (const Check& check : result.checks) {
     if (check.verdict == Verdict::kPass) continue;
@@ -144,7 +152,7 @@ std::string to_sarif(const GateResult& result, bool allow_inconclusive) {
     const auto same = [&id](const Json& one) { return one["id"] == id; };
     const auto index = std::find_if(rules.begin(), rules.end(), same) - rules.begin();
     const Json location = {{"physicalLocation",
-                            {{"artifactLocation", {{"uri", uri(result.policy)}, {"index", 0}}},
+                            {{"artifactLocation", {{"uri", uri(result.policy_in_repository)}, {"index", 0}}},
                              {"region", {{"startLine", std::max(1, check.line)}}}}}};
     results.push_back({{"ruleId", id},
                        {"ruleIndex", index},
@@ -164,11 +172,12 @@ std::string to_sarif(const GateResult& result, bool allow_inconclusive) {
                        {"version", SWARMCERT_VERSION},
                        {"semanticVersion", SWARMCERT_VERSION},
                        {"rules", std::move(rules)}};
-  const Json run = {{"tool", {{"driver", driver}}},
-                    {"invocations", Json::array({Json{{"executionSuccessful", true}}})},
-                    {"artifacts", Json::array({Json{{"location", {{"uri", uri(result.policy)}}}}})},
-                    {"columnKind", "utf16CodeUnits"},
-                    {"results", std::move(results)}};
+  const Json run = {
+      {"tool", {{"driver", driver}}},
+      {"invocations", Json::array({Json{{"executionSuccessful", true}}})},
+      {"artifacts", Json::array({Json{{"location", {{"uri", uri(result.policy_in_repository)}}}}})},
+      {"columnKind", "utf16CodeUnits"},
+      {"results", std::move(results)}};
   return files::to_text({{"$schema", "https://json.schemastore.org/sarif-2.1.0.json"},
                          {"version", "2.1.0"},
                          {"runs", Json::array({run})}});
@@ -180,7 +189,7 @@ std::string to_github(const GateResult& result, bool allow_inconclusive) {
     if (check.verdict == Verdict::kPass) continue;
     text += fmt::format("::{} file={},line={},title={}::{}\n",
                         is_warning(check, allow_inconclusive) ? "warning" : "error",
-                        github(result.policy, true), std::max(1, check.line),
+                        github(result.policy_in_repository, true), std::max(1, check.line),
                         github("swarmcert gate: " + check.name, true), github(message(check), false));
   }
   return text;

@@ -116,6 +116,7 @@ Policy read_policy(const std::string& path) {
     policy.checks.push_back({kind.name, table.line(), kind.read(table, policy)});
   }
   if (policy.checks.empty()) top.refuse("", "", "asks for no check", "add a table, such as [certificate]");
+  policy.conditions = conditions_of_policy(text, path);
   return policy;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "analysis/gate/check.h"
+#include "analysis/gate/conditions.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::files {
@@ -46,7 +47,7 @@ struct Policy {
   int release_line = 0;
   std::vector<PlannedCheck> checks;  ///< in order of the registry
   std::vector<std::string> not_run;  ///< checks that the policy does not request
-  RegressionLimits regression;       ///< from the table of this name
+  Conditions conditions;             ///< its entries, with the defaults of those that are left out
   bool judges_certificate = false;
   bool wants_guard_factor = false;  ///< flights are simulated again in the closed loop
   std::vector<std::string> blocks;  ///< input blocks with limits of their own

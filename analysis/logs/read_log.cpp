@@ -138,6 +138,7 @@ bool looks_like_log(const std::string& path) {
   if (is_log_name(std::filesystem::path(path).filename().string())) return true;
   if (std::filesystem::path(path).extension() == ".csv") return true;
   if (format_of_file(path) != nullptr) return true;
+  if (is_pipe(path)) return false;
   std::ifstream in(path, std::ios::binary);
   if (!in) return false;
   const Format format = kind_of(in);

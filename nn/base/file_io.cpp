@@ -42,9 +42,9 @@ class Descriptor {
   int number_;
 };
 
-/// Returns a descriptor that the caller closes.
+/// Returns a descriptor that the caller closes. Opening a named pipe does not wait for a writer.
 int open_to_read(const std::string& path) {
-  const int number = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int number = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (number < 0) refuse_with_errno(path, "cannot be opened");
   return number;
 }
@@ -53,6 +53,9 @@ struct stat status_of(const Descriptor& file, const std::string& path) {
   struct stat status = {};
   if (::fstat(file.number(), &status) != 0) refuse_with_errno(path, "cannot be read");
   if (S_ISDIR(status.st_mode)) refuse(path, "is a folder", "name a file in it");
+  // A pipe blocks until somebody writes to it, and can be read only once.
+  if (S_ISFIFO(status.st_mode) || S_ISSOCK(status.st_mode))
+    refuse(path, "is a pipe", "write its contents to a file and name that");
   return status;
 }
 
@@ -137,7 +140,7 @@ std::string read_file(const std::string& path, std::size_t limit_bytes) {
     contents.reserve(static_cast<std::size_t>(status.st_size));
   }
   std::array<char, 1 << 16> block;
-  for (;;) {  // to the end, not to st_size: a pipe has no size, and a log may still grow
+  for (;;) {  // to the end, not to st_size: a device has no size, and a log may still grow
     const std::string_view bytes = read_block(file, path, block);
     if (bytes.empty()) return contents;
     if (bytes.size() > limit_bytes - contents.size()) refuse_size();
@@ -196,7 +199,7 @@ std::string sha256(std::string_view bytes) {
 
 std::string sha256_of_file(const std::string& path) {
   const Descriptor file(open_to_read(path));
-  status_of(file, path);  // refuses a folder
+  status_of(file, path);  // refuses folders and pipes
   Sha256 hash;
   std::array<char, 1 << 16> block;
   for (;;) {

@@ -11,7 +11,7 @@ namespace swarmcert::files {
 inline constexpr std::size_t kLargestFile_bytes = std::size_t{256} << 20;
 
 /// Returns the contents of the whole file.
-/// @throws InputError if it cannot be read, is a folder, or is larger than `limit_bytes`.
+/// @throws InputError if it cannot be read, is a folder or a pipe, or is larger than `limit_bytes`.
 std::string read_file(const std::string& path, std::size_t limit_bytes = kLargestFile_bytes);
 
 /// Writes `contents` under a temporary name in the same folder, then renames it: readers see either the old file or the
@@ -22,7 +22,7 @@ void write_file(const std::string& path, std::string_view contents, bool overwri
 /// Returns the SHA-256 of `bytes` as 64 lower-case hex digits (FIPS 180-4; computed by OpenSSL).
 std::string sha256(std::string_view bytes);
 /// Returns the SHA-256 of the contents of a file of any size, without holding them in memory.
-/// @throws InputError if it cannot be read or is a folder.
+/// @throws InputError if it cannot be read, or is a folder or a pipe.
 std::string sha256_of_file(const std::string& path);
 
 }  // namespace swarmcert::files

@@ -47,7 +47,7 @@ TEST(GateAction, RunsAsGitHubRunsItAndLeavesAnnotationsSummaryAndBundle) {
   EXPECT_EQ(good.output.find("::error"), std::string::npos) << good.output;
   EXPECT_EQ(read_text(release / "out.txt"), "verdict=pass\n");
   EXPECT_NE(read_text(release / "summary.md").find("| pass | certificate |"), std::string::npos);
-  for (const std::string file : {"gate.json", "gate.xml", "gate.sarif", "gate.md", "bundle/manifest.json"})
+  for (const std::string file : {"gate.json", "gate.xml", "gate.sarif", "gate.md", "bundle/statement.json"})
     EXPECT_TRUE(std::filesystem::exists(release / ("my gate/" + file))) << file;
 
   release.write_facts(70000);
@@ -61,7 +61,17 @@ TEST(GateAction, RunsAsGitHubRunsItAndLeavesAnnotationsSummaryAndBundle) {
   EXPECT_EQ(read_text(release / "out.txt"), "verdict=pass\nverdict=fail\n");
   EXPECT_FALSE(std::filesystem::exists(release / "gate/bundle"));
   EXPECT_EQ(step({{"policy", "nothing.toml"}}).exit_code, 3);
+  EXPECT_NE(read_text(release / "gate/gate.xml").find("<error type=\"bad input\""), std::string::npos);
   EXPECT_NE(step({}).exit_code, 0);
+
+  // The tool is not found and cannot be had: results are left all the same.
+  write_text(release / "gate.sh", read_text(source_path("analysis/ci/gate.sh")));
+  const Outcome without =
+      release.run("env GATE_POLICY=policy.toml GATE_SWARMCERT=absent GATE_CACHE=cache bash gate.sh");
+  EXPECT_NE(without.exit_code, 0) << without.output;
+  for (const std::string file : {"gate/gate.xml", "gate/gate.sarif"})
+    EXPECT_NE(read_text(release / file).find("did not run to its end"), std::string::npos) << file;
+  files::parse_json(read_text(release / "gate/gate.sarif"), "gate.sarif");
 }
 
 }  // namespace

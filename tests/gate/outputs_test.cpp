@@ -17,7 +17,7 @@ const std::string kHostile =
 
 GateResult hostile_result() {
   GateResult result;
-  result.policy = "dir " + kHostile + "/policy.toml";
+  result.policy = result.policy_in_repository = "dir " + kHostile + "/policy.toml";
   Check good = row("certificate", 3);
   pass(good);
   Check bad = row("lipschitz", {500, 7, "gf/(m, m/s)", 1, true});

@@ -18,7 +18,7 @@ import tempfile
 try:
     import tomllib
 
-    from jsonschema import Draft202012Validator
+    from jsonschema import Draft7Validator, Draft202012Validator, RefResolver
 except ImportError as missing:
     print(f"skipped: {missing}")
     sys.exit(77)
@@ -200,7 +200,7 @@ def test_files_that_they_write_conform(folder):
         if str(document.get("schema", "")).startswith("swarmcert/") and "command_line" not in document:
             kinds.add(document["schema"].split("/")[1])
             conforms(document, document["schema"].split("/")[1], str(path))
-    wanted = {"certificate", "tracking-certificate", "baseline", "manifest", "sweep-points", "sweep-shard"}
+    wanted = {"certificate", "tracking-certificate", "baseline", "sweep-points", "sweep-shard"}
     expect(wanted <= kinds, f"no file of the kinds {sorted(wanted - kinds)}")
 
 
@@ -262,7 +262,7 @@ def test_the_writers_write_no_field_that_the_schemas_do_not_know():
         *(SOURCE / "analysis/commands").rglob("*_command.cpp"),
         *(SOURCE / "analysis/commands/bound").glob("*.cpp"),
         *(SOURCE / file for file in ("lipschitz/certificate.cpp", "stability/sweep/shards.cpp")),
-        *(SOURCE / "analysis/gate" / file for file in ("baseline.cpp", "bundle.cpp")),
+        SOURCE / "analysis/gate/baseline.cpp",
     ]
     fields = {}
     for path in files:
@@ -422,6 +422,51 @@ def test_sarif_has_the_published_structure(folder):
     expect(counts[0] == 0 and counts[1] > 0, f"results of a release that passes and of one that fails: {counts}")
 
 
+# --- bundles ---
+
+
+def test_the_statement_of_a_bundle_has_the_published_structure(folder):
+    """in-toto attestation framework, spec/v1/statement.md and spec/predicates/test-result.md: required fields."""
+    statement = json.loads((folder / "evidence/statement.json").read_text())
+    expect(statement["_type"] == "https://in-toto.io/Statement/v1", "type of the statement")
+    expect(statement["predicateType"] == "https://in-toto.io/attestation/test-result/v0.1", "type of the predicate")
+    predicate = statement["predicate"]
+    expect(predicate["result"] in ("PASSED", "WARNED", "FAILED"), "result of the statement")
+    described = statement["subject"] + predicate["configuration"]
+    expect(len(statement["subject"]) > 0 and len(predicate["configuration"]) > 0, "the statement names no file")
+    for one in described:
+        digest = one.get("digest", {}).get("sha256", "")
+        expect(one.get("name") and re.fullmatch("[0-9a-f]{64}", digest), f"{one} is no resource descriptor")
+    files = {str(path.relative_to(folder / "evidence")) for path in (folder / "evidence").rglob("*") if path.is_file()}
+    expect(files == {one["name"] for one in described} | {"statement.json"}, "the statement does not name all files")
+
+
+def test_the_bill_of_materials_conforms_to_the_schema_of_cyclonedx(folder):
+    """The schema is in the npm package of CycloneDX, which is fetched, never kept."""
+    scratch = folder / "cyclonedx"
+    scratch.mkdir()
+    if shutil.which("npm") is None:
+        print("skipped: npm, for the schema of CycloneDX, is not installed")
+        return
+    command = ["npm", "pack", "--silent", "@cyclonedx/cyclonedx-library@10.3.0"]
+    if subprocess.run(command, cwd=scratch, capture_output=True, timeout=120).returncode != 0:
+        print("skipped: the npm package with the schema of CycloneDX cannot be fetched")
+        return
+    shutil.unpack_archive(next(scratch.glob("*.tgz")), scratch, "gztar")
+    schemas = scratch / "package/res/schema"
+    store = {}
+    for path in schemas.glob("*.schema.json"):
+        name = path.name.replace(".SNAPSHOT", "")
+        store["http://cyclonedx.org/schema/" + name] = json.loads(path.read_text())
+        store["http://cyclonedx.org/schema/" + path.name] = store["http://cyclonedx.org/schema/" + name]
+    bom = store["http://cyclonedx.org/schema/bom-1.6.schema.json"]
+    validator = Draft7Validator(bom, resolver=RefResolver(bom["$id"], bom, store=store))
+    document = json.loads((folder / "evidence/bom.cdx.json").read_text())
+    for error in validator.iter_errors(document):
+        expect(False, f"bom.cdx.json: {'/'.join(map(str, error.absolute_path))}: {error.message[:200]}")
+    expect(not validator.is_valid({**document, "bomFormat": "x"}), "the schema of CycloneDX accepts anything")
+
+
 def main():
     test_schemas_are_valid_and_closed()
     test_the_command_prints_them()
@@ -433,6 +478,8 @@ def main():
         test_files_that_they_write_conform(folder)
         test_toml_files_conform(folder)
         test_sarif_has_the_published_structure(folder)
+        test_the_statement_of_a_bundle_has_the_published_structure(folder)
+        test_the_bill_of_materials_conforms_to_the_schema_of_cyclonedx(folder)
     print(f"{len(FAULTS)} faults")
     return 1 if FAULTS else 0
 

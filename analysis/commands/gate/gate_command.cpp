@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
@@ -21,7 +22,7 @@ namespace swarmcert::analysis {
 namespace {
 
 struct GateOptions {
-  std::string policy, baseline, junit, sarif, markdown, bundle, report;
+  std::string policy, baseline, junit, sarif, markdown, bundle, key, report;
   bool update_baseline = false;
   bool github = false;
   bool allow_inconclusive = false;
@@ -29,8 +30,7 @@ struct GateOptions {
 };
 
 struct VerifyOptions {
-  std::string folder, sha256;
-  bool rerun = false;
+  std::string folder, sha256, key;
 };
 
 gate::GateSettings settings_of(const CommonOptions& common, Progress& progress) {
@@ -74,33 +74,9 @@ bool may_become_baseline(const gate::GateResult& result) {
   return true;
 }
 
-int run_gate(const GateOptions& options, const CommonOptions& common) {
-  if (options.github && common.json == "-")
-    throw UsageError("--github and --json - both print to standard output: give --json a file");
-  if (options.update_baseline && options.baseline.empty())
-    throw UsageError("--update-baseline replaces the file of --baseline: name it");
-  for (const std::string& path : {common.json, options.junit, options.sarif, options.markdown})
-    refuse_to_replace(common, path);
-  refuse_folder(common, options.report);
-  if (!options.bundle.empty() && std::filesystem::exists(options.bundle) && !common.force &&
-      !(std::filesystem::is_directory(options.bundle) && std::filesystem::is_empty(options.bundle)))
-    throw files::InputError({options.bundle, "", "", "", "the folder is not empty", "--force replaces it"});
-  const gate::Policy policy = gate::read_policy(options.policy);
-  if (options.hashes) {
-    print_hashes(policy);
-    return kDone;
-  }
-  Progress progress(common.quiet);
-  gate::GateSettings settings = settings_of(common, progress);
-  settings.baseline = options.baseline;
-  settings.may_lack_baseline = settings.updates_baseline = options.update_baseline;
-  const gate::GateResult result = run_gate(policy, settings);
-
-  std::vector<std::string> inputs;
-  for (const gate::EvidenceFile& file : result.files) inputs.push_back(file.path);
-  files::Json json = result_head("gate", inputs);
-  add_json(result, json);
-  json["updates_baseline"] = options.update_baseline;
+/// Writes the result in every format that was asked for, and prints it.
+void write_outputs(const gate::GateResult& result, const files::Json& json, const GateOptions& options,
+                   const CommonOptions& common) {
   const bool allow = options.allow_inconclusive;
   if (!options.junit.empty()) files::write_file(options.junit, to_junit(result), common.force);
   if (!options.sarif.empty()) files::write_file(options.sarif, to_sarif(result, allow), common.force);
@@ -114,46 +90,102 @@ int run_gate(const GateOptions& options, const CommonOptions& common) {
     fmt::print("{}", to_github(result, allow));
     append_summary(to_markdown(result));
   }
-  // The bundle is written before the baseline is replaced: it contains the baseline against which the release was
-  // checked.
+}
+
+files::Json json_of(const gate::GateResult& result, const GateOptions& options) {
+  std::vector<std::string> inputs;
+  for (const gate::EvidenceFile& file : result.files) inputs.push_back(file.path);
+  files::Json json = result_head("gate", inputs);
+  add_json(result, json);
+  json["updates_baseline"] = options.update_baseline;
+  return json;
+}
+
+void refuse_outputs(const GateOptions& options, const CommonOptions& common) {
+  if (options.github && common.json == "-")
+    throw UsageError("--github and --json - both print to standard output: give --json a file");
+  if (options.update_baseline && options.baseline.empty())
+    throw UsageError("--update-baseline replaces the file of --baseline: name it");
+  if (!options.key.empty() && options.bundle.empty())
+    throw UsageError("--key signs a bundle: name it with --bundle");
+  for (const std::string& path : {common.json, options.junit, options.sarif, options.markdown})
+    refuse_to_replace(common, path);
+  refuse_folder(common, options.report);
+  if (!options.bundle.empty() && std::filesystem::exists(options.bundle) && !common.force &&
+      !(std::filesystem::is_directory(options.bundle) && std::filesystem::is_empty(options.bundle)))
+    throw files::InputError({options.bundle, "", "", "", "the folder is not empty", "--force replaces it"});
+}
+
+/// Writes the bundle, then replaces the baseline: the bundle contains the one against which the release was checked.
+void keep_release(const gate::Policy& policy, const gate::GateResult& result, const files::Json& json,
+                  const GateOptions& options, const CommonOptions& common) {
   if (!options.bundle.empty()) {
     const bool may = result.verdict() == gate::Verdict::kPass;
-    const std::string sha256 = may ? write_bundle(options.bundle, policy, result, json, common.force) : "";
+    const std::string sha256 =
+        may ? write_bundle(options.bundle, policy, result, json, options.key, common.force) : "";
     if (common.prints_text()) {
-      if (may) fmt::print("bundle: {}\nSHA-256 of its manifest: {}\n", options.bundle, sha256);
+      if (may) fmt::print("bundle: {}\nSHA-256 of its statement: {}\n", options.bundle, sha256);
       if (!may) fmt::print("no bundle: the release does not pass\n");
     }
   }
   if (options.update_baseline) {
     const bool may = may_become_baseline(result);
-    if (may) gate::write_baseline(options.baseline, result.checks, policy.regression);
+    if (may) gate::write_baseline(options.baseline, result.checks, result.conditions);
     if (common.prints_text())
       fmt::print("baseline {}: {}\n", may ? "replaced" : "kept, for the release does not pass",
                  options.baseline);
   }
-  return exit_code(result, allow);
+}
+
+int run_gate(const GateOptions& options, const CommonOptions& common) {
+  refuse_outputs(options, common);
+  std::optional<gate::Policy> policy;
+  try {
+    policy = gate::read_policy(options.policy);
+  } catch (const files::InputError& error) {
+    if (options.hashes) throw;
+    // Whoever reads the outputs learns about a broken policy from them.
+    const gate::GateResult refused = gate::refused_policy(options.policy, error);
+    write_outputs(refused, json_of(refused, options), options, common);
+    throw;
+  }
+  if (options.hashes) {
+    print_hashes(*policy);
+    return kDone;
+  }
+  Progress progress(common.quiet);
+  gate::GateSettings settings = settings_of(common, progress);
+  settings.baseline = options.baseline;
+  settings.may_lack_baseline = settings.updates_baseline = options.update_baseline;
+  const gate::GateResult result = run_gate(*policy, settings);
+  const files::Json json = json_of(result, options);
+  write_outputs(result, json, options, common);
+  keep_release(*policy, result, json, options, common);
+  return exit_code(result, options.allow_inconclusive);
 }
 
 int verify(const VerifyOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   Progress progress(common.quiet);
   gate::BundleVerdict verdict =
-      gate::verify_bundle(options.folder, options.rerun, settings_of(common, progress));
-  if (verdict.accepted && !options.sha256.empty() && verdict.manifest_sha256 != options.sha256) {
+      gate::verify_bundle(options.folder, options.key, settings_of(common, progress));
+  if (verdict.accepted && !options.sha256.empty() && verdict.statement_sha256 != options.sha256) {
     verdict.accepted = false;
-    verdict.reason = "the manifest's SHA-256 is " + verdict.manifest_sha256 + ": this is another release";
+    verdict.reason = "the statement's SHA-256 is " + verdict.statement_sha256 + ": this is another release";
   }
   files::Json json = result_head("verify-bundle", {});
   json["accepted"] = verdict.accepted;
   json["reason"] = gate::printable(verdict.reason);
-  json["manifest_sha256"] = verdict.manifest_sha256;
+  json["statement_sha256"] = verdict.statement_sha256;
   json["files"] = verdict.files;
   json["verified"] = verdict.verified;
+  json["not_verified"] = verdict.not_verified;
   write_result(common, json);
   if (common.prints_text()) {
     for (const std::string& what : verdict.verified) fmt::print("  {}\n", what);
+    for (const std::string& what : verdict.not_verified) fmt::print("  not verified: {}\n", what);
     if (verdict.accepted)
-      fmt::print("accepted: {}\nSHA-256 of its manifest: {}\n", options.folder, verdict.manifest_sha256);
+      fmt::print("accepted: {}\nSHA-256 of its statement: {}\n", options.folder, verdict.statement_sha256);
     if (!verdict.accepted) fmt::print("rejected: {}\n", gate::printable(verdict.reason));
   }
   return verdict.accepted ? kDone : kViolated;
@@ -174,10 +206,10 @@ Command gate_command() {
         const auto options = std::make_shared<GateOptions>();
         app.add_option("POLICY", options->policy, "policy.toml (schema swarmcert/policy/1)")->required();
         app.add_option("--baseline", options->baseline,
-                       "Numbers of the last release, for the check regression");
+                       "Values and conditions of the last release: nothing may be asked for less than there");
         app.add_flag("--update-baseline", options->update_baseline,
-                     "Replace the file of --baseline by this release's numbers and limits, if all else "
-                     "passes; limits may be looser and checks fewer");
+                     "Replace the file of --baseline by this release's values and conditions, if all else "
+                     "passes; conditions may be weaker");
         app.add_flag("--allow-inconclusive", options->allow_inconclusive,
                      "Checks that are inconclusive do not fail");
         add_output(app, "--junit", options->junit, "Write JUnit XML to this file");
@@ -188,7 +220,9 @@ Command gate_command() {
             app.add_flag("--github", options->github,
                          "Print GitHub annotations, and append to the step summary ($GITHUB_STEP_SUMMARY)"));
         add_output(app, "--bundle", options->bundle,
-                   "Copy all evidence of a release that passes into this folder, with a manifest of hashes");
+                   "Copy all evidence of a release that passes into this folder, with an in-toto statement");
+        leave_out_of_record(app.add_option("--key", options->key,
+                                           "Private key (PEM) that signs the statement of the bundle"));
         app.add_flag("--hashes", options->hashes,
                      "Print a table [hashes] of the release's files for the policy, and check nothing");
         return [options](const CommonOptions& common) { return run_gate(*options, common); };
@@ -197,17 +231,19 @@ Command gate_command() {
 
 Command verify_bundle_command() {
   return {"verify-bundle", "Verify a bundle that gate wrote, offline",
-          "Exactly the files of the manifest, with their hashes; the gate's result; then the independent "
-          "checker on the\n"
-          "bundle's certificate and weights, and the match of its source and ELF. Accepted: exit 0. "
-          "Rejected, with the reason: exit 1.\n\n"
-          "Example: swarmcert verify-bundle release/ --rerun",
+          "Exactly the files of the statement, with their hashes; then every row of the gate's result is "
+          "derived again from\n"
+          "these files, with the policy that the statement names. With --key, the statement must be signed "
+          "by that key. Accepted:\n"
+          "exit 0. Rejected, with the reason: exit 1.\n\n"
+          "Example: swarmcert verify-bundle release/ --key public.pem",
           [](CLI::App& app) {
             const auto options = std::make_shared<VerifyOptions>();
             app.add_option("DIR", options->folder, "The bundle")->required();
-            app.add_flag("--rerun", options->rerun, "Also run every check of the policy again");
+            app.add_option("--key", options->key, "Public key (PEM) that must have signed the statement");
             app.add_option("--sha256", options->sha256,
-                           "Expected SHA-256 of the manifest, as printed by gate");
+                           "Expected SHA-256 of the statement, as printed by gate");
+            app.add_flag("--rerun", "Accepted for older scripts: all checks always run again");
             return [options](const CommonOptions& common) { return verify(*options, common); };
           }};
 }

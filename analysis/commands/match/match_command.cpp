@@ -6,6 +6,7 @@
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/flown_network.h"
 #include "analysis/firmware/match_artefact.h"
+#include "analysis/gate/expected_app.h"
 #include "nn/base/content_hash.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
@@ -16,7 +17,7 @@ namespace {
 struct MatchOptions {
   files::NetworkArguments network;
   std::vector<std::string> words;  ///< NET FILE, or FILE with --phi and --rho
-  std::string file, as, certificate;
+  std::string file, as, certificate, gains, model;
   int most_neighbours = firmware::ExportOptions().most_neighbours;
 };
 
@@ -108,6 +109,12 @@ int run_match(MatchOptions options, const CommonOptions& common) {
     artefact.source.certificate_sha256 =
         files::content_sha256(files::parse_json(files::read_file(options.certificate), options.certificate));
   }
+  if (options.gains.empty() != options.model.empty())
+    throw UsageError("--gains and --model belong together: gains are converted with the vehicle's mass");
+  if (!options.gains.empty()) {
+    inputs.insert(inputs.end(), {options.gains, options.model});
+    artefact.app = [&options] { return gate::expected_app(options.gains, options.model); };
+  }
   const firmware::ArtefactMatch match = match_artefact(network, options.file, artefact);
   inputs.insert(inputs.end(), match.files.begin(), match.files.end());
   files::Json json = result_head("match", inputs);
@@ -126,9 +133,10 @@ Command match_command() {
           "compared byte for byte,\n"
           "with CR LF at line ends read as LF. In other C or C++ source and in a little-endian ELF, with or "
           "without symbols,\n"
-          "every weight and bias must match bit for bit; the evaluator in a linked ELF for Cortex-M is run "
-          "with golden vectors\n"
-          "where qemu-system-arm is installed. Exit code 0 if all is equal; 1 and the first difference; 4 if "
+          "every weight and bias must match bit for bit; a linked ELF for Cortex-M must hold them once, and "
+          "what it computes is run\n"
+          "and compared where qemu-system-arm is installed: the exported function, and the Crazyflie app "
+          "if the image holds it. Exit code 0 if all is equal; 1 and the first difference; 4 if "
           "something\n"
           "could not be checked. With --phi and --rho, NET is those two files.\n\n"
           "Example: swarmcert match nn/networks/demo/network.toml firmware",
@@ -146,6 +154,11 @@ Command match_command() {
             declare_as(app, options->as);
             app.add_option("--certificate", options->certificate,
                            "Certificate that an export was made with, if it names one");
+            app.add_option(
+                "--gains", options->gains,
+                "gains.toml with which the app in an ELF must start; otherwise those of its source");
+            app.add_option("--model", options->model,
+                           "model.toml: mass, thrust map and inertia of the app in an ELF");
             app.add_option("--most-neighbours", options->most_neighbours,
                            "Largest number of neighbours in an evaluation of an ELF")
                 ->check(CLI::Range(1, 64))

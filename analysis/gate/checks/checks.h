@@ -32,8 +32,10 @@ Run read_small_gain(const files::TomlTable& table, Policy& policy);
 /// evaluates as the network does.
 Run read_match(const files::TomlTable& table, Policy& policy);
 /// Checks one file.
+/// @param needs_app the ELF file must hold the Crazyflie app, whose flown code is compared too.
 /// @throws files::InputError if the file or the network cannot be read.
-Check match_row(Evidence& evidence, const std::string& name, int line, const std::string& path, bool is_elf);
+Check match_row(Evidence& evidence, const std::string& name, int line, const std::string& path, bool is_elf,
+                bool needs_app);
 /// [firmware_facts]: flash, RAM, stack and times.
 Run read_firmware_facts(const files::TomlTable& table, Policy& policy);
 /// [residual]: error of the model on the reference flights.

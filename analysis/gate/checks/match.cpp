@@ -4,13 +4,15 @@
 #include "analysis/firmware/match_artefact.h"
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
+#include "analysis/gate/expected_app.h"
 #include "nn/base/file_io.h"
 #include "nn/base/json.h"
 #include "nn/base/toml.h"
 
 namespace swarmcert::gate {
 
-Check match_row(Evidence& evidence, const std::string& name, int line, const std::string& path, bool is_elf) {
+Check match_row(Evidence& evidence, const std::string& name, int line, const std::string& path, bool is_elf,
+                bool needs_app) {
   Check check = row(name, line);
   if (is_elf && !firmware::is_elf(files::read_file(path))) {
     fail(check, path + " is no ELF");
@@ -25,11 +27,15 @@ Check match_row(Evidence& evidence, const std::string& name, int line, const std
     // The hash as stated; [certificate] checks that the certificate has that content.
     options.source.certificate_sha256 = evidence.certificate().value("content_sha256", "");
   if (release.most_neighbours > 0) options.most_neighbours = release.most_neighbours;
+  if (!release.gains.empty() && !release.model.empty())
+    options.app = [&release] { return expected_app(release.gains, release.model); };
   const firmware::ArtefactMatch match = match_artefact(evidence.flown(), path, options);
   switch (match.verdict) {
     case firmware::ArtefactVerdict::kEqual:
       pass(check);
       check.witness = fmt::format("compared {}", fmt::join(match.compared, "; "));
+      if (is_elf && needs_app && !match.holds_app)
+        fail(check, path + " does not hold the app, so that nothing says what flies");
       break;
     case firmware::ArtefactVerdict::kDifferent:
       fail(check, path + " is not this network");
@@ -44,15 +50,23 @@ Check match_row(Evidence& evidence, const std::string& name, int line, const std
 }
 
 Run read_match(const files::TomlTable& table, Policy& policy) {
-  table.allow_only({});
+  table.allow_only({"entry"});
   if (!policy.release.has_network()) require_file(table, "", "network");
   if (policy.release.source.empty()) require_file(table, policy.release.elf, "source or elf");
   if (!policy.release.is_float32)
     table.refuse("", "", "compares float32 weights with a network that is used in float64");
-  return [line = table.line()](Evidence& evidence, Checks& checks) {
+  const bool needs_app = table.has("entry") && table.choice("entry", {"network", "controller"}) == 1;
+  if (needs_app) {
+    require_file(table, policy.release.elf, "elf");
+    require_file(table, policy.release.gains, "gains");
+    require_file(table, policy.release.model, "model");
+  }
+  return [line = table.line(), needs_app](Evidence& evidence, Checks& checks) {
     const Release& release = evidence.release();
-    if (!release.source.empty()) checks.push_back(match_row(evidence, "match", line, release.source, false));
-    if (!release.elf.empty()) checks.push_back(match_row(evidence, "match.elf", line, release.elf, true));
+    if (!release.source.empty())
+      checks.push_back(match_row(evidence, "match", line, release.source, false, false));
+    if (!release.elf.empty())
+      checks.push_back(match_row(evidence, "match.elf", line, release.elf, true, needs_app));
   };
 }
 

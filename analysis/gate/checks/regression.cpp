@@ -37,7 +37,7 @@ void require_rows(const std::map<std::string, Limit>& own, const Checks& checks,
 
 }  // namespace
 
-Run read_regression(const files::TomlTable& table, Policy& policy) {
+Run read_regression(const files::TomlTable& table, Policy&) {
   table.allow_only({"max_increase_percent", "percent_of"});
   const std::optional<Limit> most = limit(table, "max_increase_percent", "%");
   if (!most) refuse_without_limit(table, "max_increase_percent = 5");
@@ -48,8 +48,6 @@ Run read_regression(const files::TomlTable& table, Policy& policy) {
     const files::TomlTable inner = table.table("percent_of");
     for (const std::string& name : inner.keys()) own[name] = *limit(inner, name, "%");
   }
-  policy.regression.most = most->value;
-  for (const auto& [name, percent] : own) policy.regression.own[name] = percent.value;
   return [most = *most, own](Evidence& evidence, Checks& checks) {
     const Baseline* const baseline = evidence.baseline();
     if (baseline == nullptr) {

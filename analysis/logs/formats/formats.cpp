@@ -1,5 +1,6 @@
 #include "analysis/logs/formats/formats.h"
 
+#include <filesystem>
 #include <fstream>
 
 #include "analysis/logs/formats/crazyflie_csv.h"
@@ -52,7 +53,14 @@ std::string format_head(std::istream& in) {
   return head;
 }
 
+bool is_pipe(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::is_fifo(path, ignored);
+}
+
 std::ifstream open_log(const std::string& path) {
+  if (is_pipe(path))
+    throw files::InputError({path, "", "", "", "is a pipe", "write its contents to a file and name that"});
   std::ifstream in(path, std::ios::binary);
   if (!in) throw files::InputError({path, "", "", "", "cannot be read", "check its name and permissions"});
   return in;
@@ -65,6 +73,7 @@ const LogFormat* format_of(std::string_view head) {
 }
 
 const LogFormat* format_of_file(const std::string& path) {
+  if (is_pipe(path)) return nullptr;
   std::ifstream in(path, std::ios::binary);
   return in ? format_of(format_head(in)) : nullptr;
 }

@@ -22,8 +22,11 @@ inline constexpr std::size_t kFormatHead_bytes = 4096;
 /// Returns the first kFormatHead_bytes of a stream and rewinds it.
 std::string format_head(std::istream& in);
 
+/// True for a named pipe, which blocks whoever opens it until somebody writes to it.
+bool is_pipe(const std::string& path);
+
 /// Opens a log file.
-/// @throws files::InputError if the file cannot be read.
+/// @throws files::InputError if the file cannot be read or is a pipe.
 std::ifstream open_log(const std::string& path);
 
 /// Returns the formats in the order in which they are tried.
