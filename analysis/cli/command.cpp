@@ -144,16 +144,44 @@ std::vector<std::string> regular_files(const std::vector<std::string>& paths) {
 
 }  // namespace
 
+namespace {
+
+void describe_head(files::Record& record, const std::string& command, const std::vector<std::string>& inputs,
+                   std::optional<std::uint64_t> seed) {
+  record.constant("schema", "swarmcert/" + command + "/1", "Name and version of this format.");
+  record.field("tool", "swarmcert " SWARMCERT_VERSION, "Name and version of the tool that wrote this.");
+  record.field("command_line", command_line(),
+               "Words of the command line, without outputs and what cannot change the result.");
+  record.list("inputs", inputs, "Files that were read.", [](files::Record& file, const std::string& path) {
+    file.field("file", path, "Path as it was given or found.");
+    file.field("sha256", path.empty() ? "" : files::sha256_of_file(path), "Of the content, hexadecimal.");
+  });
+  record.field("seed", seed, "Of the random numbers; null: none are used.");
+}
+
+}  // namespace
+
 files::Json result_head(const std::string& command, const std::vector<std::string>& input_files) {
-  files::Json inputs = files::Json::array();
-  for (const std::string& path : regular_files(input_files)) {
-    inputs.push_back({{"file", path}, {"sha256", files::sha256_of_file(path)}});
-  }
-  return {{"schema", "swarmcert/" + command + "/1"},
-          {"tool", "swarmcert " SWARMCERT_VERSION},
-          {"command_line", command_line()},
-          {"inputs", std::move(inputs)},
-          {"seed", nullptr}};
+  return files::to_json(described_result(command, input_files, std::nullopt, [](files::Record&) {}));
+}
+
+files::Node described_result(const std::string& command, const std::vector<std::string>& input_files,
+                             std::optional<std::uint64_t> seed,
+                             const std::function<void(files::Record&)>& describe_fields) {
+  files::Node result;
+  files::Record record(result, false);
+  describe_head(record, command, regular_files(input_files), seed);
+  describe_fields(record);
+  return result;
+}
+
+files::Node result_shape(const std::string& command,
+                         const std::function<void(files::Record&)>& describe_fields) {
+  files::Node shape;
+  files::Record record(shape, true);
+  describe_head(record, command, {}, std::nullopt);
+  describe_fields(record);
+  return shape;
 }
 
 void refuse_to_replace(const CommonOptions& common, const std::string& path) {
@@ -174,6 +202,10 @@ void refuse_folder(const CommonOptions& common, const std::string& folder) {
 void write_result(const CommonOptions& common, const files::Json& result) {
   if (host() != nullptr) host()->result = result;
   if (!common.json.empty()) files::write_file(common.json, files::to_text(result), common.force);
+}
+
+void write_result(const CommonOptions& common, const files::Node& result) {
+  if (host() != nullptr || !common.json.empty()) write_result(common, files::to_json(result));
 }
 
 std::vector<std::string> input_files(const files::Network& network) {

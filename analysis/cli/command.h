@@ -4,11 +4,13 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "nn/base/json.h"
+#include "nn/base/record.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::analysis {
@@ -41,6 +43,8 @@ struct Command {
   std::string details;  ///< shown by the command's own --help: what it does, an example
   /// Declares the options and returns the function to run once they are parsed; that function returns an exit code.
   std::function<std::function<int(const CommonOptions&)>(CLI::App&)> declare;
+  /// Describes the fields of the result after its head (see described_result()), from default values.
+  std::function<void(files::Record&)> describe_result = nullptr;
 };
 
 /// An invalid combination of options, detected after parsing: exit code kUsage.
@@ -76,6 +80,30 @@ std::vector<std::string> reading_notes(const files::Weights& weights);
 /// `seed` is null until it is set.
 files::Json result_head(const std::string& command, const std::vector<std::string>& input_files);
 
+/// Returns the result of `command`: its head, as result_head(), then the fields that `describe_fields` describes.
+/// @param seed of the random numbers; empty if none are used
+files::Node described_result(const std::string& command, const std::vector<std::string>& input_files,
+                             std::optional<std::uint64_t> seed,
+                             const std::function<void(files::Record&)>& describe_fields);
+
+/// The same for a struct that has a function describe().
+template <class T>
+files::Node result_of(const std::string& command, const std::vector<std::string>& input_files,
+                      std::optional<std::uint64_t> seed, const T& result) {
+  return described_result(command, input_files, seed,
+                          [&result](files::Record& record) { describe(record, result); });
+}
+
+/// Returns Command::describe_result for a struct that has a function describe().
+template <class T>
+std::function<void(files::Record&)> fields_of() {
+  return [](files::Record& record) { describe(record, T{}); };
+}
+
+/// Returns the shape of all results of `command`, for its schema.
+files::Node result_shape(const std::string& command,
+                         const std::function<void(files::Record&)>& describe_fields);
+
 /// Checks an output path before the work begins.
 /// @throws InputError if `path` exists and --force is not given.
 void refuse_to_replace(const CommonOptions& common, const std::string& path);
@@ -86,6 +114,7 @@ void refuse_folder(const CommonOptions& common, const std::string& folder);
 
 /// Writes `result` to the destination given by --json, if any, and passes it to the host, if there is one.
 void write_result(const CommonOptions& common, const files::Json& result);
+void write_result(const CommonOptions& common, const files::Node& result);
 
 /// Returns the files from which NET was read; empty for a network supplied by the host.
 std::vector<std::string> input_files(const files::Network& network);

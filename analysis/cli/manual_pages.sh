@@ -10,7 +10,7 @@ export PATH SOURCE_DATE_EPOCH LC_ALL=C.UTF-8
 rm -rf "$folder"
 mkdir -p "$folder"
 cd "$folder"
-list=$(swarmcert --help | sed -n '/^Subcommands:/,/^$/s/^  \([a-z-]*\)  *\(.*\)/\1 \2/p')
+list=$(swarmcert --help | sed -n '/^Start with:/,/^Exit codes/s/^  \([a-z-]*\)  *\(.*\)/\1 \2/p')
 
 # page NAME COMMAND SUMMARY SEE_ALSO
 page() {

@@ -4,18 +4,22 @@ namespace swarmcert::analysis {
 
 const std::vector<Command>& commands() {
   static const std::vector<Command> all = {
-      inspect_command(),          //
-      certify_command(),          //
-      check_command(),            //
-      study_command(),            //
-      compare_command(),          //
+      // The commands that people need first
+      demo_command(),      //
+      inspect_command(),   //
+      study_command(),     //
+      compare_command(),   //
+      add_command(),       //
+      certify_command(),   //
+      check_command(),     //
+      bound_command(),     //
+      simulate_command(),  //
+      gate_command(),      //
+      // Further commands
       diagnose_command(),         //
-      add_command(),              //
       model_command(),            //
       train_command(),            //
-      simulate_command(),         //
       reproduce_command(),        //
-      bound_command(),            //
       spacing_command(),          //
       sweep_command(),            //
       merge_command(),            //
@@ -24,10 +28,9 @@ const std::vector<Command>& commands() {
       identify_thrust_command(),  //
       export_command(),           //
       match_command(),            //
-      gate_command(),             //
       verify_bundle_command(),    //
+      explain_command(),          //
       schema_command(),           //
-      demo_command(),
   };
   return all;
 }

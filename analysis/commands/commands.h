@@ -7,6 +7,9 @@
 
 namespace swarmcert::analysis {
 
+/// Number of commands that --help lists first.
+inline constexpr int kFirstCommands = 10;
+
 /// Returns all commands in the order in which --help lists them.
 const std::vector<Command>& commands();
 
@@ -17,6 +20,7 @@ Command check_command();
 Command compare_command();
 Command demo_command();
 Command diagnose_command();
+Command explain_command();
 Command export_command();
 Command gate_command();
 Command identify_thrust_command();

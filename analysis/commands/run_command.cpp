@@ -114,8 +114,10 @@ int run_command(int argc, const char* const* argv) {
       "Print the completion for bash: source <(swarmcert --bash-completion)");
   CommonOptions common;
   std::function<int(const CommonOptions&)> action;
+  int declared = 0;
   for (const Command& command : commands()) {
     CLI::App* sub = app.add_subcommand(command.name, command.summary);
+    sub->group(declared++ < kFirstCommands ? "Start with" : "Further commands");
     sub->footer(command.details);
     declare_common(*sub, common);
     auto to_run = command.declare(*sub);

@@ -50,6 +50,8 @@ Report::Report(std::string title) : title_(std::move(title)) {}
 
 void Report::result(const nlohmann::ordered_json& result) { result_json_ = files::to_text(result); }
 
+void Report::result(const files::Node& result) { this->result(files::to_json(result)); }
+
 void Report::made_by(const std::string& command) { command_ = command; }
 
 void Report::heading(const std::string& text) { body_.push_back("<h2>" + html_text(text) + "</h2>\n"); }

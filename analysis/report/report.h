@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "analysis/report/table.h"
+
 namespace swarmcert::analysis {
 
 /// Force residuals of one vehicle over time.
@@ -57,6 +59,7 @@ class Report {
 
   /// Embeds the JSON result in the page.
   void result(const nlohmann::ordered_json& result);
+  void result(const files::Node& result);
 
   /// Sets the command that made the report, as a shell line shown on the page.
   void made_by(const std::string& command);
@@ -65,6 +68,8 @@ class Report {
   void paragraph(const std::string& text);
   /// @param rows cells as text, as many per row as `header` has.
   void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
+  /// A table of a described result.
+  void table(const Table& table) { this->table(table.header, table.rows); }
   /// @param name   file name without ending: NAME.dat and NAME.gp are written, NAME.svg is drawn.
   /// @param data   data read by the script; user-supplied names belong here, as plot_field(), never in the script.
   /// @param script gnuplot commands that read 'NAME.dat'. Terminal, key, grid, line types and the palette viridis are

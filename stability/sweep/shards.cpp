@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <set>
+#include <variant>
 
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
@@ -23,38 +24,63 @@ constexpr char kPointsSchema[] = "swarmcert/sweep-points/1";
 constexpr int kBlock = 512;  ///< cells between two checks of the clock and of Ctrl-C
 constexpr double kCheckpoint_s = 5;
 
-/// JSON has no infinity and no NaN; both occur (no bound, no sampled loop) and must be preserved.
-Json number_json(double value) {
-  if (std::isfinite(value)) return value;
-  return std::isnan(value) ? "nan" : value > 0 ? "inf" : "-inf";
-}
-
 double number_of(const Json& json) {
   if (json.is_number()) return json.get<double>();
   const std::string text = json.get<std::string>();
   return text == "nan" ? NAN : text == "inf" ? INFINITY : -INFINITY;
 }
 
-Json shard_head(const Grid& grid, const SweepOptions& options) {
-  Json axes = Json::array();
-  for (const GridAxis& axis : grid.axes) axes.push_back({{"name", axis.name}, {"values", axis.values}});
-  return {{"schema", kShardSchema},
-          {"grid", grid.path},
-          {"grid_sha256", grid.sha256},
-          {"gains_sha256", grid.gains.sha256},
-          {"model_sha256", grid.model.sha256},
-          {"axes", std::move(axes)},
-          {"compute", grid.compute},
-          {"pareto", grid.pareto},
-          {"shard", options.shard.index},
-          {"count", options.shard.count},
-          {"total", grid.cells()}};
+/// JSON has no infinity and no NaN; both occur (no bound, no sampled loop) and must be preserved.
+using ExactNumber = std::variant<double, std::string>;
+
+ExactNumber exact_number(double value) {
+  if (std::isfinite(value)) return value;
+  return std::isnan(value) ? "nan" : value > 0 ? "inf" : "-inf";
 }
 
-Json cell_json(const Cell& cell) {
-  Json values = Json::array();
-  for (const double value : cell.values) values.push_back(number_json(value));
-  return {{"index", cell.index}, {"values", std::move(values)}, {"infeasible", cell.infeasible}};
+struct NamedAxis {
+  std::string name;
+  std::vector<double> values;
+};
+
+void describe_axis(files::Record& record, const NamedAxis& axis) {
+  record.field("name", axis.name, "Of the parameter.");
+  record.field("values", axis.values, "In the unit of the parameter.");
+}
+
+void describe_cell(files::Record& record, const Cell& cell) {
+  std::vector<ExactNumber> values;
+  for (const double value : cell.values) values.push_back(exact_number(value));
+  record.field("index", cell.index, "Number of the cell, from 0; the last axis varies fastest.");
+  record.field("values", values, "What was computed, in the order of `compute`.");
+  record.field("infeasible", cell.infeasible, "Why the cell is not feasible; empty if it is.");
+}
+
+void describe_shard(files::Record& record, const Grid& grid, const files::Shard& shard,
+                    const std::vector<Cell>& cells) {
+  std::vector<NamedAxis> axes;
+  for (const GridAxis& axis : grid.axes) axes.push_back({axis.name, axis.values});
+  record.constant("schema", kShardSchema, "Name and version of this format.");
+  record.field("grid", grid.path, "The grid.toml.");
+  record.field("grid_sha256", grid.sha256, "SHA-256 of the grid.toml.");
+  record.field("gains_sha256", grid.gains.sha256, "SHA-256 of the gains.toml.");
+  record.field("model_sha256", grid.model.sha256, "SHA-256 of the model.toml.");
+  record.list("axes", axes, "The varied parameters in the order of the grid.", describe_axis);
+  record.field("compute", grid.compute, "What was computed in every cell.");
+  record.field("pareto", grid.pareto, "The quantities that span the Pareto front.");
+  record.field("shard", shard.index, "Number of this part, from 0.");
+  record.field("count", shard.count, "Number of parts.");
+  record.field("total", grid.cells(), "Number of cells of the whole grid.");
+  record.list("cells", cells, "The cells of this part.", describe_cell);
+}
+
+Json shard_json(const Grid& grid, const files::Shard& shard, const std::map<long, Cell>& done) {
+  std::vector<Cell> cells;
+  for (const auto& [index, cell] : done) cells.push_back(cell);
+  files::Node node;
+  files::Record record(node, false);
+  describe_shard(record, grid, shard, cells);
+  return files::to_json(node);
 }
 
 Cell cell_of(const Json& json) {
@@ -65,12 +91,9 @@ Cell cell_of(const Json& json) {
   return cell;
 }
 
-void write_shard(const std::string& file, const Json& head, const std::map<long, Cell>& done) {
-  Json document = head;
-  Json cells = Json::array();
-  for (const auto& [index, cell] : done) cells.push_back(cell_json(cell));
-  document["cells"] = std::move(cells);
-  files::write_file(file, document.dump() + "\n", true);
+void write_shard(const std::string& file, const Grid& grid, const files::Shard& shard,
+                 const std::map<long, Cell>& done) {
+  files::write_file(file, shard_json(grid, shard, done).dump() + "\n", true);
 }
 
 bool same_grid(const Json& a, const Json& b) {
@@ -132,14 +155,13 @@ SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepO
   outcome.file = (fs::path(folder) / ("shard-" + std::to_string(options.shard.index) + "-of-" +
                                       std::to_string(options.shard.count) + ".json"))
                      .string();
-  const Json head = shard_head(grid, options);
   if (!options.overwrite) refuse_foreign(folder);
   std::map<long, Cell> done;
   if (fs::exists(outcome.file)) {
     if (options.resume) {
       const Json old = files::read_json(outcome.file, kShardSchema);
       reading(outcome.file, [&] {
-        if (!same_grid(old, head)) {
+        if (!same_grid(old, shard_json(grid, options.shard, {}))) {
           throw InputError({outcome.file, "", "grid_sha256", "", "belongs to another grid, gains or model",
                             "--force recomputes it"});
         }
@@ -173,11 +195,11 @@ SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepO
     if (options.progress) options.progress(static_cast<long>(done.size()), outcome.total);
     const auto now = std::chrono::steady_clock::now();
     if (std::chrono::duration<double>(now - saved).count() > kCheckpoint_s) {
-      write_shard(outcome.file, head, done);
+      write_shard(outcome.file, grid, options.shard, done);
       saved = now;
     }
   }
-  write_shard(outcome.file, head, done);
+  write_shard(outcome.file, grid, options.shard, done);
   outcome.done = static_cast<long>(done.size());
   return outcome;
 }
@@ -232,35 +254,73 @@ MergedSweep read_shards(const std::string& folder) {
   return sweep;
 }
 
-Json sweep_json(const MergedSweep& sweep) {
-  Json axes = Json::array();
-  for (std::size_t i = 0; i < sweep.axis_names.size(); ++i) {
-    axes.push_back({{"name", sweep.axis_names[i]}, {"values", sweep.axis_values[i]}});
-  }
-  const std::set<long> front(sweep.front.begin(), sweep.front.end());
-  Json points = Json::array();
-  Grid grid;
-  for (std::size_t i = 0; i < sweep.axis_names.size(); ++i) {
-    grid.axes.push_back({sweep.axis_names[i], sweep.axis_values[i]});
-  }
-  for (const Cell& cell : sweep.cells) {
-    Json at;
-    const std::vector<double> values = grid.at(cell.index);
-    for (std::size_t i = 0; i < values.size(); ++i) at[sweep.axis_names[i]] = values[i];
-    Json computed;
-    for (std::size_t i = 0; i < sweep.compute.size(); ++i) {
-      computed[sweep.compute[i]] = std::isfinite(cell.values[i]) ? Json(cell.values[i]) : Json();
-    }
-    points.push_back({{"index", cell.index},
-                      {"at", std::move(at)},
-                      {"values", std::move(computed)},
-                      {"feasible", cell.infeasible.empty()},
-                      {"reason", cell.infeasible},
-                      {"pareto", front.count(cell.index) == 1}});
-  }
-  return {{"schema", kPointsSchema},    {"grid", sweep.grid_path},  {"grid_sha256", sweep.grid_sha256},
-          {"axes", std::move(axes)},    {"compute", sweep.compute}, {"pareto", sweep.pareto},
-          {"points", std::move(points)}};
+namespace {
+
+using NamedNumbers = std::vector<std::pair<std::string, double>>;
+
+/// A cell with the names of its numbers.
+struct Point {
+  long index = 0;
+  NamedNumbers at, values;
+  std::string infeasible;
+  bool is_in_front = false;
+};
+
+NamedNumbers named(const std::vector<std::string>& names, const std::vector<double>& values) {
+  NamedNumbers result;
+  for (std::size_t i = 0; i < names.size(); ++i) result.emplace_back(names[i], values[i]);
+  return result;
 }
+
+std::vector<Point> points_of(const MergedSweep& sweep) {
+  const std::set<long> front(sweep.front.begin(), sweep.front.end());
+  Grid grid;
+  for (std::size_t i = 0; i < sweep.axis_names.size(); ++i)
+    grid.axes.push_back({sweep.axis_names[i], sweep.axis_values[i]});
+  std::vector<Point> points;
+  for (const Cell& cell : sweep.cells)
+    points.push_back({cell.index, named(sweep.axis_names, grid.at(cell.index)),
+                      named(sweep.compute, cell.values), cell.infeasible, front.count(cell.index) == 1});
+  return points;
+}
+
+void describe_point(files::Record& record, const Point& point) {
+  record.field("index", point.index, "Number of the cell, from 0; the last axis varies fastest.");
+  record.field("at", point.at, "Value of each varied parameter.");
+  record.field("values", point.values, "What was computed; null: infinite or not defined.");
+  record.field("feasible", point.infeasible.empty(), "Whether the cell satisfies the limits of the grid.");
+  record.field("reason", point.infeasible, "Why it is not feasible; empty if it is.");
+  record.field("pareto", point.is_in_front, "Whether no other feasible cell is better in everything.");
+}
+
+void describe_file(files::Record& record, const MergedSweep& sweep) {
+  record.constant("schema", kPointsSchema, "Name and version of this format.");
+  record.field("grid", sweep.grid_path, "The grid.toml.");
+  record.field("grid_sha256", sweep.grid_sha256, "SHA-256 of the grid.toml.");
+  describe(record, sweep);
+}
+
+}  // namespace
+
+void describe(files::Record& record, const MergedSweep& sweep) {
+  std::vector<NamedAxis> axes;
+  for (std::size_t i = 0; i < sweep.axis_names.size(); ++i)
+    axes.push_back({sweep.axis_names[i], sweep.axis_values[i]});
+  record.list("axes", axes, "The varied parameters in the order of the grid.", describe_axis);
+  record.field("compute", sweep.compute, "What was computed in every cell.");
+  record.field("pareto", sweep.pareto, "The quantities that span the Pareto front.");
+  record.list("points", points_of(sweep), "Every cell of the grid.", describe_point);
+}
+
+Json sweep_json(const MergedSweep& sweep) {
+  files::Node node;
+  files::Record record(node, false);
+  describe_file(record, sweep);
+  return files::to_json(node);
+}
+
+void describe_points_file(files::Record& record) { describe_file(record, {}); }
+
+void describe_shard_file(files::Record& record) { describe_shard(record, {}, {}, {}); }
 
 }  // namespace swarmcert::stability

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "nn/base/json.h"
+#include "nn/base/record.h"
 #include "nn/base/shard.h"
 #include "stability/sweep/grid.h"
 
@@ -49,6 +50,13 @@ struct MergedSweep {
 /// @throws files::InputError if shards are missing, incomplete, overlapping or from different grids; the message names
 ///     them and the missing cells.
 MergedSweep read_shards(const std::string& folder);
+
+/// Describes the axes and all cells.
+void describe(files::Record& record, const MergedSweep& sweep);
+
+/// Describe sweep.json and the files of the shards, from default values.
+void describe_points_file(files::Record& record);
+void describe_shard_file(files::Record& record);
 
 /// Returns the sweep as JSON (schema swarmcert/sweep-points/1): the same bytes for any number of shards.
 files::Json sweep_json(const MergedSweep& sweep);

@@ -53,6 +53,19 @@ TEST_F(CommandLine, MisspeltCommandsAndOptionsAreUsageErrorsWithASuggestion) {
   expect("certify --phi a", 2, {"--rho"});
 }
 
+TEST_F(CommandLine, ExplainSaysWhatEffectsFieldsAndVerdictsAre) {
+  expect("explain thrust_ratio", 0, {"thrust_ratio (effect)", "equation", "mass / payload / thrust scale"});
+  expect("explain wind", 0, {"constant_force (effect)"});
+  expect("explain may_stay", 0, {"may_stay (field)", "spacing: shape.may_stay"});
+  expect("explain refuted", 0, {"iss-check: verdict"});
+  expect("explain downwahs", 2, {"did you mean \"downwash\""});
+}
+
+TEST_F(CommandLine, AddListsTheEffectsAndGuessesWhatAnUnknownOneMeant) {
+  expect("add --list", 0, {"downwash", "thrust_ratio", "pendulum"});
+  expect("add", 2, {"EFFECT is missing"});
+}
+
 TEST_F(CommandLine, TwoOutputsIntoOneFileAreRefusedBeforeAnyWork) {
   expect("certify nowhere.pth -o one.json --json ./one.json", 2,
          {"--json and -o both write", "name two files"});

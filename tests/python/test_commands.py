@@ -57,6 +57,7 @@ def calls(folder, flights):
     yield "match", lambda: swarmcert.match(NETWORK, folder / "code"), ()
     yield "gate", lambda: swarmcert.run("gate", folder / "policy.toml", bundle=folder / "evidence"), ()
     yield "verify-bundle", lambda: swarmcert.run("verify-bundle", folder / "evidence"), ()
+    yield "explain", lambda: swarmcert.run("explain", "downwash"), ()
     yield "schema", lambda: swarmcert.run("schema", "gains"), ()
     yield "demo", lambda: swarmcert.run("demo", output=folder / "demo"), ("-o", folder / "demo2")
 

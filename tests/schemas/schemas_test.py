@@ -1,4 +1,4 @@
-"""Compares the JSON Schemas that ship with the tool with its output and input files.
+"""Compares the JSON Schemas that the tool prints with its output and input files.
 
     schemas_test.py SWARMCERT SOURCE_FOLDER
 
@@ -6,6 +6,7 @@ Runs each command once on small inputs; the C++ tests validate all their other r
 with 77, which ctest treats as skipped, if Debian's python3-jsonschema is missing.
 """
 
+import functools
 import json
 import os
 import pathlib
@@ -24,7 +25,7 @@ except ImportError as missing:
     sys.exit(77)
 
 TOOL, SOURCE = os.path.abspath(sys.argv[1]), pathlib.Path(sys.argv[2]).resolve()
-SCHEMAS = SOURCE / "analysis/schemas"
+SCHEMAS = {}
 FAULTS = []
 
 
@@ -35,12 +36,14 @@ def expect(condition, what):
 
 
 def read_schema(name):
-    path = SCHEMAS / f"{name}.schema.json"
-    return json.loads(path.read_text()) if path.exists() else None
+    if name not in SCHEMAS and name in names():
+        SCHEMAS[name] = json.loads(run(["schema", name]))
+    return SCHEMAS.get(name)
 
 
+@functools.cache
 def names():
-    return sorted(path.name[: -len(".schema.json")] for path in SCHEMAS.glob("*.schema.json"))
+    return run(["schema"]).split()
 
 
 def run(words, codes=(0,), folder=None):
@@ -102,9 +105,7 @@ def test_schemas_are_valid_and_closed():
 
 
 def test_the_command_prints_them():
-    expect(run(["schema"]).split() == names(), "schema lists other names than the folder holds")
-    for name in names():
-        expect(run(["schema", name]) == (SCHEMAS / f"{name}.schema.json").read_text(), f"schema {name}")
+    expect(names() == sorted(names()), "schema lists names out of order")
     run(["schema", "certifi"], codes=(2,))
 
 
@@ -151,6 +152,7 @@ def command_lines():
     yield ["gate", "strict.toml", "--sarif", "fail.sarif"], (1,)
     yield ["verify-bundle", "evidence"], (0,)
     yield ["schema", "certify"], (0,)
+    yield ["explain", "wind"], (0,)
     yield ["demo", "-o", "demo"], (0,)
 
 

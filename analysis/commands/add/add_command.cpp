@@ -10,6 +10,7 @@
 #include "analysis/commands/add/add_output.h"
 #include "analysis/commands/add/add_report.h"
 #include "analysis/commands/commands.h"
+#include "analysis/commands/explain/glossary.h"
 #include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/flight_options.h"
@@ -31,7 +32,7 @@ using identification::Ladder;
 struct AddOptions {
   FlightOptions flights;
   std::string effects, output, report;
-  bool keep_anyway = false;
+  bool keep_anyway = false, lists_effects = false;
 };
 
 std::vector<std::string> split_names(const std::string& text) {
@@ -58,7 +59,7 @@ void check(const std::vector<std::string>& names, const stability::Model& model)
       throw UsageError("the effect " + name +
                        " cannot be fitted to the force of a flight; write it into the model file");
     if (std::find(known.begin(), known.end(), name) == known.end())
-      throw UsageError("unknown effect " + name + ": " + files::did_you_mean(name, all));
+      throw UsageError("unknown effect " + name + ": " + effect_suggestion(name, all));
     if (identification::is_taken(name, model))
       throw UsageError("the model has the effect " + name +
                        " already; remove it from the file to fit it again");
@@ -195,9 +196,24 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   return kDone;
 }
 
+/// The registered effects, one line each; their JSON is that of `explain`.
+int list_effects(const CommonOptions& common) {
+  if (common.prints_text()) {
+    for (const GlossaryEntry& effect : effect_entries())
+      fmt::print("{:<22}{}{}\n", effect.name, effect.equation,
+                 effect.same_as.empty() ? "" : "; shows like " + effect.same_as);
+    fmt::print("'swarmcert explain EFFECT' says more; formula and shape need no effect\n");
+  }
+  write_result(common, result_of("explain", {}, std::nullopt, Explanation{"effects", effect_entries()}));
+  return kDone;
+}
+
 int run_add(const AddOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
+  if (options.lists_effects) return list_effects(common);
+  if (options.effects.empty()) throw UsageError("EFFECT is missing: add EFFECT[,EFFECT], auto, undo or show");
+  if (options.flights.models.empty()) throw UsageError("--model is missing: name the model.toml to add to");
   if (options.effects == "undo") return undo(options, common);
   if (options.effects == "show") return show(options, common);
   return climb(options, common);
@@ -223,8 +239,8 @@ Command add_command() {
       [](CLI::App& app) {
         const auto options = std::make_shared<AddOptions>();
         app.add_option("EFFECT", options->effects,
-                       "Names of effects separated by commas, formula, shape, auto, undo or show")
-            ->required();
+                       "Names of effects separated by commas, formula, shape, auto, undo or show");
+        app.add_flag("--list", options->lists_effects, "List all effects");
         declare_flights(app, options->flights, false);
         add_output(app, "-o,--output", options->output, "The new model.toml");
         app.add_flag("--keep-anyway", options->keep_anyway, "Also add effects that do not reduce the error");

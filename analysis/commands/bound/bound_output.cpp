@@ -261,12 +261,23 @@ void print_bounds(const DisturbanceSource& source, const TrackingReport& report)
 
 }  // namespace
 
-Json norms_json(const GainNorms& norms) {
-  return {{"rate", finite(norms.rate)},
-          {"amplitude", finite(norms.amplitude)},
-          {"edge", finite(norms.edge)},
-          {"impulse", finite(norms.impulse)}};
+void describe_norms(files::Record& record, const GainNorms& norms) {
+  record.field("rate", norms.rate, "Error per bound on the rate of the force.", "m per N/s", "exact");
+  record.field("amplitude", norms.amplitude, "Error per bound on the force.", "m/N", "exact");
+  record.field("edge", norms.edge, "Error per total variation of the force.", "m/N", "exact");
+  record.field("impulse", norms.impulse, "Error per impulse of the force.", "m per N s", "exact");
 }
+
+namespace {
+
+Json norms_json(const GainNorms& norms) {
+  files::Node node;
+  files::Record record(node, false);
+  describe_norms(record, norms);
+  return files::to_json(node);
+}
+
+}  // namespace
 
 std::string cell(double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : "-"; }
 

@@ -3,13 +3,15 @@
 
 #include "analysis/commands/shared/tracking_input.h"
 #include "nn/base/json_number.h"
+#include "nn/base/record.h"
 #include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::analysis {
 
 using files::finite;
 
-files::Json norms_json(const stability::GainNorms& norms);
+/// Describes the four gains as fields.
+void describe_norms(files::Record& record, const stability::GainNorms& norms);
 
 /// Formats a number with six digits; "-" if it is not finite.
 std::string cell(double value);

@@ -347,17 +347,15 @@ Command compare_command() {
         add_output(app, "--report", options->report, "Write an HTML report into this folder");
         declare_unit(app, options->flights, "");
         app.add_option(
-               "--gains", options->gains,
-               "gains.toml, or KIND=gains.toml for each kind: also simulates the closed loop from the "
-               "logs' set points")
-            ->allow_extra_args(false);
+            "--gains", options->gains,
+            "gains.toml, or KIND=gains.toml for each kind: also simulates the closed loop from the "
+            "logs' set points");
         app.add_option("--network", options->flights.network,
                        "network.toml: a learned force for every model, in place of its own");
         app.add_option(
-               "--budget", options->budget,
-               "Flights to fit: how the error of FLIGHTS falls from the nominal model by motor lag, offset "
-               "per vehicle, ground, downwash and the rest; --network adds a row")
-            ->allow_extra_args(false);
+            "--budget", options->budget,
+            "Flights to fit: how the error of FLIGHTS falls from the nominal model by motor lag, offset "
+            "per vehicle, ground, downwash and the rest; --network adds a row");
         add_output(app, "--fitted", options->fitted,
                    "Folder for the models fitted by --budget, one per vehicle, and their flights.toml");
         app.add_option(

@@ -26,6 +26,21 @@ struct DemoOptions {
   std::string output = "swarmcert-demo";
 };
 
+struct DemoResult {
+  std::string certificate_sha256;
+  bool accepted = false;
+  std::string headline, verdict;
+};
+
+void describe(files::Record& record, const DemoResult& result) {
+  record.field("certificate_sha256", result.certificate_sha256, "Of the file cert.json.");
+  record.field("accepted", result.accepted, "Whether the independent checker accepts the certificate.");
+  record.object("study", "Of the flights.", [&](files::Record& study) {
+    study.field("headline", result.headline, "What the model lacks, and what adding it changes.");
+    study.field("verdict", result.verdict, "Of `study`.");
+  });
+}
+
 /// Announces each step, with the command that runs it on its own.
 class Speaker {
  public:
@@ -38,14 +53,9 @@ class Speaker {
   bool speaks_;
 };
 
-struct Certified {
-  bool accepted = false;
-  std::string page;
-};
-
-/// Certifies the bundled network, checks the certificate, and writes both with a report.
-Certified certify_network(const files::Network& network, const std::string& file, const fs::path& folder,
-                          const CommonOptions& common, const Speaker& say, files::Json& result) {
+/// Certifies the bundled network, checks the certificate, and writes both with a report. Returns the path of the page.
+std::string certify_network(const files::Network& network, const std::string& file, const fs::path& folder,
+                            const CommonOptions& common, const Speaker& say, DemoResult& result) {
   const std::string certificate_path = (folder / "cert.json").string();
   say(fmt::format("1. Certify the bundled network: swarmcert certify {} -o {}", file, certificate_path));
   lipschitz::CertifyOptions options;
@@ -66,13 +76,13 @@ Certified certify_network(const files::Network& network, const std::string& file
       check::check(files::read_json(certificate_path, check::kCertificateSchema), network);
   say(fmt::format("   {}: {}", checked.accepted ? "accepted" : "rejected", checked.reason));
 
-  result["certificate_sha256"] = files::sha256(files::read_file(certificate_path));
-  result["accepted"] = checked.accepted;
+  result.certificate_sha256 = files::sha256(files::read_file(certificate_path));
+  result.accepted = checked.accepted;
   CertifyOutput output;
   output.found = found;
   output.verdict = lipschitz::Verdict::kProved;
-  return {checked.accepted,
-          write_certify_report(network, output, result, (folder / "report").string(), common.force)};
+  const files::Json json = files::to_json(result_of("demo", input_files(network), std::nullopt, result));
+  return write_certify_report(network, output, json, (folder / "report").string(), common.force);
 }
 
 /// Simulates random walks of two vehicles with the effects of crazyflie-small-effects.toml into FOLDER/1 .. FOLDER/3.
@@ -101,7 +111,7 @@ void fly(const fs::path& folder, const std::string& models, bool force) {
 
 /// Simulates flights with effects that the studied model lacks, and studies them. Returns the path of the page.
 std::string study_flights(const fs::path& folder, const CommonOptions& common, const Speaker& say,
-                          files::Json& result) {
+                          DemoResult& result) {
   const std::string models = bundled_folder("models", "stability/models");
   const std::string model = models + "/crazyflie-small.toml", flights = (folder / "flights").string(),
                     output = (folder / "study").string();
@@ -123,7 +133,8 @@ std::string study_flights(const fs::path& folder, const CommonOptions& common, c
   const residuals::ForceUnit unit = residuals::chosen_force_unit("N", inputs.models[0]);
   const std::string sentence = headline(study, unit);
   say("   " + sentence);
-  result["study"] = {{"headline", sentence}, {"verdict", answer["verdict"]}};
+  result.headline = sentence;
+  result.verdict = answer["verdict"].get<std::string>();
   return write_study_folder(study, {}, nullptr, unit, answer, output);
 }
 
@@ -137,12 +148,12 @@ int run_demo(const DemoOptions& options, const CommonOptions& common) {
   files::NetworkArguments arguments;
   arguments.file = bundled_folder("networks", "nn/networks") + "/demo/network.toml";
   const files::Network network = files::load_network(arguments);
-  files::Json result = result_head("demo", input_files(network));
-  const Certified certified = certify_network(network, arguments.file, folder, common, say, result);
+  DemoResult result;
+  const std::string certify_page = certify_network(network, arguments.file, folder, common, say, result);
   const std::string study_page = study_flights(folder, common, say, result);
-  say(fmt::format("Look at {} and {}.", certified.page, study_page));
-  write_result(common, result);
-  return certified.accepted ? kDone : kViolated;
+  say(fmt::format("Look at {} and {}.", certify_page, study_page));
+  write_result(common, result_of("demo", input_files(network), std::nullopt, result));
+  return result.accepted ? kDone : kViolated;
 }
 
 }  // namespace
@@ -156,7 +167,8 @@ Command demo_command() {
             const auto options = std::make_shared<DemoOptions>();
             add_output(app, "-o,--output", options->output, "Folder for the results")->capture_default_str();
             return [options](const CommonOptions& common) { return run_demo(*options, common); };
-          }};
+          },
+          fields_of<DemoResult>()};
 }
 
 }  // namespace swarmcert::analysis

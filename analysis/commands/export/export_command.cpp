@@ -61,6 +61,31 @@ std::string certificate_of(const files::Network& network, const std::string& pat
   return hash;
 }
 
+struct ExportResult {
+  bool as_float32 = false;
+  std::vector<firmware::SourceFile> files;
+  long weights_bytes = 0;
+  int golden_vectors = 0;
+
+  bool fits() const { return weights_bytes <= firmware::kCrazyflieFlash_bytes; }
+};
+
+void describe_file(files::Record& record, const firmware::SourceFile& file) {
+  record.field("name", file.name, "Path in the folder of the export.");
+  record.field("sha256", files::sha256(file.contents), "Of the content, hexadecimal.");
+}
+
+void describe(files::Record& record, const ExportResult& result) {
+  record.field("as", result.as_float32 ? std::optional<std::string>("float32") : std::nullopt,
+               "Arithmetic to which float64 weights are rounded: float32; null: exported as stored.");
+  record.list("files", result.files, "Every exported file.", describe_file);
+  record.field("weights_bytes", result.weights_bytes, "What weights and biases take of the flash.", "B",
+               "exact");
+  record.field("fits_crazyflie", result.fits(), "Whether that is at most the flash of a Crazyflie, 1 MiB.");
+  record.field("golden_vectors", result.golden_vectors,
+               "Inputs with expected outputs among the exported files.");
+}
+
 int run_export(ExportOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   bool is_rounded = false;
@@ -75,29 +100,20 @@ int run_export(ExportOptions options, const CommonOptions& common) {
     if (fs::exists(fs::path(options.output) / source.name))
       refuse_to_replace(common, (fs::path(options.output) / source.name).string());
   }
-  files::Json list = files::Json::array();
   for (const firmware::SourceFile& source : sources) {
     const fs::path path = fs::path(options.output) / source.name;
     fs::create_directories(path.parent_path());
     files::write_file(path.string(), source.contents, common.force);
-    list.push_back({{"name", source.name}, {"sha256", files::sha256(source.contents)}});
   }
-  files::Json result = result_head("export", inputs);
-  result["as"] = is_rounded ? files::Json("float32") : files::Json();
-  result["seed"] = options.source.seed;
-  result["files"] = std::move(list);
-  const long bytes = firmware::weights_bytes(network);
-  const bool fits = bytes <= firmware::kCrazyflieFlash_bytes;
-  result["weights_bytes"] = bytes;
-  result["fits_crazyflie"] = fits;
-  result["golden_vectors"] = options.source.golden_vectors * static_cast<int>(network.rho.size());
-  write_result(common, result);
+  const ExportResult result = {is_rounded, sources, firmware::weights_bytes(network),
+                               options.source.golden_vectors * static_cast<int>(network.rho.size())};
+  write_result(common, result_of("export", inputs, options.source.seed, result));
   if (common.prints_text()) {
-    for (const firmware::SourceFile& source : sources)
+    for (const firmware::SourceFile& source : result.files)
       fmt::print("written: {}/{}\n", options.output, source.name);
     fmt::print("compile swarmcert_network.cpp with -std=c++17 -O2 -ffp-contract=off -I{}\n", options.output);
-    fmt::print("weights: {} bytes of flash", bytes);
-    if (!fits)
+    fmt::print("weights: {} bytes of flash", result.weights_bytes);
+    if (!result.fits())
       fmt::print(", which do not fit into the {} of a Crazyflie: {}", firmware::kCrazyflieFlash_bytes,
                  firmware::kSmallerNetwork);
     fmt::print("\n");
@@ -127,7 +143,8 @@ Command export_command() {
             ->capture_default_str();
         app.add_option("--seed", options->source.seed, "Seed of the golden vectors")->capture_default_str();
         return [options](const CommonOptions& common) { return run_export(*options, common); };
-      }};
+      },
+      fields_of<ExportResult>()};
 }
 
 }  // namespace swarmcert::analysis

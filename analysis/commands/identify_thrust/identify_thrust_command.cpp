@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <array>
 #include <memory>
 
 #include "analysis/cli/command_line.h"
@@ -18,21 +19,68 @@ struct IdentifyThrustOptions {
   double confidence = 0.95;
 };
 
-constexpr const char* kNames[] = {"thrust", "pwm", "max_thrust"};
+struct ThrustResult {
+  IdentifyThrustOptions options;
+  ThrustData data;
+  ThrustIdentification found;
 
-files::Json to_json(const PolynomialFit& fit) {
-  files::Json json = {{"determined", fit.determined},
-                      {"method", fit.method},
-                      {"unit", fit.unit},
-                      {"samples", fit.samples},
-                      {"residual_rms", fit.residual_rms},
-                      {"largest_residual", fit.largest_residual},
-                      {"largest_uncertainty", fit.largest_uncertainty}};
-  if (!fit.determined) json["why_not"] = fit.why_not;
-  return json;
+  bool is_determined() const {
+    return found.thrust.determined && found.pwm.determined && found.max_thrust.determined;
+  }
+};
+
+void describe_fit(files::Record& record, const PolynomialFit& fit) {
+  record.field("determined", fit.determined, "Whether the data determine every coefficient.");
+  record.field("method", fit.method, "Of the fit.");
+  record.field("unit", fit.unit, "Of the residuals.");
+  record.field("samples", fit.samples, "Rows that were fitted.");
+  record.field("residual_rms", fit.residual_rms, "In `unit`.");
+  record.field("largest_residual", fit.largest_residual, "In `unit`.");
+  record.field("largest_uncertainty", fit.largest_uncertainty,
+               "Of the polynomial within the data, in `unit`.");
+  record.may("why_not", fit.determined ? std::nullopt : std::optional<std::string>(fit.why_not),
+             "What the data lack.");
 }
 
-files::Json to_json(const SignalSource& source) { return {{"column", source.column}, {"unit", source.unit}}; }
+void describe_coefficient(files::Record& record, const Coefficient& c) {
+  record.field("value", c.value, "p = PWM / 65536, v = V / 4.2; gram-force of one rotor.");
+  record.field("interval", std::array<double, 2>{c.lower, c.upper}, "At the stated confidence.");
+}
+
+void describe_source(files::Record& record, const SignalSource& source) {
+  record.field("column", source.column, "Of the table.");
+  record.field("unit", source.unit, "Of the column.");
+}
+
+void describe(files::Record& record, const ThrustResult& result) {
+  const ThrustIdentification& found = result.found;
+  record.field("verdict", result.is_determined() ? "determined" : "undetermined",
+               "determined: the data determine all three polynomials.");
+  record.object("columns", "Which column was taken for what.", [&](files::Record& columns) {
+    columns.object("pwm", "Command.", [&](files::Record& one) { describe_source(one, result.data.pwm); });
+    columns.object("voltage", "Of the battery.",
+                   [&](files::Record& one) { describe_source(one, result.data.voltage); });
+    columns.object("thrust", "Of all rotors.",
+                   [&](files::Record& one) { describe_source(one, result.data.thrust); });
+  });
+  record.field("rotors", result.options.rotors, "Rotors whose force the table states together.");
+  record.field("samples", result.data.samples.size(), "Rows that were used.");
+  record.field("confidence", result.options.confidence, "Of the intervals.");
+  record.object("range", "What the fit covers.", [&](files::Record& range) {
+    range.field("p", std::array<double, 2>{found.smallest_p, found.largest_p}, "Share of the full command.");
+    range.field("battery_V",
+                std::array<double, 2>{found.smallest_v * controller::kReferenceVoltage_V,
+                                      found.largest_v * controller::kReferenceVoltage_V},
+                "Of the battery.", "V");
+  });
+  const std::vector<std::pair<std::string, PolynomialFit>> fits = {
+      {"thrust", found.thrust}, {"pwm", found.pwm}, {"max_thrust", found.max_thrust}};
+  std::vector<std::pair<std::string, Coefficient>> coefficients;
+  for (const auto& [name, fit] : fits)
+    for (const Coefficient& c : fit.coefficients) coefficients.emplace_back(c.name, c);
+  record.entries("coefficients", coefficients, "Of the three polynomials, by name.", describe_coefficient);
+  record.entries("fits", fits, "How well they fit.", describe_fit);
+}
 
 void print(const ThrustData& data, const ThrustIdentification& result) {
   fmt::print("{}: {} rows, PWM {:.2f} to {:.2f} of full, battery {:.2f} to {:.2f} V\n", data.path,
@@ -66,35 +114,15 @@ int run_identify_thrust(const IdentifyThrustOptions& options, const CommonOption
   refuse_folder(common, options.report);
   const ThrustData data = load_thrust_data(options.file, options.rotors);
   const ThrustIdentification result = identify_thrust(data, options.confidence);
-  const bool determined = result.thrust.determined && result.pwm.determined && result.max_thrust.determined;
-
-  files::Json json = result_head("identify-thrust", {options.file});
-  json["verdict"] = determined ? "determined" : "undetermined";
-  json["columns"] = {
-      {"pwm", to_json(data.pwm)}, {"voltage", to_json(data.voltage)}, {"thrust", to_json(data.thrust)}};
-  json["rotors"] = options.rotors;
-  json["samples"] = data.samples.size();
-  json["confidence"] = options.confidence;
-  json["range"] = {{"p", {result.smallest_p, result.largest_p}},
-                   {"battery_V",
-                    {result.smallest_v * controller::kReferenceVoltage_V,
-                     result.largest_v * controller::kReferenceVoltage_V}}};
-  json["coefficients"] = files::Json::object();
-  json["fits"] = files::Json::object();
-  const PolynomialFit* const fits[] = {&result.thrust, &result.pwm, &result.max_thrust};
-  for (int i = 0; i < 3; ++i) {
-    json["fits"][kNames[i]] = to_json(*fits[i]);
-    for (const Coefficient& c : fits[i]->coefficients) {
-      json["coefficients"][c.name] = {{"value", c.value}, {"interval", {c.lower, c.upper}}};
-    }
-  }
+  const ThrustResult described = {options, data, result};
+  const files::Node node = result_of("identify-thrust", {options.file}, std::nullopt, described);
   if (common.prints_text()) print(data, result);
-  write_result(common, json);
+  write_result(common, node);
   if (!options.report.empty()) {
-    const std::string path = write_thrust_report(data, result, json, options.report, common.force);
+    const std::string path = write_thrust_report(data, result, node, options.report, common.force);
     if (common.prints_text()) fmt::print("\nreport: {}\n", path);
   }
-  return determined ? kDone : kInconclusive;
+  return described.is_determined() ? kDone : kInconclusive;
 }
 
 }  // namespace
@@ -118,7 +146,8 @@ Command identify_thrust_command() {
             ->check(CLI::Range(0.5, 0.9999));
         add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
         return [options](const CommonOptions& common) { return run_identify_thrust(*options, common); };
-      }};
+      },
+      fields_of<ThrustResult>()};
 }
 
 }  // namespace swarmcert::analysis

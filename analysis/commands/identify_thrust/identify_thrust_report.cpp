@@ -44,7 +44,7 @@ void add_polynomial(Report& report, const std::string& title, const PolynomialFi
 }  // namespace
 
 std::string write_thrust_report(const ThrustData& data, const ThrustIdentification& found,
-                                const files::Json& result, const std::string& folder, bool overwrite) {
+                                const files::Node& result, const std::string& folder, bool overwrite) {
   Report report("Thrust calibration");
   report.made_by(command_to_copy());
   report.result(result);

@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
+#include <array>
 #include <map>
 #include <memory>
 
@@ -9,12 +10,12 @@
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/iss_check/iss_check_report.h"
+#include "nn/base/pi.h"
 #include "stability/iss/iss_full_loop.h"
 
 namespace swarmcert::analysis {
 namespace {
 
-using files::Json;
 using stability::IssCheck;
 using stability::IssRun;
 
@@ -23,9 +24,9 @@ struct IssCheckOptions {
   stability::IssOptions check;
 };
 
-constexpr double kDegrees = 57.29577951308232;
+constexpr double kDegrees = 180 / kPi;
 
-Json vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+std::array<double, 3> three_numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 const char* verdict(const IssCheck& check) {
   if (check.is_refuted()) return "refuted";
@@ -33,14 +34,16 @@ const char* verdict(const IssCheck& check) {
 }
 
 struct KindSummary {
+  std::string name;
   int runs = 0, violations = 0, left = 0, failed = 0;
   double worst_ratio = 0, worst_transient_ratio = 0;
 };
 
-std::map<std::string, KindSummary> by_kind(const IssCheck& check) {
+std::vector<KindSummary> by_kind(const IssCheck& check) {
   std::map<std::string, KindSummary> kinds;
   for (const IssRun& run : check.runs) {
     KindSummary& kind = kinds[run.kind];
+    kind.name = run.kind;
     ++kind.runs;
     kind.violations += run.is_violation ? 1 : 0;
     kind.left += run.left.empty() ? 0 : 1;
@@ -48,7 +51,9 @@ std::map<std::string, KindSummary> by_kind(const IssCheck& check) {
     kind.worst_ratio = std::max(kind.worst_ratio, run.ratio);
     kind.worst_transient_ratio = std::max(kind.worst_transient_ratio, run.transient_ratio);
   }
-  return kinds;
+  std::vector<KindSummary> all;
+  for (const auto& [name, kind] : kinds) all.push_back(kind);
+  return all;
 }
 
 /// Whether the shown ratio refers to the ball: if the ball is exceeded, or if nothing is violated and the run started
@@ -72,87 +77,129 @@ const IssRun* witness(const IssCheck& check) {
   return best;
 }
 
-Json run_json(const IssRun& run) {
-  Json pieces = Json::array();
-  for (std::size_t i = 0; i < run.disturbance.until_s.size(); ++i) {
-    pieces.push_back(
-        {{"until_s", run.disturbance.until_s[i]}, {"rate_N_s", vector(run.disturbance.rate_W_N_s[i])}});
-  }
-  return {{"disturbance", run.kind},
-          {"ratio", run.ratio},
-          {"transient_ratio", run.transient_ratio},
-          {"largest_error_m", run.largest_m},
-          {"at_s", run.at_s},
-          {"left_hypothesis", run.left.empty() ? Json() : Json(run.left)},
-          {"left_at_s", run.left.empty() ? Json() : Json(run.left_at_s)},
-          {"failure", run.failure.empty() ? Json() : Json(run.failure)},
-          {"initial_position_error_m", vector(run.position_m)},
-          {"initial_velocity_error_m_s", vector(run.velocity_m_s)},
-          {"bias_N", vector(run.disturbance.bias_W_N)},
-          {"pieces", std::move(pieces)}};
+struct IssCheckResult {
+  int runs = 0;  ///< asked for
+  IssCheck check;
+  std::vector<stability::FullLoopRun> flown;
+};
+
+/// A piece of a disturbance with a constant rate.
+struct Piece {
+  double until_s = 0;
+  Eigen::Vector3d rate_N_s = Eigen::Vector3d::Zero();
+};
+
+std::optional<std::string> text_or_null(const std::string& text) {
+  return text.empty() ? std::nullopt : std::optional<std::string>(text);
 }
 
-Json result_json(const IssCheckOptions& options, const IssCheck& check,
-                 const std::vector<stability::FullLoopRun>& flown) {
-  Json result = result_head("iss-check", {options.gains, options.model});
-  result["seed"] = options.check.seed;
-  result["loop"] = "continuous position loop with the declared lags, clamps and thrust limit";
-  result["delay_left_out_s"] = check.delay_left_out_s;
-  result["theorem"] = {{"applies", check.theorem_applies}, {"why_not", check.why_not}};
-  result["rate_N_s"] = check.rate_N_s;
-  result["ball_m"] = check.ball_m;
-  result["ball_from"] =
-      check.has_ball ? "theorem" : "smallest eigenvalues or m Ki: the gains lack the theorem's form";
-  result["duration_s"] = check.duration_s;
-  int runs = 0;
-  Json kinds = Json::array();
-  for (const auto& [name, kind] : by_kind(check)) {
-    runs += kind.runs;
-    kinds.push_back({{"disturbance", name},
-                     {"runs", kind.runs},
-                     {"violations", kind.violations},
-                     {"left_hypotheses", kind.left},
-                     {"failed", kind.failed},
-                     {"worst_ratio", kind.worst_ratio},
-                     {"worst_transient_ratio", kind.worst_transient_ratio}});
+/// Fields of a run of either loop.
+template <class Run>
+void describe_end(files::Record& record, const Run& run) {
+  record.field("left_hypothesis", text_or_null(run.left),
+               "Hypothesis of the theorem that it left; null: none.");
+  record.field("left_at_s", run.left.empty() ? std::nullopt : std::optional<double>(run.left_at_s),
+               "When it left it; null: never.", "s");
+  record.field("failure", text_or_null(run.failure), "Why it could not be integrated; null: it was.");
+}
+
+void describe_run(files::Record& record, const IssRun& run) {
+  std::vector<Piece> pieces;
+  for (std::size_t i = 0; i < run.disturbance.until_s.size(); ++i)
+    pieces.push_back({run.disturbance.until_s[i], run.disturbance.rate_W_N_s[i]});
+  record.field("disturbance", run.kind, "Its kind.");
+  record.field("ratio", run.ratio, "Largest error over the ball.", "", "lower bound of what is possible");
+  record.field("transient_ratio", run.transient_ratio, "Largest error over the transient bound.");
+  record.field("largest_error_m", run.largest_m, "Norm of the position error.", "m");
+  record.field("at_s", run.at_s, "When it was reached.", "s");
+  describe_end(record, run);
+  record.field("initial_position_error_m", three_numbers(run.position_m), "World frame.", "m");
+  record.field("initial_velocity_error_m_s", three_numbers(run.velocity_m_s), "World frame.", "m/s");
+  record.field("bias_N", three_numbers(run.disturbance.bias_W_N), "Disturbance at the start, world frame.",
+               "N");
+  record.list("pieces", pieces, "Of the disturbance.", [](files::Record& one, const Piece& piece) {
+    one.field("until_s", piece.until_s, "End of the piece.", "s");
+    one.field("rate_N_s", three_numbers(piece.rate_N_s), "World frame.", "N/s");
+  });
+}
+
+void describe_kind(files::Record& record, const KindSummary& kind) {
+  record.field("disturbance", kind.name, "Its kind.");
+  record.field("runs", kind.runs, "Runs that were made.");
+  record.field("violations", kind.violations, "Runs that left the ball or the transient bound.");
+  record.field("left_hypotheses", kind.left,
+               "Runs that left a hypothesis of the theorem; they refute nothing.");
+  record.field("failed", kind.failed, "Runs that could not be integrated.");
+  record.field("worst_ratio", kind.worst_ratio, "Largest error over the ball.");
+  record.field("worst_transient_ratio", kind.worst_transient_ratio,
+               "Largest error over the transient bound.");
+}
+
+/// A run with attitude and rotors, and the one without that has the same disturbance.
+struct FullRun {
+  stability::FullLoopRun run;
+  IssRun of;
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+};
+
+std::vector<FullRun> full_runs(const IssCheckResult& result) {
+  std::vector<FullRun> all;
+  for (const stability::FullLoopRun& run : result.flown) {
+    const IssRun& of = result.check.runs[static_cast<std::size_t>(run.run)];
+    all.push_back({run, of, of.disturbance.rate_W_N_s.back().stableNormalized()});
   }
-  result["runs"] = options.check.runs;
-  result["reported_runs"] = runs;
-  result["violations"] = check.violations;
-  result["left_hypotheses"] = check.left;
-  result["failed"] = check.failed;
-  result["worst_ratio"] = check.worst_ratio;
-  result["worst_transient_ratio"] = check.worst_transient_ratio;
-  result["kinds"] = std::move(kinds);
+  return all;
+}
+
+void describe_full_run(files::Record& record, const FullRun& full) {
+  record.field("disturbance", full.of.kind, "Its kind.");
+  record.field("direction", three_numbers(full.direction), "Of its last piece, world frame.");
+  record.field("ratio", full.run.ratio, "Largest error over the ball.");
+  record.field("ratio_without_attitude", full.of.ratio, "The same of the position loop alone.");
+  record.field("at_s", full.run.at_s, "When the largest error was reached.", "s");
+  record.field("largest_tilt_deg", kDegrees * full.run.largest_tilt_rad, "Largest tilt.", "deg");
+  describe_end(record, full.run);
+}
+
+void describe(files::Record& record, const IssCheckResult& result) {
+  const IssCheck& check = result.check;
+  record.field("loop", "continuous position loop with the declared lags, clamps and thrust limit",
+               "The loop that was integrated.");
+  record.field("delay_left_out_s", check.delay_left_out_s, "Delay of the gains that this loop does not have.",
+               "s");
+  record.object("theorem", "Whether the theorem applies.", [&](files::Record& theorem) {
+    theorem.field("applies", check.theorem_applies, "Whether all its hypotheses hold.");
+    theorem.field("why_not", check.why_not, "Hypotheses that do not hold.");
+  });
+  record.field("rate_N_s", check.rate_N_s, "Bound on the rate of the disturbance.", "N/s");
+  record.field("ball_m", check.ball_m, "Radius of the ball that was to be left.", "m");
+  record.field("ball_from",
+               check.has_ball ? "theorem" : "smallest eigenvalues or m Ki: the gains lack the theorem's form",
+               "What gives the ball.");
+  record.field("duration_s", check.duration_s, "Of each run.", "s");
+  record.field("runs", result.runs, "Runs that were asked for.");
+  record.field("reported_runs", check.runs.size(), "Runs that were made, of all kinds.");
+  record.field("violations", check.violations, "Runs that left the ball or the transient bound.");
+  record.field("left_hypotheses", check.left,
+               "Runs that left a hypothesis of the theorem; they refute nothing.");
+  record.field("failed", check.failed, "Runs that could not be integrated.");
+  record.field("worst_ratio", check.worst_ratio, "Largest error over the ball.");
+  record.field("worst_transient_ratio", check.worst_transient_ratio,
+               "Largest error over the transient bound.");
+  record.list("kinds", by_kind(check), "The same by kind of disturbance.", describe_kind);
   const IssRun* const shown = witness(check);
-  result["worst"] = shown != nullptr ? run_json(*shown) : Json();
-  Json full = Json::array();
-  double worst_full = 0;
-  for (const stability::FullLoopRun& run : flown) {
-    const IssRun& of = check.runs[static_cast<std::size_t>(run.run)];
-    worst_full = std::max(worst_full, run.ratio);
-    full.push_back({{"disturbance", of.kind},
-                    {"direction", vector(of.disturbance.rate_W_N_s.back().stableNormalized())},
-                    {"ratio", run.ratio},
-                    {"ratio_without_attitude", of.ratio},
-                    {"at_s", run.at_s},
-                    {"largest_tilt_deg", kDegrees * run.largest_tilt_rad},
-                    {"left_hypothesis", run.left.empty() ? Json() : Json(run.left)},
-                    {"left_at_s", run.left.empty() ? Json() : Json(run.left_at_s)},
-                    {"failure", run.failure.empty() ? Json() : Json(run.failure)}});
-  }
-  result["full_loop"] = {{"worst_ratio", worst_full}, {"runs", std::move(full)}};
-  result["verdict"] = verdict(check);
-  result["why_inconclusive"] = check.why_inconclusive();
-  return result;
-}
-
-/// What was not judged in the runs of a kind.
-std::string unjudged_text(const KindSummary& kind) {
-  std::string text;
-  if (kind.left > 0) text += fmt::format("  {} left a hypothesis", kind.left);
-  if (kind.failed > 0) text += fmt::format("  {} could not be integrated", kind.failed);
-  return text;
+  record.object_or_null(shown != nullptr, "worst", "The most significant run; null: no runs.",
+                        [&](files::Record& run) { describe_run(run, shown != nullptr ? *shown : IssRun{}); });
+  record.object("full_loop", "The same disturbances with attitude and rotors, outside the hypotheses.",
+                [&](files::Record& full) {
+                  double worst = 0;
+                  for (const stability::FullLoopRun& run : result.flown) worst = std::max(worst, run.ratio);
+                  full.field("worst_ratio", worst, "Largest error over the ball.");
+                  full.list("runs", full_runs(result), "One per disturbance.", describe_full_run);
+                });
+  record.field("verdict", verdict(check),
+               "refuted: a run left the ball under the theorem's hypotheses; none_found; inconclusive.");
+  record.field("why_inconclusive", check.why_inconclusive(), "Why nothing is concluded.");
 }
 
 std::string end_text(const stability::FullLoopRun& run) {
@@ -179,7 +226,7 @@ void print_verdict(const IssCheckOptions& options, const IssCheck& check) {
 }
 
 void print(const IssCheckOptions& options, const IssCheck& check,
-           const std::vector<stability::FullLoopRun>& flown) {
+           const std::vector<stability::FullLoopRun>& flown, const files::Node& described) {
   if (check.theorem_applies) {
     fmt::print("The theorem's hypotheses hold for these gains.\n");
   } else {
@@ -200,12 +247,7 @@ void print(const IssCheckOptions& options, const IssCheck& check,
         "include it\n",
         check.delay_left_out_s);
   }
-  fmt::print("  {:<14} {:>6} {:>11} {:>12} {:>16}\n", "disturbance", "runs", "violations", "worst ratio",
-             "over transient");
-  for (const auto& [name, kind] : by_kind(check)) {
-    fmt::print("  {:<14} {:>6} {:>11} {:>12.6f} {:>16.6f}{}\n", name, kind.runs, kind.violations,
-               kind.worst_ratio, kind.worst_transient_ratio, unjudged_text(kind));
-  }
+  fmt::print("{}", to_text(iss_kinds_table(described)));
   if (!flown.empty())
     fmt::print("The same disturbances with attitude and rotors (SE(3)), outside the hypotheses:\n");
   for (const stability::FullLoopRun& run : flown) {
@@ -230,11 +272,12 @@ int run_iss_check(IssCheckOptions options, const CommonOptions& common) {
   const IssCheck check = stability::check_iss(gains, model, options.check);
   const std::vector<stability::FullLoopRun> flown =
       check.cancelled ? std::vector<stability::FullLoopRun>{} : stability::fly_full_loop(gains, model, check);
-  const Json result = result_json(options, check, flown);
-  write_result(common, result);
-  if (common.prints_text()) print(options, check, flown);
+  const files::Node described = result_of("iss-check", {options.gains, options.model}, options.check.seed,
+                                          IssCheckResult{options.check.runs, check, flown});
+  write_result(common, described);
+  if (common.prints_text()) print(options, check, flown, described);
   if (!options.report.empty()) {
-    const std::string path = write_iss_check_report(check, result, options.report, common.force);
+    const std::string path = write_iss_check_report(check, described, options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
   if (check.is_refuted()) return kViolated;
@@ -272,7 +315,8 @@ Command iss_check_command() {
         app.add_option("--seed", options->check.seed, "Seed of the random disturbances (default 0)");
         add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
         return [options](const CommonOptions& common) { return run_iss_check(*options, common); };
-      }};
+      },
+      fields_of<IssCheckResult>()};
 }
 
 }  // namespace swarmcert::analysis

@@ -10,7 +10,17 @@
 
 namespace swarmcert::analysis {
 
-std::string write_iss_check_report(const stability::IssCheck& check, const files::Json& result,
+Table iss_kinds_table(const files::Node& result) {
+  return table(*result.find("kinds"), {{"disturbance"},
+                                       {"runs"},
+                                       {"violations"},
+                                       {"worst_ratio", "", "{:.6f}"},
+                                       {"worst_transient_ratio", "over transient", "{:.6f}"},
+                                       {"left_hypotheses", "left a hypothesis"},
+                                       {"failed", "could not be integrated"}});
+}
+
+std::string write_iss_check_report(const stability::IssCheck& check, const files::Node& result,
                                    const std::string& folder, bool overwrite) {
   Report report("The tracking theorem's ball under disturbances");
   report.made_by(command_to_copy());
@@ -25,28 +35,13 @@ std::string write_iss_check_report(const stability::IssCheck& check, const files
       check.has_ball ? "" : " (these gains do not have the theorem's form; this is the analogous number)",
       check.violations, check.runs.size(), check.cancelled ? "; the check was interrupted" : ""));
   for (const std::string& why : check.why_inconclusive()) report.paragraph("Inconclusive: " + why + ".");
-  struct Kind {
-    int row = 0, runs = 0, violations = 0;
-    double ratio = 0, transient_ratio = 0;
-  };
-  std::map<std::string, Kind> kinds;
-  for (const stability::IssRun& run : check.runs) {
-    Kind& kind = kinds[run.kind];
-    ++kind.runs;
-    kind.violations += run.is_violation ? 1 : 0;
-    kind.ratio = std::max(kind.ratio, run.ratio);
-    kind.transient_ratio = std::max(kind.transient_ratio, run.transient_ratio);
-  }
-  int next = 0;
-  std::vector<std::vector<std::string>> rows;
-  for (auto& [name, kind] : kinds) {
-    kind.row = next++;
-    rows.push_back({name, std::to_string(kind.runs), std::to_string(kind.violations),
-                    fmt::format("{:.6f}", kind.ratio), fmt::format("{:.6f}", kind.transient_ratio)});
-  }
+  const files::Node& kinds = *result.find("kinds");
+  std::map<std::string, int> row_of;
+  for (const files::Node& kind : kinds.members)
+    row_of.emplace(cell(*kind.find("disturbance")), static_cast<int>(row_of.size()));
   std::string data = "# row ratio transient_ratio disturbance\n";
   for (const stability::IssRun& run : check.runs) {
-    data += fmt::format("{} {} {:.8g} {}\n", kinds[run.kind].row,
+    data += fmt::format("{} {} {:.8g} {}\n", row_of[run.kind],
                         run.ratio > 0 ? fmt::format("{:.8g}", run.ratio) : "NaN", run.transient_ratio,
                         plot_field(run.kind));
   }
@@ -57,11 +52,11 @@ std::string write_iss_check_report(const stability::IssCheck& check, const files
                   "plot 'ratios.dat' using 2:($1-0.12):ytic(4) with points title 'over the ball', "
                   "'' using 3:($1+0.12) with points linetype 3 title 'over the transient bound', "
                   "NaN with lines linetype 2 title 'the bound'\n",
-                  next - 1),
+                  kinds.members.size() - 1),
       "Largest error of every run over the ball (runs from rest) and over the transient bound, by kind "
       "of disturbance. Right of 1 lies a violation.",
-      140 + 50 * next);
-  report.table({"disturbance", "runs", "violations", "worst ratio", "over transient"}, rows);
+      140 + 50 * static_cast<int>(kinds.members.size()));
+  report.table(iss_kinds_table(result));
   return report.write(folder, overwrite);
 }
 

@@ -3,14 +3,17 @@
 
 #include <string>
 
-#include "nn/base/json.h"
+#include "analysis/report/table.h"
 #include "stability/iss/iss_check.h"
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html with the ratio of every run and the JSON `result`. Returns its path.
+/// The runs by kind of disturbance.
+Table iss_kinds_table(const files::Node& result);
+
+/// Writes FOLDER/report.html with the ratio of every run and the described `result`. Returns its path.
 /// @throws files::InputError as Report::write().
-std::string write_iss_check_report(const stability::IssCheck& check, const files::Json& result,
+std::string write_iss_check_report(const stability::IssCheck& check, const files::Node& result,
                                    const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

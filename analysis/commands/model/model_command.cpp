@@ -21,6 +21,25 @@ struct ModelOptions {
   bool keep = false;
 };
 
+void describe_parameter(files::Record& record, const identification::DraftedParameter& p) {
+  record.field("name", p.name, "Key of the parameter in model.toml, with its unit.");
+  record.field("value", p.value, "In the unit of the name.");
+  record.field("interval",
+               p.has_interval ? std::optional<std::array<double, 2>>({p.lower, p.upper}) : std::nullopt,
+               "From the scatter between flights or blocks; null: not fitted.", "", "90 % interval");
+  record.field("source", p.source, "The log, a fit, or an assumption.");
+}
+
+struct ModelResult {
+  identification::ModelDraft draft;
+};
+
+void describe(files::Record& record, const ModelResult& result) {
+  record.field("flights", result.draft.flights, "Number of logs that were used.");
+  record.list("parameters", result.draft.parameters, "Every number of the model.", describe_parameter);
+  record.field("problems", result.draft.problems, "Logs that were not used, and why.");
+}
+
 int run_model(const ModelOptions& options, const CommonOptions& common) {
   if (options.words.empty() || options.words[0] != "draft")
     throw UsageError("'model' knows one action: model draft FLIGHTS -o model.toml");
@@ -46,29 +65,21 @@ int run_model(const ModelOptions& options, const CommonOptions& common) {
   inputs.push_back(base);
   const logs::SignalMap map =
       options.columns.empty() ? logs::known_columns() : logs::read_columns(options.columns);
-  const identification::ModelDraft draft = identification::draft_model(
-      found, map, masses_kg, options.mass_kg, options.keep, stability::read_model(base));
+  const ModelResult result = {identification::draft_model(found, map, masses_kg, options.mass_kg,
+                                                          options.keep, stability::read_model(base))};
+  const identification::ModelDraft& draft = result.draft;
   std::vector<std::string> comments = {"Drafted from " + counted(draft.flights, "log") + "."};
-  files::Json result = result_head("model", inputs);
-  result["flights"] = draft.flights;
-  result["parameters"] = files::Json::array();
   for (const identification::DraftedParameter& p : draft.parameters) {
     comments.push_back(fmt::format("{} = {:.6g}: {}", p.name, p.value, p.source));
-    result["parameters"].push_back(
-        {{"name", p.name},
-         {"value", p.value},
-         {"interval", p.has_interval ? files::Json({p.lower, p.upper}) : files::Json(nullptr)},
-         {"source", p.source}});
     if (common.prints_text())
       fmt::print("{:<22}{:>12.6g}{}  {}\n", p.name, p.value,
                  p.has_interval ? fmt::format(" [{:.6g}, {:.6g}]", p.lower, p.upper) : "", p.source);
   }
-  result["problems"] = draft.problems;
   if (common.prints_text()) {
     for (const std::string& problem : few_of_each(draft.problems)) fmt::print("not used: {}\n", problem);
   }
   files::write_file(options.output, stability::to_toml(draft.model, comments), common.force);
-  write_result(common, result);
+  write_result(common, result_of("model", inputs, std::nullopt, result));
   return kDone;
 }
 
@@ -91,7 +102,8 @@ Command model_command() {
             app.add_option("--columns", options->columns, "columns.toml: meaning of the columns of CSV logs");
             add_output(app, "-o,--output", options->output, "The new model.toml")->required();
             return [options](const CommonOptions& common) { return run_model(*options, common); };
-          }};
+          },
+          fields_of<ModelResult>()};
 }
 
 }  // namespace swarmcert::analysis

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <memory>
 
 #include "analysis/cli/bundled.h"
 #include "analysis/commands/commands.h"
+#include "analysis/commands/schema/file_kinds.h"
 #include "nn/base/file_io.h"
 #include "nn/base/suggest.h"
 
@@ -13,38 +15,61 @@ namespace swarmcert::analysis {
 namespace {
 
 namespace fs = std::filesystem;
+using files::Json;
 
 constexpr const char* kEnding = ".schema.json";
 
-/// Names of the schemas in `folder`, sorted.
-std::vector<std::string> schema_names(const std::string& folder) {
-  std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(folder)) {
+/// Schemas by name: of results that are described, and those kept as files.
+std::map<std::string, Json> schemas() {
+  std::map<std::string, Json> all;
+  for (const auto& entry : fs::directory_iterator(bundled_folder("schemas", "analysis/schemas"))) {
     const std::string name = entry.path().filename().string();
     const std::size_t at = name.rfind(kEnding);
-    if (at != std::string::npos && at > 0) names.push_back(name.substr(0, at));
+    if (at != std::string::npos && at > 0)
+      all[name.substr(0, at)] =
+          files::parse_json(files::read_file(entry.path().string()), entry.path().string());
   }
-  std::sort(names.begin(), names.end());
-  return names;
+  for (const FileKind& kind : file_kinds()) {
+    files::Node shape;
+    files::Record record(shape, true);
+    kind.describes(record);
+    all[kind.name] = files::schema_of(shape, kind.name, kind.title, kind.description, false);
+  }
+  for (const Command& command : commands()) {
+    if (!command.describe_result) continue;
+    // The file model.toml has the kind `model` too.
+    const std::string name = command.name == "model" ? "model-draft" : command.name;
+    all[name] = files::schema_of(result_shape(command.name, command.describe_result), name, command.summary,
+                                 "What `swarmcert " + command.name + " --json FILE` writes.", true);
+  }
+  return all;
+}
+
+struct SchemaResult {
+  std::vector<std::string> names;
+  Json schema;
+};
+
+void describe(files::Record& record, const SchemaResult& result) {
+  record.field("names", result.names, "Of all schemas.");
+  record.field("json_schema", result.schema, "The schema that was asked for; null: none was.");
 }
 
 int run_schema(const std::string& name, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
-  const std::string folder = bundled_folder("schemas", "analysis/schemas");
-  const std::vector<std::string> names = schema_names(folder);
-  if (!name.empty() && std::find(names.begin(), names.end(), name) == names.end())
-    throw UsageError("schema " + name + ": " + files::did_you_mean(name, names));
-  const std::string path = (fs::path(folder) / (name + kEnding)).string();
-  files::Json result = result_head("schema", {});
-  result["names"] = names;
-  result["json_schema"] = name.empty() ? files::Json() : files::parse_json(files::read_file(path), path);
-  write_result(common, result);
+  const std::map<std::string, Json> all = schemas();
+  SchemaResult result;
+  for (const auto& [known, schema] : all) result.names.push_back(known);
+  if (!name.empty() && all.count(name) == 0)
+    throw UsageError("schema " + name + ": " + files::did_you_mean(name, result.names));
+  if (!name.empty()) result.schema = all.at(name);
+  write_result(common, result_of("schema", {}, std::nullopt, result));
   if (!common.prints_text()) return kDone;
-  if (name.empty()) {
-    for (const std::string& each : names) fmt::print("{}\n", each);
-  } else {
-    fmt::print("{}", files::read_file(path));
+  if (!name.empty()) {
+    fmt::print("{}", files::to_text(result.schema));
+    return kDone;
   }
+  for (const std::string& each : result.names) fmt::print("{}\n", each);
   return kDone;
 }
 
@@ -62,7 +87,8 @@ Command schema_command() {
         const auto name = std::make_shared<std::string>();
         app.add_option("NAME", *name, "certify, compare, network, model, ...; without it, the names");
         return [name](const CommonOptions& common) { return run_schema(*name, common); };
-      }};
+      },
+      fields_of<SchemaResult>()};
 }
 
 }  // namespace swarmcert::analysis

@@ -17,7 +17,7 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
         ->required();
   } else {
     app.add_option("FLIGHTS", options.words, "Flight logs or folders of them");
-    app.add_option("--model", options.models, "model.toml")->required()->allow_extra_args(false);
+    app.add_option("--model", options.models, "model.toml")->allow_extra_args(false);
   }
   app.add_option("--flights", options.fleet,
                  "flights.toml: vehicles with their models (default: the published ones)");

@@ -12,13 +12,12 @@
 #include "analysis/report/report.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
+#include "nn/base/pi.h"
 #include "nn/base/suggest.h"
 #include "stability/simulation/simulate.h"
 
 namespace swarmcert::analysis {
 namespace {
-
-using files::Json;
 
 /// Longest simulated flight: its log still fits into memory, and no battery lasts longer.
 constexpr double kLongestFlight_s = 86400;
@@ -40,76 +39,87 @@ bool has_force_network(const SimulateOptions& options) {
   return !options.network.file.empty() || !options.network.phi.empty();
 }
 
-Json axes(const std::array<double, 4>& values) {
-  return {{"x", values[0]}, {"y", values[1]}, {"z", values[2]}, {"total", values[3]}};
-}
-
 std::string log_name(int vehicle, int run) { return fmt::format("cf{}_{:02}", vehicle + 1, run); }
 
-Json result_json(const SimulateOptions& options, const std::vector<std::string>& inputs,
-                 const stability::Simulation& flown, const stability::Task& task) {
-  Json result = result_head("simulate", inputs);
-  result["seed"] = options.seed;
-  result["task"] = options.task;
-  result["loop"] = "sampled";
-  result["duration_s"] = task.duration_s();
-  result["noise"] = !options.no_noise;
-  if (has_force_network(options) || !options.torque_network.empty()) {
-    result["radio"] = {{"latency_s", options.radio.latency_s}, {"loss", options.radio.loss}};
-  }
-  result["diverged"] = flown.diverged;
-  result["unit"] = "m";
-  Json vehicles = Json::array();
-  for (std::size_t i = 0; i < flown.vehicles.size(); ++i) {
-    const stability::SimulatedVehicle& vehicle = flown.vehicles[i];
-    vehicles.push_back({{"name", fmt::format("cf{}", i + 1)},
-                        {"kind", vehicle.kind},
-                        {"max", axes(vehicle.error.max_m)},
-                        {"rms", axes(vehicle.error.rms_m)},
-                        {"saturated_share", vehicle.saturated_share},
-                        {"largest_tilt_deg", vehicle.largest_tilt_rad * 57.29577951308232},
-                        {"smallest_height_m", vehicle.smallest_height_m}});
-  }
-  result["vehicles"] = std::move(vehicles);
-  return result;
+/// A flown task. The description reads no log, so they may have been moved away.
+struct SimulateResult {
+  SimulateOptions options;
+  double duration_s = 0;
+  stability::Simulation flown;
+};
+
+files::AxesAndTotal axes_of(const std::array<double, 4>& v) { return {v[0], v[1], v[2], v[3]}; }
+
+struct NamedVehicle {
+  std::string name;
+  stability::SimulatedVehicle vehicle;
+};
+
+std::vector<NamedVehicle> named(const std::vector<stability::SimulatedVehicle>& vehicles) {
+  std::vector<NamedVehicle> all;
+  for (const stability::SimulatedVehicle& vehicle : vehicles)
+    all.push_back({fmt::format("cf{}", all.size() + 1), vehicle});
+  return all;
 }
 
-void print(const SimulateOptions& options, const stability::Simulation& flown, const stability::Task& task) {
+void describe_vehicle(files::Record& record, const NamedVehicle& named) {
+  const stability::SimulatedVehicle& vehicle = named.vehicle;
+  record.field("name", named.name, "Of the vehicle, as in the name of its log.");
+  record.field("kind", vehicle.kind, "Of its model.");
+  record.field("max", axes_of(vehicle.error.max_m), "Largest position error.", "m", "of this run");
+  record.field("rms", axes_of(vehicle.error.rms_m), "Root mean square of the position error.", "m");
+  record.field("saturated_share", vehicle.saturated_share,
+               "Share of the flight with the thrust at its limit.");
+  record.field("largest_tilt_deg", vehicle.largest_tilt_rad * 180 / kPi, "Largest tilt.", "deg");
+  record.field("smallest_height_m", vehicle.smallest_height_m, "Smallest height.", "m");
+}
+
+void describe(files::Record& record, const SimulateResult& result) {
+  const SimulateOptions& options = result.options;
+  record.field("task", options.task, "The task that was flown.");
+  record.constant("loop", "sampled", "The loop that was integrated: Runge-Kutta per control period.");
+  record.field("duration_s", result.duration_s, "Of the task.", "s");
+  record.field("noise", !options.no_noise, "Whether the controller gets the noise of the sensors.");
+  record.may_object(has_force_network(options) || !options.torque_network.empty(), "radio",
+                    "How positions of neighbours reach the network.", [&](files::Record& radio) {
+                      radio.field("latency_s", options.radio.latency_s, "Until they arrive.", "s");
+                      radio.field("loss", options.radio.loss, "Share that is lost.");
+                    });
+  record.field("diverged", result.flown.diverged, "Whether a vehicle left all bounds.");
+  record.constant("unit", "m", "Of the errors.");
+  record.list("vehicles", named(result.flown.vehicles), "Tracking error and extremes of each vehicle.",
+              describe_vehicle);
+}
+
+Table error_table(const files::Node& result) {
+  return table(*result.find("vehicles"), {{"name", "vehicle"},
+                                          {"kind"},
+                                          {"max.x", "max x", "{:.4f}"},
+                                          {"max.y", "max y", "{:.4f}"},
+                                          {"max.z", "max z", "{:.4f}"},
+                                          {"rms.x", "rms x", "{:.4f}"},
+                                          {"rms.y", "rms y", "{:.4f}"},
+                                          {"rms.z", "rms z", "{:.4f}"},
+                                          {"saturated_share", "thrust at its limit", "{:.1f}", 100, "%"}});
+}
+
+void print(const SimulateResult& result, const files::Node& described) {
   fmt::print("{}: {}, {:g} s in the sampled loop (Runge-Kutta per control period, float32 control)\n",
-             options.task, counted(flown.vehicles.size(), "vehicle"), task.duration_s());
-  fmt::print("  {:<8} {:<8} {:>27}   {:>27}   {}\n", "vehicle", "kind", "largest error x, y, z [m]",
-             "rms error x, y, z [m]", "thrust at its limit");
-  for (std::size_t i = 0; i < flown.vehicles.size(); ++i) {
-    const stability::SimulatedVehicle& vehicle = flown.vehicles[i];
-    const auto& max = vehicle.error.max_m;
-    const auto& rms = vehicle.error.rms_m;
-    fmt::print("  {:<8} {:<8} {:>8.4f} {:>8.4f} {:>8.4f}    {:>8.4f} {:>8.4f} {:>8.4f}   {:.1f} %\n",
-               fmt::format("cf{}", i + 1), vehicle.kind, max[0], max[1], max[2], rms[0], rms[1], rms[2],
-               100 * vehicle.saturated_share);
-  }
-  if (flown.diverged) fmt::print("  DIVERGED at {:.2f} s: the flight ends there\n", flown.end_s);
+             result.options.task, counted(result.flown.vehicles.size(), "vehicle"), result.duration_s);
+  fmt::print("{}", to_text(error_table(described)));
+  if (result.flown.diverged)
+    fmt::print("  DIVERGED at {:.2f} s: the flight ends there\n", result.flown.end_s);
 }
 
-void write_report(const SimulateOptions& options, const CommonOptions& common,
-                  const stability::Simulation& flown, const Json& result) {
-  Report report(fmt::format("{} with {}", options.task, counted(flown.vehicles.size(), "vehicle")));
+void write_report(const SimulateResult& result, const files::Node& described, bool overwrite) {
+  const stability::Simulation& flown = result.flown;
+  Report report(fmt::format("{} with {}", result.options.task, counted(flown.vehicles.size(), "vehicle")));
   report.made_by(command_to_copy());
-  report.result(result);
+  report.result(described);
   report.paragraph(
       "Simulated in the sampled loop: controllers at their own rates, forces held between, Runge-Kutta per "
       "control period. One run shows its own errors, not the largest possible error.");
-  std::vector<std::vector<std::string>> rows;
-  for (std::size_t i = 0; i < flown.vehicles.size(); ++i) {
-    const auto& error = flown.vehicles[i].error;
-    std::vector<std::string> row = {fmt::format("cf{}", i + 1), flown.vehicles[i].kind};
-    for (const auto* values : {&error.max_m, &error.rms_m}) {
-      for (std::size_t axis = 0; axis < 3; ++axis) row.push_back(fmt::format("{:.4f}", (*values)[axis]));
-    }
-    rows.push_back(std::move(row));
-  }
-  report.table(
-      {"vehicle", "kind", "max x [m]", "max y [m]", "max z [m]", "rms x [m]", "rms y [m]", "rms z [m]"},
-      rows);
+  report.table(error_table(described));
   std::string data;
   for (const auto& errors : flown.errors) {
     for (const auto& e : errors) {
@@ -118,16 +128,13 @@ void write_report(const SimulateOptions& options, const CommonOptions& common,
     }
     data += "\n\n";
   }
-  const std::string each = fmt::format("for [i=0:{}] 'NAME.dat' index i", flown.errors.size() - 1);
-  const auto script = [&](const std::string& name, const std::string& columns) {
-    std::string plot = each;
-    plot.replace(plot.find("NAME"), 4, name);
-    return "set xlabel 'time [s]'\nset ylabel 'height error [m]'\nplot " + plot + " using " + columns +
-           " with lines title sprintf('cf%d', i + 1)\n";
-  };
-  report.figure("height_error", data, script("height_error", "1:4"),
+  report.figure("height_error", data,
+                fmt::format("set xlabel 'time [s]'\nset ylabel 'height error [m]'\n"
+                            "plot for [i=0:{}] 'height_error.dat' index i using 1:4 with lines "
+                            "title sprintf('cf%d', i + 1)\n",
+                            flown.errors.size() - 1),
                 "Height error p_z - p_d,z of each vehicle.");
-  report.write(options.report, common.force);
+  report.write(result.options.report, overwrite);
 }
 
 bool has_model_each(const SimulateOptions& options) {
@@ -211,11 +218,12 @@ int run_simulate(SimulateOptions options, const CommonOptions& common) {
   }
 
   write_logs(options, flown, common.force);
-  const Json result = result_json(options, inputs, flown, *task);
-  if (!options.report.empty()) write_report(options, common, flown, result);
-  write_result(common, result);
+  const SimulateResult result{options, task->duration_s(), std::move(flown)};
+  const files::Node described = result_of("simulate", inputs, options.seed, result);
+  if (!options.report.empty()) write_report(result, described, common.force);
+  write_result(common, described);
   if (common.prints_text()) {
-    print(options, flown, *task);
+    print(result, described);
     fmt::print("Logs: {}\n", (std::filesystem::path(options.output) / log_name(0, options.run)).string());
   }
   return kDone;
@@ -288,7 +296,8 @@ Command simulate_command() {
             declare_swarm(app, *options);
             declare_flight(app, *options);
             return [options](const CommonOptions& common) { return run_simulate(*options, common); };
-          }};
+          },
+          fields_of<SimulateResult>()};
 }
 
 }  // namespace swarmcert::analysis

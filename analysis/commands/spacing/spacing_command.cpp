@@ -4,7 +4,6 @@
 #include <memory>
 
 #include "analysis/cli/command_line.h"
-#include "analysis/commands/bound/bound_output.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/tracking_input.h"
 #include "analysis/commands/spacing/spacing_report.h"
@@ -56,49 +55,62 @@ DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, 
   return field;
 }
 
-/// @param source the source of the field.
-void add_spacing(const stability::SpacingQuestion& question, const stability::Spacing& found,
-                 const std::string& source, files::Json& result) {
-  result["max_error_m"] = question.max_error_m;
-  result["neighbours"] = question.neighbours;
-  result["guard"] = question.guard;
-  result["field"] = source;
-  result["least_gap_to_stay_m"] = finite(found.least_gap_to_stay_m);
-  result["least_gap_to_cross_m"] = finite(found.least_gap_to_cross_m);
-  result["shape"] = files::Json::array();
-  for (const stability::SpacingRow& row : found.shape) {
-    result["shape"].push_back({{"height_gap_m", row.height_gap_m},
-                               {"peak_force_N", row.peak_force_N},
-                               {"stay_error_m", finite(row.stay_error_m)},
-                               {"may_stay", row.may_stay},
-                               {"keep_out_radius_m", finite(row.keep_out_radius_m)},
-                               {"may_cross", std::isfinite(row.least_speed_m_s)},
-                               {"least_speed_m_s", finite(row.least_speed_m_s)},
-                               {"thrust_margin_N", row.thrust_margin_N}});
-  }
+struct SpacingResult {
+  stability::SpacingQuestion question;
+  std::string field_from;
+  stability::Spacing found;
+};
+
+void describe_row(files::Record& record, const stability::SpacingRow& row) {
+  record.field("height_gap_m", row.height_gap_m, "Height of the upper vehicles above the lower one.", "m");
+  record.field("peak_force_N", row.peak_force_N, "Largest force of the field at this gap, with the guard.",
+               "N");
+  record.field("stay_error_m", row.stay_error_m, "Error of a vehicle that stays below, or enters slowly.",
+               "m", "upper bound for the field");
+  record.field("may_stay", row.may_stay, "Whether that error is within the limit, with thrust to spare.");
+  record.field("keep_out_radius_m", row.keep_out_radius_m,
+               "Distance to the side from which any motion is safe.", "m");
+  record.field("may_cross", std::isfinite(row.least_speed_m_s),
+               "Whether a straight pass may be fast enough.");
+  record.field("least_speed_m_s", row.least_speed_m_s, "Least speed of a straight pass; null: none suffices.",
+               "m/s");
+  record.field("thrust_margin_N", row.thrust_margin_N, "Thrust that is left; negative: saturates.", "N");
 }
 
-void print_spacing(const stability::SpacingQuestion& question, const stability::Spacing& found,
-                   const std::string& source) {
-  fmt::print("Error at most {} m below {} vehicle(s), no feed-forward; field: {}; guard factor {}\n\n",
-             question.max_error_m, question.neighbours, source, question.guard);
-  fmt::print("  {:>8} {:>9} {:>11} {:>10} {:>14} {:>12}\n", "gap", "force", "error if", "keep out",
-             "cross at", "thrust left");
-  fmt::print("  {:>8} {:>9} {:>11} {:>10} {:>14} {:>12}\n", "m", "N", "it stays, m", "radius, m",
-             "least, m/s", "N");
-  for (const stability::SpacingRow& row : found.shape) {
-    fmt::print("  {:>8.3f} {:>9.4f} {:>11.4f} {:>10.3f} {:>14} {:>12.4f}\n", row.height_gap_m,
-               row.peak_force_N, row.stay_error_m, row.keep_out_radius_m,
-               row.may_stay                         ? "may stay"
-               : std::isfinite(row.least_speed_m_s) ? fmt::format("{:.2f}", row.least_speed_m_s)
-                                                    : "never",
-               row.thrust_margin_N);
-  }
+void describe(files::Record& record, const SpacingResult& result) {
+  record.field("max_error_m", result.question.max_error_m, "Largest vertical error that is allowed.", "m");
+  record.field("neighbours", result.question.neighbours, "Vehicles above at the same time.");
+  record.field("guard", result.question.guard, "Factor on predicted forces.");
+  record.field("field", result.field_from, "Where the field of force comes from.");
+  record.field("least_gap_to_stay_m", result.found.least_gap_to_stay_m,
+               "Least gap at which a vehicle may stay below; null: none in range.", "m");
+  record.field("least_gap_to_cross_m", result.found.least_gap_to_cross_m,
+               "Least gap at which a vehicle may cross below; null: none in range.", "m");
+  record.list("shape", result.found.shape, "What is allowed at every height gap.", describe_row);
+}
+
+Table rows_of(const files::Node& result) {
+  return table(*result.find("shape"), {{"height_gap_m", "height gap", "{:.3f}"},
+                                       {"peak_force_N", "force"},
+                                       {"stay_error_m", "error if it stays"},
+                                       {"may_stay"},
+                                       {"keep_out_radius_m", "keep-out radius", "{:.3f}"},
+                                       {"may_cross"},
+                                       {"least_speed_m_s", "cross at least at", "{:.2f}"},
+                                       {"thrust_margin_N", "thrust left"}});
+}
+
+std::string gap_text(double gap_m) {
+  return std::isfinite(gap_m) ? fmt::format("{:.3f} m", gap_m) : "none in range";
+}
+
+void print_spacing(const SpacingResult& result, const files::Node& described) {
+  const stability::SpacingQuestion& question = result.question;
+  fmt::print("Error at most {} m below {} vehicle(s), no feed-forward; field: {}; guard factor {}\n\n{}",
+             question.max_error_m, question.neighbours, result.field_from, question.guard,
+             to_text(rows_of(described)));
   fmt::print("\nleast gap to stay below: {}; to cross below: {}\n",
-             std::isfinite(found.least_gap_to_stay_m) ? fmt::format("{:.3f} m", found.least_gap_to_stay_m)
-                                                      : "none in range",
-             std::isfinite(found.least_gap_to_cross_m) ? fmt::format("{:.3f} m", found.least_gap_to_cross_m)
-                                                       : "none in range");
+             gap_text(result.found.least_gap_to_stay_m), gap_text(result.found.least_gap_to_cross_m));
   if (question.guard == 1) {
     fmt::print(
         "Peaks in ten recorded swaps were 1.0 to 2.6 times what such a model predicts: --guard covers "
@@ -128,23 +140,24 @@ int run_spacing(const SpacingOptions& options, const CommonOptions& common) {
               : continuous_norms(*loop, stability::Channel::kForce);
   stability::AxisLoop acting = *loop;
   if (sampled) acting.Ki = effective_Ki(*sampled);
-  std::string source;
-  const DownwashField field = field_of(input.model, neighbour_mass_kg, source);
+  SpacingResult result;
+  result.question = options.question;
+  const DownwashField field = field_of(input.model, neighbour_mass_kg, result.field_from);
   stability::SpacingVehicle vehicle;
   vehicle.effort_gain = effort_gain(acting);
   vehicle.largest_thrust_N = input.plant.thrust_scale * input.plant.largest_thrust_N;
   vehicle.integral_share = sampled ? sampled->integrator_step_s / sampled->period_s : 1;
   vehicle.integrator_limit_m_s = input.gains.integrator_limit_m_s[2];
-  const stability::Spacing found = spacing(acting, gains, vehicle, field, options.question);
+  result.found = spacing(acting, gains, vehicle, field, options.question);
 
-  files::Json result = result_head("spacing", inputs);
-  add_spacing(options.question, found, source, result);
-  write_result(common, result);
+  const files::Node described = result_of("spacing", inputs, std::nullopt, result);
+  write_result(common, described);
   std::string report;
   if (!options.report.empty())
-    report = write_spacing_report(options.question, found, result, options.report, common.force);
+    report = write_spacing_report(result.question, result.found, rows_of(described), described,
+                                  options.report, common.force);
   if (common.prints_text()) {
-    print_spacing(options.question, found, source);
+    print_spacing(result, described);
     if (!report.empty()) fmt::print("report: {}\n", report);
   }
   return kDone;
@@ -180,7 +193,8 @@ Command spacing_command() {
                 ->check(CLI::Range(1, 10000));
             add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
             return [options](const CommonOptions& common) { return run_spacing(*options, common); };
-          }};
+          },
+          fields_of<SpacingResult>()};
 }
 
 }  // namespace swarmcert::analysis

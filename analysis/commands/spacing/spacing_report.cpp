@@ -10,14 +10,13 @@
 namespace swarmcert::analysis {
 namespace {
 
-std::string cell_or_never(double x) { return std::isfinite(x) ? fmt::format("{:.4g}", x) : "never"; }
-
 std::string gap(double x) { return std::isfinite(x) ? fmt::format("{:.3f} m", x) : "none in range"; }
 
 }  // namespace
 
 std::string write_spacing_report(const stability::SpacingQuestion& question, const stability::Spacing& found,
-                                 const files::Json& result, const std::string& folder, bool overwrite) {
+                                 const Table& rows, const files::Node& result, const std::string& folder,
+                                 bool overwrite) {
   Report report("How close vehicles may fly");
   report.made_by(command_to_copy());
   report.result(result);
@@ -27,7 +26,6 @@ std::string write_spacing_report(const stability::SpacingQuestion& question, con
                   question.neighbours, question.max_error_m, question.guard, gap(found.least_gap_to_stay_m),
                   gap(found.least_gap_to_cross_m)));
   std::string shape = "# height_gap_m keep_out_radius_m left_m\n", speed = "# height_gap_m least_speed_m_s\n";
-  std::vector<std::vector<std::string>> rows;
   int passable = 0;
   for (const stability::SpacingRow& row : found.shape) {
     const bool is_known = std::isfinite(row.keep_out_radius_m);
@@ -38,10 +36,6 @@ std::string write_spacing_report(const stability::SpacingQuestion& question, con
     passable += may_cross ? 1 : 0;
     speed += fmt::format("{:.6g} {}\n", row.height_gap_m,
                          may_cross ? fmt::format("{:.6g}", row.least_speed_m_s) : "NaN");
-    rows.push_back(
-        {fmt::format("{:.3f}", row.height_gap_m), cell_or_never(row.peak_force_N),
-         cell_or_never(row.stay_error_m), row.may_stay ? "yes" : "no", cell_or_never(row.keep_out_radius_m),
-         row.may_stay ? "may stay" : cell_or_never(row.least_speed_m_s), cell_or_never(row.thrust_margin_N)});
   }
   report.figure(
       "keep_out", shape,
@@ -61,9 +55,7 @@ std::string write_spacing_report(const stability::SpacingQuestion& question, con
         "Least speed of a straight pass below; 0 if the vehicle may stay, no point if no speed suffices.");
   }
   report.heading("Rows");
-  report.table({"height gap [m]", "force [N]", "error if it stays [m]", "may stay", "keep-out radius [m]",
-                "cross at least at [m/s]", "thrust left [N]"},
-               rows);
+  report.table(rows);
   return report.write(folder, overwrite);
 }
 

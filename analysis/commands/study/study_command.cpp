@@ -130,10 +130,9 @@ Command study_command() {
           [](CLI::App& app) {
             const auto options = std::make_shared<StudyOptions>();
             declare_flights(app, options->flights, true);
-            app.add_option("--select", options->select, "Flights that only decide which effects are accepted")
-                ->allow_extra_args(false);
-            app.add_option("--test", options->test, "Test flights, which decide nothing")
-                ->allow_extra_args(false);
+            app.add_option("--select", options->select,
+                           "Flights that only decide which effects are accepted");
+            app.add_option("--test", options->test, "Test flights, which decide nothing");
             app.add_option("--against", options->against,
                            "Other flights (the healthy vehicle, the last release): the page also shows what "
                            "changed beyond their scatter, like diagnose --against");

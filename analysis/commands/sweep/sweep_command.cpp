@@ -26,20 +26,32 @@ std::string report_folder(const std::string& folder, const std::string& report) 
   return report.empty() ? (std::filesystem::path(folder) / "report").string() : report;
 }
 
+/// Of a whole sweep, or of one shard.
+struct SweepResult {
+  std::optional<MergedSweep> sweep;
+  stability::SweepOutcome shard;
+};
+
+void describe(files::Record& record, const SweepResult& result) {
+  record.may_object(!result.sweep, "shard", "With --shard: what was computed.", [&](files::Record& shard) {
+    shard.field("file", result.shard.file, "Where the cells are.");
+    shard.field("cells", result.shard.done, "Their number.");
+  });
+  record.may_fields(result.sweep.has_value(),
+                    [&](files::Record& all) { describe(all, result.sweep.value_or(MergedSweep())); });
+}
+
 /// Writes FOLDER/sweep.json and the report; the last step of both commands.
 int finish(const std::string& command, const std::string& folder, const std::string& report_wanted,
            const std::vector<std::string>& inputs, const CommonOptions& common, bool may_replace) {
   const MergedSweep sweep = stability::read_shards(folder);
-  const files::Json points = sweep_json(sweep);
   const std::string path = (std::filesystem::path(folder) / "sweep.json").string();
-  const std::string text = files::to_text(points);
+  const std::string text = files::to_text(sweep_json(sweep));
   const bool is_there = std::filesystem::exists(path) && files::read_file(path) == text;
   if (!is_there) files::write_file(path, text, common.force || may_replace);
   const std::string report = write_sweep_report(sweep, report_folder(folder, report_wanted),
                                                 common.force || may_replace || is_there);
-  files::Json result = result_head(command, command == "merge" ? sweep.files : inputs);
-  for (const char* key : {"axes", "compute", "pareto", "points"}) result[key] = points[key];
-  write_result(common, result);
+  write_result(common, result_of(command, command == "merge" ? sweep.files : inputs, std::nullopt, sweep));
   if (!common.prints_text()) return kDone;
   print_sweep(sweep);
   fmt::print("\npoints: {}\nreport: {}\n", path, report);
@@ -71,9 +83,7 @@ int run_sweep(const SweepOptions& options, const CommonOptions& common) {
   }
   if (sweep.shard.is_whole())
     return finish("sweep", options.folder, options.report, grid.inputs, common, options.resume);
-  files::Json result = result_head("sweep", grid.inputs);
-  result["shard"] = {{"file", outcome.file}, {"cells", outcome.done}};
-  write_result(common, result);
+  write_result(common, result_of("sweep", grid.inputs, std::nullopt, SweepResult{std::nullopt, outcome}));
   if (common.prints_text()) {
     fmt::print("{} cells in {}\nwhen all shards are there: swarmcert merge {}\n", outcome.done, outcome.file,
                options.folder);
@@ -103,7 +113,8 @@ Command sweep_command() {
             leave_out_of_record(app.add_flag("--resume", options->resume,
                                              "Keep the cells that the shard's file already contains"));
             return [options](const CommonOptions& common) { return run_sweep(*options, common); };
-          }};
+          },
+          fields_of<SweepResult>()};
 }
 
 Command merge_command() {
@@ -121,7 +132,8 @@ Command merge_command() {
           refuse_folder(common, options->report);
           return finish("merge", options->folder, options->report, {}, common, false);
         };
-      }};
+      },
+      fields_of<MergedSweep>()};
 }
 
 }  // namespace swarmcert::analysis

@@ -257,7 +257,9 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   learning::write_models(inputs, data.layout, options.output, outcome.kept());
   certify_and_score(options, common.jobs, data, network, outcome);
 
-  const files::Json result = train_json(options, files_of(flights), data, outcome);
+  const files::Json result = files::to_json(
+      described_result("train", files_of(flights), options.run.trainer.seed,
+                       [&](files::Record& record) { describe_training(record, options, data, outcome); }));
   write_result(common, result);
   if (common.prints_text()) print_training(options, data, outcome);
   if (!options.report.empty()) {
@@ -291,7 +293,8 @@ Command train_command() {
         const auto options = std::make_shared<TrainOptions>();
         declare_train_options(app, *options);
         return [options](const CommonOptions& common) { return run_train(*options, common); };
-      }};
+      },
+      [](files::Record& record) { describe_training(record, {}, {}, {}); }};
 }
 
 }  // namespace swarmcert::analysis

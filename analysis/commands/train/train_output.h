@@ -1,4 +1,4 @@
-/// @file Results of `train` as text and as JSON.
+/// @file Results of `train`, described and as text.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 #include "analysis/learning/output_scale.h"
 #include "analysis/learning/trained_network.h"
 #include "analysis/learning/training_run.h"
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::analysis {
 
@@ -41,9 +41,9 @@ struct Outcome {
   }
 };
 
-/// Returns the fields of schema swarmcert/train/1.
-files::Json train_json(const TrainOptions& options, const std::vector<std::string>& inputs,
-                       const learning::LearningData& data, const Outcome& outcome);
+/// Describes the result.
+void describe_training(files::Record& record, const TrainOptions& options, const learning::LearningData& data,
+                       const Outcome& outcome);
 
 void print_training(const TrainOptions& options, const learning::LearningData& data, const Outcome& outcome);
 

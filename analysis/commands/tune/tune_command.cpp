@@ -32,49 +32,15 @@ struct TuneOptions {
 /// By default the tuned gains must tolerate this share of the additional lag that the shipped gains tolerate.
 constexpr double kKeptLag = 0.5;
 
-files::Json point_json(const TunedPoint& p, const stability::GainNorms& sampled) {
-  files::Json json = {{"Kp", p.Kp},
-                      {"Kd", p.Kd},
-                      {"Ki", p.Ki},
-                      {"objective", finite(p.objective)},
-                      {"sampled", norms_json(sampled)},
-                      {"noise_command_m_s2", finite(p.noise_m_s2)},
-                      {"lag_limit_s", finite(p.lag_limit_s)},
-                      {"effort", finite(p.effort)},
-                      {"feasible", p.feasible}};
-  if (p.margins) {
-    json["limit_cycle"] = {{"verdict", name(nearness_to_limit_cycle(*p.margins))},
-                           {"gain_margin", finite(p.margins->gain)},
-                           {"damping", p.margins->damping}};
-  }
-  json.update(norms_json(p.norms));
-  return json;
-}
-
 /// The gains under the names used in the published firmware.
 struct FirmwareGain {
-  const char* name;
-  double TunedPoint::*value;
-  const char* unit;
+  const char* name = "";
+  double TunedPoint::*value = nullptr;
+  const char* unit = "";
 };
 constexpr FirmwareGain kFirmwareGains[] = {{"Kpos_P", &TunedPoint::Kp, "1/s^2"},
                                            {"Kpos_D", &TunedPoint::Kd, "1/s"},
                                            {"Kpos_I", &TunedPoint::Ki, "1/s^3"}};
-
-files::Json firmware_json(const std::string& axis, const TuneResult& found) {
-  files::Json rows = files::Json::array();
-  for (const FirmwareGain& gain : kFirmwareGains) {
-    const double before = found.shipped.*gain.value;
-    const double after = found.best.*gain.value;
-    rows.push_back({{"name", gain.name},
-                    {"axis", axis},
-                    {"shipped", before},
-                    {"tuned", after},
-                    {"relative_change", before > 0 ? files::Json(after / before - 1) : files::Json()},
-                    {"unit", gain.unit}});
-  }
-  return rows;
-}
 
 std::vector<TunedQuantity> quantities(const std::string& axis, const TuneResult& found) {
   const TunedPoint& a = found.shipped;
@@ -169,33 +135,91 @@ void set_limits(const stability::SampledLoop& loop, const Tracking& input, int a
   if (limits.most_rate == 0 && loop.plant.Ki > 0) limits.most_rate = shipped.norms.rate * (1 + kSlack);
 }
 
-files::Json result_of(const TuneOptions& options, const TuneResult& found) {
-  const stability::TuneConstraints& limits = options.tune.constraints;
-  files::Json result = result_head("tune", {options.tracking.gains, options.tracking.model});
-  result["seed"] = options.tune.seed;
-  result["axis"] = options.axis;
-  result["objective"] = options.objective;
-  result["constraints"] = {
-      {"most_noise_m_s2", limits.most_noise_m_s2},
-      {"least_lag_limit_s", limits.least_lag_limit_s},
-      {"most_rate", limits.most_rate > 0 ? finite(limits.most_rate) : files::Json()},
-      {"most_effort", limits.most_effort > 0 ? files::Json(limits.most_effort) : files::Json()}};
-  const TunedPoint& best = found.best;
-  result["verdict"] = !best.feasible ? (found.infeasible.empty() ? "none found" : "infeasible")
-                      : found.shipped.feasible && best.objective > found.shipped.objective * (1 - 1e-6)
-                          ? "no better gains found"
-                          : "found";
-  result["gains"] =
-      best.feasible ? files::Json{{"Kp", best.Kp}, {"Kd", best.Kd}, {"Ki", best.Ki}} : files::Json();
-  result["firmware_parameters"] = best.feasible ? firmware_json(options.axis, found) : files::Json();
-  result["shipped"] = point_json(found.shipped, found.shipped_sampled);
-  result["tuned"] = best.feasible ? point_json(best, found.best_sampled) : files::Json();
-  result["nearest"] = best.feasible ? files::Json() : point_json(best, found.best_sampled);
-  result["violated_constraints"] = found.violated;
-  result["why_infeasible"] = found.infeasible;
-  result["active_constraints"] = found.active_constraints;
-  result["stopped"] = found.stopped;
-  return result;
+struct TuneOutcome {
+  TuneOptions options;
+  TuneResult found;
+};
+
+void describe_point(files::Record& record, const TunedPoint& p, const stability::GainNorms& sampled) {
+  record.field("Kp", p.Kp, "Position gain.", "1/s^2");
+  record.field("Kd", p.Kd, "Velocity gain.", "1/s");
+  record.field("Ki", p.Ki, "Integral gain.", "1/s^3");
+  record.field("objective", p.objective, "The gain that is minimised.");
+  record.object("sampled", "Gains of the sampled loop.",
+                [&](files::Record& norms) { describe_norms(norms, sampled); });
+  record.field("noise_command_m_s2", p.noise_m_s2, "Of the command, for 1 mm and 0.05 m/s of sensor noise.",
+               "m/s^2");
+  record.field("lag_limit_s", p.lag_limit_s, "Additional first-order lag that the loop tolerates.", "s");
+  record.field("effort", p.effort, "Feedback force per amplitude of force.", "N/N");
+  record.field("feasible", p.feasible, "Whether all limits are kept.");
+  record.may_object(p.margins.has_value(), "limit_cycle", "With an attitude loop.",
+                    [&](files::Record& cycle) {
+                      const auto margins = p.margins.value_or(std::decay_t<decltype(*p.margins)>());
+                      cycle.field("verdict", name(nearness_to_limit_cycle(margins)),
+                                  "clear, close to a limit cycle, or unstable.");
+                      cycle.field("gain_margin", margins.gain, "Of the cascade; null: unlimited.");
+                      cycle.field("damping", margins.damping, "Least damping of its poles.");
+                    });
+  describe_norms(record, p.norms);
+}
+
+void describe_firmware_gain(files::Record& record, const FirmwareGain& gain, const TuneOutcome& outcome) {
+  const double before = gain.value != nullptr ? outcome.found.shipped.*gain.value : 0;
+  const double after = gain.value != nullptr ? outcome.found.best.*gain.value : 0;
+  record.field("name", gain.name, "Parameter of the firmware.");
+  record.field("axis", outcome.options.axis, "Whose gain it is.");
+  record.field("shipped", before, "Value of the gains given, in `unit`.");
+  record.field("tuned", after, "Value found, in `unit`.");
+  record.field("relative_change", before > 0 ? std::optional<double>(after / before - 1) : std::nullopt,
+               "null: there was no such gain.");
+  record.field("unit", gain.unit, "Of both values.");
+}
+
+std::string verdict_of(const TuneResult& found) {
+  if (!found.best.feasible) return found.infeasible.empty() ? "none found" : "infeasible";
+  return found.shipped.feasible && found.best.objective > found.shipped.objective * (1 - 1e-6)
+             ? "no better gains found"
+             : "found";
+}
+
+void describe_limits(files::Record& record, const stability::TuneConstraints& limits) {
+  const auto if_set = [](double limit) { return limit > 0 ? std::optional<double>(limit) : std::nullopt; };
+  record.field("most_noise_m_s2", limits.most_noise_m_s2, "Largest noise of the command.", "m/s^2");
+  record.field("least_lag_limit_s", limits.least_lag_limit_s, "Additional lag that must be tolerated.", "s");
+  record.field("most_rate", if_set(limits.most_rate), "Largest rate gain; null: no limit.", "m per N/s");
+  record.field("most_effort", if_set(limits.most_effort), "Largest effort; null: no limit.", "N/N");
+}
+
+void describe(files::Record& record, const TuneOutcome& outcome) {
+  const TuneResult& found = outcome.found;
+  const bool is_feasible = found.best.feasible;
+  record.field("axis", outcome.options.axis, "Whose gains are searched.");
+  record.field("objective", outcome.options.objective, "The gain that is minimised.");
+  record.object("constraints", "Limits that the gains must keep.",
+                [&](files::Record& limits) { describe_limits(limits, outcome.options.tune.constraints); });
+  record.field("verdict", verdict_of(found),
+               "found, no better gains found, none found, or infeasible: proved that there are none.");
+  record.object_or_null(is_feasible, "gains", "null: none found.", [&](files::Record& gains) {
+    gains.field("Kp", found.best.Kp, "Position gain.", "1/s^2");
+    gains.field("Kd", found.best.Kd, "Velocity gain.", "1/s");
+    gains.field("Ki", found.best.Ki, "Integral gain.", "1/s^3");
+  });
+  record.list_or_null(
+      is_feasible, "firmware_parameters",
+      std::vector<FirmwareGain>(std::begin(kFirmwareGains), std::end(kFirmwareGains)),
+      "The gains under the names of the published firmware; null: none found.",
+      [&](files::Record& one, const FirmwareGain& gain) { describe_firmware_gain(one, gain, outcome); });
+  record.object("shipped", "The gains given, and what they reach.",
+                [&](files::Record& point) { describe_point(point, found.shipped, found.shipped_sampled); });
+  const auto best = [&](files::Record& point) { describe_point(point, found.best, found.best_sampled); };
+  record.object_or_null(is_feasible, "tuned", "The gains found, and what they reach; null: none found.",
+                        best);
+  record.object_or_null(!is_feasible, "nearest",
+                        "Gains that come nearest to keeping all limits; null: some keep them.", best);
+  record.field("violated_constraints", found.violated, "Limits that the nearest gains break.");
+  record.field("why_infeasible", found.infeasible, "The proof that no gains keep all limits; empty: none.");
+  record.field("active_constraints", found.active_constraints, "Limits that the gains found touch.");
+  record.field("stopped", found.stopped, "Why the search ended.");
 }
 
 int run_tune(TuneOptions options, const CommonOptions& common) {
@@ -211,14 +235,14 @@ int run_tune(TuneOptions options, const CommonOptions& common) {
   options.tune.cancelled = interrupt.flag();
   const TuneResult found = stability::tune(loop, options.tune);
 
-  const files::Json result = result_of(options, found);
+  const files::Node result = result_of("tune", {options.tracking.gains, options.tracking.model},
+                                       options.tune.seed, TuneOutcome{options, found});
   write_result(common, result);
   if (common.prints_text()) print_result(options, found);
   if (!options.report.empty()) {
     const std::string verdict = fmt::format(
         "Axis {}, least {} gain: {}. Active constraints: {}. Good gains, not proved to be the best.",
-        options.axis, options.objective, result["verdict"].get<std::string>(),
-        constraint_names(found.active_constraints));
+        options.axis, options.objective, verdict_of(found), constraint_names(found.active_constraints));
     const std::string path = write_tune_report(
         verdict, found.best.feasible ? quantities(options.axis, found) : std::vector<TunedQuantity>(), result,
         options.report, common.force);
@@ -274,7 +298,8 @@ Command tune_command() {
         app.add_option("--seed", options->tune.seed, "Seed of the global search (default 1)");
         add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
         return [options](const CommonOptions& common) { return run_tune(*options, common); };
-      }};
+      },
+      fields_of<TuneOutcome>()};
 }
 
 }  // namespace swarmcert::analysis

@@ -11,7 +11,7 @@
 namespace swarmcert::analysis {
 
 std::string write_tune_report(const std::string& verdict, const std::vector<TunedQuantity>& quantities,
-                              const files::Json& result, const std::string& folder, bool overwrite) {
+                              const files::Node& result, const std::string& folder, bool overwrite) {
   Report report("Tuned gains");
   report.made_by(command_to_copy());
   report.result(result);

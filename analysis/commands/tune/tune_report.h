@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::analysis {
 
@@ -15,10 +15,10 @@ struct TunedQuantity {
   std::string unit;
 };
 
-/// Writes FOLDER/report.html with a bar per quantity and the JSON `result`. Returns its path.
+/// Writes FOLDER/report.html with a bar per quantity and the described `result`. Returns its path.
 /// @param verdict one sentence stating what was found; `quantities` is empty if nothing was found.
 /// @throws files::InputError as Report::write().
 std::string write_tune_report(const std::string& verdict, const std::vector<TunedQuantity>& quantities,
-                              const files::Json& result, const std::string& folder, bool overwrite);
+                              const files::Node& result, const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

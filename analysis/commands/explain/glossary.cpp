@@ -1,0 +1,183 @@
+#include "analysis/commands/explain/glossary.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <functional>
+#include <map>
+
+#include "analysis/commands/commands.h"
+#include "analysis/commands/schema/file_kinds.h"
+#include "nn/base/suggest.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+/// "mass / payload / thrust scale" as its three names.
+std::vector<std::string> names_of_class(const std::string& text) {
+  std::vector<std::string> names;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find(" / ", begin), text.size());
+    names.push_back(text.substr(begin, end - begin));
+    begin = end + 3;
+  }
+  return names;
+}
+
+std::string parameter_text(const stability::Parameter& parameter) {
+  return fmt::format("{}: {}, between {:g} and {:g}", parameter.name, parameter.meaning, parameter.lower,
+                     parameter.upper);
+}
+
+GlossaryEntry entry_of(const stability::EffectInfo& info) {
+  GlossaryEntry entry;
+  entry.kind = "effect";
+  entry.name = info.name;
+  entry.equation = info.equation;
+  entry.source = info.source;
+  entry.looks_like = info.excitation;
+  if (info.equivalence_class != info.name) entry.same_as = info.equivalence_class;
+  for (const stability::Parameter& parameter : info.linear)
+    entry.parameters.push_back(parameter_text(parameter));
+  for (const stability::Parameter& parameter : info.shape)
+    entry.parameters.push_back(parameter_text(parameter));
+  return entry;
+}
+
+/// Calls `visit` with every field of a shape and its path.
+void for_each_field(const files::Node& shape, const std::string& path,
+                    const std::function<void(const files::Node&, const std::string&)>& visit) {
+  for (const files::Node& member : shape.members) {
+    const std::string at = member.name.empty() ? path : path.empty() ? member.name : path + "." + member.name;
+    if (!member.name.empty()) visit(member, at);
+    for_each_field(member, at, visit);
+  }
+}
+
+/// The same for every described result and file; the place names the result too.
+void for_each_described_field(const std::function<void(const files::Node&, const std::string&)>& visit) {
+  const auto go_through = [&visit](const std::string& name, const files::Node& shape) {
+    for_each_field(shape, "", [&](const files::Node& field, const std::string& path) {
+      visit(field, name + ": " + path);
+    });
+  };
+  for (const Command& command : commands())
+    if (command.describe_result)
+      go_through(command.name, result_shape(command.name, command.describe_result));
+  for (const FileKind& kind : file_kinds()) {
+    files::Node shape;
+    files::Record record(shape, true);
+    kind.describes(record);
+    go_through(kind.name, shape);
+  }
+}
+
+/// Whether `text` contains `word` between other characters than those of names.
+bool mentions(const std::string& text, const std::string& word) {
+  const auto is_part = [&text](std::size_t i) {
+    return i < text.size() && (std::isalnum(static_cast<unsigned char>(text[i])) != 0 || text[i] == '_');
+  };
+  for (std::size_t at = text.find(word); at != text.npos; at = text.find(word, at + 1))
+    if ((at == 0 || !is_part(at - 1)) && !is_part(at + word.size())) return true;
+  return false;
+}
+
+bool is_value(const files::Node& field, const std::string& word) {
+  return std::find(field.choices.begin(), field.choices.end(), word) != field.choices.end();
+}
+
+void add_fields(const std::string& word, bool by_name, std::vector<GlossaryEntry>& entries) {
+  std::map<std::string, std::size_t> known;  // by meaning, which several results share
+  for_each_described_field([&](const files::Node& field, const std::string& place) {
+    const bool fits = by_name ? field.name == word
+                              : is_value(field, word) || (field.kind == files::Node::Kind::text &&
+                                                          mentions(field.about.meaning, word));
+    if (!fits || *field.about.meaning == '\0') return;
+    const auto [found, is_new] = known.emplace(field.about.meaning, entries.size());
+    if (is_new) {
+      GlossaryEntry entry;
+      entry.kind = by_name ? "field" : "value";
+      entry.name = field.name;
+      entry.meaning = field.about.meaning;
+      entry.unit = field.about.unit;
+      entry.guarantee = field.about.guarantee;
+      entries.push_back(std::move(entry));
+    }
+    entries[found->second].in.push_back(place);
+  });
+}
+
+}  // namespace
+
+void describe(files::Record& record, const GlossaryEntry& entry) {
+  record.field("kind", entry.kind, "effect, field (of a result or file) or value (of a field).");
+  record.field("name", entry.name, "Of the effect or field.");
+  record.field("meaning", entry.meaning, "What the field says.");
+  record.field("unit", entry.unit, "Of the field; empty: none, or part of the meaning.");
+  record.field("guarantee", entry.guarantee, "Of the field: exact, a bound, an estimate.");
+  record.field("in", entry.in, "Results and files that have the field.");
+  record.field("equation", entry.equation, "Of the effect.");
+  record.field("parameters", entry.parameters, "Of the effect, with their limits.");
+  record.field("looks_like", entry.looks_like, "Flights in which the effect shows.");
+  record.field("same_as", entry.same_as, "Causes that flights alone cannot tell from the effect.");
+  record.field("source", entry.source, "Of the equation.");
+}
+
+void describe(files::Record& record, const Explanation& explanation) {
+  record.field("word", explanation.word, "What was asked for.");
+  record.field("entries", explanation.entries, "Everything that the tool calls so.");
+}
+
+std::vector<GlossaryEntry> effect_entries() {
+  std::vector<GlossaryEntry> entries;
+  for (const std::string& name : stability::effect_names())
+    entries.push_back(entry_of(stability::effect_info(name)));
+  return entries;
+}
+
+std::vector<GlossaryEntry> explain(const std::string& word) {
+  std::vector<GlossaryEntry> entries;
+  for (const GlossaryEntry& effect : effect_entries()) {
+    const std::vector<std::string> others = names_of_class(effect.same_as);
+    if (effect.name == word || std::find(others.begin(), others.end(), word) != others.end())
+      entries.push_back(effect);
+  }
+  add_fields(word, true, entries);
+  add_fields(word, false, entries);
+  return entries;
+}
+
+std::vector<std::string> glossary_words() {
+  std::vector<std::string> words;
+  for (const GlossaryEntry& effect : effect_entries()) {
+    words.push_back(effect.name);
+    for (const std::string& name : names_of_class(effect.same_as)) words.push_back(name);
+  }
+  for_each_described_field([&words](const files::Node& field, const std::string&) {
+    words.push_back(field.name);
+    words.insert(words.end(), field.choices.begin(), field.choices.end());
+  });
+  std::sort(words.begin(), words.end());
+  words.erase(std::unique(words.begin(), words.end()), words.end());
+  return words;
+}
+
+std::string effect_suggestion(const std::string& name, const std::vector<std::string>& known) {
+  std::vector<std::string> words = known;
+  std::map<std::string, std::string> effect_of;
+  for (const GlossaryEntry& effect : effect_entries()) {
+    for (const std::string& other : names_of_class(effect.same_as)) {
+      words.push_back(other);
+      effect_of[other] = effect.name;
+    }
+  }
+  const std::string nearest = files::nearest(name, words);
+  const auto found = effect_of.find(nearest);
+  if (found != effect_of.end())
+    return fmt::format("did you mean {}, which flights show as {}?", nearest, found->second);
+  return files::did_you_mean(name, known);
+}
+
+}  // namespace swarmcert::analysis
