@@ -12,6 +12,7 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <new>
 #include <system_error>
 
 #include "analysis/cli/command.h"
@@ -64,6 +65,9 @@ int main(int argc, char** argv) {
     return swarmcert::analysis::kBadInput;
   } catch (const std::system_error& error) {  // thrown by fmt if the disk below standard output is full
     fmt::print(stderr, "swarmcert: {}\n", error.what());
+    return swarmcert::analysis::kBadInput;
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "swarmcert: the files need more memory than there is\n");
     return swarmcert::analysis::kBadInput;
   } catch (const std::exception& error) {
     fmt::print(stderr, "swarmcert: internal error: {}\n", error.what());

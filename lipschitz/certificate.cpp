@@ -1,7 +1,7 @@
 #include "lipschitz/certify.h"
+#include "lipschitz/checker/canonical_network.h"
 #include "lipschitz/checker/statement.h"
 #include "nn/base/content_hash.h"
-#include "nn/weights/chain.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
@@ -217,13 +217,10 @@ Json summary(const files::Network& network, const CertifiedLaw& law) {
 }
 
 Json certificate(const files::Network& network, const Certification& certification) {
-  Json weights = Json::object();
-  for (const auto& [part, stored] : files::parts(network)) {
-    weights[part.name()] = {{"sha256", stored->sha256},
-                            {"precision", files::name(stored->precision)},
-                            {"chain", files::chain_json(files::chain(network, part))},
-                            {"samples", samples_entry(certification, part)}};
-  }
+  Json canonical = check::canonical_json(network);
+  for (const auto& [part, stored] : files::parts(network))
+    canonical["weights"][part.name()]["samples"] = samples_entry(certification, part);
+  canonical["as"] = certification.as_float32 ? Json("float32") : Json();
   Json layers = Json::array();
   for (const CertifiedLayer& layer : certification.layers) layers.push_back(layer_json(layer));
   Json bounds = Json::array();
@@ -235,18 +232,15 @@ Json certificate(const files::Network& network, const Certification& certificati
   Json box;
   for (const auto& [part, sides] : certification.domain)
     box[part.name()] = {{"lower", hex_floats(sides.lower)}, {"upper", hex_floats(sides.upper)}};
-  Json as = certification.as_float32 ? Json("float32") : Json();
-  Json result = {
-      {"schema", check::kCertificateSchema},
-      {"tool", "swarmcert " SWARMCERT_VERSION},
-      {"statement", check::statement_for(network)},
-      {"network",
-       {{"description_sha256", network.sha256}, {"as", std::move(as)}, {"weights", std::move(weights)}}},
-      {"box", std::move(box)},
-      {"layers", std::move(layers)},
-      {"bounds", std::move(bounds)},
-      {"laws", std::move(laws)},
-      {"values", std::move(values)}};
+  Json result = {{"schema", check::kCertificateSchema},
+                 {"tool", "swarmcert " SWARMCERT_VERSION},
+                 {"statement", check::statement_for(network)},
+                 {"network", std::move(canonical)},
+                 {"box", std::move(box)},
+                 {"layers", std::move(layers)},
+                 {"bounds", std::move(bounds)},
+                 {"laws", std::move(laws)},
+                 {"values", std::move(values)}};
   result["content_sha256"] = files::content_sha256(result);
   return result;
 }

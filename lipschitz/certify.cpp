@@ -137,11 +137,11 @@ void add_claims(const Network& network, const CertifyOptions& options, Certifica
 }
 
 void enclose_norms(const std::vector<const files::Layer*>& layers, int jobs, WorkProgress& progress,
-                   Certification& result) {
+                   const std::optional<GammaStatement>& gamma, std::vector<CertifiedLayer>& certified) {
   std::optional<double> limit;
-  if (result.gamma && result.gamma->scope == GammaStatement::Scope::kLayer) limit = result.gamma->value;
+  if (gamma && gamma->scope == GammaStatement::Scope::kLayer) limit = gamma->value;
   files::parallel_for(static_cast<int>(layers.size()), jobs, [&](int i) {
-    CertifiedLayer& layer = result.layers[static_cast<std::size_t>(i)];
+    CertifiedLayer& layer = certified[static_cast<std::size_t>(i)];
     progress.run("spectral norm of " + layer.network.name() + " " + layer.name,
                  [&] { layer.norm = spectral_norm(*layers[static_cast<std::size_t>(i)], limit); });
   });
@@ -149,12 +149,14 @@ void enclose_norms(const std::vector<const files::Layer*>& layers, int jobs, Wor
 
 void judge_gamma(const files::Parts& parts, Certification& result) {
   if (!result.gamma) return;
-  std::size_t next = 0;
+  std::size_t next = 0, next_stored = 0;
   for (const auto& [name, weights] : parts) {
     std::vector<Enclosure> norms;
     std::vector<CertifiedLayer*> judged;
-    for (const files::Layer& layer : weights->layers) {
-      CertifiedLayer& certified = result.layers[next++];
+    const bool is_rewritten = !weights->stored.empty();
+    if (is_rewritten) next += weights->layers.size();
+    for (const files::Layer& layer : weights->stored_layers()) {
+      CertifiedLayer& certified = is_rewritten ? result.stored[next_stored++] : result.layers[next++];
       if (layer.is_added) continue;
       norms.push_back(certified.norm.norm);
       judged.push_back(&certified);
@@ -190,6 +192,14 @@ void multiply_norms(const Network& network, const files::Parts& parts,
 
 }  // namespace
 
+std::vector<CertifiedLayer> stated_norms(const Network& network, const Certification& certification) {
+  std::vector<CertifiedLayer> result;
+  for (const auto& [part, weights] : files::parts(network))
+    for (const CertifiedLayer& layer : weights->stored.empty() ? certification.layers : certification.stored)
+      if (layer.network == part) result.push_back(layer);
+  return result;
+}
+
 Certification certify(const Network& network, const CertifyOptions& options) {
   const Stop stop(options.cancelled, options.seconds);
   Certification result;
@@ -199,20 +209,25 @@ Certification certify(const Network& network, const CertifyOptions& options) {
   require_moderate(network);
   const files::Parts parts = files::parts(network);
   require_what_is_bounded(network, parts, options);
-  std::vector<const files::Layer*> layers;
+  std::vector<const files::Layer*> layers, stored;
   for (const auto& [name, weights] : parts) {
     for (const files::Layer& layer : weights->layers) {
       layers.push_back(&layer);
       result.layers.push_back({name, layer.name, {}, std::nullopt});
     }
+    for (const files::Layer& layer : weights->stored) {
+      stored.push_back(&layer);
+      result.stored.push_back({name, layer.name, {}, std::nullopt});
+    }
   }
   result.domain = options.domain;
   add_claims(network, options, result);
 
-  WorkProgress progress(
-      static_cast<int>(layers.size()) + pieces_of_work(options, static_cast<int>(result.bounds.size())),
-      options.progress);
-  enclose_norms(layers, options.jobs, progress, result);
+  WorkProgress progress(static_cast<int>(layers.size() + stored.size()) +
+                            pieces_of_work(options, static_cast<int>(result.bounds.size())),
+                        options.progress);
+  enclose_norms(layers, options.jobs, progress, result.gamma, result.layers);
+  enclose_norms(stored, options.jobs, progress, result.gamma, result.stored);
   judge_gamma(parts, result);
   for (CertifiedBound& bound : result.bounds) multiply_norms(network, parts, result.layers, bound);
   find_bounds(network, options, stop, progress, result.layers, result.bounds);

@@ -97,6 +97,8 @@ struct Certification {
   std::map<files::FunctionId, files::SampleAgreement>
       samples;  ///< by part: the samples it was compared with; for the certificate
   std::vector<CertifiedLayer> layers;
+  /// The matrices as stored, of networks whose layers are not these (Weights::stored). Limits on norms are judged here.
+  std::vector<CertifiedLayer> stored;
   std::vector<CertifiedBound> bounds;
   std::vector<CertifiedLaw> laws;
   std::vector<CertifiedValues> values;  ///< for the certificate; from certified_values()
@@ -112,6 +114,9 @@ inline constexpr double kEqualTolerance = 0x1p-20;
 /// the norm as well as the upper one, both up to kEqualTolerance. Decided in exact arithmetic; inconclusive if the
 /// limit lies inside an enclosure.
 std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const std::vector<Enclosure>& norms);
+
+/// Returns the norms that are stated to users: those of the stored matrices, in order of evaluation.
+std::vector<CertifiedLayer> stated_norms(const files::Network& network, const Certification& certification);
 
 /// Certifies all functions of NET.
 ///
@@ -140,7 +145,7 @@ UpperBound law_bound(LawKind law, const std::vector<std::pair<UpperBound, int>>&
 files::Json summary(const files::Network& network, const CertifiedBound& bound);
 files::Json summary(const files::Network& network, const CertifiedLaw& law);
 
-/// Returns the certificate of a certification: everything that check::check() needs besides the weights.
+/// Returns the certificate of a certification: the network and everything that check::check() needs.
 files::Json certificate(const files::Network& network, const Certification& certification);
 
 /// Returns whether the search for any of the bounds was interrupted.

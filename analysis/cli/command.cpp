@@ -58,6 +58,12 @@ void declare_order(CLI::App& app, files::NetworkArguments& arguments) {
          "Layers in the order of evaluation, if the weight file does not store it: fc1,fc2,fc3; with --phi "
          "and --rho phi=fc1,fc2 and rho=fc1,fc2")
       ->allow_extra_args(false);
+  app.add_option(
+         "--select", arguments.select,
+         "Prefix of the layers of one network in a file that holds several, e.g. actor; several for a "
+         "chain, in order of evaluation: encoder,head. Of policies of Stable-Baselines3: policy or value")
+      ->delimiter(',')
+      ->allow_extra_args(false);
 }
 
 void declare_activation(CLI::App& app, files::NetworkArguments& arguments) {
@@ -106,6 +112,8 @@ files::Network load_any_net(const files::NetworkArguments& arguments) {
     throw UsageError("no network: name a network.toml, one weight file, or --phi F --rho F");
   }
   const bool has_pair = !arguments.phi.empty();
+  if (!arguments.select.empty() && (has_pair || !arguments.order.empty()))
+    throw UsageError("--select is for one weight file, without --order");
   if (has_pair ? !arguments.order.empty() : !arguments.phi_order.empty() || !arguments.rho_order.empty())
     throw UsageError(has_pair ? "--order: state the file: --order phi=fc1,fc2 or rho=fc1,fc2"
                               : "--order phi=... and rho=... go with --phi and --rho");
@@ -114,10 +122,12 @@ files::Network load_any_net(const files::NetworkArguments& arguments) {
 
 std::vector<std::string> reading_notes(const files::Weights& weights) {
   std::vector<std::string> notes = weights.notes;
+  for (const std::string& unused : weights.unused) notes.push_back("unused: " + unused);
   const double rounding = files::rounding_of_slope(weights);
   if (rounding > 0)
     notes.push_back(
-        fmt::format("folded weights that are not doubles are rounded to nearest; the bounds for all inputs "
+        fmt::format("folded numbers that are not doubles, and the constants of Selu, are rounded; the bounds "
+                    "for all inputs "
                     "plus {:.2g} hold for the exact ones",
                     rounding));
   return notes;

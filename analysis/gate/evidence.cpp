@@ -36,6 +36,10 @@ Evidence::~Evidence() = default;
 const files::Network& Evidence::flown() {
   if (!network_) {
     files::Network network = files::load_evaluated_network(release().network);
+    for (const auto& [part, weights] : files::parts(network))
+      if (!weights->assumed.empty())
+        throw Unfounded(weights->path +
+                        " is read by a guess, which network.toml must state: " + weights->assumed.front());
     if (release().is_float32 && !is_stored_as_float32(network))
       network = files::as_float32(std::move(network));
     network_ = std::make_unique<files::Network>(std::move(network));
@@ -45,15 +49,16 @@ const files::Network& Evidence::flown() {
 
 const files::Json& Evidence::certificate() {
   if (!certificate_) {
-    certificate_ =
-        std::make_unique<files::Json>(files::read_json(release().certificate, check::kCertificateSchema));
+    certificate_ = std::make_unique<files::Json>(
+        check::parse_certificate(files::read_file(release().certificate), release().certificate));
   }
   return *certificate_;
 }
 
 const check::CheckResult& Evidence::certificate_verdict() {
   if (!verdict_) {
-    const files::Network stored = files::load_evaluated_network(release().network);
+    const files::Network stored =
+        files::load_evaluated_network(check::with_stated_options(certificate(), release().network));
     verdict_ = std::make_unique<check::CheckResult>(check::check(certificate(), stored));
   }
   return *verdict_;

@@ -68,12 +68,12 @@ files::Network network_of(const py::dict& source) {
   const auto description = source["description"].cast<std::string>();
   if (!description.empty()) {
     return files::parse_network(
-        description, "", [&parts](const std::string& path, const std::vector<std::string>& order) {
+        description, "", [&parts](const std::string& path, const files::LayerChoice& choice) {
           const auto found = parts.find(path);
           if (found == parts.end())
             throw files::InputError({"", "", "weights", files::in_quotes(path),
                                      "is not among the given arrays", "give them under this name"});
-          if (!order.empty())
+          if (choice.is_stated())
             throw files::InputError({"", "", "order", "", "is part of the description of a network in memory",
                                      "give it as order="});
           return found->second;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "lipschitz/checker/canonical_network.h"
 #include "lipschitz/checker/certificate_text.h"
 #include "lipschitz/checker/check.h"
 #include "lipschitz/checker/dyadic.h"
@@ -17,9 +18,9 @@ namespace swarmcert::check {
 
 class CertificateChecker {
  public:
-  CertificateChecker(const files::Json& certificate, const files::Network& network)
+  explicit CertificateChecker(const files::Json& certificate)
       : certificate_(certificate),
-        network_(is_of_float32(certificate) ? files::as_float32(network) : network),
+        network_(canonical_network(certificate.at("network"))),
         parts_(files::parts(network_)) {}
   CheckResult run();
 
@@ -30,8 +31,6 @@ class CertificateChecker {
   static constexpr long kMostNeighbours = 1000000;
 
   // check.cpp
-  /// Returns whether the certificate states that the weights are rounded to float32.
-  static bool is_of_float32(const Json& certificate);
   void check_weights(const Json& named);
   /// Requires null, or for each named network one interval per input, whether or not a bound uses it.
   void check_boxes(const Json& boxes) const;

@@ -1,9 +1,10 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "lipschitz/checker/canonical_network.h"
 #include "lipschitz/checker/certificate_checker.h"
 #include "nn/base/content_hash.h"
-#include "nn/weights/activation.h"
+#include "nn/base/input_error.h"
 #include "nn/weights/chain.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/function_id.h"
@@ -72,26 +73,17 @@ CheckResult CertificateChecker::run() {
   return {true, reason, spectral_norms_, upper_bounds_, lower_bounds_, on_boxes_, values_};
 }
 
-bool CertificateChecker::is_of_float32(const Json& certificate) {
-  require(certificate.contains("network"), "certificate lacks field network");
-  const Json& named = certificate["network"];
-  require(named.is_object(), "network is not an object");
-  require(named.contains("as"), "network lacks field as");
-  return named["as"] == "float32";
-}
-
 void CertificateChecker::check_weights(const Json& named) {
-  files::require_keys(named, {"description_sha256", "weights", "as"}, "network");
+  files::require_keys(named, {"description_sha256", "options", "output", "input", "silent", "weights", "as"},
+                      "network");
   require(named["as"].is_null() || named["as"] == "float32", "network.as is unknown");
-  require(named["description_sha256"] == network_.sha256,
-          "network.description_sha256 differs: the certificate was made for another network");
-  require(named["weights"].size() == parts_.size(), "network.weights lists another number of networks");
   for (const auto& [part, weights] : parts_) {
     const Json& entry = named["weights"].at(part.name());
     const std::string where = "network.weights." + part.name();
-    files::require_keys(entry, {"sha256", "precision", "chain", "samples"}, where);
-    require(entry["sha256"] == weights->sha256 && entry["precision"] == files::name(weights->precision),
-            where + " differs: the certificate was made for other weights than " + weights->path);
+    files::require_keys(
+        entry, {"file", "sha256", "data_files", "precision", "assumed", "chain", "layers", "samples"}, where);
+    require(named["as"].is_null() || weights->precision == files::Precision::kFloat32,
+            where + ": is not of float32, as network.as states");
     check_chain(entry["chain"], part);
     check_samples(entry["samples"], where + ".samples");
   }
@@ -355,42 +347,49 @@ std::string statement_for(const files::Network& network) {
   return text + (silent.empty() ? "" : ".");
 }
 
+files::NetworkArguments with_stated_options(const files::Json& certificate,
+                                            files::NetworkArguments arguments) {
+  const files::Json named = certificate.value("network", files::Json::object());
+  if (!named.is_object() || !named.contains("options")) return arguments;  // check() reports the error
+  files::ReadingOptions stated;
+  try {
+    stated = files::options_of(named["options"]);
+  } catch (const std::exception&) {
+    return arguments;
+  }
+  const bool chooses = !arguments.order.empty() || !arguments.select.empty() ||
+                       !arguments.phi_order.empty() || !arguments.rho_order.empty();
+  if (!chooses) {
+    const bool is_pair = !arguments.phi.empty();
+    if (!is_pair) arguments.order = stated.order;
+    if (!is_pair) arguments.select = stated.select;
+    if (is_pair) arguments.phi_order = stated.phi_order;
+    if (is_pair) arguments.rho_order = stated.rho_order;
+  }
+  if (arguments.key.empty() && arguments.file.find('#') == std::string::npos) arguments.key = stated.key;
+  if (arguments.activation.empty()) arguments.activation = stated.activation;
+  return arguments;
+}
+
+files::Json parse_certificate(const std::string& text, const std::string& path) {
+  const files::Json any = files::parse_json(text, path);
+  if (any.is_object() && any.value("schema", files::Json()) == kOldCertificateSchema)
+    throw files::InputError(
+        {path, "", "schema", files::in_quotes(kOldCertificateSchema),
+         "is older than this program: it does not carry the network",
+         "renew it: swarmcert certify NET -o CERTIFICATE --force, with the options of then"});
+  return any.is_object() && any.value("schema", files::Json()) == kCertificateSchema
+             ? any
+             : files::parse_json(text, path, kCertificateSchema);
+}
+
 namespace {
 
-/// Returns the activations stated by a chain, separated by commas.
-std::string stated_activations(const files::Json& chain) {
-  std::string text;
-  for (const files::Json& step : chain) {
-    const std::string op = step.at("op").get<std::string>();
-    if (files::activation_called(op)) text += (text.empty() ? "" : ",") + op;
-  }
-  return text;
-}
-
-}  // namespace
-
-files::Network with_stated_activations(const files::Json& certificate, files::Network network) {
-  const auto adopt = [&certificate](const files::FunctionId& part, files::Weights& weights) {
-    if (weights.states_activation()) return;
-    try {
-      const std::string text =
-          stated_activations(certificate.at("network").at("weights").at(part.name()).at("chain"));
-      if (text.empty() || !files::activation_misfit(weights, text).empty()) return;
-      weights = files::with_activation(std::move(weights), text);
-      weights.activation_is_given = false;  // given by the certificate alone
-    } catch (const files::Json::exception&) {
-      return;  // check() reports the error
-    }
-  };
-  if (network.plain) adopt("network", *network.plain);
-  for (auto& [kind, weights] : network.phi) adopt(files::FunctionId::phi(kind), weights);
-  for (auto& [kind, weights] : network.rho) adopt(files::FunctionId::rho(kind), weights);
-  return network;
-}
-
-CheckResult check(const files::Json& certificate, const files::Network& network) {
+/// Runs `decide`; what is wrong with the certificate's form becomes a reason.
+template <class Decide>
+CheckResult decided(const Decide& decide) {
   try {
-    return CertificateChecker(certificate, network).run();
+    return decide();
   } catch (const files::Json::exception& fault) {
     // "[json.exception.type_error.302] type must be string, but is null"
     const std::string text = fault.what();
@@ -399,6 +398,24 @@ CheckResult check(const files::Json& certificate, const files::Network& network)
   } catch (const std::exception& fault) {
     return {false, fault.what(), 0, 0, 0, 0, 0};
   }
+}
+
+}  // namespace
+
+CheckResult check(const files::Json& certificate) {
+  return decided([&certificate] { return CertificateChecker(certificate).run(); });
+}
+
+CheckResult check(const files::Json& certificate, const files::Network& network) {
+  return decided([&]() -> CheckResult {
+    require(certificate.contains("network"), "certificate lacks field network");
+    const files::Json& named = certificate["network"];
+    require(named.is_object(), "network is not an object");
+    const std::string difference = first_difference(
+        canonical_network(named), named.at("as") == "float32" ? files::as_float32(network) : network);
+    if (!difference.empty()) return {false, difference, 0, 0, 0, 0, 0};
+    return CertificateChecker(certificate).run();
+  });
 }
 
 }  // namespace swarmcert::check

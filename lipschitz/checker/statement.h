@@ -7,15 +7,18 @@
 
 namespace swarmcert::check {
 
-inline constexpr const char* kCertificateSchema = "swarmcert/certificate/1";
+inline constexpr const char* kCertificateSchema = "swarmcert/certificate/2";
+/// The schema before certificates carried the network.
+inline constexpr const char* kOldCertificateSchema = "swarmcert/certificate/1";
 
 inline constexpr const char* kStatement =
-    "The functions are the operations listed under chain, in that order, with the weights stored in the "
-    "files named by sha256, rounded to float32 where `as` says so: linear is W x + b; of each number t, relu "
+    "The functions are the operations listed under chain, in that order, with the weights and biases listed "
+    "under layers, which were read from the files named by sha256 and rounded to float32 where `as` says so: "
+    "linear is W x + b; of each number t, relu "
     "is the positive part, tanh and sigmoid, 1 / (1 + e^-t), are the functions of these names, softplus is "
     "ln(1 + e^t), elu is max(0, t) + min(0, e^t - 1), selu is 1.0507009873554805 max(0, t) + "
     "1.0507009873554805 * 1.6732632423543772 min(0, e^t - 1), silu is t / (1 + e^-t), gelu is t/2 (1 + erf(t "
-    "/ sqrt 2)); clamp is the input clamp of network.toml. Where samples are named, they were reproduced up "
+    "/ sqrt 2)); clamp is the input clamp listed. Where samples are named, they were reproduced up "
     "to largest_deviation when this was written; checking does not repeat that. Every bound holds in exact "
     "arithmetic: |f(x) - f(y)| <= upper |x - y| for all x and y that differ in the block only, and |f(x) - "
     "f(y)| >= lower |x - y| at the witness; where the domain is box, for x and y in the box. So |df| <= the "

@@ -1,8 +1,10 @@
 #include "nn/weights/activation.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <stdexcept>
 
@@ -13,7 +15,9 @@
 namespace swarmcert::files {
 namespace {
 
-/// constant + sum of factor * s(scale x + shift). Equals s(x) for every s except ReLU.
+constexpr char kLinear[] = "linear";  ///< no activation
+
+/// constant + sum of factor * s(scale x + shift). Equals s(x) for every s except ReLU; x itself without terms.
 struct ActivationTerms {
   struct Term {
     double scale, shift, factor;
@@ -23,6 +27,7 @@ struct ActivationTerms {
   Activation s = Activation::kRelu;
 
   bool is_s_itself() const { return terms.size() == 1; }
+  bool is_linear() const { return terms.empty(); }
   /// Return the largest growth factor of a weight's rounding error in the layer before, or after, the activation.
   double share_in_front() const { return norm_of(&Term::scale); }
   double share_behind() const { return norm_of(&Term::factor); }
@@ -37,6 +42,7 @@ struct ActivationTerms {
 
 std::optional<ActivationTerms> terms_of(const std::string& name) {
   if (const std::optional<Activation> s = activation_called(name)) return ActivationTerms{{{1, 0, 1}}, 0, *s};
+  if (name == kLinear) return ActivationTerms{};
   if (name == "relu6") return ActivationTerms{{{1, 0, 1}, {1, -6, -1}}, 0};
   if (name == "hardtanh") return ActivationTerms{{{1, 1, 1}, {1, -1, -1}}, -1};
   constexpr std::string_view kLeaky = "leaky_relu";
@@ -51,26 +57,10 @@ std::optional<ActivationTerms> terms_of(const std::string& name) {
   return ActivationTerms{{{1, 0, 1}, {-1, 0, -slope}}, 0};
 }
 
-AffineMap map_of(const Layer& layer) {
-  AffineMap map;
-  map.inputs = layer.inputs;
-  for (int i = 0; i < layer.outputs; ++i) {
-    AffineMap::Row row;
-    for (int j = 0; j < layer.inputs; ++j) {
-      const double weight =
-          layer.weights[static_cast<std::size_t>(i) * static_cast<std::size_t>(layer.inputs) +
-                        static_cast<std::size_t>(j)];
-      if (weight != 0) row.push_back({j, {weight, 0}});
-    }
-    map.rows.push_back(std::move(row));
-    map.shift.push_back({layer.biases[static_cast<std::size_t>(i)], 0});
-  }
-  return map;
-}
-
 /// Returns the activation of `before`, as a map of a new layer's outputs.
 AffineMap activated(ReluChain& chain, const AffineMap& before, const ActivationTerms& activation,
                     const std::string& name) {
+  if (activation.is_linear()) return before;
   if (activation.s != Activation::kRelu) return chain.activated(before, activation.s, {}, name);
   std::vector<AffineMap> rows;
   for (const ActivationTerms::Term& term : activation.terms) {
@@ -102,6 +92,15 @@ std::vector<Layer> rewritten(const Weights& weights, const std::vector<Activatio
   for (std::size_t k = 1; k < own.size(); ++k)
     current = composed(map_of(own[k]), activated(chain, current, between[k - 1], own[k - 1].name));
   std::vector<Layer> layers = chain.finished(current, own.back().name);
+  if (layers.size() != own.size()) {  // some were folded
+    const auto is_rounded = [](const Layer& layer) {
+      return layer.weight_rounding + layer.bias_rounding > 0;
+    };
+    if (std::any_of(own.begin(), own.end(), is_rounded))
+      throw FoldingLimit{
+          "layers without an activation between them are folded, but their weights were rounded"};
+    return layers;
+  }
   for (std::size_t k = 0; k < layers.size(); ++k) {  // earlier rounding errors enter every copy
     const double copies = (k < between.size() ? between[k].share_in_front() : 1) *
                           (k > 0 ? between[k - 1].share_behind() : 1) * kUp;
@@ -123,7 +122,8 @@ std::vector<std::string> spread(const Weights& weights, const std::vector<std::s
 }  // namespace
 
 std::string activations() {
-  return "relu, leaky_relu (slope 0.01), leaky_relu:SLOPE, relu6, hardtanh, " + smooth_activations();
+  return "relu, linear (none), leaky_relu (slope 0.01), leaky_relu:SLOPE, relu6, hardtanh, " +
+         smooth_activations();
 }
 
 bool is_activation(const std::string& name) { return terms_of(name).has_value(); }
@@ -148,7 +148,8 @@ std::string activation_misfit(const Weights& weights, const std::string& text) {
         std::equal(names.begin(), names.end(), weights.layers.begin(), weights.layers.end() - 1,
                    [](const auto& name, const Layer& layer) { return op_after(layer) == name; });
     if (agrees) return "";
-    return std::string(weights.activation_is_given ? "network.toml states " : "the file itself states ") +
+    const bool is_given = weights.activation_source == ActivationSource::kUser;
+    return std::string(is_given ? "network.toml states " : "the file itself states ") +
            weights.activation_names() + " between its layers";
   }
   if (names.size() + 1 != layers && names.size() != layers)
@@ -167,39 +168,90 @@ std::string activation_misfit(const Weights& weights, const std::string& text) {
   return "";
 }
 
-Weights with_activation(Weights weights, const std::string& text) {
+namespace {
+
+/// Applies one name for each layer but the last, or one more.
+Weights applied(Weights weights, const std::vector<std::string>& names, ActivationSource source) {
   std::vector<ActivationTerms> between;
-  for (const std::string& name : spread(weights, listed_activations(text))) {
+  for (const std::string& name : names) {
     const std::optional<ActivationTerms> terms = terms_of(name);
     if (!terms) throw std::invalid_argument("with_activation: " + in_quotes(name) + " is unknown");
     between.push_back(*terms);
   }
-  const std::string misfit = activation_misfit(weights, text);
-  if (!misfit.empty()) {
-    const bool is_other = weights.states_activation();
-    throw InputError({weights.path, "", "--activation", text, misfit,
-                      is_other ? "leave --activation out" : "state what the network was trained with"});
-  }
-  if (weights.states_activation() || between.empty()) return weights;  // already stated, or nothing to set
-  weights.activation_is_given = true;
+  weights.activation_source = source;
+  const std::vector<Layer> stored = weights.layers;
+  if (between.size() == weights.layers.size() && between.back().is_linear()) between.pop_back();
   if (between.size() == weights.layers.size()) {
     weights.end_in(between.back().s);
-    weights.notes.push_back("the network ends in " + listed_activations(text).back() +
-                            ", which an identity layer follows");
+    weights.notes.push_back("the network ends in " + names.back() + ", which an identity layer follows");
   }
   std::vector<Activation> functions;
   for (const ActivationTerms& terms : between) functions.push_back(terms.s);
   weights.set_activations(functions);
   const auto is_itself = [](const ActivationTerms& terms) { return terms.is_s_itself(); };
   if (std::all_of(between.begin(), between.end(), is_itself)) return weights;
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ",") + name;
   try {
     weights.layers = rewritten(weights, between);
   } catch (const FoldingLimit& limit) {
-    throw InputError({weights.path, "", "--activation", text, limit.what, "certify a smaller network"});
+    throw InputError({weights.path, "", "activation", text, limit.what, "certify a smaller network"});
   }
+  if (weights.stored.empty()) weights.stored = stored;
   if (weights.precision == Precision::kFloat32) weights.precision = least_precision(weights.layers);
   weights.notes.push_back("piecewise linear activations of " + text + " are written with ReLU");
   return weights;
+}
+
+/// Returns the name in activations() of an activation as MATLAB and PyTorch call it: "poslin", "LeakyReLU".
+std::string known_name(std::string word) {
+  std::transform(word.begin(), word.end(), word.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  static const std::map<std::string, std::string> kOthers = {
+      {"poslin", "relu"}, {"purelin", kLinear},  {"identity", kLinear},       {"none", kLinear},
+      {"tansig", "tanh"}, {"logsig", "sigmoid"}, {"logistic", "sigmoid"},     {"satlins", "hardtanh"},
+      {"swish", "silu"},  {"lin", kLinear},      {"leakyrelu", "leaky_relu"}, {"hard_tanh", "hardtanh"},
+      {"rectify", "relu"}};
+  const auto found = kOthers.find(word);
+  return found == kOthers.end() ? word : found->second;
+}
+
+}  // namespace
+
+Weights with_activation(Weights weights, const std::string& text) {
+  const std::vector<std::string> names = spread(weights, listed_activations(text));
+  for (const std::string& name : names)
+    if (!is_activation(name))
+      throw std::invalid_argument("with_activation: " + in_quotes(name) + " is unknown");
+  const std::string misfit = activation_misfit(weights, text);
+  if (!misfit.empty()) {
+    const bool is_other = weights.states_activation();
+    throw InputError({weights.path, "", "--activation", text, misfit,
+                      is_other ? "leave --activation out" : "state what the network was trained with"});
+  }
+  if (weights.states_activation() || names.empty()) return weights;  // already stated, or nothing to set
+  return applied(std::move(weights), names, ActivationSource::kUser);
+}
+
+Weights with_activation_of_file(Weights weights, const std::vector<std::string>& words,
+                                const std::string& field) {
+  std::vector<std::string> names;
+  std::string text;
+  for (const std::string& word : words) {
+    names.push_back(known_name(word));
+    text += (text.empty() ? "" : ",") + word;
+  }
+  names = spread(weights, names);
+  const auto refuse = [&](const std::string& what) {
+    throw InputError({weights.path, "", field, in_quotes(text), what,
+                      "save the matrices alone, and state what is between them with --activation"});
+  };
+  for (const std::string& name : names)
+    if (!is_activation(name)) refuse("names an activation that is not known");
+  if (names.size() + 1 != weights.layers.size() && names.size() != weights.layers.size())
+    refuse("names " + std::to_string(names.size()) + " activations for " +
+           std::to_string(weights.layers.size()) + " layers");
+  return applied(std::move(weights), names, ActivationSource::kFile);
 }
 
 }  // namespace swarmcert::files

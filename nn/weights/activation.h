@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "nn/weights/weights.h"
 
@@ -29,5 +30,10 @@ std::string activation_misfit(const Weights& weights, const std::string& text);
 ///   the layers, the width of a layer is not a multiple of the group size, or the network becomes too large.
 /// @throws std::invalid_argument if a name is unknown.
 Weights with_activation(Weights weights, const std::string& text);
+
+/// Same, with activations that the file itself states in `field`, in the words of MATLAB or PyTorch.
+/// @throws InputError if a word is not known or the number of words does not match the layers.
+Weights with_activation_of_file(Weights weights, const std::vector<std::string>& words,
+                                const std::string& field);
 
 }  // namespace swarmcert::files

@@ -129,8 +129,8 @@ struct Member {
 
 class SourceReader {
  public:
-  SourceReader(const std::string& bytes, const std::string& path, const std::vector<std::string>& order)
-      : scanner_(bytes, path), path_(path), order_(order) {}
+  SourceReader(const std::string& bytes, const std::string& path, const LayerChoice& choice)
+      : scanner_(bytes, path), path_(path), choice_(choice) {}
 
   Weights run(const std::string& key) {
     read();
@@ -271,12 +271,12 @@ class SourceReader {
       }
       return transposed;
     };
-    return assemble(declared, read, path_, Listing::kRegistration, order_);
+    return assemble(declared, read, path_, Listing::kRegistration, choice_);
   }
 
   Scanner scanner_;
   const std::string& path_;
-  const std::vector<std::string>& order_;
+  const LayerChoice& choice_;
   std::map<std::string, std::vector<Member>> types_;
   std::map<std::string, std::vector<Member>> objects_;
 };
@@ -292,8 +292,8 @@ bool looks_like_c_source(const std::string& bytes) {
 }
 
 Weights parse_c_source(const std::string& bytes, const std::string& path, const std::string& key,
-                       const std::vector<std::string>& order) {
-  return SourceReader(bytes, path, order).run(key);
+                       const LayerChoice& choice) {
+  return SourceReader(bytes, path, choice).run(key);
 }
 
 std::map<std::string, Weights> parse_pure_c_source(const std::string& bytes, const std::string& path) {

@@ -21,7 +21,7 @@ bool looks_like_c_source(const std::string& bytes);
 /// @param key NAME; may be empty if the file contains a single network.
 /// @throws InputError with the line if the text is anything else or does not contain `key`, or as assemble().
 Weights parse_c_source(const std::string& bytes, const std::string& path, const std::string& key,
-                       const std::vector<std::string>& order);
+                       const LayerChoice& choice);
 
 /// Parses all networks, by NAME, of C source of that format that contains nothing else.
 /// @throws InputError as parse_c_source(); also for preprocessor lines other than `include` and `pragma`, and for line

@@ -6,6 +6,7 @@
 
 #include "nn/base/input_error.h"
 #include "nn/base/suggest.h"
+#include "nn/weights/layer_names.h"
 
 namespace swarmcert::files {
 namespace {
@@ -15,38 +16,8 @@ using Order = std::vector<std::size_t>;
 constexpr std::size_t kMostSearched = 256;   ///< largest number of layers whose orders are enumerated
 constexpr std::size_t kMostSteps = 100'000;  ///< limit of that search; beyond it the order is undecided
 constexpr std::size_t kMostShown = 3;
-
-bool is_decimal(char c) { return c >= '0' && c <= '9'; }
-
-/// Returns the number at `at` without leading zeros and advances `at` past it.
-std::string number_at(const std::string& text, std::size_t& at) {
-  while (at < text.size() && text[at] == '0') ++at;
-  const std::size_t first = at;
-  while (at < text.size() && is_decimal(text[at])) ++at;
-  return text.substr(first, at - first);
-}
-
-struct Comparison {
-  int sign = 0;               ///< negative: a comes first; 0: equal up to leading zeros
-  bool is_by_number = false;  ///< at the first difference both have a number
-};
-
-Comparison compare(const std::string& a, const std::string& b) {
-  std::size_t i = 0, j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (!is_decimal(a[i]) || !is_decimal(b[j])) {
-      if (a[i] != b[j]) return {a[i] < b[j] ? -1 : 1, false};
-      ++i, ++j;
-      continue;
-    }
-    const std::string m = number_at(a, i);
-    const std::string n = number_at(b, j);
-    if (m.size() != n.size()) return {m.size() < n.size() ? -1 : 1, true};
-    if (m != n) return {m < n ? -1 : 1, true};
-  }
-  const std::size_t left_a = a.size() - i, left_b = b.size() - j;
-  return {left_a < left_b ? -1 : left_a > left_b ? 1 : 0, false};
-}
+constexpr char kByShapes[] =
+    "the order of the layers: the shapes allow no other, but the names do not state it";
 
 /// Depth-first search for orders in which the sizes of consecutive layers match.
 class OrderSearch {
@@ -135,28 +106,26 @@ class OrderDecision {
       if (!seen.insert(layer).second) refuse(in_quotes(layer), "is named twice", "name every layer once");
       order.push_back(static_cast<std::size_t>(found - layers_.begin()));
     }
-    for (const LayerShape& layer : layers_) {
-      if (seen.count(layer.name) == 0)
-        refuse(in_quotes(layer.name), "is left out", "name every layer of the file once");
-    }
     if (listing_ == Listing::kEvaluation) {
       if (order != listed_)
         refuse(words(order), "the file itself states another order: " + words(listed_),
                "leave the order out");
-      return {order, OrderSource::kFile};
+      return {order, OrderSource::kFile, {}};
     }
     check_chain(order, "the order does not fit the shapes");
-    return {order, OrderSource::kUser};
+    return {order, OrderSource::kUser, {}};
   }
 
   LayerOrder decide() const {
     if (listing_ == Listing::kEvaluation) {
       check_chain(listed_, "");
-      return {listed_, OrderSource::kFile};
+      return {listed_, OrderSource::kFile, {}};
     }
+    require_one_module();
     const bool is_registered = listing_ == Listing::kRegistration;
     if (are_all_numbered() && fits(natural_) && (!is_registered || natural_ == listed_))
-      return {natural_, layers_.size() == 1 ? OrderSource::kShapes : OrderSource::kNames};
+      return {natural_, layers_.size() == 1 ? OrderSource::kShapes : OrderSource::kNames,
+              guesses(gap_in_numbers(names()))};
     if (layers_.size() > kMostSearched) {
       if (!fits(listed_) && !fits(natural_)) check_chain(listed_, "");
       refuse_undecided({});
@@ -165,11 +134,12 @@ class OrderDecision {
     const std::vector<Order> fitting = any.run(kMostShown);
     if (fitting.empty() && any.is_complete())
       check_chain(is_registered ? listed_ : natural_, "no order of the layers fits their shapes");
-    if (fitting.size() == 1 && any.is_complete()) return {fitting.front(), OrderSource::kShapes};
+    if (fitting.size() == 1 && any.is_complete())
+      return {fitting.front(), OrderSource::kShapes, guesses(kByShapes)};
     OrderSearch numbered(layers_, natural_, true);
     const std::vector<Order> by_number = numbered.run(1);
     if (by_number.size() == 1 && numbered.is_complete() && (!is_registered || by_number.front() == listed_))
-      return {by_number.front(), OrderSource::kNames};
+      return {by_number.front(), OrderSource::kNames, guesses(kByShapes)};
     std::vector<Order> candidates = fitting;
     candidates.insert(candidates.begin(), by_number.begin(), by_number.end());
     refuse_undecided(candidates);
@@ -186,10 +156,35 @@ class OrderDecision {
     return text;
   }
 
+  std::vector<std::string> names() const {
+    std::vector<std::string> result;
+    for (const LayerShape& one : layers_) result.push_back(one.name);
+    return result;
+  }
+
+  static std::vector<std::string> guesses(const std::string& guess) {
+    return guess.empty() ? std::vector<std::string>() : std::vector<std::string>{guess};
+  }
+
+  /// Layers of an actor and of a critic may fit one another by their shapes alone.
+  void require_one_module() const {
+    const std::vector<std::string> modules = modules_of(names());
+    if (modules.size() < 2) return;
+    std::string list, options;
+    for (const std::string& module : modules) {
+      list += (list.empty() ? "" : ", ") + in_quotes(module);
+      options += (options.empty() ? "" : " or ") + ("--select " + module);
+    }
+    throw InputError(
+        {path_, "", "", "",
+         "holds layers of several modules, " + list + ", and does not say whether one follows another",
+         "name the one to certify: " + options +
+             "; for a chain of several name them in the order of evaluation: --select A,B, or its "
+             "layers: --order A.0,A.2,B.0"});
+  }
+
   std::string choose(const std::string& layer) const {
-    std::vector<std::string> names;
-    for (const LayerShape& one : layers_) names.push_back(one.name);
-    const std::string best = nearest(layer, names);
+    const std::string best = nearest(layer, names());
     return best.empty() ? "its layers are " + words(listed_) : "did you mean " + in_quotes(best) + "?";
   }
 
@@ -256,26 +251,40 @@ class OrderDecision {
 
 }  // namespace
 
-bool naturally_before(const std::string& a, const std::string& b) { return compare(a, b).sign < 0; }
-
-bool numbered_before(const std::string& a, const std::string& b) {
-  const Comparison result = compare(a, b);
-  return result.sign < 0 && result.is_by_number;
-}
-
 LayerOrder decide_layer_order(const std::vector<LayerShape>& layers, Listing listing,
-                              const std::vector<std::string>& stated, const std::string& path) {
+                              const LayerChoice& choice, const std::string& path) {
   const OrderDecision decision(layers, listing, path);
-  return stated.empty() ? decision.decide() : decision.as_stated(stated);
+  if (!choice.order.empty()) return decision.as_stated(choice.order);
+  if (choice.select.size() < 2) return decision.decide();
+  LayerOrder chain{{}, OrderSource::kUser, {}};
+  std::vector<std::string> stated;
+  std::vector<bool> is_taken(layers.size(), false);
+  for (const std::string& prefix : choice.select) {
+    std::vector<LayerShape> own;
+    for (std::size_t i = 0; i < layers.size(); ++i) {
+      if (is_taken[i] || !has_prefix(layers[i].name, prefix)) continue;
+      is_taken[i] = true;
+      own.push_back(layers[i]);
+    }
+    const LayerOrder order = OrderDecision(own, listing, path).decide();
+    for (const std::size_t i : order.indices) stated.push_back(own[i].name);
+    chain.assumed.insert(chain.assumed.end(), order.assumed.begin(), order.assumed.end());
+  }
+  chain.indices = OrderDecision(layers, Listing::kUnordered, path).as_stated(stated).indices;
+  return chain;
 }
 
-OrderSource stated_order(const std::vector<Layer>& layers, const std::vector<std::string>& stated,
+OrderSource stated_order(const std::vector<Layer>& layers, const LayerChoice& choice,
                          const std::string& path) {
+  if (!choice.select.empty())
+    throw InputError({path, "", "--select", in_quotes(choice.select.front()),
+                      "is for files that hold several networks by name; this one states its only chain",
+                      "leave --select out"});
   std::vector<LayerShape> shapes;
   for (const Layer& layer : layers)
     shapes.push_back(
         {layer.name, static_cast<std::uint64_t>(layer.inputs), static_cast<std::uint64_t>(layer.outputs)});
-  return decide_layer_order(shapes, Listing::kEvaluation, stated, path).source;
+  return decide_layer_order(shapes, Listing::kEvaluation, choice.order, path).source;
 }
 
 }  // namespace swarmcert::files

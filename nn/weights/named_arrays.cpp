@@ -77,7 +77,7 @@ std::vector<std::string> names_by_place(const std::vector<const NamedArray*>& ar
 }  // namespace
 
 Weights network_of_arrays(const std::vector<NamedArray>& arrays, const std::string& path,
-                          const std::vector<std::string>& order) {
+                          const LayerChoice& choice) {
   const auto refuse = [&path](const std::string& name, const std::string& what, const std::string& hint) {
     throw InputError({path, "", in_quotes(name), "", what, hint});
   };
@@ -110,7 +110,7 @@ Weights network_of_arrays(const std::vector<NamedArray>& arrays, const std::stri
     tensors.push_back(std::move(tensor));
   }
   const TensorReader read = [&listed](std::size_t i) { return listed[i]->numbers; };
-  return assemble(tensors, read, path, Listing::kUnordered, order);
+  return assemble(tensors, read, path, Listing::kUnordered, choice);
 }
 
 bool looks_like_npz(const std::string& bytes) {
@@ -121,7 +121,7 @@ bool looks_like_npz(const std::string& bytes) {
   return length >= 4 && bytes.size() >= 30 + length && bytes.compare(26 + length, 4, ".npy") == 0;
 }
 
-Weights parse_npz(const std::string& bytes, const std::string& path, const std::vector<std::string>& order) {
+Weights parse_npz(const std::string& bytes, const std::string& path, const LayerChoice& choice) {
   const ZipArchive archive(bytes, path);
   std::vector<NamedArray> arrays;
   std::uint64_t room_bytes = kMostElements * 8;
@@ -136,7 +136,7 @@ Weights parse_npz(const std::string& bytes, const std::string& path, const std::
     arrays.push_back({entry.substr(0, entry.size() - 4), std::move(array.shape), std::move(array.numbers),
                       array.is_float32});
   }
-  return network_of_arrays(arrays, path, order);
+  return network_of_arrays(arrays, path, choice);
 }
 
 }  // namespace swarmcert::files

@@ -21,13 +21,13 @@ struct NamedArray {
 /// Matrices are [outputs, inputs]; biases may be rows or columns. The numbers in the names order the layers.
 /// @throws InputError if an array is neither a weight nor a bias, or as assemble().
 Weights network_of_arrays(const std::vector<NamedArray>& arrays, const std::string& path,
-                          const std::vector<std::string>& order);
+                          const LayerChoice& choice);
 
 /// Returns whether every entry of this zip archive is a .npy array.
 bool looks_like_npz(const std::string& bytes);
 
 /// Parses the network in an .npz archive written by numpy.savez.
 /// @throws InputError as network_of_arrays(), or if the archive or one of its arrays cannot be read.
-Weights parse_npz(const std::string& bytes, const std::string& path, const std::vector<std::string>& order);
+Weights parse_npz(const std::string& bytes, const std::string& path, const LayerChoice& choice);
 
 }  // namespace swarmcert::files

@@ -119,7 +119,7 @@ class NetworkReader {
     if (kinds.keys().empty()) kinds.refuse("", "", "names no kind of vehicle", "add [" + role + ".<kind>]");
     for (const std::string& kind : kinds.keys()) {
       const TomlTable entry = kinds.table(kind);
-      entry.allow_only({"weights", "order", "activation"});
+      entry.allow_only({"weights", "order", "select", "activation"});
       // "set:<kind>:<kind>" is the name of a function.
       if (kind.find(':') != std::string::npos)
         kinds.refuse(in_quotes(kind), "", "a kind's name must not contain ':'", "rename the kind");
@@ -128,11 +128,7 @@ class NetworkReader {
         entry.refuse("weights", in_quotes(file), "is not the name of a file");
       }
       const std::filesystem::path folder = std::filesystem::path(path_).parent_path();
-      std::vector<std::string> order;
-      if (entry.has("order")) order = entry.texts("order");
-      if (entry.has("order") && order.empty())
-        entry.refuse("order", "[]", "names no layer", "leave it out, or name every layer once");
-      Weights read = load_((folder / file).string(), order);
+      Weights read = load_((folder / file).string(), choice_of(entry));
       if (entry.has("activation")) {
         const std::string activation = activation_of(entry);
         const std::string misfit = activation_misfit(read, activation);
@@ -141,6 +137,21 @@ class NetworkReader {
       }
       weights.emplace(kind, std::move(read));
     }
+  }
+
+  static LayerChoice choice_of(const TomlTable& entry) {
+    LayerChoice choice;
+    if (entry.has("order")) choice.order = entry.texts("order");
+    if (entry.has("order") && choice.order.empty())
+      entry.refuse("order", "[]", "names no layer",
+                   "leave it out, or name the layers in order of evaluation");
+    if (!entry.has("select")) return choice;
+    choice.select =
+        entry.is_list("select") ? entry.texts("select") : std::vector<std::string>{entry.text("select")};
+    if (choice.select.empty() || !choice.order.empty())
+      entry.refuse("select", "", choice.order.empty() ? "names no prefix" : "is beside order",
+                   "name prefixes of layers, or their order");
+    return choice;
   }
 
   /// Returns a name, or a comma-separated list of names, as used in certificates. Activations that are rewritten with
@@ -315,26 +326,28 @@ Network load_as_stated(const NetworkArguments& arguments) {
     throw std::invalid_argument("load_network: name one file, or a phi and a rho");
   }
   if (is_pair) return load_pair(arguments);
+  LayerChoice choice = arguments.order;
+  choice.select = arguments.select;
   const bool names_a_key =
       arguments.file.find('#') != std::string::npos && !std::filesystem::exists(arguments.file);
   if (names_a_key) {
     Network network;
-    network.plain = load_weights(arguments.file, arguments.key, arguments.order);
+    network.plain = load_weights(arguments.file, arguments.key, choice);
     return network;
   }
   const std::string bytes = read_file(arguments.file);
   if (is_network_toml(arguments.file, bytes)) {
-    if (!arguments.order.empty())
-      throw InputError({arguments.file, "", "--order", "",
+    if (choice.is_stated())
+      throw InputError({arguments.file, "", choice.order.empty() ? "--select" : "--order", "",
                         "applies to one weight file, and this file names several",
-                        "write order = [...] after weights = ..."});
-    const WeightsLoader load = [&](const std::string& path, const std::vector<std::string>& order) {
-      return load_weights(path, arguments.key, order);
+                        "write order = [...] or select = ... after weights = ..."});
+    const WeightsLoader load = [&](const std::string& path, const LayerChoice& stated) {
+      return load_weights(path, arguments.key, stated);
     };
     return parse_network(bytes, arguments.file, load);
   }
   Network network;
-  network.plain = parse_weights(bytes, arguments.file, arguments.key, arguments.order);
+  network.plain = parse_weights(bytes, arguments.file, arguments.key, choice);
   return network;
 }
 
@@ -380,7 +393,31 @@ Network with_activation(Network network, const std::string& activation) {
 
 Network load_any_network(const NetworkArguments& arguments) {
   Network network = load_as_stated(arguments);
-  return arguments.activation.empty() ? network : with_activation(std::move(network), arguments.activation);
+  if (!arguments.activation.empty()) network = with_activation(std::move(network), arguments.activation);
+  network.options = arguments;
+  return network;
+}
+
+Json options_json(const ReadingOptions& options) {
+  return {{"key", options.key},
+          {"order", options.order},
+          {"phi_order", options.phi_order},
+          {"rho_order", options.rho_order},
+          {"select", options.select},
+          {"activation", options.activation}};
+}
+
+ReadingOptions options_of(const Json& json) {
+  require_keys(json, {"key", "order", "phi_order", "rho_order", "select", "activation"}, "network.options");
+  const auto texts = [&json](const char* name) { return json[name].get<std::vector<std::string>>(); };
+  ReadingOptions options;
+  options.key = json["key"].get<std::string>();
+  options.order = texts("order");
+  options.phi_order = texts("phi_order");
+  options.rho_order = texts("rho_order");
+  options.select = texts("select");
+  options.activation = json["activation"].get<std::string>();
+  return options;
 }
 
 }  // namespace swarmcert::files

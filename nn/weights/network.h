@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "nn/base/json.h"
 #include "nn/weights/function_id.h"
 #include "nn/weights/weights.h"
 
@@ -31,6 +32,20 @@ struct InputClamp {
 /// Number of inputs of the phi of kind "ground": the vehicle's own -z and -v.
 inline constexpr int kGroundInputs = 4;
 
+/// What the user stated beside NET about how to read its weight files.
+struct ReadingOptions {
+  std::string key;  ///< see load_weights(); applies to every weight file
+  /// Orders of layers as in load_weights(): of the file, if it is a plain weight file, of `phi` and of `rho`.
+  std::vector<std::string> order = {}, phi_order = {}, rho_order = {};
+  std::vector<std::string> select = {};  ///< see LayerChoice; of a plain weight file
+  std::string activation =
+      {};  ///< names, for the layers of every weight file: see with_activation(); empty: not stated
+};
+
+/// Converts options to an object of a certificate, and back.
+Json options_json(const ReadingOptions& options);
+ReadingOptions options_of(const Json& json);
+
 /// NET. Either `plain` is set, or `phi` and `rho` contain at least one kind each.
 ///
 /// For a vehicle of kind r with neighbours x_1..x_n of kinds c_1..c_n, the deep set is
@@ -47,8 +62,9 @@ inline constexpr int kGroundInputs = 4;
 /// - With invariants, phi has kNeighbourInvariants inputs and "ground" has kOwnInvariants, `input_order` is the state
 ///   that they are computed from, and the output is a vertical force.
 struct Network {
-  std::string path;    ///< of network.toml; empty if weight files were given directly
-  std::string sha256;  ///< of network.toml; empty likewise
+  std::string path;        ///< of network.toml; empty if weight files were given directly
+  std::string sha256;      ///< of network.toml; empty likewise
+  ReadingOptions options;  ///< with which the files were read
   std::optional<Weights> plain;
   std::map<std::string, Weights> phi;  ///< keyed by the neighbour's kind
   std::map<std::string, Weights> rho;  ///< keyed by the vehicle's own kind
@@ -73,14 +89,9 @@ void require_force_z(const Network& network);
 void require_torque(const Network& network);
 
 /// The files that make up NET: either `file`, or `phi` and `rho`.
-struct NetworkArguments {
+struct NetworkArguments : ReadingOptions {
   std::string file;      ///< network.toml or a single plain weight file
   std::string phi, rho;  ///< weight files; their kind is "default"
-  std::string key;       ///< see load_weights(); applies to every weight file
-  /// Orders of layers as in load_weights(): of `file`, if it is a plain weight file, of `phi` and of `rho`.
-  std::vector<std::string> order = {}, phi_order = {}, rho_order = {};
-  std::string activation =
-      {};  ///< names, for the layers of every weight file: see with_activation(); empty: not stated
 };
 
 /// @throws InputError that names the part, if a part of NET has an activation other than ReLU; `what` names what
@@ -113,8 +124,8 @@ Network load_network(const NetworkArguments& arguments);
 /// Applies as_float32() to every part.
 Network as_float32(Network network);
 
-/// Reads the weight file at a path; `order` is as in load_weights().
-using WeightsLoader = std::function<Weights(const std::string& path, const std::vector<std::string>& order)>;
+/// Reads the weight file at a path; `choice` is as in load_weights().
+using WeightsLoader = std::function<Weights(const std::string& path, const LayerChoice& choice)>;
 
 /// Parses a network.toml from memory, with any activation. `path` gives its folder and its name in messages; `load`
 /// reads the weight files.

@@ -5,9 +5,8 @@
 #include <string_view>
 
 #include "nn/base/input_error.h"
-#include "nn/weights/affine_map.h"
 #include "nn/weights/layer_order.h"
-#include "nn/weights/relu_chain.h"
+#include "nn/weights/normalization.h"
 #include "nn/weights/tensors.h"
 
 namespace swarmcert::files {
@@ -19,7 +18,7 @@ class NnetReader {
  public:
   NnetReader(const std::string& bytes, const std::string& path) : rest_(bytes), path_(path) {}
 
-  std::vector<Layer> run() {
+  Weights run() {
     const std::vector<double> counts = numbers(4);
     const auto layers = static_cast<std::size_t>(count(counts[0], kMostLayers));
     const auto inputs = static_cast<std::size_t>(count(counts[1], kMostWidth));
@@ -33,22 +32,17 @@ class NnetReader {
     next_line();  // minimum inputs
     next_line();  // maximum inputs
     const std::vector<double> means = numbers(inputs + 1), ranges = numbers(inputs + 1);
-    for (const double range : ranges)
-      if (range == 0) refuse("a range is 0");
-    ReluChain chain(static_cast<int>(inputs));
-    AffineMap current = normalization(means, ranges);
+    Weights weights;
+    weights.path = path_;
+    weights.precision = Precision::kFloat64;
     std::uint64_t elements = 0;
     for (std::size_t k = 0; k < layers; ++k) {
       elements += static_cast<std::uint64_t>(widths[k]) * widths[k + 1];
       if (elements > kMostElements) refuse("the network has more than 2^25 numbers");
-      current = composed(layer(widths[k], widths[k + 1]), current);
-      const std::string name = "layer" + std::to_string(k + 1);
-      if (k + 1 < layers) current = chain.relu(current, {}, name);
+      weights.layers.push_back(layer(widths[k], widths[k + 1]));
+      weights.layers.back().name = "layer" + std::to_string(k + 1);
     }
-    scale_rows(current, {{ranges.back(), 0}});
-    shift_rows(current, {{means.back(), 0}}, 1);
-    if (!current.is_finite()) refuse("its numbers exceed the range of double");
-    return chain.finished(current, "layer" + std::to_string(layers));
+    return normalized(std::move(weights), means, ranges);
   }
 
  private:
@@ -96,27 +90,16 @@ class NnetReader {
     return result;
   }
 
-  static AffineMap normalization(const std::vector<double>& means, const std::vector<double>& ranges) {
-    AffineMap map = identity_map(static_cast<int>(means.size() - 1));
-    for (std::size_t i = 0; i < map.rows.size(); ++i) {
-      map.rows[i][0].factor = divided({1, 0}, {ranges[i], 0});
-      map.shift[i] = divided({-means[i], 0}, {ranges[i], 0});
-    }
-    return map;
-  }
-
-  AffineMap layer(std::size_t inputs, std::size_t outputs) {
-    AffineMap map;
-    map.inputs = static_cast<int>(inputs);
+  Layer layer(std::size_t inputs, std::size_t outputs) {
+    Layer layer;
+    layer.inputs = static_cast<int>(inputs);
+    layer.outputs = static_cast<int>(outputs);
     for (std::size_t i = 0; i < outputs; ++i) {
-      AffineMap::Row row;
-      const std::vector<double> weights = numbers(inputs);
-      for (std::size_t j = 0; j < inputs; ++j)
-        if (weights[j] != 0) row.push_back({static_cast<int>(j), {weights[j], 0}});
-      map.rows.push_back(std::move(row));
+      const std::vector<double> row = numbers(inputs);
+      layer.weights.insert(layer.weights.end(), row.begin(), row.end());
     }
-    for (std::size_t i = 0; i < outputs; ++i) map.shift.push_back({numbers(1)[0], 0});
-    return map;
+    for (std::size_t i = 0; i < outputs; ++i) layer.biases.push_back(numbers(1)[0]);
+    return layer;
   }
 
   std::string_view rest_;
@@ -141,18 +124,11 @@ bool looks_like_nnet(const std::string& bytes) {
   return counts == 4;
 }
 
-Weights parse_nnet(const std::string& bytes, const std::string& path, const std::vector<std::string>& order) {
-  Weights weights;
-  weights.path = path;
-  weights.precision = Precision::kFloat64;
-  try {
-    weights.layers = NnetReader(bytes, path).run();
-  } catch (const FoldingLimit& limit) {
-    throw InputError({path, "", "", "", limit.what, "certify a smaller network"});
-  }
-  weights.notes = {"the normalization of inputs and outputs is folded into the first and the last layer",
-                   "the clamp of inputs to their minimum and maximum values is omitted"};
-  weights.order_source = stated_order(weights.layers, order, path);
+Weights parse_nnet(const std::string& bytes, const std::string& path, const LayerChoice& choice) {
+  Weights weights = NnetReader(bytes, path).run();
+  weights.unused = {
+      "minimum and maximum inputs: the format's evaluators clamp inputs to them, the network does not"};
+  weights.order_source = stated_order(weights.layers, choice, path);
   return weights;
 }
 

@@ -14,6 +14,6 @@ bool looks_like_nnet(const std::string& bytes);
 /// each input, and the inverse for the outputs. The clamp of the inputs to their minimum and maximum values is omitted.
 /// Decimal numbers are read as the nearest doubles.
 /// @throws InputError with the line.
-Weights parse_nnet(const std::string& bytes, const std::string& path, const std::vector<std::string>& order);
+Weights parse_nnet(const std::string& bytes, const std::string& path, const LayerChoice& choice);
 
 }  // namespace swarmcert::files

@@ -36,6 +36,10 @@ class Parametrizations {
       for (const Style& style : kStyles)
         if (const auto prefix = prefix_before(tensors_[i].name, style.matrix);
             prefix && has(*prefix + style.first)) {
+          if (holds_weight_itself(style, *prefix)) {
+            for (const char* part : {style.matrix, style.first}) leave_unused(*prefix + part);
+            continue;
+          }
           matrices[i] = {&style, *prefix};
           for (const char* part : {style.first, style.second})
             if (*part != '\0' && has(*prefix + part)) used_.insert(index_.at(*prefix + part));
@@ -64,6 +68,16 @@ class Parametrizations {
   }
 
   bool has(const std::string& name) const { return index_.count(name) == 1; }
+
+  /// Returns whether the file holds the weight under spectral_norm beside what it was computed from, and lacks v.
+  bool holds_weight_itself(const Style& style, const std::string& prefix) const {
+    return *style.second != '\0' && !has(prefix + style.second) && has(prefix + "weight");
+  }
+
+  void leave_unused(const std::string& name) {
+    used_.insert(index_.at(name));
+    result_.unused.push_back(name + ": the file holds the weight itself, as spectral_norm computed it last");
+  }
 
   /// Returns the prefix before `ending`: "fc1." for the name "fc1.weight_orig" and the ending "weight_orig".
   static std::optional<std::string> prefix_before(const std::string& name, const std::string& ending) {

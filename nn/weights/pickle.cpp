@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <initializer_list>
 #include <unordered_map>
 #include <utility>
 
@@ -18,7 +19,48 @@ constexpr std::size_t kMostArguments = 8;  // _rebuild_tensor_v2 takes seven
 constexpr char kSaveStateDict[] = "save the weights alone: torch.save(model.state_dict(), ...)";
 
 /// Functions that a state dict may call; PickledValue::integer of a kGlobal.
-enum Callable : std::int64_t { kOrderedDict, kRebuildTensor, kRebuildParameter };
+enum Callable : std::int64_t {
+  kOrderedDict,
+  kRebuildTensor,
+  kRebuildParameter,
+  kNewArray,
+  kArrayOfBytes,
+  kNewNumberType,
+  kEncode,
+  kPassedOver
+};
+
+/// Types and functions whose results are passed over: they hold settings, and none of them is called.
+bool is_passed_over(std::string_view module, std::string_view global) {
+  const auto is_one_of = [](std::string_view word, std::initializer_list<std::string_view> words) {
+    return std::find(words.begin(), words.end(), word) != words.end();
+  };
+  if (is_one_of(module, {"builtins", "__builtin__"}))
+    return is_one_of(global, {"set", "frozenset", "complex", "bytearray", "slice", "range", "xrange",
+                              "object", "list", "dict", "tuple", "int", "float", "bool", "str", "bytes"});
+  if (is_one_of(module, {"copy_reg", "copyreg"})) return global == "_reconstructor";
+  if (module == "torch")
+    return is_one_of(global, {"device", "Size", "dtype", "float32", "float64", "float16"});
+  if (module == "numpy" || module.substr(0, 6) == "numpy.")
+    return is_one_of(global, {"scalar", "ndarray", "float64", "float32", "int64", "int32", "bool_"});
+  return is_one_of(module, {"argparse", "datetime", "pathlib", "pathlib._local", "decimal", "fractions",
+                            "uuid", "collections"}) ||
+         (module == "types" && global == "SimpleNamespace") || (module == "enum" && global == "Enum");
+}
+
+/// Returns torch's name for the type of a NumPy array, or nothing.
+std::string_view storage_type(std::string_view number_type) {
+  if (number_type == "f4") return "FloatStorage";
+  if (number_type == "f8") return "DoubleStorage";
+  if (number_type == "f2") return "HalfStorage";
+  if (number_type == "i8") return "LongStorage";
+  if (number_type == "i4") return "IntStorage";
+  if (number_type == "i2") return "ShortStorage";
+  if (number_type == "i1") return "CharStorage";
+  if (number_type == "u1") return "ByteStorage";
+  if (number_type == "b1") return "BoolStorage";
+  return {};
+}
 
 class Machine {
  public:
@@ -152,10 +194,15 @@ class Machine {
       case 'R':
         return reduce();
       case 'b':  // BUILD: torch attaches version numbers (_metadata) to the dict
-        pop();
-        if (top().kind != Kind::kDict)
-          refuse("attributes are set on something that is not a dict", kSaveStateDict);
-        return;
+        return build(pop());
+      case 0x81:    // NEWOBJ
+      case 0x92: {  // NEWOBJ_EX
+        const std::size_t count = opcode == 0x81 ? 2 : 3;
+        const Index type = pop_last(count)[0];
+        if (value(type).kind != Kind::kGlobal) refuse("an object is made of something that is not a type");
+        const bool is_dict = value(type).integer == kOrderedDict;
+        return push(make(is_dict ? Kind::kDict : Kind::kOpaque));
+      }
       case 'Q':
         return load_persistent();
       default: {
@@ -196,6 +243,13 @@ class Machine {
         return push(make(Kind::kText, 0, take(take_unsigned(4)))), true;
       case 0x8d:
         return push(make(Kind::kText, 0, take(take_unsigned(8)))), true;
+      case 'C':  // SHORT_BINBYTES
+        return push(make(Kind::kBytes, 0, take(take_unsigned(1)))), true;
+      case 'B':  // BINBYTES
+        return push(make(Kind::kBytes, 0, take(take_unsigned(4)))), true;
+      case 0x8e:  // BINBYTES8
+      case 0x96:  // BYTEARRAY8
+        return push(make(Kind::kBytes, 0, take(take_unsigned(8)))), true;
       default:
         return false;
     }
@@ -219,6 +273,14 @@ class Machine {
         return append(pop_to_mark()), true;
       case '}':
         return push(make(Kind::kDict)), true;
+      case 0x8f:  // EMPTY_SET
+        return push(make(Kind::kOpaque)), true;
+      case 0x90:  // ADDITEMS
+        pop_to_mark();
+        return peek(), true;
+      case 0x91:  // FROZENSET
+        pop_to_mark();
+        return push(make(Kind::kOpaque)), true;
       case 's':
         return set_items(pop_last(2)), true;
       case 'u':
@@ -247,19 +309,28 @@ class Machine {
 
   void append(const std::vector<Index>& items) {
     PickledValue& list = top();
+    if (list.kind == Kind::kOpaque) return;
     if (list.kind != Kind::kList) refuse("values are appended to something that is not a list");
     list.items.insert(list.items.end(), items.begin(), items.end());
   }
 
   void set_items(const std::vector<Index>& items) {
     PickledValue& dict = top();
+    if (dict.kind == Kind::kOpaque) return;
     if (dict.kind != Kind::kDict) refuse("items are set in something that is not a dict");
     if (items.size() % 2 != 0) refuse("a dict has a key without a value");
     dict.items.insert(dict.items.end(), items.begin(), items.end());
   }
 
   void push_global(std::string_view module, std::string_view global) {
-    if (module == "collections" && global == "OrderedDict") return push(make(Kind::kGlobal, kOrderedDict));
+    const bool is_dict = module == "collections" &&
+                         (global == "OrderedDict" || global == "defaultdict" || global == "Counter");
+    if (is_dict) return push(make(Kind::kGlobal, kOrderedDict));
+    const bool is_numpy = module == "numpy" || module.substr(0, 6) == "numpy.";
+    if (is_numpy && global == "_reconstruct") return push(make(Kind::kGlobal, kNewArray));
+    if (is_numpy && global == "_frombuffer") return push(make(Kind::kGlobal, kArrayOfBytes));
+    if (is_numpy && global == "dtype") return push(make(Kind::kGlobal, kNewNumberType));
+    if (module == "_codecs" && global == "encode") return push(make(Kind::kGlobal, kEncode));
     if (module == "torch._utils" && global == "_rebuild_tensor_v2")
       return push(make(Kind::kGlobal, kRebuildTensor));
     if (module == "torch._utils" && global == "_rebuild_parameter")
@@ -269,6 +340,7 @@ class Machine {
                             global.size() > kSuffix.size() &&
                             global.substr(global.size() - kSuffix.size()) == kSuffix;
     if (is_storage) return push(make(Kind::kStorageType, 0, global));
+    if (is_passed_over(module, global)) return push(make(Kind::kGlobal, kPassedOver));
     refuse(
         "the file holds a Python object of this type, which only Python code could rebuild; nothing was "
         "executed",
@@ -288,10 +360,96 @@ class Machine {
       case kRebuildParameter:
         if (items.empty() || value(items[0]).kind != Kind::kTensor) refuse("a parameter has no tensor");
         return push(items[0]);
+      case kNewArray:
+        return push(make(Kind::kArray));
+      case kArrayOfBytes:  // (bytes, type, shape, order)
+        if (items.size() != 4 || value(items[3]).kind != Kind::kText) refuse("an array is incomplete");
+        return push(
+            make(Kind::kTensor, add_array(items[1], items[2], items[0], value(items[3]).text == "F")));
+      case kNewNumberType:
+        if (items.empty() || value(items[0]).kind != Kind::kText) return push(make(Kind::kOpaque));
+        return push(make(Kind::kNumberType, 0, value(items[0]).text));
+      case kEncode:
+        return push(make(Kind::kBytes, 0, latin1(items)));
+      case kPassedOver:
+        return push(make(Kind::kOpaque));
       default:
-        if (!items.empty()) refuse("an OrderedDict is created from arguments", kSaveStateDict);
+        for (const Index item : items) {  // of defaultdict: the type of missing values
+          const PickledValue& argument = value(item);
+          const bool is_type = argument.kind == Kind::kNone ||
+                               (argument.kind == Kind::kGlobal && argument.integer == kPassedOver);
+          if (!is_type) refuse("an OrderedDict is created from arguments", kSaveStateDict);
+        }
         return push(make(Kind::kDict));
     }
+  }
+
+  /// Sets the state of the object on top of the stack. torch attaches version numbers (_metadata) to a state dict.
+  void build(Index state) {
+    const Kind kind = top().kind;
+    if (kind == Kind::kDict || kind == Kind::kOpaque) return;
+    const std::vector<Index> items = few_items(state);
+    if (kind == Kind::kNumberType) {  // (version, byte order, ...)
+      if (items.size() < 2 || value(items[1]).kind != Kind::kText)
+        refuse("the type of an array is incomplete");
+      top().integer = value(items[1]).text == ">" ? 1 : 0;
+      return;
+    }
+    if (kind != Kind::kArray || items.size() != 5)  // (version, shape, type, is in Fortran's order, bytes)
+      refuse("attributes are set on something that is not a dict", kSaveStateDict);
+    const std::int64_t tensor = add_array(items[2], items[1], items[4], value(items[3]).integer == 1);
+    top().kind = Kind::kTensor;
+    top().integer = tensor;
+  }
+
+  /// Returns the bytes of a text in which each character stands for one: ("...", "latin1").
+  std::string_view latin1(const std::vector<Index>& items) {
+    if (items.size() != 2 || value(items[0]).kind != Kind::kText || value(items[1]).text != "latin1")
+      refuse("text is encoded in another way than latin1");
+    const std::string_view text = value(items[0]).text;
+    std::string bytes;
+    bytes.reserve(text.size());
+    for (std::size_t at = 0; at < text.size(); ++at) {
+      const auto first = static_cast<unsigned char>(text[at]);
+      if (first < 0x80) {
+        bytes += text[at];
+      } else if ((first == 0xc2 || first == 0xc3) && at + 1 < text.size()) {
+        bytes += static_cast<char>((first & 3) << 6 | (static_cast<unsigned char>(text[++at]) & 0x3f));
+      } else {
+        refuse("text that stands for bytes has other characters");
+      }
+    }
+    pickle_.decoded.push_back(std::move(bytes));
+    return pickle_.decoded.back();
+  }
+
+  /// Adds a NumPy array, whose numbers are in the pickle, as a tensor.
+  std::int64_t add_array(Index number_type, Index shape, Index bytes, bool columns_first) {
+    if (value(number_type).kind != Kind::kNumberType || value(bytes).kind != Kind::kBytes)
+      refuse("an array lacks its type or its numbers");
+    if (value(number_type).integer == 1)
+      refuse("the numbers of an array are not little-endian", kSaveStateDict);
+    PickledTensor tensor;
+    tensor.storage = pickle_.storages.size();
+    tensor.offset = 0;
+    tensor.sizes = counts(shape, "the shape of an array");
+    std::uint64_t elements = 1;
+    bool overflows = false;
+    tensor.strides.resize(tensor.sizes.size());
+    for (std::size_t k = 0; k < tensor.sizes.size(); ++k) {
+      const std::size_t d = columns_first ? k : tensor.sizes.size() - 1 - k;
+      tensor.strides[d] = elements;
+      overflows = overflows || __builtin_mul_overflow(elements, tensor.sizes[d], &elements);
+    }
+    const std::string_view type = value(number_type).text;
+    const std::uint64_t width =
+        type.size() == 2 && type[1] >= '1' && type[1] <= '8' ? type[1] - std::uint64_t{'0'} : 0;
+    if (overflows || storage_type(type).empty() || width * elements != value(bytes).text.size() ||
+        elements > value(bytes).text.size())
+      refuse("an array is of another type or size than its numbers", kSaveStateDict);
+    pickle_.storages.push_back({storage_type(type), "", elements, true, value(bytes).text});
+    pickle_.tensors.push_back(std::move(tensor));
+    return static_cast<std::int64_t>(pickle_.tensors.size() - 1);
   }
 
   /// Returns a copy, because make() moves the values. Its length is limited: a file can request a million copies.
@@ -312,7 +470,7 @@ class Machine {
       refuse("a storage is a view of another storage", "save again with torch 0.4 or newer");
     }
     const std::uint64_t elements = count(items[4], "the size of a storage");
-    pickle_.storages.push_back({value(items[1]).text, value(items[2]).text, elements});
+    pickle_.storages.push_back({value(items[1]).text, value(items[2]).text, elements, false, {}});
     push(make(Kind::kStorage, static_cast<std::int64_t>(pickle_.storages.size() - 1)));
   }
 
@@ -390,6 +548,14 @@ const char* name(PickledValue::Kind kind) {
       return "a storage";
     case Kind::kTensor:
       return "a tensor";
+    case Kind::kBytes:
+      return "bytes";
+    case Kind::kNumberType:
+      return "a type of numbers";
+    case Kind::kArray:
+      return "an array without numbers";
+    case Kind::kOpaque:
+      return "an object of Python";
   }
   return "";
 }

@@ -1,10 +1,12 @@
 /// @file Reads pickled state dicts as plain data. Nothing in a pickle is executed.
 ///
-/// Python's unpickler runs whatever a file names. This reader knows a few opcodes and a handful of names, and rejects
-/// anything else with its offset. It does not recurse, and its memory is bounded by kMostPickleOperations.
+/// Python's unpickler runs whatever a file names. This reader knows the opcodes, torch's tensors, NumPy's arrays and the
+/// names of types that hold settings, such as argparse.Namespace and pathlib.Path, whose objects it passes over. It
+/// rejects every other name with its offset. It does not recurse, and its memory is bounded by kMostPickleOperations.
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,6 +21,8 @@ struct PickledStorage {
   std::string_view type;  ///< torch's name: "FloatStorage"
   std::string_view key;   ///< raw data of the file: an archive entry, or an entry of the legacy list
   std::uint64_t elements;
+  bool is_inline = false;       ///< a NumPy array: its numbers are in the pickle itself
+  std::string_view bytes = {};  ///< if `is_inline`
 };
 
 /// A strided view: entry (i, j, ...) is storage[offset + i strides[0] + j strides[1] + ...]. As declared: the sizes and
@@ -42,11 +46,15 @@ struct PickledValue {
     kGlobal,
     kStorageType,
     kStorage,
-    kTensor
+    kTensor,
+    kBytes,
+    kNumberType,  ///< numpy.dtype: `text` is "f4", `integer` 1 if big-endian
+    kArray,       ///< a NumPy array whose numbers have not been set
+    kOpaque       ///< an object that is passed over
   };
   Kind kind = Kind::kNone;
   std::int64_t integer = 0;  ///< kBool, kInteger: the value; kStorage, kTensor: index into Pickle's tables
-  std::string_view text;     ///< kText, kStorageType; points into the parsed bytes
+  std::string_view text;     ///< kText, kBytes, kStorageType; points into the parsed bytes or Pickle::decoded
   std::vector<std::uint32_t>
       items;  ///< kTuple, kList: indices into Pickle::values; kDict: key, value, key, ...
 };
@@ -56,13 +64,14 @@ struct Pickle {
   std::vector<PickledValue> values;
   std::vector<PickledStorage> storages;
   std::vector<PickledTensor> tensors;
+  std::deque<std::string> decoded;  ///< bytes that the pickle writes as text
   std::uint32_t root = 0;
   std::size_t end = 0;  ///< offset in the parsed bytes just after the STOP opcode
 };
 
 /// Parses the pickle that starts at `begin`.
 /// @param path, entry  for messages: the file, and the archive entry or part of it that `bytes` holds.
-/// @throws InputError with the offset for anything but the opcodes and names of a state dict.
+/// @throws InputError with the offset for anything but these opcodes and names.
 Pickle parse_pickle(std::string_view bytes, std::size_t begin, const std::string& path,
                     const std::string& entry);
 

@@ -6,6 +6,7 @@
 
 #include "nn/base/input_error.h"
 #include "nn/weights/pickle.h"
+#include "nn/weights/policy_archive.h"
 #include "nn/weights/state_dict.h"
 #include "nn/weights/tensors.h"
 #include "nn/weights/zip_archive.h"
@@ -58,8 +59,9 @@ std::vector<double> numbers_of(const PickledTensor& tensor, std::string_view sto
 }
 
 Weights assemble_state_dict(const Pickle& pickle, const StorageBytes& bytes_of, const std::string& path,
-                            const std::string& key, const std::vector<std::string>& order) {
-  const StateDict entries = select_state_dict(pickle, key, path);
+                            const std::string& key, const LayerChoice& choice) {
+  const StateDict dict = select_state_dict(pickle, key, path);
+  const auto& entries = dict.tensors;
   std::vector<DeclaredTensor> declared;
   for (const auto& [name, index] : entries) {
     const PickledTensor& tensor = pickle.tensors[index];
@@ -78,9 +80,13 @@ Weights assemble_state_dict(const Pickle& pickle, const StorageBytes& bytes_of, 
                         "save contiguous copies: {k: v.clone() for k, v in model.state_dict().items()}"});
     }
     const Precision precision = *precision_of(storage.type);
-    return numbers_of(tensor, bytes_of(storage, precision), precision);
+    return numbers_of(tensor, storage.is_inline ? storage.bytes : bytes_of(storage, precision), precision);
   };
-  return assemble(declared, read, path, Listing::kRegistration, order);
+  Weights weights = assemble(declared, read, path, Listing::kRegistration, choice);
+  if (!dict.key.empty())
+    weights.notes.push_back("the state dict is " + in_quotes(dict.key) + ", the only one in the file");
+  weights.unused.insert(weights.unused.end(), dict.unused.begin(), dict.unused.end());
+  return weights;
 }
 
 [[noreturn]] void refuse_storage_size(const std::string& path, const PickledStorage& storage,
@@ -146,6 +152,7 @@ class Legacy {
   std::map<std::string_view, std::string_view> locate() const {
     std::map<std::string_view, const PickledStorage*> declared;
     for (const PickledStorage& storage : state.storages) {
+      if (storage.is_inline) continue;
       const auto [entry, is_new] = declared.emplace(storage.key, &storage);
       if (!is_new && (entry->second->type != storage.type || entry->second->elements != storage.elements)) {
         throw InputError(
@@ -218,8 +225,9 @@ bool looks_like_pth_legacy(const std::string& bytes) {
 }
 
 Weights parse_pth_zip(const std::string& bytes, const std::string& path, const std::string& key,
-                      const std::vector<std::string>& order) {
+                      const LayerChoice& choice) {
   const ZipArchive archive(bytes, path);
+  if (is_policy_archive(archive)) return parse_policy_archive(archive, path, key, choice);
   const std::string folder = top_folder(archive, path);
   refuse_other_archives(archive, folder, path);
   const std::string program = archive.read(folder + "data.pkl", kLargestPickle_bytes);
@@ -240,11 +248,11 @@ Weights parse_pth_zip(const std::string& bytes, const std::string& path, const s
     }
     return contents;
   };
-  return assemble_state_dict(pickle, bytes_of, path, key, order);
+  return assemble_state_dict(pickle, bytes_of, path, key, choice);
 }
 
 Weights parse_pth_legacy(const std::string& bytes, const std::string& path, const std::string& key,
-                         const std::vector<std::string>& order) {
+                         const LayerChoice& choice) {
   const Legacy container(bytes, path);
   std::optional<std::map<std::string_view, std::string_view>> storages;  // located after checking the names
   const StorageBytes bytes_of = [&](const PickledStorage& storage, Precision) {
@@ -253,7 +261,7 @@ Weights parse_pth_legacy(const std::string& bytes, const std::string& path, cons
     if (found == storages->end()) refuse_storage_size(path, storage, 0);
     return found->second;
   };
-  return assemble_state_dict(container.state, bytes_of, path, key, order);
+  return assemble_state_dict(container.state, bytes_of, path, key, choice);
 }
 
 }  // namespace swarmcert::files

@@ -17,8 +17,8 @@ bool looks_like_pth_legacy(const std::string& bytes);
 /// Memory is limited to the file, its opcodes (kMostPickleOperations) and its numbers (kMostElements), whatever sizes
 /// the file declares.
 Weights parse_pth_zip(const std::string& bytes, const std::string& path, const std::string& key,
-                      const std::vector<std::string>& order);
+                      const LayerChoice& choice);
 Weights parse_pth_legacy(const std::string& bytes, const std::string& path, const std::string& key,
-                         const std::vector<std::string>& order);
+                         const LayerChoice& choice);
 
 }  // namespace swarmcert::files

@@ -146,6 +146,23 @@ std::vector<Layer> ReluChain::finished(const AffineMap& output, const std::strin
   return std::move(layers_);
 }
 
+AffineMap map_of(const Layer& layer) {
+  AffineMap map;
+  map.inputs = layer.inputs;
+  for (int i = 0; i < layer.outputs; ++i) {
+    AffineMap::Row row;
+    for (int j = 0; j < layer.inputs; ++j) {
+      const double weight =
+          layer.weights[static_cast<std::size_t>(i) * static_cast<std::size_t>(layer.inputs) +
+                        static_cast<std::size_t>(j)];
+      if (weight != 0) row.push_back({j, {weight, 0}});
+    }
+    map.rows.push_back(std::move(row));
+    map.shift.push_back({layer.biases[static_cast<std::size_t>(i)], 0});
+  }
+  return map;
+}
+
 Precision least_precision(const std::vector<Layer>& layers) {
   const auto is_float = [](double number) {
     return std::fabs(number) <= 0x1.fffffep127 && static_cast<double>(static_cast<float>(number)) == number;

@@ -50,6 +50,9 @@ class ReluChain {
   std::uint64_t elements_ = 0;
 };
 
+/// Returns x -> W x + b of a layer whose numbers are exact.
+AffineMap map_of(const Layer& layer);
+
 /// Returns float32 if every number of `layers` is exactly a float32 and none was rounded, else float64.
 Precision least_precision(const std::vector<Layer>& layers);
 

@@ -7,7 +7,9 @@
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
-#include "nn/weights/layer_order.h"
+#include "nn/base/text.h"
+#include "nn/weights/activation.h"
+#include "nn/weights/layer_names.h"
 #include "nn/weights/tensors.h"
 
 namespace swarmcert::files {
@@ -16,6 +18,7 @@ namespace {
 constexpr std::uint64_t kLargestHeader_bytes = std::uint64_t{4} << 20;
 /// Key in "__metadata__" for the names of our layers in order of evaluation; safetensors does not define an order.
 constexpr char kOrderKey[] = "swarmcert.layers";
+constexpr char kActivationKey[] = "activation";
 
 std::uint64_t header_length(const std::string& bytes) {
   std::uint64_t length = 0;
@@ -30,8 +33,8 @@ struct Entry {
 
 class Reader {
  public:
-  Reader(const std::string& bytes, const std::string& path, const std::vector<std::string>& order)
-      : path_(path), order_(order) {
+  Reader(const std::string& bytes, const std::string& path, const LayerChoice& choice)
+      : path_(path), choice_(choice) {
     if (bytes.size() < 8) refuse("", "", "is shorter than a safetensors header", kCopyAgain);
     const std::uint64_t length = header_length(bytes);
     if (length > bytes.size() - 8 || length > kLargestHeader_bytes) {
@@ -47,6 +50,7 @@ class Reader {
       if (name != "__metadata__") entries_.push_back(entry(name, value));
     }
     check_layout();
+    std::vector<std::string> notes = read_metadata();
     const Listing listing = sort_by_layer();
     std::vector<DeclaredTensor> tensors;
     for (const Entry& entry : entries_) tensors.push_back(entry.tensor);
@@ -59,7 +63,12 @@ class Reader {
       append_numbers(data_.data() + entry.begin, count, 1, precision, numbers);
       return numbers;
     };
-    return assemble(tensors, read, path_, listing, order_);
+    Weights weights = assemble(tensors, read, path_, listing, choice_);
+    weights.notes.insert(weights.notes.end(), notes.begin(), notes.end());
+    weights.unused.insert(weights.unused.end(), unused_.begin(), unused_.end());
+    if (activation_.empty()) return weights;
+    return with_activation_of_file(std::move(weights), listed_activations(activation_),
+                                   std::string("__metadata__.") + kActivationKey);
   }
 
  private:
@@ -134,6 +143,45 @@ class Reader {
       refuse("", std::to_string(data_.size() - covered) + " bytes", "belong to no tensor");
   }
 
+  /// Adds the tensors that __metadata__ says equal a stored one: the library stores tied tensors once and names the
+  /// copies there, {"4.weight": "2.weight"}. Other entries say who wrote the file and are named as unused.
+  std::vector<std::string> read_metadata() {
+    std::vector<std::string> notes;
+    if (!header_.contains("__metadata__")) return notes;
+    const Json& metadata = header_["__metadata__"];
+    if (!metadata.is_object()) refuse("__metadata__", "", "is not an object");
+    const auto stored = [this](const std::string& name) {
+      return std::find_if(entries_.begin(), entries_.end(),
+                          [&name](const Entry& entry) { return entry.tensor.name == name; });
+    };
+    for (const auto& [name, value] : metadata.items()) {
+      if (name == kOrderKey) continue;
+      const std::string field = "__metadata__." + name;
+      if (!value.is_string()) refuse(field, "", "is not text");
+      const std::string target = value.get<std::string>();
+      if (name == kActivationKey) {
+        activation_ = target;
+        continue;
+      }
+      const auto source = stored(target);
+      const bool is_tensor = ends_with(name, ".weight") || ends_with(name, ".bias");
+      if (source == entries_.end()) {
+        if (is_tensor)
+          refuse(field, in_quotes(target), "names a tied tensor, and the file holds no such tensor",
+                 "save the whole state dict with safetensors.torch.save_model");
+        unused_.push_back(field + ": describes the file");
+        continue;
+      }
+      if (stored(name) != entries_.end())
+        refuse(field, in_quotes(target), "ties a tensor that the file also stores");
+      Entry copy = *source;
+      copy.tensor.name = name;
+      entries_.push_back(std::move(copy));
+      notes.push_back(name + " is " + target + ", to which it is tied");
+    }
+    return notes;
+  }
+
   /// Sorts our own files into the stated order of evaluation, and other files by name.
   Listing sort_by_layer() {
     const std::vector<std::string> order = layer_order();
@@ -164,10 +212,8 @@ class Reader {
 
   /// Returns the stated order, or nothing if the file does not state one.
   std::vector<std::string> layer_order() const {
-    if (!header_.contains("__metadata__")) return {};
+    if (!header_.contains("__metadata__") || !header_["__metadata__"].contains(kOrderKey)) return {};
     const Json& metadata = header_["__metadata__"];
-    if (!metadata.is_object()) refuse("__metadata__", "", "is not an object");
-    if (!metadata.contains(kOrderKey)) return {};
     const std::string field = std::string("__metadata__.") + kOrderKey;
     if (!metadata[kOrderKey].is_string()) refuse(field, "", "is not text");
     const Json names = parse_json(metadata[kOrderKey].get<std::string>(), path_ + ": " + field);
@@ -181,10 +227,12 @@ class Reader {
   }
 
   const std::string& path_;
-  const std::vector<std::string>& order_;
+  const LayerChoice& choice_;
   Json header_;
   std::string_view data_;
   std::vector<Entry> entries_;
+  std::vector<std::string> unused_;
+  std::string activation_;  ///< as stated in __metadata__
 };
 
 }  // namespace
@@ -193,9 +241,8 @@ bool looks_like_safetensors(const std::string& bytes) {
   return bytes.size() >= 10 && header_length(bytes) <= kLargestHeader_bytes && bytes[8] == '{';
 }
 
-Weights parse_safetensors(const std::string& bytes, const std::string& path,
-                          const std::vector<std::string>& order) {
-  return Reader(bytes, path, order).run();
+Weights parse_safetensors(const std::string& bytes, const std::string& path, const LayerChoice& choice) {
+  return Reader(bytes, path, choice).run();
 }
 
 std::string safetensors_bytes(const Weights& weights) {

@@ -19,31 +19,46 @@ class Selector {
   Selector(const Pickle& pickle, const std::string& path) : pickle_(pickle), path_(path) {}
 
   StateDict select(const std::string& key) const {
-    const Index index = key.empty() ? pickle_.root : find(key);
+    StateDict result;
+    Index index = key.empty() ? pickle_.root : find(key);
+    const std::vector<std::string> keys =
+        key.empty() && !holds_tensor(index) ? keys_of_state_dicts() : std::vector<std::string>();
+    if (keys.size() == 1 && (keys.front() == "state_dict" || keys.front() == "model_state_dict")) {
+      result.key = keys.front();
+      index = find(result.key);
+    }
     const PickledValue& dict = value(index);
     if (dict.kind != Kind::kDict) {
       throw InputError(
           {path_, "", key, name(dict.kind), "is not a state dict (names and tensors)", choose(key)});
     }
-    StateDict entries;
+    if (dict.items.empty()) throw InputError({path_, "", key, "", "is an empty state dict", choose(key)});
     for (std::size_t i = 0; i + 1 < dict.items.size(); i += 2) {
       const PickledValue& entry_name = value(dict.items[i]);
-      const PickledValue& tensor = value(dict.items[i + 1]);
-      if (entry_name.kind != Kind::kText) {
+      const PickledValue& entry = value(dict.items[i + 1]);
+      if (entry_name.kind != Kind::kText)
         throw InputError({path_, "", key, name(entry_name.kind), "is a key that is not text", ""});
+      const std::string text(entry_name.text);
+      if (entry.kind == Kind::kTensor) {
+        result.tensors.emplace_back(text, static_cast<std::size_t>(entry.integer));
+      } else if (holds_tensor(index)) {
+        result.unused.push_back(text + ": " + name(entry.kind) + ", not a tensor");
+      } else {
+        throw InputError({path_, "", in_quotes(text), name(entry.kind), "is not a tensor", choose(key)});
       }
-      if (tensor.kind != Kind::kTensor) {
-        throw InputError(
-            {path_, "", in_quotes(entry_name.text), name(tensor.kind), "is not a tensor", choose(key)});
-      }
-      entries.emplace_back(entry_name.text, static_cast<std::size_t>(tensor.integer));
     }
-    if (entries.empty()) throw InputError({path_, "", key, "", "is an empty state dict", choose(key)});
-    return entries;
+    return result;
   }
 
  private:
   const PickledValue& value(Index index) const { return pickle_.values[index]; }
+
+  bool holds_tensor(Index index) const {
+    const PickledValue& dict = value(index);
+    for (std::size_t i = 0; dict.kind == Kind::kDict && i + 1 < dict.items.size(); i += 2)
+      if (value(dict.items[i + 1]).kind == Kind::kTensor) return true;
+    return false;
+  }
 
   /// Follows the dotted path `key`. Names in the file may themselves contain dots, so the longest match is taken.
   Index find(const std::string& key) const {
@@ -92,17 +107,15 @@ class Selector {
     for (std::size_t head = 0; head < queue.size() && keys.size() < kMostKeysListed; ++head) {
       const auto [prefix, index] = queue[head];
       const PickledValue& dict = value(index);
-      bool has_tensor = false;
       for (std::size_t i = 0; i + 1 < dict.items.size(); i += 2) {
         const PickledValue& entry_name = value(dict.items[i]);
         const Index child = dict.items[i + 1];
-        has_tensor = has_tensor || value(child).kind == Kind::kTensor;
         if (value(child).kind != Kind::kDict || entry_name.kind != Kind::kText || seen[child]) continue;
         if (prefix.size() + entry_name.text.size() > kLongestKey) continue;
         seen[child] = true;
         queue.emplace_back((prefix.empty() ? "" : prefix + ".") + std::string(entry_name.text), child);
       }
-      if (has_tensor && !prefix.empty()) keys.push_back(prefix);
+      if (holds_tensor(index) && !prefix.empty()) keys.push_back(prefix);
     }
     return keys;
   }

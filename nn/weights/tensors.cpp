@@ -1,11 +1,13 @@
 #include "nn/weights/tensors.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <set>
 
 #include "nn/base/input_error.h"
+#include "nn/weights/layer_names.h"
 #include "nn/weights/parametrized.h"
 #include "nn/weights/relu_chain.h"
 
@@ -32,8 +34,8 @@ struct LayerParts {
 class Assembler {
  public:
   Assembler(const std::vector<DeclaredTensor>& tensors, const TensorReader& read, const std::string& path,
-            Listing listing, const std::vector<std::string>& order)
-      : tensors_(tensors), read_(read), path_(path), listing_(listing), order_(order) {}
+            Listing listing, const LayerChoice& choice)
+      : tensors_(tensors), read_(read), path_(path), listing_(listing), choice_(choice) {}
 
   Weights run() {
     refuse_other_structures();
@@ -45,7 +47,10 @@ class Assembler {
                         "network of linear layers"});
     }
     Weights weights;
-    weights.order_source = sort_parts();
+    LayerOrder order = sort_parts();
+    weights.order_source = order.source;
+    weights.assumed = std::move(order.assumed);
+    if (listing_ != Listing::kEvaluation) weights.activation_source = ActivationSource::kDefault;
     weights.path = path_;
     weights.precision = *tensors_[parts_.front().weight].precision;
     if (width(weights.precision) == 2) {
@@ -170,23 +175,24 @@ class Assembler {
     owner->bias = i;
   }
 
-  OrderSource sort_parts() {
+  LayerOrder sort_parts() {
     std::vector<LayerShape> shapes;
     for (const LayerParts& parts : parts_) {
       const std::vector<std::uint64_t>& shape = tensors_[parts.weight].shape;
       shapes.push_back({parts.name, shape[1], shape[0]});
     }
-    const LayerOrder order = decide_layer_order(shapes, listing_, order_, path_);
+    LayerOrder order = decide_layer_order(shapes, listing_, choice_, path_);
     std::vector<LayerParts> sorted;
     for (const std::size_t k : order.indices) sorted.push_back(parts_[k]);
     parts_ = std::move(sorted);
-    return order.source;
+    return order;
   }
 
   Layer layer(const LayerParts& parts) const {
     const std::vector<std::uint64_t>& shape = tensors_[parts.weight].shape;
     Layer layer;
     layer.name = parts.name;
+    layer.tensor = tensors_[parts.weight].name;
     layer.outputs = static_cast<int>(shape[0]);
     layer.inputs = static_cast<int>(shape[1]);
     layer.weights = finite_numbers(parts.weight);
@@ -221,10 +227,87 @@ class Assembler {
   const TensorReader& read_;
   const std::string& path_;
   const Listing listing_;
-  const std::vector<std::string>& order_;
+  const LayerChoice& choice_;
   std::vector<LayerParts> parts_;
   std::set<std::string> names_;
 };
+
+/// Returns whether a tensor is outside all layers and named as the logarithm of a policy's standard deviation.
+bool is_deviation(const DeclaredTensor& tensor) {
+  static const std::set<std::string> kNames = {"log_std", "logstd", "log_stds"};
+  const std::string last = tensor.name.substr(tensor.name.rfind('.') + 1);  // npos + 1 is 0
+  if (kNames.count(last) == 1) return true;
+  const std::size_t line = last.rfind('_');
+  return line != std::string::npos && kNames.count(last.substr(line + 1)) == 1;
+}
+
+/// Returns whether tensor `name` belongs to `layer`.
+bool is_of_layer(const std::string& name, const std::string& layer) {
+  if (layer.empty()) return name.find('.') == std::string::npos;
+  return name.size() > layer.size() && name[layer.size()] == '.' && name.compare(0, layer.size(), layer) == 0;
+}
+
+/// Returns the names of the layers that have matrices, parametrised or not.
+std::vector<std::string> layers_in(const std::vector<DeclaredTensor>& tensors) {
+  std::vector<std::string> layers;
+  for (const DeclaredTensor& tensor : tensors) {
+    if (tensor.shape.size() != 2) continue;
+    const std::string name = tensor.name.substr(0, tensor.name.find(".parametrizations."));
+    const std::size_t end = name.size() < tensor.name.size() ? name.size() : name.rfind('.');
+    layers.push_back(end == std::string::npos ? "" : name.substr(0, end));
+  }
+  return layers;
+}
+
+/// An order may leave out the layers of other modules, but not some layers of a module that it names.
+void refuse_left_out(const std::vector<std::string>& order, const std::vector<std::string>& layers,
+                     const std::string& path) {
+  const std::vector<std::string> modules = modules_of(layers);
+  const auto module_of = [&modules](const std::string& layer) -> std::string {
+    for (const std::string& module : modules)
+      if (modules.size() == 1 || has_prefix(layer, module)) return module;
+    return layer;
+  };
+  std::set<std::string> named;
+  for (const std::string& layer : order) named.insert(module_of(layer));
+  for (const std::string& layer : layers)
+    if (std::find(order.begin(), order.end(), layer) == order.end() && named.count(module_of(layer)) == 1)
+      throw InputError(
+          {path, "", "order", in_quotes(layer), "is left out", "name every layer of the network once"});
+}
+
+/// Returns which tensors belong to the chosen network.
+/// @throws InputError if no name begins with a prefix that is to be selected.
+std::function<bool(const std::string&)> chosen_by(const LayerChoice& choice,
+                                                  const std::vector<DeclaredTensor>& tensors,
+                                                  const std::string& path) {
+  const auto any = [&tensors](const auto& is_chosen) {
+    return std::any_of(tensors.begin(), tensors.end(),
+                       [&](const DeclaredTensor& tensor) { return is_chosen(tensor.name); });
+  };
+  for (const std::string& prefix : choice.select) {
+    if (any([&prefix](const std::string& name) { return has_prefix(name, prefix); })) continue;
+    std::string list;
+    for (const std::string& module : modules_of(layers_in(tensors)))
+      list += (list.empty() ? "" : ", ") + module;
+    throw InputError({path, "", "--select", in_quotes(prefix), "no layer's name begins like this",
+                      list.empty() ? "leave --select out" : "its modules are " + list});
+  }
+  if (!choice.select.empty())
+    return [&choice](const std::string& name) {
+      return std::any_of(choice.select.begin(), choice.select.end(),
+                         [&name](const std::string& prefix) { return has_prefix(name, prefix); });
+    };
+  const bool are_known = std::all_of(choice.order.begin(), choice.order.end(), [&](const std::string& layer) {
+    return any([&layer](const std::string& name) { return is_of_layer(name, layer); });
+  });
+  if (choice.order.empty() || !are_known) return [](const std::string&) { return true; };
+  refuse_left_out(choice.order, layers_in(tensors), path);
+  return [&choice](const std::string& name) {
+    return std::any_of(choice.order.begin(), choice.order.end(),
+                       [&name](const std::string& layer) { return is_of_layer(name, layer); });
+  };
+}
 
 template <typename Stored>
 void append_as(const char* bytes, std::uint64_t count, std::uint64_t stride, std::vector<double>& numbers) {
@@ -246,16 +329,31 @@ void append_halves(const char* bytes, std::uint64_t count, std::uint64_t stride,
 
 }  // namespace
 
-Weights assemble(const std::vector<DeclaredTensor>& tensors, const TensorReader& read,
-                 const std::string& path, Listing listing, const std::vector<std::string>& order) {
-  if (tensors.size() > kMostTensors)
+Weights assemble(const std::vector<DeclaredTensor>& declared, const TensorReader& read_declared,
+                 const std::string& path, Listing listing, const LayerChoice& choice) {
+  if (declared.size() > kMostTensors)
     throw InputError({path, "", "", "", "holds more than " + std::to_string(kMostTensors) + " tensors", ""});
+  std::vector<std::size_t> kept;
+  std::vector<std::string> unused;
+  const std::function<bool(const std::string&)> is_chosen = chosen_by(choice, declared, path);
+  for (std::size_t i = 0; i < declared.size(); ++i) {
+    if (!is_chosen(declared[i].name)) {
+      unused.push_back(declared[i].name + ": of another network, which was not selected");
+    } else if (is_deviation(declared[i])) {
+      unused.push_back(declared[i].name + ": the deviation of a random policy, not part of its mean");
+    } else {
+      kept.push_back(i);
+    }
+  }
+  std::vector<DeclaredTensor> tensors;
+  for (const std::size_t i : kept) tensors.push_back(declared[i]);
+  const TensorReader read = [&](std::size_t i) { return read_declared(kept[i]); };
   const EffectiveTensors effective = effective_tensors(tensors, read, path);
   const TensorReader read_effective = [&](std::size_t i) {
     const auto computed = effective.computed.find(i);
     return computed == effective.computed.end() ? read(effective.sources[i]) : computed->second.numbers;
   };
-  Weights weights = Assembler(effective.tensors, read_effective, path, listing, order).run();
+  Weights weights = Assembler(effective.tensors, read_effective, path, listing, choice).run();
   for (const auto& [i, computed] : effective.computed)
     for (Layer& layer : weights.layers)
       if (tensor_name(layer, "weight") == effective.tensors[i].name)
@@ -263,6 +361,8 @@ Weights assemble(const std::vector<DeclaredTensor>& tensors, const TensorReader&
   if (!effective.computed.empty() && weights.precision == Precision::kFloat32)
     weights.precision = least_precision(weights.layers);
   weights.notes.insert(weights.notes.end(), effective.notes.begin(), effective.notes.end());
+  weights.unused = std::move(unused);
+  weights.unused.insert(weights.unused.end(), effective.unused.begin(), effective.unused.end());
   return weights;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "nn/weights/layer_choice.h"
 #include "nn/weights/layer_order.h"
 #include "nn/weights/weights.h"
 
@@ -26,11 +27,12 @@ struct DeclaredTensor {
 /// Reads the numbers of the i-th declared tensor in row-major order. Called only for tensors with a valid shape.
 using TensorReader = std::function<std::vector<double>(std::size_t)>;
 
-/// Groups `tensors` into layers in the order of evaluation; `listing` and `order` are passed to decide_layer_order().
-/// @throws InputError if a tensor is not a layer's weight or bias, if the precisions differ or are neither float32 nor
-///   float64, if a number is not finite, or as decide_layer_order().
+/// Groups `tensors` into layers in the order of evaluation; `listing` and `choice` are passed to decide_layer_order().
+/// Tensors of layers that `choice` leaves out, and the deviation of a random policy, are named as unused.
+/// @throws InputError if another tensor is not a layer's weight or bias, if the precisions differ or are neither
+///   float32 nor float64, if a number is not finite, or as decide_layer_order().
 Weights assemble(const std::vector<DeclaredTensor>& tensors, const TensorReader& read,
-                 const std::string& path, Listing listing, const std::vector<std::string>& order);
+                 const std::string& path, Listing listing, const LayerChoice& choice);
 
 /// Returns "fc1.weight", or "weight" if the layer has no name.
 std::string tensor_name(const Layer& layer, const char* part);

@@ -5,13 +5,15 @@
 #include <filesystem>
 #include <functional>
 #include <stdexcept>
-#include <string_view>
 
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/c_source.h"
 #include "nn/weights/enclosed.h"
+#include "nn/weights/hdf5.h"
+#include "nn/weights/keras.h"
 #include "nn/weights/matlab/mat_file.h"
+#include "nn/weights/matlab/mat_network.h"
 #include "nn/weights/named_arrays.h"
 #include "nn/weights/nnet.h"
 #include "nn/weights/onnx/onnx.h"
@@ -21,17 +23,10 @@
 namespace swarmcert::files {
 namespace {
 
-/// HDF5's signature may be at offset 0, 512, 1024, 2048, ...
-bool looks_like_hdf5(const std::string& bytes) {
-  constexpr std::string_view kSignature("\x89HDF\r\n\x1a\n", 8);
-  for (std::size_t at = 0; at < bytes.size(); at = std::max<std::size_t>(512, 2 * at))
-    if (bytes.compare(at, kSignature.size(), kSignature) == 0) return true;
-  return false;
-}
-
 [[noreturn]] void refuse_format(const std::string& bytes, const std::string& path) {
   std::string what =
-      "is neither a PyTorch state dict (.pth), safetensors, ONNX, .npz, .mat, .nnet nor generated C weights";
+      "is neither a PyTorch state dict (.pth), safetensors, ONNX, Keras .h5, .npz, .mat, .nnet nor "
+      "generated C weights";
   std::string hint = "save one with torch.save(model.state_dict(), ...)";
   if (bytes.empty()) {
     what = "is empty";
@@ -44,9 +39,6 @@ bool looks_like_hdf5(const std::string& bytes) {
   } else if (bytes.compare(std::min<std::size_t>(4, bytes.size()), 4, "TFL3") == 0) {
     what = "is a TensorFlow Lite model (.tflite), which is not supported";
     hint = "convert it to ONNX: python -m tf2onnx.convert --tflite net.tflite --output net.onnx";
-  } else if (looks_like_hdf5(bytes)) {
-    what = "is an HDF5 file (.h5, .hdf5), which is not supported";
-    hint = "export the model to ONNX, or write W1, b1, W2, b2, ... [outputs x inputs] with numpy.savez";
   }
   throw InputError({path, "offset 0", "", "", what, hint});
 }
@@ -167,29 +159,32 @@ const char* name(OrderSource source) {
 }
 
 Weights parse_weights(const std::string& bytes, const std::string& path, const std::string& key,
-                      const std::vector<std::string>& order) {
+                      const LayerChoice& choice) {
   Weights weights;
   if (looks_like_npz(bytes)) {
     refuse_key(key, path, ".npz");
-    weights = parse_npz(bytes, path, order);
+    weights = parse_npz(bytes, path, choice);
   } else if (looks_like_pth_zip(bytes)) {
-    weights = parse_pth_zip(bytes, path, key, order);
+    weights = parse_pth_zip(bytes, path, key, choice);
   } else if (looks_like_pth_legacy(bytes)) {
-    weights = parse_pth_legacy(bytes, path, key, order);
+    weights = parse_pth_legacy(bytes, path, key, choice);
   } else if (looks_like_safetensors(bytes)) {
     refuse_key(key, path, "safetensors");
-    weights = parse_safetensors(bytes, path, order);
+    weights = parse_safetensors(bytes, path, choice);
   } else if (looks_like_onnx(bytes)) {
     refuse_key(key, path, "ONNX");
-    weights = parse_onnx(bytes, path, order);
+    weights = parse_onnx(bytes, path, choice);
   } else if (looks_like_mat(bytes)) {
     refuse_key(key, path, ".mat");
-    weights = parse_mat(bytes, path, order);
+    weights = parse_mat(bytes, path, choice);
+  } else if (looks_like_hdf5(bytes)) {
+    refuse_key(key, path, "HDF5");
+    weights = parse_keras(bytes, path, choice);
   } else if (looks_like_nnet(bytes)) {
     refuse_key(key, path, ".nnet");
-    weights = parse_nnet(bytes, path, order);
+    weights = parse_nnet(bytes, path, choice);
   } else if (looks_like_c_source(bytes)) {
-    weights = parse_c_source(bytes, path, key, order);
+    weights = parse_c_source(bytes, path, key, choice);
   } else {
     refuse_format(bytes, path);
   }
@@ -197,15 +192,15 @@ Weights parse_weights(const std::string& bytes, const std::string& path, const s
   return weights;
 }
 
-Weights load_weights(const std::string& path, const std::string& key, const std::vector<std::string>& order) {
+Weights load_weights(const std::string& path, const std::string& key, const LayerChoice& choice) {
   const std::size_t mark = path.rfind('#');
   if (mark == std::string::npos || mark + 1 == path.size() || std::filesystem::exists(path))
-    return parse_weights(read_file(path), path, key, order);
+    return parse_weights(read_file(path), path, key, choice);
   const std::string file = path.substr(0, mark);
   if (!key.empty())
     throw InputError(
         {file, "", "--key", in_quotes(key), "the name of the file already names a key", "name one key"});
-  return parse_weights(read_file(file), file, path.substr(mark + 1), order);
+  return parse_weights(read_file(file), file, path.substr(mark + 1), choice);
 }
 
 }  // namespace swarmcert::files

@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "nn/mlp.h"
 #include "nn/weights/activation_function.h"
+#include "nn/weights/layer_choice.h"
 
 namespace swarmcert::files {
 
@@ -17,8 +19,7 @@ enum class Precision { kFloat32, kFloat64, kFloat16, kBfloat16 };
 /// Returns "float32", "float64", "float16" or "bfloat16".
 const char* name(Precision precision);
 
-/// What determines the order of the layers. A file that states it also states the activation between the layers;
-/// otherwise the activation is given (`activation_is_given`) or assumed to be ReLU.
+/// What determines the order of the layers.
 enum class OrderSource {
   kFile,    ///< the file states it: ONNX, our safetensors
   kNames,   ///< numbers in the names, consistent with the order of registration if there is one
@@ -28,6 +29,13 @@ enum class OrderSource {
 
 /// Returns "file", "names", "shapes" or "user".
 const char* name(OrderSource source);
+
+/// What states the activations between the layers.
+enum class ActivationSource {
+  kDefault,  ///< nothing: ReLU
+  kFile,     ///< the file: ONNX, our safetensors, act_fcns of .mat files, the policies of Stable-Baselines3
+  kUser,     ///< --activation, or `activation` in network.toml
+};
 
 /// One affine layer y = W x + b.
 struct Layer {
@@ -46,6 +54,7 @@ struct Layer {
   /// Is 0 if the activation is ReLU or sorts.
   int kept = 0;
   bool is_added = false;  ///< not in the file: an identity layer added after a final activation
+  std::string tensor;     ///< that holds the weights: "fc1.weight"; empty: they were folded or rewritten
 };
 
 /// Returns the activation after `layer` as stated in chains: "tanh", or "tanh:8" for the first 8 outputs only.
@@ -63,8 +72,18 @@ struct Weights {
   Precision precision = Precision::kFloat32;
   std::vector<Layer> layers;
   OrderSource order_source = OrderSource::kFile;
-  bool activation_is_given = false;  ///< by `activation` in network.toml, or by --activation
-  std::vector<std::string> notes;    ///< what was folded, rewritten, omitted or assumed; one clause each
+  ActivationSource activation_source = ActivationSource::kFile;
+  std::vector<std::string> notes;  ///< what was folded, rewritten or omitted; one clause each
+  /// What the reader guessed about the function, one clause each. A result about this network is a result about the
+  /// trained one only if these hold; unless the user states them or recorded samples confirm them, nothing is proved.
+  std::vector<std::string> assumed;
+  /// Other files that hold numbers of this one, with their SHA-256: ONNX's external data.
+  std::vector<std::pair<std::string, std::string>> data_files;
+  std::vector<std::string>
+      unused;  ///< tensors and entries of the file that are not part of the network, with the reason
+  /// The matrices as stored, without biases, if `layers` are not these: activations or parts of layers were rewritten
+  /// or folded. Norms and limits on them are stated for these. Empty: they are the layers.
+  std::vector<Layer> stored;
 
   int inputs() const { return layers.front().inputs; }
   int outputs() const { return layers.back().outputs; }
@@ -81,7 +100,9 @@ struct Weights {
   /// Makes the network end in `activation`: appends an identity layer and puts `activation` in front of it.
   void end_in(Activation activation);
   /// Returns whether the file itself, network.toml or the user states the activation.
-  bool states_activation() const { return order_source == OrderSource::kFile || activation_is_given; }
+  bool states_activation() const { return activation_source != ActivationSource::kDefault; }
+  /// Returns the matrices as stored.
+  const std::vector<Layer>& stored_layers() const { return stored.empty() ? layers : stored; }
 };
 
 /// Reads a weight file. The format is detected from the content, not from the name: PyTorch state dicts (`.pth`, zip
@@ -93,14 +114,14 @@ struct Weights {
 /// @param path if no such file exists, "FILE#KEY" is FILE with the key KEY.
 /// @param key for nested checkpoints: the dotted path of the state dict, e.g. "model"; empty: the top level. For C
 ///   source: the name of one of its networks.
-/// @param order every layer of the file once, in order of evaluation; empty: not stated.
+/// @param choice the layers of the network, if the file does not state them or holds others.
 /// @throws InputError with offset, field, value and hint for anything that is not such a network.
-Weights load_weights(const std::string& path, const std::string& key = "",
-                     const std::vector<std::string>& order = {});
+Weights load_weights(const std::string& path, const std::string& key = "", const LayerChoice& choice = {});
 
-/// Same as load_weights(), but reads from memory; `path` is used in messages only.
+/// Same as load_weights(), but reads from memory; `path` is used in messages, and for its folder, in which ONNX's
+/// external data lie.
 Weights parse_weights(const std::string& bytes, const std::string& path, const std::string& key = "",
-                      const std::vector<std::string>& order = {});
+                      const LayerChoice& choice = {});
 
 /// Writes safetensors with tensors `<name>.weight` and `<name>.bias` in the network's precision.
 /// @throws InputError if the file exists and `overwrite` is false, if a layer's name is not UTF-8, or if an activation

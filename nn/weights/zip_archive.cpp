@@ -29,13 +29,14 @@ bool has_too_many_entries(std::string_view bytes) {
   for (std::size_t at = bytes.find(kEntry); at != bytes.npos; at = bytes.find(kEntry, at + 4)) {
     if (++entries > kMostEntries) return true;
   }
-  constexpr std::string_view kLocator64("PK\6\7", 4);
+  constexpr std::string_view kLocator64("PK\6\7", 4), kRecord64("PK\6\6", 4);
   constexpr std::size_t kTail = 0xffff + 22 + 20;  // longest comment, end record, locator
   const std::size_t tail = bytes.size() - std::min(bytes.size(), kTail);
   for (std::size_t at = bytes.find(kLocator64, tail); at != bytes.npos; at = bytes.find(kLocator64, at + 4)) {
     if (bytes.size() - at < 16) continue;
     const std::uint64_t record = little_endian_64(bytes.substr(at + 8, 8));
     if (bytes.size() < 56 || record > bytes.size() - 56) continue;
+    if (bytes.substr(record, 4) != kRecord64) continue;  // of an archive inside this one
     if (little_endian_64(bytes.substr(record + 24, 8)) > kMostEntries) return true;
     if (little_endian_64(bytes.substr(record + 32, 8)) > kMostEntries) return true;
   }

@@ -10,7 +10,7 @@ namespace {
 using namespace swarmcert::files;
 
 /// A one-layer network whose file name states its size: "6x20" has 6 inputs and 20 outputs.
-Weights sized(const std::string& path, const std::vector<std::string>&) {
+Weights sized(const std::string& path, const LayerChoice&) {
   Weights weights;
   weights.path = path;
   const std::size_t slash = path.rfind('/');

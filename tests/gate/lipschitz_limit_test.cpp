@@ -65,7 +65,7 @@ TEST(Gate, ALimitIsNotKeptByACertificateThatLacksABoundOfOneSetFunction) {
   release.certify("");
   EXPECT_EQ(release.judge("max_joint_gf = 1000").exit_code, 0);
   Json certificate =
-      files::parse_json(read_text(release / "cert.json"), "cert.json", "swarmcert/certificate/1");
+      files::parse_json(read_text(release / "cert.json"), "cert.json", "swarmcert/certificate/2");
   Json kept = Json::array();
   for (const Json& bound : certificate["bounds"])
     if (bound["function"] != "set:large:small") kept.push_back(bound);

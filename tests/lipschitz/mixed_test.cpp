@@ -359,26 +359,6 @@ TEST(MixedCertificate, OfTheProductCountsEachSlopeExactly) {
   }
 }
 
-TEST(MixedCertificate, StatesTheActivationsForFilesThatDoNot) {
-  Network unstated = mixed_set();
-  Weights& phi = unstated.phi.at("default");
-  phi.layers.pop_back();  // the identity is not a layer of the file
-  for (Weights* const weights : {&phi, &unstated.rho.at("default")}) {
-    tests::set_activation(*weights, Activation::kRelu);
-    weights->order_source = files::OrderSource::kNames;
-  }
-  // The identity layer has the name used in the certificate, because the layers of the file have the same names.
-  const Network adopted = check::with_stated_activations(mixed_certificate(), unstated);
-  EXPECT_EQ(adopted.phi.at("default").activation_names(), "tanh, relu, sigmoid");
-  EXPECT_EQ(adopted.rho.at("default").activation_names(), "relu, silu");
-  EXPECT_FALSE(adopted.phi.at("default").activation_is_given);
-  EXPECT_TRUE(check_mixed(mixed_certificate(), adopted).accepted)
-      << check_mixed(mixed_certificate(), adopted).reason;
-  Json fewer = mixed_certificate();
-  fewer["network"]["weights"]["rho:default"]["chain"][1]["op"] = "mish";
-  EXPECT_FALSE(check_mixed(fewer, check::with_stated_activations(fewer, unstated)).accepted);
-}
-
 TEST(MixedCertificate, PastSkipConnectionsIsOfTheNumbersThatAreKept) {
   const Weights weights = with_skip({3, 8, 7, 2}, {3, 2}, {Activation::kSigmoid, Activation::kSigmoid}, 71);
   const Network network = tests::plain(weights);

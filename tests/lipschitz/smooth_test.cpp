@@ -288,22 +288,26 @@ TEST(SmoothCertificate, OfTheProductIsRejectedForABlockThatIsNone) {
   EXPECT_NE(checked(changed).reason.find("no block"), std::string::npos);
 }
 
-TEST(SmoothCertificate, StatesTheActivationForFilesThatDoNot) {
-  Network unstated = smooth_set();
-  for (files::Weights* const weights : {&unstated.phi.at("default"), &unstated.rho.at("default")}) {
-    tests::set_activation(*weights, Activation::kRelu);  // the default
-    weights->order_source = files::OrderSource::kNames;
-  }
-  EXPECT_FALSE(checked(smooth_certificate(), unstated).accepted)
-      << "check() itself does not adopt stated activations";
-  const Network adopted = check::with_stated_activations(smooth_certificate(), unstated);
-  EXPECT_EQ(adopted.phi.at("default").activation_names(), "tanh");
-  EXPECT_TRUE(checked(smooth_certificate(), adopted).accepted);
-  unstated.phi.at("default").activation_is_given = true;
-  EXPECT_TRUE(check::with_stated_activations(smooth_certificate(), unstated).phi.at("default").is_relu());
-  for (const Json& malformed :
-       {Json(), Json(3), Json::parse(R"({"network": {"weights": {"phi:default": {"chain": [1]}}}})")})
-    EXPECT_TRUE(check::with_stated_activations(malformed, unstated).rho.at("default").is_relu());
+TEST(SmoothCertificate, IsOfTheActivationThatItCarriesAndOfNoOther) {
+  Network other = smooth_set();
+  for (files::Weights* const weights : {&other.phi.at("default"), &other.rho.at("default")})
+    tests::set_activation(*weights, Activation::kRelu);
+  EXPECT_TRUE(check::check(smooth_certificate()).accepted);
+  EXPECT_NE(checked(smooth_certificate(), other).reason.find("chain"), std::string::npos);
+}
+
+TEST(SmoothCertificate, OptionsThatAreLeftOpenAreThoseOfTheCertificate) {
+  Network network = smooth_set();
+  network.options.activation = "tanh";
+  network.options.phi_order = {"fc1", "fc2"};
+  const Json made = lipschitz::certificate(network, certify(network, few_rounds()));
+  files::NetworkArguments open;
+  open.phi = open.rho = "net.pth";
+  EXPECT_EQ(check::with_stated_options(made, open).activation, "tanh");
+  EXPECT_EQ(check::with_stated_options(made, open).phi_order.size(), 2u);
+  open.activation = "relu";
+  EXPECT_EQ(check::with_stated_options(made, open).activation, "relu");
+  EXPECT_EQ(check::with_stated_options(Json(), open).activation, "relu");
 }
 
 }  // namespace

@@ -100,14 +100,13 @@ TEST(Sorting, TheProductIsAttainedByOrthogonalLayersAndBelowTheBoundThatReluGive
   EXPECT_GT(certify(tests::plain(relu), few_rounds()).bounds.front().upper.value(), 1.2);
 }
 
-/// Returns the certificate of a network whose file does not state its activation.
 Json certificate_of(const Network& network) {
   return lipschitz::certificate(network, certify(network, few_rounds()));
 }
 
 bool accepted(Json certificate, const Network& network) {
   certificate["content_sha256"] = files::content_sha256(certificate);
-  return check::check(certificate, check::with_stated_activations(certificate, network)).accepted;
+  return check::check(certificate, network).accepted;
 }
 
 TEST(Sorting, CheckerAcceptsTheProductAndNothingBetter) {
@@ -148,7 +147,7 @@ TEST(Sorting, WidthsMustBeMultiplesOfTheGroup) {
   std::mt19937 generator(7);
   files::Weights weights = tests::random_network({3, 6, 4, 2}, generator);
   weights.order_source = files::OrderSource::kNames;
-  weights.activation_is_given = false;
+  weights.activation_source = files::ActivationSource::kDefault;
   EXPECT_NO_THROW(files::with_activation(weights, "groupsort:2"));
   EXPECT_THROW(files::with_activation(weights, "groupsort:4"), files::InputError);
   EXPECT_FALSE(files::is_activation("maxmin"));

@@ -109,6 +109,7 @@ Weights unstated() {
   std::mt19937 generator(3);
   Weights weights = tests::random_network({2, 6, 5, 1}, generator);
   weights.order_source = OrderSource::kNames;
+  weights.activation_source = ActivationSource::kDefault;
   return weights;
 }
 
@@ -164,6 +165,7 @@ TEST(SmoothActivation, SamplesRefuseEveryOtherActivation) {
 TEST(SmoothActivation, IsRefusedWhereTheFileStatesAnotherOne) {
   Weights stated = unstated();
   stated.order_source = OrderSource::kFile;
+  stated.activation_source = ActivationSource::kFile;
   EXPECT_TRUE(
       refuses([&] { with_activation(stated, "tanh"); }, {"--activation", "the file itself states relu"}));
   EXPECT_TRUE(with_activation(stated, "relu").is_relu());
@@ -195,13 +197,14 @@ activation = "sigmoid"
 
 /// Returns phi 2-6-5-1 and rho 1-3-1, whose files state no activation unless `source` is kFile.
 Network pair(const std::string& text, OrderSource source = OrderSource::kNames) {
-  return parse_network(
-      text, "network.toml", [source](const std::string& path, const std::vector<std::string>&) {
-        std::mt19937 generator(4);
-        Weights weights = path == "phi" ? unstated() : tests::random_network({1, 3, 1}, generator);
-        weights.order_source = source;
-        return weights;
-      });
+  return parse_network(text, "network.toml", [source](const std::string& path, const LayerChoice&) {
+    std::mt19937 generator(4);
+    Weights weights = path == "phi" ? unstated() : tests::random_network({1, 3, 1}, generator);
+    weights.order_source = source;
+    weights.activation_source =
+        source == OrderSource::kFile ? ActivationSource::kFile : ActivationSource::kDefault;
+    return weights;
+  });
 }
 
 TEST(SmoothActivation, NetworkTomlStatesItForEachPart) {

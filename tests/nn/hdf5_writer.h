@@ -1,159 +1,160 @@
-/// @file Writes valid and damaged MAT files of version 7.3: HDF5 with object headers of version 2.
+/// @file Writes HDF5 files by the HDF5 library: MAT files of version 7.3 and Keras models.
 #pragma once
 
-#include <zlib.h>
+#include <hdf5.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "pth_writer.h"
-
 namespace swarmcert::tests {
 
-/// Returns a header message; `type` as in the specification of the format.
-inline std::string hdf5_message(int type, const std::string& contents, int flags = 0) {
-  return little_endian(static_cast<std::uint64_t>(type), 1) + little_endian(contents.size(), 2) +
-         little_endian(static_cast<std::uint64_t>(flags), 1) + contents;
-}
-
-inline std::string hdf5_shape(const std::vector<std::uint64_t>& sizes) {
-  std::string contents = little_endian(2, 1) + little_endian(sizes.size(), 1) + little_endian(0x100, 2);
-  for (const std::uint64_t size : sizes) contents += little_endian(size, 8);
-  return hdf5_message(1, contents);
-}
-
-/// Return the datatype messages of float64 and of references to objects.
-inline std::string hdf5_double() {
-  return hdf5_message(3, std::string("\x11\x20\x3f\0", 4) + little_endian(8, 4) +
-                             std::string("\0\0\x40\0\x34\x0b\0\x34", 8) + little_endian(1023, 4));
-}
-inline std::string hdf5_reference() {
-  return hdf5_message(3, std::string("\x17\0\0\0", 4) + little_endian(8, 4));
-}
-
-inline std::string hdf5_contiguous(std::uint64_t address, std::uint64_t size) {
-  return hdf5_message(8, std::string("\3\1") + little_endian(address, 8) + little_endian(size, 8));
-}
-
-/// @param shape  of a chunk, without the element size, which is 8.
-inline std::string hdf5_chunked(std::uint64_t tree, const std::vector<std::uint64_t>& shape) {
-  std::string contents = std::string("\3\2") + little_endian(shape.size() + 1, 1) + little_endian(tree, 8);
-  for (const std::uint64_t size : shape) contents += little_endian(size, 4);
-  return hdf5_message(8, contents + little_endian(8, 4));
-}
-
-inline std::string hdf5_filters(const std::vector<std::uint64_t>& filters) {
-  std::string contents = little_endian(2, 1) + little_endian(filters.size(), 1);
-  for (const std::uint64_t filter : filters) contents += little_endian(filter, 2) + little_endian(0, 4);
-  return hdf5_message(0xb, contents);
-}
-
-/// Returns the attribute MATLAB_class.
-inline std::string hdf5_class(const std::string& name) {
-  const std::string type = std::string("\x13\0\0\0", 4) + little_endian(name.size(), 4);
-  const std::string shape = little_endian(2, 4);  // a single text
-  const std::string key("MATLAB_class", 13);
-  return hdf5_message(0xc, std::string("\3\0", 2) + little_endian(key.size(), 2) +
-                               little_endian(type.size(), 2) + little_endian(shape.size(), 2) +
-                               std::string(1, '\0') + key + type + shape + name);
-}
-
-inline std::string hdf5_link(const std::string& name, std::uint64_t address, char kind = 0) {
-  return hdf5_message(
-      6, std::string("\1\x8") + kind + little_endian(name.size(), 1) + name + little_endian(address, 8));
-}
-
-inline std::string hdf5_continuation(std::uint64_t address, std::uint64_t size) {
-  return hdf5_message(0x10, little_endian(address, 8) + little_endian(size, 8));
-}
-
-inline std::string hdf5_object(const std::string& messages) {
-  return std::string("OHDR\2\2") + little_endian(messages.size(), 4) + messages + little_endian(0, 4);
-}
-
-struct Hdf5Chunk {
-  std::vector<std::uint64_t> corner;  ///< in elements
-  std::uint64_t address = 0, size = 0;
-};
-
-/// Returns a node of the B-tree of chunks; at level 0 its children are the chunks themselves.
-inline std::string hdf5_chunk_tree(const std::vector<Hdf5Chunk>& chunks, std::uint64_t level = 0) {
-  std::string bytes = std::string("TREE\1") + little_endian(level, 1) + little_endian(chunks.size(), 2) +
-                      std::string(16, '\xff');
-  for (const Hdf5Chunk& chunk : chunks) {
-    bytes += little_endian(chunk.size, 4) + little_endian(0, 4);
-    for (const std::uint64_t at : chunk.corner) bytes += little_endian(at, 8);
-    bytes += little_endian(0, 8) + little_endian(chunk.address, 8);
-  }
-  return bytes;
-}
-
-inline std::string deflated(const std::string& bytes) {
-  uLongf size = compressBound(static_cast<uLong>(bytes.size()));
-  std::string packed(size, '\0');
-  compress2(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(bytes.data()),
-            static_cast<uLong>(bytes.size()), Z_BEST_COMPRESSION);
-  packed.resize(size);
-  return packed;
-}
-
-/// Writes consecutive objects after MATLAB's header; addresses are relative to the superblock.
-class Mat73Writer {
+class Hdf5Writer {
  public:
-  /// Returns the address of the next piece.
-  std::uint64_t end() const { return kSuperblock_bytes + body_.size(); }
-
-  /// Appends `piece` and returns its address.
-  std::uint64_t add(const std::string& piece) {
-    const std::uint64_t address = end();
-    body_ += piece;
-    return address;
+  /// @param user_block  bytes before the HDF5 part: 512 for MATLAB's header.
+  explicit Hdf5Writer(hsize_t user_block = 0)
+      : path_((std::filesystem::temp_directory_path() / ("writer" + std::to_string(getpid()) + ".h5"))
+                  .string()),
+        user_block_(user_block) {
+    const hid_t create = H5Pcreate(H5P_FILE_CREATE);
+    H5Pset_userblock(create, user_block);
+    file_ = H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, create, H5P_DEFAULT);
+    H5Pclose(create);
+  }
+  Hdf5Writer(const Hdf5Writer&) = delete;
+  Hdf5Writer& operator=(const Hdf5Writer&) = delete;
+  ~Hdf5Writer() {
+    if (file_ >= 0) H5Fclose(file_);
+    std::filesystem::remove(path_);
   }
 
-  /// Adds a matrix with `sizes` as MATLAB states them and its numbers in column-major order.
-  std::uint64_t add_matrix(const std::vector<std::uint64_t>& sizes, const std::vector<double>& numbers) {
-    const std::uint64_t elements = add(raw_numbers(numbers));
-    return add(hdf5_object(hdf5_shape({sizes.rbegin(), sizes.rend()}) + hdf5_double() +
-                           hdf5_contiguous(elements, 8 * numbers.size()) + hdf5_class("double")));
+  /// Adds a dataset of numbers, row by row; with `chunk` in compressed chunks of this shape.
+  void add(const std::string& name, const std::vector<hsize_t>& shape, const std::vector<double>& numbers,
+           hid_t type = H5T_IEEE_F64LE, const std::vector<hsize_t>& chunk = {}) {
+    const hid_t space = H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr);
+    const hid_t layout = H5Pcreate(H5P_DATASET_CREATE);
+    if (!chunk.empty()) {
+      H5Pset_chunk(layout, static_cast<int>(chunk.size()), chunk.data());
+      H5Pset_deflate(layout, 9);
+    }
+    const hid_t links = H5Pcreate(H5P_LINK_CREATE);
+    H5Pset_create_intermediate_group(links, 1);
+    const hid_t data = H5Dcreate2(file_, name.c_str(), type, space, links, layout, H5P_DEFAULT);
+    if (!numbers.empty()) H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, numbers.data());
+    H5Dclose(data);
+    H5Pclose(links);
+    H5Pclose(layout);
+    H5Sclose(space);
   }
 
-  std::string file(std::uint64_t root) const {
+  /// Adds a matrix as MATLAB does: `sizes` as MATLAB states them, the numbers column by column.
+  void add_matrix(const std::string& name, const std::vector<hsize_t>& sizes,
+                  const std::vector<double>& numbers, const std::string& matlab_class = "double") {
+    add(name, {sizes.rbegin(), sizes.rend()}, numbers,
+        matlab_class == "char" ? H5T_STD_U16LE : H5T_IEEE_F64LE);
+    set_text(name, "MATLAB_class", {matlab_class});
+  }
+
+  /// Adds a cell array [1 x count] of these objects.
+  void add_cells(const std::string& name, const std::vector<std::string>& objects) {
+    std::vector<hobj_ref_t> references(objects.size());
+    for (std::size_t k = 0; k < objects.size(); ++k)
+      H5Rcreate(&references[k], file_, objects[k].c_str(), H5R_OBJECT, -1);
+    const hsize_t shape[] = {objects.size(), 1};
+    const hid_t space = H5Screate_simple(2, shape, nullptr);
+    const hid_t data =
+        H5Dcreate2(file_, name.c_str(), H5T_STD_REF_OBJ, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    H5Dwrite(data, H5T_STD_REF_OBJ, H5S_ALL, H5S_ALL, H5P_DEFAULT, references.data());
+    H5Dclose(data);
+    H5Sclose(space);
+    set_text(name, "MATLAB_class", {"cell"});
+  }
+
+  /// Sets an attribute: one text, or a list of texts.
+  void set_text(const std::string& object, const std::string& attribute,
+                const std::vector<std::string>& texts) {
+    std::size_t size = 1;
+    for (const std::string& text : texts) size = std::max(size, text.size());
+    std::string padded;
+    for (std::string text : texts) {
+      text.resize(size, '\0');
+      padded += text;
+    }
+    const hid_t type = H5Tcopy(H5T_C_S1);
+    H5Tset_size(type, size);
+    const hsize_t count[] = {texts.size()};
+    const hid_t space = texts.size() == 1 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, count, nullptr);
+    const hid_t at = H5Oopen(file_, object.c_str(), H5P_DEFAULT);
+    const hid_t stored = H5Acreate2(at, attribute.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT);
+    H5Awrite(stored, type, padded.data());
+    H5Aclose(stored);
+    H5Oclose(at);
+    H5Sclose(space);
+    H5Tclose(type);
+  }
+
+  /// Makes `name` another link to `object`.
+  void link(const std::string& object, const std::string& name) {
+    H5Lcreate_hard(file_, object.c_str(), file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT);
+  }
+  void link_to_file(const std::string& file, const std::string& name) {
+    H5Lcreate_external(file.c_str(), "/x", file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT);
+  }
+
+  /// Closes the file and returns its bytes, with MATLAB's header if there is a user block.
+  std::string bytes() {
+    H5Fclose(std::exchange(file_, -1));
+    std::ifstream stream(path_, std::ios::binary);
+    std::string all((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+    if (user_block_ == 0) return all;
     std::string head = "MATLAB 7.3 MAT-file";
     head.resize(124, ' ');
     head += std::string("\0\2IM", 4);
-    head.resize(512, '\0');
-    return head + std::string("\x89HDF\r\n\x1a\n\2\x8\x8\0", 12) + little_endian(512, 8) +
-           std::string(8, '\xff') + little_endian(512 + end(), 8) + little_endian(root, 8) +
-           little_endian(0, 4) + body_;
-  }
-
-  /// Returns the file whose root group has these links.
-  std::string file_with(const std::vector<std::pair<std::string, std::uint64_t>>& links) {
-    std::string messages;
-    for (const auto& [name, address] : links) messages += hdf5_link(name, address);
-    return file(add(hdf5_object(messages)));
+    return all.replace(0, head.size(), head);
   }
 
  private:
-  static constexpr std::uint64_t kSuperblock_bytes = 48;
-  std::string body_;
+  std::string path_;
+  hsize_t user_block_;
+  hid_t file_ = -1;
 };
 
-/// Returns a file with two layers, 2-2-1, as the cell arrays "weights" and "biases".
+/// Returns a MAT file with two layers, 2-2-1, as the cell arrays "weights" and "biases".
 inline std::string small_mat73() {
-  Mat73Writer writer;
-  const auto cells = [&writer](const std::vector<std::uint64_t>& objects) {
-    const std::uint64_t elements = writer.add(raw_numbers(objects));
-    return writer.add(hdf5_object(hdf5_shape({objects.size(), 1}) + hdf5_reference() +
-                                  hdf5_contiguous(elements, 8 * objects.size()) + hdf5_class("cell")));
-  };
-  const std::uint64_t weights =
-      cells({writer.add_matrix({2, 2}, {1, 2, 3, 4}), writer.add_matrix({1, 2}, {5, 6})});
-  const std::uint64_t biases =
-      cells({writer.add_matrix({2, 1}, {0.5, -0.5}), writer.add_matrix({1, 1}, {0.25})});
-  return writer.file_with({{"weights", weights}, {"biases", biases}});
+  Hdf5Writer writer(512);
+  writer.add_matrix("#refs#/a", {2, 2}, {1, 2, 3, 4});
+  writer.add_matrix("#refs#/b", {1, 2}, {5, 6});
+  writer.add_matrix("#refs#/c", {2, 1}, {0.5, -0.5});
+  writer.add_matrix("#refs#/d", {1, 1}, {0.25});
+  writer.add_cells("weights", {"#refs#/a", "#refs#/b"});
+  writer.add_cells("biases", {"#refs#/c", "#refs#/d"});
+  return writer.bytes();
+}
+
+/// Returns a Keras model 2-3-1 of Dense layers with this activation between them. Kernels are [inputs x outputs].
+inline std::string small_keras(const std::string& activation) {
+  Hdf5Writer writer;
+  const std::vector<std::string> kernels = {"dense/dense/kernel:0", "dense_1/dense_1/kernel:0"};
+  writer.add("model_weights/" + kernels[0], {2, 3}, {1, 2, 3, 4, 5, 6}, H5T_IEEE_F32LE);
+  writer.add("model_weights/dense/dense/bias:0", {3}, {0.5, 0.25, 0.125}, H5T_IEEE_F32LE);
+  writer.add("model_weights/" + kernels[1], {3, 1}, {1, -1, 2}, H5T_IEEE_F32LE);
+  writer.set_text("model_weights", "layer_names", {"dense", "dense_1"});
+  writer.set_text("model_weights/dense", "weight_names", {"dense/kernel:0", "dense/bias:0"});
+  writer.set_text("model_weights/dense_1", "weight_names", {"dense_1/kernel:0"});
+  writer.set_text("/", "model_config",
+                  {R"({"class_name": "Sequential", "config": {"name": "s", "layers": [
+    {"class_name": "InputLayer", "config": {"name": "x"}},
+    {"class_name": "Dense", "config": {"name": "dense", "activation": ")" +
+                   activation + R"("}},
+    {"class_name": "Dropout", "config": {"name": "dropout"}},
+    {"class_name": "Dense", "config": {"name": "dense_1", "activation": "linear"}}]}})"});
+  return writer.bytes();
 }
 
 }  // namespace swarmcert::tests

@@ -211,6 +211,7 @@ Weights unstated_network(const std::vector<int>& sizes) {
   std::mt19937 generator(5);
   Weights weights = random_network(sizes, generator);
   weights.order_source = OrderSource::kNames;
+  weights.activation_source = ActivationSource::kDefault;
   return weights;
 }
 
@@ -264,7 +265,7 @@ TEST(MixedActivations, AreRefusedWithTheCountThatIsExpected) {
   EXPECT_TRUE(refuses([&] { with_activation(stated, "tanh"); }, {"network.toml states tanh, relu"}));
   EXPECT_TRUE(refuses([&] { with_activation(stated, "relu,tanh"); }, {"network.toml states tanh, relu"}));
   stated.order_source = OrderSource::kFile;
-  stated.activation_is_given = false;
+  stated.activation_source = ActivationSource::kFile;
   EXPECT_TRUE(refuses([&] { with_activation(stated, "tanh"); }, {"the file itself states tanh, relu"}));
 }
 
@@ -297,7 +298,7 @@ TEST(MixedActivations, RoundedWeightsCountTimesTheSteepestSlopeOfEachLayer) {
 Network with_line(const std::string& line) {
   const std::string text = "schema = \"swarmcert/network/1\"\n[phi.small]\nweights = \"phi\"\n" + line +
                            "\n[rho.small]\nweights = \"rho\"\n";
-  return parse_network(text, "network.toml", [](const std::string& path, const std::vector<std::string>&) {
+  return parse_network(text, "network.toml", [](const std::string& path, const LayerChoice&) {
     return path == "phi" ? unstated_network({2, 6, 5, 1}) : unstated_network({1, 3, 1});
   });
 }

@@ -34,13 +34,13 @@ weights = "20x1"
 )";
 
 /// Returns a network of the size stated in its file name.
-Weights sized(const std::string& path, const std::vector<std::string>& order = {}) {
+Weights sized(const std::string& path, const LayerChoice& choice = {}) {
   std::mt19937 generator(1);
   const std::string name = std::filesystem::path(path).filename().string();
   const std::size_t cross = name.find('x');
   Weights weights = tests::random_network({std::stoi(name), std::stoi(name.substr(cross + 1))}, generator);
   weights.path = path;
-  if (!order.empty()) weights.layers.front().name = order.front();
+  if (!choice.order.empty()) weights.layers.front().name = choice.order.front();
   return weights;
 }
 Network parse(const std::string& text) { return parse_network(text, "nets/network.toml", sized); }

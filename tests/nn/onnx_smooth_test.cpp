@@ -101,8 +101,6 @@ TEST(OnnxSmooth, OtherParametersAreRefused) {
   EXPECT_TRUE(
       smooth_is_refused({onnx_node("Elu", {"h"}, {"a"}, {onnx_float("alpha", 0.5F)})}, {"Elu: alpha"}));
   // 1.05070102214813232 * 1.67326319217681885 = 1.75809934634, above the slope 1.75809934085 of the statement's SELU.
-  EXPECT_TRUE(smooth_is_refused({onnx_node("Selu", {"h"}, {"a"})},
-                                {"Selu: uses float32 constants", "--activation selu"}));
   EXPECT_TRUE(
       smooth_is_refused({onnx_node("Swish", {"h"}, {"a"}, {onnx_float("alpha", 2)})}, {"Swish: alpha"}));
   const std::string tanh_form = onnx_text(1, "approximate") + onnx_text(4, "tanh");

@@ -104,14 +104,14 @@ TEST(Pth, ABareLinearLayerNeedsNoName) {
 
 TEST(Pth, LayersFollowTheFileNotTheirNames) {
   std::vector<TensorSpec> tensors = small_tensors();
-  tensors[0].name = "z.input.weight";
-  tensors[1].name = "z.input.bias";
-  tensors[2].name = "a.output.weight";
-  tensors[3].name = "a.output.bias";
+  tensors[0].name = "z_input.weight";
+  tensors[1].name = "z_input.bias";
+  tensors[2].name = "a_output.weight";
+  tensors[3].name = "a_output.bias";
   std::swap(tensors[0], tensors[1]);  // and a bias may come before its weight
   const Weights weights = parse_weights(zip_file(tensors, small_storages<float>()), "order");
-  EXPECT_EQ(weights.layers[0].name, "z.input");
-  EXPECT_EQ(weights.layers[1].name, "a.output");
+  EXPECT_EQ(weights.layers[0].name, "z_input");
+  EXPECT_EQ(weights.layers[1].name, "a_output");
 }
 
 TEST(Pth, PrefixesOfWrappersStayInTheNamesOfLayers) {

@@ -13,7 +13,7 @@ from pathlib import Path
 SWARMCERT, SOURCE, CHECKER, COQC, THEORY = sys.argv[1], Path(sys.argv[2]), sys.argv[4], sys.argv[5], sys.argv[6]
 sys.path.insert(0, str(SOURCE / "tests/lipschitz"))
 import activations_test as smooth  # noqa: E402
-import check_certificate_test as common  # noqa: E402
+import certificates as common  # noqa: E402
 
 AXIOMS = {"ClassicalDedekindReals.sig_not_dec", "ClassicalDedekindReals.sig_forall_dec",
           "FunctionalExtensionality.functional_extensionality_dep"}

@@ -10,6 +10,7 @@
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
 #include "nn/base/doubles.h"
+#include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
@@ -193,7 +194,8 @@ files::Network force_network(const DisturbanceArguments& arguments, std::vector<
 Constants certified_constants(const DisturbanceArguments& arguments, std::vector<std::string>& inputs,
                               std::vector<std::string>& notes) {
   inputs.push_back(arguments.certificate);
-  const Json certificate = files::read_json(arguments.certificate, check::kCertificateSchema);
+  const Json certificate =
+      check::parse_certificate(files::read_file(arguments.certificate), arguments.certificate);
   if (arguments.network.file.empty() && arguments.network.phi.empty()) {
     throw UsageError("--certificate C proves nothing without its network: add --network NET");
   }
@@ -203,6 +205,9 @@ Constants certified_constants(const DisturbanceArguments& arguments, std::vector
     throw InputError({arguments.certificate, "", "", "", "is rejected by the checker: " + verdict.reason,
                       "certify the network again"});
   }
+  for (const auto& [part, stated] : certificate["network"]["weights"].items())
+    for (const Json& guess : stated["assumed"])
+      notes.push_back("assumed when " + part + " was read: " + guess.get<std::string>());
   return largest(
       certificate["bounds"],
       [](const Json& b) -> std::optional<files::FunctionId> {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <limits>
 #include <memory>
 
@@ -13,6 +14,7 @@
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/output_folder.h"
 #include "lipschitz/certify.h"
+#include "lipschitz/checker/canonical_network.h"
 #include "lipschitz/lower/slope_estimate.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
@@ -66,9 +68,9 @@ Verdict all_of(const std::vector<Verdict>& verdicts) {
 /// Judges gamma in every layer and --max-lipschitz for every composed function, as far as they are stated.
 Verdict judge(const Certification& found, double max_lipschitz) {
   std::vector<Verdict> verdicts;
-  for (const CertifiedLayer& layer : found.layers) {
-    if (layer.respects_gamma) verdicts.push_back(*layer.respects_gamma);
-  }
+  for (const auto* const layers : {&found.layers, &found.stored})
+    for (const CertifiedLayer& layer : *layers)
+      if (layer.respects_gamma) verdicts.push_back(*layer.respects_gamma);
   for (const CertifiedBound& bound : found.bounds) {
     if (max_lipschitz <= 0 || !bound.function.is_whole()) continue;
     if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) continue;
@@ -123,16 +125,41 @@ void parse_blocks(CertifyOptions& options) {
   options.certify.blocks = std::move(blocks);
 }
 
-/// Compares NET with recorded samples of its outputs.
+/// Returns the recorded samples that lie beside NET: samples.json beside a network.toml, as `train` writes it, or
+/// STEM.samples.json, .csv or .npz beside a weight file.
+std::vector<std::string> samples_beside(const CertifyOptions& options) {
+  if (host() != nullptr || options.network.file.empty()) return {};
+  const std::filesystem::path net(options.network.file);
+  std::vector<std::filesystem::path> candidates;
+  if (net.extension() == ".toml") candidates.push_back(net.parent_path() / "samples.json");
+  for (const char* const ending : {".samples.json", ".samples.csv", ".samples.npz"})
+    candidates.push_back(net.parent_path() / (net.stem().string() + ending));
+  for (const std::filesystem::path& candidate : candidates)
+    if (std::filesystem::is_regular_file(candidate)) return {candidate.string()};
+  return {};
+}
+
+/// Compares NET with recorded samples of its outputs: those that are named, else those beside NET.
 /// @throws InputError if they differ.
 std::map<files::FunctionId, files::SampleAgreement> compare_samples(const files::Network& network,
                                                                     const CertifyOptions& options) {
   std::map<files::FunctionId, files::SampleAgreement> result;
-  for (const std::string& argument : options.samples) {
+  for (const std::string& argument : options.samples.empty() ? samples_beside(options) : options.samples) {
     for (const auto& [part, samples] : files::read_samples(argument, network)) {
       if (!result.emplace(part, files::hold_against(network, part, samples, options.sample_tolerance)).second)
         throw UsageError("--samples " + argument + ": there are samples of " + part + " already");
     }
+  }
+  return result;
+}
+
+/// Returns what was guessed about the parts, unless recorded samples confirm it.
+std::vector<std::string> assumptions(const files::Network& network,
+                                     const std::map<files::FunctionId, files::SampleAgreement>& samples) {
+  std::vector<std::string> result;
+  for (const auto& [part, weights] : files::parts(network)) {
+    if (samples.count(part) == 1) continue;
+    for (const std::string& guess : weights->assumed) result.push_back(part.name() + ": " + guess);
   }
   return result;
 }
@@ -143,6 +170,12 @@ Certification certify_or_refuse(const files::Network& network, const lipschitz::
     return certify(network, options);
   } catch (const std::invalid_argument& error) {
     throw UsageError(error.what());
+  } catch (const files::InputError&) {
+    throw;
+  } catch (const std::runtime_error& error) {  // numbers so large or small that no bound can be computed
+    const files::Weights& first = *files::parts(network).begin()->second;
+    throw files::InputError({network.path.empty() ? first.path : network.path, "", "weights", "",
+                             error.what(), "scale the network's inputs and outputs to numbers near one"});
   }
 }
 
@@ -275,7 +308,9 @@ void set_method(CertifyOptions& options) {
 }
 
 /// Computes the bounds and the additional results that the options request.
-CertifyOutput find_all(const files::Network& network, const CertifyOptions& options, Progress& progress) {
+CertifyOutput find_all(const files::Network& network, const CertifyOptions& options,
+                       const std::map<files::FunctionId, files::SampleAgreement>& samples,
+                       Progress& progress) {
   CertifyOutput output;
   output.found = certify_or_refuse(network, options.certify);
   output.found.as_float32 = options.as == "float32";
@@ -286,6 +321,9 @@ CertifyOutput find_all(const files::Network& network, const CertifyOptions& opti
   if (options.explain) add_comparisons(network, options.certify, output);
   if (!options.domain.empty() || options.range) add_ranges(network, options, progress, output);
   output.verdict = judge(output.found, options.max_lipschitz);
+  output.found.samples = samples;
+  output.assumed = assumptions(network, samples);
+  if (!output.assumed.empty()) output.verdict = Verdict::kInconclusive;
   return output;
 }
 
@@ -297,11 +335,27 @@ void write_certificate(const files::Network& network, const CertifyOutput& outpu
   if (host() != nullptr) host()->certificate_written = text;
 }
 
+/// Reads the files again and compares them with the network that the certificate carries.
+/// @throws InputError if they were changed meanwhile.
+void compare_with_files(const CertifyOptions& options, const files::Network& certified) {
+  files::Network again = load_any_net(options.network);
+  if (options.as == "float32") again = files::as_float32(std::move(again));
+  const std::string difference = check::first_difference(certified, again);
+  if (difference.empty()) return;
+  throw files::InputError(
+      {options.output, "", "", "", difference, "the files changed meanwhile: certify again"});
+}
+
 void print_all(const files::Network& network, const CertifyOptions& options, const CertifyOutput& output) {
   print_certification(network, output);
   if (options.max_lipschitz > 0)
     fmt::print("\nlimit: Lipschitz constant at most {}\n", options.max_lipschitz);
-  if (!options.output.empty()) fmt::print("\ncertificate: {}\n", options.output);
+  if (!options.output.empty())
+    fmt::print(
+        "\ncertificate: {}\n  it carries the network; the files were read again and compared with it, tensor "
+        "by "
+        "tensor, by the same reader,\n  not by the formats' own libraries\n",
+        options.output);
   fmt::print("verdict: {} for {}{}\n", name(output.verdict), files::chain_words(network),
              output.is_interrupted() ? ", from interrupted searches" : "");
 }
@@ -327,9 +381,9 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   options.certify.cancelled = interrupt.flag();
   options.certify.seconds = options.seconds;
 
-  CertifyOutput output = find_all(network, options, progress);
-  output.found.samples = samples;
+  CertifyOutput output = find_all(network, options, samples, progress);
   write_certificate(network, output, options.output, common.force);
+  if (!options.output.empty() && host() == nullptr) compare_with_files(options, network);
   const files::Json result = certify_json(network, output);
   write_result(common, result);
   if (common.prints_text()) print_all(network, options, output);
@@ -354,7 +408,9 @@ void declare_function(CLI::App& app, CertifyOptions& options) {
   app.add_option(
          "--samples", options.samples,
          "Inputs and outputs recorded from the trained network (CSV, .npz or JSON), which the certified "
-         "function must reproduce, else exit 3; PART=FILE for a part of a deep set, e.g. phi:small=FILE")
+         "function must reproduce, else exit 3; PART=FILE for a part of a deep set, e.g. phi:small=FILE. "
+         "Default: "
+         "samples.json beside a network.toml, or NAME.samples.json, .csv or .npz beside NAME.pth")
       ->allow_extra_args(false);
   app.add_option("--samples-tolerance", options.sample_tolerance,
                  "Tolerance for samples, relative to the range of their outputs")
@@ -436,27 +492,29 @@ void declare_limits(CLI::App& app, CertifyOptions& options) {
 }  // namespace
 
 Command certify_command() {
-  return {"certify", "Spectral norms and Lipschitz bounds of a network that hold in exact arithmetic",
-          "Upper bounds are proved in exact arithmetic for the weights as stored; the certificate (-o) holds "
-          "the proofs\n"
-          "and 'swarmcert check' verifies them without an optimiser. Lower bounds are slopes between two "
-          "float32 points,\n"
-          "exact or, with smooth activations, rounded down.\n"
-          "Verdict: proved (exit 0), refuted (1) or inconclusive (4), for --gamma and --max-lipschitz if "
-          "given, and for\nthe gamma that a network.toml states.\n\n"
-          "Example: swarmcert certify nn/networks/demo/network.toml --max-lipschitz 500 -o cert.json",
-          [](CLI::App& app) {
-            const auto options = std::make_shared<CertifyOptions>();
-            declare_network(app, options->network);
-            declare_function(app, *options);
-            const CLI::Option* const blocks = declare_inputs(app, *options);
-            declare_search_on_a_box(app, *options);
-            declare_limits(app, *options);
-            return [options, blocks](const CommonOptions& common) {
-              if (blocks->count() > 0 && options->blocks.empty()) options->blocks = "every";
-              return run_certify(*options, common);
-            };
-          }};
+  return {
+      "certify", "Spectral norms and Lipschitz bounds of a network that hold in exact arithmetic",
+      "Upper bounds are proved in exact arithmetic for the weights as stored; the certificate (-o) holds "
+      "the proofs\n"
+      "and 'swarmcert check' verifies them without an optimiser. Lower bounds are slopes between two "
+      "float32 points,\n"
+      "exact or, with smooth activations, rounded down.\n"
+      "Verdict: proved (exit 0), refuted (1) or inconclusive (4), for --gamma and --max-lipschitz if "
+      "given, and for\nthe gamma that a network.toml states. Inconclusive, whatever the bounds, if the order "
+      "of the layers was guessed:\nstate it with --order or --select, or compare --samples.\n\n"
+      "Example: swarmcert certify nn/networks/demo/network.toml --max-lipschitz 500 -o cert.json",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<CertifyOptions>();
+        declare_network(app, options->network);
+        declare_function(app, *options);
+        const CLI::Option* const blocks = declare_inputs(app, *options);
+        declare_search_on_a_box(app, *options);
+        declare_limits(app, *options);
+        return [options, blocks](const CommonOptions& common) {
+          if (blocks->count() > 0 && options->blocks.empty()) options->blocks = "every";
+          return run_certify(*options, common);
+        };
+      }};
 }
 
 }  // namespace swarmcert::analysis

@@ -101,11 +101,13 @@ Json chains_json(const files::Network& network) {
 Json chain_sources_json(const files::Network& network) {
   Json sources = Json::object();
   for (const auto& [part, weights] : files::parts(network)) {
-    const bool is_stated = weights->order_source == files::OrderSource::kFile;
-    const char* const otherwise = weights->activation_is_given ? "user" : "assumed";
+    const files::ActivationSource source = weights->activation_source;
     sources[part.name()] = {{"order", files::name(weights->order_source)},
-                            {"activation", is_stated ? "file" : otherwise},
+                            {"activation", source == files::ActivationSource::kFile   ? "file"
+                                           : source == files::ActivationSource::kUser ? "user"
+                                                                                      : "assumed"},
                             {"notes", weights->notes},
+                            {"unused", weights->unused},
                             {"rounding_of_slope", files::rounding_of_slope(*weights)}};
   }
   return sources;
@@ -204,7 +206,8 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
   result["chain_source"] = chain_sources_json(network);
   result["silent"] = files::silent_compositions(network);
   result["samples"] = samples_result(found);
-  result["layers"] = list_of(found.layers, layer_json);
+  result["assumed"] = output.assumed;
+  result["layers"] = list_of(stated_norms(network, found), layer_json);
   result["bounds"] = std::move(bounds);
   result["range"] = list_of(output.ranges, [&](const lipschitz::CertifiedRange& range) {
     return range_json(network, output, range);

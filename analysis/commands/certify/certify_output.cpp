@@ -100,8 +100,24 @@ std::string sizes(const files::Weights& weights) {
   return text;
 }
 
+/// The first line: what has to be known before any number is read.
+void print_heading(const files::Network& network, const CertifyOutput& output) {
+  const files::Parts parts = files::parts(network);
+  const bool is_by_default = std::any_of(parts.begin(), parts.end(), [&output](const auto& part) {
+    return !part.second->states_activation() && part.second->layers.size() > 1 &&
+           output.found.samples.count(part.first) == 0;
+  });
+  if (!output.assumed.empty())
+    fmt::print(
+        "ASSUMED, so nothing is proved of the trained network: {}. State it (--order, --select) or confirm "
+        "it "
+        "(--samples)\n",
+        fmt::join(output.assumed, "; "));
+  fmt::print("Functions that are certified{}\n",
+             is_by_default ? ", with ReLU between the layers where the file states nothing" : "");
+}
+
 void print_chains(const files::Network& network, const Certification& found) {
-  fmt::print("Functions that are certified\n");
   for (const auto& [part, weights] : files::parts(network)) {
     std::string remark;
     switch (weights->order_source) {
@@ -119,11 +135,11 @@ void print_chains(const files::Network& network, const Certification& found) {
         break;
     }
     const auto samples = found.samples.find(part);
-    const bool is_unstated = weights->order_source != files::OrderSource::kFile &&
-                             weights->layers.size() > 1 && samples == found.samples.end();
-    if (is_unstated)
-      remark += weights->activation_is_given ? "; activation as given, --samples compares"
-                                             : "; ReLU is assumed, --samples compares";
+    const bool is_given = weights->activation_source == files::ActivationSource::kUser;
+    if (weights->activation_source != files::ActivationSource::kFile && weights->layers.size() > 1 &&
+        samples == found.samples.end())
+      remark +=
+          is_given ? "; activation as given, --samples compares" : "; ReLU by default, --samples compares";
     fmt::print("  {}  {}  ({})\n", part.name(), files::chain_words(files::chain(network, part)), remark);
     for (const std::string& note : reading_notes(*weights)) fmt::print("    {}\n", note);
     if (samples == found.samples.end()) continue;
@@ -135,11 +151,12 @@ void print_chains(const files::Network& network, const Certification& found) {
 }
 
 void print_layers(const files::Network& network, const Certification& found) {
+  const std::vector<CertifiedLayer> norms = stated_norms(network, found);
   fmt::print("Spectral norms, enclosed from both sides in exact arithmetic\n");
   for (const auto& [part, weights] : files::parts(network)) {
     fmt::print("  {}  {}  ({}, {})\n", part.name(), weights->path, sizes(*weights),
                files::name(weights->precision));
-    for (const CertifiedLayer& layer : found.layers) {
+    for (const CertifiedLayer& layer : norms) {
       if (layer.network != part) continue;
       const double lower = layer.norm.norm.lower.value();
       const double upper = layer.norm.norm.upper.value();
@@ -324,6 +341,7 @@ void print_laws(const files::Network& network, const Certification& found) {
 }  // namespace
 
 void print_certification(const files::Network& network, const CertifyOutput& output) {
+  print_heading(network, output);
   print_chains(network, output.found);
   print_layers(network, output.found);
   print_bounds(network, output);

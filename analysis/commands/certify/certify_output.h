@@ -25,6 +25,9 @@ struct CertifyOutput {
   std::vector<lipschitz::Float32Error> float32_errors;
   lipschitz::Verdict verdict = lipschitz::Verdict::kInconclusive;
   double max_lipschitz = 0;  ///< 0: no limit was given
+  /// What was guessed about the function and no sample confirmed (Weights::assumed): nothing is proved of the trained
+  /// network.
+  std::vector<std::string> assumed;
   std::uint64_t seed = 1;
   std::string domain_file;        ///< box.toml; empty if there is none
   bool ranges_cut_short = false;  ///< ranges and float32 errors cover only a part of the box

@@ -123,9 +123,9 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
   if (!options.gains.empty() || !options.model.empty())
     throw UsageError("--gains and --model are for certificates of tracking gains; " + options.certificate +
                      " is none");
-  const files::Json certificate = files::parse_json(text, options.certificate, check::kCertificateSchema);
+  const files::Json certificate = check::parse_certificate(text, options.certificate);
   text = std::string();  // frees the text, which may be as large as all that follows
-  const files::Network network = check::with_stated_activations(certificate, load_any_net(options.network));
+  const files::Network network = load_any_net(check::with_stated_options(certificate, options.network));
   const check::CheckResult verdict = check::check(certificate, network);
 
   std::vector<std::string> inputs;
@@ -145,7 +145,8 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
       fmt::print("accepted: {}: {} spectral norms, {} upper bounds, {} lower bounds{}\n", verdict.reason,
                  verdict.spectral_norms, verdict.upper_bounds, verdict.lower_bounds,
                  verdict.values > 0 ? fmt::format(", values of {}", verdict.values) : "");
-      fmt::print("for {}\n", files::chain_words(network));
+      fmt::print("for {}\nthe files hold this network: read again and compared tensor by tensor\n",
+                 files::chain_words(network));
       for (const auto& [part, weights] : files::parts(network))
         for (const std::string& note : reading_notes(*weights)) fmt::print("  {}: {}\n", part.name(), note);
     } else {
@@ -158,27 +159,30 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
 }  // namespace
 
 Command check_command() {
-  return {"check", "Verify a certificate against the weights, independently of the program that wrote it",
-          "Rebuilds every matrix inequality from the weights and verifies it in exact integer arithmetic, "
-          "proofs on a box\n"
-          "in double with every rounding accounted for; uses no optimiser. Accepted: exit 0. Rejected, with "
-          "the reason: exit 1.\n"
-          "A certificate of tracking gains needs no network; with --gains and --model, to which it must "
-          "belong, the loops are derived again.\n\n"
-          "Example: swarmcert check cert.json nn/networks/demo/network.toml\n"
-          "         swarmcert check gains-cert.json --gains controller/gains/composite.toml",
-          [](CLI::App& app) {
-            const auto options = std::make_shared<CheckOptions>();
-            app.add_option("CERTIFICATE", options->certificate,
-                           "Certificate that certify or bound --verified wrote with -o")
-                ->required();
-            declare_network(app, options->network);
-            app.add_option("--gains", options->gains,
-                           "gains.toml to which a certificate of tracking gains must belong");
-            app.add_option("--model", options->model,
-                           "model.toml to which a certificate of tracking gains must belong");
-            return [options](const CommonOptions& common) { return run_check(*options, common); };
-          }};
+  return {
+      "check", "Verify a certificate against the weights, independently of the program that wrote it",
+      "Rebuilds every matrix inequality from the network in the certificate and verifies it in exact integer "
+      "arithmetic,\nproofs on a box in double with every rounding accounted for; uses no optimiser. Reads "
+      "the "
+      "weight files again and\ncompares them with that network, tensor by tensor. Accepted: exit 0. "
+      "Rejected, "
+      "with the reason: exit 1.\n"
+      "A certificate of tracking gains needs no network; with --gains and --model, to which it must "
+      "belong, the loops are derived again.\n\n"
+      "Example: swarmcert check cert.json nn/networks/demo/network.toml\n"
+      "         swarmcert check gains-cert.json --gains controller/gains/composite.toml",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<CheckOptions>();
+        app.add_option("CERTIFICATE", options->certificate,
+                       "Certificate that certify or bound --verified wrote with -o")
+            ->required();
+        declare_network(app, options->network);
+        app.add_option("--gains", options->gains,
+                       "gains.toml to which a certificate of tracking gains must belong");
+        app.add_option("--model", options->model,
+                       "model.toml to which a certificate of tracking gains must belong");
+        return [options](const CommonOptions& common) { return run_check(*options, common); };
+      }};
 }
 
 }  // namespace swarmcert::analysis

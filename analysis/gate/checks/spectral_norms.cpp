@@ -30,7 +30,7 @@ void judge_norms(Evidence& evidence, const std::optional<Limit>& own, int line, 
   double largest = 0;
   for (const auto& [part, weights] : files::parts(network)) {
     std::vector<Enclosure> norms;
-    for (const files::Layer& layer : weights->layers)
+    for (const files::Layer& layer : weights->stored_layers())
       norms.push_back(lipschitz::spectral_norm(layer, gamma->value).norm);
     const std::vector<lipschitz::Verdict> verdicts = lipschitz::respects_gamma(*gamma, norms);
     const bool of_network = gamma->scope == GammaStatement::Scope::kNetwork;
@@ -44,9 +44,9 @@ void judge_norms(Evidence& evidence, const std::optional<Limit>& own, int line, 
       if (verdicts[k] == lipschitz::Verdict::kProved || check.verdict == Verdict::kFail) continue;
       const bool is_refuted = verdicts[k] == lipschitz::Verdict::kRefuted;
       check.verdict = is_refuted ? Verdict::kFail : Verdict::kInconclusive;
-      check.reason = fmt::format("{} {} {} gamma {}", part.name(), weights->layers[k].name,
+      check.reason = fmt::format("{} {} {} gamma {}", part.name(), weights->stored_layers()[k].name,
                                  is_refuted ? "breaks" : "is too near to", gamma->value);
-      check.witness = fmt::format("{} {}: {:.15g} .. {:.15g}", part.name(), weights->layers[k].name,
+      check.witness = fmt::format("{} {}: {:.15g} .. {:.15g}", part.name(), weights->stored_layers()[k].name,
                                   norms[k].lower.value(), norms[k].upper.value());
     }
   }

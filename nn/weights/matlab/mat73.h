@@ -9,8 +9,7 @@
 namespace swarmcert::files {
 
 /// Reads the variables of a MAT file of version 7.3, whose HDF5 part begins at offset 512.
-/// @throws InputError if the file is damaged, or uses HDF5 features that hdf5_file.h, hdf5_group.h and hdf5_dataset.h
-///   do not support.
+/// @throws InputError if the file is damaged, or as Hdf5Object.
 std::vector<MatVariable> mat73_variables(const std::string& bytes, const std::string& path);
 
 }  // namespace swarmcert::files

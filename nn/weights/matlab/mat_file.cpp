@@ -15,14 +15,12 @@ namespace {
 
 // MATLAB, "MAT-File Format", Level 5: types of data elements and classes of arrays.
 constexpr std::uint32_t kInt8 = 1, kUint8 = 2, kInt16 = 3, kUint16 = 4, kInt32 = 5, kUint32 = 6, kSingle = 7,
-                        kDouble = 9, kInt64 = 12, kUint64 = 13, kMatrix = 14, kCompressed = 15;
-constexpr std::uint32_t kCellClass = 1, kStructClass = 2, kDoubleClass = 6, kSingleClass = 7,
+                        kDouble = 9, kInt64 = 12, kUint64 = 13, kMatrix = 14, kCompressed = 15, kUtf16 = 17;
+constexpr std::uint32_t kCellClass = 1, kStructClass = 2, kTextClass = 4, kDoubleClass = 6, kSingleClass = 7,
                         kLastNumericClass = 15;
 constexpr std::uint32_t kComplexFlag = 0x800;
 constexpr std::size_t kHeader_bytes = 128;
 constexpr std::uint64_t kMostDecompressed_bytes = std::uint64_t{1} << 27;
-constexpr char kSaveAgain[] =
-    "save in MATLAB with save('net.mat', 'weights', '-v7'), or with scipy.io.savemat";
 
 struct MatElement {
   std::uint32_t type = 0;
@@ -147,6 +145,8 @@ class MatReader {
     } else if (array_class == kStructClass && inside == MatInside::kFile && *element_count(shape) == 1) {
       result.is_struct = true;
       read_fields(parts, result);
+    } else if (array_class == kTextClass && shape.size() == 2) {
+      result.texts = rows_of_text(units(parts.expect(0, "text")), shape);
     } else if (array_class >= kDoubleClass && array_class <= kLastNumericClass) {
       if ((word & kComplexFlag) != 0) refuse(matrix.offset, in_quotes(result.name), "holds complex numbers");
       result.array = numbers(parts.expect(0, "numbers"), shape, result.name);
@@ -174,11 +174,23 @@ class MatReader {
     for (std::uint64_t k = 0; k < count; ++k) {
       const MatElement element = parts.expect(kMatrix, "cells");
       MatVariable cell = variable(element, MatInside::kCell);
-      if (!cell.array)
+      if (!cell.array && cell.texts.size() != 1)
         refuse(element.offset, in_quotes(result.name),
-               "cell " + std::to_string(k + 1) + " is not a numeric array");
-      result.cells.push_back(std::move(*cell.array));
+               "cell " + std::to_string(k + 1) + " is neither a numeric array nor text");
+      if (cell.array) result.cells.push_back(std::move(*cell.array));
+      if (!cell.array) result.texts.push_back(cell.texts.front());
     }
+  }
+
+  /// Returns the units of text, one byte or two each.
+  static std::vector<double> units(const MatElement& element) {
+    std::vector<double> result;
+    if (element.type == kUint16 || element.type == kUtf16) {
+      append_values<std::uint16_t>(element.data, result);
+    } else {
+      append_values<std::uint8_t>(element.data, result);
+    }
+    return result;
   }
 
   /// Reads the field names, which all have the same length and are padded with zeros.
@@ -243,54 +255,6 @@ class MatReader {
   std::uint64_t room_bytes_ = kMostDecompressed_bytes;
 };
 
-std::vector<MatVariable> variables_of(const std::string& bytes, const std::string& path) {
-  if (bytes.compare(126, 2, "IM") != 0)
-    throw InputError({path, "offset 126", "", "", "the numbers are not little-endian", kSaveAgain});
-  if (bytes.compare(124, 2, std::string("\0\2", 2)) == 0) return mat73_variables(bytes, path);
-  if (bytes.compare(124, 2, std::string("\0\1", 2)) != 0)
-    throw InputError(
-        {path, "offset 124", "", "", "is a MAT file of a version other than 5 and 7.3", kSaveAgain});
-  return MatReader(bytes, path).run();
-}
-
-bool are_weights(const MatVariable& variable) { return variable.name == "weights" || variable.name == "W"; }
-
-bool holds_layers(const MatVariable& variable) {
-  return variable.array.has_value() || (variable.is_cell && are_weights(variable));
-}
-
-Weights network_of_variables(std::vector<MatVariable>& variables, const std::string& path,
-                             const std::vector<std::string>& order) {
-  std::vector<NamedArray> cells, arrays;
-  std::string left_out;
-  const auto leave_out = [&left_out](const std::string& name) {
-    left_out += (left_out.empty() ? "" : ", ") + in_quotes(name);
-  };
-  bool has_weights = false;
-  for (MatVariable& variable : variables) {
-    const bool are_biases = variable.name == "biases" || variable.name == "bias" || variable.name == "b";
-    if (variable.is_cell && (are_weights(variable) || are_biases)) {
-      has_weights = has_weights || !are_biases;
-      for (std::size_t k = 0; k < variable.cells.size(); ++k) {
-        variable.cells[k].name = "layer" + std::to_string(k + 1) + (are_biases ? ".bias" : ".weight");
-        cells.push_back(std::move(variable.cells[k]));
-      }
-    } else if (variable.array) {
-      arrays.push_back(std::move(*variable.array));
-    } else {
-      leave_out(variable.name);
-    }
-  }
-  if (has_weights)
-    for (const NamedArray& array : arrays) leave_out(array.name);
-  if (!has_weights && arrays.empty())
-    throw InputError(
-        {path, "", "", "", "holds neither a cell array \"weights\" nor numeric matrices", kSaveAgain});
-  Weights weights = network_of_arrays(has_weights ? cells : arrays, path, order);
-  if (!left_out.empty()) weights.notes.push_back("other variables are ignored: " + left_out);
-  return weights;
-}
-
 }  // namespace
 
 std::vector<double> rows_first(std::vector<double> columns_first, const std::vector<std::uint64_t>& shape) {
@@ -303,24 +267,33 @@ std::vector<double> rows_first(std::vector<double> columns_first, const std::vec
   return numbers;
 }
 
+std::vector<std::string> rows_of_text(const std::vector<double>& units,
+                                      const std::vector<std::uint64_t>& shape) {
+  std::vector<std::string> rows;
+  if (units.empty() || shape.size() != 2 || shape[0] == 0 || units.size() % shape[0] != 0) return rows;
+  for (std::uint64_t i = 0; i < shape[0]; ++i) {
+    rows.emplace_back();
+    for (std::size_t k = i; k < units.size(); k += shape[0])
+      rows.back() += units[k] < 128 ? static_cast<char>(units[k]) : '?';
+    while (!rows.back().empty() && (rows.back().back() == ' ' || rows.back().back() == '\0'))
+      rows.back().pop_back();
+  }
+  return rows;
+}
+
 bool looks_like_mat(const std::string& bytes) {
   return bytes.size() >= kHeader_bytes && bytes.compare(0, 7, "MATLAB ") == 0 &&
          (bytes.compare(126, 2, "IM") == 0 || bytes.compare(126, 2, "MI") == 0);
 }
 
-Weights parse_mat(const std::string& bytes, const std::string& path, const std::vector<std::string>& order) {
-  std::vector<MatVariable> variables = variables_of(bytes, path);
-  std::string structure;
-  const auto is_single = [](const MatVariable& variable) { return variable.is_struct; };
-  if (std::none_of(variables.begin(), variables.end(), holds_layers) &&
-      std::count_if(variables.begin(), variables.end(), is_single) == 1) {
-    MatVariable only = std::move(*std::find_if(variables.begin(), variables.end(), is_single));
-    structure = only.name;
-    variables = std::move(only.fields);
-  }
-  Weights weights = network_of_variables(variables, path, order);
-  if (!structure.empty()) weights.notes.push_back("the network is the struct " + in_quotes(structure));
-  return weights;
+std::vector<MatVariable> mat_variables(const std::string& bytes, const std::string& path) {
+  if (bytes.compare(126, 2, "IM") != 0)
+    throw InputError({path, "offset 126", "", "", "the numbers are not little-endian", kSaveAgain});
+  if (bytes.compare(124, 2, std::string("\0\2", 2)) == 0) return mat73_variables(bytes, path);
+  if (bytes.compare(124, 2, std::string("\0\1", 2)) != 0)
+    throw InputError(
+        {path, "offset 124", "", "", "is a MAT file of a version other than 5 and 7.3", kSaveAgain});
+  return MatReader(bytes, path).run();
 }
 
 }  // namespace swarmcert::files

@@ -262,12 +262,14 @@ void OnnxGraph::compute_constant(const Node& node) {
              node.type == "Flatten") {
     const OnnxShape own(result.shape.begin(), result.shape.end());
     if (node.type == "Reshape" && !result.numbers.empty()) {
-      const OnnxShape shape = reshaped(own, integers(node, 1, "shape"), false);
+      const bool zero_is_zero = node.number("allowzero", 0) != 0;
+      const OnnxShape shape = reshaped(own, integers(node, 1, "shape"), zero_is_zero);
       result.shape.assign(shape.begin(), shape.end());
     } else if (result.integers.empty()) {
       throw OperatorRefusal{"cannot be computed from constants",
                             "fold constants: torch.onnx.export(..., do_constant_folding=True)"};
-    }  // lists of sizes remain lists of integers
+    }  // lists of sizes remain lists of integers, whatever the axes
+    for (const char* const attribute : {"axes", "axis", "allowzero"}) node.read.insert(attribute);
   } else if (node.type == "Transpose" && !result.numbers.empty()) {
     OnnxShape shape;
     const OnnxShape own(result.shape.begin(), result.shape.end());
@@ -276,13 +278,13 @@ void OnnxGraph::compute_constant(const Node& node) {
     for (const int k : which) numbers.push_back(result.numbers[static_cast<std::size_t>(k)]);
     result.numbers = std::move(numbers);
     result.shape.assign(shape.begin(), shape.end());
-  } else if (node.type == "Gather" && !result.integers.empty()) {
+  } else if (node.type == "Gather" && !result.integers.empty() && node.number("axis", 0) == 0) {
     const std::vector<std::int64_t> sizes = result.integers;
     result.integers.clear();
     for (const std::int64_t index : needed_constant(node, 1).integers)
       result.integers.push_back(sizes[axis_of(index, sizes.size())]);
     result.shape = {result.integers.size()};
-  } else if (node.type == "Concat" && !result.integers.empty()) {
+  } else if (node.type == "Concat" && !result.integers.empty() && node.number("axis", 0) == 0) {
     result.integers.clear();
     for (std::size_t k = 0; k < node.inputs.size(); ++k) {
       const std::vector<std::int64_t>& more = needed_constant(node, k).integers;

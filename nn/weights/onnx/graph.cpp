@@ -50,9 +50,15 @@ Weights OnnxGraph::run() {
   if (!count || *count > kMostRows) refuse(0, in_quotes(model_.input.name), "has more than 2^20 entries");
   chain_ = ReluChain(static_cast<int>(*count));
   values_[model_.input.name] = {identity_map(static_cast<int>(*count)), shape, ""};
+  std::set<std::string> used;
+  for (const Node& node : model_.nodes) used.insert(node.inputs.begin(), node.inputs.end());
+  for (const auto& [name, tensor] : model_.tensors)
+    if (used.count(name) == 0) model_.unused.push_back(name + ": no node uses it");
   join_sorting();
   join_smooth_activations();
   count_uses();
+  if (!shape.empty() && shape[0] > 1)
+    notes_.insert("the input is a whole batch of " + std::to_string(shape[0]) + ", as the model states it");
   for (const Node& node : model_.nodes) follow(node);
   const auto output = values_.find(model_.output);
   if (output == values_.end())
@@ -73,7 +79,13 @@ Weights OnnxGraph::run() {
   bool is_double = false;
   for (const auto& [name, tensor] : model_.tensors) is_double = is_double || tensor.type == kOnnxDouble;
   weights.precision = is_double ? Precision::kFloat64 : least_precision(weights.layers);
+  for (std::size_t k = 1; k < weights.layers.size(); ++k)
+    if (weights.layers[k - 1].activation ==
+        Activation::kSelu)  // its slopes, as if they scaled the next matrix
+      weights.layers[k].weight_rounding += kSeluRounding * norm_up(weights.layers[k].weights);
   weights.notes.assign(notes_.begin(), notes_.end());
+  weights.data_files = std::move(model_.data_files);
+  weights.unused = std::move(model_.unused);
   return weights;
 }
 
@@ -143,8 +155,12 @@ void OnnxGraph::count_uses() {
 
 void OnnxGraph::follow(const Node& node) {
   try {
-    if (follow_constant(node)) return;
+    if (follow_constant(node)) {
+      if (node.type != "Constant") require_all_read(node);
+      return;
+    }
     OnnxValue result = computed(node);
+    require_all_read(node);
     require_finite(node, result.map);
     for (std::size_t k = 0; k < inputs_that_count(node); ++k) {
       const std::string& name = node.inputs[k];
@@ -160,6 +176,11 @@ void OnnxGraph::follow(const Node& node) {
   } catch (const FoldingLimit& limit) {
     refuse(node.offset, node.label(), limit.what, "certify a smaller network, or fold before exporting");
   }
+}
+
+void OnnxGraph::require_all_read(const Node& node) {
+  const std::string attribute = node.unread_attribute();
+  if (!attribute.empty()) throw OperatorRefusal{"its attribute " + in_quotes(attribute) + " is not known"};
 }
 
 void OnnxGraph::require_finite(const Node& node, const AffineMap& map) const {

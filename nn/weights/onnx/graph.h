@@ -80,6 +80,7 @@ class OnnxGraph {
   OnnxValue sorted_by_top(const Node& node);
   std::vector<AffineMap*> needed_after(const Node& node);
   std::string layer_name(const std::string& weight);
+  static void require_all_read(const Node& node);
   void require_finite(const Node& node, const AffineMap& map) const;
 
   OnnxModel model_;

@@ -1,8 +1,12 @@
 #include "nn/weights/onnx/model.h"
 
+#include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <utility>
 
+#include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/onnx/protobuf.h"
 #include "nn/weights/tensors.h"
@@ -50,6 +54,9 @@ class OnnxModelReader {
     bool has_graph = false;
     for (ProtobufField field; model.next(field);) {
       if (field.number == 8) read_operator_set(field);
+      if (field.number == 14)
+        model_.unused.push_back("metadata_props " + key_value(field).first + ": describes the model");
+      if (field.number == 20) model_.unused.push_back("training_info: is for training");
       if (field.number != 7) continue;  // 7: graph; the other fields only say who wrote the file and when
       if (std::exchange(has_graph, true)) refuse(field.offset, "graph", "appears twice");
       read_graph(field);
@@ -102,6 +109,7 @@ class OnnxModelReader {
                  "export the model with the output that is to be certified alone");
         model_.output = name;
       }
+      if (field.number == 14) refuse(field.offset, "", "quantized tensors cannot be read");
       if (field.number == 15) refuse(field.offset, "", "sparse tensors cannot be read");
       if (model_.nodes.size() > kMostNodes) refuse(field.offset, "", "the graph has more than 10000 nodes");
     }
@@ -159,7 +167,7 @@ class OnnxModelReader {
     return size;
   }
 
-  OnnxNode node(const ProtobufField& message) const {
+  OnnxNode node(const ProtobufField& message) {
     OnnxNode node;
     node.offset = message.offset;
     std::string domain;
@@ -209,7 +217,7 @@ class OnnxModelReader {
     node.attributes["value"].tensor = std::move(tensor);
   }
 
-  void read_attribute(const ProtobufField& message, OnnxNode& node) const {
+  void read_attribute(const ProtobufField& message, OnnxNode& node) {
     std::string name;
     OnnxAttribute attribute;
     ProtobufReader reader = fields(message);
@@ -233,11 +241,55 @@ class OnnxModelReader {
     node.attributes[name] = std::move(attribute);
   }
 
-  OnnxTensor tensor(const ProtobufField& message) const {
+  std::pair<std::string, std::string> key_value(const ProtobufField& message) const {
+    std::pair<std::string, std::string> entry;
+    ProtobufReader reader = fields(message);
+    for (ProtobufField field; reader.next(field);) {
+      if (field.number == 1) entry.first = text(field);
+      if (field.number == 2) entry.second = text(field);
+    }
+    return entry;
+  }
+
+  /// Returns the numbers of a tensor that lie in another file of the same folder.
+  std::string_view external_data(const OnnxTensor& tensor, std::map<std::string, std::string>& stated) {
+    const auto refuse_data = [&](const std::string& value, const std::string& what) {
+      throw InputError({path_, "offset " + std::to_string(tensor.offset), in_quotes(tensor.name), value, what,
+                        "save the model in one file: onnx.save(model, path, save_as_external_data=False)"});
+    };
+    const std::string& name = stated["location"];
+    const std::filesystem::path location(name);
+    const bool is_inside = !name.empty() && name.find('\0') == std::string::npos && location.is_relative() &&
+                           std::find(location.begin(), location.end(), "..") == location.end();
+    if (!is_inside) refuse_data(in_quotes(name), "its numbers lie outside the folder of the model");
+    auto data = data_.find(name);
+    if (data == data_.end()) {
+      data = data_.emplace(name, read_file((std::filesystem::path(path_).parent_path() / location).string()))
+                 .first;
+      model_.data_files.emplace_back(name, sha256(data->second));
+    }
+    const auto count = [&](const char* key, std::uint64_t otherwise) {
+      const std::string& digits = stated[key];
+      std::uint64_t value = otherwise;
+      const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+      if (!digits.empty() && (error != std::errc() || end != digits.data() + digits.size()))
+        refuse_data(in_quotes(digits), std::string(key) + " is not a number");
+      return value;
+    };
+    const std::uint64_t size = data->second.size(), offset = count("offset", 0);
+    if (offset > size) refuse_data(std::to_string(offset), "begins beyond the end of " + name);
+    const std::uint64_t length = count("length", size - offset);
+    if (length > size - offset) refuse_data(std::to_string(length), "reaches beyond the end of " + name);
+    return std::string_view(data->second).substr(offset, length);
+  }
+
+  OnnxTensor tensor(const ProtobufField& message) {
     OnnxTensor tensor;
     tensor.offset = message.offset;
     std::vector<std::int64_t> dims;
     std::map<std::uint32_t, ProtobufField> data;  // keyed by field number of TensorProto
+    std::map<std::string, std::string> external;
+    bool is_external = false;
     ProtobufReader reader = fields(message);
     for (ProtobufField field; reader.next(field);) {
       if (field.number == 1) append_integers(field, path_, dims);
@@ -247,9 +299,15 @@ class OnnxModelReader {
                                  field.number == 9 || field.number == 10;
       if (holds_numbers && (!field.is_bytes || !data.emplace(field.number, field).second))
         refuse(field.offset, in_quotes(tensor.name), "its numbers are not in one piece");
-      if (field.number == 13 || (field.number == 14 && field.value != 0))
-        refuse(field.offset, in_quotes(tensor.name), "its numbers lie in another file",
-               "save the model in one file: onnx.save(model, path, save_as_external_data=False)");
+      if (field.number == 13) external.insert(key_value(field));
+      if (field.number == 14) is_external = field.value != 0;
+    }
+    if (is_external) {
+      ProtobufField raw;
+      raw.number = 9;
+      raw.is_bytes = true;
+      raw.bytes = external_data(tensor, external);
+      data.emplace(9, raw);
     }
     for (const std::int64_t size : dims) {
       if (size < 0) refuse(tensor.offset, in_quotes(tensor.name), "has a negative dimension");
@@ -309,24 +367,50 @@ class OnnxModelReader {
   const std::string& path_;
   OnnxModel model_;
   std::vector<OnnxInput> inputs_;
+  std::map<std::string, std::string> data_;  ///< contents of other files
 };
 
 }  // namespace
 
 std::string OnnxNode::label() const { return type + (name.empty() ? "" : " " + in_quotes(name)); }
 
+std::string OnnxNode::unread_attribute() const {
+  static const std::set<std::pair<std::string, std::string>> kHarmless = {
+      {"Dropout", "ratio"},
+      {"Dropout", "seed"},
+      {"BatchNormalization", "momentum"},
+      {"MaxPool", "storage_order"},
+      {"Softmax", "axis"},
+      {"LogSoftmax", "axis"},
+      // before operator set 7, where it matters: require_trailing_axes()
+      {"Add", "axis"},
+      {"Sub", "axis"},
+      {"Mul", "axis"},
+      {"Div", "axis"},
+      {"PRelu", "axis"}};
+  static const std::set<std::string> kOfOldSets = {"consumed_inputs", "broadcast"};
+  for (const auto& [attribute, value] : attributes)
+    if (read.count(attribute) == 0 && kHarmless.count({type, attribute}) == 0 &&
+        kOfOldSets.count(attribute) == 0)
+      return attribute;
+  return {};
+}
+
 double OnnxNode::number(const std::string& attribute, double otherwise) const {
+  read.insert(attribute);
   const auto found = attributes.find(attribute);
   return found == attributes.end() ? otherwise : found->second.number.value_or(otherwise);
 }
 
 std::vector<std::int64_t> OnnxNode::integers(const std::string& attribute,
                                              const std::vector<std::int64_t>& otherwise) const {
+  read.insert(attribute);
   const auto found = attributes.find(attribute);
   return found == attributes.end() ? otherwise : found->second.integers;
 }
 
 std::string OnnxNode::text(const std::string& attribute, const std::string& otherwise) const {
+  read.insert(attribute);
   const auto found = attributes.find(attribute);
   return found == attributes.end() ? otherwise : found->second.text.value_or(otherwise);
 }

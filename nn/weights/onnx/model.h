@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace swarmcert::files {
@@ -35,10 +37,16 @@ struct OnnxNode {
   std::vector<std::string> inputs, outputs;
   std::map<std::string, OnnxAttribute> attributes;
   std::size_t offset = 0;
+  mutable std::set<std::string> read;  ///< the attributes that were asked for
 
   /// Returns `Gemm "/fc1/Gemm"`, for messages.
   std::string label() const;
-  bool has(const std::string& attribute) const { return attributes.count(attribute) == 1; }
+  bool has(const std::string& attribute) const {
+    read.insert(attribute);
+    return attributes.count(attribute) == 1;
+  }
+  /// Returns an attribute that was never asked for and may bear on the result; empty: there is none.
+  std::string unread_attribute() const;
   double number(const std::string& attribute, double otherwise) const;
   std::vector<std::int64_t> integers(const std::string& attribute,
                                      const std::vector<std::int64_t>& otherwise) const;
@@ -56,6 +64,8 @@ struct OnnxModel {
   std::map<std::string, OnnxTensor> tensors;
   OnnxInput input;
   std::string output;
+  std::vector<std::pair<std::string, std::string>> data_files;  ///< see Weights::data_files
+  std::vector<std::string> unused;                              ///< see Weights::unused
   std::int64_t operator_set = 0;  ///< version of the operators of ONNX itself; 0: not stated
 };
 
@@ -66,6 +76,7 @@ inline constexpr char kReexportOnnx[] =
     "export a plain chain of linear layers with ReLU between them: torch.onnx.export(model, ...)";
 
 /// Parses the needed parts of a ModelProto. https://onnx.ai/onnx/repo-docs/IR.html
+/// External data are read from the folder of `path`.
 /// @throws InputError with the offset.
 OnnxModel read_onnx_model(const std::string& bytes, const std::string& path);
 

@@ -13,10 +13,10 @@ bool looks_like_onnx(const std::string& bytes) {
   return tags.find(bytes[2]) != std::string::npos;
 }
 
-Weights parse_onnx(const std::string& bytes, const std::string& path, const std::vector<std::string>& order) {
+Weights parse_onnx(const std::string& bytes, const std::string& path, const LayerChoice& choice) {
   Weights weights = OnnxGraph(read_onnx_model(bytes, path), path).run();
   weights.path = path;
-  weights.order_source = stated_order(weights.layers, order, path);
+  weights.order_source = stated_order(weights.layers, choice, path);
   return weights;
 }
 

@@ -24,6 +24,6 @@ bool looks_like_onnx(const std::string& bytes);
 /// the file itself, as float16, bfloat16, float32 or float64. The batch size is 1. A layer is named after its first
 /// weight, without ".weight".
 /// @throws InputError with node, tensor or attribute for anything else, or as assemble().
-Weights parse_onnx(const std::string& bytes, const std::string& path, const std::vector<std::string>& order);
+Weights parse_onnx(const std::string& bytes, const std::string& path, const LayerChoice& choice);
 
 }  // namespace swarmcert::files

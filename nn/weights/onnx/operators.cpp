@@ -317,7 +317,10 @@ AffineMap convolution_map(const OnnxNode& node, const OnnxTensor& weight, const 
   const OnnxShape sizes = signed_shape(weight);
   if (sizes.size() < 3 || weight.numbers.empty())
     throw OperatorRefusal{"its weights of shape " + shape_text(weight.shape) + " are not a kernel"};
-  const Window window(node, shape, OnnxShape(sizes.begin() + 2, sizes.end()));
+  const OnnxShape kernel_sizes(sizes.begin() + 2, sizes.end());
+  if (node.integers("kernel_shape", kernel_sizes) != kernel_sizes)
+    throw OperatorRefusal{"kernel_shape is not the shape of its weights"};
+  const Window window(node, shape, kernel_sizes);
   const double groups_stated = node.number("group", 1);
   const std::int64_t outputs = sizes[0], per_group = sizes[1];
   if (!(groups_stated >= 1 && groups_stated <= static_cast<double>(shape[1])))
@@ -396,7 +399,9 @@ void batch_normalization(const OnnxNode& node, const std::vector<const OnnxTenso
   const Enclosed epsilon{node.number("epsilon", static_cast<double>(1e-5F)), 0};
   factors.clear();
   amounts.clear();
-  const std::int64_t repeats = count_of(shape) / std::max<std::int64_t>(channels, 1);
+  if (node.number("spatial", 1) == 0) throw OperatorRefusal{"spatial is 0, as before operator set 9"};
+  const std::int64_t batch = shape.empty() ? 1 : shape[0];
+  const std::int64_t repeats = count_of(shape) / std::max<std::int64_t>(channels * batch, 1);
   for (std::size_t c = 0; c < static_cast<std::size_t>(channels); ++c) {
     const auto parameter = [&](std::size_t p) { return Enclosed{parameters[p]->numbers[c], 0}; };
     ExactSum variance;
@@ -410,6 +415,11 @@ void batch_normalization(const OnnxNode& node, const std::vector<const OnnxTenso
     amount.add_product({-factor.value, factor.radius}, parameter(2));
     factors.insert(factors.end(), static_cast<std::size_t>(repeats), factor);
     amounts.insert(amounts.end(), static_cast<std::size_t>(repeats), amount.value());
+  }
+  const std::vector<Enclosed> factors_of_one = factors, amounts_of_one = amounts;
+  for (std::int64_t b = 1; b < batch; ++b) {  // the channels are the second axis, inside the batch
+    factors.insert(factors.end(), factors_of_one.begin(), factors_of_one.end());
+    amounts.insert(amounts.end(), amounts_of_one.begin(), amounts_of_one.end());
   }
 }
 

@@ -13,6 +13,10 @@ namespace swarmcert::files {
 /// Maximum number of entries of the input, or of the result of a convolution.
 inline constexpr std::uint64_t kMostRows = std::uint64_t{1} << 20;
 
+/// ONNX's SELU has float32 constants: its slopes are those of SELU times a factor between 1 and 1 + kSeluRounding. 1 +
+/// 3.32e-8 = 1.05070102214813232421875 / 1.0507009873554804934... for x > 0, and less for x < 0.
+inline constexpr double kSeluRounding = 3.4e-8;
+
 using OnnxShape = std::vector<std::int64_t>;  ///< every size at least 1; the batch is 1
 
 /// Thrown by these functions; the reader adds file, offset and node.

@@ -34,9 +34,11 @@ Activation smooth_activation(const OnnxNode& node) {
     require_parameter(node, "alpha", 1);
     return Activation::kElu;
   }
-  if (node.type == "Selu")
-    throw OperatorRefusal{"uses float32 constants whose product exceeds the slope of SELU",
-                          "save the state dict, and certify it with --activation selu"};
+  if (node.type == "Selu") {  // the standard's default values, which are float32
+    require_parameter(node, "alpha", 1.67326319217681884765625);
+    require_parameter(node, "gamma", 1.05070102214813232421875);
+    return Activation::kSelu;
+  }
   if (node.type == "Gelu") {
     if (node.text("approximate", "none") != "none")
       throw OperatorRefusal{"approximate is not none", kOtherParameters};

@@ -1,4 +1,4 @@
-(* A whole certificate against NET, in the order in which the C++ checker looks at it. *)
+(* A whole certificate, in the order in which the C++ checker looks at it. *)
 
 open Refusal
 open Json
@@ -15,22 +15,6 @@ let check_chain net part stated where =
   let is_equal = match stated with
     | Array steps -> List.length steps = List.length expected && List.for_all2 fits steps expected | _ -> false in
   require is_equal "%s is not the one of this network: %s" here (Functions.chain_words expected)
-
-let rec inside path json = match path, json with
-  | [], _ -> Some json
-  | key :: rest, Object members -> Option.bind (List.assoc_opt key members) (inside rest)
-  | _ -> None
-
-(* NET with the activations that the chains state, where neither a weight file nor network.toml does. *)
-let with_stated_activations (net : Network.t) json =
-  let activation_of step = match inside [ "op" ] step with Some (Text op) -> Activation.called op | _ -> None in
-  let stated part = match inside [ "network"; "weights"; part; "chain" ] json with
-    | Some (Array steps) -> List.filter_map activation_of steps
-    | _ -> [] in
-  let adopted (part, (w : Weights.t)) = match w.activations, stated part with
-    | None, (_ :: _ as activations) -> part, Option.value (Weights.with_activations w activations) ~default:w
-    | _ -> part, w in
-  { net with parts = List.map adopted net.parts }
 
 let is_hash = function
   | Text s -> String.length s = 64 && String.for_all (fun c -> (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f')) s
@@ -51,20 +35,15 @@ let check_samples samples where =
   end
 
 let check_weights (net : Network.t) named =
-  require_keys "network" [ "description_sha256"; "weights"; "as" ] named;
+  require_keys "network" [ "description_sha256"; "options"; "output"; "input"; "silent"; "weights"; "as" ] named;
   let as_ = find "network" "as" named in
   require (as_ = Null || as_ = Text "float32") "network.as is unknown";
-  require (find "network" "description_sha256" named = Text net.sha256)
-      "network.description_sha256 differs: the certificate was made for another network";
   let weights = find "network" "weights" named in
-  require (List.length (members "network.weights" weights) = List.length net.parts)
-      "network.weights lists another number of networks";
   List.iter (fun (name, (w : Weights.t)) ->
       let where = "network.weights." ^ name in
       let entry = find "network.weights" name weights in
-      require_keys where [ "sha256"; "precision"; "chain"; "samples" ] entry;
-      require (find where "sha256" entry = Text w.sha256 && find where "precision" entry = Text w.precision)
-        "%s differs: the certificate was made for other weights than %s" where w.path;
+      require_keys where [ "file"; "sha256"; "data_files"; "precision"; "assumed"; "chain"; "layers"; "samples" ] entry;
+      require (as_ = Null || w.precision = "float32") "%s: is not of float32, as network.as states" where;
       check_chain net name (find where "chain" entry) where;
       check_samples (find where "samples" entry) (where ^ ".samples")) net.parts
 
@@ -84,14 +63,13 @@ let check_boxes net boxes =
         require (List.for_all2 ( <= ) lower upper) "%s is empty" where) boxes
   | _ -> rejected "box is neither null nor an object with boxes"
 
-(* `json`: an object of the schema. Raises Rejected. *)
-let check net json =
-  let as_float32 = find "network" "as" (find "certificate" "network" json) = Text "float32" in
-  let net = if as_float32 then Network.as_float32 net else net in
+(* `json`: an object of the schema, made for `files`. Raises Rejected. *)
+let check files json =
+  let net = Network.canonical (find "certificate" "network" json) in
+  Network.require_files net files;
   require_keys "certificate"
     [ "schema"; "tool"; "statement"; "network"; "box"; "layers"; "bounds"; "laws"; "values"; "content_sha256" ] json;
   let member key = find "certificate" key json in
-  let net = with_stated_activations net json in
   let some property = List.exists (fun (_, w) -> List.exists property (Weights.between w)) net.parts in
   let text = Statement.text ~sorts:(some Activation.sorts) ~keeps:(some Activation.keeps)
       ~of_invariants:net.invariants ~silent_names:(Functions.silent_names net) in

@@ -2,7 +2,8 @@
 
 open Refusal
 
-let starts_with = Tensor.starts_with
+let starts_with prefix text = String.starts_with ~prefix text
+let ends_with suffix text = String.ends_with ~suffix text
 
 let networks_of f =
   if f = "network" || starts_with "phi:" f || starts_with "rho:" f then [ f ]
@@ -42,7 +43,7 @@ let moves net f block =
   let is_in k =
     let name = Option.value ~default:"" (List.nth_opt names k) in
     block = "all" || block = "x" ^ string_of_int k
-    || (block = "position" && Tensor.ends_with "_m" name) || (block = "velocity" && Tensor.ends_with "_m_s" name) in
+    || (block = "position" && ends_with "_m" name) || (block = "velocity" && ends_with "_m_s" name) in
   let result = List.init (inputs net part) is_in in
   require (List.mem true result) "block_coordinates: %s has no block \"%s\"" (shown f) (shown block);
   result
@@ -52,7 +53,7 @@ let unit (net : Network.t) f block =
   let names = if net.order = [] then [] else input_names net part in
   let names = if block = "all" || names = [] then names
     else List.concat (List.mapi (fun k moved -> if moved then [ List.nth names k ] else []) (moves net f block)) in
-  let all suffix = List.for_all (Tensor.ends_with suffix) names in
+  let all suffix = List.for_all (ends_with suffix) names in
   let input = if names = [] then "input" else if all "_m_s" then "(m/s)" else if all "_m" then "m" else "(m, m/s)" in
   let output = if net.unit = "" then "output" else net.unit in
   if starts_with "phi:" f then "hidden/" ^ input else if starts_with "rho:" f then

@@ -3,16 +3,12 @@
 open Refusal
 
 let help =
-  "Verify a certificate against the weights with a checker that is proved in Coq\n\
-   Usage: swarmcert-check-proved [--coq] [OPTIONS] CERTIFICATE [NET]\n\
-  \       swarmcert-check-proved --many [OPTIONS] [NET]\n\n\
-   NET is a network.toml, or a weight file that holds one plain network; or instead of it\n\
-  \  --phi FILE --rho FILE   phi and rho\n\
-  \  --key KEY               key of the state dict inside a nested checkpoint\n\
-  \  --order A,B,C           layers in the order of evaluation; with --phi and --rho phi=A,B and rho=A,B\n\
-  \  --activation OP,...     what lies between the layers, where neither the weight files nor network.toml say \
-      it; without it,\n\
-  \                          the certificate says it\n\
+  "Verify a certificate with a checker that is proved in Coq\n\
+   Usage: swarmcert-check-proved [--coq] CERTIFICATE NET\n\
+  \       swarmcert-check-proved [--coq] CERTIFICATE --phi FILE --rho FILE\n\
+  \       swarmcert-check-proved --many NET\n\n\
+   The network is read from the certificate. NET, a network.toml or a weight file, must have the hashes that the \
+      certificate\nnames; that it holds this network is for swarmcert check to say.\n\n\
   \  --coq                   write the certificate as a Coq file to standard output; coqc then accepts it in \
       its kernel\n\
   \  --many                  certificates of one NET, named on standard input, one in a line; writes the exit \
@@ -27,32 +23,25 @@ exception Usage of string
 
 type mode = Report | Coq_file | Many
 
-let rec options (args : Network.arguments) mode positional = function
-  | [] -> args, mode, List.rev positional
+type arguments = { phi : string; rho : string; mode : mode; positional : string list (* the last one first *) }
+
+let rec options args = function
+  | [] -> { args with positional = List.rev args.positional }
   | ("-h" | "--help") :: _ -> print_string help; exit 0
   | "--version" :: _ -> print_endline Version.text; exit 0
-  | "--coq" :: rest -> options args Coq_file positional rest
-  | "--many" :: rest -> options args Many positional rest
-  | ("-q" | "--quiet") :: rest -> options args mode positional rest
-  | "--phi" :: file :: rest -> options { args with phi = file } mode positional rest
-  | "--rho" :: file :: rest -> options { args with rho = file } mode positional rest
-  | "--key" :: key :: rest -> options { args with key } mode positional rest
-  | "--activation" :: activation :: rest ->
-    let known name = if Piecewise.called name = None then
-        raise (Usage ("--activation: there is no activation " ^ shown name)) in
-    List.iter known (String.split_on_char ',' activation);
-    options { args with activation } mode positional rest
-  | "--order" :: word :: rest ->
-    let part, names = match String.index_opt word '=' with
-      | Some at -> String.sub word 0 at, String.sub word (at + 1) (String.length word - at - 1)
-      | None -> "network", word in
-    options { args with orders = (part, String.split_on_char ',' names) :: args.orders } mode positional rest
+  | "--coq" :: rest -> options { args with mode = Coq_file } rest
+  | "--many" :: rest -> options { args with mode = Many } rest
+  | ("-q" | "--quiet") :: rest -> options args rest
+  | "--phi" :: file :: rest -> options { args with phi = file } rest
+  | "--rho" :: file :: rest -> options { args with rho = file } rest
   | word :: _ when String.length word > 1 && word.[0] = '-' ->
     raise (Usage ("unknown option, or one without its value: " ^ word))
-  | word :: rest -> options args mode (word :: positional) rest
+  | word :: rest -> options { args with positional = word :: args.positional } rest
 
 let schema_of path = function
   | Json.Object members ->
+    if List.assoc_opt "schema" members = Some (Json.Text Statement.old_schema) then
+      bad_input "%s: is older than this program and does not carry the network: renew it with swarmcert certify" path;
     if List.assoc_opt "schema" members <> Some (Json.Text Statement.schema) then
       bad_input "%s: schema must be \"%s\": is this the right file?" path Statement.schema
   | _ -> bad_input "%s: is not a JSON object" path
@@ -68,10 +57,10 @@ let report (state : Claims.t) =
   Printf.printf "for %s\n" (Functions.words state.net);
   if state.not_checked = [] then 0 else 4
 
-let check_file net path =
+let check_file files path =
   let json = Json.parse path (contents path) in
   schema_of path json;
-  Certificate.check net json
+  Certificate.check files json
 
 (* Exit code and message of an exception. *)
 let failure = function
@@ -81,8 +70,8 @@ let failure = function
   | Out_of_memory | Stack_overflow -> 3, "the files are too large for this checker"
   | fault -> 70, "internal fault: " ^ Printexc.to_string fault
 
-let check_many net =
-  let decide path = match check_file net path with
+let check_many files =
+  let decide path = match check_file files path with
     | state -> if state.Claims.not_checked = [] then 0, "accepted" else 4, "inconclusive"
     | exception fault -> failure fault in
   try
@@ -92,12 +81,8 @@ let check_many net =
     done; 0
   with End_of_file -> 0
 
-(* The certificate is read before the weights: it is the first file that is named. *)
-let single args mode certificate =
-  let json = Json.parse certificate (contents certificate) in
-  schema_of certificate json;
-  let net = Network.read args in
-  let state = Certificate.check net json in
+let single files mode certificate =
+  let state = check_file files certificate in
   if mode = Coq_file then begin
     print_string (Kernel.file state.parts (List.rev state.log));
     List.iter (fun what -> prerr_endline ("not checked: " ^ what)) (List.rev state.not_checked);
@@ -109,15 +94,15 @@ let single args mode certificate =
   else report state
 
 let run () =
-  let empty = { Network.net = ""; phi = ""; rho = ""; key = ""; orders = []; activation = "" } in
-  let args, mode, positional = options empty Report [] (List.tl (Array.to_list Sys.argv)) in
+  let empty = { phi = ""; rho = ""; mode = Report; positional = [] } in
+  let args = options empty (List.tl (Array.to_list Sys.argv)) in
   let has_pair = args.phi <> "" && args.rho <> "" and has_none = args.phi = "" && args.rho = "" in
-  match mode, positional with
-  | Many, [ net ] when has_none -> check_many (Network.read { args with net })
-  | Many, [] when has_pair -> check_many (Network.read args)
+  match args.mode, args.positional with
+  | Many, [ net ] when has_none -> check_many (Network.Described net)
+  | Many, [] when has_pair -> check_many (Network.Pair (args.phi, args.rho))
   | Many, _ -> raise (Usage "expected NET, or --phi FILE --rho FILE")
-  | _, ([ _; _ ] as words) when has_none -> single { args with net = List.nth words 1 } mode (List.hd words)
-  | _, [ certificate ] when has_pair -> single args mode certificate
+  | mode, [ certificate; net ] when has_none -> single (Network.Described net) mode certificate
+  | mode, [ certificate ] when has_pair -> single (Network.Pair (args.phi, args.rho)) mode certificate
   | _ -> raise (Usage "expected CERTIFICATE NET, or CERTIFICATE --phi FILE --rho FILE")
 
 let () =

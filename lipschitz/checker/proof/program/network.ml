@@ -1,6 +1,9 @@
-(* NET: its networks by name ("network", "phi:<kind>", "rho:<kind>"), units, input order and clamp. *)
+(* The network in a certificate: its networks by name ("network", "phi:<kind>", "rho:<kind>"), units, input order and
+   clamp. What it reads is what every claim is about; that the files hold it is not decided here, only that they are
+   the files with the hashes that the certificate names. *)
 
 open Refusal
+open Json
 
 type t = {
   sha256 : string;  (* of network.toml; else "" *)
@@ -13,233 +16,178 @@ type t = {
   parts : (string * Weights.t) list;  (* by name, sorted *)
 }
 
-type arguments = {
-  net : string;
-  phi : string;
-  rho : string;
-  key : string;
-  orders : (string * string list) list;
-  activation : string;  (* names, separated by commas; "": not stated *)
-}
-
-let sha256_of bytes = Sha256.to_hex (Sha256.string bytes)
-(* Formats that hold one network and no keys, in the order in which every checker looks for them. *)
-let flat_formats = [
-  "safetensors", Safetensors.looks_like, (fun path bytes ~order -> Safetensors.read path bytes ~order);
-  "ONNX", Onnx_model.looks_like, (fun path bytes ~order -> Onnx.read path bytes ~order);
-  ".mat", Mat_file.looks_like, (fun path bytes ~order ->
-      Weights.assemble ~path ~sha256:(sha256_of bytes) Layer_order.Unordered ~order (Mat_file.read path bytes));
-  ".nnet", Nnet.looks_like, (fun path bytes ~order ->
-      Weights.assemble ~path ~sha256:(sha256_of bytes) Layer_order.Evaluation ~order (Nnet.read path bytes)) ]
-let npz = ".npz", Named_arrays.looks_like_npz, (fun path bytes ~order ->
-    Weights.assemble ~path ~sha256:(sha256_of bytes) Layer_order.Unordered ~order (Named_arrays.read_npz path bytes))
-
-let load_bytes path bytes ~key ~order =
-  let is_of (_, looks_like, _) = looks_like bytes in
-  let read (format, _, read) =
-    if key <> "" then bad_input "%s: %s files are not nested: leave --key out" path format;
-    read path bytes ~order in
-  if is_of npz then read npz
-  else if Pth.looks_like bytes then Pth.read path bytes ~key ~order
-  else match List.find_opt is_of flat_formats with
-    | Some format -> read format
-    | None when C_source.looks_like bytes -> C_source.read path bytes ~key ~order
-    | None -> bad_input "%s: is no weight file: neither a PyTorch state dict, safetensors, ONNX, .npz, .mat, .nnet nor \
-                         generated C source" path
-let load path ~key ~order =
-  match String.rindex_opt path '#' with
-  | Some mark when mark + 1 < String.length path && not (Sys.file_exists path) ->
-    if key <> "" then bad_input "%s: the name of the file already names a key" path;
-    let file = String.sub path 0 mark in
-    load_bytes file (contents file) ~key:(String.sub path (mark + 1) (String.length path - mark - 1)) ~order
-  | _ -> load_bytes path (contents path) ~key ~order
-
-let is_clamped part = part = "network" || (String.length part >= 4 && String.sub part 0 4 = "phi:" && part <>
-    "phi:ground")
+let is_clamped part = part = "network" || (String.starts_with ~prefix:"phi:" part && part <> "phi:ground")
 let sizes weights = Weights.inputs (Weights.first_layer weights), Weights.outputs (Weights.last_layer weights)
 
-(* network.toml *)
+let texts where json = List.map (Json.text where) (list where json)
+let floats where json = List.map Exact.parse_hex_float (Exact.words (text where json))
 
-let allow_only path where keys members =
-  List.iter (fun (key, _) -> if not (List.mem key keys) then bad_input
-      "%s: %s%s is not a known key" path where (shown key)) members
-let table path name = function
-  | Some (Json.Object members) -> members
-  | Some _ -> bad_input "%s: %s must be a table" path name
-  | None -> bad_input "%s: %s is missing" path name
-let text path name = function Some (Json.Text s) -> s | _ -> bad_input "%s: %s must be text in quotes" path name
-let texts path name = function
-  | Json.Array elements -> List.map (fun e -> text path name (Some e)) elements
-  | _ -> bad_input "%s: %s must be a list of texts in quotes" path name
-let numbers path name = function
-  | Some (Json.Array elements) ->
-    List.map (function Json.Number { value; _ } -> value | _ -> bad_input "%s: %s must be a list of numbers" path name)
-        elements
-  | _ -> bad_input "%s: %s must be a list of numbers" path name
+let layer where json =
+  require_keys where [ "name"; "tensor"; "weights"; "biases"; "weight_rounding"; "bias_rounding" ] json;
+  (match find where "tensor" json with Null | Text _ -> () | _ -> rejected "%s: tensor is not text" where);
+  List.iter (fun key -> require (Exact.hex_float where (find where key json) >= 0.) "%s: a rounding is negative" where)
+    [ "weight_rounding"; "bias_rounding" ];
+  let row json = Array.of_list (floats where json) in
+  let weights = Array.of_list (List.map row (list where (find where "weights" json))) in
+  let biases = Array.of_list (floats where (find where "biases" json)) in
+  require (Array.length weights > 0 && Array.length biases = Array.length weights) "%s: not one bias per row" where;
+  let size = Array.length weights.(0) in
+  require (size > 0 && Array.for_all (fun row -> Array.length row = size) weights) "%s: rows of different lengths" where;
+  { Weights.name = text where (find where "name" json); weights; biases }
 
-let read_output path members =
-  allow_only path "output." [ "quantity"; "unit" ] members;
-  let quantity = text path "output.quantity" (List.assoc_opt "quantity" members) in
-  let unit = text path "output.unit" (List.assoc_opt "unit" members) in
-  let units = match quantity with
-    | "force_z" | "force" -> [ "gf"; "N" ] | "torque" -> [ "mN_m"; "N_m" ]
-    | _ -> bad_input "%s: output.quantity is not one of the possible values" path in
-  if not (List.mem unit units) then bad_input "%s: output.unit is not one of the possible values" path;
-  unit, Some quantity
+(* The activation behind a layer with so many outputs. *)
+let activation where outputs op =
+  let found = match Activation.called op, String.rindex_opt op ':' with
+    | None, Some mark ->
+      let digits = String.sub op (mark + 1) (String.length op - mark - 1) in
+      let is_count = digits <> "" && String.length digits < 9 && String.for_all (fun c -> c >= '0' && c <= '9') digits in
+      (match Activation.called (String.sub op 0 mark) with
+       | Some changed when is_count && changed <> Proved.Relu && not (Activation.sorts changed) ->
+         let n = int_of_string digits in
+         if 0 < n && n < outputs then Some (Proved.Keeping (n, changed)) else None
+       | _ -> None)
+    | found, _ -> found in
+  match found with
+  | Some a -> require (outputs mod Activation.group a = 0) "%s: a layer does not fit %s" where (shown op); a
+  | None -> rejected "%s: unknown operation %s" where (shown op)
+
+let weights where json =
+  let find key = find where key json in
+  let layers = List.map (layer (where ^ ".layers")) (list where (find "layers")) in
+  require (layers <> [] && List.length layers <= 10000) "%s.layers is empty or too long" where;
+  let op step = text where (Json.find where "op" step) in
+  let ops = List.filter (fun op -> op <> "linear" && op <> "clamp") (List.map op (list where (find "chain"))) in
+  require (List.length ops + 1 = List.length layers) "%s.chain has another number of activations than its layers" where;
+  let hidden = List.filteri (fun k _ -> k + 1 < List.length layers) layers in
+  let activations = List.map2 (fun l op -> activation (where ^ ".chain") (Weights.outputs l) op) hidden ops in
+  List.iter2 (fun before after -> require (Weights.outputs before = Weights.inputs after)
+      "%s.layers do not fit one another" where) hidden (List.tl layers);
+  let precision = text where (find "precision") in
+  require (precision = "float32" || precision = "float64") "%s: unknown precision" where;
+  let is_float32 x = Exact.float32 x = x in
+  let holds (l : Weights.layer) = Array.for_all (Array.for_all is_float32) l.weights && Array.for_all is_float32 l.biases in
+  require (precision <> "float32" || List.for_all holds layers) "%s: a number is no float32" where;
+  ignore (texts where (find "assumed"));
+  let data_files = List.map (fun (name, hash) -> name, text where hash) (members where (find "data_files")) in
+  { Weights.file = text where (find "file"); sha256 = text where (find "sha256"); data_files; precision; layers;
+    activations }
 
 let relative_state = [ "dp_x_m"; "dp_y_m"; "dp_z_m"; "dv_x_m_s"; "dv_y_m_s"; "dv_z_m_s" ]
 let invariants_of_neighbour = 5
 let invariants_of_ground = 3
 
-let read_input path members =
-  allow_only path "input." [ "order"; "invariants"; "clamp" ] members;
-  let order = match List.assoc_opt "order" members with None -> [] | Some json ->
-    let names = texts path "input.order" json in
-    if names = [] || List.length (List.sort_uniq compare names) <> List.length names then
-      bad_input "%s: input.order is empty or names an input twice" path;
-    names in
-  let invariants = match List.assoc_opt "invariants" members with
-    | None -> false
-    | Some (Json.Text "rotation") when order = relative_state -> true
-    | Some (Json.Text "rotation") -> bad_input "%s: input.order: invariants are made from a relative state" path
-    | _ -> bad_input "%s: input.invariants is not one of the possible values" path in
-  let clamp = match List.assoc_opt "clamp" members with None -> [] | json ->
-    let members = table path "input.clamp" json in
-    allow_only path "input.clamp." [ "lower"; "upper" ] members;
-    let lower = numbers path "input.clamp.lower" (List.assoc_opt "lower" members) in
-    let upper = numbers path "input.clamp.upper" (List.assoc_opt "upper" members) in
-    let count = if invariants then invariants_of_neighbour
-      else if order = [] then List.length lower else List.length order in
-    if count = 0 || List.length lower <> count || List.length upper <> count then
-      bad_input "%s: input.clamp needs %d numbers each" path count;
-    if not (List.for_all2 ( <= ) lower upper) then bad_input "%s: input.clamp: lower is above upper" path;
-    List.combine lower upper in
-  order, invariants, clamp
+let read_clamp = function
+  | Null -> []
+  | json ->
+    let where = "network.input.clamp" in
+    require_keys where [ "lower"; "upper" ] json;
+    let side key = Exact.hex_floats where (find where key json) in
+    let lower = side "lower" and upper = side "upper" in
+    require (lower <> [] && List.length lower = List.length upper) "%s has other sizes" where;
+    require (List.for_all2 ( <= ) lower upper) "%s is empty" where;
+    List.combine lower upper
 
-let read_gamma path members =
-  allow_only path "gamma." [ "value"; "scope"; "mode" ] members;
-  let choice key words = if not (List.mem (text path ("gamma." ^ key) (List.assoc_opt key members)) words) then
-      bad_input "%s: gamma.%s is not one of the possible values" path key in
-  choice "scope" [ "layer"; "network" ]; choice "mode" [ "clip"; "equal" ];
-  match List.assoc_opt "value" members with
-  | Some (Json.Number { value; _ }) when value > 0. -> ()
-  | _ -> bad_input "%s: gamma.value must be positive" path
+let require_consistent net quantity =
+  let fits holds = require holds "network: its parts do not fit one another" in
+  let named prefix = List.filter (fun (name, _) -> String.starts_with ~prefix name) net.parts in
+  let phis = named "phi:" and rhos = named "rho:" in
+  let stated = if net.invariants then invariants_of_neighbour else List.length net.order in
+  let clamped = List.length net.clamp in
+  fits (stated = 0 || clamped = 0 || stated = clamped);
+  if net.invariants then fits (net.order = relative_state && quantity = "force_z");
+  let inputs = ref (if stated > 0 then stated else clamped) in
+  match net.parts with
+  | [ "network", w ] ->
+    fits (not net.invariants && net.silent = [] && (!inputs = 0 || !inputs = fst (sizes w)))
+  | parts ->
+    fits (phis <> [] && rhos <> [] && List.length phis + List.length rhos = List.length parts);
+    let hidden = snd (sizes (snd (List.hd phis))) and outputs = snd (sizes (snd (List.hd rhos))) in
+    List.iter (fun (name, w) ->
+        let i, o = sizes w in
+        fits (o = hidden);
+        if name = "phi:ground" then fits (i = (if net.invariants then invariants_of_ground else 4))
+        else (if !inputs = 0 then inputs := i; fits (i = !inputs))) phis;
+    let components = match quantity with "" -> 0 | "force_z" -> 1 | _ -> 3 in
+    List.iter (fun (_, w) -> fits (sizes w = (hidden, outputs) && (components = 0 || components = outputs))) rhos
 
-(* What `field` states beside the weights, in names that `called` knows. *)
-let with_activations field called (weights : Weights.t) names =
-  let called name = match called name with
-    | Some activation -> activation | None -> bad_input "%s: there is no activation %s" field (shown name) in
-  if names = [] then bad_input "%s: names no activation" field;
-  let stated = List.map called names in
-  let is_written = not (List.for_all Piecewise.is_itself stated) in
-  let within = List.map (fun (a : Piecewise.t) -> a.within) stated in
-  match Weights.with_activations weights within, weights.activations with
-  | Some found, (None | Some []) -> if is_written then Piecewise.written found stated else found
-  | Some found, Some _ when not is_written -> found
-  | _, Some (_ :: _ as others) ->
-    bad_input "%s: %s: %s is stated already" weights.path field (String.concat ", " (List.map Activation.name others))
-  | _, _ ->
-    bad_input "%s: %s: %d activations do not fit the %d layers, or a group the size of its layer" weights.path field
-      (List.length names) (List.length weights.layers)
+(* "large+small>small", with kinds that the network has, sorted. *)
+let composition net name =
+  match String.index_opt name '>' with
+  | None -> rejected "network.silent: %s is not a composition" (shown name)
+  | Some arrow ->
+    let own = String.sub name (arrow + 1) (String.length name - arrow - 1) in
+    require (List.mem_assoc ("rho:" ^ own) net.parts) "network.silent: %s is not a composition" (shown name);
+    let kinds = if arrow = 0 then [] else String.split_on_char '+' (String.sub name 0 arrow) in
+    List.iter (fun kind -> require (kind <> "ground" && List.mem_assoc ("phi:" ^ kind) net.parts)
+        "network.silent: there is no phi of %s" (shown kind)) kinds;
+    require (List.sort String.compare kinds = kinds) "network.silent: kinds are not sorted";
+    own, kinds
 
-let read_kinds path ~key role members =
-  if members = [] then bad_input "%s: %s names no kind of vehicle" path role;
-  List.map (fun (kind, json) ->
-      let where = role ^ "." ^ kind in
-      let entry = table path where (Some json) in
-      allow_only path (where ^ ".") [ "weights"; "order"; "activation" ] entry;
-      if String.contains kind ':' then bad_input "%s: a kind's name must not contain ':'" path;
-      let file = text path (where ^ ".weights") (List.assoc_opt "weights" entry) in
-      if file = "" || String.contains file '\000' then bad_input "%s: %s.weights is not the name of a file" path where;
-      let order = match List.assoc_opt "order" entry with None -> [] | Some json ->
-        let names = texts path (where ^ ".order") json in
-        if names = [] then bad_input "%s: %s.order names no layer" path where; names in
-      let file = if Filename.is_relative file then Filename.concat (Filename.dirname path) file else file in
-      let weights = load file ~key ~order in
-      let weights = match List.assoc_opt "activation" entry with
-        | None -> weights
-        | Some json ->
-          let here = where ^ ".activation" in
-          let names = match json with Json.Array _ -> texts path here json | _ -> [ text path here (Some json) ] in
-          let called name = Option.map Piecewise.that_is (Activation.called name) in
-          with_activations (path ^ ": " ^ here) called weights names in
-      role ^ ":" ^ kind, weights) members
+(* With which the files were read, for the reader of files; their form only. *)
+let check_options json =
+  let where = "network.options" in
+  let lists = [ "order"; "phi_order"; "rho_order"; "select" ] and words = [ "key"; "activation" ] in
+  require_keys where (lists @ words) json;
+  List.iter (fun key -> ignore (texts where (Json.find where key json))) lists;
+  List.iter (fun key -> ignore (text where (Json.find where key json))) words
 
-let check_sizes path ~order ~invariants ~clamp ~components phis rhos =
-  let refuse name what = bad_input "%s: %s: does not fit the other networks (%s)" path name what in
-  let hidden = snd (sizes (snd (List.hd phis))) and outputs = snd (sizes (snd (List.hd rhos))) in
-  let stated = if invariants then invariants_of_neighbour
-    else if order <> [] then List.length order else List.length clamp in
-  let inputs = ref stated in
-  List.iter (fun (name, w) ->
-      let i, o = sizes w in
-      if o <> hidden then refuse name "outputs";
-      if name = "phi:ground" then begin
-        let inputs = if invariants then invariants_of_ground else 4 in
-        if i <> inputs then refuse name (Printf.sprintf "the ground's network has %d inputs" inputs)
-      end
-      else (if !inputs = 0 then inputs := i; if i <> !inputs then refuse name "inputs")) phis;
-  List.iter (fun (name, w) ->
-      let i, o = sizes w in
-      if i <> hidden then refuse name "inputs";
-      if o <> outputs || (components <> None && components <> Some o) then refuse name "outputs") rhos
+(* `json`: the member "network" of a certificate. *)
+let canonical json =
+  let where = "network" in
+  let find key = Json.find where key json in
+  let output = find "output" and input = find "input" in
+  check_options (find "options");
+  require_keys "network.output" [ "quantity"; "unit" ] output;
+  require_keys "network.input" [ "order"; "invariants"; "clamp" ] input;
+  let quantity = text where (Json.find where "quantity" output) in
+  let order = texts where (Json.find where "order" input) in
+  require (List.length (List.sort_uniq compare order) = List.length order) "network.input names one twice";
+  let invariants = match Json.find where "invariants" input with
+    | Bool b -> b | _ -> rejected "network.input.invariants is neither true nor false" in
+  let is_network name =
+    name = "network" || List.exists (fun prefix -> String.starts_with ~prefix name && not (String.contains_from name 4 ':'))
+      [ "phi:"; "rho:" ] in
+  let part (name, entry) =
+    require (is_network name) "network.weights: %s is no network" (shown name);
+    name, weights ("network.weights." ^ name) entry in
+  let parts = List.sort (fun (a, _) (b, _) -> String.compare a b) (List.map part (members where (find "weights"))) in
+  let net = { sha256 = text where (find "description_sha256"); unit = text where (Json.find where "unit" output); order;
+              invariants; clamp = read_clamp (Json.find where "clamp" input); silent = []; parts } in
+  let compositions = List.map (composition net) (texts where (find "silent")) in
+  let silent = List.sort_uniq compare compositions in
+  require (List.length silent = List.length compositions) "network.silent names a composition twice";
+  require_consistent { net with silent } quantity;
+  { net with silent }
 
-let read_silent path phis rhos json =
-  let names = texts path "silent" json in
-  if names = [] then bad_input "%s: silent: names no composition" path;
-  let composition name =
-    let refuse what = bad_input "%s: silent: %s: %s" path (shown name) what in
-    match String.index_opt name '>' with
-    | None -> refuse "is not a composition"
-    | Some arrow ->
-      let own = String.sub name (arrow + 1) (String.length name - arrow - 1) in
-      if not (List.mem_assoc ("rho:" ^ own) rhos) then refuse ("there is no rho." ^ own);
-      let kinds = if arrow = 0 then [] else String.split_on_char '+' (String.sub name 0 arrow) in
-      List.iter (fun kind -> if kind = "ground" || not (List.mem_assoc ("phi:" ^ kind) phis) then
-          refuse ("there is no phi." ^ kind ^ " of a neighbour")) kinds;
-      own, List.sort String.compare kinds in
-  let compositions = List.map composition names in
-  let sorted = List.sort_uniq compare compositions in
-  if List.length sorted < List.length names then bad_input "%s: silent: names a composition twice" path;
-  sorted
+(* The files that are given as NET. *)
+type files = Described of string (* network.toml, or one weight file *) | Pair of string * string (* phi, rho *)
 
-let read_toml path bytes ~key =
-  let members = match Toml.parse path bytes with Json.Object m -> m | _ -> assert false in
-  if List.assoc_opt "schema" members <> Some (Json.Text "swarmcert/network/1") then
-    bad_input "%s: schema must be \"swarmcert/network/1\"" path;
-  allow_only path "" [ "schema"; "output"; "gamma"; "input"; "silent"; "phi"; "rho" ] members;
-  let optional name absent read = match List.assoc_opt name members with
-    | None -> absent | json -> read path (table path name json) in
-  let unit, quantity = optional "output" ("", None) read_output in
-  let components = Option.map (fun quantity -> if quantity = "force_z" then 1 else 3) quantity in
-  optional "gamma" () read_gamma;
-  let order, invariants, clamp = optional "input" ([], false, []) read_input in
-  if invariants && quantity <> Some "force_z" then bad_input "%s: input.invariants are for a vertical force" path;
-  let kinds role = read_kinds path ~key role (table path role (List.assoc_opt role members)) in
-  let phis = kinds "phi" in
-  let rhos = kinds "rho" in
-  check_sizes path ~order ~invariants ~clamp ~components phis rhos;
-  let sorted = List.sort (fun (a, _) (b, _) -> String.compare a b) (phis @ rhos) in
-  let silent = Option.fold ~none:[] ~some:(read_silent path phis rhos) (List.assoc_opt "silent" members) in
-  { sha256 = Sha256.to_hex (Sha256.string bytes); unit; order; invariants; clamp; silent; parts = sorted }
+let hashes = Hashtbl.create 8
+let sha256_of path = match Hashtbl.find_opt hashes path with
+  | Some hash -> hash
+  | None ->
+    let hash = Sha256.to_hex (Sha256.string (contents path)) in
+    Hashtbl.add hashes path hash; hash
 
-let plain parts = { sha256 = ""; unit = ""; order = []; invariants = false; clamp = []; silent = []; parts }
-let read_stated { net; phi; rho; key; orders; _ } =
-  let order part = Option.value ~default:[] (List.assoc_opt part orders) in
-  if phi <> "" then begin
-    let p = load phi ~key ~order:(order "phi") and r = load rho ~key ~order:(order "rho") in
-    if snd (sizes p) <> fst (sizes r) then bad_input "%s: does not take as many inputs as %s has outputs" rho phi;
-    plain [ "phi:default", p; "rho:default", r ]
-  end
-  else if Filename.check_suffix net ".toml" then begin
-    if orders <> [] then bad_input "%s: --order is of one weight file, and this names several" net;
-    read_toml net (contents net) ~key
-  end
-  else plain [ "network", load net ~key ~order:(order "network") ]
-let read arguments =
-  let net = read_stated arguments in
-  let names = String.split_on_char ',' arguments.activation in
-  let stated (name, weights) = name, with_activations "--activation" Piecewise.called weights names in
-  if arguments.activation = "" then net else { net with parts = List.map stated net.parts }
+(* "FILE#KEY" where there is no such file is FILE. *)
+let without_key path = match String.rindex_opt path '#' with
+  | Some mark when not (Sys.file_exists path) -> String.sub path 0 mark
+  | _ -> path
 
-let as_float32 net = { net with parts = List.map (fun (name, w) -> name, Weights.as_float32 w) net.parts }
+(* Raises Rejected unless these are the files that the network was read from, by their hashes. *)
+let require_files net files =
+  let beside path name = if Filename.is_relative name then Filename.concat (Filename.dirname path) name else name in
+  let path_of part (w : Weights.t) = match files with
+    | Described path -> if net.sha256 = "" then without_key path else beside path w.file
+    | Pair (phi, rho) -> if part = "phi:default" then phi else rho in
+  let description = match files with Described path when net.sha256 <> "" -> sha256_of path | _ -> net.sha256 in
+  let names = List.map fst net.parts in
+  let fits = match files with
+    | Described _ -> description = net.sha256 && (net.sha256 <> "" || names = [ "network" ])
+    | Pair _ -> net.sha256 = "" && names = [ "phi:default"; "rho:default" ] in
+  require fits "network.description_sha256 differs: the certificate was made for another network";
+  List.iter (fun (part, (w : Weights.t)) ->
+      let path = path_of part w in
+      let holds (name, hash) = sha256_of (beside path name) = hash in
+      require (sha256_of path = w.sha256 && List.for_all holds w.data_files)
+        "network.weights.%s differs: the certificate was made for other weights than %s" part path) net.parts

@@ -1,0 +1,107 @@
+/// MAT files of version 7.3 and Keras models: exact values, what the files say about activations, and rejection of
+/// damaged and malicious files. Files written by h5py are tested in foreign_files_test.
+#include <gtest/gtest.h>
+
+#include "hdf5_writer.h"
+#include "nn/weights/weights.h"
+#include "refusal.h"
+
+namespace swarmcert::files {
+namespace {
+
+using tests::Hdf5Writer;
+
+testing::AssertionResult hdf5_is_refused(const std::string& bytes, const std::vector<std::string>& pieces) {
+  return tests::refuses([&] { parse_weights(bytes, "net.mat"); }, pieces);
+}
+
+TEST(Mat73, NumbersAreReadColumnByColumn) {
+  const Weights weights = parse_weights(tests::small_mat73(), "net.mat");
+  ASSERT_EQ(weights.layers.size(), 2u);
+  EXPECT_EQ(weights.layers[0].weights, (std::vector<double>{1, 3, 2, 4}));
+  EXPECT_EQ(weights.layers[0].biases, (std::vector<double>{0.5, -0.5}));
+  EXPECT_EQ(weights.layers[1].weights, (std::vector<double>{5, 6}));
+  EXPECT_EQ(weights.precision, Precision::kFloat64);
+  EXPECT_FALSE(weights.states_activation());
+}
+
+TEST(Mat73, CompressedChunksGiveTheSameNumbers) {
+  Hdf5Writer writer(512);  // HDF5's 2 x 3 elements are a 3 x 2 matrix in MATLAB
+  writer.add("W1", {2, 3}, {1, 2, 3, 4, 5, 6}, H5T_IEEE_F64LE, {2, 2});
+  writer.set_text("W1", "MATLAB_class", {"double"});
+  const Weights weights = parse_weights(writer.bytes(), "net.mat");
+  EXPECT_EQ(weights.layers.at(0).weights, (std::vector<double>{1, 4, 2, 5, 3, 6}));
+  EXPECT_EQ(weights.layers.at(0).outputs, 3);
+}
+
+TEST(Mat73, TheActivationsThatTheFileStatesAreUsed) {
+  Hdf5Writer writer(512);
+  writer.add_matrix("#refs#/a", {2, 2}, {1, 2, 3, 4});
+  writer.add_matrix("#refs#/b", {1, 2}, {5, 6});
+  writer.add_cells("W", {"#refs#/a", "#refs#/b"});
+  // Two rows of text, padded to the same length and stored column by column: "tanh  ", "linear".
+  std::vector<double> units;
+  const std::string rows[] = {"tanh  ", "linear"};
+  for (std::size_t k = 0; k < 6; ++k)
+    for (const std::string& row : rows) units.push_back(row[k]);
+  writer.add_matrix("act_fcns", {2, 6}, units, "char");
+  const Weights weights = parse_weights(writer.bytes(), "net.mat");
+  EXPECT_EQ(weights.activation_names(), "tanh");
+  EXPECT_EQ(weights.layers.size(), 2u);
+  EXPECT_EQ(weights.activation_source, ActivationSource::kFile);
+}
+
+TEST(Mat73, WhatIsNoNetworkIsRefusedByName) {
+  Hdf5Writer text(512);
+  text.add_matrix("comment", {1, 2}, {'h', 'i'}, "char");
+  EXPECT_TRUE(hdf5_is_refused(text.bytes(), {"neither a cell array", "-v7"}));
+  Hdf5Writer words(512);
+  words.add_matrix("#refs#/a", {1, 2}, {'h', 'i'}, "char");
+  words.add_cells("weights", {"#refs#/a"});
+  EXPECT_TRUE(hdf5_is_refused(words.bytes(), {"\"weights\"", "holds text"}));
+  Hdf5Writer outside(512);
+  outside.link_to_file("other.h5", "W1");
+  EXPECT_TRUE(hdf5_is_refused(outside.bytes(), {"\"W1\"", "another file"}));
+}
+
+TEST(Mat73, TruncatedFilesAreRefused) {
+  const std::string good = tests::small_mat73();
+  for (std::size_t size = 512; size < good.size(); size += 97)
+    EXPECT_TRUE(hdf5_is_refused(good.substr(0, size), {"net.mat"})) << size;
+}
+
+TEST(Mat73, RepetitionsCostNoMoreThanALargeNetwork) {
+  Hdf5Writer writer(512);  // a matrix of 2^20 zeros, a few kilobytes, under 100 names
+  writer.add("W1", {1024, 1024}, std::vector<double>(1 << 20), H5T_IEEE_F64LE, {1024, 1024});
+  writer.set_text("W1", "MATLAB_class", {"double"});
+  for (int k = 2; k <= 100; ++k) writer.link("W1", "W" + std::to_string(k));
+  EXPECT_TRUE(hdf5_is_refused(writer.bytes(), {"more than 2^25 numbers"}));
+}
+
+TEST(Mat73, AMatrixOfManyRowsWithoutColumnsCostsNoTime) {
+  Hdf5Writer writer(512);
+  writer.add("W1", {0, hsize_t{1} << 40}, {});
+  writer.set_text("W1", "MATLAB_class", {"double"});
+  EXPECT_TRUE(hdf5_is_refused(writer.bytes(), {"dimension of size 0"}));
+}
+
+TEST(Keras, LayersOrderAndActivationsAreThoseOfTheModel) {
+  const Weights weights = parse_weights(tests::small_keras("tanh"), "net.h5");
+  ASSERT_EQ(weights.layers.size(), 2u);
+  EXPECT_EQ(weights.layers[0].weights, (std::vector<double>{1, 4, 2, 5, 3, 6}));
+  EXPECT_EQ(weights.layers[0].biases, (std::vector<double>{0.5, 0.25, 0.125}));
+  EXPECT_EQ(weights.layers[1].biases, (std::vector<double>{0}));
+  EXPECT_EQ(weights.activation_names(), "tanh");
+  EXPECT_EQ(weights.precision, Precision::kFloat32);
+  EXPECT_TRUE(weights.assumed.empty());
+}
+
+TEST(Keras, AnUnknownActivationOrAFileWithoutLayersIsRefused) {
+  EXPECT_TRUE(hdf5_is_refused(tests::small_keras("mish"), {"mish", "not known"}));
+  Hdf5Writer other;
+  other.add("table", {2, 2}, {1, 2, 3, 4});
+  EXPECT_TRUE(hdf5_is_refused(other.bytes(), {"without the layers of a Keras model"}));
+}
+
+}  // namespace
+}  // namespace swarmcert::files
