@@ -43,16 +43,13 @@ DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, 
     }
     throw std::logic_error(std::string("downwash has no parameter ") + name);
   };
-  if (shape("tail") != 0) {
-    throw files::InputError({model.path, "", "downwash, tail", std::to_string(shape("tail")),
-                             "spacing knows the Gaussian profile only", "fit the effect with tail = 0"});
-  }
   DownwashField field;
   field.amplitude_N =
       std::abs(values.linear.at(0)) * std::pow(neighbour_mass_kg / 0.034, shape("mass_exponent"));
   field.decay = shape("decay_exponent");
   field.spread_m = shape("spread_m");
   field.spread_slope = shape("spread_slope");
+  field.tail = shape("tail");
   return field;
 }
 
@@ -60,6 +57,7 @@ DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, 
 void add_spacing(const stability::SpacingQuestion& question, const stability::Spacing& found,
                  const std::string& source, files::Json& result) {
   result["max_error_m"] = question.max_error_m;
+  result["dwell_s"] = question.dwell_s;
   result["neighbours"] = question.neighbours;
   result["guard"] = question.guard;
   result["field"] = source;
@@ -74,7 +72,7 @@ void add_spacing(const stability::SpacingQuestion& question, const stability::Sp
                                {"keep_out_radius_m", finite(row.keep_out_radius_m)},
                                {"may_cross", std::isfinite(row.least_speed_m_s)},
                                {"least_speed_m_s", finite(row.least_speed_m_s)},
-                               {"thrust_margin_N", row.thrust_margin_N}});
+                               {"thrust_margin_N", finite(row.thrust_margin_N)}});
   }
 }
 
@@ -94,6 +92,11 @@ void print_spacing(const stability::SpacingQuestion& question, const stability::
                                                     : "never",
                row.thrust_margin_N);
   }
+  fmt::print(
+      "\nEach line holds for any number of straight passes at this speed or faster, with {:g} s or more "
+      "outside the "
+      "radius between two of them, and any motion outside.\n",
+      question.dwell_s);
   fmt::print("\nleast gap to stay below: {}; to cross below: {}\n",
              std::isfinite(found.least_gap_to_stay_m) ? fmt::format("{:.3f} m", found.least_gap_to_stay_m)
                                                       : "none in range",
@@ -120,22 +123,11 @@ int run_spacing(const SpacingOptions& options, const CommonOptions& common) {
     neighbour_mass_kg = stability::read_model(options.neighbour_model).mass_kg;
     inputs.push_back(options.neighbour_model);
   }
-  const std::optional<stability::AxisLoop> loop = axis_loop(input.gains, input.plant, 2);
-  if (!loop) throw UsageError("Lambda or K couples the z axis to others: spacing needs its own loop");
-  const std::optional<stability::SampledLoop> sampled = sampled_axis_loop(input.gains, input.plant, 2);
-  const stability::GainNorms gains =
-      sampled ? sampled_norms(*sampled, stability::Channel::kForce, stability::Instants::kAll)
-              : continuous_norms(*loop, stability::Channel::kForce);
-  stability::AxisLoop acting = *loop;
-  if (sampled) acting.Ki = effective_Ki(*sampled);
+  if (!input.continuous(2))
+    throw UsageError("Lambda or K couples the z axis to others: spacing needs its own loop");
   std::string source;
   const DownwashField field = field_of(input.model, neighbour_mass_kg, source);
-  stability::SpacingVehicle vehicle;
-  vehicle.effort_gain = effort_gain(acting);
-  vehicle.largest_thrust_N = input.plant.thrust_scale * input.plant.largest_thrust_N;
-  vehicle.integral_share = sampled ? sampled->integrator_step_s / sampled->period_s : 1;
-  vehicle.integrator_limit_m_s = input.gains.integrator_limit_m_s[2];
-  const stability::Spacing found = spacing(acting, gains, vehicle, field, options.question);
+  const stability::Spacing found = spacing(input, field, options.question);
 
   files::Json result = result_head("spacing", inputs);
   add_spacing(options.question, found, source, result);
@@ -156,8 +148,8 @@ Command spacing_command() {
   return {"spacing", "Least distance and crossing speed for vehicles that pass below one another",
           "States for every height gap whether the lower vehicle may stay there, how far to the side it "
           "must keep\n"
-          "otherwise, and how fast it must cross so that its error bound stays below the limit with thrust\n"
-          "to spare.\n\n"
+          "otherwise, and how fast it must cross, however often and with how much time between, so that its\n"
+          "error bound stays below the limit with thrust to spare.\n\n"
           "Example: swarmcert spacing --gains controller/gains/crazyflie-small.toml --model "
           "stability/models/crazyflie-small.toml \\\n           --max-error 0.1",
           [](CLI::App& app) {
@@ -166,6 +158,9 @@ Command spacing_command() {
             auto& question = options->question;
             app.add_option("--max-error", question.max_error_m, "Largest vertical error, m")
                 ->required()
+                ->check(CLI::PositiveNumber);
+            app.add_option("--dwell", question.dwell_s,
+                           "Least time outside the keep-out radius between two passes, s (default 2)")
                 ->check(CLI::PositiveNumber);
             app.add_option("--neighbours", question.neighbours, "Vehicles above at the same time (default 1)")
                 ->check(CLI::PositiveNumber);
