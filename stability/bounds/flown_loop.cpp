@@ -134,13 +134,13 @@ double FlownLoop::spectral_radius() const {
   MatrixXd control = MatrixXd::Zero(after.back(), before.back());
   MatrixXd hold = MatrixXd::Zero(before.back(), after.back());
   for (std::size_t i = 0; i < 3; ++i) {
-    const SampledModel& model = models[i];
-    control.block(after[i], before[i], model.size() + 1, model.size()) = model.control();
-    hold.block(before[i], after[i], model.size(), model.size() + 1) = model.hold();
+    const SampledModel& block = models[i];
+    control.block(after[i], before[i], block.size() + 1, block.size()) = block.control();
+    hold.block(before[i], after[i], block.size(), block.size() + 1) = block.hold();
     for (std::size_t j = 0; j < 3; ++j) {
       const auto row = static_cast<Index>(i), column = static_cast<Index>(j);
       const double Ki = feedback.Ki(row, column) / integral_share();
-      const Index command = after[i] + model.command_index();
+      const Index command = after[i] + block.command_index();
       control(command, before[j]) = -(feedback.Kp(row, column) + Ki * gains.integrator_step_s);
       control(command, before[j] + 1) = -feedback.Kd(row, column);
       control(command, before[j] + models[j].integral_index()) = -Ki;

@@ -159,7 +159,8 @@ std::optional<double> flown_ball_per_rate(const FlownLoop& loop, const Theorem& 
     const auto is_same = [&one](const SampledLoop& other) { return other.plant == one->plant; };
     if (std::any_of(groups.begin(), groups.end(), is_same)) continue;
     groups.push_back(*one);
-    const double rate = sampled_norms(*one, Channel::kCommand, Instants::kAll).rate;
+    const double rate = std::max(sampled_norms(*one, Channel::kForce, Instants::kAll).rate,
+                                 sampled_norms(*one, Channel::kCommand, Instants::kAll).rate);
     square += rate * rate;
   }
   return std::sqrt(square);

@@ -36,7 +36,8 @@ Theorem check_theorem(const FlownLoop& loop, const std::optional<PerAxis>& integ
 
 /// Returns the ball per unit of d_m of the loop that flies, m per N/s: an upper bound on sup |e| from rest over all
 /// |eps'| <= 1 N/s, for all axes together; axes with equal loops count once. For a sampled loop it is that of its exact
-/// rate gains. Nothing if Lambda or K couples the axes of a sampled loop, or if the theorem does not apply.
+/// rate gains, for a force or an error of the command. Nothing if Lambda or K couples the axes of a sampled loop, or if
+/// the theorem does not apply.
 std::optional<double> flown_ball_per_rate(const FlownLoop& loop, const Theorem& theorem);
 
 /// The closed-form transient bound, valid for all t >= 0:

@@ -108,7 +108,7 @@ TEST(Spacing, NoSequenceOfPassesExceedsTheLimit) {
           most_m = std::max(most_m, std::abs(flight.step(force_N, force_N)));
         }
         EXPECT_LE(most_m, question.max_error_m) << row.height_gap_m;
-        EXPECT_GT(most_m, 0.3 * question.max_error_m) << row.height_gap_m;
+        EXPECT_GT(most_m, 0.25 * question.max_error_m) << row.height_gap_m;
       }
     }
     EXPECT_GT(crossings, 0);
