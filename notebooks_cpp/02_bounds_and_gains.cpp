@@ -22,8 +22,8 @@ using namespace swarmcert;
 int main() {
   const double mass_kg = 0.034, rate_N_s = 0.3;
   const stability::Gains gains = stability::load_gains("controller/gains/composite.toml");
-  const stability::Theorem theorem = stability::check_theorem(gains, mass_kg, {});
-  const stability::AxisLoop loop = *stability::axis_loop(gains, {mass_kg, 1, 0}, 2);
+  const stability::Theorem theorem = stability::check_theorem({gains, {mass_kg}}, {});
+  const stability::AxisLoop loop = *stability::FlownLoop{gains, {mass_kg}}.continuous(2);
   const double exact = stability::continuous_norms(loop, stability::Channel::kCommand).rate;
   fmt::print("theorem applies: {}\n", theorem.applies);
   fmt::print("its ball:        {:.4f} m\n", theorem.ball_per_rate() * rate_N_s);
@@ -41,10 +41,10 @@ int main() {
     stability::Gains both = gains;
     both.composite->Lambda_1_s = controller::scaled(c, both.composite->Lambda_1_s);
     both.composite->K_kg_s = controller::scaled(c, both.composite->K_kg_s);
-    const double ball = stability::check_theorem(both, mass_kg, {}).ball_per_rate() * rate_N_s;
-    const double lag_limit = stability::lag_limit(*stability::axis_loop(both, {mass_kg, 1, 0}, 2));
+    const double ball = stability::check_theorem({both, {mass_kg}}, {}).ball_per_rate() * rate_N_s;
+    const double lag_limit = stability::lag_limit(*stability::FlownLoop{both, {mass_kg}}.continuous(2));
     both.motor_lag_s = 0.057;
-    const stability::AxisLoop lagged = *stability::axis_loop(both, {mass_kg, 1, 0}, 2);
+    const stability::AxisLoop lagged = *stability::FlownLoop{both, {mass_kg}}.continuous(2);
     const double error = stability::continuous_norms(lagged, stability::Channel::kCommand).rate * rate_N_s;
     data += fmt::format("{:.2f} {:.4g} {:.4g}\n", c, 1000 * ball, 1000 * error);
     if (step % 10 == 0) {

@@ -16,7 +16,7 @@
 #include "lipschitz/values/range.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/functions.h"
-#include "stability/bounds/tracking_setup.h"
+#include "stability/bounds/flown_loop.h"
 
 namespace swarmcert::gate {
 namespace {
@@ -144,10 +144,10 @@ lipschitz::Domain Evidence::domain() {
   return clamp;
 }
 
-const stability::TrackingSetup& Evidence::tracking() {
+const stability::FlownLoop& Evidence::tracking() {
   if (!tracking_) {
-    tracking_ = std::make_unique<stability::TrackingSetup>(
-        stability::load_tracking_setup(release().gains, release().model, release().battery_V));
+    tracking_ = std::make_unique<stability::FlownLoop>(
+        stability::load_flown_loop(release().gains, release().model, release().battery_V));
     const std::string problem = stability::battery_problem(tracking_->model, release().battery_V);
     if (!problem.empty()) {
       tracking_.reset();

@@ -23,7 +23,7 @@ struct Inputs;
 struct VelocityError;
 }  // namespace swarmcert::residuals
 namespace swarmcert::stability {
-struct TrackingSetup;
+struct FlownLoop;
 }
 
 namespace swarmcert::gate {
@@ -84,7 +84,7 @@ class Evidence {
   /// @throws Unfounded if there is neither.
   lipschitz::Domain domain();
 
-  const stability::TrackingSetup& tracking();
+  const stability::FlownLoop& tracking();
 
   /// Compares the model with the reference flights; with the closed loop if the policy asks for a guard factor.
   const residuals::Comparison& comparison();
@@ -111,7 +111,7 @@ class Evidence {
   std::unique_ptr<files::Json> certificate_;
   std::unique_ptr<check::CheckResult> verdict_;
   std::unique_ptr<std::vector<LipschitzBound>> bounds_, computed_;
-  std::unique_ptr<stability::TrackingSetup> tracking_;
+  std::unique_ptr<stability::FlownLoop> tracking_;
   std::unique_ptr<residuals::Comparison> comparison_, residual_comparison_;
   std::unique_ptr<residuals::VelocityError> velocity_error_;
   bool looked_for_velocity_error_ = false;

@@ -17,23 +17,6 @@ namespace {
 
 using namespace stability;  // NOLINT: every name below is of that library
 
-/// Converts the firmware's control law to PID gains, so that the true mass may differ from the nominal one.
-bool as_pid(const TrackingSetup& setup, Gains& gains) {
-  PidGains pid{};
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto i = static_cast<std::size_t>(axis);
-    const std::optional<controller::AxisPid<double>> one = axis_gains(setup.gains, setup.plant.mass_kg, axis);
-    if (!one) return false;
-    pid.Kp_1_s2[i] = one->Kp_1_s2;
-    pid.Kd_1_s[i] = one->Kd_1_s;
-    pid.Ki_1_s3[i] = one->Ki_1_s3;
-  }
-  gains = setup.gains;
-  gains.composite.reset();
-  gains.pid = pid;
-  return true;
-}
-
 /// The points of the box at which bounds are evaluated: its centre, then its corners, without duplicates.
 std::vector<std::array<double, 4>> points_of(const UncertainPlant& box) {
   const Interval ranges[] = {box.mass_kg, box.thrust_scale, box.lag_s, box.delay_s};
@@ -47,130 +30,98 @@ std::vector<std::array<double, 4>> points_of(const UncertainPlant& box) {
   return points;
 }
 
-/// AxisBounds::least() for one plant: the loop used in flight, at all times.
-double nominal_bound(const Gains& gains, const Plant& plant, const DisturbanceSource& source, int axis,
-                     Channel channel) {
-  const Disturbance& d = source.axis[axis];
-  const OtherErrors other = source.other(axis, {}, plant);
-  const double limit_m_s = gains.integrator_limit_m_s[static_cast<std::size_t>(axis)];
-  if (const std::optional<SampledLoop> sampled = sampled_axis_loop(gains, plant, axis)) {
-    return axis_bounds(*sampled, channel, sampled_norms(*sampled, channel, Instants::kAll), d, other,
-                       source.classes_contain_bias, limit_m_s)
-        .least();
-  }
-  const AxisLoop loop = *axis_loop(gains, plant, axis);
-  return axis_bounds(loop, channel, continuous_norms(loop, channel), d, other, source.classes_contain_bias,
-                     limit_m_s)
-      .least();
-}
-
 /// Whether an axis has the same loop and force error as the previous one.
-bool repeats(const Gains& pid, const DisturbanceSource& source, int axis) {
-  if (axis == 0) return false;
-  const auto i = static_cast<std::size_t>(axis);
-  return pid.pid->Kp_1_s2[i] == pid.pid->Kp_1_s2[i - 1] && pid.pid->Kd_1_s[i] == pid.pid->Kd_1_s[i - 1] &&
-         pid.pid->Ki_1_s3[i] == pid.pid->Ki_1_s3[i - 1] &&
-         pid.integrator_limit_m_s[i] == pid.integrator_limit_m_s[i - 1] &&
-         (axis < 2 || pid.attitude_lag_s == 0) && source.axis[axis] == source.axis[axis - 1] &&
-         source.bias_N[axis] == source.bias_N[axis - 1] &&
+bool repeats(const FlownLoop& loop, const DisturbanceSource& source, int axis) {
+  return axis > 0 && loop.continuous(axis) == loop.continuous(axis - 1) &&
+         loop.integrator_limit_m_s(axis) == loop.integrator_limit_m_s(axis - 1) &&
+         source.axis[axis] == source.axis[axis - 1] && source.bias_N[axis] == source.bias_N[axis - 1] &&
          source.velocity_error[axis] == source.velocity_error[axis - 1] &&
          source.position_error[axis] == source.position_error[axis - 1];
 }
 
-std::pair<Gains, Plant> at_point(const TrackingSetup& setup, const Gains& pid,
-                                 const std::array<double, 4>& point) {
-  Gains gains = pid;
-  gains.motor_lag_s = point[2];
-  gains.delay_s = point[3];
-  Plant plant = setup.plant;
-  plant.mass_kg = point[0];
-  plant.thrust_scale = point[1] * setup.plant.mass_kg / point[0];
-  return {gains, plant};
+/// The loop at one point of the box; the law commands forces for the mass that it was told.
+FlownLoop at_point(FlownLoop loop, const std::array<double, 4>& point) {
+  loop.plant.told_mass_kg = loop.told_mass_kg();
+  loop.plant.mass_kg = point[0];
+  loop.plant.thrust_scale = point[1];
+  loop.gains.motor_lag_s = point[2];
+  loop.gains.delay_s = point[3];
+  return loop;
 }
 
-void add_reached(const TrackingSetup& setup, const Gains& pid, const UncertainPlant& box,
-                 const DisturbanceSource& source, BoxBound& result) {
-  for (const std::array<double, 4>& point : points_of(box)) {
-    const auto [gains, plant] = at_point(setup, pid, point);
+void add_reached(const FlownLoop& setup, const UncertainPlant& box, const DisturbanceSource& source,
+                 BoxBound& result) {
+  const std::vector<std::array<double, 4>> points = points_of(box);
+  for (const std::array<double, 4>& point : points) {
+    const FlownLoop loop = at_point(setup, point);
+    const Saturation found = saturation(loop, source, {});
+    const bool is_worse = found.is_proved() == result.saturation.is_proved()
+                              ? found.margin_N() < result.saturation.margin_N()
+                              : !found.is_proved();
+    if (&point == &points.front() || is_worse) result.saturation = found;
     for (int axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<std::size_t>(axis);
-      if (repeats(pid, source, axis)) {
+      if (repeats(setup, source, axis)) {
         result.reached_m[i] = result.reached_m[i - 1];
         result.where[i] = result.where[i - 1];
         continue;
       }
       for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
-        const double bound = nominal_bound(gains, plant, source, axis, channel);
+        const double bound = axis_bounds(loop, flown_gains(loop, axis, channel), source, {}).least();
         if (bound <= result.reached_m[i]) continue;  // NaN is stored as well
         result.reached_m[i] = bound;
         result.where[i] = fmt::format(
             "{} channel, {} loop, mass {:.4g} kg, thrust scale {:.4g}, motor lag {:.4g} s, delay {:.4g} s",
-            stability::name(channel), pid.rate_hz > 0 ? "sampled" : "continuous", point[0], point[1],
+            stability::name(channel), loop.is_sampled() ? "sampled" : "continuous", point[0], point[1],
             point[2], point[3]);
       }
     }
   }
 }
 
-/// Least margin to saturation at the corners and the centre of the box; infinite if it is unknown.
-double least_thrust_margin_N(const TrackingSetup& setup, const Gains& pid, const UncertainPlant& box,
-                             const DisturbanceSource& source) {
-  double least_N = std::numeric_limits<double>::infinity();
-  for (const std::array<double, 4>& point : points_of(box)) {
-    const auto [gains, plant] = at_point(setup, pid, point);
-    Plant rotors = plant;
-    rotors.thrust_scale = point[1];  // of the maximum thrust, whatever mass the law is told
-    const std::optional<double> margin_N = thrust_margin_N(rotors, *axis_loop(gains, plant, 2), source, {});
-    least_N = std::min(least_N, margin_N.value_or(least_N));
-  }
-  return least_N;
-}
-
 double times(double gain, double size) { return size == 0 ? 0 : gain * size; }  // avoids infinity times zero
 
-bool has_clamp(const Gains& pid, int axis) {
-  const auto i = static_cast<std::size_t>(axis);
-  return pid.pid->Ki_1_s3[i] > 0 && std::isfinite(pid.integrator_limit_m_s[i]);
+bool has_clamp(const FlownLoop& loop, int axis) {
+  return loop.continuous(axis)->Ki > 0 && std::isfinite(loop.integrator_limit_m_s(axis));
 }
 
-UncertainNorms norms_over(const Gains& pid, const AxisLoop& loop, const UncertainPlant& box,
+/// @param axis of a sampled loop: with the Ki as written.
+UncertainNorms norms_over(const FlownLoop& loop, const AxisLoop& axis, const UncertainPlant& box,
                           Channel channel) {
-  if (pid.rate_hz == 0) return uncertain_norms(loop, box, channel);
-  return uncertain_norms(SampledLoop{loop, 1 / pid.rate_hz, pid.integrator_step_s}, box, channel);
+  if (!loop.is_sampled()) return uncertain_norms(axis, box, channel);
+  return uncertain_norms(SampledLoop{axis, 1 / loop.gains.rate_hz, loop.gains.integrator_step_s}, box,
+                         channel);
 }
 
 /// Bound of the estimation errors, treated as errors of the command: m Kd n for the velocity, m (Kp n + Ki int n) for
 /// the position, where the integral term changes at a rate of at most m Ki |n|.
 /// @param command gains from the command to the tracking error.
 /// @param told gains and mass as used by the firmware.
-double of_estimates(const Gains& pid, const AxisLoop& told, const UncertainPlant& box,
+double of_estimates(const FlownLoop& setup, const AxisLoop& told, const UncertainPlant& box,
                     const DisturbanceSource& source, int axis, const UncertainNorms& command) {
-  const double period_share = pid.rate_hz > 0 ? pid.integrator_step_s * pid.rate_hz : 1;
   const double force_N = box.thrust_scale.upper * told.mass_kg;
   const double velocity = source.velocity_error[axis].largest();
   const double position = source.position_error[axis].largest();
   return force_N * (times(command.amplitude.upper, told.Kd * velocity + told.Kp * position) +
-                    times(command.rate.upper, told.Ki * period_share * position));
+                    times(command.rate.upper, told.Ki * setup.integral_share() * position));
 }
 
 /// Largest bound of one axis and channel over the box.
-double enclosed(const TrackingSetup& setup, const Gains& pid, const UncertainPlant& box,
-                const DisturbanceSource& source, int axis, Channel channel) {
-  Plant told = setup.plant;
-  told.thrust_scale = 1;
-  AxisLoop loop = *axis_loop(pid, told, axis);
-  loop.lags_s.clear();
-  if (axis < 2 && pid.attitude_lag_s > 0) loop.lags_s.push_back(pid.attitude_lag_s);
-  loop.delay_s = 0;
+double enclosed(const FlownLoop& setup, const UncertainPlant& box, const DisturbanceSource& source, int axis,
+                Channel channel) {
+  FlownLoop told = setup;
+  told.plant.thrust_scale = 1;
+  told.gains.motor_lag_s = told.gains.delay_s = 0;
+  const AxisLoop loop = told.is_sampled() ? told.sampled(axis)->plant : *told.continuous(axis);
   const Disturbance& d = source.axis[axis];
   const double bias = std::abs(source.bias_N[axis]);
-  const UncertainNorms norms = norms_over(pid, loop, box, channel);
+  const UncertainNorms norms = norms_over(setup, loop, box, channel);
   const auto of_command = [&](const AxisLoop& of, const UncertainNorms& same) {
-    return channel == Channel::kCommand ? same : norms_over(pid, of, box, Channel::kCommand);
+    return channel == Channel::kCommand ? same : norms_over(setup, of, box, Channel::kCommand);
   };
   const bool has_estimates = !source.velocity_error[axis].is_zero() || !source.position_error[axis].is_zero();
   const auto estimates_m = [&](const AxisLoop& of, const UncertainNorms& command) {
-    return has_estimates ? of_estimates(pid, of, box, source, axis, command) : 0;
+    return has_estimates ? of_estimates(setup, of, box, source, axis, command) : 0;
   };
   // The bias acts as a step; a measured amplitude or impulse contains it.
   const double step_m = times(norms.edge.upper, bias);
@@ -180,42 +131,42 @@ double enclosed(const TrackingSetup& setup, const Gains& pid, const UncertainPla
   double least = std::min(with_bias, times(norms.rate.upper, d.rate_N_s) + step_m);
   if (d.passes == 1) least = std::min(least, times(norms.edge.upper, d.variation_N) + step_m);
   if (has_estimates) least += estimates_m(loop, of_command(loop, norms));
-  if (!has_clamp(pid, axis)) return least;
+  if (!has_clamp(setup, axis)) return least;
   // int e responds to f as e responds to the integral of f: |int e| <= |h|_1 sup|f|, also for a bias. The
   // contribution of estimation errors to the integral is not enclosed.
-  const double limit_m_s = pid.integrator_limit_m_s[static_cast<std::size_t>(axis)];
+  const double limit_m_s = setup.integrator_limit_m_s(axis);
   const double bias_beside = source.classes_contain_bias ? 0 : bias;
   if (!has_estimates && times(norms.rate.upper, d.amplitude_N + bias_beside) <= limit_m_s) return least;
   AxisLoop no_integral = loop;
   no_integral.Ki = 0;
-  const UncertainNorms without = norms_over(pid, no_integral, box, channel);
+  const UncertainNorms without = norms_over(setup, no_integral, box, channel);
   const UncertainNorms command = of_command(no_integral, without);
   return times(without.amplitude.upper, d.amplitude_N) + times(without.edge.upper, bias_beside) +
-         times(command.amplitude.upper, box.thrust_scale.upper * told.mass_kg * loop.Ki * limit_m_s) +
+         times(command.amplitude.upper, box.thrust_scale.upper * loop.mass_kg * loop.Ki * limit_m_s) +
          estimates_m(no_integral, command);
 }
 
 }  // namespace
 
-BoxBound bound_over(const TrackingSetup& setup, const UncertainPlant& box, const DisturbanceSource& source) {
+BoxBound bound_over(const FlownLoop& setup, const UncertainPlant& box, const DisturbanceSource& source) {
   BoxBound result;
-  Gains pid;
-  if (!as_pid(setup, pid)) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (setup.continuous(axis)) continue;
     std::fill(std::begin(result.reached_m), std::end(result.reached_m),
               std::numeric_limits<double>::quiet_NaN());
     return result;
   }
-  add_reached(setup, pid, box, source, result);
-  result.thrust_margin_N = least_thrust_margin_N(setup, pid, box, source);
-  result.is_enclosed = pid.rate_hz == 0 || !(has_clamp(pid, 0) || has_clamp(pid, 1) || has_clamp(pid, 2));
-  const FloatErrors float32 = float_errors(setup, tracking_bounds(setup.gains, setup.plant, {}, {}));
+  add_reached(setup, box, source, result);
+  result.is_enclosed =
+      !setup.is_sampled() || !(has_clamp(setup, 0) || has_clamp(setup, 1) || has_clamp(setup, 2));
+  const FloatErrors float32 = float_errors(setup, tracking_bounds(setup, {}, {}));
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    if (result.is_enclosed && repeats(pid, source, axis)) {
+    if (result.is_enclosed && repeats(setup, source, axis)) {
       result.enclosed_m[i] = result.enclosed_m[i - 1];
     } else if (result.is_enclosed) {
-      result.enclosed_m[i] = std::max(enclosed(setup, pid, box, source, axis, Channel::kForce),
-                                      enclosed(setup, pid, box, source, axis, Channel::kCommand));
+      result.enclosed_m[i] = std::max(enclosed(setup, box, source, axis, Channel::kForce),
+                                      enclosed(setup, box, source, axis, Channel::kCommand));
     }
   }
   for (std::size_t i = 0; i < 3; ++i) {

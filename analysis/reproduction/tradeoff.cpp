@@ -83,7 +83,8 @@ Finding lipschitz_tradeoff(const Setting& setting) {
   Stages stages(setting, truth, 0);
   const int stage = stage_of(kVehicles);
   const stability::Gains gains = stability::load_gains(setting.gains);
-  const std::optional<stability::AxisLoop> loop = stability::axis_loop(gains, {truth.model.mass_kg, 1, 0}, 2);
+  const std::optional<stability::AxisLoop> loop =
+      stability::FlownLoop{gains, {truth.model.mass_kg}}.continuous(2);
   finding.json["truth"] = truth.name;
   finding.json["trained_with"] = kVehicles;
   finding.json["curve"] = files::Json::array();

@@ -58,22 +58,6 @@ void add_declared(const stability::DisturbanceSource& declared, stability::Distu
   }
 }
 
-double bound_m(const stability::Gains& gains, const stability::Plant& plant,
-               const stability::ExactGains& exact, const stability::DisturbanceSource& source,
-               const stability::InitialError& initial) {
-  const double limit_m_s = gains.integrator_limit_m_s[static_cast<std::size_t>(exact.axis)];
-  const stability::Disturbance& known = source.axis[exact.axis];
-  const stability::OtherErrors other = source.other(exact.axis, initial, plant);
-  if (exact.loop == stability::Loop::kSampled) {
-    return axis_bounds(*sampled_axis_loop(gains, plant, exact.axis), exact.channel, exact.all_times, known,
-                       other, source.classes_contain_bias, limit_m_s)
-        .least();
-  }
-  return axis_bounds(*axis_loop(gains, plant, exact.axis), exact.channel, exact.all_times, known, other,
-                     source.classes_contain_bias, limit_m_s)
-      .least();
-}
-
 }  // namespace
 
 std::vector<FlightClass> read_flight_classes(const std::string& path) {
@@ -103,7 +87,7 @@ std::vector<FlightClass> read_flight_classes(const std::string& path) {
   return flights;
 }
 
-std::vector<PromisedBound> promised_bounds(const stability::Gains& gains, const stability::Plant& plant,
+std::vector<PromisedBound> promised_bounds(const stability::FlownLoop& loop,
                                            const stability::TrackingReport& report,
                                            const std::vector<FlightClass>& flights,
                                            const stability::DisturbanceSource& declared,
@@ -120,7 +104,7 @@ std::vector<PromisedBound> promised_bounds(const stability::Gains& gains, const 
     for (const FlightClass& flight : flights) {
       stability::DisturbanceSource source = flight.source;
       add_declared(declared, source);
-      scores.push_back({flight.flight, beside_m + bound_m(gains, plant, exact, source, initial)});
+      scores.push_back({flight.flight, beside_m + axis_bounds(loop, exact, source, initial).least()});
     }
     rows.push_back({exact.axis, exact.channel, exact.loop, conformal_threshold(scores, level)});
   }

@@ -38,7 +38,7 @@ struct PromisedBound {
 /// @param report result of tracking_bounds(): its gains are reused, and staircase_m and float32_m of its bounds are
 ///     added.
 /// @throws std::invalid_argument for fewer flights than the level needs; see fewest_groups().
-std::vector<PromisedBound> promised_bounds(const stability::Gains& gains, const stability::Plant& plant,
+std::vector<PromisedBound> promised_bounds(const stability::FlownLoop& loop,
                                            const stability::TrackingReport& report,
                                            const std::vector<FlightClass>& flights,
                                            const stability::DisturbanceSource& declared,

@@ -162,8 +162,16 @@ DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, cons
   return bounds;
 }
 
+double effort_of_class_N(const AxisLoop& loop, Channel channel, const Disturbance& disturbance) {
+  const double own = channel == Channel::kCommand ? 1 : 0;
+  const double by_amplitude = times_known(effort_gain(loop, channel) - own, disturbance.largest_N());
+  const double by_impulse =
+      times_known(effort_impulse_gain(loop, channel) * disturbance.passes, disturbance.impulse_N_s);
+  return times_known(own, disturbance.largest_N()) + std::min(by_amplitude, by_impulse);
+}
+
 ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance,
-                         const OtherErrors& other, double limit_m_s, double integral_share) {
+                         const OtherErrors& other, double limit_m_s) {
   ClampBounds result;
   if (loop.Ki == 0 || std::isinf(limit_m_s)) return result;
   result.exists = true;
@@ -175,11 +183,11 @@ ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbanc
                             : felt_passes(disturbance, FadingResponse(step_transfer(loop, channel)));
     demand_m_s = std::min(demand_m_s, disturbance.impulse_N_s * felt);
   }
-  result.set_demand(integral_share * (demand_m_s + integral_demand_m_s(loop, channel, other)), limit_m_s);
+  result.set_demand(demand_m_s + integral_demand_m_s(loop, channel, other), limit_m_s);
   AxisLoop without = loop;
   without.Ki = 0;
   const GainNorms pd = continuous_norms(without, channel);
-  const double integral_N = loop.mass_kg * loop.Ki / integral_share * limit_m_s;
+  const double integral_N = loop.mass_kg * loop.Ki * limit_m_s;
   const GainNorms pd_command =
       channel == Channel::kCommand ? pd : continuous_norms(without, Channel::kCommand);
   const double constant_m =

@@ -1,6 +1,7 @@
 /// @file Bounds on the tracking error of one axis for the declared classes of disturbances, and the smallest one.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -24,6 +25,8 @@ struct Disturbance {
   double pass_length_s = 0;  ///< duration of one pass
   /// True if variation_N is also that of one pass, for a force that need not vanish between passes.
   bool variation_per_pass = false;
+  /// Returns the smallest bound on |f| that follows.
+  double largest_N() const { return variation_per_pass ? amplitude_N : std::min(amplitude_N, variation_N); }
   bool operator==(const Disturbance& o) const {
     return rate_N_s == o.rate_N_s && amplitude_N == o.amplitude_N && variation_N == o.variation_N &&
            impulse_N_s == o.impulse_N_s && passes == o.passes && pass_period_s == o.pass_period_s &&
@@ -89,12 +92,12 @@ struct ClampBounds {
 };
 
 /// Returns the clamp's effect. For a sampled loop's own clamp see sampled_bounds.h.
-/// @param loop with the effective integral gain.
-/// @param limit_m_s infinite: no clamp.
-/// @param integral_share what the firmware adds to its integrator per second of error: 1 unless its step differs from
-///     its period.
+/// @param limit_m_s on |int e dt|, FlownLoop::integral_limit_m_s(); infinite: no clamp.
 ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance,
-                         const OtherErrors& other, double limit_m_s, double integral_share = 1);
+                         const OtherErrors& other, double limit_m_s);
+
+/// Returns sup |u| of the commanded force due to a force error, N; for kCommand including the error itself.
+double effort_of_class_N(const AxisLoop& loop, Channel channel, const Disturbance& disturbance);
 
 /// Returns a bound on sup |e| over all f with |f| <= amplitude and |f'| <= rate, from rest: split_bound() of h on a
 /// grid of `nodes`.

@@ -300,13 +300,13 @@ double effort_gain(const SampledLoop& loop) {
   return sum.norms().amplitude;
 }
 
-double effort_N(const SampledLoop& loop, const OtherErrors& errors) {
+double effort_N(const SampledLoop& loop, const OtherErrors& errors, Channel channel) {
   const SampledAdjoint adjoint(loop);
   if (!adjoint.is_stable()) return kInfinity;
-  return loop.plant.mass_kg * largest_output(loop, adjoint, commanded(adjoint), Channel::kForce, errors);
+  return loop.plant.mass_kg * largest_output(loop, adjoint, commanded(adjoint), channel, errors);
 }
 
-double effort_N(const AxisLoop& loop, const OtherErrors& errors) {
+double effort_N(const AxisLoop& loop, const OtherErrors& errors, Channel channel) {
   const double effort = effort_gain(loop);
   // An error of an estimate enters the command immediately, and the loop responds to it as to a force.
   const auto velocity_error = [&] { return loop.Kd * (1 + effort); };
@@ -328,7 +328,7 @@ double effort_N(const AxisLoop& loop, const OtherErrors& errors) {
     }
     return most;
   };
-  return part(errors.step_N(), [&] { return effort; }) +
+  return part(errors.step_N(), [&] { return effort_gain(loop, channel); }) +
          loop.mass_kg *
              (part(errors.velocity_error.largest(), velocity_error) +
               part(errors.position_error.largest(), position_error) + part(errors.position_m, position)) +

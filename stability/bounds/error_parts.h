@@ -35,8 +35,13 @@ struct ReferenceMotion {
   double steps_m = 0;          ///< sum of the sizes of all jumps of p_d
   double speed_steps_m_s = 0;  ///< of all jumps of p_d', such as the start and the end of a ramp
   double jerk_m_s3 = 0;        ///< sup |p_d'''| between the jumps; p_d'' is zero before t = 0
+  double acceleration_m_s2 =
+      std::numeric_limits<double>::infinity();  ///< sup |p_d''|; needs a jerk to be nonzero
+  /// Returns sup of the acceleration that is fed forward.
+  double fed_forward_m_s2() const { return jerk_m_s3 == 0 ? 0 : acceleration_m_s2; }
   bool operator==(const ReferenceMotion& o) const {
-    return steps_m == o.steps_m && speed_steps_m_s == o.speed_steps_m_s && jerk_m_s3 == o.jerk_m_s3;
+    return steps_m == o.steps_m && speed_steps_m_s == o.speed_steps_m_s && jerk_m_s3 == o.jerk_m_s3 &&
+           acceleration_m_s2 == o.acceleration_m_s2;
   }
 };
 
@@ -105,9 +110,9 @@ double drift_gain(const AxisLoop& loop);
 /// The same for a sampled loop; n is the error at the last sample.
 double drift_gain(const SampledLoop& loop);
 
-/// Returns the demand of these errors on the feedback, N: the supremum of its part of the commanded force, force
-/// channel.
-double effort_N(const AxisLoop& loop, const OtherErrors& errors);
-double effort_N(const SampledLoop& loop, const OtherErrors& errors);
+/// Returns the demand of these errors on the commanded force beside weight and feedforward, N; a step of the force
+/// error enters by `channel`.
+double effort_N(const AxisLoop& loop, const OtherErrors& errors, Channel channel = Channel::kForce);
+double effort_N(const SampledLoop& loop, const OtherErrors& errors, Channel channel = Channel::kForce);
 
 }  // namespace swarmcert::stability

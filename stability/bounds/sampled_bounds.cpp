@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "nn/base/doubles.h"
 #include "stability/bounds/amplitude_and_rate.h"
@@ -51,7 +52,9 @@ struct Kernel {
   }
 };
 
-Kernel kernel_of(const SampledAdjoint& adjoint, Channel channel, double phase_s, double mass_kg) {
+/// @param with_own whether an error of the command in the output's own period is included.
+Kernel kernel_of(const SampledAdjoint& adjoint, Channel channel, double phase_s, double mass_kg,
+                 bool with_own = true) {
   Kernel kernel;
   kernel.step.push_back(0);
   if (channel == Channel::kForce) {
@@ -67,8 +70,12 @@ Kernel kernel_of(const SampledAdjoint& adjoint, Channel channel, double phase_s,
     // An error of one period is a force held for that period, with the same int |eps| dt.
     const double period_s = adjoint.period_s();
     const double scale = 1 / (mass_kg * period_s);
+    bool skips = !with_own;
     adjoint.command_kernel(
-        phase_s, [&](double response) { kernel.add(response * scale, 0, period_s); },
+        phase_s,
+        [&](double response) {
+          if (!std::exchange(skips, false)) kernel.add(response * scale, 0, period_s);
+        },
         [&](double response, double ratio) { kernel.add_series(response * scale, 0, period_s, ratio); });
   }
   return kernel;
@@ -134,6 +141,65 @@ DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, c
     bounds.by_both = std::min(bounds.by_both, both);
   }
   return bounds;
+}
+
+double effort_of_class_N(const SampledLoop& loop, Channel channel, const Disturbance& disturbance) {
+  const SampledAdjoint adjoint(loop, SampledAdjoint::Output::kCommand);
+  if (!adjoint.is_stable()) return kInfinity;
+  const double mass_kg = loop.plant.mass_kg, E = disturbance.largest_N(), J = disturbance.impulse_N_s;
+  const Kernel kernel = kernel_of(adjoint, channel, 0, mass_kg, false);
+  double feedback_N = times_known(mass_kg * kernel.area, E);
+  if (std::isfinite(J)) {
+    const double felt = felt_passes(disturbance, FadingKernel(kernel, kernel.peak));
+    feedback_N = std::min(feedback_N, mass_kg * J * felt);
+  }
+  return feedback_N + (channel == Channel::kCommand ? std::min(E, J / loop.period_s) : 0);
+}
+
+namespace {
+
+/// The signs by which a force, held over each period, drives the command farthest; the latest period first.
+std::vector<double> worst_signs(const SampledLoop& loop) {
+  std::vector<double> signs;
+  const SampledAdjoint adjoint(loop, SampledAdjoint::Output::kCommand);
+  if (!adjoint.is_stable()) return signs;
+  const auto add = [&](double start, double slope, double length) {
+    signs.push_back(start + slope * length / 2 < 0 ? 1 : -1);
+  };
+  adjoint.force_kernel(0, add,
+                       [&](double start, double slope, double length, double) { add(start, slope, length); });
+  return signs;
+}
+
+/// Returns |u| at the end of such a force, with the clamp.
+double command_after_N(const SampledLoop& loop, const std::vector<double>& signs, double amplitude_N,
+                       double limit_m_s) {
+  const SampledModel model(loop);
+  const double push = amplitude_N / loop.plant.mass_kg, h = loop.period_s;
+  const Eigen::Index integral = model.integral_index(), command = model.command_index();
+  Eigen::VectorXd before = Eigen::VectorXd::Zero(model.size());
+  const auto controlled = [&] {
+    Eigen::VectorXd after = model.control() * before;
+    const double excess = after[integral] - std::clamp(after[integral], -limit_m_s, limit_m_s);
+    after[integral] -= excess;
+    after[command] += loop.plant.Ki * excess;
+    return after;
+  };
+  for (std::size_t k = signs.size(); k-- > 0;) {
+    before = model.hold() * controlled();
+    before[0] += signs[k] * push * h * h / 2;
+    before[1] += signs[k] * push * h;
+  }
+  return loop.plant.mass_kg * std::abs(controlled()[command]);
+}
+
+}  // namespace
+
+double effort_of_worst_force_N(const SampledLoop& loop, double amplitude_N, double limit_m_s) {
+  SampledLoop without = loop;
+  without.plant.Ki = 0;
+  return std::max(command_after_N(loop, worst_signs(loop), amplitude_N, limit_m_s),
+                  command_after_N(loop, worst_signs(without), amplitude_N, limit_m_s));
 }
 
 ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturbance& disturbance,

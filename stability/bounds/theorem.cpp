@@ -1,6 +1,7 @@
 #include "stability/bounds/theorem.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -67,22 +68,71 @@ std::optional<CompositeGains> composite_of(const PidGains& pid, double share, do
 
 }  // namespace
 
-Theorem check_theorem(const Gains& gains, double mass_kg,
-                      const std::optional<PerAxis>& integrator_needs_m_s) {
-  Theorem theorem;
-  const double share = gains.rate_hz > 0 ? gains.integrator_step_s * gains.rate_hz : 1;
-  const bool acts_as_written = std::abs(share - 1) < 1e-9;
-  if (gains.pid) {
-    theorem.composite = composite_of(*gains.pid, share, mass_kg, theorem.why_not);
-  } else {
-    theorem.composite = gains.composite;
-    if (!acts_as_written) {
-      theorem.why_not.push_back("the integrator adds " + number(gains.integrator_step_s) +
-                                " s per cycle of " + number(1 / gains.rate_hz) +
-                                " s: the effective Lambda^2 is " + number(share) +
-                                " times the written one, which has no (Lambda, K) form");
-    }
+namespace {
+
+/// Returns why the clamps of the integrators violate the hypotheses, an objection per axis.
+void object_to_clamps(const FlownLoop& loop, const std::optional<PerAxis>& needs_m_s, Theorem& theorem) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double limit = loop.integrator_limit_m_s(axis);
+    const auto i = static_cast<std::size_t>(axis);
+    if (std::isinf(limit) || (needs_m_s && (*needs_m_s)[i] <= limit)) continue;
+    std::string why =
+        std::string("the integrator of axis ") + kAxes[i] + " is clamped at " + number(limit) + " m s";
+    if (needs_m_s) why += ", but the disturbance can demand " + number((*needs_m_s)[i]);
+    theorem.why_not.push_back(why);
   }
+}
+
+void object_to_sampling(const FlownLoop& loop, Theorem& theorem) {
+  const double radius = loop.spectral_radius();
+  if (radius < 1) return;
+  theorem.why_not.push_back("sampled at " + number(loop.gains.rate_hz) +
+                            " Hz the loop diverges: its spectral radius is " + number(radius));
+}
+
+/// Visits one fact of the loop: sets the gains, or adds an objection if the theorem's loop lacks it.
+void visit(Fact fact, const FlownLoop& loop, const std::optional<PerAxis>& needs_m_s, Theorem& theorem) {
+  const Gains& gains = loop.gains;
+  const auto object = [&theorem](const std::string& why) { theorem.why_not.push_back(why); };
+  switch (fact) {
+    case Fact::kGainsOfLaw:
+      theorem.composite = gains.composite ? gains.composite
+                                          : composite_of(*gains.pid, loop.integral_share(),
+                                                         loop.told_mass_kg(), theorem.why_not);
+      return;
+    case Fact::kSampling:
+      return object_to_sampling(loop, theorem);
+    case Fact::kIntegratorStep:
+      if (!gains.composite) return;  // converted with the Ki that acts
+      return object("the integrator adds " + number(gains.integrator_step_s) + " s per cycle of " +
+                    number(1 / gains.rate_hz) + " s: the effective Lambda^2 is " +
+                    number(loop.integral_share()) + " times the written one, which has no (Lambda, K) form");
+    case Fact::kIntegratorClamp:
+      return object_to_clamps(loop, needs_m_s, theorem);
+    case Fact::kMotorLag:
+      return object("thrust lags by " + number(gains.motor_lag_s) + " s");
+    case Fact::kAttitudeLag:
+      return object("the thrust's direction lags by " + number(gains.attitude_lag_s) + " s");
+    case Fact::kDelay:
+      return object("the force is delayed by " + number(gains.delay_s) + " s");
+    case Fact::kNetworkRate:
+      return object("the learned force is a staircase of " + number(gains.network_rate_hz) +
+                    " Hz, whose rate is not bounded");
+    case Fact::kNetworkLatency:
+      return object("the learned force is " + number(gains.network_latency_s) + " s old when applied");
+    case Fact::kThrustScale:
+      return object("the actual force is not the commanded force: thrust scale " +
+                    number(loop.command_scale()));
+    case Fact::kThrustLimits:
+      return;  // a hypothesis on the flight, judged by saturation.h
+  }
+}
+
+}  // namespace
+
+Theorem check_theorem(const FlownLoop& loop, const std::optional<PerAxis>& integrator_needs_m_s) {
+  Theorem theorem;
+  for (const Fact fact : loop.facts()) visit(fact, loop, integrator_needs_m_s, theorem);
   if (theorem.composite) {
     const auto least_Lambda = positive_definite(theorem.composite->Lambda_1_s, "Lambda", theorem.why_not);
     const auto least_K = positive_definite(theorem.composite->K_kg_s, "K", theorem.why_not);
@@ -93,42 +143,27 @@ Theorem check_theorem(const Gains& gains, double mass_kg,
       theorem.composite.reset();
     }
   }
-  if (gains.motor_lag_s > 0) theorem.why_not.push_back("thrust lags by " + number(gains.motor_lag_s) + " s");
-  if (gains.attitude_lag_s > 0) {
-    theorem.why_not.push_back("the thrust's direction lags by " + number(gains.attitude_lag_s) + " s");
-  }
-  if (gains.delay_s > 0) theorem.why_not.push_back("the force is delayed by " + number(gains.delay_s) + " s");
-  for (std::size_t i = 0; i < 3; ++i) {
-    const double limit = gains.integrator_limit_m_s[i];
-    if (std::isinf(limit)) continue;
-    if (integrator_needs_m_s && (*integrator_needs_m_s)[i] <= limit) continue;
-    std::string why =
-        std::string("the integrator of axis ") + kAxes[i] + " is clamped at " + number(limit) + " m s";
-    if (integrator_needs_m_s) why += ", but the disturbance can demand " + number((*integrator_needs_m_s)[i]);
-    theorem.why_not.push_back(why);
-  }
-  if (gains.network_rate_hz > 0) {
-    theorem.why_not.push_back("the learned force is a staircase of " + number(gains.network_rate_hz) +
-                              " Hz, whose rate is not bounded");
-  }
-  if (gains.network_latency_s > 0) {
-    theorem.why_not.push_back("the learned force is " + number(gains.network_latency_s) +
-                              " s old when applied");
-  }
   theorem.applies = theorem.why_not.empty() && theorem.composite.has_value();
   return theorem;
 }
 
-std::optional<controller::AxisPid<double>> axis_gains(const Gains& gains, double mass_kg, int axis) {
-  const auto i = static_cast<std::size_t>(axis);
-  if (gains.pid)
-    return controller::AxisPid<double>{gains.pid->Kp_1_s2[i], gains.pid->Kd_1_s[i], gains.pid->Ki_1_s3[i]};
-  const Matrix3 &Lambda = gains.composite->Lambda_1_s, &K = gains.composite->K_kg_s;
-  for (std::size_t j = 0; j < 3; ++j) {
-    if (j != i && (Lambda[i][j] != 0 || Lambda[j][i] != 0 || K[i][j] != 0 || K[j][i] != 0))
-      return std::nullopt;
+std::optional<double> flown_ball_per_rate(const FlownLoop& loop, const Theorem& theorem) {
+  if (!theorem.applies) return std::nullopt;
+  if (!loop.is_sampled()) return theorem.ball_per_rate();
+  // |(a, b, c)| <= root of the sum of squares of the groups of equal loops: equal loops are one loop of a vector.
+  std::vector<SampledLoop> groups;
+  double square = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::optional<SampledLoop> one = loop.sampled(axis);
+    if (!one) return std::nullopt;
+    const auto is_same = [&one](const SampledLoop& other) { return other.plant == one->plant; };
+    if (std::any_of(groups.begin(), groups.end(), is_same)) continue;
+    groups.push_back(*one);
+    const double rate = std::max(sampled_norms(*one, Channel::kForce, Instants::kAll).rate,
+                                 sampled_norms(*one, Channel::kCommand, Instants::kAll).rate);
+    square += rate * rate;
   }
-  return controller::to_pid<double>(Lambda[i][i], K[i][i], mass_kg);
+  return std::sqrt(square);
 }
 
 namespace {

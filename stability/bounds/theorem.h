@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "controller/gain_conversion.h"
-#include "stability/gains.h"
+#include "stability/bounds/flown_loop.h"
 
 namespace swarmcert::stability {
 
@@ -28,13 +28,17 @@ struct Theorem {
   double ball_per_rate() const { return 1 / (min_Lambda * min_Lambda * min_K); }
 };
 
-/// Checks every hypothesis on `gains` for a vehicle of `mass_kg`.
-/// @param integrator_needs_m_s largest |int e| demanded of the integrator, per axis, if known; a clamp above it never
-///     acts and does not violate the hypotheses.
-Theorem check_theorem(const Gains& gains, double mass_kg, const std::optional<PerAxis>& integrator_needs_m_s);
+/// Checks every hypothesis on the loop: each declared fact either satisfies it or is an objection. The theorem is about
+/// the continuous loop; of a sampled one it requires that it is stable. Saturation is not judged here (saturation.h).
+/// @param integrator_needs_m_s largest state demanded of the integrator in firmware, per axis, if known; a clamp above
+///     it never acts and does not violate the hypotheses.
+Theorem check_theorem(const FlownLoop& loop, const std::optional<PerAxis>& integrator_needs_m_s);
 
-/// Returns the PID gains of one axis of `gains`, with the integrator as written; nothing if Lambda or K couples axes.
-std::optional<controller::AxisPid<double>> axis_gains(const Gains& gains, double mass_kg, int axis);
+/// Returns the ball per unit of d_m of the loop that flies, m per N/s: an upper bound on sup |e| from rest over all
+/// |eps'| <= 1 N/s, for all axes together; axes with equal loops count once. For a sampled loop it is that of its exact
+/// rate gains, for a force or an error of the command. Nothing if Lambda or K couples the axes of a sampled loop, or if
+/// the theorem does not apply.
+std::optional<double> flown_ball_per_rate(const FlownLoop& loop, const Theorem& theorem);
 
 /// The closed-form transient bound, valid for all t >= 0:
 ///   |e(t)| <= (1 + lt) e^(-lt) |e(0)| + t e^(-lt) |e'(0)| + m h(t) |s'(0)| + d_m int_0^t h.

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
 
 #include "nn/base/doubles.h"
 #include "stability/bounds/sampled_bounds.h"
 #include "stability/bounds/thrust_ratio.h"
-#include "stability/model.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -15,33 +15,72 @@ namespace {
 constexpr double kPositionNoise_m = 1e-3;
 constexpr double kVelocityNoise_m_s = 0.05;
 
-bool same(const AxisLoop& a, const AxisLoop& b) {
-  return a.mass_kg == b.mass_kg && a.Kp == b.Kp && a.Kd == b.Kd && a.Ki == b.Ki && a.lags_s == b.lags_s &&
-         a.delay_s == b.delay_s;
-}
-
-AxisFacts facts_of(const Gains& gains, const AxisLoop& loop, const std::optional<SampledLoop>& sampled,
-                   int axis, double bias_N) {
+AxisFacts facts_of(const FlownLoop& flown, int axis, double bias_N) {
+  const AxisLoop loop = *flown.continuous(axis);
   AxisFacts facts;
   facts.axis = axis;
   facts.stable = is_stable(loop);
   facts.lag_floor = lag_floor(loop);
-  facts.effort_gain = effort_gain(loop);
   facts.lag_limit_s = lag_limit(loop);
   facts.delay_limit_s = delay_limit(loop);
-  facts.written_Ki = loop.Ki;
-  facts.effective_Ki = sampled ? effective_Ki(*sampled) : loop.Ki;
-  const double limit_m_s = gains.integrator_limit_m_s[static_cast<std::size_t>(axis)];
+  facts.effective_Ki = loop.Ki;
+  facts.written_Ki = loop.Ki / flown.integral_share();
+  const double limit_m_s = flown.integral_limit_m_s(axis);
   facts.clamp_authority_N = loop.Ki > 0 ? loop.mass_kg * loop.Ki * limit_m_s : 0;
   facts.clamp_residual_m = clamp_residual(loop, bias_N, limit_m_s);
+  const std::optional<SampledLoop> sampled = flown.sampled(axis);
+  facts.effort_gain = sampled ? effort_gain(*sampled) : effort_gain(loop);
   if (sampled) {
     facts.spectral_radius = spectral_radius(*sampled);
+    facts.stable = facts.spectral_radius < 1;
     facts.noise = noise_deviation(*sampled, kPositionNoise_m, kVelocityNoise_m_s);
   }
   return facts;
 }
 
-void add_assumptions(const Gains& gains, const DisturbanceSource& source, TrackingReport& report) {
+using AddAssumption = std::function<void(const char* name, const char* status, const std::string& note)>;
+
+/// Visits one fact of the loop that flies: adds what the bounds assume about it.
+void assume(Fact fact, const FlownLoop& loop, const DisturbanceSource& source, const AddAssumption& add) {
+  switch (fact) {
+    case Fact::kGainsOfLaw:
+    case Fact::kIntegratorStep:   // the Ki that acts is used
+    case Fact::kIntegratorClamp:  // contained in every total
+    case Fact::kThrustScale:      // scales the gains
+      return;
+    case Fact::kSampling:
+      return add("continuous position loop", "assumed", "not needed for rows named 'sampled'");
+    case Fact::kMotorLag:
+      return add("first-order lag of the thrust", "assumed", "as in [lag]");
+    case Fact::kAttitudeLag:
+      add("first-order lag of the thrust's direction", "assumed", "as in [lag]");
+      return add("attitude error small", "assumed", "the direction of thrust is treated as linear");
+    case Fact::kDelay:
+      return add("constant delay", "assumed", "as in [lag]");
+    case Fact::kNetworkRate:
+    case Fact::kNetworkLatency:
+      if (!source.bounds_learning_error() || source.f_hat_rate_known) return;
+      if (fact == Fact::kNetworkLatency && loop.gains.network_rate_hz > 0) return;  // stated already
+      add("the learned force follows its inputs immediately", "assumed",
+          "[network] makes it a staircase or late; --network NET --speed V bounds the effect");
+      return;
+    case Fact::kThrustLimits:
+      return add("single rotors have thrust left for the torques of the attitude law", "assumed", "");
+  }
+}
+
+void assume_saturation(const Saturation& found, const DisturbanceSource& source, const AddAssumption& add) {
+  const bool is_refuted = found.verdict == Saturation::Verdict::kRefuted;
+  const char* const status = is_refuted                  ? "refuted"
+                             : !found.is_proved()        ? "assumed"
+                             : source.kind == "measured" ? "measured"
+                                                         : "proved";
+  add("no saturation of the collective thrust", status,
+      found.is_proved() ? "for all forces that the declared inputs make the law command, of all axes together"
+                        : found.why);
+}
+
+void add_assumptions(const FlownLoop& loop, const DisturbanceSource& source, TrackingReport& report) {
   const auto add = [&report](const std::string& name, const std::string& status, const std::string& note) {
     report.assumptions.push_back({name, status, note});
   };
@@ -62,14 +101,7 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
   } else {
     add("mass and thrust scale as in the model", "assumed", "--uncertain encloses intervals");
   }
-  const bool has_thrust = report.thrust_margin_N && *report.thrust_margin_N >= 0;
-  add("no saturation of the collective thrust",
-      !has_thrust                 ? "assumed"
-      : source.kind == "measured" ? "measured"
-                                  : "proved",
-      report.thrust_margin_N
-          ? "under all declared disturbances, about hover, by the effort gain of the continuous loop"
-          : "");
+  assume_saturation(report.saturation, source, add);
   if (source.has_moving_reference())
     add("the setpoint moves as declared", "assumed",
         "its acceleration is fed forward, and the actual force is the commanded force");
@@ -81,24 +113,7 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
     add("exact position and velocity", "assumed",
         "--velocity-error and --position-error bound the effect of estimation errors");
   }
-  if (source.bounds_learning_error() && !source.f_hat_rate_known &&
-      (gains.network_rate_hz > 0 || gains.network_latency_s > 0)) {
-    add("the learned force follows its inputs immediately", "assumed",
-        "[network] makes it a staircase or late; --network NET --speed V bounds the effect");
-  }
-  if (gains.rate_hz > 0) {
-    add("continuous position loop", "assumed", "not needed for rows named 'sampled'");
-  }
-  if (gains.motor_lag_s > 0 || gains.attitude_lag_s > 0 || gains.delay_s > 0) {
-    add("first-order lags and a constant delay", "assumed", "as in [lag]");
-  }
-  if (gains.attitude_lag_s > 0) {
-    add("attitude error small", "assumed", "the direction of thrust is treated as linear");
-  }
-}
-
-double integrator_limit(const Gains& gains, int axis) {
-  return gains.integrator_limit_m_s[static_cast<std::size_t>(axis)];
+  for (const Fact fact : loop.facts()) assume(fact, loop, source, add);
 }
 
 /// @param of_class disturbance_bounds() of the class alone.
@@ -133,80 +148,55 @@ AxisBounds bounds_of(const AnyLoop& loop, DisturbanceBounds of_class, Channel ch
   return row;
 }
 
-/// Computes the gains of an axis, or copies them if its loop equals that of the previous axis.
-void add_gains(const AxisLoop& loop, const std::optional<SampledLoop>& sampled, int axis, bool is_as_before,
-               TrackingReport& report) {
-  const auto copy = [axis](auto& rows) {
-    const std::size_t count = rows.size();
-    for (std::size_t k = 0; k < count; ++k) {
-      if (rows[k].axis != axis - 1) continue;
-      auto row = rows[k];
-      row.axis = axis;
-      rows.push_back(row);
-    }
+/// The gains of an axis in one loop, over the channels by which a force error may enter, and of the estimates.
+void add_gains(const FlownLoop& loop, int axis, TrackingReport& report) {
+  const std::optional<AxisLoop> continuous = loop.continuous(axis);
+  const std::optional<SampledLoop> sampled = loop.sampled(axis);
+  const auto add = [&](auto input, auto& rows) {
+    const GainNorms norms = continuous_norms(*continuous, input);
+    rows.push_back({axis, input, Loop::kContinuous, norms, norms});
+    if (!sampled) return;
+    rows.push_back({axis, input, Loop::kSampled, sampled_norms(*sampled, input, Instants::kSampling),
+                    sampled_norms(*sampled, input, Instants::kAll)});
   };
-  if (is_as_before) {
-    copy(report.exact);
-    copy(report.of_estimates);
-    return;
-  }
-  for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
-    const GainNorms norms = continuous_norms(loop, channel);
-    report.exact.push_back({axis, channel, Loop::kContinuous, norms, norms});
-    if (!sampled) continue;
-    report.exact.push_back({axis, channel, Loop::kSampled,
-                            sampled_norms(*sampled, channel, Instants::kSampling),
-                            sampled_norms(*sampled, channel, Instants::kAll)});
-  }
-  for (const Estimate estimate : {Estimate::kVelocity, Estimate::kPosition}) {
-    const GainNorms norms = continuous_norms(loop, estimate);
-    report.of_estimates.push_back({axis, estimate, Loop::kContinuous, norms, norms});
-    if (!sampled) continue;
-    report.of_estimates.push_back({axis, estimate, Loop::kSampled,
-                                   sampled_norms(*sampled, estimate, Instants::kSampling),
-                                   sampled_norms(*sampled, estimate, Instants::kAll)});
+  for (const Channel channel : {Channel::kForce, Channel::kCommand}) add(channel, report.exact);
+  for (const Estimate estimate : {Estimate::kVelocity, Estimate::kPosition})
+    add(estimate, report.of_estimates);
+}
+
+/// Appends to `rows` a copy of the rows of the previous axis, for this one.
+template <class Row>
+void repeat(int axis, std::vector<Row>& rows) {
+  const std::size_t count = rows.size();
+  for (std::size_t k = 0; k < count; ++k) {
+    if (rows[k].axis != axis - 1) continue;
+    Row row = rows[k];
+    row.axis = axis;
+    rows.push_back(row);
   }
 }
 
 /// Returns the demand of the disturbance on the integrator of the loop as flown.
-double integrator_need(const Gains& gains, const Plant& plant, const AxisLoop& loop,
-                       const std::optional<SampledLoop>& sampled, int axis, const DisturbanceSource& source,
-                       const InitialError& initial) {
-  const double limit_m_s = integrator_limit(gains, axis);
-  const Disturbance& known = source.axis[axis];
-  OtherErrors other = source.other(axis, initial, plant);
+double integrator_need_m_s(const FlownLoop& loop, int axis, const DisturbanceSource& source,
+                           const InitialError& initial) {
+  OtherErrors other = source.other(axis, initial, loop.plant);
   if (source.classes_contain_bias) other.bias_N = other.start_N = 0;
-  const ClampBounds clamp = sampled ? clamp_bounds(*sampled, Channel::kForce, known, other, limit_m_s)
-                                    : clamp_bounds(loop, Channel::kForce, known, other, limit_m_s);
-  return clamp.demand_m_s;
+  const auto need = [&](const auto& one, double limit_m_s) {
+    return clamp_bounds(one, Channel::kForce, source.axis[axis], other, limit_m_s).demand_m_s;
+  };
+  if (const auto sampled = loop.sampled(axis)) return need(*sampled, loop.integrator_limit_m_s(axis));
+  return need(*loop.continuous(axis), loop.integral_limit_m_s(axis));
 }
 
-/// Computes the bounds of an axis, one row per row of gains, or copies them if nothing differs from the previous axis.
-void add_bounds(const Gains& gains, const Plant& plant, const AxisLoop& loop,
-                const std::optional<SampledLoop>& sampled, int axis, bool is_as_before,
-                const DisturbanceSource& source, const InitialError& initial, TrackingReport& report) {
-  const std::size_t count = report.bounds.size();
-  for (std::size_t k = 0; k < count && is_as_before; ++k) {
-    if (report.bounds[k].axis != axis - 1) continue;
-    AxisBounds row = report.bounds[k];
-    row.axis = axis;
-    report.bounds.push_back(row);
-  }
-  if (is_as_before) return;
-  const Disturbance& known = source.axis[axis];
-  const OtherErrors other = source.other(axis, initial, plant);
-  const double limit_m_s = integrator_limit(gains, axis);
+/// Computes the bounds of an axis, one row per row of gains.
+void add_bounds(const FlownLoop& loop, int axis, const DisturbanceSource& source, const InitialError& initial,
+                TrackingReport& report) {
   for (const ExactGains& of : report.exact) {
     if (of.axis != axis) continue;
-    AxisBounds row = of.loop == Loop::kSampled ? axis_bounds(*sampled, of.channel, of.all_times, known, other,
-                                                             source.classes_contain_bias, limit_m_s)
-                                               : axis_bounds(loop, of.channel, of.all_times, known, other,
-                                                             source.classes_contain_bias, limit_m_s);
-    row.axis = axis;
-    row.loop = of.loop;
+    AxisBounds row = axis_bounds(loop, of, source, initial);
     if (source.f_hat_rate_known) {
-      row.staircase_m = staircase_error(of.all_times, gains.network_rate_hz, gains.network_latency_s,
-                                        source.f_hat_rate_N_s);
+      row.staircase_m = staircase_error(of.all_times, loop.gains.network_rate_hz,
+                                        loop.gains.network_latency_s, source.f_hat_rate_N_s);
     }
     report.bounds.push_back(row);
   }
@@ -242,16 +232,14 @@ Transient transient_of(const Theorem& theorem, const Plant& plant, const Disturb
 }
 
 /// Checks the hypotheses that do not concern the gains; then adds vector gain, transient and ball.
-void add_theorem(const Plant& plant, const DisturbanceSource& source, const InitialError& initial,
+void add_theorem(const FlownLoop& loop, const DisturbanceSource& source, const InitialError& initial,
                  TrackingReport& report) {
+  const Plant& plant = loop.plant;
   Theorem& theorem = report.theorem;
   const auto object = [&theorem](std::string why) {
     theorem.applies = false;
     theorem.why_not.push_back(std::move(why));
   };
-  if (plant.thrust_scale != 1) {
-    object("the actual force is not the commanded force: thrust scale " + std::to_string(plant.thrust_scale));
-  }
   if (source.has_estimate_errors()) object("the estimated position or velocity has errors, as declared");
   if (source.thrust_ratio_error > 0) object("the thrust ratio has an error, as declared");
   if (source.has_moving_reference()) object("the setpoint moves, as declared");
@@ -260,6 +248,8 @@ void add_theorem(const Plant& plant, const DisturbanceSource& source, const Init
   report.transient = transient_of(theorem, plant, source, initial);
   if (theorem.applies && source.bounds_learning_error() && std::isfinite(source.rate_norm_N_s)) {
     report.ball_m = source.rate_norm_N_s * theorem.ball_per_rate();
+    if (const std::optional<double> per_rate = flown_ball_per_rate(loop, theorem))
+      report.flown_ball_m = source.rate_norm_N_s * *per_rate;
   }
 }
 
@@ -275,94 +265,35 @@ const char* name(Channel channel) { return channel == Channel::kForce ? "force" 
 const char* name(Estimate estimate) { return estimate == Estimate::kVelocity ? "velocity" : "position"; }
 const char* name(Loop loop) { return loop == Loop::kContinuous ? "continuous" : "sampled"; }
 
-std::optional<AxisLoop> axis_loop(const Gains& gains, const Plant& plant, int axis) {
-  const std::optional<controller::AxisPid<double>> pid = axis_gains(gains, plant.mass_kg, axis);
-  if (!pid) return std::nullopt;
-  AxisLoop loop;
-  loop.mass_kg = plant.mass_kg;
-  loop.Kp = pid->Kp_1_s2 * plant.thrust_scale;
-  loop.Kd = pid->Kd_1_s * plant.thrust_scale;
-  loop.Ki = pid->Ki_1_s3 * plant.thrust_scale;
-  if (gains.motor_lag_s > 0) loop.lags_s.push_back(gains.motor_lag_s);
-  if (axis < 2 && gains.attitude_lag_s > 0) loop.lags_s.push_back(gains.attitude_lag_s);
-  loop.delay_s = gains.delay_s;
-  return loop;
-}
-
-std::optional<SampledLoop> sampled_axis_loop(const Gains& gains, const Plant& plant, int axis) {
-  const std::optional<AxisLoop> loop = axis_loop(gains, plant, axis);
-  if (!loop || gains.rate_hz == 0) return std::nullopt;
-  return SampledLoop{*loop, 1 / gains.rate_hz, gains.integrator_step_s};
-}
-
-bool DisturbanceSource::has_estimate_errors() const {
-  const auto is_given = [](const EstimateError& error) { return !error.is_zero(); };
-  return std::any_of(std::begin(velocity_error), std::end(velocity_error), is_given) ||
-         std::any_of(std::begin(position_error), std::end(position_error), is_given);
-}
-
-bool DisturbanceSource::has_moving_reference() const {
-  return std::any_of(std::begin(reference), std::end(reference),
-                     [](const ReferenceMotion& motion) { return !(motion == ReferenceMotion{}); });
-}
-
-bool DisturbanceSource::amplitudes_reach_bias() const {
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (std::abs(bias_N[i]) > axis[i].amplitude_N) return false;
+AxisBounds axis_bounds(const FlownLoop& loop, const ExactGains& of, const DisturbanceSource& source,
+                       const InitialError& initial) {
+  const Disturbance& known = source.axis[of.axis];
+  const OtherErrors other = source.other(of.axis, initial, loop.plant);
+  AxisBounds row;
+  if (of.loop == Loop::kSampled) {
+    const SampledLoop one = loop.sampled(of.axis).value();
+    row = bounds_of(one, disturbance_bounds(one, of.channel, of.all_times, known), of.channel, of.all_times,
+                    known, other, source.classes_contain_bias, loop.integrator_limit_m_s(of.axis));
+  } else {
+    const AxisLoop one = loop.continuous(of.axis).value();
+    row = bounds_of(one, disturbance_bounds(one, of.channel, known), of.channel, of.all_times, known, other,
+                    source.classes_contain_bias, loop.integral_limit_m_s(of.axis));
   }
-  return true;
+  row.axis = of.axis;
+  row.loop = of.loop;
+  return row;
 }
 
-OtherErrors DisturbanceSource::other(int of_axis, const InitialError& initial, const Plant& plant) const {
-  OtherErrors errors;
-  errors.bias_N = bias_N[of_axis];
-  errors.start_N = initial.learning_error_N;
-  errors.position_m = initial.position_m;
-  errors.velocity_m_s = initial.velocity_m_s;
-  errors.reference = reference[of_axis];
-  errors.velocity_error = velocity_error[of_axis];
-  errors.position_error = position_error[of_axis];
-  errors.thrust_ratio_error = thrust_ratio_error;
-  if (of_axis == 2 && thrust_ratio_error > 0)
-    errors.hover_N = plant.thrust_scale * plant.mass_kg * kGravity_m_s2;
-  return errors;
+ExactGains flown_gains(const FlownLoop& loop, int axis, Channel channel) {
+  if (const auto sampled = loop.sampled(axis)) {
+    return {axis, channel, Loop::kSampled, sampled_norms(*sampled, channel, Instants::kSampling),
+            sampled_norms(*sampled, channel, Instants::kAll)};
+  }
+  const GainNorms norms = continuous_norms(loop.continuous(axis).value(), channel);
+  return {axis, channel, Loop::kContinuous, norms, norms};
 }
 
-AxisBounds axis_bounds(const AxisLoop& loop, Channel channel, const GainNorms& gains,
-                       const Disturbance& known, const OtherErrors& other, bool classes_contain_bias,
-                       double limit_m_s) {
-  return bounds_of(loop, disturbance_bounds(loop, channel, known), channel, gains, known, other,
-                   classes_contain_bias, limit_m_s);
-}
-
-AxisBounds axis_bounds(const SampledLoop& loop, Channel channel, const GainNorms& gains,
-                       const Disturbance& known, const OtherErrors& other, bool classes_contain_bias,
-                       double limit_m_s) {
-  return bounds_of(loop, disturbance_bounds(loop, channel, gains, known), channel, gains, known, other,
-                   classes_contain_bias, limit_m_s);
-}
-
-std::optional<double> thrust_margin_N(const Plant& plant, const AxisLoop& vertical,
-                                      const DisturbanceSource& source, const InitialError& initial) {
-  const double amplitude_N = source.axis[2].amplitude_N;
-  if (!(plant.largest_thrust_N > 0) || !std::isfinite(amplitude_N)) return std::nullopt;
-  if (source.has_moving_reference())
-    return std::nullopt;  // the feedforward also uses thrust, and is not bounded
-  OtherErrors other = source.other(2, initial, plant);
-  if (source.classes_contain_bias) other.bias_N = other.start_N = 0;
-  const double weight_N = plant.mass_kg * kGravity_m_s2;
-  const double effort = effort_gain(vertical);
-  const double ratio = other.thrust_ratio_error;
-  double needed_N = effort * amplitude_N + effort_N(vertical, with_hover_share(other));
-  // d u is an additional force on the loop of the model; see thrust_ratio.h.
-  if (ratio > 0) needed_N = ratio * effort < 1 ? needed_N / (1 - ratio * effort) : kInfinity;
-  if (!std::isfinite(needed_N)) return std::nullopt;
-  return std::min((1 - ratio) * plant.thrust_scale * plant.largest_thrust_N - weight_N,
-                  (1 - ratio) * weight_N) -
-         needed_N;
-}
-
-TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const DisturbanceSource& source,
+TrackingReport tracking_bounds(const FlownLoop& loop, const DisturbanceSource& source,
                                const InitialError& initial) {
   TrackingReport report;
   PerAxis integrator_needs{};
@@ -370,32 +301,38 @@ TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const Dis
   for (int axis = 0; axis < 3; ++axis) {
     const Disturbance& known = source.axis[axis];
     needs_known = needs_known && (std::isfinite(known.amplitude_N) || std::isfinite(known.impulse_N_s));
-    const std::optional<AxisLoop> loop = axis_loop(gains, plant, axis);
-    if (!loop) {
+    const std::optional<AxisLoop> one = loop.continuous(axis);
+    if (!one) {
       needs_known = false;
       continue;
     }
-    const std::optional<SampledLoop> sampled = sampled_axis_loop(gains, plant, axis);
-    report.facts.push_back(facts_of(gains, *loop, sampled, axis, source.bias_N[axis]));
-    const std::optional<AxisLoop> before =
-        axis > 0 ? axis_loop(gains, plant, axis - 1) : std::optional<AxisLoop>();
-    const bool is_same_loop = before && same(*before, *loop);
-    add_gains(*loop, sampled, axis, is_same_loop, report);
-    const bool is_same =
-        is_same_loop && source.other(axis, initial, plant) == source.other(axis - 1, initial, plant) &&
-        known == source.axis[axis - 1] && integrator_limit(gains, axis) == integrator_limit(gains, axis - 1);
-    const auto i = static_cast<std::size_t>(axis);
-    integrator_needs[i] = is_same ? integrator_needs[i - 1]
-                                  : integrator_need(gains, plant, *loop, sampled, axis, source, initial);
-    if (source.kind != "none") {
-      add_bounds(gains, plant, *loop, sampled, axis, is_same, source, initial, report);
+    report.facts.push_back(facts_of(loop, axis, source.bias_N[axis]));
+    const bool is_same_loop = axis > 0 && loop.continuous(axis - 1) == one;
+    if (is_same_loop) {
+      repeat(axis, report.exact);
+      repeat(axis, report.of_estimates);
+    } else {
+      add_gains(loop, axis, report);
     }
-    if (axis == 2) report.thrust_margin_N = thrust_margin_N(plant, *loop, source, initial);
+    const bool is_same =
+        is_same_loop && known == source.axis[axis - 1] &&
+        source.other(axis, initial, loop.plant) == source.other(axis - 1, initial, loop.plant) &&
+        loop.integrator_limit_m_s(axis) == loop.integrator_limit_m_s(axis - 1);
+    const auto i = static_cast<std::size_t>(axis);
+    integrator_needs[i] =
+        is_same ? integrator_needs[i - 1] : integrator_need_m_s(loop, axis, source, initial);
+    if (source.kind == "none") continue;
+    if (is_same) {
+      repeat(axis, report.bounds);
+    } else {
+      add_bounds(loop, axis, source, initial, report);
+    }
   }
-  report.theorem = check_theorem(gains, plant.mass_kg,
-                                 needs_known ? std::optional<PerAxis>(integrator_needs) : std::nullopt);
-  add_theorem(plant, source, initial, report);
-  add_assumptions(gains, source, report);
+  report.is_stable = loop.is_stable();
+  report.saturation = saturation(loop, source, initial);
+  report.theorem = check_theorem(loop, needs_known ? std::optional<PerAxis>(integrator_needs) : std::nullopt);
+  add_theorem(loop, source, initial, report);
+  add_assumptions(loop, source, report);
   return report;
 }
 

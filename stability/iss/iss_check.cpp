@@ -180,14 +180,15 @@ double slowest_decay(const PositionLoop& loop) {
 }
 
 /// Returns what one would use as the ball without checking whether the theorem applies.
-double naive_ball(const Gains& gains, double mass_kg) {
+double naive_ball(const FlownLoop& flown) {
+  const Gains& gains = flown.gains;
   if (gains.composite) {
     const auto least = [](const Matrix3& m) { return to_eigen(m).eigenvalues().real().minCoeff(); };
     const double lambda = least(gains.composite->Lambda_1_s), k = least(gains.composite->K_kg_s);
     return 1 / (lambda * lambda * k);
   }
   const double least_Ki = to_eigen(gains.pid->Ki_1_s3).minCoeff();
-  return 1 / (mass_kg * least_Ki);
+  return 1 / (flown.plant.mass_kg * least_Ki * flown.integral_share());
 }
 
 }  // namespace
@@ -226,24 +227,25 @@ std::vector<std::string> IssCheck::why_inconclusive() const {
   return why;
 }
 
-IssCheck check_iss(const Gains& gains, const Model& model, const IssOptions& options) {
+IssCheck check_iss(const FlownLoop& flown, const IssOptions& options) {
   IssCheck check;
-  const Theorem theorem = check_theorem(gains, model.mass_kg, std::nullopt);
+  const Theorem theorem = check_theorem(flown, std::nullopt);
   check.theorem_applies = theorem.applies;
   check.why_not = theorem.why_not;
-  check.delay_left_out_s = gains.delay_s;
+  check.delay_left_out_s = flown.gains.delay_s;
   check.has_ball = theorem.composite.has_value();
-  const PositionLoop loop(gains, model);
+  const PositionLoop loop(flown);
   const double decay_1_s = slowest_decay(loop);
   check.unstable = !(decay_1_s > 1e-9);
   // After 14 time constants even a triple pole has settled to 1e-4.
   check.duration_s = check.unstable ? 20 : std::clamp(14 / decay_1_s, 0.1, 200.0);
-  check.rate_N_s = options.rate_N_s > 0 ? options.rate_N_s : 0.2 * model.weight_N() / check.duration_s;
-  double ball_m_per_N_s = check.has_ball ? theorem.ball_per_rate() : naive_ball(gains, model.mass_kg);
+  check.rate_N_s =
+      options.rate_N_s > 0 ? options.rate_N_s : 0.2 * flown.plant.mass_kg * kGravity_m_s2 / check.duration_s;
+  double ball_m_per_N_s = check.has_ball ? theorem.ball_per_rate() : naive_ball(flown);
   if (!(ball_m_per_N_s > 0 && std::isfinite(ball_m_per_N_s))) ball_m_per_N_s = 1;  // Ki = 0: no ball at all
   check.ball_m = std::min(check.rate_N_s * ball_m_per_N_s, std::numeric_limits<double>::max());
 
-  const IssJudge judge(gains, model, check, theorem);
+  const IssJudge judge(flown, check, theorem);
   // A fifth of the runs is used by optimisers, with kEvaluations runs each.
   constexpr int kEvaluations = 40;
   const int searches = options.runs / (5 * kEvaluations);

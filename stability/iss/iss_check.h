@@ -16,8 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "stability/gains.h"
-#include "stability/model.h"
+#include "stability/bounds/flown_loop.h"
 
 namespace swarmcert::stability {
 
@@ -86,6 +85,6 @@ struct IssCheck {
 
 /// Runs the campaign. The result does not depend on the number of jobs. A violation is a ratio above 1 + 1e-6, well
 /// above the integrator's tolerance of 1e-9. A run whose integration fails is reported, and the campaign continues.
-IssCheck check_iss(const Gains& gains, const Model& model, const IssOptions& options);
+IssCheck check_iss(const FlownLoop& loop, const IssOptions& options);
 
 }  // namespace swarmcert::stability

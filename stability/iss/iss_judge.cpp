@@ -33,9 +33,9 @@ double TransientTable::at(int k, const std::array<double, 4>& sizes) const {
   return sum;
 }
 
-IssJudge::IssJudge(const Gains& gains, const Model& model, const IssCheck& check, const Theorem& theorem)
-    : loop_(gains, model), check_(check), theorem_(theorem) {
-  if (check_.has_ball) table_.emplace(theorem, model.mass_kg, check_.duration_s);
+IssJudge::IssJudge(const FlownLoop& loop, const IssCheck& check, const Theorem& theorem)
+    : loop_(loop), check_(check), theorem_(theorem) {
+  if (check_.has_ball) table_.emplace(theorem, loop.plant.mass_kg, check_.duration_s);
 }
 
 void IssJudge::judge(IssRun* run) const {

@@ -29,7 +29,7 @@ class TransientTable {
 class IssJudge {
  public:
   /// @param check provides d_m, ball and duration of the campaign; must outlive this.
-  IssJudge(const Gains& gains, const Model& model, const IssCheck& check, const Theorem& theorem);
+  IssJudge(const FlownLoop& loop, const IssCheck& check, const Theorem& theorem);
 
   /// Fills in the run's ratios up to the time at which a hypothesis or the integration fails.
   void judge(IssRun* run) const;

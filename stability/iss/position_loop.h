@@ -3,9 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "stability/gains.h"
 #include "stability/iss/iss_check.h"
-#include "stability/model.h"
 
 namespace swarmcert::stability {
 
@@ -15,7 +13,7 @@ class PositionLoop {
   static constexpr int kSize = 15;
   using State = Eigen::Matrix<double, kSize, 1>;
 
-  PositionLoop(const Gains& gains, const Model& model);
+  explicit PositionLoop(const FlownLoop& loop);
 
   /// Computes dx/dt at the state x under the learning error `eps` (f_a_hat - f_a, in newton).
   void derivative(const double* x, const Eigen::Vector3d& eps_W_N, double* dx) const;
@@ -28,9 +26,8 @@ class PositionLoop {
   /// Returns the initial state with these errors: integral 0, forces that balance the weight.
   State start(const Eigen::Vector3d& position_m, const Eigen::Vector3d& velocity_m_s) const;
 
-  /// Returns the loop's matrix about rest, without clamp and limit: d state = A state + B eps; eps enters v as
-  /// -eps / m.
-  Eigen::Matrix<double, kSize, kSize> matrix() const;
+  /// Returns FlownLoop::matrix(): d state = A state + B eps; eps enters v as -eps / m.
+  const Eigen::Matrix<double, kSize, kSize>& matrix() const { return matrix_; }
 
   double mass_kg() const { return mass_kg_; }
 
@@ -40,7 +37,9 @@ class PositionLoop {
 
   Eigen::Matrix3d position_, velocity_, integral_;  ///< f_d = m g - position_ p~ - velocity_ v - integral_ I
   PerAxis limit_m_s_;
-  double mass_kg_, motor_s_, attitude_s_, largest_N_;
+  Eigen::Matrix<double, kSize, kSize> matrix_;
+  double mass_kg_, motor_s_, attitude_s_;
+  Interval thrust_N_;
 };
 
 }  // namespace swarmcert::stability

@@ -17,7 +17,7 @@ constexpr double kUnstatedPeriod_s = 0.002;
 
 }  // namespace
 
-FloatErrors float_errors(const TrackingSetup& input, const TrackingReport& report) {
+FloatErrors float_errors(const FlownLoop& input, const TrackingReport& report) {
   const Gains& gains = input.gains;
   const double period_s = gains.rate_hz > 0 ? 1 / gains.rate_hz : kUnstatedPeriod_s;
   controller::RoundedLaw law;
@@ -50,12 +50,11 @@ FloatErrors float_errors(const TrackingSetup& input, const TrackingReport& repor
     errors.integral_m_s[i] = integral[i];
     errors.torque_N_m[i] = torque[i];
     errors.tracking_error_m[i] = std::numeric_limits<double>::infinity();
-    const std::optional<controller::AxisPid<double>> pid =
-        axis_gains(gains, input.plant.mass_kg, static_cast<int>(i));
+    const std::optional<AxisLoop> loop = input.continuous(static_cast<int>(i));
     for (const ExactGains& row : report.exact) {
-      if (!pid || row.axis != static_cast<int>(i) || row.channel != Channel::kCommand || row.loop != flown)
+      if (!loop || row.axis != static_cast<int>(i) || row.channel != Channel::kCommand || row.loop != flown)
         continue;
-      const double rate_N_s = input.plant.mass_kg * pid->Ki_1_s3 * integral[i] / period_s;
+      const double rate_N_s = loop->mass_kg * loop->Ki / input.integral_share() * integral[i] / period_s;
       errors.tracking_error_m[i] = row.all_times.amplitude * std::max(force[i], bounds.thrust_N) +
                                    (rate_N_s > 0 ? row.all_times.rate * rate_N_s : 0);
     }

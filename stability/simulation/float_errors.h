@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "stability/bounds/tracking_setup.h"
+#include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::stability {
 
@@ -22,6 +22,6 @@ struct FloatErrors {
 /// the body axis is thrust_N; the larger of the two is an amplitude bound. The integrator's error acts on the command
 /// through m Ki and grows by the same amount in each cycle, which is a rate bound. Both enter the command channel: of
 /// the sampled loop if there is a rate, else of the continuous loop with a cycle of 2 ms.
-FloatErrors float_errors(const TrackingSetup& input, const stability::TrackingReport& report);
+FloatErrors float_errors(const FlownLoop& input, const stability::TrackingReport& report);
 
 }  // namespace swarmcert::stability

@@ -1,6 +1,6 @@
 #include "stability/simulation/pilot.h"
 
-#include <algorithm>
+#include "stability/bounds/flown_loop.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -21,12 +21,6 @@ controller::Vector3<Scalar> vector(const controller::Vector3<double>& v) {
 template <typename Scalar>
 controller::Matrix3<Scalar> matrix(const Matrix3& m) {
   return {vector<Scalar>(m.x), vector<Scalar>(m.y), vector<Scalar>(m.z)};
-}
-
-/// Returns the smallest force of a rotor at full battery: at the map's minimum, or at p = 0 if the minimum is at p < 0.
-double least_force_N(const ThrustMap& map) {
-  const double lowest = map.c20 > 0 ? std::clamp(-(map.c10 + map.c11) / (2 * map.c20), 0.0, 1.0) : 0;
-  return map.force_N(lowest, kFullBattery_V);
 }
 
 /// Fills in all settings except the position gains.
@@ -57,7 +51,7 @@ void fill(const Gains& gains, const Model& model, double attitude_step_s,
   // The map at p = 1 is linear in v.
   settings->largest_force = {static_cast<Scalar>(map.c00 + map.c10 + map.c20), Scalar(0),
                              static_cast<Scalar>(map.c01 + map.c11), Scalar(0), Scalar(1e6)};
-  settings->idle_force_N = static_cast<Scalar>(least_force_N(map));
+  settings->idle_force_N = static_cast<Scalar>(least_rotor_force_N(map));
 }
 
 }  // namespace

@@ -1,126 +1,120 @@
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <cstdio>
 
-#include "nn/base/doubles.h"
 #include "stability/sweep/grid.h"
 
 namespace swarmcert::stability {
 namespace {
 
-/// The grid's gains and vehicle with a cell's values inserted.
+/// The loop of a cell, and how many neighbours multiply the disturbance.
 struct Variant {
-  Gains gains;
-  Plant plant;
+  FlownLoop loop;
   double neighbours = 1;
 };
 
 Variant variant_of(const Grid& grid, const std::vector<double>& values) {
-  Variant v = {grid.gains, {}, 1};
+  Variant v = {{grid.gains, {}}, 1};
+  Gains& gains = v.loop.gains;
+  Plant& plant = v.loop.plant;
   const auto i = static_cast<std::size_t>(grid.axis);
   double battery_V = kFullBattery_V;
-  v.plant.mass_kg = grid.model.mass_kg;
-  bool own_step = std::abs(grid.gains.integrator_step_s * grid.gains.rate_hz - 1) > 1e-12;
+  plant.mass_kg = plant.told_mass_kg = grid.model.mass_kg;
+  // A loop without a step of its own adds one period per period, whatever its rate.
+  bool own_step = gains.rate_hz > 0 && std::abs(v.loop.integral_share() - 1) > 1e-12;
   for (std::size_t k = 0; k < values.size(); ++k) {
     const std::string& name = grid.axes[k].name;
     const double value = values[k];
-    if (name == "Kp") v.gains.pid->Kp_1_s2[i] = value;
-    if (name == "Kd") v.gains.pid->Kd_1_s[i] = value;
-    if (name == "Ki") v.gains.pid->Ki_1_s3[i] = value;
-    if (name == "Lambda") v.gains.composite->Lambda_1_s[i][i] = value;
-    if (name == "K") v.gains.composite->K_kg_s[i][i] = value;
-    if (name == "mass_kg") v.plant.mass_kg = value;
-    if (name == "thrust_scale") v.plant.thrust_scale = value;
+    if (name == "Kp") gains.pid->Kp_1_s2[i] = value;
+    if (name == "Kd") gains.pid->Kd_1_s[i] = value;
+    if (name == "Ki") gains.pid->Ki_1_s3[i] = value;
+    if (name == "Lambda") gains.composite->Lambda_1_s[i][i] = value;
+    if (name == "K") gains.composite->K_kg_s[i][i] = value;
+    if (name == "mass_kg") plant.mass_kg = value;
+    if (name == "thrust_scale") plant.thrust_scale = value;
     if (name == "battery_V") battery_V = value;
-    if (name == "motor_s") v.gains.motor_lag_s = value;
-    if (name == "attitude_s") v.gains.attitude_lag_s = value;
-    if (name == "delay_s") v.gains.delay_s = value;
-    if (name == "rate_hz") v.gains.rate_hz = value;
-    if (name == "integrator_step_s") v.gains.integrator_step_s = value, own_step = true;
+    if (name == "motor_s") gains.motor_lag_s = value;
+    if (name == "attitude_s") gains.attitude_lag_s = value;
+    if (name == "delay_s") gains.delay_s = value;
+    if (name == "rate_hz") gains.rate_hz = value;
+    if (name == "integrator_step_s") gains.integrator_step_s = value, own_step = true;
     if (name == "neighbours") v.neighbours = value;
     if (name == "vehicles") v.neighbours = std::max(0.0, value - 1);
   }
-  if (v.gains.rate_hz > 0 && !own_step) v.gains.integrator_step_s = 1 / v.gains.rate_hz;
-  v.plant.largest_thrust_N = v.plant.thrust_scale * grid.model.largest_thrust_N(battery_V);
-  // The firmware commands forces for the mass it was told, so another mass scales the effect of its gains.
-  v.plant.thrust_scale *= grid.model.mass_kg / v.plant.mass_kg;
+  if (gains.rate_hz > 0 && !own_step) gains.integrator_step_s = 1 / gains.rate_hz;
+  plant.largest_thrust_N = grid.model.largest_thrust_N(battery_V);
+  plant.least_thrust_N =
+      static_cast<double>(grid.model.num_rotors()) * least_rotor_force_N(grid.model.thrust);
   return v;
 }
 
-/// Computes each requested quantity, at most once.
+/// Computes each requested quantity of the loop that flies, at most once.
 class Quantities {
  public:
-  Quantities(const Grid& grid, const Variant& variant, const AxisLoop& loop,
-             const std::optional<SampledLoop>& sampled)
-      : grid_(grid), variant_(variant), loop_(loop), acting_(loop), sampled_(sampled) {
-    if (sampled_) acting_.Ki = effective_Ki(*sampled_);
+  Quantities(const Grid& grid, const Variant& variant)
+      : axis_(grid.axis),
+        loop_(variant.loop),
+        continuous_(*loop_.continuous(axis_)),
+        sampled_(loop_.sampled(axis_)) {
+    source_.kind = "declared";
+    for (int axis = 0; axis < 3; ++axis) {
+      Disturbance& d = source_.axis[axis];
+      if (axis != axis_) {
+        d.amplitude_N = d.rate_N_s = d.variation_N = d.impulse_N_s = 0;
+        continue;
+      }
+      d = grid.disturbance;
+      for (double* const known : {&d.amplitude_N, &d.rate_N_s, &d.variation_N, &d.impulse_N_s})
+        if (std::isfinite(*known)) *known *= variant.neighbours;
+    }
   }
 
   double operator()(const std::string& name) {
-    if (name == "rate") return norms().rate;
-    if (name == "amplitude") return norms().amplitude;
-    if (name == "edge") return norms().edge;
-    if (name == "impulse") return norms().impulse;
-    if (name == "error_m") return error();
-    if (name == "lag_limit_s") return lag_limit(acting_);
-    if (name == "delay_limit_s") return delay_limit(acting_);
-    if (name == "lag_floor") return lag_floor(acting_).rate;
-    if (name == "effort") return effort();
+    if (name == "rate") return gains().all_times.rate;
+    if (name == "amplitude") return gains().all_times.amplitude;
+    if (name == "edge") return gains().all_times.edge;
+    if (name == "impulse") return gains().all_times.impulse;
+    if (name == "error_m") return axis_bounds(loop_, gains(), source_, {}).least();
+    if (name == "lag_limit_s") return lag_limit(continuous_);
+    if (name == "delay_limit_s") return delay_limit(continuous_);
+    if (name == "lag_floor") return lag_floor(continuous_).rate;
+    if (name == "effort") return sampled_ ? effort_gain(*sampled_) : effort_gain(continuous_);
     if (name == "noise_command_m_s2") return sampled_ ? noise().command_m_s2 : NAN;
     if (name == "noise_error_m") return sampled_ ? noise().error_m : NAN;
     if (name == "spectral_radius") return sampled_ ? spectral_radius(*sampled_) : NAN;
-    if (name == "integral_authority_N") {
-      return loop_.Ki > 0 ? loop_.mass_kg * loop_.Ki *
-                                variant_.gains.integrator_limit_m_s[static_cast<std::size_t>(grid_.axis)]
-                          : 0;
-    }
-    const double weight_N = grid_.axis == 2 ? variant_.plant.mass_kg * kGravity_m_s2 : 0;
-    return variant_.plant.largest_thrust_N - weight_N - effort() * scaled(grid_.disturbance.amplitude_N);
+    if (name == "integral_authority_N")
+      return continuous_.Ki > 0 ? continuous_.mass_kg * continuous_.Ki * loop_.integral_limit_m_s(axis_) : 0;
+    return thrust().margin_N();
+  }
+
+  /// Saturation under [disturbance], of this axis alone.
+  const Saturation& thrust() {
+    if (!thrust_) thrust_ = saturation(loop_, source_, {});
+    return *thrust_;
   }
 
  private:
-  double scaled(double known) const { return std::isinf(known) ? known : variant_.neighbours * known; }
-
-  /// Norms of the loop as flown, with the effective integral gain.
-  const GainNorms& norms() {
-    if (!norms_) norms_ = continuous_norms(acting_, Channel::kForce);
-    return *norms_;
-  }
-  double error() {
-    const Disturbance& d = grid_.disturbance;
-    Disturbance all = d;
-    all.amplitude_N = scaled(d.amplitude_N);
-    all.impulse_N_s = scaled(d.impulse_N_s);
-    all.rate_N_s = scaled(d.rate_N_s);
-    all.variation_N = scaled(d.variation_N);
-    const double share = sampled_ ? sampled_->integrator_step_s / sampled_->period_s : 1;
-    const ClampBounds clamp =
-        clamp_bounds(acting_, Channel::kForce, all, {},
-                     variant_.gains.integrator_limit_m_s[static_cast<std::size_t>(grid_.axis)], share);
-    // If the integrator may reach its clamp, the loop is not linear.
-    if (clamp.exists && !clamp.never_acts) return std::min(clamp.by_amplitude, clamp.by_impulse);
-    const auto bound = [](double gain, double known) { return std::isinf(known) ? kInfinity : gain * known; };
-    return std::min({bound(norms().rate, scaled(d.rate_N_s)), bound(norms().amplitude, scaled(d.amplitude_N)),
-                     bound(norms().edge, scaled(d.variation_N)),
-                     bound(norms().impulse, scaled(d.impulse_N_s))});
-  }
-  double effort() {
-    if (!effort_) effort_ = effort_gain(acting_);
-    return *effort_;
+  const ExactGains& gains() {
+    if (gains_) return *gains_;
+    gains_ = {axis_, Channel::kForce, Loop::kContinuous, {}, {}};
+    if (sampled_) gains_->loop = Loop::kSampled;
+    gains_->all_times = sampled_ ? sampled_norms(*sampled_, Channel::kForce, Instants::kAll)
+                                 : continuous_norms(continuous_, Channel::kForce);
+    return *gains_;
   }
   const NoiseDeviation& noise() {
     if (!noise_) noise_ = noise_deviation(*sampled_, 1e-3, 0.05);
     return *noise_;
   }
 
-  const Grid& grid_;
-  const Variant& variant_;
-  const AxisLoop& loop_;
-  AxisLoop acting_;  ///< with the effective integral gain of the sampled loop
-  const std::optional<SampledLoop>& sampled_;
-  std::optional<GainNorms> norms_;
-  std::optional<double> effort_;
+  int axis_;
+  FlownLoop loop_;
+  AxisLoop continuous_;
+  std::optional<SampledLoop> sampled_;
+  DisturbanceSource source_;
+  std::optional<ExactGains> gains_;
   std::optional<NoiseDeviation> noise_;
+  std::optional<Saturation> thrust_;
 };
 
 std::string limit_text(const GridLimit& limit, double value) {
@@ -134,13 +128,13 @@ std::string limit_text(const GridLimit& limit, double value) {
 }
 
 /// Returns an empty text if the rotors can lift the vehicle.
-std::string lift_text(const Variant& variant) {
-  const double weight_N = variant.plant.mass_kg * kGravity_m_s2;
-  if (variant.plant.largest_thrust_N > weight_N) return "";
+std::string lift_text(const FlownLoop& loop) {
+  const double weight_N = loop.plant.mass_kg * kGravity_m_s2, most_N = loop.thrust_range_N().upper;
+  if (most_N > weight_N) return "";
   char text[160];
   std::snprintf(text, sizeof text,
-                "the rotors cannot lift the vehicle: %.4g N of thrust for %.4g N of weight",
-                variant.plant.largest_thrust_N, weight_N);
+                "the rotors cannot lift the vehicle: %.4g N of thrust for %.4g N of weight", most_N,
+                weight_N);
   return text;
 }
 
@@ -157,27 +151,24 @@ Cell compute_cell(const Grid& grid, long index) {
   cell.index = index;
   cell.values.assign(grid.compute.size(), NAN);
   const Variant variant = variant_of(grid, grid.at(index));
-  const std::optional<AxisLoop> loop = axis_loop(variant.gains, variant.plant, grid.axis);
-  if (!loop) {
+  const FlownLoop& loop = variant.loop;
+  const std::optional<AxisLoop> continuous = loop.continuous(grid.axis);
+  if (!continuous) {
     cell.infeasible = "Lambda or K couples axes";
     return cell;
   }
-  if (!is_stable(*loop)) {
-    cell.infeasible = "the continuous loop is unstable";
+  const std::optional<SampledLoop> sampled = loop.sampled(grid.axis);
+  if (sampled ? !(spectral_radius(*sampled) < 1) : !is_stable(*continuous)) {
+    cell.infeasible = sampled ? "the sampled loop is unstable" : "the continuous loop is unstable";
     return cell;
   }
-  const std::optional<SampledLoop> sampled = sampled_axis_loop(variant.gains, variant.plant, grid.axis);
-  if (sampled && !(spectral_radius(*sampled) < 1)) {
-    cell.infeasible = "the sampled loop is unstable";
-    return cell;
-  }
-  cell.infeasible = lift_text(variant);
-  Quantities quantities(grid, variant, *loop, sampled);
+  cell.infeasible = lift_text(loop);
+  Quantities quantities(grid, variant);
   for (std::size_t i = 0; i < grid.compute.size(); ++i) cell.values[i] = quantities(grid.compute[i]);
   // All bounds assume that thrust never reaches its limit.
   if (cell.infeasible.empty() && std::isfinite(grid.disturbance.amplitude_N)) {
-    const double margin_N = quantities("thrust_margin_N");
-    if (margin_N < 0) cell.infeasible = thrust_text(margin_N);
+    const Saturation& thrust = quantities.thrust();
+    if (!thrust.is_proved()) cell.infeasible = thrust_text(thrust.margin_N());
   }
   for (const GridLimit& limit : grid.limits) {
     if (!cell.infeasible.empty()) break;

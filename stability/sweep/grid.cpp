@@ -122,7 +122,7 @@ const std::vector<Quantity>& grid_quantities() {
       {"amplitude", "m/N", -1, "worst error per amplitude of force, |h'|_1"},
       {"edge", "m/N", -1, "worst error per variation of force, |h|_oo"},
       {"impulse", "m per N s", -1, "worst error per impulse, |h'|_oo"},
-      {"error_m", "m", -1, "smallest of the rate, amplitude, edge and impulse bounds for [disturbance]"},
+      {"error_m", "m", -1, "smallest bound for [disturbance], with the clamp"},
       {"lag_limit_s", "s", 1, "additional first-order lag that the loop tolerates"},
       {"delay_limit_s", "s", 1, "delay that the loop tolerates"},
       {"lag_floor", "m per N/s", -1, "error that remains with perfect feedforward, due to the lag"},
@@ -131,7 +131,7 @@ const std::vector<Quantity>& grid_quantities() {
       {"noise_error_m", "m", -1, "error from the same noise"},
       {"spectral_radius", "1", -1, "of the sampled loop"},
       {"integral_authority_N", "N", 1, "constant force that the clamped integrator can cancel"},
-      {"thrust_margin_N", "N", 1, "thrust margin about hover under [disturbance]"}};
+      {"thrust_margin_N", "N", 1, "distance of the commanded thrust from its limits under [disturbance]"}};
   return all;
 }
 

@@ -193,10 +193,10 @@ TEST(BoundCommand, ADeclaredTruthIsEnclosedAndGivesABall) {
   const Json with_network = json_of(folder, "bound" + gains + truth + " --accel 2 --network " +
                                                 kSourceFolder + "/nn/networks/demo/network.toml");
   EXPECT_GT(with_network["theorem"]["ball"].get<double>(), result["theorem"]["ball"].get<double>());
-  const Outcome unknown = run_shell("swarmcert bound" + gains + " --truth " + kSourceFolder +
+  const Outcome unknown = run_shell("swarmcert bound --details" + gains + " --truth " + kSourceFolder +
                                         "/stability/models/crazyflie-small-effects.toml",
                                     folder.path());
-  EXPECT_EQ(unknown.exit_code, 0);
+  EXPECT_EQ(unknown.exit_code, 4);
   EXPECT_NE(unknown.output.find("needs the relative speed: --speed"), std::string::npos) << unknown.output;
   EXPECT_EQ(run_shell("swarmcert bound" + gains + truth + " --rate 1", folder.path()).exit_code, 2);
   EXPECT_EQ(run_shell("swarmcert bound" + gains + truth + " --gap 3:1", folder.path()).exit_code, 2);
@@ -293,8 +293,9 @@ TEST(BoundCommand, CoupledAxesAreNamedAndWhatNeedsASingleAxisIsRefused) {
   const std::string all = gains_file(
       folder,
       "[position]\nLambda = [[3.1, 0.4, -0.2], [0.4, 2.5, 0.3], [-0.2, 0.3, 4.2]]\nK = [0.12, 0.2, 0.09]\n");
-  const Outcome text = run_shell("swarmcert bound" + all + " --rate 0.2 --amplitude 0.1", folder.path());
-  EXPECT_EQ(text.exit_code, 0) << text.output;
+  const Outcome text =
+      run_shell("swarmcert bound --details" + all + " --rate 0.2 --amplitude 0.1", folder.path());
+  EXPECT_EQ(text.exit_code, 4) << text.output;
   EXPECT_NE(text.output.find("couples the axes x, y, z"), std::string::npos) << text.output;
   EXPECT_EQ(text.output.find("No disturbance is declared"), std::string::npos) << text.output;
   EXPECT_EQ(text.output.find("inf"), std::string::npos) << text.output;

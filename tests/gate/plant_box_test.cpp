@@ -16,13 +16,13 @@ namespace swarmcert::gate {
 namespace {
 
 using stability::DisturbanceSource;
-using stability::TrackingSetup;
+using stability::FlownLoop;
 using stability::UncertainPlant;
 
 /// A continuous loop with known gains.
 /// @param limit_m_s limit of the integrator.
-TrackingSetup continuous_setup(double limit_m_s) {
-  TrackingSetup setup;
+FlownLoop continuous_setup(double limit_m_s) {
+  FlownLoop setup;
   setup.model = tests::small_vehicle();
   setup.plant.mass_kg = setup.model.mass_kg;
   setup.gains = stability::load_gains(tests::source_path("controller/gains/crazyflie-small.toml"));
@@ -33,7 +33,7 @@ TrackingSetup continuous_setup(double limit_m_s) {
   return setup;
 }
 
-UncertainPlant box_about(const TrackingSetup& setup) {
+UncertainPlant box_about(const FlownLoop& setup) {
   const double m = setup.plant.mass_kg;
   return {{0.95 * m, 1.05 * m}, {0.9, 1.2}, {0.03, 0.03}, {0, 0}};
 }
@@ -51,7 +51,7 @@ DisturbanceSource force_and_estimates(double amplitude_N, double velocity_m_s, d
 
 TEST(PlantBox, NoCornerIsAboveTheEnclosure) {
   for (const double limit_m_s : {std::numeric_limits<double>::infinity(), 2.0, 0.02}) {
-    const TrackingSetup setup = continuous_setup(limit_m_s);
+    const FlownLoop setup = continuous_setup(limit_m_s);
     for (const auto& [amplitude_N, velocity_m_s, position_m] :
          {std::array<double, 3>{0.02, 0, 0}, {0.02, 0.1, 0}, {0.02, 0, 0.01}, {0, 0.1, 0.02}}) {
       const BoxBound bound =
@@ -71,16 +71,16 @@ TEST(PlantBox, NoCornerIsAboveTheEnclosure) {
 
 TEST(PlantBox, TheIntegralOfAnActingClampPassesTheLargestThrustScale) {
   // Thrust of 1.3 times the command: the integral's part of the command acts 1.3 times as well.
-  const TrackingSetup setup = continuous_setup(0.5);
+  const FlownLoop setup = continuous_setup(0.5);
   UncertainPlant box = box_about(setup);
   box.lag_s = box.delay_s = {0, 0};
   box.mass_kg = {setup.plant.mass_kg, setup.plant.mass_kg};
   box.thrust_scale = {1.3, 1.5};
-  TrackingSetup strong = setup;
+  FlownLoop strong = setup;
   strong.plant.thrust_scale = 1.3;
   const DisturbanceSource source = force_and_estimates(0.25, 0, 0);
   const BoxBound bound = bound_over(setup, box, source);
-  const stability::TrackingReport corner = stability::tracking_bounds(strong.gains, strong.plant, source, {});
+  const stability::TrackingReport corner = stability::tracking_bounds(strong, source, {});
   int acting = 0;
   for (const stability::AxisBounds& row : corner.bounds) {
     if (row.loop != stability::Loop::kContinuous) continue;
@@ -91,7 +91,7 @@ TEST(PlantBox, TheIntegralOfAnActingClampPassesTheLargestThrustScale) {
 }
 
 TEST(PlantBox, ErrorsOfTheEstimatesWidenTheBound) {
-  const TrackingSetup setup = continuous_setup(std::numeric_limits<double>::infinity());
+  const FlownLoop setup = continuous_setup(std::numeric_limits<double>::infinity());
   const BoxBound without = bound_over(setup, box_about(setup), force_and_estimates(0.02, 0, 0));
   const BoxBound velocity = bound_over(setup, box_about(setup), force_and_estimates(0.02, 0.1, 0));
   const BoxBound position = bound_over(setup, box_about(setup), force_and_estimates(0.02, 0, 0.01));
@@ -104,12 +104,16 @@ TEST(PlantBox, ErrorsOfTheEstimatesWidenTheBound) {
 }
 
 TEST(PlantBox, TheThrustMarginIsNegativeExactlyIfTheForceErrorSaturatesTheThrust) {
-  TrackingSetup setup = continuous_setup(2.0);
-  EXPECT_TRUE(
-      std::isinf(bound_over(setup, box_about(setup), force_and_estimates(0.02, 0, 0)).thrust_margin_N));
+  FlownLoop setup = continuous_setup(2.0);
+  EXPECT_FALSE(bound_over(setup, box_about(setup), force_and_estimates(0.02, 0, 0)).saturation.is_proved());
   setup.plant.largest_thrust_N = 0.84;  // of which the weight takes 0.33
-  EXPECT_GT(bound_over(setup, box_about(setup), force_and_estimates(0.02, 0, 0)).thrust_margin_N, 0);
-  EXPECT_LT(bound_over(setup, box_about(setup), force_and_estimates(0.5, 0, 0)).thrust_margin_N, 0);
+  const auto found = [&](double amplitude_N) {
+    return bound_over(setup, box_about(setup), force_and_estimates(amplitude_N, 0, 0)).saturation;
+  };
+  EXPECT_TRUE(found(0.005).is_proved()) << found(0.005).why;
+  EXPECT_GT(found(0.005).margin_N(), 0);
+  EXPECT_LT(found(0.5).margin_N(), 0);
+  EXPECT_EQ(found(0.5).verdict, stability::Saturation::Verdict::kRefuted) << found(0.5).why;
 }
 
 TEST(PlantBox, TheGateDoesNotPassATrackingLimitWhoseForceErrorSaturatesTheThrust) {

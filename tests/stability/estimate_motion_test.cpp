@@ -142,18 +142,17 @@ TEST(EstimateMotion, ASlowErrorMovesAVehicleByItsRate) {
 }
 
 TEST(EstimateMotion, NoSimulatedSwarmLeavesTheBoundThatContainsTheErrorsOfItsEstimates) {
-  const Gains gains = gains_of_pair();
-  const Plant plant = {0.034, 1, 0};
+  const FlownLoop flown = {gains_of_pair(), {0.034}};
   constexpr double kSlope_N_m = 0.06, kSize = 0.1;
   const CoupledSwarm swarm = pair_of(kSlope_N_m);
   OtherErrors errors;
   errors.velocity_error.amplitude = kSize;
-  EXPECT_EQ(couple(swarm, gains, plant).small_gain.error_m[0], 0);
-  const CoupledVerdict verdict = couple(swarm, gains, plant, errors);
+  EXPECT_EQ(couple(swarm, flown).small_gain.error_m[0], 0);
+  const CoupledVerdict verdict = couple(swarm, flown, errors);
   ASSERT_TRUE(verdict.small_gain.proved);
   EXPECT_GT(verdict.small_gain.error_m[0], verdict.of_estimates.error_m);
 
-  const AxisLoop loop = *axis_loop(gains, plant, 2);
+  const AxisLoop loop = *flown.continuous(2);
   std::mt19937 random(7);
   double most_m = 0, most_rate_N_s = 0;
   for (int run = 0; run < 60; ++run) {
@@ -230,16 +229,15 @@ TEST(ForceMotion, ASlowForceMovesAVehicleByItsRateAndAnEdgeByItsSize) {
 }
 
 TEST(ForceMotion, NoSimulatedSwarmLeavesTheBoundThatContainsItsForces) {
-  const Gains gains = gains_of_pair();
-  const Plant plant = {0.034, 1, 0};
+  const FlownLoop flown = {gains_of_pair(), {0.034}};
   constexpr double kSlope_N_m = 0.06, kSize_N = 0.01;
   const CoupledSwarm swarm = pair_of(kSlope_N_m);
   Disturbance force;
   force.amplitude_N = kSize_N;
-  const CoupledVerdict verdict = couple(swarm, gains, plant, {}, force);
+  const CoupledVerdict verdict = couple(swarm, flown, {}, force);
   ASSERT_TRUE(verdict.small_gain.proved);
   EXPECT_GT(verdict.small_gain.error_m[0], verdict.of_force.error_m);
-  const AxisLoop loop = *axis_loop(gains, plant, 2);
+  const AxisLoop loop = *flown.continuous(2);
   double most_m = 0;
   for (int run = 0; run < 40; ++run) {
     const double half_s = 0.2 + 0.05 * run;

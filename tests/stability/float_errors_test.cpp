@@ -17,20 +17,18 @@ namespace {
 
 constexpr char kModel[] = "stability/models/crazyflie-small.toml";
 
-TrackingSetup setup_with(const std::string& position_gains) {
+FlownLoop setup_with(const std::string& position_gains) {
   const tests::TempFolder folder;
   const std::string gains = folder / "gains.toml";
   files::write_file(
       gains, "schema = \"swarmcert/gains/1\"\n[position]\n" + position_gains + "rate_hz = 500\n", false);
-  return load_tracking_setup(gains, tests::source_path(kModel));
+  return load_flown_loop(gains, tests::source_path(kModel));
 }
 
-FloatErrors errors_of(const TrackingSetup& setup) {
-  return float_errors(setup, tracking_bounds(setup.gains, setup.plant, {}, {}));
-}
+FloatErrors errors_of(const FlownLoop& setup) { return float_errors(setup, tracking_bounds(setup, {}, {})); }
 
 TEST(FloatErrors, BoundHowFarAFlightInFloatDepartsFromTheSameInDouble) {
-  const TrackingSetup setup = setup_with("Kp = 10\nKd = 5\nKi = 10\nintegrator_limit = 0.1\n");
+  const FlownLoop setup = setup_with("Kp = 10\nKd = 5\nKi = 10\nintegrator_limit = 0.1\n");
   const FloatErrors errors = errors_of(setup);
   ASSERT_TRUE(errors.applies) << errors.why_not;
   const auto task = make_task("hover", {1, 20, 0});

@@ -38,7 +38,7 @@ double worst_of(const IssCheck& check, const std::string& kind) {
 
 TEST(IssCheck, IsotropicGainsReachTheBallByARampAndNothingExceedsIt) {
   for (const auto& [lambda, k] : {std::pair{"4", "0.136"}, std::pair{"2", "0.2"}, std::pair{"1", "0.5"}}) {
-    const IssCheck check = check_iss(composite(lambda, k), tests::small_vehicle(), {});
+    const IssCheck check = check_iss(flown_loop(composite(lambda, k), tests::small_vehicle()), {});
     EXPECT_TRUE(check.theorem_applies);
     EXPECT_EQ(check.violations, 0);
     EXPECT_GT(worst_of(check, "ramp"), 0.999);
@@ -50,22 +50,24 @@ TEST(IssCheck, IsotropicGainsReachTheBallByARampAndNothingExceedsIt) {
 
 TEST(IssCheck, HasTheBallOfTheTables) {
   // 1 / (k l^2) for l = 4, k = 0.136 and l = 2, k = 0.2: 0.45955882352941174 and 1.25 m per N/s.
-  const IssCheck a1 = check_iss(composite("4", "0.136"), tests::small_vehicle(), with_runs(5));
+  const IssCheck a1 = check_iss(flown_loop(composite("4", "0.136"), tests::small_vehicle()), with_runs(5));
   EXPECT_NEAR(a1.ball_m / a1.rate_N_s, 0.45955882352941174, 1e-12);
-  const IssCheck a2 = check_iss(composite("2", "0.2"), tests::small_vehicle(), with_runs(5));
+  const IssCheck a2 = check_iss(flown_loop(composite("2", "0.2"), tests::small_vehicle()), with_runs(5));
   EXPECT_NEAR(a2.ball_m / a2.rate_N_s, 1.25, 1e-12);
 }
 
 TEST(IssCheck, AnisotropicGainsStayInsideWhereTheTheoremIsConservative) {
   // As in vector_gain_test.cpp: theorem 5.0, exact 2-norm peak gain 1.2503991779, ratio 0.25008.
-  const IssCheck check = check_iss(composite("[2, 2, 4]", "[0.2, 0.2, 0.05]"), tests::small_vehicle(), {});
+  const IssCheck check =
+      check_iss(flown_loop(composite("[2, 2, 4]", "[0.2, 0.2, 0.05]"), tests::small_vehicle()), {});
   EXPECT_EQ(check.violations, 0);
   EXPECT_LE(check.worst_ratio, 0.25008 + 1e-4);
   EXPECT_GT(check.worst_ratio, 0.95 * 0.25008);
 }
 
 TEST(IssCheck, NoneOfTenThousandOfEachKindLeavesBallOrTransient_slow) {
-  const IssCheck check = check_iss(composite("4", "0.136"), tests::small_vehicle(), with_runs(63000));
+  const IssCheck check =
+      check_iss(flown_loop(composite("4", "0.136"), tests::small_vehicle()), with_runs(63000));
   std::map<std::string, int> count;
   for (const IssRun& run : check.runs) ++count[run.kind];
   for (const char* const kind : {"ramp", "worst_linear", "bang_bang", "random", "initial_state"}) {
@@ -88,7 +90,7 @@ TEST(IssCheck, FindsTheViolationsOfBrokenHypotheses) {
   };
   for (const auto& [what, gains] : broken) {
     SCOPED_TRACE(what);
-    const IssCheck check = check_iss(gains, tests::small_vehicle(), with_runs(45));
+    const IssCheck check = check_iss(flown_loop(gains, tests::small_vehicle()), with_runs(45));
     EXPECT_FALSE(check.theorem_applies);
     EXPECT_FALSE(check.why_not.empty());
     EXPECT_GT(check.violations, 0);
@@ -113,7 +115,7 @@ TEST(IssCheck, RunsThatLeaveAHypothesisAreLabelledAndRefuteNothing) {
     SCOPED_TRACE(std::string(expected) + ", " + std::to_string(rate_N_s));
     IssOptions options = with_runs(60);
     options.rate_N_s = rate_N_s;
-    const IssCheck check = check_iss(gains, tests::small_vehicle(), options);
+    const IssCheck check = check_iss(flown_loop(gains, tests::small_vehicle()), options);
     int labelled = 0;
     for (const IssRun& run : check.runs) {
       labelled += run.left == expected;
@@ -163,7 +165,7 @@ void check_shipped_gains(const std::vector<double>& rates_N_s, const std::vector
         SCOPED_TRACE(file.path().filename().string() + ", " + name + ", " + std::to_string(rate_N_s));
         IssOptions options = with_runs(runs);
         options.rate_N_s = rate_N_s;
-        const IssCheck check = check_iss(gains, model, options);
+        const IssCheck check = check_iss(flown_loop(gains, model), options);
         const std::vector<FullLoopRun> flown = fly_full_loop(gains, model, check);
         ++campaigns;
         left += check.left > 0;
@@ -194,8 +196,9 @@ TEST(IssCheck, ShippedGainsGetAnAnswerOnAGridOfRates_slow) {
 TEST(IssCheck, EveryViolationShowsInARatioAboveOne) {
   // With unequal gains the errors stay far below the ball; the lag violates the transient bound at its start.
   const IssCheck check =
-      check_iss(composite("[3.1, 2.5, 4.2]", "[0.12, 0.2, 0.09]", "[lag]\nmotor_s = 0.03\n"),
-                tests::small_vehicle(), with_runs(45));
+      check_iss(flown_loop(composite("[3.1, 2.5, 4.2]", "[0.12, 0.2, 0.09]", "[lag]\nmotor_s = 0.03\n"),
+                           tests::small_vehicle()),
+                with_runs(45));
   EXPECT_LT(check.worst_ratio, 1);
   EXPECT_GT(check.violations, 0);
   for (const IssRun& run : check.runs) {
@@ -207,19 +210,19 @@ TEST(IssCheck, DoesNotDependOnJobsOrOnTheRate) {
   IssOptions options;
   options.runs = 60;
   options.jobs = 1;
-  const IssCheck one = check_iss(composite("2", "0.2"), tests::small_vehicle(), options);
+  const IssCheck one = check_iss(flown_loop(composite("2", "0.2"), tests::small_vehicle()), options);
   options.jobs = 3;
-  const IssCheck three = check_iss(composite("2", "0.2"), tests::small_vehicle(), options);
+  const IssCheck three = check_iss(flown_loop(composite("2", "0.2"), tests::small_vehicle()), options);
   ASSERT_EQ(one.runs.size(), three.runs.size());
   for (std::size_t i = 0; i < one.runs.size(); ++i) EXPECT_EQ(one.runs[i].largest_m, three.runs[i].largest_m);
   options.rate_N_s = one.rate_N_s / 7;
-  const IssCheck slower = check_iss(composite("2", "0.2"), tests::small_vehicle(), options);
+  const IssCheck slower = check_iss(flown_loop(composite("2", "0.2"), tests::small_vehicle()), options);
   EXPECT_NEAR(slower.worst_ratio, one.worst_ratio, 1e-6) << "the unsaturated loop is linear";
 }
 
 TEST(IssCheck, VerticalRampsReachTheBallInTheFullLoopToo) {
   const Gains gains = composite("4", "0.136", "[attitude]\nlaw = \"lee\"\n");
-  const IssCheck check = check_iss(gains, tests::small_vehicle(), with_runs(30));
+  const IssCheck check = check_iss(flown_loop(gains, tests::small_vehicle()), with_runs(30));
   const std::vector<FullLoopRun> flown = fly_full_loop(gains, tests::small_vehicle(), check);
   ASSERT_EQ(flown.size(), 6u);
   double vertical = 0, tilt = 0;

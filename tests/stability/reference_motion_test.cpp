@@ -115,20 +115,26 @@ TEST(ReferenceMotion, JumpsAreStartsAwayFromTheSetPoint) {
   }
 }
 
-TEST(ReferenceMotion, LeavesNeitherBallNorThrustMarginAsNoneOfThemContainsIt) {
+TEST(ReferenceMotion, LeavesNoBallAndTakesThrustByItsJumpsAndItsAcceleration) {
   const Gains gains =
       parse_gains("schema = \"swarmcert/gains/1\"\n[position]\nLambda = 4\nK = 0.136\n", "gains.toml");
-  const Plant plant = {kMass_kg, 1, 3 * kMass_kg * kGravity_m_s2};
+  const FlownLoop loop = {gains, {kMass_kg, 1, 5 * kMass_kg * kGravity_m_s2}};
   DisturbanceSource source;
   source.kind = "declared";
   for (Disturbance& d : source.axis) d.amplitude_N = d.rate_N_s = 0.01;
   source.rate_norm_N_s = 0.01;
-  const TrackingReport still = tracking_bounds(gains, plant, source, {});
-  source.reference[2].steps_m = 0.1;
-  const TrackingReport moving = tracking_bounds(gains, plant, source, {});
-  EXPECT_TRUE(still.ball_m && still.thrust_margin_N);
-  EXPECT_FALSE(moving.ball_m || moving.thrust_margin_N);
-  EXPECT_GT(moving.bounds.back().total_m(), still.bounds.back().total_m() + 0.1 - 1e-9);
+  const TrackingReport still = tracking_bounds(loop, source, {});
+  source.reference[2].steps_m = 0.05;
+  const TrackingReport moving = tracking_bounds(loop, source, {});
+  EXPECT_TRUE(still.ball_m && still.saturation.is_proved());
+  EXPECT_FALSE(moving.ball_m);
+  EXPECT_LT(moving.saturation.margin_N(),
+            still.saturation.margin_N() - 0.05 * 48 * kMass_kg);  // Kp = 48 1/s^2
+  EXPECT_GT(moving.bounds.back().total_m(), still.bounds.back().total_m() + 0.05 - 1e-9);
+  source.reference[2] = {0, 0, 1, 0.5};
+  EXPECT_LE(saturation(loop, source, {}).margin_N(), still.saturation.margin_N() - 0.5 * kMass_kg + 1e-12);
+  source.reference[2].acceleration_m_s2 = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(saturation(loop, source, {}).verdict, Saturation::Verdict::kUndecided);
 }
 
 TEST(ReferenceMotion, WhatItDemandsOfTheIntegratorIsNotExceeded) {

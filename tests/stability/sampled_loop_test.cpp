@@ -84,7 +84,7 @@ TEST(SampledLoop, ErrorsBetweenSamplesOfTheShippedGainsAreLargerByWhatTheHeaderS
     if (file.path().extension() != ".toml") continue;
     const Gains gains = load_gains(file.path().string());
     for (const int axis : {0, 2}) {
-      const std::optional<SampledLoop> loop = sampled_axis_loop(gains, {kMass_kg}, axis);
+      const std::optional<SampledLoop> loop = FlownLoop{gains, {kMass_kg}}.sampled(axis);
       if (!loop) continue;
       ++loops;
       for (const Channel channel : {Channel::kForce, Channel::kCommand}) {

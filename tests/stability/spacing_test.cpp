@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 
-#include "stability/bounds/loops/axis_loop.h"
+#include "stability/stepped_loop.h"
 #include "stability/vehicle.h"
 
 namespace swarmcert::stability {
@@ -20,14 +22,15 @@ DownwashField field() {
   return result;
 }
 
+FlownLoop flown(double largest_thrust_N) {
+  const Gains gains = parse_gains(
+      "schema = \"swarmcert/gains/1\"\n[position]\nKp = 10\nKd = 5\nKi = 10\nintegrator_limit = 100\n",
+      "gains.toml");
+  return {gains, {tests::kMass_kg, 1, largest_thrust_N}};
+}
+
 Spacing spacing_of(const SpacingQuestion& question, double largest_thrust_N = 0.6) {
-  const AxisLoop loop = {tests::kMass_kg, 10, 5, 10, {}, 0};
-  const GainNorms gains = continuous_norms(loop, Channel::kForce);
-  SpacingVehicle vehicle;
-  vehicle.effort_gain = 1;
-  vehicle.largest_thrust_N = largest_thrust_N;
-  vehicle.integrator_limit_m_s = 100;
-  return spacing(loop, gains, vehicle, field(), question);
+  return spacing(flown(largest_thrust_N), field(), question);
 }
 
 TEST(Spacing, FieldFallsAsItsFormulaAndIsConstantWhereItIsNearest) {
@@ -55,6 +58,60 @@ TEST(Spacing, AVehicleMayStayExactlyWhereItsErrorIsSmallEnoughAndItsThrustSuffic
     }
     EXPECT_GT(stays, 0);
     EXPECT_LT(stays, 9);
+  }
+}
+
+TEST(Spacing, ProfileWithATailFallsToItsShareAndHasItsIntegralAlongALine) {
+  for (const double tail : {0.0, 0.3, 1.0}) {
+    DownwashField one = field();
+    one.tail = tail;
+    const auto profile = [tail](double u) {
+      return tail > 0 ? std::pow(1 + tail * u * u / 2, -1 / tail) : std::exp(-u * u / 2);
+    };
+    EXPECT_NEAR(profile(one.spreads_at(0.2)), 0.2, 1e-12);
+    double area = 0;
+    constexpr double kStep = 1e-2, kEnd = 2e3;
+    for (double u = kStep / 2; u < kEnd; u += kStep) area += 2 * kStep * profile(u);
+    EXPECT_NEAR(one.line_integral(), area, 3e-3) << tail;
+  }
+}
+
+/// The lower vehicle crosses back and forth at the least speed, turns outside the radius at once, and waits there for
+/// the least time, where the force is as large as it may be.
+TEST(Spacing, NoSequenceOfPassesExceedsTheLimit) {
+  SpacingQuestion question;
+  question.max_error_m = 0.06;
+  question.steps = 9;
+  for (const char* const text : {"", "rate_hz = 100\nintegrator_step_s = 0.002\n"}) {
+    const Gains gains = parse_gains(
+        std::string("schema = \"swarmcert/gains/1\"\n[position]\nKp = 10\nKd = 5\nKi = 10\n") + text,
+        "gains.toml");
+    const FlownLoop loop = {gains, {tests::kMass_kg, 1, 0.6}};
+    int crossings = 0;
+    for (const double dwell_s : {0.3, 2.0}) {
+      question.dwell_s = dwell_s;
+      for (const SpacingRow& row : spacing(loop, field(), question).shape) {
+        if (!(row.least_speed_m_s > 0) || !std::isfinite(row.least_speed_m_s)) continue;
+        ++crossings;
+        const double spread_m = field().spread_at_m(row.height_gap_m + question.max_error_m);
+        const double R = row.keep_out_radius_m, pass_s = 2 * R / row.least_speed_m_s,
+                     turn_s = pass_s + dwell_s;
+        const double outside_N = row.peak_force_N * std::exp(-R * R / (2 * spread_m * spread_m));
+        SteppedLoop flight =
+            loop.is_sampled() ? SteppedLoop(*loop.sampled(2), 4) : SteppedLoop(*loop.continuous(2), 0.0025);
+        flight.reset();
+        double most_m = 0;
+        for (int k = 0; k * flight.step_s() < 12 * turn_s; ++k) {
+          const double at_s = std::fmod(k * flight.step_s(), turn_s), r = -R + at_s * row.least_speed_m_s;
+          const double force_N =
+              at_s < pass_s ? row.peak_force_N * std::exp(-r * r / (2 * spread_m * spread_m)) : outside_N;
+          most_m = std::max(most_m, std::abs(flight.step(force_N, force_N)));
+        }
+        EXPECT_LE(most_m, question.max_error_m) << row.height_gap_m;
+        EXPECT_GT(most_m, 0.25 * question.max_error_m) << row.height_gap_m;
+      }
+    }
+    EXPECT_GT(crossings, 0);
   }
 }
 

@@ -28,7 +28,7 @@ class AxesFlight {
   /// Called with the time, the vehicle, e and e'.
   using Look = std::function<void(double, int, const std::array<double, 3>&, const std::array<double, 3>&)>;
 
-  AxesFlight(const stability::TrackingSetup& tracking, const stability::Model& truth,
+  AxesFlight(const stability::FlownLoop& tracking, const stability::Model& truth,
              const files::Network& network, const stability::Task& task, int vehicles,
              bool is_sampled = false, const analysis::EstimateErrors& estimates = {},
              const std::optional<Interval>& motor_lag_s = {},
@@ -43,9 +43,7 @@ class AxesFlight {
         forces_(network, truth) {
     Loops loops;
     for (int k = 0; k < 3; ++k) {
-      loops[k] = *axis_loop(gains_, tracking.plant, k);
-      if (const auto sampled = sampled_axis_loop(gains_, tracking.plant, k))
-        loops[k].Ki = stability::effective_Ki(*sampled);
+      loops[k] = *tracking.continuous(k);
     }
     loops_.assign(static_cast<std::size_t>(vehicles), loops);
   }

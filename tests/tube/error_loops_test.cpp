@@ -30,7 +30,7 @@ struct Start {
 };
 
 TEST(ErrorLoops, RotorsThatStartWithAnExcessOfThrustAreEnclosedSliceBySlice) {
-  stability::TrackingSetup tracking;
+  stability::FlownLoop tracking;
   tracking.plant.mass_kg = Start::kMass_kg;
   tracking.gains.pid = stability::PidGains{{Start::kKp, Start::kKp, Start::kKp},
                                            {Start::kKd, Start::kKd, Start::kKd},
@@ -65,7 +65,7 @@ TEST(ErrorLoops, WithoutALagTheThrustFollowsAtOnce) {
 
 /// A loop with `lag_s` that is sampled at 100 Hz, with cells of `slice_s`.
 ErrorLoop sampled_loop(double lag_s, double slice_s, int slices) {
-  stability::TrackingSetup tracking;
+  stability::FlownLoop tracking;
   tracking.plant.mass_kg = Start::kMass_kg;
   tracking.gains.pid = stability::PidGains{{Start::kKp, Start::kKp, Start::kKp},
                                            {Start::kKd, Start::kKd, Start::kKd},

@@ -25,7 +25,7 @@ Campaign fly_in_tube(int flights, const EstimateErrors& estimates, const std::op
   const files::Network network = tests::demo_network();
   const stability::Model truth = tests::truth_model();
   const auto task = stability::make_task("swap", {2, 4.5, 0});
-  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  const stability::FlownLoop loop = tests::loop_of("crazyflie-small");
   LocalTubeOptions options;
   options.estimates = estimates;
   options.motor_lag_s = motor_lag_s;

@@ -60,7 +60,7 @@ struct Case {
 TEST(Enclosure, NoStateOfTheTubeExceedsItsBoundAndSomeComeNear) {
   const files::Network network = tests::demo_network();
   const stability::Model truth = tests::truth_model();
-  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  const stability::FlownLoop loop = tests::loop_of("crazyflie-small");
   for (const Case& c : {Case{2, 0, 0}, Case{2, 0.04, 0.15}, Case{3, 0.01, 0.03}}) {
     const auto task = stability::make_task("swap", {c.vehicles, 4.5, 0});
     const Scene scene(loop, truth, network, *task, c.vehicles, 0.011);
@@ -89,7 +89,7 @@ TEST(Enclosure, NoStateOfTheTubeExceedsItsBoundAndSomeComeNear) {
 TEST(SlopeBound, NoStateOfTheTubeExceedsItAndBetterConstantsBoundBetter) {
   const files::Network network = tests::demo_network();
   const stability::Model truth = tests::truth_model();
-  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  const stability::FlownLoop loop = tests::loop_of("crazyflie-small");
   const auto task = stability::make_task("swap", {2, 4.5, 0});
   const Scene scene(loop, truth, network, *task, 2, 0.011);
   Enclosure at_set_points(scene, {});

@@ -55,7 +55,7 @@ TEST(LocalTube, HoldsEveryFlightOfItsSwapAndOrdersTheBounds) {
   // Gains that state the vehicle's attitude response, which the simulator includes and composite.toml omits. No tube
   // includes the reduced lift of a tilted thrust, which affects only the height.
   const double left_out_m[] = {0, 0, 5e-5};
-  const stability::TrackingSetup loop = tests::loop_of("firmware-defaults");
+  const stability::FlownLoop loop = tests::loop_of("firmware-defaults");
   const stability::Model truth = tests::truth_model();
   const auto task = stability::make_task("swap", {2, 4.5, 0});
   const LocalTube tube = local_tube(loop, truth, network, *task, 2, quick());
@@ -95,9 +95,9 @@ TEST(LocalTube, MotorsLagAsTheTruthSaysWhateverTheGainsState) {
   const files::Network network = tests::demo_network();
   const stability::Model truth = tests::truth_model();
   const auto task = stability::make_task("swap", {2, 4.5, 0});
-  stability::TrackingSetup stated = tests::loop_of("firmware-defaults");
+  stability::FlownLoop stated = tests::loop_of("firmware-defaults");
   stated.gains.motor_lag_s = stated.gains.attitude_lag_s = 0;
-  stability::TrackingSetup flies = stated;
+  stability::FlownLoop flies = stated;
   for (const stability::EffectSpec& effect : truth.effects)
     if (effect.name == "motor_lag") flies.gains.motor_lag_s = effect.parameters.at("tau_s");
   const auto outside = [&](const LocalTube& tube) {
@@ -121,7 +121,7 @@ TEST(LocalTube, MotorsLagAsTheTruthSaysWhateverTheGainsState) {
 }
 
 TEST(LocalTube, GainsTooWeakForTheForceAreInconclusiveAndSayHowMuchComesBack) {
-  stability::TrackingSetup loop = tests::loop_of("composite");
+  stability::FlownLoop loop = tests::loop_of("composite");
   loop.gains.composite->Lambda_1_s = scaled(0.03, loop.gains.composite->Lambda_1_s);
   loop.gains.composite->K_kg_s = scaled(0.05, loop.gains.composite->K_kg_s);
   const auto task = stability::make_task("swap", {2, 9, 0});
@@ -139,7 +139,7 @@ TEST(LocalTube, SliceBySliceTheShippedGainsAreProvedWhereOneRadiusHasAGainAboveO
   for (const auto& [gains, one_radius] : {std::pair("composite", true), std::pair("crazyflie-small", false),
                                           std::pair("crazyflie-large", false)}) {
     SCOPED_TRACE(gains);
-    const stability::TrackingSetup loop = tests::loop_of(gains);
+    const stability::FlownLoop loop = tests::loop_of(gains);
     const LocalTube tube = local_tube(loop, truth_for(loop.gains), network, *task, 2, quick());
     ASSERT_TRUE(tube.proved) << tube.why;
     ASSERT_TRUE(tube.sliced.proved);
@@ -166,7 +166,7 @@ TEST(LocalTube, SliceBySliceTheShippedGainsAreProvedWhereOneRadiusHasAGainAboveO
 TEST(LocalTube, UnstableOrDelayedLoopsAndTruthsWithoutEnclosureAreRefused) {
   const files::Network network = tests::demo_network();
   const auto task = stability::make_task("swap", {2, 4.5, 0});
-  stability::TrackingSetup delayed = tests::loop_of("composite");
+  stability::FlownLoop delayed = tests::loop_of("composite");
   delayed.gains.delay_s = 0.01;
   EXPECT_NE(local_tube(delayed, tests::truth_model(), network, *task, 2, quick()).why.find("delay"),
             std::string::npos);

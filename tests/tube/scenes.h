@@ -5,7 +5,7 @@
 
 #include "nn/base/random.h"
 #include "nn/weights/network.h"
-#include "stability/bounds/tracking_setup.h"
+#include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::tests {
 
@@ -22,9 +22,9 @@ inline stability::Model truth_model() {
 }
 
 /// Gains of controller/gains/<name>.toml on the small vehicle.
-inline stability::TrackingSetup loop_of(const std::string& name) {
-  return stability::load_tracking_setup(kRoot + "/controller/gains/" + name + ".toml",
-                                        kRoot + "/stability/models/crazyflie-small.toml");
+inline stability::FlownLoop loop_of(const std::string& name) {
+  return stability::load_flown_loop(kRoot + "/controller/gains/" + name + ".toml",
+                                    kRoot + "/stability/models/crazyflie-small.toml");
 }
 
 inline double between(files::Random& random, double from, double to) {

@@ -25,7 +25,7 @@ struct Seen {
   double nearest = 0;
 };
 
-Seen fly(const stability::TrackingSetup& loop, const stability::Model& truth, const stability::Task& task,
+Seen fly(const stability::FlownLoop& loop, const stability::Model& truth, const stability::Task& task,
          const SlicedTube& tube, double slice_s, int flights, bool is_sampled = false,
          const EstimateErrors& estimates = {}, const std::optional<Interval>& motor_lag_s = {}) {
   const int vehicles = static_cast<int>(tube.slices.front().size());
@@ -63,7 +63,7 @@ TEST(SlicedTube, HoldsEveryFlightInEverySliceForAllShippedGainsAndTwoAndThreeVeh
         std::pair("crazyflie-large", 2), std::pair("crazyflie-small-nominal", 2),
         std::pair("firmware-defaults", 2)}) {
     SCOPED_TRACE(gains + std::string(", vehicles: ") + std::to_string(vehicles));
-    const stability::TrackingSetup loop = tests::loop_of(gains);
+    const stability::FlownLoop loop = tests::loop_of(gains);
     const auto task = stability::make_task("swap", {vehicles, 4.5, 0});
     const Scene scene(loop, truth, network, *task, vehicles, network_age_s(loop.gains));
     const SlicedTube tube = sliced_tube(scene, boxes(vehicles == 2 ? 8 : 2), kTolerance_N);
@@ -80,7 +80,7 @@ TEST(SlicedTube, SampledFlightsThatLeaveTheContinuousTubeStayInTheSampledOne) {
   stability::Model truth = tests::truth_model();
   truth.effects.clear();
   const auto task = stability::make_task("swap", {2, 4.5, 0});
-  stability::TrackingSetup loop = tests::loop_of("firmware-defaults");
+  stability::FlownLoop loop = tests::loop_of("firmware-defaults");
   loop.gains.rate_hz = 40;
   loop.gains.integrator_step_s = 0.025;
   const auto tube_of = [&](bool is_sampled) {
@@ -107,7 +107,7 @@ TEST(SlicedTube, SampledTubesHoldSampledFlightsAndAreLittleWiderThanContinuousOn
   for (const auto& [gains, most] :
        {std::pair("firmware-defaults", 1.08), std::pair("crazyflie-small", 1.35)}) {
     SCOPED_TRACE(gains);
-    const stability::TrackingSetup loop = tests::loop_of(gains);
+    const stability::FlownLoop loop = tests::loop_of(gains);
     double radius_m[2][3];
     for (const bool is_sampled : {false, true}) {
       const Scene scene(loop, tests::truth_model(), network, *task, 2, network_age_s(loop.gains, is_sampled),
@@ -130,7 +130,7 @@ TEST(SlicedTube, SampledTubesHoldSampledFlightsAndAreLittleWiderThanContinuousOn
 TEST(SlicedTube, OverTheDefaultSwapTheSampledTubeIsAtMostOneAndAHalfTimesTheContinuousOne_slow) {
   const files::Network network = tests::demo_network();
   const auto task = stability::make_task("swap", {2, 0, 0});
-  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  const stability::FlownLoop loop = tests::loop_of("crazyflie-small");
   Radii radii[2];
   for (const bool is_sampled : {false, true}) {
     const Scene scene(loop, tests::truth_model(), network, *task, 2, network_age_s(loop.gains, is_sampled),
@@ -149,7 +149,7 @@ TEST(SlicedTube, OfAnIntervalOfLagsHoldsFlightsOfAnyLagInItAndIsLittleWider) {
   const auto task = stability::make_task("swap", {2, 4.5, 0});
   for (const bool is_sampled : {false, true}) {
     SCOPED_TRACE(is_sampled ? "sampled" : "continuous");
-    const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+    const stability::FlownLoop loop = tests::loop_of("crazyflie-small");
     const double lag_s = loop.gains.motor_lag_s;
     const Interval within(0.9 * lag_s, 1.1 * lag_s);
     const auto tube_of = [&](const Interval& lags_s) {
@@ -176,7 +176,7 @@ TEST(SlicedTube, OfAnIntervalOfLagsHoldsFlightsOfAnyLagInItAndIsLittleWider) {
 TEST(SlicedTube, OverTheDefaultSwapTheTubeOfAnIntervalOfLagsIsAtMostOneAndAHalfTimesThatOfOneLag_slow) {
   const files::Network network = tests::demo_network();
   const auto task = stability::make_task("swap", {2, 0, 0});
-  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  const stability::FlownLoop loop = tests::loop_of("crazyflie-small");
   const double lag_s = loop.gains.motor_lag_s;
   const auto radii_of = [&](const Interval& lags_s) {
     const Scene scene(loop, tests::truth_model(), network, *task, 2, network_age_s(loop.gains, true),
@@ -203,7 +203,7 @@ TEST(SlicedTube, HoldsFlightsWhoseEstimatesAreWrongWithinTheirBounds) {
         WrongEstimates{"crazyflie-small", true, {{0, 0, 0}, {0.003, 0.002, 0.002}}},
         WrongEstimates{"firmware-defaults", true, {{0.02, 0.01, 0.02}, {0.002, 0.001, 0.001}}}}) {
     SCOPED_TRACE(c.gains + std::string(c.is_sampled ? ", sampled" : ", continuous"));
-    const stability::TrackingSetup loop = tests::loop_of(c.gains);
+    const stability::FlownLoop loop = tests::loop_of(c.gains);
     const Scene scene(loop, tests::truth_model(), network, *task, 2, network_age_s(loop.gains, c.is_sampled),
                       kSlice_s, c.is_sampled, c.estimates);
     const SlicedTube tube = sliced_tube(scene, boxes(4), kTolerance_N);
@@ -222,12 +222,12 @@ TEST(SlicedTube, HoldsFlightsWhoseEstimatesAreWrongWithinTheirBounds) {
 TEST(SlicedTube, FlightsOfAnotherLoopOrAnotherTruthLeaveIt) {
   const files::Network network = tests::demo_network();
   const stability::Model truth = tests::truth_model();
-  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  const stability::FlownLoop loop = tests::loop_of("crazyflie-small");
   const auto task = stability::make_task("swap", {2, 4.5, 0});
   const Scene scene(loop, truth, network, *task, 2, network_age_s(loop.gains));
   const SlicedTube tube = sliced_tube(scene, boxes(8), kTolerance_N);
   ASSERT_TRUE(tube.proved) << tube.why;
-  stability::TrackingSetup slower = loop;
+  stability::FlownLoop slower = loop;
   slower.gains.attitude_lag_s *= 1.5;
   EXPECT_GT(fly(slower, truth, *task, tube, scene.motion().slice_s, 1).outside, 0);
   stability::Model stronger = truth;
@@ -239,7 +239,7 @@ TEST(SlicedTube, FlightsOfAnotherLoopOrAnotherTruthLeaveIt) {
 TEST(SlicedTube, FinerSlicesAreNeverWiderAndLaterSlicesChangeNothingBefore) {
   const files::Network network = tests::demo_network();
   const stability::Model truth = tests::truth_model();
-  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  const stability::FlownLoop loop = tests::loop_of("crazyflie-small");
   double last_m = 1;
   for (const double slice_s : {0.05, 0.025, 0.0125}) {
     const auto task = stability::make_task("swap", {2, 4.5, 0});
@@ -262,7 +262,7 @@ TEST(SlicedTube, FinerSlicesAreNeverWiderAndLaterSlicesChangeNothingBefore) {
 
 TEST(SlicedTube, SaysWhenErrorsCouldGoTooFarAndProvesNothingWhenInterrupted) {
   const files::Network network = tests::demo_network();
-  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  const stability::FlownLoop loop = tests::loop_of("crazyflie-small");
   const auto task = stability::make_task("swap", {2, 4.5, 0});
   const Scene scene(loop, tests::truth_model(), network, *task, 2, network_age_s(loop.gains));
   const SlicedTube near = sliced_tube(scene, boxes(1), kTolerance_N, 0.02);

@@ -42,7 +42,7 @@ files::Json gains_json(const stability::Cascade& loop, CascadeInput input, const
 std::vector<int> coupled_axes(const Tracking& input) {
   std::vector<int> result;
   for (int axis = 0; axis < 3; ++axis)
-    if (!axis_loop(input.gains, input.plant, axis)) result.push_back(axis);
+    if (!input.continuous(axis)) result.push_back(axis);
   return result;
 }
 
@@ -130,15 +130,13 @@ bool has_attitude_gains(const Tracking& input, const std::string& words) {
 }
 
 stability::Cascade attitude_cascade(const Tracking& input, const std::string& words, int axis) {
-  const std::optional<stability::AxisLoop> position = axis_loop(input.gains, input.plant, axis);
+  const std::optional<stability::AxisLoop> position = input.continuous(axis);
   if (!position) throw UsageError("attitude gains: Lambda or K couples the axes; make them diagonal");
   stability::Cascade loop = without_position(input, words, axis);
-  // The gains from axis_loop() already contain the thrust scale.
+  // The gains of the loop already contain the thrust scale.
   loop.Kp = position->Kp / loop.ratio;
   loop.Kd = position->Kd / loop.ratio;
   loop.Ki = position->Ki / loop.ratio;
-  if (const auto sampled = sampled_axis_loop(input.gains, input.plant, axis))
-    loop.Ki = effective_Ki(*sampled) / loop.ratio;
   return loop;
 }
 
@@ -147,7 +145,7 @@ stability::CoupledCascade coupled_attitude_cascade(const Tracking& input, const 
   stability::CoupledCascade loop;
   const stability::PidMatrices all = stability::pid_matrices(*input.gains.composite, input.plant.mass_kg);
   loop.position = {all.Kp(axes, axes), all.Kd(axes, axes), all.Ki(axes, axes)};
-  if (input.gains.rate_hz > 0) loop.position.Ki *= input.gains.integrator_step_s * input.gains.rate_hz;
+  loop.position.Ki *= input.integral_share();
   for (const int axis : axes) loop.channels.push_back(without_position(input, words, axis));
   return loop;
 }
@@ -156,7 +154,7 @@ files::Json attitude_json(const Tracking& input, const std::string& words) {
   files::Json rows = files::Json::array();
   const std::vector<int> coupled = coupled_axes(input);
   for (int axis = 0; axis < 2; ++axis)
-    if (axis_loop(input.gains, input.plant, axis)) rows.push_back(axis_json(input, words, axis));
+    if (input.continuous(axis)) rows.push_back(axis_json(input, words, axis));
   if (!coupled.empty()) rows.push_back(coupled_json(input, words, coupled));
   return rows;
 }

@@ -7,6 +7,7 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
+#include "analysis/commands/bound/bound_answer.h"
 #include "analysis/commands/bound/bound_attitude.h"
 #include "analysis/commands/bound/bound_extras.h"
 #include "analysis/commands/bound/bound_output.h"
@@ -36,6 +37,7 @@ struct BoundOptions {
   bool tube = false;
   TubeArguments task;
   std::string swarm;
+  bool details = false;
   std::string report;
 };
 
@@ -47,7 +49,7 @@ void refuse_coupled_axes(const BoundOptions& options, const Tracking& input) {
                                                  : nullptr;
   if (asked == nullptr) return;
   for (int axis = 0; axis < 3; ++axis) {
-    if (axis_loop(input.gains, input.plant, axis)) return;
+    if (input.continuous(axis)) return;
   }
   throw UsageError(std::string(asked) + ": Lambda or K of " + options.tracking.gains +
                    " couples all axes, and this bounds the loop of one axis at a time; leave " + asked +
@@ -194,11 +196,13 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
     local = load_local_tube(options.task, options.disturbance, input, source, measured ? &*measured : nullptr,
                             common, inputs);
   }
-  stability::TrackingReport report = tracking_bounds(input.gains, input.plant, source, options.initial);
+  stability::TrackingReport report = tracking_bounds(input, source, options.initial);
   const FloatErrors float32 = float_errors(input, report);
   for (stability::AxisBounds& row : report.bounds) row.float32_m = float32.tracking_error_m[row.axis];
 
+  const BoundAnswer answer = bound_answer(input, source, options.initial, report);
   files::Json result = result_head("bound", inputs);
+  result["answer"] = answer_json(answer);
   add_tracking_json(result, input, source, report);
   result["float32"] = float_errors_json(float32);
   if (disturbance.truth) result["truth"] = truth_json(*disturbance.truth);
@@ -215,18 +219,20 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
     report_path = write_bound_report(input, disturbance, report, local, result, options.report, common.force);
   write_result(common, result);
   if (common.prints_text()) {
-    print_tracking(input, source, report);
-    print_float_errors(float32);
-    if (disturbance.truth) print_truth(*disturbance.truth);
+    print_answer(input, answer);
+    if (options.details) {
+      print_tracking(input, source, report);
+      print_float_errors(float32);
+      if (disturbance.truth) print_truth(*disturbance.truth);
+    }
     print_extras(result);
     if (certificate) print_certificate_summary(*certificate, options.certificate);
     if (!report_path.empty()) fmt::print("\nreport: {}\n", report_path);
   }
-  if (local && !local->proved && options.swarm.empty()) return kInconclusive;
-  if (options.swarm.empty()) return kDone;
-  const std::string verdict = result["swarm"]["verdict"];
-  if (verdict == "refuted") return kViolated;
-  return verdict == "proved" && !(local && !local->proved) ? kDone : kInconclusive;
+  const std::string swarm = options.swarm.empty() ? "proved" : result["swarm"]["verdict"];
+  if (answer.flies == false || swarm == "refuted") return kViolated;
+  const bool is_proved = swarm == "proved" && !(local && !local->proved);
+  return is_proved ? exit_code(answer) : kInconclusive;
 }
 
 void declare_initial(CLI::App& app, stability::InitialError& initial) {
@@ -273,6 +279,8 @@ CLI::Option* declare_extras(CLI::App& app, BoundOptions& options) {
   app.add_option("--swarm", options.swarm,
                  "swarm.toml: do the vehicles' mutual forces stay bounded? Errors of the estimates, "
                  "--amplitude, --rate and --bias count");
+  app.add_flag("--details", options.details,
+               "Print the tables: theorem, gains, bounds, and what they rest on");
   add_output(app, "--report", options.report, "Write an HTML report with plots into this folder");
   return uncertain;
 }
@@ -280,32 +288,38 @@ CLI::Option* declare_extras(CLI::App& app, BoundOptions& options) {
 }  // namespace
 
 Command bound_command() {
-  return {"bound", "Tracking error that gains and a vehicle give under a bounded force error",
-          "Reports whether the tracking theorem applies or why not, its ball, the exact gains of every axis "
-          "for the\n"
-          "continuous and the sampled loop, and, for a declared or measured force error, the smallest of "
-          "five bounds,\n"
-          "each with the bias, the initial error and the errors of the estimates that are declared.\n"
-          "A certificate or a network bounds the rate of f_hat only and gives no ball; --truth declares the "
-          "true force\nand encloses its constants; --from takes measured quantiles.\n\n"
-          "Example: swarmcert bound --gains controller/gains/crazyflie-small.toml --model "
-          "stability/models/crazyflie-small.toml \\\n"
-          "           --amplitude 0.097 --impulse 0.0202 --rate 0.75\n"
-          "         swarmcert bound --gains controller/gains/composite.toml --model "
-          "stability/models/crazyflie-small.toml --tube --task swap \\\n"
-          "           --network nn/networks/demo/network.toml --truth "
-          "stability/models/crazyflie-small-effects.toml",
-          [](CLI::App& app) {
-            const auto options = std::make_shared<BoundOptions>();
-            declare_tracking(app, options->tracking);
-            declare_disturbance(app, options->disturbance);
-            declare_initial(app, options->initial);
-            const CLI::Option* const uncertain = declare_extras(app, *options);
-            return [options, uncertain](const CommonOptions& common) {
-              options->is_uncertain = uncertain->count() > 0;
-              return run_bound(*options, common);
-            };
-          }};
+  return {
+      "bound", "Tracking error that gains and a vehicle give under a bounded force error",
+      "Answers first: does this loop fly under all that is declared, how large can its error become, what "
+      "does that\n"
+      "rest on, what limits it. Exit code 0: it flies; 1: it diverges, or a declared input saturates the "
+      "thrust; 4:\n"
+      "undecided. --details adds whether the tracking theorem applies or why not, its ball, the exact gains "
+      "of every\n"
+      "axis for the continuous and the sampled loop, and, for a declared or measured force error, the "
+      "smallest of\n"
+      "five bounds, each with the bias, the initial error and the errors of the estimates that are "
+      "declared.\n"
+      "A certificate or a network bounds the rate of f_hat only and gives no ball; --truth declares the "
+      "true force\nand encloses its constants; --from takes measured quantiles.\n\n"
+      "Example: swarmcert bound --gains controller/gains/crazyflie-small.toml --model "
+      "stability/models/crazyflie-small.toml \\\n"
+      "           --amplitude 0.097 --impulse 0.0202 --rate 0.75\n"
+      "         swarmcert bound --gains controller/gains/composite.toml --model "
+      "stability/models/crazyflie-small.toml --tube --task swap \\\n"
+      "           --network nn/networks/demo/network.toml --truth "
+      "stability/models/crazyflie-small-effects.toml",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<BoundOptions>();
+        declare_tracking(app, options->tracking);
+        declare_disturbance(app, options->disturbance);
+        declare_initial(app, options->initial);
+        const CLI::Option* const uncertain = declare_extras(app, *options);
+        return [options, uncertain](const CommonOptions& common) {
+          options->is_uncertain = uncertain->count() > 0;
+          return run_bound(*options, common);
+        };
+      }};
 }
 
 }  // namespace swarmcert::analysis

@@ -101,10 +101,10 @@ Json worst_json(const UncertainGain& g) {
 }
 
 /// The loop of an axis without the uncertain parameters.
-AxisLoop fixed_part(const Tracking& input, int axis) {
-  Plant nominal = input.plant;
-  nominal.thrust_scale = 1;
-  AxisLoop loop = *axis_loop(input.gains, nominal, axis);
+AxisLoop fixed_part(const Tracking& input, int axis, Loop which) {
+  stability::FlownLoop nominal = input;
+  nominal.plant.thrust_scale = 1;
+  AxisLoop loop = which == Loop::kSampled ? nominal.sampled(axis)->plant : *nominal.continuous(axis);
   loop.lags_s.clear();
   if (axis < 2 && input.gains.attitude_lag_s > 0) loop.lags_s.push_back(input.gains.attitude_lag_s);
   loop.delay_s = 0;
@@ -193,7 +193,7 @@ std::vector<UncertainNorms> norms_of(const std::vector<UncertainTask>& tasks, co
   std::atomic<int> percent_done{0};  // summed over the tasks
   files::parallel_for(total, run.jobs, [&](int i) {
     const UncertainTask& task = tasks[static_cast<std::size_t>(i)];
-    const AxisLoop fixed = fixed_part(input, task.axis);
+    const AxisLoop fixed = fixed_part(input, task.axis, task.loop);
     WayToGap way;
     int shown = 0;
     const auto show = [&](int percent) {
@@ -221,12 +221,13 @@ Json uncertain_json(const Tracking& input, const std::vector<std::string>& words
   const UncertainPlant plant = intervals_of(input, words);
   const std::size_t rows_per_axis = input.gains.rate_hz > 0 ? 4 : 2;
   const auto repeats = [&](int axis) {
-    return axis > 0 && axis_loop(input.gains, input.plant, axis - 1) &&
-           same_gains_and_lags(fixed_part(input, axis), fixed_part(input, axis - 1));
+    return axis > 0 && input.continuous(axis - 1) &&
+           same_gains_and_lags(fixed_part(input, axis, Loop::kContinuous),
+                               fixed_part(input, axis - 1, Loop::kContinuous));
   };
   std::vector<UncertainTask> tasks;
   for (int axis = 0; axis < 3; ++axis) {
-    if (!axis_loop(input.gains, input.plant, axis) || repeats(axis)) continue;
+    if (!input.continuous(axis) || repeats(axis)) continue;
     for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
       tasks.push_back({axis, channel, Loop::kContinuous});
       if (input.gains.rate_hz > 0) tasks.push_back({axis, channel, Loop::kSampled});
@@ -236,7 +237,7 @@ Json uncertain_json(const Tracking& input, const std::vector<std::string>& words
   Json gains = Json::array();
   std::size_t next = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    if (!axis_loop(input.gains, input.plant, axis)) continue;
+    if (!input.continuous(axis)) continue;
     if (repeats(axis)) {
       repeat_rows(gains, rows_per_axis, axis);
       continue;
@@ -326,9 +327,9 @@ Json verified_json(const Tracking& input) {
   Json rows = Json::array(), of_estimates = Json::array();
   std::optional<AxisLoop> last;
   for (int axis = 0; axis < 3; ++axis) {
-    const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, axis);
+    const std::optional<AxisLoop> loop = input.continuous(axis);
     if (!loop) continue;
-    const std::optional<SampledLoop> sampled = sampled_axis_loop(input.gains, input.plant, axis);
+    const std::optional<SampledLoop> sampled = input.sampled(axis);
     if (axis > 0 && last && same_gains_and_lags(*loop, *last)) {
       for (Json* const repeated : {&rows, &of_estimates}) repeat_rows(*repeated, sampled ? 4 : 2, axis);
       continue;
@@ -432,7 +433,7 @@ Json tube_of(const AxisLoop& loop, const DisturbanceSource& source, int axis, in
 Json tube_json(const Tracking& input, const DisturbanceSource& source, int count) {
   Json rows = Json::array();
   for (int axis = 0; axis < 3; ++axis) {
-    const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, axis);
+    const std::optional<AxisLoop> loop = input.continuous(axis);
     if (!loop) continue;
     Json row = {{"axis", axis_name(axis)}, {"channel", "force"}, {"loop", "continuous"}};
     if (const char* const why = no_tube(*loop, source, axis)) {

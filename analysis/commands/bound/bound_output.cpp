@@ -20,6 +20,7 @@ Json theorem_json(const TrackingReport& report) {
   Json json = {{"applies", theorem.applies},
                {"why_not", theorem.why_not},
                {"ball", report.ball_m ? Json(*report.ball_m) : Json()},
+               {"ball_of_flown_loop", report.flown_ball_m ? Json(*report.flown_ball_m) : Json()},
                {"ball_unit", "m"},
                {"ball_per_rate", nullptr},
                {"lambda_min_Lambda", nullptr},
@@ -42,6 +43,13 @@ Json theorem_json(const TrackingReport& report) {
   return json;
 }
 
+/// What every total is subject to; null if it is proved.
+Json condition(const TrackingReport& report) {
+  const Saturation& thrust = report.saturation;
+  if (thrust.is_proved()) return nullptr;
+  return std::string("the thrust does not saturate, which is ") + name(thrust.verdict) + ": " + thrust.why;
+}
+
 /// Name of the bound that row.least() returns.
 std::string smallest(const AxisBounds& row) {
   if (row.least() == row.bounds.least() && row.clamp.never_acts) return row.bounds.which();
@@ -49,7 +57,7 @@ std::string smallest(const AxisBounds& row) {
   return row.clamp.by_amplitude < row.clamp.by_impulse ? "amplitude with clamp" : "impulse with clamp";
 }
 
-Json bounds_json(const AxisBounds& row) {
+Json bounds_json(const AxisBounds& row, const TrackingReport& report) {
   const DisturbanceBounds& b = row.bounds;
   return {{"axis", axis_name(row.axis)},
           {"channel", name(row.channel)},
@@ -66,6 +74,7 @@ Json bounds_json(const AxisBounds& row) {
           {"impulse_with_clamp", finite(row.clamp.by_impulse)},
           {"minimum", finite(row.least())},
           {"guarantee", "bound"},
+          {"condition", condition(report)},
           {"smallest", smallest(row)},
           {"parts",
            {{"bias", finite(row.parts.bias_m)},
@@ -135,7 +144,7 @@ std::vector<std::string> coupled_axes(const TrackingReport& report) {
 
 /// The bound from the vector gain and the rate, if the loop of the theorem is the one that flies.
 std::optional<double> vector_error_m(const DisturbanceSource& source, const TrackingReport& report) {
-  if (!report.ball_m || !report.vector) return std::nullopt;
+  if (!report.ball_m || !report.vector || !report.saturation.is_proved()) return std::nullopt;
   return report.vector->upper * source.rate_norm_N_s;
 }
 
@@ -148,15 +157,22 @@ void print_theorem(const DisturbanceSource& source, const TrackingReport& report
     fmt::print("  lmin(Lambda) {:.6g} 1/s, lmin(K) {:.6g} kg/s: {:.10g} m per N/s{}\n", theorem.min_Lambda,
                theorem.min_K, theorem.ball_per_rate(), theorem.applies ? "" : ", were its hypotheses true");
   }
-  if (report.ball_m) fmt::print("  ball: {:.6g} m\n", *report.ball_m);
+  if (report.ball_m) {
+    fmt::print("  ball of the continuous loop, in the long run: {:.6g} m; of the loop that flies: {}\n",
+               *report.ball_m,
+               report.flown_ball_m ? fmt::format("{:.6g} m", *report.flown_ball_m) : "unknown");
+    if (const Json unmet = condition(report); !unmet.is_null())
+      fmt::print("  both only if {}\n", unmet.get<std::string>());
+  }
   if (report.vector) {
     fmt::print(
-        "  exact vector gain of that loop: {:.10g} .. {:.10g} m per N/s, worst along ({:.3f}, {:.3f}, "
+        "  exact vector gain of the continuous loop: {:.10g} .. {:.10g} m per N/s, worst along ({:.3f}, "
+        "{:.3f}, "
         "{:.3f})\n",
         report.vector->lower, report.vector->upper, report.vector->direction[0], report.vector->direction[1],
         report.vector->direction[2]);
     if (const auto error_m = vector_error_m(source, report)) {
-      fmt::print("  no error is larger than {:.6g} m in the long run, all axes together\n", *error_m);
+      fmt::print("  no error of it is larger than {:.6g} m in the long run, all axes together\n", *error_m);
     }
   }
 }
@@ -317,12 +333,22 @@ void add_tracking_json(Json& result, const Tracking& input, const DisturbanceSou
   }
   result["bounds"] = Json::array();
   for (const AxisBounds& row : report.bounds) {
-    result["bounds"].push_back(bounds_json(row));
+    result["bounds"].push_back(bounds_json(row, report));
     if (source.kind == "rate of f_hat") result["bounds"].back()["of"] = "rate of f_hat";
   }
   result["axes"] = Json::array();
   for (const AxisFacts& f : report.facts) result["axes"].push_back(facts_json(f));
-  result["thrust_margin_N"] = report.thrust_margin_N ? Json(*report.thrust_margin_N) : Json();
+  const Saturation& thrust = report.saturation;
+  result["thrust_margin_N"] = finite(thrust.margin_N());
+  result["thrust"] = {
+      {"verdict", name(thrust.verdict)},
+      {"why", thrust.why},
+      {"feedback_N",
+       {finite(thrust.feedback_N[0]), finite(thrust.feedback_N[1]), finite(thrust.feedback_N[2])}},
+      {"least_N", finite(thrust.least_N)},
+      {"most_N", finite(thrust.most_N)},
+      {"available_N", {thrust.available_N.lower, finite(thrust.available_N.upper)}},
+      {"tilt_rad", thrust.tilt_rad()}};
   result["assumptions"] = Json::array();
   for (const Assumption& a : report.assumptions) {
     result["assumptions"].push_back({{"name", a.name}, {"status", a.status}, {"note", a.note}});
@@ -330,7 +356,6 @@ void add_tracking_json(Json& result, const Tracking& input, const DisturbanceSou
 }
 
 void print_tracking(const Tracking& input, const DisturbanceSource& source, const TrackingReport& report) {
-  fmt::print("{} on {} ({} kg)\n", input.gains.path, input.model.path, input.plant.mass_kg);
   for (const std::string& note : input.notes) fmt::print("  with {}\n", note);
   fmt::print("\n");
   print_theorem(source, report);
@@ -341,10 +366,8 @@ void print_tracking(const Tracking& input, const DisturbanceSource& source, cons
                source.f_hat_rate_N_s);
   }
   print_bounds(source, report);
-  if (report.thrust_margin_N) {
-    fmt::print("\nthrust left about hover under this disturbance: {:.4g} N{}\n", *report.thrust_margin_N,
-               *report.thrust_margin_N < 0 ? ": SATURATES, the bounds do not hold" : "");
-  }
+  if (const Json unmet = condition(report); source.kind != "none" && !unmet.is_null())
+    fmt::print("\nThese totals hold only if {}\n", unmet.get<std::string>());
   fmt::print("\nRests on\n");
   for (const Assumption& a : report.assumptions) {
     fmt::print("  {:<9} {}{}\n", a.status, a.name, a.note.empty() ? "" : " (" + a.note + ")");

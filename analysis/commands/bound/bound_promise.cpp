@@ -40,8 +40,7 @@ files::Json promise_json(const Tracking& input, const stability::TrackingReport&
   files::Json json = {{"level", level}, {"flights", names.size()}, {"vehicles", flights.size()}};
   json["made_from"] = logs_of(from);
   json["bounds"] = files::Json::array();
-  for (const PromisedBound& row :
-       promised_bounds(input.gains, input.plant, report, flights, declared, initial, level)) {
+  for (const PromisedBound& row : promised_bounds(input, report, flights, declared, initial, level)) {
     json["interval"] = row.promise.coverage_90;  // identical for all rows
     json["bounds"].push_back({{"axis", stability::axis_name(row.axis)},
                               {"channel", stability::name(row.channel)},

@@ -31,7 +31,7 @@ double horizon_s(const TransferFunction& h) {
 /// Plots the theorem's transient and ball, and the errors of one axis under ramps of slope eps of either sign.
 void add_theorem_plot(Report& report, const Tracking& input, const TrackingReport& tracking) {
   if (!tracking.transient || !tracking.ball_m) return;
-  const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, 2);
+  const std::optional<AxisLoop> loop = input.continuous(2);
   double end_s = 12 / tracking.transient->decay_1_s();
   std::vector<double> ramp;
   if (loop) {
@@ -62,7 +62,7 @@ void add_theorem_plot(Report& report, const Tracking& input, const TrackingRepor
 
 /// Plots the tube of |e| from rest for forces within the amplitude, and the error under the worst of these forces.
 void add_tube_plot(Report& report, const Tracking& input, const Disturbance& disturbance, int axis) {
-  const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, axis);
+  const std::optional<AxisLoop> loop = input.continuous(axis);
   if (!loop || !is_stable(*loop) || !std::isfinite(disturbance.amplitude_N)) return;
   const TransferFunction impulse = impulse_transfer(*loop, Channel::kForce);
   const double end_s = horizon_s(impulse);

@@ -71,6 +71,8 @@ void read_reference(const DisturbanceArguments& arguments, DisturbanceSource& so
   read("--reference-speed-step", arguments.reference_speed_step,
        &stability::ReferenceMotion::speed_steps_m_s);
   read("--reference-jerk", arguments.reference_jerk, &stability::ReferenceMotion::jerk_m_s3);
+  if (!arguments.reference_accel.empty())
+    read("--reference-accel", arguments.reference_accel, &stability::ReferenceMotion::acceleration_m_s2);
 }
 
 void declare_estimate(CLI::App& app, const std::string& estimate, const std::string& unit, const char* law,
@@ -295,6 +297,8 @@ void declare_motion_of_reference(CLI::App& app, DisturbanceArguments& arguments)
   app.add_option(
       "--reference-jerk", arguments.reference_jerk,
       "sup |p_d'''|, m/s^3, of a set point whose acceleration is fed forward through the lags" + axes);
+  app.add_option("--reference-accel", arguments.reference_accel,
+                 "sup |p_d''|, m/s^2, for the thrust that the fed-forward acceleration takes" + axes);
   auto* passes = app.add_option("--passes", arguments.passes, "Number of such passes (default 1)")
                      ->check(CLI::PositiveNumber);
   app.add_option("--every", arguments.every_s, "Least time between the starts of two passes, s")

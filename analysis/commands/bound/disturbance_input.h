@@ -20,7 +20,7 @@ struct DisturbanceArguments {
   std::string bias;  ///< a number for all axes, or X,Y,Z; empty: not given
   double thrust_ratio_error = 0;
   EstimateArguments velocity_error, position_error;
-  std::string reference_step, reference_speed_step, reference_jerk;  ///< like `bias`
+  std::string reference_step, reference_speed_step, reference_jerk, reference_accel;  ///< like `bias`
   int passes = 1;
   double every_s = 0, pass_s = 0;
   std::string from;  ///< compare.json

@@ -34,15 +34,14 @@ void refuse_unbounded(const CoupledVerdict& verdict) {
 
 Json swarm_json(const Tracking& input, const std::string& path, const DisturbanceSource& source) {
   const CoupledSwarm swarm = read_coupled_swarm(path);
-  if (!axis_loop(input.gains, input.plant, 2))
+  if (!input.continuous(2))
     throw UsageError("Lambda or K couples the z axis to others: a swarm needs its own loop");
   OtherErrors others;
   others.velocity_error = source.velocity_error[2];
   others.position_error = source.position_error[2];
   const bool has_force = source.kind == "declared" || source.kind == "measured";
   if (has_force) others.bias_N = source.bias_N[2];
-  const CoupledVerdict verdict =
-      couple(swarm, input.gains, input.plant, others, has_force ? source.axis[2] : no_force());
+  const CoupledVerdict verdict = couple(swarm, input, others, has_force ? source.axis[2] : no_force());
   refuse_unbounded(verdict);
   const SmallGain& found = verdict.small_gain;
   Json entries = Json::array();

@@ -150,7 +150,7 @@ void add_continuous(const Tracking& input, const Json& verified, Entries& entrie
   for (const Json& row : verified) {
     if (row["loop"] != "continuous") continue;
     const stability::AxisLoop loop =
-        *axis_loop(input.gains, input.plant, stability::axis_of_name(row["axis"].get<std::string>()));
+        *input.continuous(stability::axis_of_name(row["axis"].get<std::string>()));
     const auto [place, is_new] = known.try_emplace(numbers_of(loop) + row["channel"].get<std::string>());
     if (is_new) place->second = entry_or_reason(loop, row);
     entries.add(row, place->second);
@@ -165,7 +165,7 @@ void add_sampled(const Tracking& input, const Json& verified, Entries& entries) 
   }
   std::map<std::string, Json> known;
   for (const auto& [axis, inputs] : rows) {
-    const stability::SampledLoop loop = *sampled_axis_loop(input.gains, input.plant, axis);
+    const stability::SampledLoop loop = *input.sampled(axis);
     const auto [place, is_new] = known.try_emplace(numbers_of(loop.plant));
     if (is_new) place->second = sampled_entry_or_reason(loop, inputs);
     if (place->second.is_object()) {

@@ -13,7 +13,7 @@
 #include "nn/base/file_io.h"
 #include "nn/weights/chain.h"
 #include "nn/weights/functions.h"
-#include "stability/bounds/tracking_setup.h"
+#include "stability/bounds/tracking_bounds.h"
 #include "stability/checker/check_tracking.h"
 
 namespace swarmcert::analysis {
@@ -62,19 +62,18 @@ bool states(const files::Json& entry, const stability::SampledLoop& loop) {
 /// Rejects an accepted certificate whose loops differ from those of the given files.
 void compare_loops(const CheckOptions& options, const files::Json& certificate,
                    check::TrackingVerdict& verdict) {
-  const stability::TrackingSetup setup = stability::load_tracking_setup(options.gains, options.model);
-  const auto compare = [&](const char* kind, const auto& loop_of) {
+  const stability::FlownLoop setup = stability::load_flown_loop(options.gains, options.model);
+  const auto compare = [&](const char* kind, auto loop_of) {
     for (const files::Json& entry : certificate[kind]) {
-      const auto loop =
-          loop_of(setup.gains, setup.plant, stability::axis_of_name(entry["axis"].get<std::string>()));
+      const auto loop = (setup.*loop_of)(stability::axis_of_name(entry["axis"].get<std::string>()));
       if (loop && states(entry, *loop)) continue;
       const std::string axis = entry["axis"].get<std::string>();
       verdict = {false, std::string(kind) + ": that of axis " + axis + " is not the one of the files given",
                  0, 0};
     }
   };
-  compare("loops", stability::axis_loop);
-  compare("sampled_loops", stability::sampled_axis_loop);
+  compare("loops", &stability::FlownLoop::continuous);
+  compare("sampled_loops", &stability::FlownLoop::sampled);
 }
 
 int check_gains(const CheckOptions& options, const CommonOptions& common, const std::string& text) {

@@ -262,16 +262,16 @@ void print(const IssCheckOptions& options, const IssCheck& check,
 int run_iss_check(IssCheckOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
-  const stability::Gains gains = stability::load_gains(options.gains);
-  const stability::Model model = stability::read_model(options.model);
+  const stability::FlownLoop loop = stability::load_flown_loop(options.gains, options.model);
   Progress progress(common.quiet);
   options.check.jobs = common.jobs;
   options.check.progress = [&progress](int done, int total) { progress.show(done, total, "integrations"); };
   const CancelOnInterrupt interrupt;
   options.check.cancelled = interrupt.flag();
-  const IssCheck check = stability::check_iss(gains, model, options.check);
+  const IssCheck check = stability::check_iss(loop, options.check);
   const std::vector<stability::FullLoopRun> flown =
-      check.cancelled ? std::vector<stability::FullLoopRun>{} : stability::fly_full_loop(gains, model, check);
+      check.cancelled ? std::vector<stability::FullLoopRun>{}
+                      : stability::fly_full_loop(loop.gains, loop.model, check);
   const files::Node described = result_of("iss-check", {options.gains, options.model}, options.check.seed,
                                           IssCheckResult{options.check.runs, check, flown});
   write_result(common, described);

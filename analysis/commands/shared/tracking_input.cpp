@@ -10,7 +10,7 @@ void declare_tracking(CLI::App& app, TrackingArguments& arguments) {
 }
 
 Tracking load_tracking(const TrackingArguments& arguments) {
-  Tracking tracking = stability::load_tracking_setup(arguments.gains, arguments.model, arguments.battery_V);
+  Tracking tracking = stability::load_flown_loop(arguments.gains, arguments.model, arguments.battery_V);
   const std::string problem = stability::battery_problem(tracking.model, arguments.battery_V);
   if (!problem.empty()) throw UsageError("--battery: " + problem);
   return tracking;

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "analysis/cli/command.h"
-#include "stability/bounds/tracking_setup.h"
+#include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::analysis {
 
@@ -16,9 +16,9 @@ struct TrackingArguments {
 /// Declares --gains, --model, --battery.
 void declare_tracking(CLI::App& app, TrackingArguments& arguments);
 
-using Tracking = stability::TrackingSetup;
+using Tracking = stability::FlownLoop;
 
-/// Calls stability::load_tracking_setup() with the declared options.
+/// Calls stability::load_flown_loop() with the declared options.
 /// @throws UsageError if the battery voltage is outside the range of the model.
 Tracking load_tracking(const TrackingArguments& arguments);
 

@@ -42,16 +42,13 @@ DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, 
     }
     throw std::logic_error(std::string("downwash has no parameter ") + name);
   };
-  if (shape("tail") != 0) {
-    throw files::InputError({model.path, "", "downwash, tail", std::to_string(shape("tail")),
-                             "spacing knows the Gaussian profile only", "fit the effect with tail = 0"});
-  }
   DownwashField field;
   field.amplitude_N =
       std::abs(values.linear.at(0)) * std::pow(neighbour_mass_kg / 0.034, shape("mass_exponent"));
   field.decay = shape("decay_exponent");
   field.spread_m = shape("spread_m");
   field.spread_slope = shape("spread_slope");
+  field.tail = shape("tail");
   return field;
 }
 
@@ -79,6 +76,8 @@ void describe_row(files::Record& record, const stability::SpacingRow& row) {
 
 void describe(files::Record& record, const SpacingResult& result) {
   record.field("max_error_m", result.question.max_error_m, "Largest vertical error that is allowed.", "m");
+  record.field("dwell_s", result.question.dwell_s,
+               "Least time outside the keep-out radius between two passes.", "s");
   record.field("neighbours", result.question.neighbours, "Vehicles above at the same time.");
   record.field("guard", result.question.guard, "Factor on predicted forces.");
   record.field("field", result.field_from, "Where the field of force comes from.");
@@ -109,6 +108,11 @@ void print_spacing(const SpacingResult& result, const files::Node& described) {
   fmt::print("Error at most {} m below {} vehicle(s), no feed-forward; field: {}; guard factor {}\n\n{}",
              question.max_error_m, question.neighbours, result.field_from, question.guard,
              to_text(rows_of(described)));
+  fmt::print(
+      "\nEach line holds for any number of straight passes at this speed or faster, with {:g} s or more "
+      "outside the "
+      "radius between two of them, and any motion outside.\n",
+      question.dwell_s);
   fmt::print("\nleast gap to stay below: {}; to cross below: {}\n",
              gap_text(result.found.least_gap_to_stay_m), gap_text(result.found.least_gap_to_cross_m));
   if (question.guard == 1) {
@@ -132,23 +136,12 @@ int run_spacing(const SpacingOptions& options, const CommonOptions& common) {
     neighbour_mass_kg = stability::read_model(options.neighbour_model).mass_kg;
     inputs.push_back(options.neighbour_model);
   }
-  const std::optional<stability::AxisLoop> loop = axis_loop(input.gains, input.plant, 2);
-  if (!loop) throw UsageError("Lambda or K couples the z axis to others: spacing needs its own loop");
-  const std::optional<stability::SampledLoop> sampled = sampled_axis_loop(input.gains, input.plant, 2);
-  const stability::GainNorms gains =
-      sampled ? sampled_norms(*sampled, stability::Channel::kForce, stability::Instants::kAll)
-              : continuous_norms(*loop, stability::Channel::kForce);
-  stability::AxisLoop acting = *loop;
-  if (sampled) acting.Ki = effective_Ki(*sampled);
+  if (!input.continuous(2))
+    throw UsageError("Lambda or K couples the z axis to others: spacing needs its own loop");
   SpacingResult result;
   result.question = options.question;
   const DownwashField field = field_of(input.model, neighbour_mass_kg, result.field_from);
-  stability::SpacingVehicle vehicle;
-  vehicle.effort_gain = effort_gain(acting);
-  vehicle.largest_thrust_N = input.plant.thrust_scale * input.plant.largest_thrust_N;
-  vehicle.integral_share = sampled ? sampled->integrator_step_s / sampled->period_s : 1;
-  vehicle.integrator_limit_m_s = input.gains.integrator_limit_m_s[2];
-  result.found = spacing(acting, gains, vehicle, field, options.question);
+  result.found = spacing(input, field, options.question);
 
   const files::Node described = result_of("spacing", inputs, std::nullopt, result);
   write_result(common, described);
@@ -169,8 +162,8 @@ Command spacing_command() {
   return {"spacing", "Least distance and crossing speed for vehicles that pass below one another",
           "States for every height gap whether the lower vehicle may stay there, how far to the side it "
           "must keep\n"
-          "otherwise, and how fast it must cross so that its error bound stays below the limit with thrust\n"
-          "to spare.\n\n"
+          "otherwise, and how fast it must cross, however often and with how much time between, so that its\n"
+          "error bound stays below the limit with thrust to spare.\n\n"
           "Example: swarmcert spacing --gains controller/gains/crazyflie-small.toml --model "
           "stability/models/crazyflie-small.toml \\\n           --max-error 0.1",
           [](CLI::App& app) {
@@ -179,6 +172,9 @@ Command spacing_command() {
             auto& question = options->question;
             app.add_option("--max-error", question.max_error_m, "Largest vertical error, m")
                 ->required()
+                ->check(CLI::PositiveNumber);
+            app.add_option("--dwell", question.dwell_s,
+                           "Least time outside the keep-out radius between two passes, s (default 2)")
                 ->check(CLI::PositiveNumber);
             app.add_option("--neighbours", question.neighbours, "Vehicles above at the same time (default 1)")
                 ->check(CLI::PositiveNumber);

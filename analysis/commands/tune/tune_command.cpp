@@ -99,9 +99,9 @@ void print_result(const TuneOptions& options, const TuneResult& found) {
 
 /// The sampled loop of the axis whose gains are searched.
 stability::SampledLoop loop_of(const TuneOptions& options, const Tracking& input, int axis) {
-  std::optional<stability::SampledLoop> loop = sampled_axis_loop(input.gains, input.plant, axis);
+  std::optional<stability::SampledLoop> loop = input.sampled(axis);
   if (!loop) {
-    const std::optional<stability::AxisLoop> continuous = axis_loop(input.gains, input.plant, axis);
+    const std::optional<stability::AxisLoop> continuous = input.continuous(axis);
     if (!continuous) throw UsageError("Lambda or K couples axes: there are no gains of one axis to tune");
     throw files::InputError({options.tracking.gains, "", "position.rate_hz", "", "is missing",
                              "the noise of the command depends on the rate of the loop"});

@@ -5,8 +5,8 @@
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
 #include "nn/base/toml.h"
+#include "stability/bounds/tracking_bounds.h"
 #include "stability/bounds/swarms/coupled_swarm.h"
-#include "stability/bounds/tracking_setup.h"
 
 namespace swarmcert::gate {
 
@@ -19,8 +19,8 @@ Run read_small_gain(const files::TomlTable& table, Policy& policy) {
   if (!limit) refuse_without_limit(table, "min_margin = 0.1");
   return [limit = *limit](Evidence& evidence, Checks& checks) {
     const stability::CoupledSwarm swarm = stability::read_coupled_swarm(evidence.release().swarm);
-    const stability::TrackingSetup& setup = evidence.tracking();
-    const stability::CoupledVerdict verdict = couple(swarm, setup.gains, setup.plant);
+    const stability::FlownLoop& setup = evidence.tracking();
+    const stability::CoupledVerdict verdict = couple(swarm, setup);
     const stability::SmallGain& found = verdict.small_gain;
     Check check = row("small_gain", limit);
     judge(check, limit, 1 - found.spectral_radius_upper, 1 - found.spectral_radius_lower);

@@ -1,9 +1,11 @@
 #include <fmt/ranges.h>
 
+#include <algorithm>
+
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/checks/disturbance.h"
 #include "nn/base/toml.h"
-#include "stability/bounds/tracking_setup.h"
+#include "stability/bounds/flown_loop.h"
 
 namespace swarmcert::gate {
 
@@ -21,10 +23,10 @@ Run read_theorem(const files::TomlTable& table, Policy& policy) {
     if (!ball && table.has(key))
       table.refuse(key, "", "has no effect without a limit on the ball", "add max_ball_m");
   return [declared, ball, line = table.line()](Evidence& evidence, Checks& checks) {
-    const stability::TrackingSetup& setup = evidence.tracking();
+    const stability::FlownLoop& setup = evidence.tracking();
     stability::DisturbanceSource source = declared.declared;
     if (ball) source = disturbance(declared, evidence);
-    const stability::TrackingReport report = tracking_bounds(setup.gains, setup.plant, source, {});
+    const stability::TrackingReport report = tracking_bounds(setup, source, {});
     Check check = row("theorem", line);
     if (report.theorem.applies) {
       pass(check);
@@ -36,10 +38,19 @@ Run read_theorem(const files::TomlTable& table, Policy& policy) {
     checks.push_back(check);
     if (!ball) return;
     Check of_ball = row("theorem.ball", *ball);
-    if (report.ball_m) {
-      judge(of_ball, *ball, *report.ball_m, *report.ball_m);
+    if (report.ball_m && report.flown_ball_m && report.saturation.is_proved()) {
+      const double ball_m = std::max(*report.ball_m, *report.flown_ball_m);
+      judge(of_ball, *ball, ball_m, ball_m);
       of_ball.witness =
           fmt::format("rate of the force error {:.4g} N/s, {}", source.rate_norm_N_s, source.kind);
+    } else if (report.ball_m) {
+      of_ball.reason =
+          report.saturation.is_proved()
+              ? "the ball is that of the continuous loop: nothing bounds the coupled sampled loop"
+              : fmt::format(
+                    "the ball of {:.6g} m holds only if the thrust does not saturate, which is "
+                    "{}: {}",
+                    *report.ball_m, stability::name(report.saturation.verdict), report.saturation.why);
     } else {
       of_ball.reason = "the theorem gives no ball for these gains and this force error";
     }

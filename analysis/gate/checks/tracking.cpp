@@ -47,7 +47,7 @@ Uncertainty read_uncertainty(const files::TomlTable& table) {
           interval(inner, "lag_s", false), interval(inner, "delay_s", false)};
 }
 
-stability::UncertainPlant box_of(const stability::TrackingSetup& setup, const Uncertainty& stated) {
+stability::UncertainPlant box_of(const stability::FlownLoop& setup, const Uncertainty& stated) {
   const stability::UncertainPlant usual = analysis::usual_uncertainty(setup.gains, setup.plant);
   return {stated.mass_kg.value_or(usual.mass_kg), stated.thrust_scale.value_or(usual.thrust_scale),
           stated.lag_s.value_or(usual.lag_s), stated.delay_s.value_or(usual.delay_s)};
@@ -73,7 +73,7 @@ double guard_factor(Evidence& evidence, const Guard& guard, int axis) {
 void judge_tracking(Evidence& evidence, const DisturbanceTable& declared, const EstimateTable& estimates,
                     const Uncertainty& uncertainty, const Guard& guard, Over over, const Limit& limit,
                     Checks& checks) {
-  const stability::TrackingSetup& setup = evidence.tracking();
+  const stability::FlownLoop& setup = evidence.tracking();
   stability::DisturbanceSource source = disturbance(declared, evidence);
   add_estimates(estimates, declared, evidence, source);
   const BoxBound bound = bound_over(setup, box_of(setup, uncertainty), source);
@@ -102,13 +102,12 @@ void judge_tracking(Evidence& evidence, const DisturbanceTable& declared, const 
       check.reason =
           "there is no bound on the error: the loop is unstable in the box, the integrator's clamp may act, "
           "or the force error's amplitude is unknown";
-  } else if (bound.thrust_margin_N < 0 && !(attained > limit.value)) {
+  } else if (!bound.saturation.is_proved() && !(attained > limit.value)) {
     judge(check, limit, std::numeric_limits<double>::infinity(), -1);
     check.value.reset();
     check.reason = fmt::format(
-        "the thrust saturates under this force error: about hover, {:.4g} N are lacking at a corner of the "
-        "box, so that no bound holds",
-        -bound.thrust_margin_N);
+        "{:.6g} m hold only if the thrust does not saturate, which is {} at a corner of the box: {}", proved,
+        stability::name(bound.saturation.verdict), bound.saturation.why);
   } else if (over == Over::kBox && !bound.is_enclosed && !(attained > limit.value)) {
     judge(check, limit, std::numeric_limits<double>::infinity(), attained);
     check.value.reset();

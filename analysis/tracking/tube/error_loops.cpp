@@ -168,12 +168,12 @@ bool same_gains_and_lags(const AxisLoop& a, const AxisLoop& b) {
   return a.Kp == b.Kp && a.Kd == b.Kd && a.Ki == b.Ki && a.lags_s == b.lags_s;
 }
 
-ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices, bool is_sampled,
+ErrorLoops error_loops(const stability::FlownLoop& tracking, double slice_s, int slices, bool is_sampled,
                        const std::optional<Interval>& motor_lag_s) {
   ErrorLoops loops;
   const Interval motors_s = motor_lag_s ? *motor_lag_s : Interval(tracking.gains.motor_lag_s);
-  stability::Gains without_motors = tracking.gains;
-  without_motors.motor_lag_s = 0;
+  stability::FlownLoop without_motors = tracking;
+  without_motors.gains.motor_lag_s = 0;
   if (tracking.gains.delay_s > 0) {
     loops.refusal = "the loop has a delay, whose kernel has no enclosure: set [lag] delay_s = 0";
     return loops;
@@ -185,16 +185,12 @@ ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s,
   }
   std::optional<AxisLoop> last;
   for (int axis = 0; axis < 3; ++axis) {
-    std::optional<AxisLoop> loop = axis_loop(without_motors, tracking.plant, axis);
+    std::optional<AxisLoop> loop = without_motors.continuous(axis);
     if (!loop) {
       loops.refusal = "Lambda or K couples the axes";
       return loops;
     }
-    double period_s = 0;
-    if (const auto sampled = sampled_axis_loop(tracking.gains, tracking.plant, axis)) {
-      loop->Ki = stability::effective_Ki(*sampled);
-      if (is_sampled) period_s = up(sampled->period_s);
-    }
+    const double period_s = is_sampled && tracking.is_sampled() ? up(1 / tracking.gains.rate_hz) : 0;
     loops.axis[axis] = last && same_gains_and_lags(*loop, *last)
                            ? loops.axis[axis - 1]
                            : error_loop(*loop, motors_s, period_s, slice_s, slices);

@@ -7,7 +7,7 @@
 
 #include "nn/base/interval.h"
 #include "stability/bounds/enclosures/kernel_cells.h"
-#include "stability/bounds/tracking_setup.h"
+#include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::analysis {
 
@@ -57,7 +57,7 @@ bool same_gains_and_lags(const stability::AxisLoop& a, const stability::AxisLoop
 /// firmware's integration step makes it act.
 /// @param is_sampled the command is held over one period of the gains' rate; otherwise the law is continuous.
 /// @param motor_lag_s positive: covers the loops for all lags in the interval; if empty, the lag stated by the gains.
-ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices,
+ErrorLoops error_loops(const stability::FlownLoop& tracking, double slice_s, int slices,
                        bool is_sampled = false, const std::optional<Interval>& motor_lag_s = {});
 
 /// Bounds of |e| and |e'| in each slice.

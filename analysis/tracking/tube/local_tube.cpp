@@ -72,7 +72,7 @@ double ForceErrorBounds::least_m() const {
 
 namespace {
 
-LocalTube tube_of_loop(const stability::TrackingSetup& tracking, const stability::Model& truth,
+LocalTube tube_of_loop(const stability::FlownLoop& tracking, const stability::Model& truth,
                        const files::Network& network, const stability::Task& task, int vehicles,
                        const LocalTubeOptions& options, bool is_sampled) {
   LocalTube result;
@@ -177,10 +177,10 @@ LocalTube tube_of_loop(const stability::TrackingSetup& tracking, const stability
 
 }  // namespace
 
-LocalTube local_tube(const stability::TrackingSetup& stated, const stability::Model& truth,
+LocalTube local_tube(const stability::FlownLoop& stated, const stability::Model& truth,
                      const files::Network& network, const stability::Task& task, int vehicles,
                      const LocalTubeOptions& options) {
-  stability::TrackingSetup tracking = stated;
+  stability::FlownLoop tracking = stated;
   const double truth_lag_s = TruthForce(truth, tracking.plant.largest_thrust_N).motor_lag_s();
   if (truth_lag_s > 0) tracking.gains.motor_lag_s = truth_lag_s;
   if (tracking.gains.rate_hz > 0) {

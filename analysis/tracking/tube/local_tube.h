@@ -83,7 +83,7 @@ struct LocalTube {
 ///   if the gains state a rate and it is proved for that loop, otherwise for the continuous one
 ///   (LocalTube::is_sampled). If `proved` is false nothing is known (inconclusive), for the reason in `why`.
 /// @throws files::InputError if the network lacks functions for the kind of these vehicles or has no unit of force.
-LocalTube local_tube(const stability::TrackingSetup& stated, const stability::Model& truth,
+LocalTube local_tube(const stability::FlownLoop& stated, const stability::Model& truth,
                      const files::Network& network, const stability::Task& task, int vehicles,
                      const LocalTubeOptions& options);
 

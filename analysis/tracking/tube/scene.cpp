@@ -113,7 +113,7 @@ double network_age_s(const stability::Gains& gains, bool is_sampled) {
   return age_s;
 }
 
-Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
+Scene::Scene(const stability::FlownLoop& tracking, const stability::Model& truth,
              const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
              double longest_slice_s, bool is_sampled, const EstimateErrors& estimates,
              const std::optional<Interval>& motor_lag_s, const ResidualEnvelope* residual)

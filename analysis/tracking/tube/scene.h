@@ -68,12 +68,12 @@ class Scene {
   /// @param estimates errors of each vehicle's own state estimates and of those it receives from others.
   /// @param residual force that acts in addition to the effects of the truth; may be null; must outlive this object.
   /// @throws files::InputError as LearnedForce.
-  Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
-        const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
-        double longest_slice_s = kSlice_s, bool is_sampled = false, const EstimateErrors& estimates = {},
+  Scene(const stability::FlownLoop& tracking, const stability::Model& truth, const files::Network& network,
+        const stability::Task& task, int vehicles, double network_age_s, double longest_slice_s = kSlice_s,
+        bool is_sampled = false, const EstimateErrors& estimates = {},
         const std::optional<Interval>& motor_lag_s = {}, const ResidualEnvelope* residual = nullptr);
 
-  const stability::TrackingSetup& tracking() const { return tracking_; }
+  const stability::FlownLoop& tracking() const { return tracking_; }
   const LearnedForce& learned() const { return learned_; }
   const TruthForce& truth() const { return truth_; }
   const ResidualEnvelope* residual() const { return residual_; }  ///< null: none
@@ -140,7 +140,7 @@ class Scene {
   ErrorHistory start_errors(int vehicle) const;
   void add_lag_parts(bool is_sampled);
 
-  const stability::TrackingSetup& tracking_;
+  const stability::FlownLoop& tracking_;
   double network_age_s_;
   const ResidualEnvelope* residual_;
   Interval motor_lag_s_;

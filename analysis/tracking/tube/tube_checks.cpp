@@ -279,7 +279,7 @@ bool neighbours_are_near(const Scene& scene, const Deviations& deviations) {
 }
 
 void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, LocalTube& tube) {
-  const stability::TrackingSetup& tracking = scene.tracking();
+  const stability::FlownLoop& tracking = scene.tracking();
   const stability::Gains& gains = tracking.gains;
   const auto add = [&tube](const char* name, const char* status, const std::string& note) {
     tube.assumptions.push_back({name, status, note});

@@ -35,11 +35,12 @@ Polynomial channel_numerator(const AxisLoop& loop, Channel channel) {
   return scaled(channel == Channel::kForce ? lag_polynomial(loop) : Polynomial{1}, 1 / loop.mass_kg);
 }
 
-/// Returns -u after an impulse of force, without the delay's shift.
-TransferFunction effort_transfer(const AxisLoop& loop) {
+/// Returns -u of the feedback after an impulse of force or command, without the delay's shift.
+TransferFunction effort_transfer(const AxisLoop& loop, Channel channel) {
   const Polynomial feedback =
       loop.Ki > 0 ? Polynomial{loop.Ki, loop.Kp, loop.Kd} : Polynomial{loop.Kp, loop.Kd};
-  return over_characteristic(loop, product(feedback, lag_polynomial(loop)));
+  return over_characteristic(loop,
+                             channel == Channel::kForce ? product(feedback, lag_polynomial(loop)) : feedback);
 }
 
 /// Returns (p - p[0]) / s.
@@ -92,12 +93,6 @@ TransferFunction initial_position_transfer(const AxisLoop& loop) {
   return over_characteristic(loop, loop.Ki > 0 ? times_s(std::move(numerator)) : std::move(numerator));
 }
 
-double pulse_gain(const AxisLoop& loop, Channel channel) {
-  if (loop.Ki == 0) return 2 * continuous_norms(loop, channel).edge;
-  const ResponseNorms h = response_norms(step_transfer(loop, channel));
-  return h.max - h.min;
-}
-
 LagFloor lag_floor(const AxisLoop& loop) {
   if (!is_stable(loop)) return {kInfinity, kInfinity};
   const Polynomial rest = without_constant(lag_polynomial(loop));
@@ -118,9 +113,13 @@ LagFloor lag_floor(const AxisLoop& loop) {
   return floor;
 }
 
-double effort_gain(const AxisLoop& loop) { return response_norms(effort_transfer(loop)).integral_abs; }
+double effort_gain(const AxisLoop& loop, Channel channel) {
+  return (channel == Channel::kCommand ? 1 : 0) + response_norms(effort_transfer(loop, channel)).integral_abs;
+}
 
-double effort_impulse_gain(const AxisLoop& loop) { return response_norms(effort_transfer(loop)).max_abs(); }
+double effort_impulse_gain(const AxisLoop& loop, Channel channel) {
+  return response_norms(effort_transfer(loop, channel)).max_abs();
+}
 
 RateGains rate_gains(const AxisLoop& loop) {
   if (loop.Ki == 0) return {kInfinity, kInfinity, kInfinity};

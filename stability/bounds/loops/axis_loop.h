@@ -18,6 +18,10 @@ struct AxisLoop {
   double Ki = 0;               ///< 1/s^3, effective (see effective_Ki())
   std::vector<double> lags_s;  ///< time constants; zeros are skipped
   double delay_s = 0;
+  bool operator==(const AxisLoop& o) const {
+    return mass_kg == o.mass_kg && Kp == o.Kp && Kd == o.Kd && Ki == o.Ki && lags_s == o.lags_s &&
+           delay_s == o.delay_s;
+  }
 };
 
 /// The point at which a force error enters.
@@ -48,9 +52,6 @@ GainNorms continuous_norms(const AxisLoop& loop, Channel channel);
 /// n 1, int |n| dt = 1. e is the true error. The vehicle follows a constant position error, so its `rate` is infinite.
 GainNorms continuous_norms(const AxisLoop& loop, Estimate estimate);
 
-/// Returns sup h - inf h: worst error due to one pulse of unit amplitude that rises once and falls once, m/N.
-double pulse_gain(const AxisLoop& loop, Channel channel);
-
 /// Returns h' of `channel`, m per N s: the error after a unit impulse of force.
 TransferFunction impulse_transfer(const AxisLoop& loop, Channel channel);
 /// Returns h of `channel`, m/N. It decays only if Ki > 0.
@@ -70,11 +71,12 @@ struct LagFloor {
 };
 LagFloor lag_floor(const AxisLoop& loop);
 
-/// Returns |u|_oo per |f|_oo for the feedback part u of the commanded force, N/N (force channel).
-double effort_gain(const AxisLoop& loop);
+/// Returns |u|_oo per |f|_oo for the commanded force u beside weight and feedforward, N/N: the feedback, and for
+/// kCommand the error of the command itself.
+double effort_gain(const AxisLoop& loop, Channel channel = Channel::kForce);
 
-/// Returns sup |u| after an impulse of force of 1 N s, N per N s.
-double effort_impulse_gain(const AxisLoop& loop);
+/// Returns sup |u| of the feedback after an impulse of 1 N s, N per N s.
+double effort_impulse_gain(const AxisLoop& loop, Channel channel = Channel::kForce);
 
 /// Gains from |eps'| <= 1 N/s in the command to e, e' and e'': g0, g1, g2 of a small-gain argument.
 struct RateGains {

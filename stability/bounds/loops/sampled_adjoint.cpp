@@ -54,7 +54,8 @@ SampledAdjoint::SampledAdjoint(const SampledLoop& loop, Output output)
 
 RowVectorXd SampledAdjoint::output_after_control(double phase_s) const {
   if (output_ == Output::kError) return model_.error_at(phase_s);
-  return RowVectorXd::Unit(model_.size() + 1, model_.integral_index());
+  return RowVectorXd::Unit(model_.size() + 1,
+                           output_ == Output::kIntegral ? model_.integral_index() : model_.command_index());
 }
 
 }  // namespace swarmcert::stability

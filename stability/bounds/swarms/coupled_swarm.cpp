@@ -64,24 +64,22 @@ Disturbance no_force() {
   return none;
 }
 
-CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant,
-                      const OtherErrors& others, const Disturbance& force) {
-  const std::optional<AxisLoop> loop = axis_loop(gains, plant, 2);
+CoupledVerdict couple(const CoupledSwarm& swarm, const FlownLoop& flown, const OtherErrors& others,
+                      const Disturbance& force) {
+  const std::optional<AxisLoop> loop = flown.continuous(2);
   if (!loop) throw std::invalid_argument("Lambda or K couples the z axis to others");
-  AxisLoop acting = *loop;
-  if (const auto sampled = sampled_axis_loop(gains, plant, 2)) acting.Ki = effective_Ki(*sampled);
-  const RateGains rate = rate_gains(acting);
+  const RateGains rate = rate_gains(*loop);
   const auto vehicles = static_cast<std::size_t>(swarm.vehicles);
   const std::vector<LoopGains> loops(vehicles, {rate.position, rate.velocity, rate.acceleration});
   CoupledVerdict verdict;
-  verdict.of_estimates = estimate_motion(acting, others);
-  verdict.of_force = force_motion(acting, force, others.bias_N);
+  verdict.of_estimates = estimate_motion(*loop, others);
+  verdict.of_force = force_motion(*loop, force, others.bias_N);
   const OwnMotion own = {verdict.of_estimates.error_m + verdict.of_force.error_m,
                          verdict.of_estimates.speed_m_s + verdict.of_force.speed_m_s,
                          verdict.of_estimates.acceleration_m_s2 + verdict.of_force.acceleration_m_s2};
   verdict.small_gain = small_gain(loops, swarm.couplings, std::vector<OwnMotion>(vehicles, own));
   if (!verdict.small_gain.proved)
-    verdict.unstable = find_unstable_swarm(acting, swarm.vehicles, swarm.couplings);
+    verdict.unstable = find_unstable_swarm(*loop, swarm.vehicles, swarm.couplings);
   return verdict;
 }
 

@@ -39,7 +39,7 @@ struct CoupledVerdict {
 /// @param others velocity_error, position_error and bias_N of every vehicle's z axis; the other members are ignored.
 /// @param force class of every vehicle's force error along z in addition to the bias and the couplings.
 /// @throws std::invalid_argument if Lambda or K couples the z axis to others.
-CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant,
-                      const OtherErrors& others = {}, const Disturbance& force = no_force());
+CoupledVerdict couple(const CoupledSwarm& swarm, const FlownLoop& flown, const OtherErrors& others = {},
+                      const Disturbance& force = no_force());
 
 }  // namespace swarmcert::stability

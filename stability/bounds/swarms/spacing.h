@@ -7,28 +7,27 @@
 
 namespace swarmcert::stability {
 
-/// |f_z| due to one vehicle above at height gap dz and horizontal distance r: amplitude (0.3/dz)^decay exp(-r^2/(2
-/// s^2)), s = spread + slope dz; a gap below `nearest_m` is replaced by it.
+/// |f_z| due to one vehicle above at height gap dz and horizontal distance r from its wake: amplitude (0.3/dz)^decay
+/// (1 + q x)^(-1/q), x = r^2/(2 s^2), s = spread + slope dz; exp(-x) for q = 0. A gap below `nearest_m` is replaced by
+/// it.
 struct DownwashField {
   double amplitude_N = 0;
   double decay = 0;
   double spread_m = 0, spread_slope = 0;
+  double tail = 0;  ///< q, 0 to 1
   double nearest_m = 0.12;
 
   double peak_N(double height_gap_m) const;
   double spread_at_m(double height_gap_m) const;
-};
-
-/// Further parameters of the lower vehicle.
-struct SpacingVehicle {
-  double effort_gain = 0;  ///< N/N
-  double largest_thrust_N = 0;
-  double integral_share = 1;  ///< see clamp_bounds()
-  double integrator_limit_m_s = 0;
+  /// Returns the distance, in spreads, at which the force has fallen to a share of its peak.
+  double spreads_at(double share) const;
+  /// Returns the integral of the profile along a line through its centre, in spreads.
+  double line_integral() const;
 };
 
 struct SpacingQuestion {
   double max_error_m = 0;
+  double dwell_s = 2;  ///< least time outside the keep-out radius between two passes
   int neighbours = 1;  ///< number above at once; their forces add at most linearly
   double guard = 1;    ///< factor on every predicted force, from comparison with flights
   double from_m = 0.15, to_m = 0.8;
@@ -41,11 +40,9 @@ struct SpacingRow {
   double peak_force_N = 0;
   double stay_error_m = 0;       ///< bound for any motion below, however slow
   bool may_stay = false;         ///< stay_error_m <= max_error_m and the thrust suffices
-  double keep_out_radius_m = 0;  ///< horizontal distance beyond which any motion is allowed; 0 if may_stay
-  /// Smallest relative horizontal speed of a straight pass at constant gap through the keep-out radius; infinite if no
-  /// speed suffices, 0 if may_stay.
-  double least_speed_m_s = 0;
-  double thrust_margin_N = 0;  ///< at the peak force; negative: the thrust does not suffice at any speed
+  double keep_out_radius_m = 0;  ///< see spacing(); 0 if may_stay
+  double least_speed_m_s = 0;    ///< see spacing(); infinite if no speed suffices, 0 if may_stay
+  double thrust_margin_N = 0;    ///< Saturation::margin_N() at the peak force; negative: no bound holds
 };
 
 struct Spacing {
@@ -55,12 +52,16 @@ struct Spacing {
 };
 
 /// Computes the spacing for the lower vehicle, without feedforward. Its own error may bring it closer, so forces are
-/// evaluated at the gap less max_error_m. Staying: amplitude bound. Passing at speed v: J = peak s sqrt(2 pi)/v and the
-/// smaller of the impulse and the pulse bound. The bounds hold for forces within the field; `guard` accounts for its
-/// deviation from flights. If the integrator's clamp may act, the bounds that hold with a clamp are used.
-/// @param loop of the z axis, with the effective Ki.
-/// @param gains of its force channel, over all times.
-Spacing spacing(const AxisLoop& loop, const GainNorms& gains, const SpacingVehicle& vehicle,
-                const DownwashField& field, const SpacingQuestion& question);
+/// evaluated at the gap less max_error_m. Each row is one statement: the error stays below max_error_m for any number
+/// of straight passes through the keep-out radius at least_speed_m_s or more (relative, horizontal), with at least
+/// dwell_s between the end of one and the start of the next, and any motion outside the radius meanwhile.
+///
+/// Outside, the force is at most F, which alone causes half of max_error_m; the rest of a pass is an impulse of at most
+/// J = peak s line_integral()/v. The error is at most A F + I J, with A the amplitude gain and I the impulse gain summed
+/// over all earlier passes as far as they are still felt; with the gains of the loop without integral, plus the effect
+/// of the largest integral, if the clamp may act. The bounds hold for forces within the field; `guard` accounts for its
+/// deviation from flights.
+/// @throws std::invalid_argument if Lambda or K couples the z axis to others.
+Spacing spacing(const FlownLoop& loop, const DownwashField& field, const SpacingQuestion& question);
 
 }  // namespace swarmcert::stability

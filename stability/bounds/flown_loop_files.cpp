@@ -1,18 +1,24 @@
-#include "stability/bounds/tracking_setup.h"
-
 #include <fmt/core.h>
 
+#include <utility>
+
+#include "stability/bounds/flown_loop.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::stability {
 
-TrackingSetup load_tracking_setup(const std::string& gains, const std::string& model, double battery_V) {
-  TrackingSetup result;
-  result.gains = load_gains(gains);
-  result.model = read_model(model);
-  result.plant.mass_kg = result.model.mass_kg;
-  result.plant.largest_thrust_N = result.model.largest_thrust_N(battery_V);
-  for (const EffectSpec& effect : result.model.effects) {
+FlownLoop load_flown_loop(const std::string& gains, const std::string& model, double battery_V) {
+  return flown_loop(load_gains(gains), read_model(model), battery_V);
+}
+
+FlownLoop flown_loop(Gains gains, Model model, double battery_V) {
+  FlownLoop result = {std::move(gains), {}, std::move(model)};
+  const Model& vehicle = result.model;
+  result.plant.mass_kg = vehicle.mass_kg;
+  result.plant.largest_thrust_N = vehicle.largest_thrust_N(battery_V);
+  result.plant.least_thrust_N =
+      static_cast<double>(vehicle.num_rotors()) * least_rotor_force_N(vehicle.thrust);
+  for (const EffectSpec& effect : vehicle.effects) {
     if (effect.is_expression()) continue;
     const auto first = [&](bool shape) {
       const EffectValues values = effect_values(effect_info(effect.name), effect);
