@@ -8,6 +8,7 @@
 
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
+#include "nn/base/rotor_speed.h"
 #include "nn/base/suggest.h"
 #include "nn/base/toml.h"
 #include "stability/effects/registry.h"
@@ -115,13 +116,24 @@ void read_thrust(const TomlTable& vehicle, Model* model) {
     vehicle.refuse("thrust", "", "cannot be combined with thrust_curve, which replaces it",
                    "omit one of the two");
   const TomlTable curve = vehicle.table("thrust_curve");
-  curve.allow_only({"force_N"});
-  const std::vector<double> force_N = curve.numbers("force_N");
+  curve.allow_only({"force_N", "force_of_speed"});
+  const bool of_speed = curve.has("force_of_speed");
+  if (of_speed && curve.has("force_N"))
+    curve.refuse("force_of_speed", "", "cannot be combined with force_N", "omit one of the two");
+  const std::string name = of_speed ? "force_of_speed" : "force_N";
+  std::vector<double> force_N = curve.numbers(name);
   if (force_N.size() != 3)
-    curve.refuse("force_N", "",
-                 "must be [a, b, c]: a rotor gives a + b u + c u^2 newton at command u in 0 .. 1");
+    curve.refuse(name, "",
+                 of_speed ? "must be [a, b, c]: a rotor gives a + b W + c W^2 newton at W rad/s"
+                          : "must be [a, b, c]: a rotor gives a + b u + c u^2 newton at command u in 0 .. 1");
+  if (of_speed) {
+    force_N[1] *= kFullRotorSpeed_rad_s;
+    force_N[2] *= kFullRotorSpeed_rad_s * kFullRotorSpeed_rad_s;
+  }
   if (!(force_N[1] >= 0) || !(force_N[1] + 2 * force_N[2] >= 0) || !(force_N[1] + force_N[2] > 0))
-    curve.refuse("force_N", "", "does not increase with the command in 0 .. 1");
+    curve.refuse(name, "",
+                 of_speed ? "does not increase with the speed in 0 .. 3000 rad/s"
+                          : "does not increase with the command in 0 .. 1");
   set_thrust_curve({force_N[0], force_N[1], force_N[2]}, *model);
 }
 

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "analysis/logs/angles.h"
+#include "nn/base/pi.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -90,7 +91,7 @@ void add_crazyflie(Table& t) {
   t.push_back({kDuty, rotors("pwm.m#.pwm"), "1/65536", 1, 65536});
   t.push_back({kRequested, rotors("motor.m#req"), "1/65536", 1, 65536});
   t.push_back({kRequested, rotors("motor.m#"), "1/65536", 1, 65536, Ask::kMotors});
-  t.push_back({kRotorSpeed, rotors("rpm.m#"), "rpm"});
+  t.push_back({kRotorSpeed, rotors("rpm.m#"), "rpm", 2 * kPi, 60});
   t.push_back({kBattery, {"pm.vbatmv"}, "mV", 1, 1000});
   t.push_back({kBattery, {"pm.vbat"}, "V"});
   t.push_back({kTargetPosition, axes("ctrltargetz.#"), "mm", 1, 1000});
@@ -163,7 +164,12 @@ void add_generic(Table& t) {
   for (const char* group : {"motor.#", "motor#", "m#", "u#", "pwm#", "pwm.#", "duty.#"})
     t.push_back({kDuty, each(group, {"0", "1", "2", "3"}), "", 1, 1, Ask::kMotors});
   for (const char* group : {"rpm#", "rpm.#", "motor.rpm.#", "rotor.speed.#", "motor.speed.#", "omega.m#"})
-    t.push_back({kRotorSpeed, rotors(group), "rpm"});
+    t.push_back({kRotorSpeed, rotors(group), "rpm", 2 * kPi, 60});
+  for (const char* group : {"m#.rads", "m#.rad.s", "motor#.rad.s", "rotor.speed.#.rad.s"})
+    t.push_back({kRotorSpeed, rotors(group), "rad/s"});
+  // Electrical revolutions per minute: the brushless motors of a Crazyflie have six pole pairs.
+  for (const char* group : {"m#.erpm", "erpm.m#", "erpm#", "erpm.#", "motor#.erpm"})
+    t.push_back({kRotorSpeed, rotors(group), "erpm", 2 * kPi, 60 * 6});
   for (const char* name : {"battery", "vbat", "voltage", "battery.voltage", "batteryvoltage", "batt", "bat",
                            "v.bat", "battery.v"})
     t.push_back({kBattery, {name}, "V"});

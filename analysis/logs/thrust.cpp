@@ -5,6 +5,7 @@
 #include "analysis/logs/battery_compensation.h"
 #include "analysis/logs/interpretation.h"
 #include "analysis/logs/statistics_of_series.h"
+#include "nn/base/rotor_speed.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -72,6 +73,16 @@ Scale scale_of(const std::vector<double>& thrust, const std::vector<double>& loa
   return scale;
 }
 
+/// Writes the rotor speeds as commands of the motors; see nn/base/rotor_speed.h.
+void speeds_become_commands(Draft& draft) {
+  SignalTable& t = draft.table;
+  for (int k = 0; k < kFour; ++k) {
+    t[kMotorCommand + k] = t[kRotorSpeed + k];
+    for (double& command : t[kMotorCommand + k]) command /= kFullRotorSpeed_rad_s;
+  }
+  draft.log.hover_command /= kFullRotorSpeed_rad_s;
+}
+
 /// Sets the thrust in multiples of the hover thrust, linear or quadratic in the command, whichever follows the load
 /// factor more closely.
 void set_hover_multiple(Draft& draft, const Rotors& rotors, bool squares_only, const std::string& what) {
@@ -91,7 +102,9 @@ void set_hover_multiple(Draft& draft, const Rotors& rotors, bool squares_only, c
   given = is_square ? square : linear;
   for (double& value : given) value /= scale.hover;
   draft.log.signals.thrust = ThrustSource::kHoverMultiple;
-  if (rotors.first == kMotorCommand) {
+  const bool has_speeds = rotors.first == kRotorSpeed;
+  if (has_speeds) speeds_become_commands(draft);
+  if (has_speeds || rotors.first == kMotorCommand) {
     draft.log.signals.motor_commands = rotors.count;
     draft.log.motor_power = is_square ? 2 : 1;
   }

@@ -47,36 +47,46 @@ Eigen::Vector3d rotor_torque_Nm(const stability::Model& model,
   return torque;
 }
 
+/// Adds the torque of `spec` to `torque`, whose values it sees as the torque so far.
+void add_effect(const stability::EffectSpec& spec, const stability::Model& model, const Kinds& kinds,
+                const Track& track, std::vector<Eigen::Vector3d>& torque) {
+  const stability::AppliedEffect effect(spec, {model.kind, kinds.names, model.path});
+  const auto stream = effect.effect().stream(effect.shape().data());
+  std::vector<stability::Wrench> columns(effect.coefficients().size());
+  for (std::size_t i = 0; i < torque.size(); ++i) {
+    stability::Instant now = track.instants[i];
+    now.torque_B_Nm = torque[i];
+    if (track.restarts[i] != 0) stream->restart();
+    stream->advance(now, columns.data());
+    for (std::size_t c = 0; c < columns.size(); ++c)
+      torque[i] += effect.coefficients()[c] * columns[c].torque_B_Nm;
+  }
+}
+
 /// Returns the torque of the rotors, after the model's motor lag, and of its effects.
 std::vector<Eigen::Vector3d> modelled_torque_B_Nm(const stability::Model& model, const Kinds& kinds,
                                                   const Track& track) {
-  std::vector<Eigen::Vector3d> torque(track.instants.size());
-  const std::vector<stability::RotorPlace> rotors = rotor_places(model);
-  for (std::size_t i = 0; i < torque.size(); ++i) torque[i] = rotor_torque_Nm(model, rotors, track, i);
-  const stability::EffectContext context = {model.kind, kinds.names, model.path};
-  const auto add = [&](const stability::EffectSpec& spec) {
-    const stability::AppliedEffect effect(spec, context);
-    const auto stream = effect.effect().stream(effect.shape().data());
-    std::vector<stability::Wrench> columns(effect.coefficients().size());
-    for (std::size_t i = 0; i < torque.size(); ++i) {
-      stability::Instant now = track.instants[i];
-      now.torque_B_Nm = torque[i];
-      if (track.restarts[i] != 0) stream->restart();
-      stream->advance(now, columns.data());
-      for (std::size_t c = 0; c < columns.size(); ++c)
-        torque[i] += effect.coefficients()[c] * columns[c].torque_B_Nm;
-    }
-  };
+  std::vector<Eigen::Vector3d> torque = rotor_torques(model, kinds, track);
   for (const stability::EffectSpec& spec : model.effects) {
-    if (spec.name == "motor_lag") add(spec);
-  }
-  for (const stability::EffectSpec& spec : model.effects) {
-    if (spec.name != "motor_lag" && spec.name != "delay" && spec.acts_on(track.vehicle)) add(spec);
+    if (spec.name != "motor_lag" && spec.name != "delay" && spec.acts_on(track.vehicle))
+      add_effect(spec, model, kinds, track, torque);
   }
   return torque;
 }
 
 }  // namespace
+
+std::vector<Eigen::Vector3d> rotor_torques(const stability::Model& model, const Kinds& kinds,
+                                           const Track& track) {
+  if (!why_no_rotor_forces(model, track).empty()) return {};
+  std::vector<Eigen::Vector3d> torque(track.instants.size());
+  const std::vector<stability::RotorPlace> rotors = rotor_places(model);
+  for (std::size_t i = 0; i < torque.size(); ++i) torque[i] = rotor_torque_Nm(model, rotors, track, i);
+  for (const stability::EffectSpec& spec : model.effects) {
+    if (spec.name == "motor_lag") add_effect(spec, model, kinds, track, torque);
+  }
+  return torque;
+}
 
 std::vector<Eigen::Vector3d> torque_records(const stability::Model& model, const Kinds& kinds,
                                             const Track& track) {

@@ -28,6 +28,12 @@ struct TorqueResidual {
 /// @throws files::InputError if an effect of the model cannot be created.
 TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds, const Track& track);
 
+/// Returns the torque of the rotors after the model's motor lag, one per record, without the model's other effects.
+/// Empty if the log does not give the force of each rotor.
+/// @throws files::InputError if the motor lag cannot be created.
+std::vector<Eigen::Vector3d> rotor_torques(const stability::Model& model, const Kinds& kinds,
+                                           const Track& track);
+
 /// Like torque_residual(), for logs of any rate: single records of slow logs are aliased by the attitude loop, but
 /// their means over many records show the torque that it balances. Empty if the log has no rates or does not give the
 /// force of each rotor.

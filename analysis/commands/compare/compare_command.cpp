@@ -20,10 +20,12 @@
 #include "analysis/commands/compare/compare_output.h"
 #include "analysis/commands/compare/compare_report.h"
 #include "analysis/commands/shared/flight_options.h"
+#include "analysis/commands/shared/prediction_output.h"
 #include "analysis/residuals/comparison.h"
 #include "analysis/residuals/flight_errors.h"
 #include "analysis/residuals/flight_peaks.h"
 #include "analysis/residuals/injected_log.h"
+#include "analysis/residuals/prediction.h"
 #include "analysis/tracking/kept_promise.h"
 #include "nn/base/file_io.h"
 #include "nn/base/suggest.h"
@@ -40,6 +42,8 @@ struct CompareOptions {
   std::string fitted;
   std::string inject;
   std::string promise;
+  double horizon_s = 0;
+  std::string predictions;
 };
 
 /// Parses "FILE" for every kind, or "KIND=FILE" for one kind.
@@ -227,6 +231,16 @@ void print_promise_kept(const files::Json& promise) {
                promise["left_out"].size());
 }
 
+/// Returns the errors of the prediction over --horizon, and writes it where --predictions says.
+files::Json prediction_json(const CompareOptions& options, const residuals::Inputs& inputs,
+                            const CommonOptions& common) {
+  const bool keeps = !options.predictions.empty();
+  const std::vector<residuals::FlightPrediction> flights =
+      residuals::predict(inputs, options.horizon_s, keeps, common.jobs);
+  if (keeps) write_predictions(flights, options.predictions, common.force);
+  return json_of(flights);
+}
+
 /// Output files must not exist yet, unless --force is given.
 void check_outputs(const CompareOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
@@ -234,6 +248,10 @@ void check_outputs(const CompareOptions& options, const CommonOptions& common) {
   if (!options.inject.empty() &&
       !(std::filesystem::is_directory(options.inject) && std::filesystem::is_empty(options.inject)))
     refuse_to_replace(common, options.inject);
+  if (!options.predictions.empty()) {
+    if (options.horizon_s == 0) throw UsageError("--predictions writes what --horizon predicts: give it");
+    refuse_folder(common, options.predictions);
+  }
   if (!options.fitted.empty()) {
     if (options.budget.empty()) throw UsageError("--fitted writes what --budget fits: name its flights");
     refuse_to_replace(common, (std::filesystem::path(options.fitted) / "flights.toml").string());
@@ -262,6 +280,7 @@ Extras add_extras(const CompareOptions& options, const residuals::Inputs& inputs
   }
   if (!options.inject.empty()) result["injected"] = inject(inputs, options.inject, common.force);
   if (!options.promise.empty()) result["promise"] = kept_promise_json(inputs, options.promise, common.jobs);
+  if (options.horizon_s > 0) result["prediction"] = prediction_json(options, inputs, common);
   return extras;
 }
 
@@ -315,6 +334,7 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
     print_comparison(comparison, inputs, extras.own ? &*extras.own : nullptr);
     if (!options.promise.empty()) print_promise_kept(result["promise"]);
     if (extras.budget) print(*extras.budget);
+    if (options.horizon_s > 0) print_prediction(result["prediction"]);
     const std::chrono::duration<double> run = std::chrono::steady_clock::now() - start;
     if (inputs.found.flights.size() > 1)
       fmt::print("Run time: {:.1f} s for {}.\n", run.count(), counted(inputs.found.flights.size(), "flight"));
@@ -340,6 +360,7 @@ Command compare_command() {
       "         swarmcert compare flights/ --network network.toml --published-filter\n"
       "         swarmcert compare test/ --budget development/ --network network.toml\n"
       "         swarmcert compare truth.toml flights/ --inject injected\n"
+      "         swarmcert compare model.toml flights/ --horizon 0.5 --predictions predicted\n"
       "         swarmcert compare flights/ --gains small=small.toml --gains large=large.toml",
       [](CLI::App& app) {
         const auto options = std::make_shared<CompareOptions>();
@@ -361,6 +382,12 @@ Command compare_command() {
         app.add_option(
             "--promise", options->promise,
             "Result of bound --coverage: how often its promise holds on the FLIGHTS not used to make it");
+        app.add_option("--horizon", options->horizon_s,
+                       "Predict so many seconds from every measured state with the logged motor commands or "
+                       "rotor speeds: error of position, velocity, rotation and rate against the horizon")
+            ->check(CLI::Range(0.001, 60.0));
+        add_output(app, "--predictions", options->predictions,
+                   "Folder for what --horizon predicts: FLIGHT.npy, float32, [starts x steps x 13]");
         add_output(app, "--inject", options->inject,
                    "Write FLIGHTS into this folder with the force of the model's effects added to the "
                    "accelerometer (open loop: nothing else changes)");

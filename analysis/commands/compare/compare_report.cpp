@@ -8,6 +8,7 @@
 #include <map>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/commands/shared/prediction_output.h"
 #include "analysis/commands/shared/time_plots.h"
 #include "analysis/report/report.h"
 #include "analysis/residuals/force_unit.h"
@@ -216,6 +217,7 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
   add_time_series(report, comparison, nullptr, unit.name, 1 / unit.size_N);
   add_trajectories(report, comparison);
   add_learning_error(report, comparison.learning_error, unit);
+  if (result.contains("prediction")) add_prediction(report, result["prediction"]);
 
   report.heading("Flights");
   rows.clear();
