@@ -15,6 +15,7 @@
 #include <new>
 #include <system_error>
 
+#include "analysis/cli/bundled.h"
 #include "analysis/cli/command.h"
 #include "analysis/commands/run_command.h"
 #include "nn/base/input_error.h"
@@ -53,6 +54,7 @@ int main(int argc, char** argv) {
   keep_freed_memory();
   std::signal(SIGXFSZ, SIG_IGN);  // exceeding the file size limit is reported as a write error instead
   try {
+    swarmcert::analysis::add_bundled_programs_to_path();
     return after_printing(swarmcert::analysis::run_command(argc, argv));
   } catch (const swarmcert::files::InputError& error) {
     fmt::print(stderr, "swarmcert: {}\n", error.what());

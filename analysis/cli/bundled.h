@@ -16,4 +16,8 @@ std::string bundled_folder(const std::string& installed, const std::string& sour
 /// command runs.
 void bundled_files_beside(const std::string& folder);
 
+/// Appends PREFIX/lib/swarmcert of an installed tool to PATH, where packages that stand alone (the Python wheel, the
+/// container) keep the program that draws the plots of reports. A program of the system's own is found before it.
+void add_bundled_programs_to_path();
+
 }  // namespace swarmcert::analysis

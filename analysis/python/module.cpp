@@ -68,5 +68,11 @@ PYBIND11_MODULE(_core, module) {
   module.def("residuals", residuals, py::arg("words"), py::arg("fleet") = "", py::arg("columns") = "",
              py::arg("network") = "");
   module.def("save_network", save_network, py::arg("source"), py::arg("folder"), py::arg("overwrite"));
-  module.def("bundled_files_beside", swarmcert::analysis::bundled_files_beside, py::arg("folder"));
+  module.def(
+      "bundled_files_beside",
+      [](const std::string& folder) {
+        swarmcert::analysis::bundled_files_beside(folder);
+        swarmcert::analysis::add_bundled_programs_to_path();
+      },
+      py::arg("folder"));
 }
