@@ -10,7 +10,7 @@
 #include "nn/weights/tensors.h"
 
 namespace swarmcert::files {
-namespace {
+namespace hdf5 {
 
 /// Closes an identifier of the library.
 class Handle {
@@ -58,10 +58,10 @@ struct OpenFile {
   std::uint64_t numbers = 0;  ///< read so far, or held in chunks while they were read
 };
 
-}  // namespace
+}  // namespace hdf5
 
 struct Hdf5Object::State {
-  State(std::shared_ptr<OpenFile> in, hid_t opened, std::string called)
+  State(std::shared_ptr<hdf5::OpenFile> in, hid_t opened, std::string called)
       : file(std::move(in)), object(opened, H5Oclose), name(std::move(called)) {}
 
   [[noreturn]] void refuse(const std::string& what) const {
@@ -69,8 +69,8 @@ struct Hdf5Object::State {
                       "save the numbers as float32 or float64 in plain datasets of one file"});
   }
 
-  std::shared_ptr<OpenFile> file;
-  Handle object;
+  std::shared_ptr<hdf5::OpenFile> file;
+  hdf5::Handle object;
   std::string name;
 };
 
@@ -113,7 +113,7 @@ Hdf5Object Hdf5Object::open(const std::string& link) const {
   while (!rest.empty()) {  // step by step, so that no step leads to another file
     const std::string step = rest.substr(0, rest.find('/'));
     rest.erase(0, std::min(step.size() + 1, rest.size()));
-    const Handle here(at, H5Oclose);
+    const hdf5::Handle here(at, H5Oclose);
     H5L_info_t info;
     if (!here.is_open() || H5Lget_info(here.id(), step.c_str(), &info, H5P_DEFAULT) < 0)
       state_->refuse("has no " + in_quotes(link));
@@ -126,9 +126,9 @@ Hdf5Object Hdf5Object::open(const std::string& link) const {
 
 std::optional<std::vector<std::string>> Hdf5Object::texts(const std::string& attribute) const {
   if (H5Aexists(state_->object.id(), attribute.c_str()) <= 0) return std::nullopt;
-  const Handle stored(H5Aopen(state_->object.id(), attribute.c_str(), H5P_DEFAULT), H5Aclose);
-  const Handle type(H5Aget_type(stored.id()), H5Tclose);
-  const Handle space(H5Aget_space(stored.id()), H5Sclose);
+  const hdf5::Handle stored(H5Aopen(state_->object.id(), attribute.c_str(), H5P_DEFAULT), H5Aclose);
+  const hdf5::Handle type(H5Aget_type(stored.id()), H5Tclose);
+  const hdf5::Handle space(H5Aget_space(stored.id()), H5Sclose);
   if (!stored.is_open() || !type.is_open() || H5Tget_class(type.id()) != H5T_STRING)
     state_->refuse("its attribute " + in_quotes(attribute) + " is not text");
   const hssize_t count = H5Sget_simple_extent_npoints(space.id());
@@ -159,8 +159,8 @@ std::optional<std::vector<std::string>> Hdf5Object::texts(const std::string& att
 
 bool Hdf5Object::flag(const std::string& attribute) const {
   if (H5Aexists(state_->object.id(), attribute.c_str()) <= 0) return false;
-  const Handle stored(H5Aopen(state_->object.id(), attribute.c_str(), H5P_DEFAULT), H5Aclose);
-  const Handle space(H5Aget_space(stored.id()), H5Sclose);
+  const hdf5::Handle stored(H5Aopen(state_->object.id(), attribute.c_str(), H5P_DEFAULT), H5Aclose);
+  const hdf5::Handle space(H5Aget_space(stored.id()), H5Sclose);
   double value = 0;
   return H5Sget_simple_extent_npoints(space.id()) == 1 &&
          H5Aread(stored.id(), H5T_NATIVE_DOUBLE, &value) >= 0 && value != 0;
@@ -168,9 +168,9 @@ bool Hdf5Object::flag(const std::string& attribute) const {
 
 Hdf5Numbers Hdf5Object::numbers() const {
   if (H5Iget_type(state_->object.id()) != H5I_DATASET) state_->refuse("is not a dataset");
-  const Handle type(H5Dget_type(state_->object.id()), H5Tclose);
-  const Handle space(H5Dget_space(state_->object.id()), H5Sclose);
-  const Handle layout(H5Dget_create_plist(state_->object.id()), H5Pclose);
+  const hdf5::Handle type(H5Dget_type(state_->object.id()), H5Tclose);
+  const hdf5::Handle space(H5Dget_space(state_->object.id()), H5Sclose);
+  const hdf5::Handle layout(H5Dget_create_plist(state_->object.id()), H5Pclose);
   const H5T_class_t type_class = H5Tget_class(type.id());
   const std::size_t size = H5Tget_size(type.id());
   const bool is_float = type_class == H5T_FLOAT && (size == 2 || size == 4 || size == 8);
@@ -205,8 +205,8 @@ Hdf5Numbers Hdf5Object::numbers() const {
 }
 
 std::vector<Hdf5Object> Hdf5Object::references() const {
-  const Handle type(H5Dget_type(state_->object.id()), H5Tclose);
-  const Handle space(H5Dget_space(state_->object.id()), H5Sclose);
+  const hdf5::Handle type(H5Dget_type(state_->object.id()), H5Tclose);
+  const hdf5::Handle space(H5Dget_space(state_->object.id()), H5Sclose);
   const hssize_t count = H5Sget_simple_extent_npoints(space.id());
   if (!type.is_open() || H5Tequal(type.id(), H5T_STD_REF_OBJ) <= 0)
     state_->refuse("is a cell array without references");
@@ -226,7 +226,7 @@ std::vector<Hdf5Object> Hdf5Object::references() const {
 }
 
 Hdf5Object Hdf5File::opened(const std::string& bytes, const std::string& path) {
-  auto file = std::make_shared<OpenFile>(bytes, path);
+  auto file = std::make_shared<hdf5::OpenFile>(bytes, path);
   const hid_t root = H5Gopen2(file->id, "/", H5P_DEFAULT);
   if (root < 0) throw InputError({path, "", "", "", "is not a complete HDF5 file", kCopyAgain});
   return Hdf5Object(std::make_shared<Hdf5Object::State>(std::move(file), root, ""));
