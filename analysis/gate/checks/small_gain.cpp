@@ -5,8 +5,8 @@
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
 #include "nn/base/toml.h"
-#include "stability/bounds/tracking_bounds.h"
 #include "stability/bounds/swarms/coupled_swarm.h"
+#include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::gate {
 
