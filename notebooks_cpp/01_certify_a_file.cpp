@@ -31,7 +31,7 @@
 using namespace swarmcert;
 
 int main() {
-  const files::Network network = files::load_network({"nn/networks/demo/network.toml", "", "", ""});
+  const files::Network network = files::load_network({{}, "nn/networks/demo/network.toml", "", ""});
   lipschitz::CertifyOptions options;
   options.lower.rounds = 4;  // a short search for steep slopes
   const lipschitz::Certification found = lipschitz::certify(network, options);

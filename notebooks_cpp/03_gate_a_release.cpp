@@ -40,7 +40,7 @@ gate::GateResult judge(double max_joint_gf) {
 }
 
 int main() {
-  const files::Network network = files::load_network({"nn/networks/demo/network.toml", "", "", ""});
+  const files::Network network = files::load_network({{}, "nn/networks/demo/network.toml", "", ""});
   lipschitz::CertifyOptions options;
   options.lower.rounds = 4;
   const lipschitz::Certification found = lipschitz::certify(network, options);

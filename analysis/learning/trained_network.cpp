@@ -69,7 +69,7 @@ files::Network write_network(const LearningData& data, const training::Vector& t
   }
   const std::string path = (fs::path(folder) / "network.toml").string();
   files::write_file(path, network_toml(data, gamma, silent), true);
-  files::Network network = files::load_evaluated_network({path, "", "", ""});
+  files::Network network = files::load_evaluated_network({{}, path, "", ""});
   write_samples(layout, theta, network, (fs::path(folder) / kSamplesFile).string());
   return network;
 }

@@ -40,7 +40,7 @@ std::string text_of(const LearnOptions& options) {
 Learned read_back(const files::Json& file, const std::string& folder) {
   Learned learned;
   learned.folder = folder;
-  learned.network = files::load_evaluated_network({(fs::path(folder) / "network.toml").string(), "", "", ""});
+  learned.network = files::load_evaluated_network({{}, (fs::path(folder) / "network.toml").string(), "", ""});
   for (const files::Json& bound : file.at("set_bounds"))
     learned.set_bounds.emplace_back(bound.at(0).get<std::string>(), bound.at(1).get<double>());
   learned.bound = file.at("bound").get<double>();

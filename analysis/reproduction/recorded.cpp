@@ -102,7 +102,7 @@ learning::Certified certified_published(const Setting& setting) {
   certify.jobs = setting.jobs;
   certify.lower.rounds = 0;
   if (!setting.full) certify.method = lipschitz::UpperMethod::kProduct;
-  return learning::write_certificate(files::load_network({published_network(setting), "", "", ""}),
+  return learning::write_certificate(files::load_network({{}, published_network(setting), "", ""}),
                                      (fs::path(setting.work) / "published").string(), certify);
 }
 

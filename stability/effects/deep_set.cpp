@@ -16,7 +16,7 @@ files::Network load(const EffectSpec& spec, const EffectContext& context) {
                              "add network = \"network.toml\""});
   }
   return files::load_evaluated_network(
-      {(std::filesystem::path(context.path).parent_path() / spec.network).string(), "", "", ""});
+      {{}, (std::filesystem::path(context.path).parent_path() / spec.network).string(), "", ""});
 }
 
 }  // namespace

@@ -391,30 +391,30 @@ class LoadNetwork : public testing::Test {
 };
 
 TEST_F(LoadNetwork, WeightsAreRelativeToTheToml) {
-  const Network network = load_network({folder_ + "/network.toml", "", "", ""});
+  const Network network = load_network({{}, folder_ + "/network.toml", "", ""});
   EXPECT_EQ(network.phi.at("small").path, folder_ + "/weights/6x20");
   EXPECT_EQ(network.sha256, sha256(read_file(folder_ + "/network.toml")));
 }
 
 TEST_F(LoadNetwork, ATomlUnderAnotherNameIsRecognised) {
   write_file(folder_ + "/renamed", read_file(folder_ + "/network.toml"), true);
-  EXPECT_EQ(load_network({folder_ + "/renamed", "", "", ""}).phi.size(), 1u);
+  EXPECT_EQ(load_network({{}, folder_ + "/renamed", "", ""}).phi.size(), 1u);
 }
 
 TEST_F(LoadNetwork, OneWeightFileIsAPlainNetwork) {
-  const Network network = load_network({folder_ + "/weights/6x20", "", "", ""});
+  const Network network = load_network({{}, folder_ + "/weights/6x20", "", ""});
   ASSERT_TRUE(network.plain);
   EXPECT_EQ(network.plain->outputs(), 20);
   EXPECT_TRUE(network.phi.empty() && network.rho.empty() && network.path.empty());
 }
 
 TEST_F(LoadNetwork, PhiAndRhoHaveTheDefaultKind) {
-  const Network network = load_network({"", folder_ + "/weights/6x20", folder_ + "/weights/20x1", ""});
+  const Network network = load_network({{}, "", folder_ + "/weights/6x20", folder_ + "/weights/20x1"});
   EXPECT_EQ(network.phi.at("default").inputs(), 6);
   EXPECT_EQ(network.rho.at("default").outputs(), 1);
   EXPECT_TRUE(refuses(
       [&] {
-        load_network({"", folder_ + "/weights/6x20", folder_ + "/weights/19x1", ""});
+        load_network({{}, "", folder_ + "/weights/6x20", folder_ + "/weights/19x1"});
       },
       {"19x1: fc1.weight = 19 inputs", "must be 20"}));
 }
@@ -425,15 +425,15 @@ TEST_F(LoadNetwork, ErrorsInAWeightFileNameThatFile) {
              true);
   EXPECT_TRUE(refuses(
       [&] {
-        load_network({folder_ + "/broken.toml", "", "", ""});
+        load_network({{}, folder_ + "/broken.toml", "", ""});
       },
       {folder_ + "/nowhere: cannot be opened"}));
 }
 
 TEST_F(LoadNetwork, AmbiguousArgumentsAreAProgrammingError) {
-  EXPECT_THROW(load_network({"", "", "", ""}), std::invalid_argument);
-  EXPECT_THROW(load_network({"", "a", "", ""}), std::invalid_argument);
-  EXPECT_THROW(load_network({"a", "b", "", ""}), std::invalid_argument);
+  EXPECT_THROW(load_network({{}, "", "", ""}), std::invalid_argument);
+  EXPECT_THROW(load_network({{}, "", "a", ""}), std::invalid_argument);
+  EXPECT_THROW(load_network({{}, "a", "b", ""}), std::invalid_argument);
 }
 
 TEST_F(LoadNetwork, ThePublishedNetworksFitTogether) {
@@ -449,7 +449,7 @@ TEST_F(LoadNetwork, ThePublishedNetworksFitTogether) {
                  "\nphi.ground.weights = " + path("phi_G.pth") + "\nrho.small.weights = " +
                  path("rho_S.pth") + "\nrho.large.weights = " + path("rho_L.pth") + "\n",
              true);
-  const Network network = load_network({folder_ + "/published.toml", "", "", ""});
+  const Network network = load_network({{}, folder_ + "/published.toml", "", ""});
   EXPECT_EQ(network.phi.size(), 3u);
   EXPECT_EQ(network.rho.at("large").inputs(), 20);
 }

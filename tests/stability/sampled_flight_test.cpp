@@ -313,7 +313,7 @@ TEST(SampledFlight, PredictedForceIsAStaircaseThatComesLate) {
   Gains slow = parsed_gains();
   slow.network_rate_hz = 50;
   slow.network_latency_s = 0.03;
-  const auto network = files::load_network({tests::source_path("nn/networks/demo/network.toml"), "", "", ""});
+  const auto network = files::load_network({{}, tests::source_path("nn/networks/demo/network.toml"), "", ""});
   Swarm swarm(with_effects({{"downwash", {}}}), 2);
   const auto task = make_task("swap", {2, 9, 0});
   SampledFlight loop(swarm, slow, *task, exact(), &network);
@@ -334,7 +334,7 @@ TEST(SampledFlight, PredictedForceIsAStaircaseThatComesLate) {
 TEST(SampledFlight, ANeighbourThatFallsSilentFadesOutWithin500ms) {
   // A network whose output depends on the neighbours only. If all positions are lost, the prediction is that of an
   // empty set; if none is lost, it is another; other losses and delays never give a third.
-  const auto network = files::load_network({tests::source_path("nn/networks/demo/network.toml"), "", "", ""});
+  const auto network = files::load_network({{}, tests::source_path("nn/networks/demo/network.toml"), "", ""});
   const auto predictions = [&](const RadioOptions& radio, std::uint64_t seed) {
     Swarm swarm(with_effects({{"downwash", {}}}), 2);
     const auto task = make_task("swap", {2, 9, 0});

@@ -87,7 +87,7 @@ Json sizes(const std::string& path) {
 }
 
 int run(char** arguments, int count) {
-  const swarmcert::files::Network network = swarmcert::files::load_network({arguments[1], "", "", ""});
+  const swarmcert::files::Network network = swarmcert::files::load_network({{}, arguments[1], "", ""});
   std::map<std::string, Cost> costs = read_costs(arguments[2]);
   swarmcert::facts::CallGraph graph;
   for (int i = 7; i < count; ++i) graph.add(swarmcert::files::read_file(arguments[i]));
