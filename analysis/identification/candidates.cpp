@@ -14,7 +14,6 @@
 #include "analysis/residuals/thrust_stage.h"
 #include "nn/base/parallel.h"
 #include "stability/effects/registry.h"
-#include "stability/effects/torque_effects.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -210,7 +209,8 @@ std::vector<ScaledStage> scaled_stages(const std::vector<const Candidate*>& effe
 }
 
 bool is_written_by_hand(const std::string& name) {
-  return name == "deep_set" || name == "accelerometer_scale" || stability::is_torque_effect(name);
+  return name == "deep_set" || name == "torque_bias" || name == "downwash_torque" || name == "com_offset" ||
+         name == "accelerometer_scale";
 }
 
 std::vector<std::string> candidate_names(const stability::Model& model) {

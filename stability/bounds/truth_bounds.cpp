@@ -7,7 +7,6 @@
 #include "stability/bounds/enclosures/interval_functions.h"
 #include "stability/bounds/field_slope.h"
 #include "stability/effects/registry.h"
-#include "stability/effects/torque_effects.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -287,7 +286,7 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
   const Values value(effect, info);
   if (name == "motor_lag" || name == "delay" || name == "thrust_ratio") {
     result.note = "acts through the loop";
-  } else if (is_torque_effect(name)) {
+  } else if (name == "torque_bias" || name == "downwash_torque" || name == "com_offset") {
     result.note = "a torque: no force";
   } else if (name == "sensor_delay" || name == "accelerometer_scale") {
     result.note = "affects only the accelerometer: no force";

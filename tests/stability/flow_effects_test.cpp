@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "stability/effects/registry.h"
-#include "stability/effects/torque_effects.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -124,49 +123,6 @@ TEST(ComOffset, LeversTheThrustAboutTheCentreOfMass) {
       Eigen::Vector3d(-0.002, 0.001, 0).cross(Eigen::Vector3d(0, 0, kFlowWeight_N));
   EXPECT_LT((wrench.torque_B_Nm - expected).norm(), 1e-15);
   EXPECT_EQ(wrench.force_W_N.norm(), 0);
-}
-
-/// Returns the torque of an effect on a hovering vehicle that turns at (1, 2, 3) rad/s, with rotor torque (4, 5, 6) mN m.
-Eigen::Vector3d torque_while_turning(const std::string& effect,
-                                     const std::map<std::string, double>& parameters,
-                                     const Eigen::Vector3d& v_B_m_s = Eigen::Vector3d::Zero()) {
-  EffectSpec spec;
-  spec.name = effect;
-  spec.parameters = parameters;
-  Instant now = hovering();
-  now.R_WB = Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 2, 2) / 3).toRotationMatrix();
-  now.v_W_m_s = now.R_WB * v_B_m_s;
-  now.omega_B_rad_s = {1, 2, 3};
-  now.torque_B_Nm = {4e-3, 5e-3, 6e-3};
-  const Wrench wrench = AppliedEffect(spec, {"small", {"small"}, ""}).wrench(now);
-  EXPECT_EQ(wrench.force_W_N.norm(), 0);
-  EXPECT_TRUE(is_torque_effect(effect));
-  return wrench.torque_B_Nm;
-}
-
-TEST(RateDamping, OpposesTheTurnAboutEachBodyAxis) {
-  const Eigen::Vector3d torque = torque_while_turning(
-      "rate_damping", {{"damping_x_Nm_s", 1e-4}, {"damping_y_Nm_s", 2e-4}, {"damping_z_Nm_s", 3e-4}});
-  EXPECT_LT((torque - Eigen::Vector3d(-1e-4, -4e-4, -9e-4)).norm(), 1e-15);
-}
-
-TEST(TorqueRatio, AddsAShareOfTheRotorsTorque) {
-  const Eigen::Vector3d torque = torque_while_turning("torque_ratio", {{"excess_x", 0.5}, {"excess_z", -1}});
-  EXPECT_LT((torque - Eigen::Vector3d(2e-3, 0, -6e-3)).norm(), 1e-15);
-}
-
-TEST(FlowTorque, RaisesTheNoseInForwardFlight) {
-  // Positive pitch about body y, which points left, lowers the nose.
-  const Eigen::Vector3d torque =
-      torque_while_turning("flow_torque", {{"flow_x_N_s", 1e-4}, {"flow_y_N_s", 1e-4}}, {2, 3, 4});
-  EXPECT_LT((torque - Eigen::Vector3d(3e-4, -2e-4, 0)).norm(), 1e-15);
-}
-
-TEST(Gyroscopic, TurnsTheMomentumOfTheRotorsWithTheBody) {
-  // -omega x h e3 in hover, where h = -t tau_z.
-  const Eigen::Vector3d torque = torque_while_turning("gyroscopic", {{"time_s", 0.1}});
-  const Eigen::Vector3d expected = -Eigen::Vector3d(1, 2, 3).cross(Eigen::Vector3d(0, 0, -0.1 * 6e-3));
-  EXPECT_LT((torque - expected).norm(), 1e-15);
 }
 
 TEST(ImuTilt, TiltsTheThrustInTheBody) {
