@@ -216,7 +216,8 @@ void derive_battery(Draft& draft) {
   }
 }
 
-/// Replaces rotor speeds that are halved or drop out by the mean of the others, and reports these rotors.
+/// Doubles the speeds of rotors that show half of them, replaces missing and impossible speeds by the mean of the
+/// others, and reports these rotors.
 void replace_broken_rotor_speeds(Draft& draft) {
   SignalTable& t = draft.table;
   std::array<double, kFour> middle{};
@@ -237,16 +238,29 @@ void replace_broken_rotor_speeds(Draft& draft) {
       for (double& speed : speeds) speed *= 2;
       draft.note(fmt::format("rotor {}: its speed is {:.2f} of the others': doubled", k + 1, share));
     }
-    std::size_t dropped = 0;
-    for (std::size_t i = 0; i < t.size(); ++i) {
-      double others = 0;
-      for (int j = 0; j < kFour; ++j) others += j == k ? 0 : t[kRotorSpeed + j][i] / 3;
-      if (speeds[i] > 0.1 * common || !(others > 0.6 * common)) continue;
-      speeds[i] = others;
-      ++dropped;
+  }
+  // No rotor spins at three times the speed that carries the vehicle.
+  const auto is_possible = [common](double speed) { return speed > 0.1 * common && speed < 3 * common; };
+  std::array<std::size_t, kFour> replaced{};
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    std::vector<double> others;
+    for (int k = 0; k < kFour; ++k) {
+      if (is_possible(t[kRotorSpeed + k][i])) others.push_back(t[kRotorSpeed + k][i]);
     }
-    if (dropped > 0)
-      draft.note(fmt::format("rotor {}: {} records without a speed, taken from the others", k + 1, dropped));
+    double mean = 0;
+    for (const double speed : others) mean += speed / static_cast<double>(others.size());
+    if (!(mean > 0.6 * common)) continue;
+    for (int k = 0; k < kFour; ++k) {
+      double& speed = t[kRotorSpeed + k][i];
+      if (is_possible(speed)) continue;
+      speed = mean;
+      ++replaced[static_cast<std::size_t>(k)];
+    }
+  }
+  for (std::size_t k = 0; k < kFour; ++k) {
+    if (replaced[k] > 0)
+      draft.note(fmt::format("rotor {}: {} records without a possible speed, taken from the others", k + 1,
+                             replaced[k]));
   }
 }
 

@@ -41,11 +41,11 @@ void write_state(const PredictedState& state, float* numbers) {
       state.omega_B_rad_s.cast<float>();
 }
 
-/// Returns, for each record, the number of records from it on without contact, crash or gap.
+/// Returns, for each record, the number of records from it on without contact or gap.
 std::vector<std::size_t> clear_records(const Track& track) {
   std::vector<std::size_t> clear(track.instants.size() + 1, 0);
   for (std::size_t i = track.instants.size(); i-- > 0;) {
-    const bool on_ground = track.cut[i] == Cut::kContact || track.cut[i] == Cut::kCrash;
+    const bool on_ground = track.cut[i] == Cut::kContact;
     const bool ends = i + 1 < track.instants.size() && track.restarts[i + 1] != 0;
     clear[i] = on_ground ? 0 : ends ? 1 : clear[i + 1] + 1;
   }

@@ -83,14 +83,14 @@ struct FlightPrediction {
   std::size_t starts = 0;         ///< that were predicted
   PredictionErrors errors, held;  ///< `held`: of a prediction that nothing changes
   /// [all starts x steps x 13], row-major, if requested. NaN for starts that are not predicted: those with contact with
-  /// the ground, a crash or a gap in the log within the horizon.
+  /// the ground or a gap in the log within the horizon.
   std::vector<float> states;
 };
 
 /// Returns the number of steps in `horizon_s`, at least 1.
 int prediction_steps(double horizon_s, double step_s);
 
-/// Returns the records from which `steps` steps can be predicted: without contact, crash or gap within them.
+/// Returns the records from which `steps` steps can be predicted: without contact or gap within them.
 std::vector<std::size_t> prediction_starts(const Track& track, std::size_t steps);
 
 /// Predicts `horizon_s` from every record of `track` after which so many records follow.

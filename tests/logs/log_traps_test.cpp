@@ -10,6 +10,7 @@
 #include "analysis/logs/flight_story.h"
 #include "analysis/logs/interpretation.h"
 #include "analysis/logs/read_log.h"
+#include "nn/base/rotor_speed.h"
 
 namespace swarmcert::tests {
 namespace {
@@ -174,6 +175,27 @@ TEST(LogTraps, ThrustFollowsTheSquareOfRotorSpeedsOfWhichOneIsHalved) {
     ++compared;
   }
   EXPECT_GT(compared, 700u);
+}
+
+TEST(LogTraps, ElectricalRotorSpeedsGiveCommandsAndImpossibleOnesAreReplaced) {
+  constexpr double kPolePairs = 6, kPi_rad = 3.14159265358979323846;
+  std::string text = "time,x,y,z,vx,vy,vz,m1_erpm,m2_erpm,m3_erpm,m4_erpm\n";
+  constexpr int kSpike = 500;
+  for (int k = 0; k < 1000; ++k) {
+    const double t = 0.01 * k, erpm = kPolePairs * 18000 * std::sqrt(Bob(t).load);
+    text += fmt::format("{0:.3f},0,0,{1:.5f},0,0,{2:.5f},{3:.1f},{3:.1f},{4:.1f},{3:.1f}\n", t, Bob(t).z,
+                        Bob(t).vz, erpm, k == kSpike ? 1e7 : erpm);
+  }
+  const logs::Log log = parse_text(text);
+  EXPECT_TRUE(says(log, "rotor 3: 1 records without a possible speed, taken from the others"));
+  EXPECT_EQ(log.signals.motor_commands, 4);
+  EXPECT_EQ(log.motor_power, 2);
+  ASSERT_EQ(log.samples.size(), 1000u);
+  for (const int k : {100, kSpike, 900}) {
+    const double speed_rad_s = 18000 * std::sqrt(Bob(0.01 * k).load) * 2 * kPi_rad / 60;
+    EXPECT_NEAR(log.samples[static_cast<std::size_t>(k)].motor_command[2],
+                speed_rad_s / kFullRotorSpeed_rad_s, 1e-5);
+  }
 }
 
 TEST(LogTraps, TheControllersCommandedForceIsAThrust) {
