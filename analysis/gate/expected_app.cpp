@@ -1,13 +1,24 @@
 #include "analysis/gate/expected_app.h"
 
 #include "nn/base/input_error.h"
-#include "stability/bounds/theorem.h"
-#include "stability/bounds/tracking_setup.h"
+#include "stability/bounds/flown_loop.h"
 
 namespace swarmcert::gate {
+namespace {
+
+/// The law as gains.toml writes it, without what the loop makes of it.
+stability::PidMatrices written_law(const stability::Gains& gains, double mass_kg) {
+  if (gains.composite) return stability::pid_matrices(*gains.composite, mass_kg);
+  const auto diagonal = [](const auto& v) {
+    return Eigen::Vector3d(v.x, v.y, v.z).asDiagonal().toDenseMatrix();
+  };
+  return {diagonal(gains.pid->Kp_1_s2), diagonal(gains.pid->Kd_1_s), diagonal(gains.pid->Ki_1_s3)};
+}
+
+}  // namespace
 
 firmware::AppExpectation expected_app(const std::string& gains, const std::string& model) {
-  const stability::TrackingSetup setup = stability::load_tracking_setup(gains, model);
+  const stability::FlownLoop setup = stability::load_flown_loop(gains, model);
   const auto refuse = [&gains](const std::string& what) {
     throw files::InputError(
         {gains, "", "position", "", what, "the app has one gain for x and y and one for z"});
@@ -15,16 +26,14 @@ firmware::AppExpectation expected_app(const std::string& gains, const std::strin
   firmware::AppExpectation expected;
   const double mass_kg = setup.model.mass_kg;
   expected.parameters.mass_kg = static_cast<float>(mass_kg);
-  for (const int axis : {0, 1, 2}) {
-    const auto pid = axis_gains(setup.gains, mass_kg, axis);
-    if (!pid) refuse("couples the axes");
-    const std::size_t place = axis == 2 ? 1 : 0;
-    const double values[] = {pid->Kp_1_s2, pid->Kd_1_s, pid->Ki_1_s3};
-    for (std::size_t k = 0; k < 3; ++k) {
-      float& gain = expected.parameters.gains[2 * k + place];
-      if (axis == 1 && gain != static_cast<float>(values[k])) refuse("has different gains for x and y");
-      gain = static_cast<float>(values[k]);
-    }
+  const stability::PidMatrices law = written_law(setup.gains, mass_kg);
+  const Eigen::MatrixXd* const matrices[] = {&law.Kp, &law.Kd, &law.Ki};
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!matrices[k]->isDiagonal(0)) refuse("couples the axes");
+    const Eigen::VectorXf gain = matrices[k]->diagonal().cast<float>();
+    if (gain[0] != gain[1]) refuse("has different gains for x and y");
+    expected.parameters.gains[2 * k] = gain[0];
+    expected.parameters.gains[2 * k + 1] = gain[2];
   }
   const auto& map = setup.model.thrust;
   const auto& inertia = setup.model.inertia_kg_m2;

@@ -195,7 +195,7 @@ int run_simulate(SimulateOptions options, const CommonOptions& common) {
   const std::unique_ptr<files::Network> network =
       has_force_network(options) ? read_network(options.network, inputs) : nullptr;
   const std::unique_ptr<files::Network> torque_network =
-      options.torque_network.empty() ? nullptr : read_network({options.torque_network, "", "", ""}, inputs);
+      options.torque_network.empty() ? nullptr : read_network({{}, options.torque_network, "", ""}, inputs);
   const std::unique_ptr<stability::Task> task =
       stability::make_task(options.task, {options.vehicles, options.duration_s, options.seed});
   swarm.assume_lag(gains.motor_lag_s, gains.delay_s);
