@@ -53,8 +53,8 @@ struct Layer {
   /// Number of trailing outputs to which the activation is not applied, because a skip connection carries them past it.
   /// Is 0 if the activation is ReLU or sorts.
   int kept = 0;
-  bool is_added = false;  ///< not in the file: an identity layer added after a final activation
-  std::string tensor;     ///< that holds the weights: "fc1.weight"; empty: they were folded or rewritten
+  bool is_added = false;    ///< not in the file: an identity layer added after a final activation
+  std::string tensor = {};  ///< that holds the weights: "fc1.weight"; empty: they were folded or rewritten
 };
 
 /// Returns the activation after `layer` as stated in chains: "tanh", or "tanh:8" for the first 8 outputs only.
