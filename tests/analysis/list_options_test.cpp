@@ -13,9 +13,12 @@ namespace {
 
 /// Repeated options with one value each. A second word would be NET, or one of the logs after the model of `add`.
 const std::set<std::string>& one_value_each() {
-  static const std::set<std::string> names = {
-      "add --model",     "certify --order", "certify --samples", "check --order",    "export --order",
-      "inspect --order", "match --order",   "bound --order",     "simulate --order", "gate --order"};
+  static const std::set<std::string> names = [] {
+    std::set<std::string> all = {"add --model", "certify --samples", "gate --order"};
+    for (const char* const command : {"inspect", "certify", "check", "bound", "simulate", "export", "match"})
+      for (const char* const option : {" --order", " --select"}) all.insert(std::string(command) + option);
+    return all;
+  }();
   return names;
 }
 

@@ -87,7 +87,10 @@ def test_schemas_are_valid_and_closed():
         schema = read_schema(name)
         Draft202012Validator.check_schema(schema)
         expect(schema["$schema"] == "https://json-schema.org/draft/2020-12/schema", f"{name}: another draft")
-        expect(schema["$id"] == f"urn:swarmcert:schema:{name}:1", f"{name}: $id {schema['$id']}")
+        stated = schema["properties"].get("schema", {}).get("const", f"swarmcert/{name}/1")
+        expect(schema["$id"] == "urn:swarmcert:schema:" + stated.removeprefix("swarmcert/").replace("/", ":"),
+               f"{name}: $id {schema['$id']} for documents {stated}")
+        expect(stated.split("/")[1] == name, f"{name}: of documents {stated}")
         expect("title" in schema and "description" in schema, f"{name}: no title or description")
         silent = [field for field, rule in schema["properties"].items() if not rule.get("description")]
         expect(not silent, f"{name}: no description of {', '.join(silent)}")
@@ -275,7 +278,7 @@ def test_the_writers_write_no_field_that_the_schemas_do_not_know():
     expect(len(fields) > 150, f"only {len(fields)} fields found in the source")
     # Values, and names in maps such as the parameters of effects.
     no_fields = {"auto", "free", "aol", "orthogonal", "sandwich", "Kpos_P", "Kpos_D", "Kpos_I", "force_z", "gf", "mN",
-                 "pwm", "voltage", "offset_x_m", "offset_y_m", "torque_x_Nm", "torque_y_Nm", "offset_s"}
+                 "pwm", "voltage", "max_thrust", "offset_x_m", "offset_y_m", "torque_x_Nm", "torque_y_Nm", "offset_s"}
     unknown = {field: file for field, file in fields.items() if field not in known | no_fields}
     expect(not unknown, f"no schema knows {unknown}")
 
