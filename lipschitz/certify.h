@@ -133,8 +133,8 @@ std::vector<CertifiedLayer> stated_norms(const files::Network& network, const Ce
 /// Branch and bound runs on the image of the box under the clamp or, of ReLU networks and if requested, on a projective
 /// cover of all inputs.
 /// @throws std::invalid_argument if gamma is not positive; if branch and bound is requested without a box and an
-///   activation is not ReLU; if NET has invariants and there is a domain or branch and bound is requested; or as claims() and
-///   law_claims().
+///   activation is not ReLU; if NET has invariants and there is a domain or branch and bound is requested; or as
+///   claims() and law_claims().
 Certification certify(const files::Network& network, const CertifyOptions& options);
 
 /// Returns the bound that a law yields from verified bounds of its terms, rounded up.

@@ -14,8 +14,8 @@ int pieces_of_work(const CertifyOptions& options, int bounds);
 ///
 /// The order is: eclipse_fast(), which takes seconds at any size; then the semidefinite programs, with the slopes on
 /// the box if activations other than ReLU have smaller slopes there, and the searches for lower bounds; then branch and
-/// bound, on a box or if requested. Every bound is proved no matter when `stop` ends the work; bounds whose search was cut short are
-/// marked as interrupted.
+/// bound, on a box or if requested. Every bound is proved no matter when `stop` ends the work; bounds whose search was
+/// cut short are marked as interrupted.
 /// @param layers all layers of the network, with their norms.
 void find_bounds(const files::Network& network, const CertifyOptions& options, const Stop& stop,
                  WorkProgress& progress, const std::vector<CertifiedLayer>& layers,

@@ -52,7 +52,8 @@ struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Declares --order and --select, for weight files that do not state which layers make up the network; part of declare_network().
+/// Declares --order and --select, for weight files that do not state which layers make up the network; part of
+/// declare_network().
 void declare_order(CLI::App& app, files::NetworkArguments& arguments);
 
 /// Declares --activation, for weight files that do not store it; part of declare_network(). Unknown names are

@@ -1,8 +1,8 @@
-/// @file The independent checker: decides whether a certificate proves its statements about the network that it carries.
+/// @file The independent checker: decides whether a certificate proves its statements about the network it carries.
 ///
 /// It trusts no optimiser. It relies on SHA-256, GMP's integers, the short files in this folder and, for lower bounds,
-/// the exact slope of lipschitz/checker/witness.h; on no reader of weight files. It works in exact arithmetic except for
-/// proofs on a box (tree_proof.h): these have thousands of parts and are verified in double, with bounds on all
+/// the exact slope of lipschitz/checker/witness.h; on no reader of weight files. It works in exact arithmetic except
+/// for proofs on a box (tree_proof.h): these have thousands of parts and are verified in double, with bounds on all
 /// round-off errors.
 #pragma once
 

@@ -1,4 +1,4 @@
-/// @file Results and files described once. A function describe() names each field of a struct with its unit, meaning and
+/// @file Results and files described once. A function describe() names each field of a struct with unit, meaning and
 /// guarantee; JSON (to_json), JSON Schema (schema_of) and tables (analysis/report/table.h) are views of what it says.
 #pragma once
 
@@ -238,7 +238,7 @@ std::vector<std::string> field_names(const Node& shape);
 /// The value as JSON, fields in the order of the description.
 nlohmann::ordered_json to_json(const Node& value);
 
-/// Returns the JSON Schema (draft 2020-12) of all values of a shape. Objects hold the described fields and nothing else.
+/// Returns the JSON Schema (draft 2020-12) of all values of a shape. Objects hold the described fields, nothing else.
 /// @param name of the schema: its $id is urn:swarmcert:schema:NAME:1
 /// @param numbers_may_be_null whether numbers may be null (not finite): true for results, false for files that are read
 nlohmann::ordered_json schema_of(const Node& shape, const std::string& name, const std::string& title,

@@ -37,7 +37,7 @@ class Hdf5Object {
   /// Returns whether an attribute is there and holds a number other than 0.
   bool flag(const std::string& attribute) const;
   /// Returns the numbers of a dataset.
-  /// @throws InputError unless they are float16, float32, float64 or integers of at most 32 bits, at most kMostElements.
+  /// @throws InputError unless they are float16, float32, float64 or integers of up to 32 bits, at most kMostElements.
   Hdf5Numbers numbers() const;
   /// Returns the objects to which a dataset of references refers.
   std::vector<Hdf5Object> references() const;

@@ -7,8 +7,8 @@
 
 namespace swarmcert::files {
 
-/// Returns x -> range f((x - m) ./ r) + mean, with m and r the first numbers of `means` and `ranges`, one per input, and
-/// `mean` and `range` their last one, for all outputs. Exact, or with the rounding that Layer states.
+/// Returns x -> range f((x - m) ./ r) + mean, with m and r the first numbers of `means` and `ranges`, one per input,
+/// and `mean` and `range` their last one, for all outputs. Exact, or with the rounding that Layer states.
 /// @throws InputError if a range is 0 or the result is not finite.
 /// @throws std::invalid_argument unless there are weights.inputs() + 1 of each.
 Weights normalized(Weights weights, const std::vector<double>& means, const std::vector<double>& ranges);

@@ -24,8 +24,8 @@ struct EffectiveTensors {
 
 /// Computes effective weights. spectral_norm, old style (weight_orig, weight_u, weight_v) and new
 /// (parametrizations.weight.original, 0._u, 0._v): W / (u' W v) with the stored u and v, as PyTorch evaluates it after
-/// eval(). Files of PyTorch before 0.4.1 hold no v, but the weight itself, which is taken. weight_norm over the outputs, old style (weight_g, weight_v) and new (original0, original1): row i is g_i
-/// v_i / |v_i|.
+/// eval(). Files of PyTorch before 0.4.1 hold no v, but the weight itself, which is taken. weight_norm over outputs,
+/// old style (weight_g, weight_v) and new (original0, original1): row i is g_i v_i / |v_i|.
 /// @throws InputError if one of these tensors is missing, has another shape or is not finite, or if the divisor is 0.
 EffectiveTensors effective_tensors(const std::vector<DeclaredTensor>& tensors, const TensorReader& read,
                                    const std::string& path);

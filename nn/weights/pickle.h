@@ -1,7 +1,7 @@
 /// @file Reads pickled state dicts as plain data. Nothing in a pickle is executed.
 ///
-/// Python's unpickler runs whatever a file names. This reader knows the opcodes, torch's tensors, NumPy's arrays and the
-/// names of types that hold settings, such as argparse.Namespace and pathlib.Path, whose objects it passes over. It
+/// Python's unpickler runs whatever a file names. This reader knows the opcodes, torch's tensors, NumPy's arrays and
+/// the names of types that hold settings, such as argparse.Namespace and pathlib.Path, whose objects it passes over. It
 /// rejects every other name with its offset. It does not recurse, and its memory is bounded by kMostPickleOperations.
 #pragma once
 

@@ -17,8 +17,8 @@ DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, c
 /// Returns sup |u| of the commanded force due to a force error, N; for kCommand including the error itself.
 double effort_of_class_N(const SampledLoop& loop, Channel channel, const Disturbance& disturbance);
 
-/// Returns |u| that a force within the amplitude attains with the clamp, N: the worst force of the linear loop, and that
-/// of the loop without integral, held over each period and simulated from rest. 0 if the loop is unstable.
+/// Returns |u| that a force within the amplitude attains with the clamp, N: the worst force of the linear loop, and
+/// that of the loop without integral, held over each period and simulated from rest. 0 if the loop is unstable.
 double effort_of_worst_force_N(const SampledLoop& loop, double amplitude_N, double limit_m_s);
 
 /// Returns the effect of a clamp on the integrator's state. The demand is the exact gain to that state. The bounds that

@@ -4,10 +4,10 @@ any code of swarmcert.
 
     file_is_function.py CERTIFICATE FILE [--part NAME] [--points N]
 
-Reads .pth with torch, .safetensors with safetensors, .npz with numpy, .mat with scipy, or h5py for version 7.3, .h5 with
-h5py, and .onnx with onnxruntime or onnx's reference evaluator. State dicts and arrays hold no function: their tensors
-are looked up under the names in the certificate and evaluated with its chain, here in double. An ONNX model is evaluated
-by its runtime.
+Reads .pth with torch, .safetensors with safetensors, .npz with numpy, .mat with scipy, or h5py for version 7.3, .h5
+with h5py, and .onnx with onnxruntime or onnx's reference evaluator. State dicts and arrays hold no function: their
+tensors are looked up under the names in the certificate and evaluated with its chain, here in double. An ONNX model is
+evaluated by its runtime.
 Exit codes: 0 equal; 1 they differ, with the input; 3 the file cannot be read; 4 not run: no library of this format is
 installed here, or the certificate names no tensors, because layers were folded.
 """
@@ -35,7 +35,7 @@ def library(*names):
     raise NotRun(f"not run: none of {', '.join(names)} is installed here")
 
 
-# --- tensors by name, each a list of rows or of numbers -----------------------------------------------------------------
+# --- tensors by name, each a list of rows or of numbers ---------------------------------------------------------------
 
 def flattened(tensors, prefix=""):
     """Nested dicts as one, with dots between the names."""

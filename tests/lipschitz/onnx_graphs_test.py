@@ -22,7 +22,9 @@ def certify(path):
     done = subprocess.run([sys.argv[1], "certify", path, "--method", "product", "--nodes", "0", "-q", "--force", "-o",
                            certificate], capture_output=True, text=True, timeout=60)
     assert done.returncode in (0, 3), done
-    return (canonical.networks(canonical.read(certificate))["network"], "") if done.returncode == 0 else (None, done.stderr)
+    if done.returncode != 0:
+        return None, done.stderr
+    return canonical.networks(canonical.read(certificate))["network"], ""
 
 
 def random_graphs_have_their_outputs(folder, count):

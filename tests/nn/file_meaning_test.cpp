@@ -4,6 +4,7 @@
 
 #include "nn/base/file_io.h"
 #include "nn/weights/activation.h"
+#include "nn/weights/layer_choice.h"
 #include "nn/weights/layer_names.h"
 #include "nn/weights/weights.h"
 #include "onnx_writer.h"

@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "nn/base/random.h"
+#include "stability/bounds/disturbance_source.h"
+#include "stability/bounds/saturation.h"
 #include "stability/bounds/tracking_bounds.h"
 #include "stability/sweep/grid.h"
 #include "stability/vehicle.h"
@@ -45,8 +47,8 @@ DisturbanceSource rate_of(double rate_N_s) {
   return source;
 }
 
-/// The vehicle as a point: the law of the firmware in its period, clamp, delay, limits of the thrust along the commanded
-/// direction, lags. Integrated by itself, without the library's matrices.
+/// The vehicle as a point: the law of the firmware in its period, clamp, delay, limits of the thrust along the
+/// commanded direction, lags. Integrated by itself, without the library's matrices.
 class PointVehicle {
  public:
   explicit PointVehicle(const FlownLoop& loop) : loop_(loop), law_(loop.law()) {

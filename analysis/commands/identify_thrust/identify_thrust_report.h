@@ -9,7 +9,8 @@
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html with the fit, its residuals, the coefficients and the described `result`. Returns its path.
+/// Writes FOLDER/report.html with the fit, its residuals, the coefficients and the described `result`. Returns its
+/// path.
 /// @throws files::InputError as Report::write().
 std::string write_thrust_report(const ThrustData& data, const ThrustIdentification& found,
                                 const files::Node& result, const std::string& folder, bool overwrite);

@@ -9,8 +9,8 @@
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html with the keep-out shape, the least crossing speeds, the `rows` of the shape and the described `result`. Returns its
-/// path.
+/// Writes FOLDER/report.html with the keep-out shape, the least crossing speeds, the `rows` of the shape and the
+/// described `result`. Returns its path.
 /// @throws files::InputError as Report::write().
 std::string write_spacing_report(const stability::SpacingQuestion& question, const stability::Spacing& found,
                                  const Table& rows, const files::Node& result, const std::string& folder,

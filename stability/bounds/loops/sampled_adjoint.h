@@ -15,7 +15,8 @@ Eigen::MatrixXd without_row(const Eigen::MatrixXd& m, Eigen::Index row);
 /// Returns the largest modulus of an eigenvalue.
 double largest_modulus(const Eigen::MatrixXd& map);
 
-/// Outputs are e at a phase within a period, or I or the new command after the control of a period; kernels are per unit of acceleration.
+/// Outputs are e at a phase within a period, or I or the new command after the control of a period; kernels are per
+/// unit of acceleration.
 class SampledAdjoint {
  public:
   enum class Output { kError, kIntegral, kCommand };

@@ -57,7 +57,7 @@ struct Spacing {
 /// dwell_s between the end of one and the start of the next, and any motion outside the radius meanwhile.
 ///
 /// Outside, the force is at most F, which alone causes half of max_error_m; the rest of a pass is an impulse of at most
-/// J = peak s line_integral()/v. The error is at most A F + I J, with A the amplitude gain and I the impulse gain summed
+/// J = peak s line_integral()/v. The error is at most A F + I J, with A the amplitude gain, I the impulse gain summed
 /// over all earlier passes as far as they are still felt; with the gains of the loop without integral, plus the effect
 /// of the largest integral, if the clamp may act. The bounds hold for forces within the field; `guard` accounts for its
 /// deviation from flights.

@@ -32,7 +32,8 @@ let layer where json =
   let biases = Array.of_list (floats where (find where "biases" json)) in
   require (Array.length weights > 0 && Array.length biases = Array.length weights) "%s: not one bias per row" where;
   let size = Array.length weights.(0) in
-  require (size > 0 && Array.for_all (fun row -> Array.length row = size) weights) "%s: rows of different lengths" where;
+  let is_full row = Array.length row = size in
+  require (size > 0 && Array.for_all is_full weights) "%s: rows of different lengths" where;
   { Weights.name = text where (find where "name" json); weights; biases }
 
 (* The activation behind a layer with so many outputs. *)
@@ -40,7 +41,8 @@ let activation where outputs op =
   let found = match Activation.called op, String.rindex_opt op ':' with
     | None, Some mark ->
       let digits = String.sub op (mark + 1) (String.length op - mark - 1) in
-      let is_count = digits <> "" && String.length digits < 9 && String.for_all (fun c -> c >= '0' && c <= '9') digits in
+      let is_digit c = c >= '0' && c <= '9' in
+      let is_count = digits <> "" && String.length digits < 9 && String.for_all is_digit digits in
       (match Activation.called (String.sub op 0 mark) with
        | Some changed when is_count && changed <> Proved.Relu && not (Activation.sorts changed) ->
          let n = int_of_string digits in
@@ -65,7 +67,8 @@ let weights where json =
   let precision = text where (find "precision") in
   require (precision = "float32" || precision = "float64") "%s: unknown precision" where;
   let is_float32 x = Exact.float32 x = x in
-  let holds (l : Weights.layer) = Array.for_all (Array.for_all is_float32) l.weights && Array.for_all is_float32 l.biases in
+  let holds (l : Weights.layer) =
+    Array.for_all (Array.for_all is_float32) l.weights && Array.for_all is_float32 l.biases in
   require (precision <> "float32" || List.for_all holds layers) "%s: a number is no float32" where;
   ignore (texts where (find "assumed"));
   let data_files = List.map (fun (name, hash) -> name, text where hash) (members where (find "data_files")) in
@@ -145,8 +148,8 @@ let canonical json =
   let invariants = match Json.find where "invariants" input with
     | Bool b -> b | _ -> rejected "network.input.invariants is neither true nor false" in
   let is_network name =
-    name = "network" || List.exists (fun prefix -> String.starts_with ~prefix name && not (String.contains_from name 4 ':'))
-      [ "phi:"; "rho:" ] in
+    let is_of prefix = String.starts_with ~prefix name && not (String.contains_from name 4 ':') in
+    name = "network" || List.exists is_of [ "phi:"; "rho:" ] in
   let part (name, entry) =
     require (is_network name) "network.weights: %s is no network" (shown name);
     name, weights ("network.weights." ^ name) entry in

@@ -6,7 +6,8 @@ let old_schema = "swarmcert/certificate/1"
 
 let common =
   "The functions are the operations listed under chain, in that order, with the weights and biases listed under \
-   layers, which were read from the files named by sha256 and rounded to float32 where `as` says so: linear is W x + b; of each number t, relu is the positive \
+   layers, which were read from the files named by sha256 and rounded to float32 where `as` says so: linear is \
+   W x + b; of each number t, relu is the positive \
    part, tanh and sigmoid, 1 / (1 + e^-t), are the functions of these names, softplus is ln(1 + e^t), elu is \
    max(0, t) + min(0, e^t - 1), selu is 1.0507009873554805 max(0, t) + 1.0507009873554805 * 1.6732632423543772 \
    min(0, e^t - 1), silu is t / (1 + e^-t), gelu is t/2 (1 + erf(t / sqrt 2)); clamp is the input clamp listed. \
