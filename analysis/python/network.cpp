@@ -52,6 +52,9 @@ files::Weights weights_of(const std::string& name, const py::dict& part) {
   return weights;
 }
 
+/// Returns the name of the file that save_network() writes of a part without a description.
+std::string file_of(const std::string& part) { return part + ".safetensors"; }
+
 Parts parts_of(const py::dict& source) {
   Parts parts;
   for (const auto& [name, part] : source["parts"].cast<py::dict>()) {
@@ -79,6 +82,8 @@ files::Network network_of(const py::dict& source) {
           return found->second;
         });
   }
+  // A certificate names weight files, and is the same for arrays as for the files that hold them.
+  for (auto& [name, weights] : parts) weights.path = file_of(name);
   files::Network network;
   if (parts.size() == 1) {
     network.plain = std::move(parts.begin()->second);
@@ -102,7 +107,7 @@ std::string save_network(const py::dict& source, const std::string& folder, bool
   const auto description = source["description"].cast<std::string>();
   std::string last;
   for (const auto& [name, weights] : parts_of(source)) {
-    const fs::path path = fs::path(folder) / (description.empty() ? name + ".safetensors" : name);
+    const fs::path path = fs::path(folder) / (description.empty() ? file_of(name) : name);
     files::save_safetensors(weights, path.string(), overwrite);
     last = path.string();
   }
