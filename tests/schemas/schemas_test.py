@@ -87,10 +87,9 @@ def test_schemas_are_valid_and_closed():
         schema = read_schema(name)
         Draft202012Validator.check_schema(schema)
         expect(schema["$schema"] == "https://json-schema.org/draft/2020-12/schema", f"{name}: another draft")
-        stated = schema["properties"].get("schema", {}).get("const", f"swarmcert/{name}/1")
-        expect(schema["$id"] == "urn:swarmcert:schema:" + stated.removeprefix("swarmcert/").replace("/", ":"),
-               f"{name}: $id {schema['$id']} for documents {stated}")
-        expect(stated.split("/")[1] == name, f"{name}: of documents {stated}")
+        _, kind, version = schema["properties"].get("schema", {}).get("const", f"swarmcert/{name}/1").split("/")
+        expect(kind == ("model" if name == "model-draft" else name), f"{name}: of documents {kind}")
+        expect(schema["$id"] == f"urn:swarmcert:schema:{name}:{version}", f"{name}: $id {schema['$id']}")
         expect("title" in schema and "description" in schema, f"{name}: no title or description")
         silent = [field for field, rule in schema["properties"].items() if not rule.get("description")]
         expect(not silent, f"{name}: no description of {', '.join(silent)}")
