@@ -36,6 +36,28 @@ std::mutex& library() {
   return mutex;
 }
 
+/// Returns whether a type is IEEE 754's binary16, 32 or 64, or an integer of 1, 2 or 4 bytes without unused bits. The
+/// library's conversions trust the positions of bits that a file states, and write past their buffers for others.
+bool is_plain(hid_t type) {
+  const std::size_t size = H5Tget_size(type);
+  const H5T_class_t type_class = H5Tget_class(type);
+  if (type_class != H5T_INTEGER && type_class != H5T_FLOAT) return false;
+  const H5T_order_t order = H5Tget_order(type);
+  if ((order != H5T_ORDER_LE && order != H5T_ORDER_BE) || H5Tget_offset(type) != 0 ||
+      H5Tget_precision(type) != 8 * size)
+    return false;
+  if (type_class == H5T_INTEGER) return size == 1 || size == 2 || size == 4;
+  if (size != 2 && size != 4 && size != 8) return false;
+  const std::size_t exponent = size == 2 ? 5 : size == 4 ? 8 : 11;
+  const std::size_t mantissa = 8 * size - exponent - 1;
+  std::size_t sign_at = 0, exponent_at = 0, exponent_bits = 0, mantissa_at = 0, mantissa_bits = 0;
+  return H5Tget_fields(type, &sign_at, &exponent_at, &exponent_bits, &mantissa_at, &mantissa_bits) >= 0 &&
+         sign_at == 8 * size - 1 && exponent_at == mantissa && exponent_bits == exponent &&
+         mantissa_at == 0 && mantissa_bits == mantissa &&
+         H5Tget_ebias(type) == (std::size_t{1} << (exponent - 1)) - 1 &&
+         H5Tget_norm(type) == H5T_NORM_IMPLIED;
+}
+
 struct OpenFile {
   OpenFile(const std::string& bytes, const std::string& file_path) : lock(library()), path(file_path) {
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // errors are reported as InputError
@@ -160,8 +182,11 @@ std::optional<std::vector<std::string>> Hdf5Object::texts(const std::string& att
 bool Hdf5Object::flag(const std::string& attribute) const {
   if (H5Aexists(state_->object.id(), attribute.c_str()) <= 0) return false;
   const hdf5::Handle stored(H5Aopen(state_->object.id(), attribute.c_str(), H5P_DEFAULT), H5Aclose);
+  const hdf5::Handle type(H5Aget_type(stored.id()), H5Tclose);
   const hdf5::Handle space(H5Aget_space(stored.id()), H5Sclose);
   double value = 0;
+  if (!hdf5::is_plain(type.id()))
+    state_->refuse("its attribute " + in_quotes(attribute) + " is not a number of a plain type");
   return H5Sget_simple_extent_npoints(space.id()) == 1 &&
          H5Aread(stored.id(), H5T_NATIVE_DOUBLE, &value) >= 0 && value != 0;
 }
@@ -171,10 +196,7 @@ Hdf5Numbers Hdf5Object::numbers() const {
   const hdf5::Handle type(H5Dget_type(state_->object.id()), H5Tclose);
   const hdf5::Handle space(H5Dget_space(state_->object.id()), H5Sclose);
   const hdf5::Handle layout(H5Dget_create_plist(state_->object.id()), H5Pclose);
-  const H5T_class_t type_class = H5Tget_class(type.id());
-  const std::size_t size = H5Tget_size(type.id());
-  const bool is_float = type_class == H5T_FLOAT && (size == 2 || size == 4 || size == 8);
-  if (!is_float && !(type_class == H5T_INTEGER && size <= 4)) state_->refuse("holds numbers of another type");
+  if (!hdf5::is_plain(type.id())) state_->refuse("holds numbers of another type");
   const int rank = H5Sget_simple_extent_ndims(space.id());
   if (rank < 0 || rank > 8) state_->refuse("has more than 8 dimensions");
   std::vector<hsize_t> sizes(static_cast<std::size_t>(rank));
@@ -193,7 +215,7 @@ Hdf5Numbers Hdf5Object::numbers() const {
   if (H5Pget_external_count(layout.id()) > 0) state_->refuse("lies in another file");
   Hdf5Numbers result;
   result.shape.assign(sizes.begin(), sizes.end());
-  result.is_float32 = is_float && size <= 4;
+  result.is_float32 = H5Tget_class(type.id()) == H5T_FLOAT && H5Tget_size(type.id()) <= 4;
   state_->file->numbers += held;
   if (state_->file->numbers > kMostElements)
     state_->refuse("and what was read before it have more than 2^25 numbers");

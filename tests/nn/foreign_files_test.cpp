@@ -70,7 +70,9 @@ TEST(ForeignFiles, WhatWasComputedOrAssumedIsSaid) {
   EXPECT_TRUE(says(notes_of("h5py_struct.mat"), "the network is the struct \"net\""));
   EXPECT_TRUE(says(notes_of("scipy_struct.mat"), "the network is the struct \"net\""));
   EXPECT_EQ(load_weights(foreign("h5py_struct.mat")).precision, Precision::kFloat32);
-  EXPECT_EQ(notes_of("h5py_cells.mat"), "other variables are ignored: \"comment\"\n");
+  const Weights cells = load_weights(foreign("h5py_cells.mat"));
+  EXPECT_EQ(cells.unused, std::vector<std::string>{"comment: not known"});
+  EXPECT_TRUE(says(cells.assumed.at(0), "\"comment\" does not bear on the function"));
   EXPECT_EQ(notes_of("onnx_acas.onnx"), "");
 }
 

@@ -2,6 +2,8 @@
 /// damaged and malicious files. Files written by h5py are tested in foreign_files_test.
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "hdf5_writer.h"
 #include "nn/weights/weights.h"
 #include "refusal.h"
@@ -62,6 +64,41 @@ TEST(Mat73, WhatIsNoNetworkIsRefusedByName) {
   Hdf5Writer outside(512);
   outside.link_to_file("other.h5", "W1");
   EXPECT_TRUE(hdf5_is_refused(outside.bytes(), {"\"W1\"", "another file"}));
+}
+
+TEST(Mat73, TypesWithUnusedOrMovedBitsAreRefusedAndIeeeOfEitherOrderIsRead) {
+  // The library's conversions trust the positions of bits in the file.
+  const auto with = [](hid_t type) {
+    Hdf5Writer writer(512);
+    writer.add("W1", {1, 2}, {1, 2}, type);
+    writer.set_text("W1", "MATLAB_class", {"double"});
+    return writer.bytes();
+  };
+  const auto changed = [](hid_t plain, const std::function<void(hid_t)>& change) {
+    const hid_t type = H5Tcopy(plain);
+    change(type);
+    return type;
+  };
+  for (const hid_t type : {H5T_IEEE_F64LE, H5T_IEEE_F64BE, H5T_IEEE_F32LE, H5T_IEEE_F32BE, H5T_STD_I8LE,
+                           H5T_STD_U16BE, H5T_STD_I32LE})
+    EXPECT_EQ(parse_weights(with(type), "net.mat").layers.at(0).weights, (std::vector<double>{1, 2}));
+  const hid_t half = changed(H5T_IEEE_F32LE, [](hid_t type) {
+    H5Tset_fields(type, 15, 10, 5, 0, 10);
+    H5Tset_precision(type, 16);
+    H5Tset_size(type, 2);
+    H5Tset_ebias(type, 15);
+  });
+  EXPECT_EQ(parse_weights(with(half), "net.mat").layers.at(0).weights, (std::vector<double>{1, 2}));
+  const hid_t refused[] = {changed(H5T_STD_I16LE, [](hid_t type) { H5Tset_precision(type, 12); }),
+                           changed(H5T_STD_I32LE,
+                                   [](hid_t type) {
+                                     H5Tset_precision(type, 12);
+                                     H5Tset_offset(type, 7);
+                                   }),
+                           changed(H5T_IEEE_F32LE, [](hid_t type) { H5Tset_fields(type, 30, 22, 8, 0, 22); }),
+                           changed(H5T_IEEE_F64LE, [](hid_t type) { H5Tset_ebias(type, 1000); }),
+                           changed(H5T_STD_I64LE, [](hid_t) {})};
+  for (const hid_t type : refused) EXPECT_TRUE(hdf5_is_refused(with(type), {"W1", "another type"}));
 }
 
 TEST(Mat73, TruncatedFilesAreRefused) {
