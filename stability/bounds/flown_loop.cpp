@@ -23,15 +23,28 @@ AxisLoop with_gains(const FlownLoop& loop, int axis, double Kp, double Kd, doubl
   return result;
 }
 
-/// One axis with the Ki that acts divided by `share`; nothing if the axis is coupled to another.
-std::optional<AxisLoop> alone(const FlownLoop& loop, int axis, double share) {
-  const PidMatrices law = loop.law();
+/// The law of all axes as accelerations that act, with Ki as written.
+PidMatrices written_law(const FlownLoop& loop) {
+  const Gains& gains = loop.gains;
+  PidMatrices result;
+  if (gains.composite) {
+    result = pid_matrices(*gains.composite, loop.told_mass_kg());
+  } else {
+    const auto diagonal = [](const auto& v) { return to_eigen(v).asDiagonal().toDenseMatrix(); };
+    result = {diagonal(gains.pid->Kp_1_s2), diagonal(gains.pid->Kd_1_s), diagonal(gains.pid->Ki_1_s3)};
+  }
+  for (MatrixXd* const gain : {&result.Kp, &result.Kd, &result.Ki}) *gain *= loop.command_scale();
+  return result;
+}
+
+/// One axis of the law; nothing if the axis is coupled to another.
+std::optional<AxisLoop> alone(const FlownLoop& loop, const PidMatrices& law, int axis) {
   for (const MatrixXd* const gain : {&law.Kp, &law.Kd, &law.Ki}) {
     for (int other = 0; other < 3; ++other) {
       if (other != axis && ((*gain)(axis, other) != 0 || (*gain)(other, axis) != 0)) return std::nullopt;
     }
   }
-  return with_gains(loop, axis, law.Kp(axis, axis), law.Kd(axis, axis), law.Ki(axis, axis) / share);
+  return with_gains(loop, axis, law.Kp(axis, axis), law.Kd(axis, axis), law.Ki(axis, axis));
 }
 
 SampledLoop at_rate(const FlownLoop& loop, const AxisLoop& axis) {
@@ -66,14 +79,7 @@ std::vector<Fact> FlownLoop::facts() const {
 }
 
 PidMatrices FlownLoop::law() const {
-  PidMatrices result;
-  if (gains.composite) {
-    result = pid_matrices(*gains.composite, told_mass_kg());
-  } else {
-    const auto diagonal = [](const auto& v) { return to_eigen(v).asDiagonal().toDenseMatrix(); };
-    result = {diagonal(gains.pid->Kp_1_s2), diagonal(gains.pid->Kd_1_s), diagonal(gains.pid->Ki_1_s3)};
-  }
-  for (MatrixXd* const gain : {&result.Kp, &result.Kd, &result.Ki}) *gain *= command_scale();
+  PidMatrices result = written_law(*this);
   result.Ki *= integral_share();
   return result;
 }
@@ -105,10 +111,10 @@ Eigen::Matrix<double, 15, 15> FlownLoop::matrix() const {
   return a;
 }
 
-std::optional<AxisLoop> FlownLoop::continuous(int axis) const { return alone(*this, axis, 1); }
+std::optional<AxisLoop> FlownLoop::continuous(int axis) const { return alone(*this, law(), axis); }
 
 std::optional<SampledLoop> FlownLoop::sampled(int axis) const {
-  const std::optional<AxisLoop> written = alone(*this, axis, integral_share());
+  const std::optional<AxisLoop> written = alone(*this, written_law(*this), axis);
   if (!written || !is_sampled()) return std::nullopt;
   return at_rate(*this, *written);
 }
@@ -123,7 +129,7 @@ double FlownLoop::spectral_radius() const {
   }
   if (!is_coupled) return largest;
   // All axes as one map: blocks of the single axes, whose new commands read the errors of all of them.
-  const PidMatrices feedback = law();
+  const PidMatrices feedback = written_law(*this);
   std::vector<SampledModel> models;
   std::vector<Index> before = {0}, after = {0};
   for (int axis = 0; axis < 3; ++axis) {
@@ -139,7 +145,7 @@ double FlownLoop::spectral_radius() const {
     hold.block(before[i], after[i], block.size(), block.size() + 1) = block.hold();
     for (std::size_t j = 0; j < 3; ++j) {
       const auto row = static_cast<Index>(i), column = static_cast<Index>(j);
-      const double Ki = feedback.Ki(row, column) / integral_share();
+      const double Ki = feedback.Ki(row, column);
       const Index command = after[i] + block.command_index();
       control(command, before[j]) = -(feedback.Kp(row, column) + Ki * gains.integrator_step_s);
       control(command, before[j] + 1) = -feedback.Kd(row, column);

@@ -24,11 +24,11 @@ AxisFacts facts_of(const FlownLoop& flown, int axis, double bias_N) {
   facts.lag_limit_s = lag_limit(loop);
   facts.delay_limit_s = delay_limit(loop);
   facts.effective_Ki = loop.Ki;
-  facts.written_Ki = loop.Ki / flown.integral_share();
   const double limit_m_s = flown.integral_limit_m_s(axis);
   facts.clamp_authority_N = loop.Ki > 0 ? loop.mass_kg * loop.Ki * limit_m_s : 0;
   facts.clamp_residual_m = clamp_residual(loop, bias_N, limit_m_s);
   const std::optional<SampledLoop> sampled = flown.sampled(axis);
+  facts.written_Ki = sampled ? sampled->plant.Ki : loop.Ki;
   facts.effort_gain = sampled ? effort_gain(*sampled) : effort_gain(loop);
   if (sampled) {
     facts.spectral_radius = spectral_radius(*sampled);

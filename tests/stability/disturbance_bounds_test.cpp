@@ -210,15 +210,18 @@ TEST(DisturbanceBounds, AMeasuredAmplitudeThatContainsTheBiasIsNotChargedTwice) 
     source.bias_N[axis] = 0.04;
   }
   EXPECT_TRUE(source.amplitudes_reach_bias());
-  const AxisLoop loop = {kMass_kg, 10, 5, 10, {}, 0};
-  const GainNorms gains = continuous_norms(loop, Channel::kForce);
-  const AxisBounds once =
-      axis_bounds(loop, Channel::kForce, gains, source.axis[0], source.other(0, {}, {}), true, INFINITY);
+  FlownLoop loop;
+  loop.gains.pid = PidGains{{10, 10, 10}, {5, 5, 5}, {10, 10, 10}};
+  loop.plant.mass_kg = kMass_kg;
+  const ExactGains of = flown_gains(loop, 0, Channel::kForce);
+  const GainNorms& gains = of.all_times;
+  source.classes_contain_bias = true;
+  const AxisBounds once = axis_bounds(loop, of, source, {});
   EXPECT_DOUBLE_EQ(once.bounds.by_amplitude, gains.amplitude * 0.1);
   EXPECT_DOUBLE_EQ(once.bounds.by_rate, gains.rate * 0.05 + gains.edge * 0.04)
       << "a rate does not contain it";
-  const AxisBounds beside =
-      axis_bounds(loop, Channel::kForce, gains, source.axis[0], source.other(0, {}, {}), false, INFINITY);
+  source.classes_contain_bias = false;
+  const AxisBounds beside = axis_bounds(loop, of, source, {});
   EXPECT_DOUBLE_EQ(beside.bounds.by_amplitude, gains.amplitude * 0.1 + gains.edge * 0.04);
   source.bias_N[1] = 0.2;
   EXPECT_FALSE(source.amplitudes_reach_bias()) << "no amplitude contains a larger bias";

@@ -69,14 +69,43 @@ struct Declared {
   OtherErrors other;
 };
 
-AxisBounds bounds_of(const Case& c, const Declared& declared, double limit_m_s = kInfinite) {
-  if (c.steps == 0) {
-    return axis_bounds(c.loop, Channel::kForce, continuous_norms(c.loop, Channel::kForce), declared.known,
-                       declared.other, false, limit_m_s);
+/// Returns the loop whose `axis` is that of the case.
+FlownLoop flown(const Case& c, int axis, double limit_m_s) {
+  const AxisLoop& one = c.loop;
+  Gains gains;
+  gains.pid = PidGains{{one.Kp, one.Kp, one.Kp}, {one.Kd, one.Kd, one.Kd}, {one.Ki, one.Ki, one.Ki}};
+  gains.integrator_limit_m_s = {limit_m_s, limit_m_s, limit_m_s};
+  if (c.steps > 0) {
+    const SampledLoop sampled = c.sampled();
+    gains.rate_hz = 1 / sampled.period_s;
+    gains.integrator_step_s = sampled.integrator_step_s;
   }
-  const SampledLoop loop = c.sampled();
-  return axis_bounds(loop, Channel::kForce, sampled_norms(loop, Channel::kForce, Instants::kAll),
-                     declared.known, declared.other, false, limit_m_s);
+  if (!one.lags_s.empty()) gains.motor_lag_s = one.lags_s[0];
+  if (one.lags_s.size() > 1) gains.attitude_lag_s = one.lags_s[1];
+  gains.delay_s = one.delay_s;
+  FlownLoop loop = {gains, {one.mass_kg}};
+  EXPECT_EQ(loop.continuous(axis)->lags_s, one.lags_s);
+  return loop;
+}
+
+/// Only the vertical axis hovers, and only the horizontal ones have the second lag.
+bool may_hover(const Case& c) { return c.loop.lags_s.size() < 2; }
+double hover_N(const Case& c) { return may_hover(c) ? c.loop.mass_kg * kGravity_m_s2 : 0; }
+
+AxisBounds bounds_of(const Case& c, const Declared& declared, double limit_m_s = kInfinite) {
+  const int axis = may_hover(c) ? 2 : 0;
+  const FlownLoop loop = flown(c, axis, limit_m_s);
+  const OtherErrors& other = declared.other;
+  DisturbanceSource source;
+  source.kind = "declared";
+  source.axis[axis] = declared.known;
+  source.bias_N[axis] = other.bias_N;
+  source.velocity_error[axis] = other.velocity_error;
+  source.position_error[axis] = other.position_error;
+  source.thrust_ratio_error = other.thrust_ratio_error;
+  const InitialError initial = {other.position_m, other.velocity_m_s, other.start_N};
+  EXPECT_TRUE(source.other(axis, initial, loop.plant) == other) << "a declaration was lost";
+  return axis_bounds(loop, flown_gains(loop, axis, Channel::kForce), source, initial);
 }
 
 /// Signs with which all parts add up at the end of the run: those of the responses to each of them, backwards in time.
@@ -239,7 +268,7 @@ void check_ratios(double limit_m_s, double least_closest) {
     for (const double error : {0.02, 0.15}) {
       for (Declared declared : random_declarations(random, c.loop.Ki > 0)) {
         declared.other.thrust_ratio_error = error;
-        declared.other.hover_N = kMass_kg * 9.81;
+        declared.other.hover_N = hover_N(c);
         const AxisBounds bounds = bounds_of(c, declared, limit_m_s);
         clamped += !bounds.clamp.never_acts;
         if (!std::isfinite(bounds.least())) continue;
@@ -272,8 +301,8 @@ TEST(ErrorParts, AnErrorOfTheThrustRatioCostsASagThatIsKnownWithoutIntegrator) {
   Declared declared;
   declared.known.amplitude_N = 0;
   declared.other.thrust_ratio_error = error;
-  declared.other.hover_N = kMass_kg * 9.81;
-  const double sag_m = error * 9.81 / ((1 - error) * Kp);
+  declared.other.hover_N = hover_N(c);
+  const double sag_m = error * kGravity_m_s2 / ((1 - error) * Kp);
   const double bound_m = bounds_of(c, declared).least();
   EXPECT_GE(bound_m, sag_m);
   EXPECT_LE(bound_m, 1.1 * sag_m);

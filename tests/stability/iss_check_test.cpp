@@ -101,21 +101,25 @@ TEST(IssCheck, FindsTheViolationsOfBrokenHypotheses) {
 }
 
 TEST(IssCheck, RunsThatLeaveAHypothesisAreLabelledAndRefuteNothing) {
-  const Gains plain = composite("4", "0.136");
+  const FlownLoop plain = flown_loop(composite("4", "0.136"), tests::small_vehicle());
+  // Rotors that always give some force saturate before the commanded force is near zero.
+  FlownLoop stoppable = plain;
+  stoppable.plant.least_thrust_N = 0;
   const struct {
     const char* expected;
-    Gains gains;
+    FlownLoop loop;
     double rate_N_s;
-  } cases[] = {{"the integral reaches its clamp", composite("4", "0.136", "integrator_limit = 0.01\n"), 0},
-               {"the commanded force is near zero", plain, 0.3},
+  } cases[] = {{"the integral reaches its clamp",
+                flown_loop(composite("4", "0.136", "integrator_limit = 0.01\n"), tests::small_vehicle()), 0},
+               {"the commanded force is near zero", stoppable, 0.3},
                {"the commanded force tilts by 90 degrees", plain, 0.3},
                {"the thrust saturates", plain, 0.3},
                {"the thrust saturates", plain, 1e308}};
-  for (const auto& [expected, gains, rate_N_s] : cases) {
+  for (const auto& [expected, loop, rate_N_s] : cases) {
     SCOPED_TRACE(std::string(expected) + ", " + std::to_string(rate_N_s));
     IssOptions options = with_runs(60);
     options.rate_N_s = rate_N_s;
-    const IssCheck check = check_iss(flown_loop(gains, tests::small_vehicle()), options);
+    const IssCheck check = check_iss(loop, options);
     int labelled = 0;
     for (const IssRun& run : check.runs) {
       labelled += run.left == expected;
