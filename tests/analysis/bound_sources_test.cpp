@@ -236,8 +236,21 @@ TEST(BoundCommand, EnclosuresAndIntervalsContainTheEstimate) {
       const double value = exact[gain].get<double>();
       EXPECT_LE(verified[gain][0].get<double>(), value * (1 + 1e-9)) << gain;
       EXPECT_GE(verified[gain][1].get<double>(), value * (1 - 1e-9)) << gain;
-      EXPECT_LT(verified[gain][1].get<double>() - verified[gain][0].get<double>(), 1e-5 * value) << gain;
+      // The weakened integrator leaves a slow pole, and its responses are long.
+      const double width = exact["loop"] == "continuous" && exact["axis"] != "z" ? 3e-4 : 1e-5;
+      EXPECT_LT(verified[gain][1].get<double>() - verified[gain][0].get<double>(), width * value) << gain;
       EXPECT_GE(uncertain[gain][1].get<double>(), value) << gain;
+    }
+  }
+  const Json nominal =
+      json_of(folder, "bound --gains " + kSourceFolder + "/controller/gains/crazyflie-small-nominal.toml" +
+                          kModel + " --verified");
+  for (std::size_t i = 0; i < 12; ++i) {
+    for (const char* gain : {"rate", "amplitude", "edge", "impulse"}) {
+      const Json& verified = nominal["verified"][i][gain];
+      EXPECT_LT(verified[1].get<double>() - verified[0].get<double>(),
+                1e-5 * nominal["exact"][i][gain].get<double>())
+          << gain;
     }
   }
   EXPECT_EQ(run_shell("swarmcert bound" + gains + " --uncertain weight=1:2", folder.path()).exit_code, 2);
@@ -274,7 +287,7 @@ TEST(BoundCommand, ADelayIsVerifiedAndADelayIntervalOnTheFlownGainsEnds) {
   // An insufficient budget is reported, and the bounds found until then still hold.
   const std::string box = " --uncertain mass=0.032:0.036 thrust=0.9:1.1 lag=0.05:0.065 delay=0:0";
   const Json full = json_of(folder, "bound" + kFlown + box);
-  const Json part = json_of(folder, "bound" + kFlown + box + " --loops 20");
+  const Json part = json_of(folder, "bound" + kFlown + box + " --loops 8");
   for (std::size_t i = 0; i < 12; ++i) {
     const Json& found = part["uncertain"]["gains"][i];
     EXPECT_EQ(full["uncertain"]["gains"][i]["ended"], "gap reached");
@@ -301,9 +314,8 @@ TEST(BoundCommand, CoupledAxesAreNamedAndWhatNeedsASingleAxisIsRefused) {
   EXPECT_EQ(text.output.find("inf"), std::string::npos) << text.output;
   const Json json = json_of(folder, "bound" + all + " --rate 0.2");
   EXPECT_EQ(json["coupled_axes"], Json({"x", "y", "z"}));
-  EXPECT_NEAR(json["vector"]["worst_error_m"].get<double>(),
-              0.2 * json["vector"]["peak_gain"][1].get<double>(), 1e-15);
-  EXPECT_LT(json["vector"]["worst_error_m"], json["theorem"]["ball"]);
+  EXPECT_LT(0.2 * json["vector"]["peak_gain"][1].get<double>(), json["theorem"]["ball"].get<double>());
+  EXPECT_TRUE(json["vector"]["worst_error_m"].is_null()) << "a rate alone saturates the thrust";
   for (const char* const asked : {"--verified", "--uncertain", "--tube --amplitude 0.1"}) {
     const Outcome refused = run_shell("swarmcert bound" + all + " " + asked, folder.path());
     EXPECT_EQ(refused.exit_code, 2) << asked;
@@ -315,6 +327,10 @@ TEST(BoundCommand, CoupledAxesAreNamedAndWhatNeedsASingleAxisIsRefused) {
   EXPECT_EQ(one_axis["coupled_axes"], Json({"x", "y"}));
   for (const Json& row : one_axis["verified"]) EXPECT_EQ(row["axis"], "z");
   EXPECT_EQ(one_axis["verified"].size(), 4u);
+  const Json alone = json_of(folder, "bound" + gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n") +
+                                         " --rate 0.3 --amplitude 0.05");
+  EXPECT_NEAR(alone["vector"]["worst_error_m"].get<double>(),
+              0.3 * alone["vector"]["peak_gain"][1].get<double>(), 1e-15);
 }
 
 TEST(BoundCommand, ASwarmsBoundContainsTheErrorsOfItsEstimatesOrSaysWhichAreMissing) {
