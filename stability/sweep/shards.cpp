@@ -285,9 +285,12 @@ std::vector<Point> points_of(const MergedSweep& sweep) {
 }
 
 void describe_point(files::Record& record, const Point& point) {
+  std::vector<std::pair<std::string, std::optional<double>>> values;
+  for (const auto& [name, value] : point.values)
+    values.emplace_back(name, std::isfinite(value) ? std::optional<double>(value) : std::nullopt);
   record.field("index", point.index, "Number of the cell, from 0; the last axis varies fastest.");
   record.field("at", point.at, "Value of each varied parameter.");
-  record.field("values", point.values, "What was computed; null: infinite or not defined.");
+  record.field("values", values, "What was computed; null: infinite or not defined.");
   record.field("feasible", point.infeasible.empty(), "Whether the cell satisfies the limits of the grid.");
   record.field("reason", point.infeasible, "Why it is not feasible; empty if it is.");
   record.field("pareto", point.is_in_front, "Whether no other feasible cell is better in everything.");
