@@ -105,7 +105,7 @@ def make(r):
              expect=(0, 4))
     r.report("bound", "bound", "--gains", composite, "--model", model, "--amplitude", 0.097, "--impulse", 0.02,
              "--rate", 0.75)
-    r.report("bound-sampled", "bound", "--gains", gains, "--model", model, "--amplitude", 0.05)
+    r.report("bound-sampled", "bound", "--gains", gains, "--model", model, "--amplitude", 0.04)
     r.report("spacing", "spacing", "--gains", gains, "--model", model, "--max-error", 0.1)
     r.report("iss-check", "iss-check", "--gains", composite, "--model", model, "--runs", 10)
     r.report("tune", "tune", "--gains", gains, "--model", model, "--nodes", 50, expect=(0, 4))
