@@ -384,13 +384,17 @@ TEST(MixedCertificate, PastSkipConnectionsIsOfTheNumbersThatAreKept) {
   }
 }
 
-TEST(MixedCertificate, IsRejectedWithABoundByParts) {
+TEST(MixedCertificate, IsRejectedWithABoundByPartsOfAllInputs) {
   const Network network = tests::plain(mixed({2, 4, 4, 1}, {Activation::kRelu, Activation::kTanh}, 59));
   const Json made = lipschitz::certificate(network, certify_mixed(network));
   Json changed = made;
   changed["bounds"][0]["upper_method"] = "branch";
-  EXPECT_NE(check_mixed(changed, network).reason.find("a bound by parts of a box of a network with tanh"),
-            std::string::npos);
+  EXPECT_FALSE(check_mixed(changed, network).accepted);
+  changed["bounds"][0]["proof"] =
+      Json::parse(R"({"rho": "0x1p-60", "form": null, "tree": "", "multipliers": [], "radius": []})");
+  const std::string reason = check_mixed(changed, network).reason;
+  EXPECT_NE(reason.find("a bound by parts for other activations than ReLU is for a box"), std::string::npos)
+      << reason;
   CertifyOptions options;
   options.method = UpperMethod::kBranch;
   EXPECT_THROW(certify(network, options), std::invalid_argument);

@@ -267,7 +267,7 @@ TEST(SmoothCertificate, OfTheProductCountsTheSlopesExactly) {
   }
 }
 
-TEST(SmoothCertificate, IsRejectedWithBoundsByParts) {
+TEST(SmoothCertificate, IsRejectedWithBoundsByPartsOfAllInputs) {
   const auto rejects = [](const std::function<void(Json&)>& change, const std::string& reason) {
     Json changed = smooth_certificate();
     change(changed);
@@ -275,7 +275,14 @@ TEST(SmoothCertificate, IsRejectedWithBoundsByParts) {
     EXPECT_FALSE(result.accepted) << reason;
     EXPECT_NE(result.reason.find(reason), std::string::npos) << result.reason;
   };
-  rejects([&](Json& c) { c["bounds"][0]["upper_method"] = "branch"; }, "a bound by parts of a box");
+  rejects([&](Json& c) { c["bounds"][0]["upper_method"] = "branch"; }, "proof");
+  rejects(
+      [&](Json& c) {
+        c["bounds"][0]["upper_method"] = "branch";
+        c["bounds"][0]["proof"] =
+            Json::parse(R"({"rho": "0x1p-60", "form": null, "tree": "", "multipliers": [], "radius": []})");
+      },
+      "a bound by parts for other activations than ReLU is for a box");
   rejects([&](Json& c) { c["bounds"][0]["upper_method"] = "local_sdp"; },
           "slopes on a box of a bound without one");
 }
