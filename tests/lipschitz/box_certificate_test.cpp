@@ -3,6 +3,7 @@
 #include <cstdlib>
 
 #include "lipschitz/boxes.h"
+#include "lipschitz/checker/canonical_network.h"
 #include "lipschitz/checker/check.h"
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/checker/statement.h"
@@ -209,6 +210,7 @@ TEST(BoxCertificate, IsRefusedOfRotationInvariants) {
   EXPECT_TRUE(check::check(made, network).accepted);
   network.invariants = true;
   network.input_order = files::relative_state();
+  made["network"] = check::canonical_json(network);
   made["statement"] = check::statement_for(network);
   for (const char* const method : {"local_sdp", "local_product"}) {
     Json changed = made;

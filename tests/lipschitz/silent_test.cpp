@@ -34,7 +34,10 @@ Network two_kinds(const Compositions& silent, bool with_ground = false) {
     for (double& weight : phi.layers.back().weights) weight *= 0.125;
     for (double& bias : phi.layers.back().biases) bias *= 0.125;
   }
-  for (auto& [kind, rho] : net.rho) rho.layers.back().biases[0] += 5;
+  for (auto& [kind, rho] : net.rho) {
+    double& bias = rho.layers.back().biases[0];
+    bias = static_cast<float>(bias + 5);
+  }
   net.sha256 = "made by a test";
   if (!silent.empty()) net.silent["small"] = silent;
   return net;
