@@ -210,6 +210,7 @@ TEST(BoxCertificate, IsRefusedOfRotationInvariants) {
   EXPECT_TRUE(check::check(made, network).accepted);
   network.invariants = true;
   network.input_order = files::relative_state();
+  network.output_quantity = "force_z";
   made["network"].update(check::canonical_json(network), true);  // besides "as" and samples
   made["statement"] = check::statement_for(network);
   for (const char* const method : {"local_sdp", "local_product"}) {
