@@ -349,8 +349,10 @@ std::string statement_for(const files::Network& network) {
 
 files::NetworkArguments with_stated_options(const files::Json& certificate,
                                             files::NetworkArguments arguments) {
-  const files::Json named = certificate.value("network", files::Json::object());
-  if (!named.is_object() || !named.contains("options")) return arguments;  // check() reports the error
+  const auto network = certificate.find("network");
+  if (network == certificate.end() || !network->contains("options"))
+    return arguments;  // check() reports the error
+  const files::Json& named = *network;
   files::ReadingOptions stated;
   try {
     stated = files::options_of(named["options"]);
