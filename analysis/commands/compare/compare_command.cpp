@@ -383,7 +383,7 @@ Command compare_command() {
             "--promise", options->promise,
             "Result of bound --coverage: how often its promise holds on the FLIGHTS not used to make it");
         app.add_option("--horizon", options->horizon_s,
-                       "Predict so many seconds from every measured state with the logged motor commands or "
+                       "Predict this many seconds from every measured state with the logged motor commands or "
                        "rotor speeds: error of position, velocity, rotation and rate against the horizon")
             ->check(CLI::Range(0.001, 60.0));
         add_output(app, "--predictions", options->predictions,
