@@ -11,7 +11,6 @@
 #include "lipschitz/certify_bounds.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -26,14 +25,9 @@ check::Dyadic power(double base, std::size_t exponent) {
   return result;
 }
 
-/// Requires that bounds on a box are about relative states, and branch and bound without a box about ReLU networks.
+/// Requires that branch and bound without a box is about ReLU networks.
 /// @throws std::invalid_argument otherwise.
-void require_what_is_bounded(const Network& network, const files::Parts& parts,
-                             const CertifyOptions& options) {
-  if (options.domain.empty() && options.method != UpperMethod::kBranch) return;
-  if (network.invariants)
-    throw std::invalid_argument(std::string(options.domain.empty() ? "--method branch" : "bounds on a box") +
-                                ": only for networks of relative states, not of rotation invariants");
+void require_what_is_bounded(const files::Parts& parts, const CertifyOptions& options) {
   if (options.method != UpperMethod::kBranch || !options.domain.empty()) return;
   for (const auto& [part, weights] : parts) {
     if (weights->is_relu()) continue;
@@ -166,13 +160,11 @@ void judge_gamma(const files::Parts& parts, Certification& result) {
   }
 }
 
-/// Sets the first upper bound: the product of the norms, the Lipschitz constant of the map to invariants, the scale and
-/// the steepest activation slopes.
+/// Sets the first upper bound: the product of the norms, the scale and the steepest activation slopes.
 void multiply_norms(const Network& network, const files::Parts& parts,
                     const std::vector<CertifiedLayer>& layers, CertifiedBound& bound) {
   std::vector<UpperBound> norms;
   if (!bound.scale.empty()) norms.emplace_back(*std::max_element(bound.scale.begin(), bound.scale.end()));
-  norms.emplace_back(files::slope_of_inputs(network, bound.function));
   for (const files::FunctionId& name : bound.function.parts()) {
     for (const CertifiedLayer& layer : layers) {
       if (layer.network == name) norms.push_back(layer.norm.norm.upper);
@@ -185,8 +177,7 @@ void multiply_norms(const Network& network, const files::Parts& parts,
     }
     bound.has_local_slopes = bound.has_local_slopes || (bound.domain == "box" && !parts.at(name)->is_relu());
   }
-  bound.has_witness = !files::maps_to_invariants(network, bound.function);
-  bound.is_relu = bound.has_witness && has_relu_only(network, bound.function);
+  bound.is_relu = has_relu_only(network, bound.function);
   bound.product = bound.upper = product_up(norms);
 }
 
@@ -208,7 +199,7 @@ Certification certify(const Network& network, const CertifyOptions& options) {
     throw std::invalid_argument("certify: gamma must be positive");
   require_moderate(network);
   const files::Parts parts = files::parts(network);
-  require_what_is_bounded(network, parts, options);
+  require_what_is_bounded(parts, options);
   std::vector<const files::Layer*> layers, stored;
   for (const auto& [name, weights] : parts) {
     for (const files::Layer& layer : weights->layers) {

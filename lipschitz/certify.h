@@ -58,9 +58,7 @@ struct CertifiedLayer {
 };
 
 struct CertifiedBound : Claim {
-  bool has_witness = true;  ///< false for functions of invariants, which get no lower bound
-  bool is_relu =
-      true;  ///< all activations are ReLU and `has_witness`; else no branch and bound without a box
+  bool is_relu = true;     ///< all activations are ReLU; else no branch and bound without a box
   bool has_slopes = true;  ///< activations act entry by entry; false: a layer sorts, product bound only
   bool has_local_slopes = false;  ///< a box, and an activation other than ReLU: slopes may be smaller there
   bool is_monotone = true;        ///< false: the layer-wise bound is the product of norms
@@ -126,15 +124,13 @@ std::vector<CertifiedLayer> stated_norms(const files::Network& network, const Ce
 ///
 /// Functions with activations other than ReLU are bounded above by the same matrix inequality if the activation is
 /// monotone (checker/stages.h), otherwise by its extension up to the size stated in bent_bound.h; on a box also by the
-/// slopes of the activations there. Set functions of rotation invariants get upper bounds only: the bound of
-/// rho(sum phi) times the Lipschitz constant of the map to invariants. If NET is silent in some compositions, bounds
-/// hold while the neighbours stay the same, and lower bounds use compositions in which it is not silent.
+/// slopes of the activations there. If NET is silent in some compositions, bounds hold while the neighbours stay the
+/// same, and lower bounds use compositions in which it is not silent.
 ///
 /// Branch and bound runs on the image of the box under the clamp or, of ReLU networks and if requested, on a projective
 /// cover of all inputs.
 /// @throws std::invalid_argument if gamma is not positive; if branch and bound is requested without a box and an
-///   activation is not ReLU; if NET has invariants and there is a domain or branch and bound is requested; or as
-///   claims() and law_claims().
+///   activation is not ReLU; or as claims() and law_claims().
 Certification certify(const files::Network& network, const CertifyOptions& options);
 
 /// Returns the bound that a law yields from verified bounds of its terms, rounded up.

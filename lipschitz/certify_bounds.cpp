@@ -35,7 +35,7 @@ bool searches_boxes(const CertifyOptions& options) {
 
 /// Whether branch and bound runs: over a box for all activations that act entry by entry, else for ReLU only.
 bool is_branched(const CertifyOptions& options, const CertifiedBound& bound) {
-  if (!searches_boxes(options) || bound.function.is_rho() || !bound.has_witness) return false;
+  if (!searches_boxes(options) || bound.function.is_rho()) return false;
   return bound.is_relu || (bound.domain == "box" && bound.has_slopes && bound.neighbours.empty());
 }
 
@@ -231,9 +231,8 @@ void find_bounds(const Network& network, const CertifyOptions& options, const St
     CertifiedBound& bound = bounds[static_cast<std::size_t>(i % count)];
     const Stop share = shares.next();
     if (i < count) {
-      progress.run("search for steep slopes of " + called(bound), [&] {
-        if (bound.has_witness) search_below(network, options, share, options.lower.starts, bound);
-      });
+      progress.run("search for steep slopes of " + called(bound),
+                   [&] { search_below(network, options, share, options.lower.starts, bound); });
     } else {
       progress.run("semidefinite program of " + called(bound), [&] {
         const bool is_solved =

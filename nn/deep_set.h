@@ -2,10 +2,9 @@
 ///
 ///   f(own, {x_j, c_j}) = rho(phi_ground(own) + sum_j phi_{c_j}(clamp(x_j)))
 ///
-/// With `of_invariants`, J(x_j) replaces x_j and K(own) replaces own (invariants.h). For the compositions of neighbours
-/// listed in `silent`, f is 0: the network is switched off where it did not help. f therefore jumps by its full value
-/// when a neighbour arrives or leaves and the composition becomes silent or stops being so; while the neighbours stay
-/// the same, f is either 0 throughout or the function above.
+/// For the compositions of neighbours listed in `silent`, f is 0: the network is switched off where it did not help. f
+/// therefore jumps by its full value when a neighbour arrives or leaves and the composition becomes silent or stops
+/// being so; while the neighbours stay the same, f is either 0 throughout or the function above.
 ///
 /// Floating-point addition is not associative: summing the same neighbours in another order gives different bits. The
 /// order in which radio packets arrive would then be an input of the controller that no certificate covers and no log
@@ -19,7 +18,6 @@
 #include <cstdint>
 
 #include "nn/arithmetic.h"
-#include "nn/invariants.h"
 #include "nn/mlp.h"
 
 namespace swarmcert::nn {
@@ -32,25 +30,21 @@ struct DeepSet {
   const Mlp<Scalar>* phi;     ///< [num_kinds], indexed by the neighbour's kind
   int num_kinds;
   Mlp<Scalar> rho;      ///< for the vehicle's own kind
-  const Scalar* lower;  ///< [phi_inputs()] each; nullptr: no clamp. The input of `ground` is never clamped.
+  const Scalar* lower;  ///< [inputs()] each; nullptr: no clamp. The input of `ground` is never clamped.
   const Scalar* upper;
-  bool of_invariants = false;
   const int* silent = nullptr;  ///< [num_silent x num_kinds]: neighbours per kind where f is 0
   int num_silent = 0;
 
-  /// Number of inputs per neighbour. Differs from phi_inputs() if `of_invariants` is set.
-  constexpr int inputs() const { return of_invariants ? kRelativeState : phi_inputs(); }
-  constexpr int phi_inputs() const { return phi[0].inputs(); }
+  /// Number of inputs per neighbour.
+  constexpr int inputs() const { return phi[0].inputs(); }
   /// Number of inputs that describe the vehicle's own state; 0 without a ground term.
-  constexpr int own_inputs() const {
-    return ground == nullptr ? 0 : of_invariants ? kOwnState : ground->inputs();
-  }
+  constexpr int own_inputs() const { return ground == nullptr ? 0 : ground->inputs(); }
   constexpr int hidden() const { return rho.inputs(); }
   constexpr int outputs() const { return rho.outputs(); }
 };
 
 /// Returns true if all networks are chains, all phi have the same number of inputs, and phi and ground have
-/// rho.inputs() outputs. With `of_invariants`, phi and ground must also have one input per invariant.
+/// rho.inputs() outputs.
 template <typename Scalar>
 constexpr bool fits_together(const DeepSet<Scalar>& set) {
   if (set.num_kinds < 1 || !is_chain(set.rho)) return false;
@@ -58,11 +52,9 @@ constexpr bool fits_together(const DeepSet<Scalar>& set) {
     return false;
   for (int kind = 0; kind < set.num_kinds; ++kind) {
     const Mlp<Scalar>& phi = set.phi[kind];
-    if (!is_chain(phi) || phi.inputs() != set.phi_inputs() || phi.outputs() != set.hidden()) return false;
+    if (!is_chain(phi) || phi.inputs() != set.inputs() || phi.outputs() != set.hidden()) return false;
   }
-  if (!set.of_invariants) return true;
-  return set.phi_inputs() == kNeighbourInvariants &&
-         (set.ground == nullptr || set.ground->inputs() == kOwnInvariants);
+  return true;
 }
 
 /// One neighbour as seen by the vehicle.
@@ -84,7 +76,7 @@ enum class DeepSetStatus : std::uint8_t {
 /// Memory for one evaluation. The caller owns it; it need not be initialised.
 template <typename Scalar>
 struct DeepSetWorkspace {
-  Scalar* inputs;      ///< [capacity x DeepSet::phi_inputs()], copies of the clamped inputs of phi
+  Scalar* inputs;      ///< [capacity x DeepSet::inputs()], copies of the clamped inputs of phi
   int* order;          ///< [capacity]
   int capacity;        ///< maximum number of neighbours
   Scalar* hidden_sum;  ///< [DeepSet::hidden()]
@@ -101,7 +93,7 @@ constexpr int scratch_size(const DeepSet<Scalar>& set) {
   if (set.ground != nullptr && scratch_size(*set.ground) > largest) largest = scratch_size(*set.ground);
   for (int kind = 0; kind < set.num_kinds; ++kind) {
     const int size =
-        scratch_size(set.phi[kind], kMostTogether) + kMostTogether * (set.phi_inputs() + set.hidden());
+        scratch_size(set.phi[kind], kMostTogether) + kMostTogether * (set.inputs() + set.hidden());
     if (size > largest) largest = size;
   }
   return largest;
@@ -122,12 +114,8 @@ inline bool comes_before(const Scalar* a, const Scalar* b, int size) {
 /// @returns whether all copied inputs are finite.
 template <typename Scalar>
 inline bool take_input(const DeepSet<Scalar>& set, const Scalar* input, Scalar* copy) {
-  if (set.of_invariants) {
-    neighbour_invariants(input, copy);  // a non-finite input gives at least one non-finite invariant
-  } else {
-    for (int i = 0; i < set.phi_inputs(); ++i) copy[i] = input[i];
-  }
-  for (int i = 0; i < set.phi_inputs(); ++i) {
+  for (int i = 0; i < set.inputs(); ++i) copy[i] = input[i];
+  for (int i = 0; i < set.inputs(); ++i) {
     if (!is_finite(copy[i])) return false;
   }
   return true;
@@ -137,7 +125,7 @@ inline bool take_input(const DeepSet<Scalar>& set, const Scalar* input, Scalar* 
 template <typename Scalar>
 inline DeepSetStatus take_inputs(const DeepSet<Scalar>& set, const Neighbour<Scalar>* neighbours,
                                  int num_neighbours, Scalar* copies) {
-  const int size = set.phi_inputs();
+  const int size = set.inputs();
   for (int j = 0; j < num_neighbours; ++j) {
     if (neighbours[j].kind < 0 || neighbours[j].kind >= set.num_kinds) return DeepSetStatus::kUnknownKind;
     Scalar* const copy = copies + static_cast<long>(j) * size;
@@ -172,13 +160,10 @@ inline bool is_silent(const DeepSet<Scalar>& set, const Neighbour<Scalar>* neigh
 template <typename Scalar>
 inline bool add_ground(const DeepSet<Scalar>& set, const Scalar* own,
                        const DeepSetWorkspace<Scalar>& workspace) {
-  Scalar invariants[kOwnInvariants] = {};
-  if (set.of_invariants) own_invariants(own, invariants);
-  const Scalar* const x = set.of_invariants ? invariants : own;
   for (int i = 0; i < set.ground->inputs(); ++i) {
-    if (!is_finite(x[i])) return false;
+    if (!is_finite(own[i])) return false;
   }
-  evaluate(*set.ground, x, workspace.hidden_sum, workspace.scratch);
+  evaluate(*set.ground, own, workspace.hidden_sum, workspace.scratch);
   return true;
 }
 
@@ -187,7 +172,7 @@ inline bool add_ground(const DeepSet<Scalar>& set, const Scalar* own,
 template <typename Scalar>
 inline void sort_canonically(const DeepSet<Scalar>& set, const Neighbour<Scalar>* neighbours,
                              int num_neighbours, const Scalar* copies, int* order) {
-  const int size = set.phi_inputs();
+  const int size = set.inputs();
   for (int j = 0; j < num_neighbours; ++j) {
     int at = j;
     for (; at > 0; --at) {
@@ -209,7 +194,7 @@ inline void sort_canonically(const DeepSet<Scalar>& set, const Neighbour<Scalar>
 template <int Together, typename Scalar>
 inline void add_phi(const DeepSet<Scalar>& set, int kind, const int* order,
                     const DeepSetWorkspace<Scalar>& workspace) {
-  const int inputs = set.phi_inputs();
+  const int inputs = set.inputs();
   Scalar* const x = workspace.scratch;
   Scalar* const hidden = x + static_cast<long>(Together) * inputs;
   Scalar* const scratch = hidden + static_cast<long>(Together) * set.hidden();

@@ -12,7 +12,6 @@
 #include "nn/base/text.h"
 #include "nn/weights/activation.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert::analysis {
 
@@ -92,12 +91,6 @@ void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
 }
 
 files::Network load_net(const files::NetworkArguments& arguments) {
-  files::Network network = load_evaluated_net(arguments);
-  files::require_relative_states(network, "this command is for networks of relative states");
-  return network;
-}
-
-files::Network load_evaluated_net(const files::NetworkArguments& arguments) {
   files::Network network = load_any_net(arguments);
   files::require_relu(network, "this command is for ReLU networks");
   return network;

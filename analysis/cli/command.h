@@ -63,12 +63,10 @@ void declare_activation(CLI::App& app, files::NetworkArguments& arguments);
 /// Declares NET: a positional FILE, or --phi with --rho, --key and --order.
 void declare_network(CLI::App& app, files::NetworkArguments& arguments);
 
-/// Loads NET, which must have ReLU activations and relative states as inputs, or takes the host's network.
+/// Loads NET, which must have ReLU activations, or takes the host's network.
 /// @throws UsageError if no network is named, or if a layer order is given for a file that is not part of the
 ///     network; files::InputError as files::load_network() does.
 files::Network load_net(const files::NetworkArguments& arguments);
-/// The same for inputs that are relative states or invariants, which are what the evaluator supports (nn/deep_set.h).
-files::Network load_evaluated_net(const files::NetworkArguments& arguments);
 /// The same for networks with any activation.
 files::Network load_any_net(const files::NetworkArguments& arguments);
 

@@ -14,7 +14,6 @@
 #include "nn/deep_set.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 #include "nn/weights/record_samples.h"
 
 namespace swarmcert::firmware {
@@ -324,9 +323,9 @@ std::string source_text(const files::Network& network, const ExportOptions& opti
           "static constexpr int silent_{}[] = {{{}}};\n",
           comment(kind), rho, fmt::join(silent, ", "));
     sets +=
-        fmt::format("    {{{}, phi, swarmcert_network::kNeighbourKinds, {}, {}, {}{}}},\n",
+        fmt::format("    {{{}, phi, swarmcert_network::kNeighbourKinds, {}, {}{}}},\n",
                     has_ground ? "&ground" : "nullptr", mlp(rho, weights),
-                    network.clamp ? "lower, upper" : "nullptr, nullptr", network.invariants,
+                    network.clamp ? "lower, upper" : "nullptr, nullptr",
                     silent.empty() ? "" : fmt::format(", silent_{}, {}", rho, silent.size() / kinds.size()));
   }
   text += fmt::format(

@@ -9,6 +9,6 @@ struct FlightHeader {
 };
 
 /// Generated at build time from nn/, byte for byte.
-extern const FlightHeader kFlightHeaders[5];
+extern const FlightHeader kFlightHeaders[4];
 
 }  // namespace swarmcert::firmware

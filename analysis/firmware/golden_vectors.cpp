@@ -40,13 +40,12 @@ void FlightEvaluator::run(const std::string& rho_kind, GoldenVector& vector) con
                                evaluators_.at(files::FunctionId::rho(rho_kind)).mlp(),
                                lower_.empty() ? nullptr : lower_.data(),
                                upper_.empty() ? nullptr : upper_.data(),
-                               network_.invariants,
                                silent.data(),
                                static_cast<int>(silent.size() / phi_.size())};
   std::vector<nn::Neighbour<float>> neighbours;
   for (std::size_t j = 0; j < vector.inputs.size(); ++j)
     neighbours.push_back({vector.inputs[j].data(), vector.kinds[j]});
-  std::vector<float> copies(static_cast<std::size_t>(most_ * set.phi_inputs()));
+  std::vector<float> copies(static_cast<std::size_t>(most_ * set.inputs()));
   std::vector<int> order(static_cast<std::size_t>(most_));
   std::vector<float> sum(static_cast<std::size_t>(set.hidden()));
   std::vector<float> scratch(static_cast<std::size_t>(scratch_size(set)));
@@ -78,11 +77,10 @@ GoldenVector random_vector(const files::Network& network, int neighbours, std::v
   const bool draws_kinds = kinds.empty();
   for (std::vector<float>& input : vector.inputs) {
     for (int i = 0; i < inputs; ++i) {
-      const bool has_clamp = network.clamp && !network.invariants;  // one on invariants limits no state
       const double side =
-          !has_clamp ? 0 : std::max(std::abs(network.clamp->lower[i]), std::abs(network.clamp->upper[i]));
-      const float range = has_clamp ? static_cast<float>(1.5 * std::min(side, 1e3))
-                                    : (i < 3 ? kMostPosition_m : kMostVelocity_m_s);
+          !network.clamp ? 0 : std::max(std::abs(network.clamp->lower[i]), std::abs(network.clamp->upper[i]));
+      const float range = network.clamp ? static_cast<float>(1.5 * std::min(side, 1e3))
+                                        : (i < 3 ? kMostPosition_m : kMostVelocity_m_s);
       input.push_back(within(range));
     }
     if (draws_kinds) kinds.push_back(static_cast<int>(random.below(known.size())));

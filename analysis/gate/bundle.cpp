@@ -158,7 +158,7 @@ struct Documents {
 Documents documents_of(const Policy& policy, std::vector<BundledFile> files, const Json& gate_json,
                        const std::string& gate_text) {
   std::optional<files::Network> network;
-  if (policy.release.has_network()) network = files::load_evaluated_network(policy.release.network);
+  if (policy.release.has_network()) network = files::load_network(policy.release.network);
   Documents documents;
   const Json& rows = gate_json.at("checks");
   documents.bill = files::to_text(bill_of_materials(network ? &*network : nullptr, files, rows));

@@ -35,7 +35,7 @@ Evidence::~Evidence() = default;
 
 const files::Network& Evidence::flown() {
   if (!network_) {
-    files::Network network = files::load_evaluated_network(release().network);
+    files::Network network = files::load_network(release().network);
     for (const auto& [part, weights] : files::parts(network))
       if (!weights->assumed.empty())
         throw Unfounded(weights->path +
@@ -58,7 +58,7 @@ const files::Json& Evidence::certificate() {
 const check::CheckResult& Evidence::certificate_verdict() {
   if (!verdict_) {
     const files::Network stored =
-        files::load_evaluated_network(check::with_stated_options(certificate(), release().network));
+        files::load_network(check::with_stated_options(certificate(), release().network));
     verdict_ = std::make_unique<check::CheckResult>(check::check(certificate(), stored));
   }
   return *verdict_;
@@ -68,7 +68,7 @@ std::string Evidence::why_not_certified() {
   const check::CheckResult& verdict = certificate_verdict();
   if (!verdict.accepted) return verdict.reason;
   const files::Json& as = certificate()["network"]["as"];
-  const bool is_stored_float32 = is_stored_as_float32(files::load_evaluated_network(release().network));
+  const bool is_stored_float32 = is_stored_as_float32(files::load_network(release().network));
   if (release().is_float32 && !is_stored_float32 && as != "float32")
     return "it refers to the float64 weights as stored, but float32 is used in flight: certify --as float32";
   if (!release().is_float32 && as == "float32")
@@ -138,7 +138,6 @@ std::map<files::FunctionId, double> Evidence::global_bounds() {
 
 lipschitz::Domain Evidence::domain() {
   if (!release().box.empty()) return lipschitz::read_domain(release().box, flown());
-  if (flown().invariants) throw Unfounded("no box of relative states: name box in [release]");
   lipschitz::Domain clamp = lipschitz::clamp_domain(flown());
   if (clamp.empty()) throw Unfounded("no box: name box in [release], or clamp the inputs in network.toml");
   return clamp;

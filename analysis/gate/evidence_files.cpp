@@ -24,7 +24,7 @@ class FileList {
     add("weights", arguments.phi);
     add("weights", arguments.rho);
     try {
-      const files::Network network = files::load_evaluated_network(arguments);
+      const files::Network network = files::load_network(arguments);
       for (const auto& [name, weights] : files::parts(network)) add("weights", weights->path);
     } catch (const files::InputError&) {
       return;  // the checks report what is wrong with the file

@@ -62,7 +62,7 @@ Run mean_run(const std::vector<Run>& runs, const RunOptions& options, LearningDa
   data.layout = layout_of_mean(data.layout, static_cast<int>(members.size()));
   project(data.layout, options.trainer.gamma, mean.theta);
   if (options.max_lipschitz > 0)
-    limit_joint_bounds(options.max_lipschitz, data.layout, options.trainer.jobs, mean.theta, data.invariants);
+    limit_joint_bounds(options.max_lipschitz, data.layout, options.trainer.jobs, mean.theta);
   mean.epochs = mean_epochs(runs);
   mean.best_epoch = best_epoch(mean.epochs);
   return mean;

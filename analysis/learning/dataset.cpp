@@ -11,7 +11,6 @@
 #include "analysis/residuals/torque_residual.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
-#include "nn/invariants.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
@@ -129,17 +128,11 @@ training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vecto
     all.push_back(outputs);
     parts.push_back({part, std::move(all), 0, std::move(horizontal)});
   };
-  if (sizes.ground && sizes.invariants) {
-    add(files::FunctionId::ground_phi(), nn::kOwnInvariants, sizes.phi, sizes.features, {});
-  } else if (sizes.ground) {
+  if (sizes.ground)
     add(files::FunctionId::ground_phi(), files::kGroundInputs, sizes.phi, sizes.features, {Plane{1, 2}});
-  }
   for (const std::string& kind : neighbours) {
-    if (sizes.invariants)
-      add(files::FunctionId::phi(kind), nn::kNeighbourInvariants, sizes.phi, sizes.features, {});
-    else
-      add(files::FunctionId::phi(kind), kNeighbourInputs, sizes.phi, sizes.features,
-          {Plane{0, 1}, Plane{3, 4}});
+    add(files::FunctionId::phi(kind), kNeighbourInputs, sizes.phi, sizes.features,
+        {Plane{0, 1}, Plane{3, 4}});
   }
   for (const std::string& kind : own)
     add(files::FunctionId::rho(kind), sizes.features, sizes.rho, info(target).components, {});
@@ -171,12 +164,9 @@ void append_alike(LearningData& data, const RawTrack& raw, const std::vector<std
   std::vector<int> phi;
   for (const std::string& kind : kinds) phi.push_back(data.layout.find(files::FunctionId::phi(kind)));
   for (std::size_t i = from; i < to; ++i) {
-    if (ground >= 0)
-      data.samples.add_input(ground, seen_of_own({raw.own[i].begin(), raw.own[i].end()}, data.invariants));
+    if (ground >= 0) data.samples.add_input(ground, {raw.own[i].begin(), raw.own[i].end()});
     for (std::size_t j = raw.first[i]; j < raw.first[i + 1]; ++j)
-      data.samples.add_input(
-          phi[raw.neighbour_kind[j]],
-          seen_of_neighbour({raw.neighbour[j].begin(), raw.neighbour[j].end()}, data.invariants));
+      data.samples.add_input(phi[raw.neighbour_kind[j]], {raw.neighbour[j].begin(), raw.neighbour[j].end()});
     const Eigen::Vector3f& y = raw.target[i];
     if (data.samples.outputs == 1)
       data.samples.add_sample(rho, {y.z()});
@@ -221,20 +211,6 @@ const TargetInfo& info(Target target) {
       {"torque", "mN_m", "torque", 3, 1e-3},
   };
   return kInfo[static_cast<int>(target)];
-}
-
-std::vector<float> seen_of_neighbour(const std::vector<float>& state, bool invariants) {
-  if (!invariants) return state;
-  std::vector<float> seen(nn::kNeighbourInvariants);
-  nn::neighbour_invariants(state.data(), seen.data());
-  return seen;
-}
-
-std::vector<float> seen_of_own(const std::vector<float>& state, bool invariants) {
-  if (!invariants) return state;
-  std::vector<float> seen(nn::kOwnInvariants);
-  nn::own_invariants(state.data(), seen.data());
-  return seen;
 }
 
 const char* name(Use use) { return use == Use::kFit ? "fit" : use == Use::kSelect ? "select" : "test"; }
@@ -306,12 +282,8 @@ void append_if_known(LearningData& data, const RawTrack& track, const std::vecto
 
 LearningData load_learning_data(const LearningFlights& named, const NetworkSizes& sizes, SplitBy split,
                                 int jobs, const Progress& progress, Target target) {
-  if (sizes.invariants && target != Target::kForceZ)
-    throw std::invalid_argument(
-        "load_learning_data: only a vertical force is a function of rotation invariants");
   LearningData data;
   data.target = target;
-  data.invariants = sizes.invariants;
   data.samples.outputs = info(target).components;
   data.samples.target_is_axial = target == Target::kTorque;
   const residuals::Inputs& inputs = *named.fit;

@@ -37,8 +37,7 @@ struct NetworkSizes {
   std::vector<int> phi = {25, 40, 40};
   std::vector<int> rho = {40, 40, 40};
   int features = 40;
-  bool ground = true;       ///< a phi for the vehicle's own height and velocity, always in the sum
-  bool invariants = false;  ///< every phi receives invariants under rotation about z (nn/invariants.h)
+  bool ground = true;  ///< a phi for the vehicle's own height and velocity, always in the sum
 };
 
 /// Samples of one vehicle in one flight with a constant number of neighbours of each kind.
@@ -54,7 +53,6 @@ struct TrackSamples {
 
 struct LearningData {
   Target target = Target::kForceZ;
-  bool invariants = false;  ///< inputs of the samples are invariants of the states
   training::Layout layout;  ///< parts "phi:<kind>", with "phi:ground", and "rho:<kind>"
   training::Dataset samples;
   std::vector<TrackSamples> tracks;
@@ -63,12 +61,6 @@ struct LearningData {
 
   std::vector<Eigen::Index> indices(Use use) const;
 };
-
-/// Returns the input of phi for a neighbour's relative state, and of the ground's phi for the vehicle's own state:
-/// the state itself, or its invariants as computed by nn/deep_set.h.
-/// @param state [nn::kRelativeState] and [nn::kOwnState].
-std::vector<float> seen_of_neighbour(const std::vector<float>& state, bool invariants);
-std::vector<float> seen_of_own(const std::vector<float>& state, bool invariants);
 
 /// Sets the weights of the samples to fit: every group has the same total weight, and the weights sum to the number
 /// of samples. Other samples keep their weights.
@@ -93,15 +85,14 @@ struct LearningFlights {
 
 /// Loads flights as samples. The target of a sample is the force or torque that the vehicle's model leaves; inputs are
 /// relative positions and velocities of the neighbours in the world frame (paper, section V-B), and the own (-z, -v)
-/// for the ground; or, if `sizes` says so, invariants of these, computed in float32 as the evaluator does.
+/// for the ground.
 /// Among the samples to fit, every group (a scenario and a composition of kinds) has the same total weight, because ten
 /// flights of one task say no more about another task than one flight does. Other samples have weight 1.
 ///
 /// If `select` or `test` is null, samples are held back from `fit`: of every five flights, in order of names and runs,
 /// the third selects and the fifth tests; of three or four flights the last two do. With blocks, the same holds for
 /// every five blocks of a flight. The set of networks and the fitted data do not depend on the test records.
-/// @throws files::InputError if no record to fit of a vehicle with a model remains, or none has a neighbour;
-///   std::invalid_argument for invariants with a target other than the vertical force.
+/// @throws files::InputError if no record to fit of a vehicle with a model remains, or none has a neighbour.
 LearningData load_learning_data(const LearningFlights& flights, const NetworkSizes& sizes, SplitBy split,
                                 int jobs, const Progress& progress, Target target = Target::kForceZ);
 

@@ -10,7 +10,6 @@
 #include "nn/base/parallel.h"
 #include "nn/training/spectral_normalization.h"
 #include "nn/weights/function_id.h"
-#include "nn/weights/invariants.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::learning {
@@ -20,9 +19,8 @@ namespace {
 constexpr double kScalingHeadroom = 0x1p-20;
 constexpr int kMostScalings = 8;
 
-lipschitz::UpperBound product_of_norms(const files::Weights& phi, const files::Weights& rho,
-                                       double slope_of_inputs) {
-  std::vector<lipschitz::UpperBound> norms = {lipschitz::UpperBound(slope_of_inputs)};
+lipschitz::UpperBound product_of_norms(const files::Weights& phi, const files::Weights& rho) {
+  std::vector<lipschitz::UpperBound> norms;
   for (const files::Weights* const weights : {&phi, &rho}) {
     for (const files::Layer& layer : weights->layers)
       norms.push_back(lipschitz::spectral_norm(layer).norm.upper);
@@ -32,10 +30,9 @@ lipschitz::UpperBound product_of_norms(const files::Weights& phi, const files::W
 
 }  // namespace
 
-std::vector<JointBound> joint_bounds(const training::Layout& layout, const training::Vector& theta, int jobs,
-                                     bool invariants) {
+std::vector<JointBound> joint_bounds(const training::Layout& layout, const training::Vector& theta,
+                                     int jobs) {
   files::Network network;
-  network.invariants = invariants;
   std::vector<JointBound> bounds;
   const auto count = static_cast<int>(layout.parts().size());
   const auto kind = [&](int part) { return layout.parts()[part].id.kind(); };
@@ -51,9 +48,7 @@ std::vector<JointBound> joint_bounds(const training::Layout& layout, const train
     const std::string phi = kind(bound.phi), rho = kind(bound.rho);
     const files::FunctionId function = files::FunctionId::set(phi, rho);
     const lipschitz::SdpBound found = lipschitz::sdp_bound(check::stages(network, function));
-    bound.upper =
-        product_of_norms(network.phi.at(phi), network.rho.at(rho), files::slope_of_inputs(network, function))
-            .value();
+    bound.upper = product_of_norms(network.phi.at(phi), network.rho.at(rho)).value();
     if (found.proof) bound.upper = std::min(bound.upper, found.proof->upper.value());
   });
   return bounds;
@@ -77,13 +72,12 @@ std::vector<double> shares_of_product(double limit, training::Layers layers,
   return shares;
 }
 
-Tightening scale_to(double limit, const training::Layout& layout, int jobs, training::Vector& theta,
-                    bool invariants) {
+Tightening scale_to(double limit, const training::Layout& layout, int jobs, training::Vector& theta) {
   const std::size_t count = layout.parts().size();
   Tightening result;
   result.shares.assign(count, 1.0);
   std::vector<double> ratio(count, 0.0);
-  for (const JointBound& bound : joint_bounds(layout, theta, jobs, invariants)) {
+  for (const JointBound& bound : joint_bounds(layout, theta, jobs)) {
     result.largest = std::max(result.largest, bound.upper);
     const int layers = layout.parts()[bound.phi].layers() + layout.parts()[bound.rho].layers();
     for (const int part : {bound.phi, bound.rho}) {
@@ -102,10 +96,9 @@ Tightening scale_to(double limit, const training::Layout& layout, int jobs, trai
   return result;
 }
 
-void limit_joint_bounds(double limit, const training::Layout& layout, int jobs, training::Vector& theta,
-                        bool invariants) {
+void limit_joint_bounds(double limit, const training::Layout& layout, int jobs, training::Vector& theta) {
   for (int tries = 0; tries < kMostScalings; ++tries) {
-    if (scale_to(limit, layout, jobs, theta, invariants).largest <= limit) return;
+    if (scale_to(limit, layout, jobs, theta).largest <= limit) return;
   }
   throw std::runtime_error("the limit of the joint Lipschitz bounds could not be proved");
 }

@@ -19,10 +19,7 @@ struct JointBound {
 };
 
 /// Returns the bounds for all pairs of a phi, including that of the ground, and a rho.
-/// @param invariants whether phi receives invariants of the inputs (nn/invariants.h), whose slope is included in the
-///     bounds.
-std::vector<JointBound> joint_bounds(const training::Layout& layout, const training::Vector& theta, int jobs,
-                                     bool invariants = false);
+std::vector<JointBound> joint_bounds(const training::Layout& layout, const training::Vector& theta, int jobs);
 
 /// Returns the factors on gamma's limits, per part, for which the product of the layers' limits over each phi and
 /// rho, minus the slack of the kind of layers (slack_of_product()), equals `limit`; one where gamma alone keeps it.
@@ -40,12 +37,10 @@ struct Tightening {
 /// Scales the last weights of each rho, and with them the differences of the outputs, so that its bounds keep the
 /// limit up to rounding. Bounds grow with the product of the norms over the layers of phi and rho, so the factors are
 /// (limit / bound)^(1 / layers) for the largest bound in which the part is involved; they exceed one if there is room.
-Tightening scale_to(double limit, const training::Layout& layout, int jobs, training::Vector& theta,
-                    bool invariants = false);
+Tightening scale_to(double limit, const training::Layout& layout, int jobs, training::Vector& theta);
 
 /// Scales until every bound is proved to keep the limit.
 /// @throws std::runtime_error if a few attempts are not enough.
-void limit_joint_bounds(double limit, const training::Layout& layout, int jobs, training::Vector& theta,
-                        bool invariants = false);
+void limit_joint_bounds(double limit, const training::Layout& layout, int jobs, training::Vector& theta);
 
 }  // namespace swarmcert::learning

@@ -32,11 +32,10 @@ std::string network_toml(const LearningData& data, const files::GammaStatement& 
   text += fmt::format(
       "output = {{ quantity = \"{}\", unit = \"{}\" }}\n"
       "gamma = {{ value = {}, scope = \"{}\", mode = \"{}\" }}\n"
-      "[input]\norder = [\"dp_x_m\", \"dp_y_m\", \"dp_z_m\", \"dv_x_m_s\", \"dv_y_m_s\", \"dv_z_m_s\"]\n{}",
+      "[input]\norder = [\"dp_x_m\", \"dp_y_m\", \"dp_z_m\", \"dv_x_m_s\", \"dv_y_m_s\", \"dv_z_m_s\"]\n",
       info(data.target).quantity, info(data.target).unit, gamma.value,
       gamma.scope == files::GammaStatement::Scope::kLayer ? "layer" : "network",
-      gamma.mode == files::GammaStatement::Mode::kClip ? "clip" : "equal",
-      data.invariants ? "invariants = \"rotation\"\n" : "");
+      gamma.mode == files::GammaStatement::Mode::kClip ? "clip" : "equal");
   for (const training::Part& part : data.layout.parts()) {
     text += fmt::format("[{}.{}]\nweights = \"{}\"\n", part.id.is_phi() ? "phi" : "rho", part.id.kind(),
                         file_of(part.id));
@@ -69,7 +68,7 @@ files::Network write_network(const LearningData& data, const training::Vector& t
   }
   const std::string path = (fs::path(folder) / "network.toml").string();
   files::write_file(path, network_toml(data, gamma, silent), true);
-  files::Network network = files::load_evaluated_network({{}, path, "", ""});
+  files::Network network = files::load_network({{}, path, "", ""});
   write_samples(layout, theta, network, (fs::path(folder) / kSamplesFile).string());
   return network;
 }

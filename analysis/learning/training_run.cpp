@@ -154,8 +154,7 @@ Run run_training(const LearningData& data, const RunOptions& options) {
                                "give a smaller rate, or a smaller --gamma"});
     Vector candidate = trainer.theta();
     if (options.max_lipschitz > 0) {
-      const Tightening asked =
-          scale_to(options.max_lipschitz, data.layout, chosen.jobs, candidate, data.invariants);
+      const Tightening asked = scale_to(options.max_lipschitz, data.layout, chosen.jobs, candidate);
       for (std::size_t p = 0; p < state.shares.size(); ++p)
         state.shares[p] = std::min(1.0, state.shares[p] * asked.shares[p]);
     }
@@ -172,7 +171,7 @@ Run run_training(const LearningData& data, const RunOptions& options) {
   run.best_epoch = run.epochs.empty() ? 0 : best_epoch(run.epochs);
   project(data.layout, chosen.gamma, run.theta);
   if (options.max_lipschitz > 0)
-    limit_joint_bounds(options.max_lipschitz, data.layout, chosen.jobs, run.theta, data.invariants);
+    limit_joint_bounds(options.max_lipschitz, data.layout, chosen.jobs, run.theta);
   return run;
 }
 

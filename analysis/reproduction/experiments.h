@@ -26,7 +26,7 @@ Finding figure_validation(const Setting& setting);
 Finding superposition(const Setting& setting);
 /// Test error and the tracking error predicted from it over the certified Lipschitz bound, as gamma varies.
 Finding lipschitz_tradeoff(const Setting& setting);
-/// Test errors of networks with exact symmetry about the vertical, with rotated samples and with neither, from all
+/// Test errors of networks with samples rotated about the vertical and with samples as recorded, from all
 /// flights and from half of them; test error over the proved joint bound, with a limit on the norms of the layers or
 /// on the bound itself.
 Finding symmetry(const Setting& setting);

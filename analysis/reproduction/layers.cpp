@@ -46,8 +46,6 @@ struct Point {
 
 Point point_of(const Setting& setting, const Source& source, const Method& method, double limit) {
   LearnOptions options = source.options;
-  options.turns = false;
-  options.sizes.invariants = true;
   options.layers = method.layers;
   options.rate = kRate;
   options.max_lipschitz = method.joint ? limit : 0;
@@ -179,7 +177,8 @@ Finding bounded_layers(const Setting& setting) {
   add_equal_bounds(setting, source, curves, finding);
   add_figure(source, curves, finding);
   finding.notes.push_back(
-      "All with exact symmetry and the same epochs. The rate and the epoch of each network are chosen on the "
+      "All with rotated samples and the same epochs. The rate and the epoch of each network are chosen on "
+      "the "
       "selecting flights, and nothing on the test flights. Bounds are those of the certificate, not products "
       "of norms; at equal "
       "bounds, spectral normalisation is interpolated between two gammas.");

@@ -25,7 +25,6 @@ std::string text_of(const LearnOptions& options) {
                                  static_cast<int>(options.gamma.mode), options.max_lipschitz, options.turns,
                                  options.rate, options.batch, options.steps, options.epochs, options.seed,
                                  options.teachers, options.sizes.features, options.sizes.ground);
-  if (options.sizes.invariants) text += " invariants";
   if (options.tight_bounds) text += " tight bounds";
   if (options.layers != training::Layers::kFree)
     text += fmt::format(" layers {}", static_cast<int>(options.layers));
@@ -40,7 +39,7 @@ std::string text_of(const LearnOptions& options) {
 Learned read_back(const files::Json& file, const std::string& folder) {
   Learned learned;
   learned.folder = folder;
-  learned.network = files::load_evaluated_network({{}, (fs::path(folder) / "network.toml").string(), "", ""});
+  learned.network = files::load_network({{}, (fs::path(folder) / "network.toml").string(), "", ""});
   for (const files::Json& bound : file.at("set_bounds"))
     learned.set_bounds.emplace_back(bound.at(0).get<std::string>(), bound.at(1).get<double>());
   learned.bound = file.at("bound").get<double>();

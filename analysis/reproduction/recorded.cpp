@@ -140,7 +140,6 @@ learning::LearningData load_recorded(const Setting& setting, const Recorded& rec
 
 LearnOptions folds_options(const Setting& setting) {
   LearnOptions options;
-  options.sizes.invariants = true;
   options.gamma.value = 3;
   options.rate = 1e-3;
   options.batch = 1024;

@@ -74,7 +74,7 @@ double Group::standard_error_gf() const {
 
 Group train_group(const Setting& setting, const Source& source, const Recorded& flights, LearnOptions options,
                   const std::string& name, int seeds) {
-  if (!setting.full) options.sizes = {{12, 12}, {12}, 8, options.sizes.ground, options.sizes.invariants};
+  if (!setting.full) options.sizes = {{12, 12}, {12}, 8, options.sizes.ground};
   options.tight_bounds = true;
   Group group;
   for (int s = 0; s < seeds; ++s) {

@@ -141,7 +141,7 @@ void complete_models(const InputArguments& arguments, Inputs& inputs) {
   inputs.named_files.push_back(arguments.network);
   files::NetworkArguments network;
   network.file = arguments.network;
-  const files::Network loaded = files::load_evaluated_network(network);
+  const files::Network loaded = files::load_network(network);
   for (const auto& [name, weights] : files::parts(loaded)) inputs.named_files.push_back(weights->path);
 }
 

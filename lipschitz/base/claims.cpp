@@ -8,7 +8,6 @@
 #include "nn/base/json.h"
 #include "nn/base/toml.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -22,8 +21,7 @@ bool takes_inputs(const files::FunctionId& function) { return !function.is_rho()
 
 /// Whether there are claims about `function` in a weighted norm of its inputs.
 bool takes_scale(const files::Network& network, const files::FunctionId& function, std::size_t scales) {
-  return takes_inputs(function) && !files::maps_to_invariants(network, function) &&
-         static_cast<std::size_t>(files::inputs(network, function)) == scales;
+  return takes_inputs(function) && static_cast<std::size_t>(files::inputs(network, function)) == scales;
 }
 
 /// Returns the groups of neighbours named by the options.
@@ -147,7 +145,6 @@ Domain read_domain(const std::string& path, const files::Network& network) {
   for (const auto& [kind, phi] : network.phi) {
     if (kind != files::kGroundKind) inputs = static_cast<std::size_t>(phi.inputs());
   }
-  if (network.invariants) inputs = nn::kRelativeState;  // the box is one of states
   if (inputs > 0) {
     const Box box = read_box(top, inputs);
     for (const auto& [kind, phi] : network.phi) domain[files::FunctionId::phi(kind)] = box;

@@ -10,7 +10,6 @@
 #include "nn/weights/chain.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert::check {
 namespace {
@@ -155,15 +154,12 @@ Weights weights_of(const Json& json, const std::string& where) {
 /// The class invariant of Network.
 void require_consistent(const Network& network) {
   const auto fits = [](bool holds) { require(holds, "network: its parts do not fit one another"); };
-  const std::size_t stated =
-      network.invariants ? files::neighbour_invariant_names().size() : network.input_order.size();
+  const std::size_t stated = network.input_order.size();
   const std::size_t clamped = network.clamp ? network.clamp->lower.size() : 0;
   fits(stated == 0 || clamped == 0 || stated == clamped);
-  if (network.invariants)
-    fits(network.input_order == files::relative_state() && network.output_quantity == "force_z");
   std::size_t inputs = stated > 0 ? stated : clamped;
   if (network.plain) {
-    fits(network.phi.empty() && network.rho.empty() && !network.invariants && network.silent.empty());
+    fits(network.phi.empty() && network.rho.empty() && network.silent.empty());
     return fits(inputs == 0 || inputs == static_cast<std::size_t>(network.plain->inputs()));
   }
   fits(!network.phi.empty() && !network.rho.empty());
@@ -171,8 +167,7 @@ void require_consistent(const Network& network) {
   for (const auto& [kind, phi] : network.phi) {
     fits(phi.outputs() == hidden);
     if (kind == files::kGroundKind) {
-      fits(phi.inputs() == (network.invariants ? static_cast<int>(files::own_invariant_names().size())
-                                               : files::kGroundInputs));
+      fits(phi.inputs() == files::kGroundInputs);
       continue;
     }
     if (inputs == 0) inputs = static_cast<std::size_t>(phi.inputs());
@@ -184,12 +179,11 @@ void require_consistent(const Network& network) {
 }
 
 void read_input(const Json& json, Network& network) {
-  files::require_keys(json, {"order", "invariants", "clamp"}, "network.input");
+  files::require_keys(json, {"order", "clamp"}, "network.input");
   network.input_order = texts(json["order"]);
   std::vector<std::string> sorted = network.input_order;
   std::sort(sorted.begin(), sorted.end());
   require(std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end(), "network.input names one twice");
-  network.invariants = json["invariants"].get<bool>();
   if (json["clamp"].is_null()) return;
   files::require_keys(json["clamp"], {"lower", "upper"}, "network.input.clamp");
   files::InputClamp clamp = {files::parse_hex_floats(json["clamp"]["lower"]),
@@ -261,8 +255,7 @@ Json canonical_json(const Network& network) {
   return {{"description_sha256", network.sha256},
           {"options", files::options_json(network.options)},
           {"output", {{"quantity", network.output_quantity}, {"unit", network.output_unit}}},
-          {"input",
-           {{"order", network.input_order}, {"invariants", network.invariants}, {"clamp", std::move(clamp)}}},
+          {"input", {{"order", network.input_order}, {"clamp", std::move(clamp)}}},
           {"silent", files::silent_compositions(network)},
           {"weights", std::move(weights)}};
 }
@@ -307,8 +300,7 @@ std::string first_difference(const Network& stated, const Network& read) {
                          : std::pair<std::vector<double>, std::vector<double>>();
   };
   const bool is_same = clamp(stated) == clamp(read) && stated.input_order == read.input_order &&
-                       stated.invariants == read.invariants && stated.silent == read.silent &&
-                       stated.output_quantity == read.output_quantity &&
+                       stated.silent == read.silent && stated.output_quantity == read.output_quantity &&
                        stated.output_unit == read.output_unit;
   return is_same ? ""
                  : "network.output, its unit, input or silent differ from the description of the network";

@@ -48,10 +48,7 @@ class CertificateChecker {
   /// with layers that sort only product bounds.
   void check_activations(const Json& bound, const std::vector<files::FunctionId>& names,
                          const std::string& where) const;
-  /// Requires that functions of rotation invariants have no bound on a box, no witness and no scale.
-  void check_invariants(const Json& bound, const files::FunctionId& function, const std::string& where) const;
-  /// Returns the box on which the activation slopes of a bound are taken: the inputs of `part` after the clamp. Refuses
-  /// networks of rotation invariants.
+  /// Returns the box on which the activation slopes of a bound are taken: the inputs of `part` after the clamp.
   Intervals local_inputs(const Json& bound, const files::FunctionId& part, const std::string& where) const;
   /// Returns the largest number of neighbours of each kind for a set function; empty: any number.
   Neighbours neighbours_of(const Json& bound, const std::string& where) const;

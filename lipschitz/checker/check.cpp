@@ -8,7 +8,6 @@
 #include "nn/weights/chain.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/function_id.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert::check {
 namespace {
@@ -185,7 +184,6 @@ void CertificateChecker::check_bound(const Json& bound) {
   const double upper = number(bound["upper"], bound["upper_hex"], where + " upper");
   check_status(bound, where);
   check_activations(bound, names, where);
-  check_invariants(bound, function, where);
   files::block_coordinates(network_, function, block);  // throws if the function has no such block
   if (bound["upper_method"] == "sdp" || bound["upper_method"] == "eclipse_fast") {
     check_upper(bent_chain(network_, function, block, scale), bound["proof"], upper, where);
@@ -218,7 +216,6 @@ void CertificateChecker::check_product(const Json& bound, const std::vector<file
   require((is_local || bound["upper_method"] == "product") && bound["proof"].is_null(),
           where + ": unknown upper_method");
   Dyadic total = scale.empty() ? 1.0 : *std::max_element(scale.begin(), scale.end());
-  total = total * files::slope_of_inputs(network_, bound["function"].get<std::string>());
   for (const files::FunctionId& part : names) {
     require(norms_.count(part) == 1, where + ": there is no network " + part.name());
     total = total * norms_.at(part);
@@ -246,21 +243,9 @@ void CertificateChecker::check_activations(const Json& bound, const std::vector<
   }
 }
 
-void CertificateChecker::check_invariants(const Json& bound, const files::FunctionId& function,
-                                          const std::string& where) const {
-  if (!files::maps_to_invariants(network_, function)) return;
-  const std::string of = " of a function of rotation invariants";
-  require(bound["domain"] == "global" && bound["upper_method"] != "branch",
-          where + ": a bound on a box" + of);
-  require(bound["lower"].is_null() && bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
-          where + ": a lower bound" + of);
-  require(bound["scale"].empty(), where + ": a scale" + of);
-}
-
 Intervals CertificateChecker::local_inputs(const Json& bound, const files::FunctionId& part,
                                            const std::string& where) const {
   require(bound["domain"] == "box" && !part.is_rho(), where + ": slopes on a box of a bound without one");
-  require(!network_.invariants, where + ": slopes on a box of a network of rotation invariants");
   Row lower, upper;
   read_box(part, lower, upper, where);
   return {{lower.begin(), lower.end()}, {upper.begin(), upper.end()}};
@@ -341,7 +326,6 @@ std::string statement_for(const files::Network& network) {
   std::string text = kStatement;
   if (sorts) text += kSortingStatement;
   if (keeps) text += kKeepingStatement;
-  if (network.invariants) text += kInvariantsStatement;
   const std::vector<std::string> silent = files::silent_compositions(network);
   for (std::size_t k = 0; k < silent.size(); ++k) text += (k == 0 ? kSilentStatement : ", ") + silent[k];
   return text + (silent.empty() ? "" : ".");

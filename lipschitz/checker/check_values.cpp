@@ -95,7 +95,6 @@ void CertificateChecker::check_values(const Json& entry) {
   const bool is_set = names.size() == 2;
   for (const files::FunctionId& part : names)
     require(parts_.count(part) == 1, where + ": there is no network " + part.name());
-  require(!network_.invariants, where + ": values of a function of rotation invariants");
   require(is_set ? !names[0].is_ground_phi() : function.is_plain(),
           where + ": possible only for the network, or for a sum over neighbours");
   const bool has_ground = is_set && parts_.count(files::FunctionId::ground_phi()) == 1;

@@ -8,7 +8,6 @@
 #include "lipschitz/checker/centred_form.h"
 #include "lipschitz/checker/lipschitz_lmi.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert::check {
 namespace {
@@ -23,12 +22,6 @@ Matrix selected_columns(const Matrix& w, const std::vector<int>& inputs, const s
           scale.empty() ? w(i, input) : w(i, input) * Dyadic(scale[static_cast<std::size_t>(input)]);
   }
   return result;
-}
-
-/// Returns W times `slope`, the Lipschitz constant of the map to its inputs.
-Matrix of_invariants(Matrix w, const Dyadic& slope) {
-  for (Dyadic& entry : w.entries) entry = entry * slope;
-  return w;
 }
 
 /// The divisor of an activation, and the slope range of the quotient: [0, 1] or [1 - c, c].
@@ -58,9 +51,6 @@ std::vector<Matrix> chained(const files::Network& network, const files::Function
   const std::vector<files::FunctionId> names = function.parts();
   const std::vector<int> coordinates = files::block_coordinates(network, function, block);
   const int inputs = parts.at(names.front())->inputs();
-  const bool maps = files::maps_to_invariants(network, function);
-  if (maps && !scale.empty())
-    throw std::invalid_argument(function.name() + " takes states, whose invariants have no scale");
   if (!scale.empty() && scale.size() != static_cast<std::size_t>(inputs)) {
     throw std::invalid_argument("scale has " + std::to_string(scale.size()) + " numbers, " + function.name() +
                                 " has " + std::to_string(inputs) + " inputs");
@@ -72,8 +62,7 @@ std::vector<Matrix> chained(const files::Network& network, const files::Function
       const files::Layer& layer = weights.layers[k];
       Matrix w(layer.outputs, layer.inputs, layer.weights);
       if (chain.empty()) {  // the first layer acts on the inputs, the first of rho on the last of phi
-        chain.push_back(maps ? of_invariants(std::move(w), files::slope_of_inputs(network, function))
-                             : selected_columns(w, coordinates, scale));
+        chain.push_back(selected_columns(w, coordinates, scale));
       } else if (k == 0) {
         chain.back() = product(w, chain.back());
       } else {
@@ -122,8 +111,6 @@ BentChain bent_chain(const files::Network& network, const files::FunctionId& fun
 BentChain chain_on_box(const files::Network& network, const files::FunctionId& function,
                        const std::string& block, const std::vector<double>& scale, const Intervals& box) {
   if (function.is_rho()) throw std::domain_error(function.name() + " has no box");
-  if (network.invariants)
-    throw std::domain_error(function.name() + " is of rotation invariants, which have no box");
   BentChain result;
   result.stages = chained(network, function, block, scale,
                           [](const files::Weights&, std::size_t) { return Dyadic(1.0); });

@@ -20,8 +20,7 @@ namespace swarmcert::check {
 /// stage: their product.
 ///
 /// An activation with slopes in [0, b] is b times one with slopes in [0, 1], so the stage behind it is multiplied by b;
-/// b = 1 for ReLU. If `function` maps its inputs to invariants, the first stage acts on the invariants and is
-/// multiplied by the Lipschitz constant of the map, so that every bound of the chain is a bound of the function.
+/// b = 1 for ReLU.
 /// @throws std::domain_error if an activation of `function` sorts or is not monotone, see bent_chain();
 ///   std::out_of_range or std::invalid_argument if NET has no such function or block, or `scale` does not have one
 ///   number per input.

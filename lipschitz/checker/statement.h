@@ -46,13 +46,6 @@ inline constexpr const char* kKeepingStatement =
     " tanh:n, and so with other names, is that function of each of the first n numbers of a layer and leaves "
     "the others as they are.";
 
-/// Added for networks of rotation invariants.
-inline constexpr const char* kInvariantsStatement =
-    " A set function takes of each neighbour its relative position p in m and velocity v in m/s, whose "
-    "vertical components are p_z and v_z, and of the vehicle -z in m and -v in m/s; phi sees their "
-    "invariants: of a neighbour |p_xy|, 3/2 p_z, |v_xy|, 3/2 v_z, |p_xy + v_xy / 2|, and the ground's phi "
-    "-z, |v_xy|, -v_z. So the input clamp is one of invariants, and phi alone is a function of them.";
-
 /// Added for networks that are silent in some compositions; the list of compositions follows.
 inline constexpr const char* kSilentStatement =
     " Among these neighbours > vehicle, as many of each kind and no others, the set functions of that kind "

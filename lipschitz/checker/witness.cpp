@@ -10,7 +10,6 @@
 #include "lipschitz/checker/values.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -279,7 +278,6 @@ SlopeFunction slope_function(const files::Network& network, const files::Functio
                              const std::vector<files::FunctionId>& others) {
   const files::Parts parts = files::parts(network);
   const std::vector<files::FunctionId> names = function.parts();
-  if (files::maps_to_invariants(network, function)) refuse(function.name() + " maps to rotation invariants");
   std::vector<files::FunctionId> neighbours = others;
   neighbours.push_back(names[0]);
   if (files::is_silent_among(network, function, neighbours))
@@ -307,7 +305,6 @@ std::vector<mpq_class> value(const files::Network& network, const files::Functio
                              const std::vector<std::vector<float>>& points) {
   const files::Parts parts = files::parts(network);
   const std::vector<files::FunctionId> names = function.parts();
-  if (files::maps_to_invariants(network, function)) refuse(function.name() + " maps to rotation invariants");
   if (names.size() == 1 && networks.size() != 1) refuse("a plain network needs exactly one point");
   if (networks.size() != points.size()) refuse("there must be one point per network");
   DyadicVector sum;

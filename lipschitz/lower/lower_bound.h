@@ -45,8 +45,7 @@ bool has_relu_only(const files::Network& network, const files::FunctionId& funct
 /// the ground. Other networks are searched around the result of steep_place(). Compositions in which NET is silent are
 /// not used.
 /// @param domain the boxes of a claim whose domain is "box", by part.
-/// @throws std::invalid_argument as slope_function(), and for functions of rotation invariants, which have no such
-///   proof.
+/// @throws std::invalid_argument as slope_function().
 FoundSlope lower_bound(const files::Network& network, const Claim& claim, const Domain& domain,
                        const LowerBoundOptions& options);
 

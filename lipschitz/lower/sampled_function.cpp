@@ -6,7 +6,6 @@
 
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -38,7 +37,6 @@ SampledFunction::SampledFunction(const files::Network& network, const Claim& cla
   first_ = names.front();
   box_ = box_in(domain_, first_);
   inputs_ = files::inputs(network, claim.function);
-  maps_ = files::maps_to_invariants(network, claim.function);
   if (names.size() == 2) last_ = names.back();
   for (const auto& [name, weights] : parts)
     if (last_ && claim.neighbours.empty() && name.is_phi() && !name.is_ground_phi())
@@ -75,7 +73,7 @@ std::optional<std::pair<double, double>> SampledFunction::interval(const files::
                                                                    Index k) const {
   const auto i = static_cast<std::size_t>(k);
   if (box) return std::pair{box->lower[i], box->upper[i]};
-  if (network_.clamp && files::is_clamped(part) && !maps_)
+  if (network_.clamp && files::is_clamped(part))
     return std::pair{network_.clamp->lower[i], network_.clamp->upper[i]};
   return std::nullopt;
 }
@@ -136,10 +134,6 @@ VectorXd SampledFunction::evaluated(const files::FunctionId& part, const VectorX
 }
 
 VectorXd SampledFunction::term(const files::FunctionId& part, VectorXd x) const {
-  if (maps_) {
-    const std::vector<double> seen = files::invariants_of(part, {x.data(), x.data() + x.size()});
-    x = VectorXd::Map(seen.data(), static_cast<Index>(seen.size()));
-  }
   if (network_.clamp && files::is_clamped(part))
     for (Index k = 0; k < x.size(); ++k)
       x[k] = std::min(std::max(x[k], network_.clamp->lower[static_cast<std::size_t>(k)]),

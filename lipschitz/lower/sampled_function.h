@@ -15,7 +15,7 @@
 
 namespace swarmcert::lipschitz {
 
-/// The function x -> rho(phi(x) + s) or one part of NET, including the clamp and the map to invariants.
+/// The function x -> rho(phi(x) + s) or one part of NET, including the clamp.
 class SampledFunction {
  public:
   /// A difference quotient and its direction in the block, which has length 1 in units of the scale.
@@ -78,7 +78,6 @@ class SampledFunction {
   files::FunctionId first_;
   std::optional<files::FunctionId> last_;
   Eigen::Index inputs_ = 0;
-  bool maps_ = false;       ///< inputs are mapped to invariants before the clamp
   bool is_silent_ = false;  ///< NET is silent among the moving neighbour and the others
   std::vector<int> block_;
   std::vector<double> scale_;

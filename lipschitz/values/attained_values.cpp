@@ -7,10 +7,8 @@
 
 #include "lipschitz/base/rounding.h"
 #include "lipschitz/checker/values.h"
-#include "lipschitz/values/invariant_box.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -64,8 +62,8 @@ class ValueSearch {
     }
     std::vector<check::SumTerm> terms;
     for (std::size_t j = 0; j < point.inputs.size(); ++j) {
-      const Box seen = seen_at(point.networks[j], point.inputs[j]);
-      check::Intervals at{{seen.lower.begin(), seen.lower.end()}, {seen.upper.begin(), seen.upper.end()}};
+      const std::vector<float>& x = point.inputs[j];
+      check::Intervals at{{x.begin(), x.end()}, {x.begin(), x.end()}};
       const files::Weights& network = *parts_.at(point.networks[j]);
       terms.push_back({{check::network_intervals(network, std::move(at)), {}}, 1, 1});
     }
@@ -75,13 +73,6 @@ class ValueSearch {
   }
 
  private:
-  /// What phi sees of a point: itself, or about its invariants, as they leave the clamp.
-  Box seen_at(const files::FunctionId& name, const std::vector<float>& x) const {
-    const Box point{{x.begin(), x.end()}, {x.begin(), x.end()}};
-    if (!files::maps_to_invariants(network_, function_)) return point;
-    return clamped(network_, {{name, invariant_box(name, point)}}).at(name);
-  }
-
   double share() { return std::ldexp(static_cast<double>(generator_() >> 11), -53); }
 
   /// Each coordinate at random, a third of them at an end.

@@ -21,7 +21,7 @@ struct AttainedEnds {
 /// the greatest is not above the function there, `value` of the least is not below it. Returns one entry per output;
 /// the points are empty if the box contains no float32.
 /// @param function "network" or "set:<phi kind>:<rho kind>", with 1 to `neighbours` of the kind and the ground's input.
-/// @param domain by part, finite, after the clamp; if the network has invariants: boxes of states, before the clamp.
+/// @param domain by part, finite, after the clamp.
 std::vector<AttainedEnds> attained_ends(const files::Network& network, const Domain& domain,
                                         const files::FunctionId& function, int neighbours,
                                         std::uint64_t seed = 1);

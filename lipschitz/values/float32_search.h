@@ -21,7 +21,7 @@ struct Float32Search {
 /// moves a set of points to a region with large errors, and then its worst point with steps of all sizes, down to
 /// neighbouring floats.
 /// @param function "network" or a set function, with exactly `neighbours` neighbours and the ground's input.
-/// @param domain by part, finite, after the clamp. NET has no invariants and is stored in float32.
+/// @param domain by part, finite, after the clamp. NET is stored in float32.
 Attained float32_error_found(const files::Network& network, const Domain& domain,
                              const files::FunctionId& function, int neighbours, const Float32Search& search);
 

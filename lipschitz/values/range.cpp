@@ -6,13 +6,11 @@
 
 #include "lipschitz/values/attained_values.h"
 #include "lipschitz/values/function_range.h"
-#include "lipschitz/values/invariant_box.h"
 #include "lipschitz/values/value_bounds.h"
 #include "nn/base/doubles.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -31,12 +29,11 @@ struct Ends {
 /// Bounds of all outputs of one function, for 1, 2, ... neighbours.
 class RangesOf {
  public:
-  /// @param states where the inputs are; `domain`: what phi sees of them.
-  RangesOf(const Network& network, const Domain& states, const Domain& domain, files::FunctionId function,
+  /// @param domain where the inputs are, after the clamp.
+  RangesOf(const Network& network, const Domain& domain, files::FunctionId function,
            const std::map<std::string, double>& rho_bound, const RangeOptions& options,
            std::function<void()> searched)
       : network_(network),
-        states_(states),
         function_(std::move(function)),
         names_(function_.parts()),
         is_set_(names_.size() == 2),
@@ -105,26 +102,13 @@ class RangesOf {
       before = now;
       if (is_set_ && n == 0) continue;
       range.neighbours_at_most = is_set_ ? n : 0;
-      attain(output, n, low, high, range);
+      range.greatest = values_.attained(output, 1, high);
+      range.least = values_.attained(output, -1, low);
       found.push_back(range);
     }
   }
 
-  /// Values of invariants are no rational numbers: they are enclosed, at states.
-  void attain(int output, int neighbours, const Candidates& low, const Candidates& high,
-              CertifiedRange& range) {
-    if (files::maps_to_invariants(network_, function_)) {
-      const std::vector<AttainedEnds> ends = attained_ends(network_, states_, function_, neighbours);
-      range.least = ends[static_cast<std::size_t>(output)].least;
-      range.greatest = ends[static_cast<std::size_t>(output)].greatest;
-      return;
-    }
-    range.greatest = values_.attained(output, 1, high);
-    range.least = values_.attained(output, -1, low);
-  }
-
   const Network& network_;
-  const Domain& states_;
   files::FunctionId function_;
   std::vector<files::FunctionId> names_;
   bool is_set_, only_kind_;
@@ -149,7 +133,7 @@ bool is_of_relu(const Network& network, const files::FunctionId& function) {
 }
 
 /// What a certificate states of a function with other activations, and values that it takes.
-std::vector<CertifiedRange> stated_ranges(const Network& network, const Domain& states, const Domain& domain,
+std::vector<CertifiedRange> stated_ranges(const Network& network, const Domain& domain,
                                           const files::FunctionId& function,
                                           const std::map<std::string, double>& rho_bound,
                                           const RangeOptions& options) {
@@ -157,7 +141,7 @@ std::vector<CertifiedRange> stated_ranges(const Network& network, const Domain& 
   for (const CertifiedValues& values :
        certified_values(network, domain, rho_bound, {options.neighbours, false, false, 0}, function)) {
     const std::vector<AttainedEnds> ends =
-        attained_ends(network, states, function, std::max(1, values.neighbours));
+        attained_ends(network, domain, function, std::max(1, values.neighbours));
     for (std::size_t i = 0; i < ends.size(); ++i) {
       CertifiedRange range;
       range.function = function;
@@ -220,8 +204,7 @@ std::vector<files::FunctionId> value_functions(const Network& network) {
 std::vector<CertifiedRange> ranges(const Network& network, const Domain& domain,
                                    const std::map<std::string, double>& rho_bound,
                                    const RangeOptions& options) {
-  const Domain inner = clamped(network, network.invariants ? invariant_boxes(domain) : domain);
-  const Domain& states = network.invariants ? domain : inner;
+  const Domain inner = clamped(network, domain);
   // One function after the other: each search uses all threads.
   std::vector<CertifiedRange> result;
   int done = 0, total = 0;
@@ -237,9 +220,8 @@ std::vector<CertifiedRange> ranges(const Network& network, const Domain& domain,
   };
   for (const files::FunctionId& function : functions) {
     const std::vector<CertifiedRange> found =
-        is_of_relu(network, function)
-            ? RangesOf(network, states, inner, function, rho_bound, options, searched).all()
-            : stated_ranges(network, states, inner, function, rho_bound, options);
+        is_of_relu(network, function) ? RangesOf(network, inner, function, rho_bound, options, searched).all()
+                                      : stated_ranges(network, inner, function, rho_bound, options);
     result.insert(result.end(), found.begin(), found.end());
   }
   return result;

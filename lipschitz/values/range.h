@@ -67,9 +67,7 @@ std::vector<files::FunctionId> value_functions(const files::Network& network);
 ///
 /// Functions with activations other than ReLU get the bounds of certified_values(), without branch and bound.
 ///
-/// For networks of rotation invariants, the boxes are those of the invariants, which enclose the invariants of the
-/// states.
-/// @param domain by part, finite; boxes of states if NET has invariants.
+/// @param domain by part, finite.
 /// @param rho_bound proved Lipschitz bounds of rho by kind, for the jump |f - f'| <= L |phi(x)|.
 std::vector<CertifiedRange> ranges(const files::Network& network, const Domain& domain,
                                    const std::map<std::string, double>& rho_bound,

@@ -57,7 +57,6 @@ std::string chain_words(const Network& network) {
   if (network.plain) return chains.front().first;
   std::string text;
   for (const auto& [words, names] : chains) text += (text.empty() ? "" : "; ") + names + ": " + words;
-  text += network.invariants ? "; phi of rotation invariants" : "";
   for (const std::string& composition : silent_compositions(network)) text += "; silent: " + composition;
   return text;
 }

@@ -28,7 +28,7 @@ Json chain_json(const std::vector<ChainStep>& chain);
 std::string chain_words(const std::vector<ChainStep>& chain);
 
 /// Describes all parts: "fc1 - ReLU - fc2" for a plain network; else each distinct chain with the parts that have it,
-/// "phi:large, phi:small: clamp - fc1 - ReLU - fc2; rho:small: ...", whether phi takes invariants, and silent
+/// "phi:large, phi:small: clamp - fc1 - ReLU - fc2; rho:small: ...", and silent
 /// compositions.
 std::string chain_words(const Network& network);
 

@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "nn/base/text.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert::files {
 namespace {
@@ -29,8 +28,6 @@ std::vector<std::string> ground_names() {
 std::vector<std::string> input_names(const Network& network, const FunctionId& function, int inputs) {
   if (function.is_rho()) return {};
   const bool is_ground = function.input_part().is_ground_phi();
-  if (network.invariants && function.is_phi())
-    return is_ground ? own_invariant_names() : neighbour_invariant_names();
   if (is_ground) return ground_names();
   if (!network.input_order.empty()) return network.input_order;
   if (inputs != 6) return {};
@@ -57,10 +54,7 @@ std::vector<FunctionId> functions(const Network& network) {
 }
 
 int inputs(const Network& network, const FunctionId& function) {
-  const FunctionId first = function.input_part();
-  if (maps_to_invariants(network, function))
-    return first.is_ground_phi() ? nn::kOwnState : nn::kRelativeState;
-  return parts(network).at(first)->inputs();
+  return parts(network).at(function.input_part())->inputs();
 }
 
 bool is_clamped(const FunctionId& part) {
@@ -72,11 +66,6 @@ std::vector<int> block_coordinates(const Network& network, const FunctionId& fun
   const int count = inputs(network, function);
   const std::vector<std::string> names = input_names(network, function, count);
   std::vector<int> result;
-  if (maps_to_invariants(network, function) && block != "all") {
-    throw std::invalid_argument("block_coordinates: " + function.name() +
-                                " is bounded for all inputs together, not for \"" + block +
-                                "\": its phi sees invariants of them");
-  }
   for (int k = 0; k < count; ++k) {
     const bool named = static_cast<std::size_t>(k) < names.size();
     const bool is_velocity = named && ends_with(names[k], "_m_s");
@@ -93,7 +82,7 @@ std::vector<int> block_coordinates(const Network& network, const FunctionId& fun
 
 std::vector<std::string> blocks(const Network& network, const FunctionId& function) {
   const int count = inputs(network, function);
-  if (function.is_rho() || count == 1 || maps_to_invariants(network, function)) return {};
+  if (function.is_rho() || count == 1) return {};
   std::vector<std::string> result;
   const std::vector<std::string> names = input_names(network, function, count);
   const auto has = [&names](const char* suffix) {

@@ -17,8 +17,7 @@ Parts parts(const Network& network);
 /// Returns every function of NET: its parts, then every set function, in alphabetical order.
 std::vector<FunctionId> functions(const Network& network);
 
-/// Returns the number of inputs of `function`. In a network with invariants, a set function takes the state and its phi
-/// takes the invariants.
+/// Returns the number of inputs of `function`.
 int inputs(const Network& network, const FunctionId& function);
 
 /// Returns true if NET's input clamp applies to `part`: to every phi except the ground's, and to a plain network.
@@ -27,14 +26,13 @@ bool is_clamped(const FunctionId& part);
 /// Returns the input coordinates of `function` that belong to `block`, in ascending order: "all"; "x<k>", the k-th
 /// coordinate, counted from 0; "position" and "velocity", the inputs whose names end in "_m" and "_m_s". If NET does
 /// not name its inputs, six inputs are taken as three of each; the ground's four are one position (-z) and three
-/// velocities. A set function of a network with invariants has only "all", since bounds on J hold for all inputs
-/// together.
+/// velocities.
 /// @throws std::invalid_argument if the function has no such block.
 std::vector<int> block_coordinates(const Network& network, const FunctionId& function,
                                    const std::string& block);
 
 /// Returns every block of `function` except "all": "position" and "velocity" if it has both, then each coordinate.
-/// Empty for a rho, whose inputs have no names, for a function of one input, and for a set function with invariants.
+/// Empty for a rho, whose inputs have no names, and for a function of one input.
 std::vector<std::string> blocks(const Network& network, const FunctionId& function);
 
 /// Returns the unit of a Lipschitz constant of `function` with respect to `block`, as far as NET states units: "gf/(m,

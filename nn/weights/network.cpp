@@ -11,7 +11,6 @@
 #include "nn/base/toml.h"
 #include "nn/weights/activation.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert::files {
 namespace {
@@ -65,7 +64,7 @@ class NetworkReader {
   }
 
   void read_input(const TomlTable& input) {
-    input.allow_only({"order", "invariants", "clamp"});
+    input.allow_only({"order", "clamp"});
     if (input.has("order")) {
       network_.input_order = input.texts("order");
       std::vector<std::string> sorted = network_.input_order;
@@ -74,14 +73,11 @@ class NetworkReader {
       if (twice != sorted.end()) input.refuse("order", in_quotes(*twice), "appears twice");
       if (sorted.empty()) input.refuse("order", "", "is empty");
     }
-    if (input.has("invariants")) read_invariants(input);
     if (!input.has("clamp")) return;
     const TomlTable clamp = input.table("clamp");
     clamp.allow_only({"lower", "upper"});
     InputClamp box = {clamp.numbers("lower"), clamp.numbers("upper")};
-    const std::size_t inputs = network_.invariants            ? nn::kNeighbourInvariants
-                               : network_.input_order.empty() ? box.lower.size()
-                                                              : network_.input_order.size();
+    const std::size_t inputs = network_.input_order.empty() ? box.lower.size() : network_.input_order.size();
     check_length(clamp, "lower", box.lower, inputs, "inputs");
     check_length(clamp, "upper", box.upper, inputs, "inputs");
     for (std::size_t i = 0; i < box.lower.size(); ++i) {
@@ -91,20 +87,6 @@ class NetworkReader {
       }
     }
     network_.clamp = std::move(box);
-  }
-
-  /// Invariants require a vertical force, since other quantities rotate with the vehicles, and the standard order of
-  /// inputs, since another order would give another J.
-  void read_invariants(const TomlTable& input) {
-    input.choice("invariants", {"rotation"});
-    if (network_.input_order != relative_state())
-      input.refuse(
-          "order", "", "invariants are made from a relative state",
-          "write order = [\"dp_x_m\", \"dp_y_m\", \"dp_z_m\", \"dv_x_m_s\", \"dv_y_m_s\", \"dv_z_m_s\"]");
-    if (network_.output_quantity != "force_z")
-      input.refuse("invariants", "\"rotation\"", "require a vertical force, which is unchanged by rotations",
-                   "write output = { quantity = \"force_z\", ... }, or leave invariants out");
-    network_.invariants = true;
   }
 
   static void check_length(const TomlTable& table, const std::string& key, const std::vector<double>& numbers,
@@ -183,10 +165,7 @@ class NetworkReader {
     const auto& [first_kind, first] = *network_.phi.begin();
     std::size_t inputs = network_.input_order.size();
     std::string because = "input.order names that many";
-    if (network_.invariants) {
-      inputs = nn::kNeighbourInvariants;
-      because = "there are that many input.invariants";
-    } else if (inputs == 0 && network_.clamp) {
+    if (inputs == 0 && network_.clamp) {
       inputs = network_.clamp->lower.size();
       because = "input.clamp has that many";
     }
@@ -194,11 +173,7 @@ class NetworkReader {
       check_size("phi", kind, "outputs", phi.outputs(), static_cast<std::size_t>(first.outputs()),
                  "all phi are summed, and phi." + first_kind + " has that many");
       if (kind == kGround) {
-        if (network_.invariants)
-          check_size("phi", kind, "inputs", phi.inputs(), nn::kOwnInvariants,
-                     "input.invariants: -z, |v_xy|, -v_z");
-        else
-          check_size("phi", kind, "inputs", phi.inputs(), kGroundInputs, "the vehicle's own -z and -v");
+        check_size("phi", kind, "inputs", phi.inputs(), kGroundInputs, "the vehicle's own -z and -v");
         continue;
       }
       if (inputs == 0) {
@@ -369,15 +344,9 @@ bool is_relu(const Network& network, const FunctionId& function) {
                      [&stored](const FunctionId& part) { return stored.at(part)->is_relu(); });
 }
 
-Network load_evaluated_network(const NetworkArguments& arguments) {
+Network load_network(const NetworkArguments& arguments) {
   Network network = load_any_network(arguments);
   require_relu(network, "this command is for ReLU networks");
-  return network;
-}
-
-Network load_network(const NetworkArguments& arguments) {
-  Network network = load_evaluated_network(arguments);
-  require_relative_states(network, "this command is for networks of relative states");
   return network;
 }
 

@@ -23,8 +23,8 @@ struct GammaStatement {
   Mode mode = Mode::kClip;  ///< kClip: at most `value`; kEqual: equal to it up to the stored precision
 };
 
-/// Bounds [lower, upper] to which the input of phi, either a neighbour's state or its invariants, is clamped. The clamp
-/// is part of the function. It does not apply to the ground's phi, whose input is the vehicle's own state.
+/// Bounds [lower, upper] to which the input of phi, a neighbour's state, is clamped. The clamp is part of the
+/// function. It does not apply to the ground's phi, whose input is the vehicle's own state.
 struct InputClamp {
   std::vector<double> lower, upper;
 };
@@ -51,16 +51,13 @@ ReadingOptions options_of(const Json& json);
 /// For a vehicle of kind r with neighbours x_1..x_n of kinds c_1..c_n, the deep set is
 ///   f(x) = rho_r(phi_ground(own) + sum_j phi_{c_j}(x_j)),
 /// where the ground term is present iff phi has the kind "ground"; f is 0 if `silent` lists r among these neighbours
-/// (compositions.h). With `invariants`, J(x_j) replaces x_j and K(own) replaces own (nn/invariants.h); see
-/// invariants.h.
+/// (compositions.h).
 ///
 /// Class invariant after load:
-/// - Every phi but "ground" has the same number of inputs, which is the length of `input_order`, unless there are
-///   invariants, and of the clamp, where these are given; "ground" has kGroundInputs.
+/// - Every phi but "ground" has the same number of inputs, which is the length of `input_order` and of the clamp,
+///   where these are given; "ground" has kGroundInputs.
 /// - All phi have the same number of outputs, which is every rho's number of inputs.
 /// - All rho have the same number of outputs, which is components(output_quantity) if that is stated.
-/// - With invariants, phi has kNeighbourInvariants inputs and "ground" has kOwnInvariants, `input_order` is the state
-///   that they are computed from, and the output is a vertical force.
 struct Network {
   std::string path;        ///< of network.toml; empty if weight files were given directly
   std::string sha256;      ///< of network.toml; empty likewise
@@ -72,7 +69,6 @@ struct Network {
   std::string output_quantity;           ///< "force_z", "force" or "torque"; empty if not stated
   std::string output_unit;               ///< "gf" or "N"; for torques "mN_m" or "N_m"; empty if not stated
   std::vector<std::string> input_order;  ///< "dp_x_m", ...; empty if not stated
-  bool invariants = false;               ///< `invariants = "rotation"`
   std::optional<InputClamp> clamp;
   std::optional<GammaStatement> gamma;
   /// `silent`, keyed by the vehicle's own kind: the alphabetically sorted kinds of the neighbours for which f is 0.
@@ -105,20 +101,14 @@ bool is_relu(const Network& network, const FunctionId& function);
 /// Applies with_activation() to every part (activation.h).
 Network with_activation(Network network, const std::string& activation);
 
-/// Same as load_network(), but also accepts networks with any activation, with invariants, and silent ones. Code that
-/// supports only ReLU networks of relative states calls load_network() instead.
+/// Same as load_network(), but accepts networks with any activation.
 Network load_any_network(const NetworkArguments& arguments);
 
-/// Loads a network that the evaluator supports (nn/deep_set.h): ReLU networks of relative states or invariants, silent
-/// or not.
-/// @throws as load_any_network() and require_relu().
-Network load_evaluated_network(const NetworkArguments& arguments);
-
-/// Loads NET, which must have ReLU activations and relative states as inputs; it may be silent. A `file` is a
+/// Loads NET, which must have ReLU activations, as the evaluator (nn/deep_set.h); it may be silent. A `file` is a
 /// network.toml if its name ends in ".toml" or its text names that schema. Paths of weight files in a network.toml are
 /// relative to its folder; the file also states the order of their layers.
 /// @throws InputError with line, field, value and hint; unknown keys are errors that suggest a known one.
-/// @throws as require_relu() and require_relative_states().
+/// @throws as require_relu().
 Network load_network(const NetworkArguments& arguments);
 
 /// Applies as_float32() to every part.

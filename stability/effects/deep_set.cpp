@@ -15,7 +15,7 @@ files::Network load(const EffectSpec& spec, const EffectContext& context) {
     throw files::InputError({"", "", "effect.network", "", "the effect deep_set needs a network",
                              "add network = \"network.toml\""});
   }
-  return files::load_evaluated_network(
+  return files::load_network(
       {{}, (std::filesystem::path(context.path).parent_path() / spec.network).string(), "", ""});
 }
 

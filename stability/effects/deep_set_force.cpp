@@ -85,7 +85,6 @@ DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
     set_.lower = network_.clamp->lower.data();
     set_.upper = network_.clamp->upper.data();
   }
-  set_.of_invariants = network_.invariants;
   silent_ = files::silent_counts(network_, rho->first);
   set_.silent = silent_.data();
   set_.num_silent = static_cast<int>(silent_.size()) / set_.num_kinds;
@@ -106,7 +105,7 @@ DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
 void DeepSetForce::reserve(int neighbours) {
   const auto count = static_cast<std::size_t>(neighbours);
   inputs_.resize(count * input_.size());
-  clamped_.resize(count * static_cast<std::size_t>(set_.phi_inputs()));
+  clamped_.resize(count * static_cast<std::size_t>(set_.inputs()));
   order_.resize(count);
   neighbours_.resize(count);
 }

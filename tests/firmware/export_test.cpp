@@ -25,44 +25,6 @@ TEST_F(Firmware, ExportPassesItsOwnSelfTestWhateverTheCompilerMayContract) {
   }
 }
 
-TEST_F(Firmware, ANetworkOfInvariantsIsExportedWithThemAndMatchFindsItWithout) {
-  files::Random random(4);
-  std::string toml = read_text(folder_ / "network.toml");
-  const auto replace = [&toml](const std::string& from, const std::string& to) {
-    ASSERT_NE(toml.find(from), std::string::npos) << from;
-    toml.replace(toml.find(from), from.size(), to);
-  };
-  replace("clamp = { lower = [-1,-1,-1,-2,-2,-2], upper = [1,1,1,2,2,2] }",
-          "invariants = \"rotation\"\nclamp = { lower = [0,-1,0,-2,0], upper = [1,1,1,2,1] }");
-  for (const auto& [part, inputs] : {std::pair{"phi.ground", 3}, {"phi.small", 5}, {"phi.large", 5}}) {
-    files::Weights narrow = weights(part);
-    files::Layer& first = narrow.layers.front();
-    first.inputs = inputs;
-    first.weights.resize(static_cast<std::size_t>(first.outputs * inputs));
-    files::save_safetensors(narrow, folder_ / ("of_" + std::string(part) + ".safetensors"), true);
-    replace("\"" + std::string(part) + ".safetensors", "\"of_" + std::string(part) + ".safetensors");
-  }
-  write_text(folder_ / "invariants.toml", toml);
-  const Outcome exported = run("swarmcert export invariants.toml -o turned");
-  ASSERT_EQ(exported.exit_code, 0) << exported.output;
-  for (const std::string compiler : {"g++ -O0", "g++ -O3 -march=native -ffp-contract=fast"}) {
-    const Outcome built =
-        run(compiler +
-            " -std=c++17 -Wall -Wextra -Werror -Iturned turned/swarmcert_network.cpp main.cpp -o flown");
-    ASSERT_EQ(built.exit_code, 0) << built.output;
-    EXPECT_EQ(run("./flown").exit_code, 0) << compiler;
-  }
-  EXPECT_EQ(run("swarmcert match invariants.toml turned").exit_code, 0);
-  std::string source = read_text(folder_ / "turned/swarmcert_network.cpp");
-  const std::string sets = "lower, upper, true}", without = "lower, upper, false}";
-  ASSERT_NE(source.find(sets), std::string::npos);
-  source.replace(source.find(sets), sets.size(), without);
-  write_text(folder_ / "turned/swarmcert_network.cpp", source);
-  EXPECT_EQ(run("swarmcert match invariants.toml turned").exit_code, 1);
-  EXPECT_NE(run("g++ -std=c++17 -Iturned turned/swarmcert_network.cpp main.cpp -o flown").exit_code, 0)
-      << "five inputs are no relative state";
-}
-
 TEST_F(Firmware, ASilentCompositionIsExportedAndMatchFindsItWithout) {
   std::string toml = read_text(folder_ / "network.toml");
   toml.insert(toml.find("[input]"), "silent = [\"large+small>small\", \">large\"]\n");

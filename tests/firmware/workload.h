@@ -30,7 +30,6 @@ class Workload {
     phi_small_.fill(next);
     phi_large_.fill(next);
     ground_.fill(next);
-    invariants_.fill(next);
     rho_.fill(next);
   }
 
@@ -128,12 +127,6 @@ class Workload {
         neighbours[k] = other;
       }
     }
-    const nn::Mlp<float> of_invariants = invariants_.mlp();
-    const nn::DeepSet<float> turned{nullptr, &of_invariants, 1, rho_.mlp(), nullptr, nullptr, true};
-    for (int j = 0; j < count; ++j) neighbours[j].kind = 0;
-    float y = 0;
-    sink_(static_cast<std::uint32_t>(nn::evaluate(turned, own, neighbours, count, &y, workspace)));
-    put(y);
     if (i % 4 != 0) return;
     for (int j = 0; j < count; ++j) {
       controller::NeighbourTrack<float>& track = tracks_[j];
@@ -243,7 +236,6 @@ class Workload {
   FourLayers<6, 25, kHidden> phi_small_;
   FourLayers<6, 15, kHidden> phi_large_;  // blocks of 8, 4, 2 and 1
   FourLayers<4, 25, kHidden, nn::Layout::kRows> ground_;
-  FourLayers<nn::kNeighbourInvariants, 15, kHidden> invariants_;
   FourLayers<kHidden, kHidden, 1> rho_;
   Settings settings_ = crazyflie_settings();
   controller::FlightMemory<float> memory_;

@@ -50,7 +50,7 @@ void forge_documents(const std::string& folder) {
   files::NetworkArguments arguments;
   arguments.file = folder + "/files/network/network.toml";
   try {
-    const files::Network network = files::load_evaluated_network(arguments);
+    const files::Network network = files::load_network(arguments);
     bill = gate::bill_of_materials(&network, files, rows);
   } catch (const std::exception&) {  // the forger's network is damaged: only the hashes are renewed
   }

@@ -12,7 +12,6 @@
 #include "nn/base/content_hash.h"
 #include "nn/base/json.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 
 namespace swarmcert {
 namespace {
@@ -198,36 +197,6 @@ TEST(BoxCertificate, IsRefusedWithTheActivationsInAnotherOrder) {
   Json values = made;  // with the bounds of the other network, so that only the values are wrong
   values["bounds"] = lipschitz::certificate(other, certify(other, on_box(domain)))["bounds"];
   EXPECT_NE(refusal(values).find("the values leave the bounds"), std::string::npos) << refusal(values);
-}
-
-/// Networks of rotation invariants get no bounds on a box, not even for their parts.
-TEST(BoxCertificate, IsRefusedOfRotationInvariants) {
-  std::mt19937 generator(95);
-  Network network = tests::deep_set(with(tests::random_network({5, 6, 4}, generator), Activation::kTanh),
-                                    with(tests::random_network({4, 5, 1}, generator), Activation::kTanh));
-  const Domain domain = {{"phi:default", cube(5, 0.2)}};
-  Json made = lipschitz::certificate(network, certify(network, on_box(domain)));
-  EXPECT_TRUE(check::check(made, network).accepted);
-  network.invariants = true;
-  network.input_order = files::relative_state();
-  network.output_quantity = "force_z";
-  made["network"].update(check::canonical_json(network), true);  // besides "as" and samples
-  made["statement"] = check::statement_for(network);
-  for (const char* const method : {"local_sdp", "local_product"}) {
-    Json changed = made;
-    Json bound;
-    for (const Json& one : made["bounds"])
-      if (one["function"] == "phi:default") bound = one;
-    bound["upper_method"] = method;
-    bound["unit"] = files::unit(network, "phi:default", "all");
-    if (std::string(method) == "local_product") bound["proof"] = nullptr;
-    changed["bounds"] = Json::array({bound});
-    changed["content_sha256"] = files::content_sha256(changed);
-    EXPECT_FALSE(check::check(changed, network).accepted) << method;
-  }
-  EXPECT_THROW(check::chain_on_box(network, "phi:default", "all", {}, intervals(domain.at("phi:default"))),
-               std::domain_error);
-  EXPECT_THROW(certify(network, on_box(domain)), std::invalid_argument);
 }
 
 TEST(BoxCertificate, HoldsForAnIntervalOfOnePoint) {

@@ -56,43 +56,6 @@ std::string with(const std::string& from, const std::string& to) {
   return text.replace(at, from.size(), to);
 }
 
-/// Returns kFull with phi that take invariants.
-std::string of_invariants() {
-  std::string text = kFull;
-  const auto replace = [&text](const std::string& from, const std::string& to) {
-    const std::size_t at = text.find(from);
-    ASSERT_NE(at, std::string::npos) << from;
-    text.replace(at, from.size(), to);
-  };
-  replace("clamp = { lower = [-1, -1, -1, -2, -2, -2], upper = [1, 1, 1, 2, 2, 2] }",
-          "invariants = \"rotation\"\nclamp = { lower = [0, -1, 0, -2, 0], upper = [1, 1, 2, 2, 2] }");
-  replace("6x20", "5x20");
-  replace("4x20", "3x20");
-  return text;
-}
-
-TEST(NetworkToml, InvariantsAreOfARelativeStateAndOfAVerticalForceAndPhiTakesAsMany) {
-  const Network network = parse(of_invariants());
-  EXPECT_TRUE(network.invariants);
-  EXPECT_EQ(network.clamp->lower.size(), 5u);
-  EXPECT_FALSE(parse(kFull).invariants);
-  const auto refused = [](const std::string& from, const std::string& to,
-                          const std::vector<std::string>& pieces) {
-    std::string text = of_invariants();
-    return network_is_refused(text.replace(text.find(from), from.size(), to), pieces);
-  };
-  EXPECT_TRUE(refused("\"rotation\"", "\"all\"", {"line 6: input.invariants", "rotation"}));
-  EXPECT_TRUE(refused("\"dp_x_m\", \"dp_y_m\"", "\"dp_y_m\", \"dp_x_m\"", {"input.order", "relative state"}));
-  EXPECT_TRUE(
-      refused("order = [\"dp_x_m\", \"dp_y_m\", \"dp_z_m\", \"dv_x_m_s\", \"dv_y_m_s\", \"dv_z_m_s\"]", "",
-              {"input.order", "relative state"}));
-  EXPECT_TRUE(refused("\"force_z\"", "\"force\"", {"input.invariants", "vertical force"}));
-  EXPECT_TRUE(
-      refused("[0, -1, 0, -2, 0]", "[0, -1, 0, -2, 0, 0]", {"input.clamp.lower", "there are 5 inputs"}));
-  EXPECT_TRUE(refused("5x20", "6x20", {"phi.small.weights", "must be 5"}));
-  EXPECT_TRUE(refused("3x20", "4x20", {"phi.ground.weights", "must be 3"}));
-}
-
 TEST(NetworkToml, SilentCompositionsAreOfKindsThatItHasInAnyOrderAndEachOnce) {
   const auto silent = [](const std::string& list) {
     return with("[input]", "[phi.large]\nweights = \"6x20\"\n[input]")

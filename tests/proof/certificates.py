@@ -170,19 +170,6 @@ def with_skips(folder, generator):
     return net
 
 
-def of_invariants(folder, generator):
-    """A network.toml with two kinds and ground, whose phi take rotation invariants."""
-    for name, sizes in (("five", [5, 5, 4]), ("more", [5, 4, 4, 4]), ("three", [3, 5, 4])):
-        (folder / f"{name}.safetensors").write_bytes(safetensors(sizes, generator))
-    net, text = folder / "invariants.toml", (folder / "network.toml").read_text()
-    text = text.replace("clamp = { lower = [-1,-1,-1,-2,-2,-2], upper = [1,1,1,2,2,2] }",
-                        'invariants = "rotation"\nclamp = { lower = [0,-1,0,-2,0], upper = [1,1,1,2,2] }')
-    for old, new in (("small", "five"), ("large", "more"), ("ground", "three")):
-        text = text.replace(f'"{old}.safetensors"', f'"{new}.safetensors"')
-    net.write_text(text)
-    return net
-
-
 def silent(folder):
     """The network of heterogeneous(), silent next to a small neighbour, alone or together with a large one."""
     net = folder / "silent.toml"

@@ -182,7 +182,7 @@ Constants largest(const Bounds& bounds, const Function& function, const Upper& u
 
 files::Network force_network(const DisturbanceArguments& arguments, std::vector<std::string>& inputs,
                              std::vector<std::string>& notes) {
-  files::Network network = load_evaluated_net(arguments.network);
+  files::Network network = load_net(arguments.network);
   files::require_force_z(network);
   for (const std::string& path : input_files(network)) inputs.push_back(path);
   for (const std::string& composition : files::silent_compositions(network))

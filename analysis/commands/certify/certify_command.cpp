@@ -15,14 +15,12 @@
 #include "analysis/commands/shared/output_folder.h"
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/canonical_network.h"
-#include "lipschitz/lower/slope_estimate.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
 #include "nn/base/text.h"
 #include "nn/weights/chain.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 #include "nn/weights/samples.h"
 
 namespace swarmcert::analysis {
@@ -191,23 +189,6 @@ void add_comparisons(const files::Network& network, const lipschitz::CertifyOpti
   });
 }
 
-/// Adds sampled slopes for bounds without a witness. None with --nodes 0, which also disables lower bounds.
-void add_slope_estimates(const files::Network& network, const lipschitz::CertifyOptions& options,
-                         CertifyOutput& output) {
-  if (options.lower.rounds == 0) return;
-  const std::vector<CertifiedBound>& bounds = output.found.bounds;
-  output.slope_estimates.resize(bounds.size());
-  files::parallel_for(static_cast<int>(bounds.size()), options.jobs, [&](int i) {
-    const CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
-    if (bound.has_witness) return;
-    lipschitz::SlopeEstimateOptions sampling;
-    sampling.seed = options.lower.seed;
-    sampling.domain = options.domain;
-    sampling.stop = lipschitz::Stop(options.cancelled);
-    output.slope_estimates[static_cast<std::size_t>(i)] = lipschitz::slope_estimate(network, bound, sampling);
-  });
-}
-
 /// Adds ranges and float32 errors over the box of --domain, or over the set that the clamp lets through.
 void add_ranges(const files::Network& network, const CertifyOptions& options, Progress& progress,
                 CertifyOutput& output) {
@@ -247,25 +228,18 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Pr
   output.float32_errors = lipschitz::float32_errors(network, domain, bounds, float32);
 }
 
-/// Float32 errors, and branch and bound without a box, require ReLU. For rotation invariants only bounds for all inputs
-/// are proved.
+/// Float32 errors, and branch and bound without a box, require ReLU.
 void refuse_what_is_for_relu(const files::Network& network, const CertifyOptions& options) {
   struct Asked {
     bool is_asked;
     const char* option;
-    bool is_for_relu;
   };
   const Asked all[] = {
-      {!options.domain.empty(), "--domain", false},
-      {options.range, "--range", false},
-      {options.explain, "--explain", true},
-      {options.input_step > 0, "--input-step, for the float32 error,", true},
-      {options.method == "branch" && options.domain.empty(), "--method branch without --domain", true}};
+      {options.explain, "--explain"},
+      {options.input_step > 0, "--input-step, for the float32 error,"},
+      {options.method == "branch" && options.domain.empty(), "--method branch without --domain"}};
   for (const Asked& one : all) {
-    if (!one.is_asked) continue;
-    const std::string option = one.option;
-    if (one.is_for_relu) files::require_relu(network, option + " is for ReLU networks");
-    files::require_relative_states(network, option + " is for networks of relative states");
+    if (one.is_asked) files::require_relu(network, std::string(one.option) + " is for ReLU networks");
   }
 }
 
@@ -317,7 +291,6 @@ CertifyOutput find_all(const files::Network& network, const CertifyOptions& opti
   output.seed = options.certify.lower.seed;
   output.max_lipschitz = options.max_lipschitz;
   output.domain_file = options.domain;
-  add_slope_estimates(network, options.certify, output);
   if (options.explain) add_comparisons(network, options.certify, output);
   if (!options.domain.empty() || options.range) add_ranges(network, options, progress, output);
   output.verdict = judge(output.found, options.max_lipschitz);

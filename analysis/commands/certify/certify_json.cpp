@@ -143,8 +143,6 @@ Json bound_json(const files::Network& network, const CertifyOutput& output, std:
   json["lower_witness"] = witness_json(bound.lower);
   json["product_upper"] = bound.product.value();
   json["search_rounds"] = bound.lower.rounds;
-  if (!bound.has_witness) json["lower_reason"] = kNoLowerBound;
-  if (const auto estimate = slope_estimate_of(output, i)) json["slope_estimate"] = estimate->value();
   if (bound.branch_stop != lipschitz::BranchStop::kNothingRun) json["branch_stop"] = name(bound.branch_stop);
   if (bound.nodes > 0) {
     json["nodes"] = bound.nodes;

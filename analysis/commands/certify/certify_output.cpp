@@ -37,10 +37,6 @@ double slope_found(const CertifiedBound& bound) {
   return bound.lower.witness ? bound.lower.witness->slope.value() : 0;
 }
 
-std::optional<lipschitz::Estimate> slope_estimate_of(const CertifyOutput& output, std::size_t bound) {
-  return bound < output.slope_estimates.size() ? output.slope_estimates[bound] : std::nullopt;
-}
-
 const lipschitz::CertifiedValues* in_certificate(const CertifyOutput& output,
                                                  const files::FunctionId& function, int neighbours) {
   for (const lipschitz::CertifiedValues& values : output.found.values)
@@ -225,12 +221,6 @@ void print_bounds(const files::Network& network, const CertifyOutput& output) {
     if (unproved && bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun && !is_interrupted(bound.sdp.stop)) {
       fmt::print("    no bound from the semidefinite program could be proved: {}\n", name(bound.sdp.stop));
     }
-    if (const auto estimate = slope_estimate_of(output, i)) {
-      fmt::print("    steepest slope of sampled pairs, in double: {:.6g} (estimate)", estimate->value());
-      if (estimate->value() > 0)
-        fmt::print("; upper / estimate: {:.3f}", bound.upper.value() / estimate->value());
-      fmt::print("\n");
-    }
     const std::string interruption = interruption_words(bound);
     if (!interruption.empty()) fmt::print("    {}\n", interruption);
     const std::string outlook = branch_outlook_words(bound);
@@ -239,9 +229,6 @@ void print_bounds(const files::Network& network, const CertifyOutput& output) {
   if (found.domain.empty() && std::any_of(found.bounds.begin(), found.bounds.end(),
                                           [](const CertifiedBound& bound) { return !bound.is_relu; }))
     fmt::print("  {}\n", kForReluOnly);
-  if (std::any_of(found.bounds.begin(), found.bounds.end(),
-                  [](const CertifiedBound& bound) { return !bound.has_witness; }))
-    fmt::print("  {}\n", kNoLowerBound);
   if (!network.silent.empty())
     fmt::print("  {}{}\n", kWhereSilent, fmt::join(files::silent_compositions(network), ", "));
   if (!network.rho.empty()) {

@@ -19,8 +19,6 @@ struct CertifyOutput {
   lipschitz::Certification found;
   std::vector<std::optional<lipschitz::Comparison>>
       comparisons;  ///< one per bound of `found`; empty if not requested
-  /// One per bound of `found`, set if the bound has no witness; empty if not requested.
-  std::vector<std::optional<lipschitz::Estimate>> slope_estimates;
   std::vector<lipschitz::CertifiedRange> ranges;
   std::vector<lipschitz::Float32Error> float32_errors;
   lipschitz::Verdict verdict = lipschitz::Verdict::kInconclusive;
@@ -35,13 +33,8 @@ struct CertifyOutput {
   bool is_interrupted() const { return lipschitz::is_interrupted(found) || ranges_cut_short; }
 };
 
-/// Note for bounds over all inputs of functions with activations other than ReLU or with rotation invariants as inputs.
-inline constexpr char kForReluOnly[] =
-    "branch and bound over all inputs is for ReLU networks of relative states";
-
-/// Note for functions of rotation invariants.
-inline constexpr char kNoLowerBound[] =
-    "of functions of rotation invariants upper bounds for all inputs are proved, and no lower bounds";
+/// Note for bounds over all inputs of functions with activations other than ReLU.
+inline constexpr char kForReluOnly[] = "branch and bound over all inputs is for ReLU networks";
 
 /// Note for networks that output zero in some compositions; the names of the compositions follow.
 inline constexpr char kWhereSilent[] =
@@ -53,9 +46,6 @@ std::string output_unit(const files::Network& network);
 
 /// The steepest slope found between two points, a lower bound; 0 if none was found.
 double slope_found(const lipschitz::CertifiedBound& bound);
-
-/// The sampled slope of bound number `bound`; nothing if it was not requested.
-std::optional<lipschitz::Estimate> slope_estimate_of(const CertifyOutput& output, std::size_t bound);
 
 /// Value bounds that the certificate states for the function; null if it leaves them out.
 const lipschitz::CertifiedValues* in_certificate(const CertifyOutput& output,

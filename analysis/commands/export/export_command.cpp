@@ -49,11 +49,9 @@ std::string certificate_of(const files::Network& network, const std::string& pat
       refuse("network.weights." + part + ".chain", "",
              "is not the chain that is exported: " + files::chain_words(files::chain(network, id)));
   }
-  const bool rests_on_description = network.invariants || !network.silent.empty();
-  if (rests_on_description && certificate["network"].value("description_sha256", "") != network.sha256)
+  if (!network.silent.empty() && certificate["network"].value("description_sha256", "") != network.sha256)
     refuse("network.description_sha256", "",
-           "is not the hash of " + network.path +
-               ", which states the inputs of phi and the silent compositions");
+           "is not the hash of " + network.path + ", which states the silent compositions");
   const bool certified_as_float32 = certificate["network"].value("as", files::Json()) == "float32";
   if (as_float32 && !certified_as_float32)
     refuse("network.as", "null",

@@ -28,7 +28,6 @@
 #include "nn/base/toml.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 #include "stability/model.h"
 
 namespace swarmcert::analysis {
@@ -86,10 +85,7 @@ files::Json description(const files::Network& network) {
   return {{"output", {{"quantity", network.output_quantity}, {"unit", network.output_unit}}},
           {"gamma", std::move(gamma)},
           {"silent", files::silent_compositions(network)},
-          {"input",
-           {{"order", network.input_order},
-            {"invariants", network.invariants ? files::Json("rotation") : files::Json()},
-            {"clamp", std::move(clamp)}}}};
+          {"input", {{"order", network.input_order}, {"clamp", std::move(clamp)}}}};
 }
 
 void print_description(const files::Network& network) {
@@ -104,9 +100,7 @@ void print_description(const files::Network& network) {
                is_layer ? "layer" : "network");
   }
   fmt::print("\n");
-  if (network.invariants) fmt::print("  phi sees rotation invariants of dp and dv, in this order:\n");
-  const std::vector<std::string>& order =
-      network.invariants ? files::neighbour_invariant_names() : network.input_order;
+  const std::vector<std::string>& order = network.input_order;
   for (std::size_t k = 0; k < order.size(); ++k) {
     fmt::print("  input {}: {}", k, order[k]);
     if (network.clamp) fmt::print(", clamped to {} .. {}", network.clamp->lower[k], network.clamp->upper[k]);

@@ -12,7 +12,7 @@ void declare_as(CLI::App& app, std::string& as) {
 
 files::Network load_flown_net(const files::NetworkArguments& arguments, const std::string& as,
                               bool& is_rounded) {
-  files::Network network = load_evaluated_net(arguments);
+  files::Network network = load_net(arguments);
   is_rounded = false;
   for (const auto& [part, weights] : files::parts(network)) {
     if (weights->precision == files::Precision::kFloat32) continue;

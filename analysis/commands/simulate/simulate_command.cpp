@@ -170,7 +170,7 @@ stability::Swarm read_swarm(const SimulateOptions& options, std::vector<std::str
 /// @param inputs receives the paths of the network's files.
 std::unique_ptr<files::Network> read_network(const files::NetworkArguments& arguments,
                                              std::vector<std::string>& inputs) {
-  auto network = std::make_unique<files::Network>(load_evaluated_net(arguments));
+  auto network = std::make_unique<files::Network>(load_net(arguments));
   for (const std::string& path : input_files(*network)) inputs.push_back(path);
   return network;
 }

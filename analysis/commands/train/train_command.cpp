@@ -148,10 +148,6 @@ void check_folds(const TrainOptions& options) {
 /// Converts trainer options given as words on the command line.
 void choose_trainer(const CommonOptions& common, TrainOptions& options) {
   options.sizes.ground = !options.no_ground;
-  options.sizes.invariants = options.symmetry == "exact";
-  if (options.sizes.invariants && options.quantity != "force_z")
-    throw UsageError("--symmetry exact is for the vertical force; with --quantity " + options.quantity +
-                     " use --symmetry vertical");
   training::TrainerOptions& trainer = options.run.trainer;
   trainer.gamma.scope = options.gamma_scope == "layer" ? files::GammaStatement::Scope::kLayer
                                                        : files::GammaStatement::Scope::kNetwork;

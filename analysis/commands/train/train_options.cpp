@@ -52,10 +52,8 @@ void declare_samples(CLI::App& app, TrainOptions& options) {
       ->capture_default_str();
   app.add_option("--symmetry", options.symmetry,
                  "vertical: every epoch rotates every sample about the vertical and mirrors it, including "
-                 "its force or torque; exact: the networks receive inputs invariant under rotation (vertical "
-                 "force only); none: "
-                 "samples as recorded")
-      ->check(CLI::IsMember({"vertical", "exact", "none"}))
+                 "its force or torque; none: samples as recorded")
+      ->check(CLI::IsMember({"vertical", "none"}))
       ->capture_default_str();
 }
 

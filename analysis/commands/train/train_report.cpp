@@ -84,8 +84,8 @@ void add_map(Report& report, const LearningData& data, const learning::Run& run,
       const float x = -0.5f + static_cast<float>(i) / (kSteps - 1);
       const float z = -0.3f + 1.2f * static_cast<float>(j) / (kSteps - 1);
       const int ground = data.layout.find(files::FunctionId::ground_phi());
-      if (ground >= 0) grid.add_input(ground, learning::seen_of_own({-0.6f, 0, 0, 0}, data.invariants));
-      grid.add_input(phi, learning::seen_of_neighbour({x, 0, z, 0, 0, 0}, data.invariants));
+      if (ground >= 0) grid.add_input(ground, {-0.6f, 0, 0, 0});
+      grid.add_input(phi, {x, 0, z, 0, 0, 0});
       grid.add_sample(rho, std::vector<float>(static_cast<std::size_t>(grid.outputs), 0.0f));
     }
   }

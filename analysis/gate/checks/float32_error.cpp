@@ -21,8 +21,6 @@ Run read_float32_error(const files::TomlTable& table, Policy& policy) {
   if (options.input_step < 0) table.refuse("input_step", "", "must not be negative");
   return [limit = *limit, options](Evidence& evidence, Checks& checks) mutable {
     if (!evidence.release().is_float32) throw Unfounded("the policy states that float64 is used in flight");
-    if (evidence.flown().invariants)
-      throw Unfounded("float32 errors are bounded of networks of relative states, not of invariants");
     options.jobs = evidence.settings().jobs;
     const auto errors =
         lipschitz::float32_errors(evidence.flown(), evidence.domain(), evidence.global_bounds(), options);

@@ -7,7 +7,6 @@
 #include "nn/base/input_error.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/invariants.h"
 #include "stability/effects/deep_set_force.h"
 
 namespace swarmcert::analysis {
@@ -82,7 +81,6 @@ Index component(const std::string& name) {
 }  // namespace
 
 LearnedForce::LearnedForce(const files::Network& network, const std::string& kind, int neighbours) {
-  files::require_relative_states(network, "a tube requires a network of relative states");
   stability::DeepSetForce(network, kind, {kind});  // rejects networks that cannot be used in flight
   std::vector<std::string> kinds;
   for (const auto& [name, weights] : network.phi)

@@ -25,7 +25,7 @@ inline int state_size(int neighbours) { return neighbours * kPerNeighbour + kOwn
 class LearnedForce {
  public:
   /// Selects networks as stability::DeepSetForce does.
-  /// @throws files::InputError as DeepSetForce, and if the network has invariants, or phi networks of different depth
+  /// @throws files::InputError as DeepSetForce, or phi networks of different depth
   ///     that cannot be brought to a common depth.
   LearnedForce(const files::Network& network, const std::string& kind, int neighbours);
   LearnedForce(const LearnedForce&) = delete;  // forms refer to its layers

@@ -200,37 +200,11 @@ let check_activations state where bound names =
           "%s: a bound from slopes of single numbers%s" where of_
       end) activations
 
-(* Functions of states, whose invariants phi sees: bounded in units of how steep these are. *)
-let observed_by part = if part = "phi:ground" then Proved.Vehicle else Neighbour
-let check_of_invariants state bound names f where ~scale ~neighbours upper =
-  let of_ = " of a function of rotation invariants" in
-  require (find where "domain" bound = Text "global" && find where "upper_method" bound <> Text "branch")
-    "%s: a bound on a box%s" where of_;
-  require (List.for_all (fun key -> find where key bound = Null) [ "lower"; "lower_hex"; "lower_witness" ])
-    "%s: a lower bound%s" where of_;
-  require (scale = []) "%s: a scale%s" where of_;
-  require (find where "block" bound = Text "all") "%s is bounded for all inputs together" where;
-  let observed = observed_by (List.hd names) and index = Functions.index state.net in
-  let slope = Proved.slope_of_invariants observed and count = Proved.number_of_invariants observed in
-  let alike x = List.init count (fun _ -> x) in
-  let claim = Proved.Slope_at_most (function_of state names, alike true, alike slope, upper) in
-  (match find where "upper_method" bound, find where "proof" bound with
-   | Text ("sdp" | "eclipse_fast"), proof ->
-     let neurons = hidden_neurons state names in
-     prove_by state claim (inequality state claim where ~neurons ~upper proof) (no_factor where)
-   | Text "product", Null -> check_product state where names claim ~largest:slope upper
-   | _ -> rejected "%s: unknown upper_method" where);
-  prove state (Slope_of_states (observed, index (List.hd names), index (List.nth names 1), upper)) Proved.By_invariants
-    (where ^ ": claims less than the bound times the slope of the invariants");
-  state.upper_bounds <- state.upper_bounds + 1;
-  Hashtbl.replace state.uppers (f, "all", neighbours) (upper, Proved_here)
-
 (* From the slopes that activations have on the box. *)
 let local_methods = [ Text "local_sdp"; Text "local_product" ]
 let check_local state where bound names ~func ~moves ~exact_scale ~upper =
   require (find where "domain" bound = Text "box" && not (Functions.starts_with "rho:" (List.hd names)))
     "%s: slopes on a box of a bound without one" where;
-  require (not state.net.invariants) "%s: slopes on a box of a network of rotation invariants" where;
   let is_product = find where "upper_method" bound = Text "local_product" and proof = find where "proof" bound in
   require (not is_product || proof = Null) "%s: unknown upper_method" where;
   let claim = Proved.Slope_in_box (func, moves, exact_scale, box_of state where (List.hd names), upper) in
@@ -248,7 +222,6 @@ let check_slope_tree state where bound names ~func ~moves ~exact_scale ~upper =
   require (find where "domain" bound = Text "box" && find here "form" json = Null)
     "%s: a bound by parts for other activations than ReLU is for a box, without a form" where;
   require (not (Functions.starts_with "rho:" moved)) "%s: rho has no box" where;
-  require (not state.net.invariants) "%s: slopes on a box of a network of rotation invariants" where;
   let rho = Exact.of_float (Box_parts.rho_of where json ~upper) and neurons = hidden_neurons state names in
   let multipliers = Array.of_list (List.map (Box_parts.hex_words where) (list where (find here "multipliers" json))) in
   let reader = Box_parts.reader where (text where (find here "tree" json)) in
@@ -335,9 +308,7 @@ let check_bound state bound =
       (find where "upper_hex" bound)) in
   check_status where bound;
   check_activations state where bound names;
-  if Functions.maps_to_invariants state.net f then
-    check_of_invariants state bound names f where ~scale ~neighbours upper
-  else check_bound_by_theorems state bound names f block where ~scale ~neighbours ~upper
+  check_bound_by_theorems state bound names f block where ~scale ~neighbours ~upper
 
 (* Laws *)
 
@@ -378,13 +349,7 @@ let check_law state law =
     | _ -> false in
   let is_written = List.for_all (fun (_, _, _, source) -> source = Proved_here) bounds in
   let everywhere = List.for_all (fun (_, _, _, source) -> source = Proved_here || source = By_parts) bounds in
-  if state.net.invariants then begin
-    let kind (f, n, _, _) = (observed_by (part f), Functions.index state.net (part f)), Z.of_int n in
-    let rho = Functions.index state.net ("rho:" ^ rho) in
-    prove state (Law_of_states (stacked, List.map kind bounds, rho, upper)) By_triangle reason;
-    state.upper_bounds <- state.upper_bounds + 1
-  end
-  else if not (everywhere || List.for_all has_box bounds) then
+  if not (everywhere || List.for_all has_box bounds) then
     not_checked state (Printf.sprintf "%s: rests on a bound that is not checked" where)
   else begin
     let kind (f, n, _, _) = (Functions.index state.net (part f), Functions.moves state.net f block), Z.of_int n in

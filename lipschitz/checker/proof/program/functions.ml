@@ -20,18 +20,12 @@ let index (net : Network.t) part =
   go 0 net.parts
 let is_relu net part = Weights.is_relu (weights net part)
 let inputs net part = Weights.inputs (Weights.first_layer (weights net part))
-(* Set functions that take states, and whose phi sees invariants of them. *)
-let maps_to_invariants (net : Network.t) f = net.invariants && starts_with "set:" f
 let has_ground (net : Network.t) = List.mem_assoc "phi:ground" net.parts
 
 let ground_names = [ "minus_z_m"; "minus_v_x_m_s"; "minus_v_y_m_s"; "minus_v_z_m_s" ]
 let six_names = [ "dp_x_m"; "dp_y_m"; "dp_z_m"; "dv_x_m_s"; "dv_y_m_s"; "dv_z_m_s" ]
-let invariant_names = [ "dp_xy_m"; "scaled_dp_z_m"; "dv_xy_m_s"; "scaled_dv_z_m_s"; "dp_xy_ahead_m" ]
-let ground_invariant_names = [ "minus_z_m"; "v_xy_m_s"; "minus_v_z_m_s" ]
 let input_names (net : Network.t) part =
-  if net.invariants && not (starts_with "rho:" part) then
-    if part = "phi:ground" then ground_invariant_names else invariant_names
-  else if part = "phi:ground" then ground_names
+  if part = "phi:ground" then ground_names
   else if starts_with "rho:" part then []
   else if net.order <> [] then net.order
   else if inputs net part = 6 then six_names else []
@@ -85,7 +79,6 @@ let words (net : Network.t) =
   match net.parts with
   | [ "network", _ ] -> chain_words (chain net "network")
   | parts -> String.concat "; " (List.map (fun (w, names) -> names ^ ": " ^ w) (List.fold_left add [] parts))
-    ^ (if net.invariants then "; phi of rotation invariants" else "")
     ^ String.concat "" (List.map (( ^ ) "; silent: ") (silent_names net))
 
 (* The networks as the theorems speak of them. *)

@@ -33,7 +33,6 @@ let compositions = list (list natural)
 let box = list (pair number number)
 let term out { Proved.phi; inputs_in; fewest; most } =
   Printf.bprintf out "(Term %a %a (%a) (%a))" natural phi box inputs_in integer fewest integer most
-let observed out o = Buffer.add_string out (match o with Proved.Neighbour -> "Neighbour" | Vehicle -> "Vehicle")
 let claim out = function
   | Proved.Norm_at_most (p, k, u) -> Printf.bprintf out "Norm_at_most %a %a %a" natural p natural k number u
   | Norm_at_least (p, k, l) -> Printf.bprintf out "Norm_at_least %a %a %a" natural p natural k number l
@@ -53,11 +52,6 @@ let claim out = function
   | Step_at_most (silent, boxes, phi, rho, u) ->
     Printf.bprintf out "Step_at_most %a %a %a %a %a" compositions silent (list (pair natural box)) boxes natural phi
       natural rho number u
-  | Slope_of_states (o, phi, rho, u) ->
-    Printf.bprintf out "Slope_of_states %a %a %a %a" observed o natural phi natural rho number u
-  | Law_of_states (stacked, kinds, rho, u) ->
-    Printf.bprintf out "Law_of_states %a %a %a %a" flag stacked (list (pair (pair observed natural) integer)) kinds
-      natural rho number u
   | Jump_at_most (phi, b, rho, u) ->
     Printf.bprintf out "Jump_at_most %a %a %a %a" natural phi box b natural rho number u
   | Float_error (p, b, r, e, u) ->
@@ -73,7 +67,6 @@ let proof out = function
   | By_points (x, y, others) ->
     Printf.bprintf out "By_points %a %a %a" numbers x numbers y (list (pair natural numbers)) others
   | By_triangle -> Buffer.add_string out "By_triangle"
-  | By_invariants -> Buffer.add_string out "By_invariants"
   | By_parts _ | By_all_parts _ | By_parts_among _ | By_local_product | By_local_inequality _ | By_halves _ ->
     assert false  (* not written *)
   | By_layers bounds -> Printf.bprintf out "By_layers %a" (list box) bounds

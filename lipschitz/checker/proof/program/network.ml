@@ -9,7 +9,6 @@ type t = {
   sha256 : string;  (* of network.toml; else "" *)
   unit : string;
   order : string list;
-  invariants : bool;  (* the phi of set functions see rotation invariants *)
   clamp : (float * float) list;  (* [] : none *)
   silent : (string * string list) list;
     (* kinds of a vehicle and of the neighbours among which it has no network, sorted *)
@@ -75,10 +74,6 @@ let weights where json =
   { Weights.file = text where (find "file"); sha256 = text where (find "sha256"); data_files; precision; layers;
     activations }
 
-let relative_state = [ "dp_x_m"; "dp_y_m"; "dp_z_m"; "dv_x_m_s"; "dv_y_m_s"; "dv_z_m_s" ]
-let invariants_of_neighbour = 5
-let invariants_of_ground = 3
-
 let read_clamp = function
   | Null -> []
   | json ->
@@ -94,21 +89,19 @@ let require_consistent net quantity =
   let fits holds = require holds "network: its parts do not fit one another" in
   let named prefix = List.filter (fun (name, _) -> String.starts_with ~prefix name) net.parts in
   let phis = named "phi:" and rhos = named "rho:" in
-  let stated = if net.invariants then invariants_of_neighbour else List.length net.order in
-  let clamped = List.length net.clamp in
+  let stated = List.length net.order and clamped = List.length net.clamp in
   fits (stated = 0 || clamped = 0 || stated = clamped);
-  if net.invariants then fits (net.order = relative_state && quantity = "force_z");
   let inputs = ref (if stated > 0 then stated else clamped) in
   match net.parts with
   | [ "network", w ] ->
-    fits (not net.invariants && net.silent = [] && (!inputs = 0 || !inputs = fst (sizes w)))
+    fits (net.silent = [] && (!inputs = 0 || !inputs = fst (sizes w)))
   | parts ->
     fits (phis <> [] && rhos <> [] && List.length phis + List.length rhos = List.length parts);
     let hidden = snd (sizes (snd (List.hd phis))) and outputs = snd (sizes (snd (List.hd rhos))) in
     List.iter (fun (name, w) ->
         let i, o = sizes w in
         fits (o = hidden);
-        if name = "phi:ground" then fits (i = (if net.invariants then invariants_of_ground else 4))
+        if name = "phi:ground" then fits (i = 4)
         else (if !inputs = 0 then inputs := i; fits (i = !inputs))) phis;
     let components = match quantity with "" -> 0 | "force_z" -> 1 | _ -> 3 in
     List.iter (fun (_, w) -> fits (sizes w = (hidden, outputs) && (components = 0 || components = outputs))) rhos
@@ -141,12 +134,10 @@ let canonical json =
   let output = find "output" and input = find "input" in
   check_options (find "options");
   require_keys "network.output" [ "quantity"; "unit" ] output;
-  require_keys "network.input" [ "order"; "invariants"; "clamp" ] input;
+  require_keys "network.input" [ "order"; "clamp" ] input;
   let quantity = text where (Json.find where "quantity" output) in
   let order = texts where (Json.find where "order" input) in
   require (List.length (List.sort_uniq compare order) = List.length order) "network.input names one twice";
-  let invariants = match Json.find where "invariants" input with
-    | Bool b -> b | _ -> rejected "network.input.invariants is neither true nor false" in
   let is_network name =
     let is_of prefix = String.starts_with ~prefix name && not (String.contains_from name 4 ':') in
     name = "network" || List.exists is_of [ "phi:"; "rho:" ] in
@@ -155,7 +146,7 @@ let canonical json =
     name, weights ("network.weights." ^ name) entry in
   let parts = List.sort (fun (a, _) (b, _) -> String.compare a b) (List.map part (members where (find "weights"))) in
   let net = { sha256 = text where (find "description_sha256"); unit = text where (Json.find where "unit" output); order;
-              invariants; clamp = read_clamp (Json.find where "clamp" input); silent = []; parts } in
+              clamp = read_clamp (Json.find where "clamp" input); silent = []; parts } in
   let compositions = List.map (composition net) (texts where (find "silent")) in
   let silent = List.sort_uniq compare compositions in
   require (List.length silent = List.length compositions) "network.silent names a composition twice";

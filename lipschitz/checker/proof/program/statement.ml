@@ -39,13 +39,6 @@ let keeping =
   " tanh:n, and so with other names, is that function of each of the first n numbers of a layer and leaves the others \
    as they are."
 
-(* What is added for networks of rotation invariants. *)
-let invariants =
-  " A set function takes of each neighbour its relative position p in m and velocity v in m/s, whose vertical \
-   components are p_z and v_z, and of the vehicle -z in m and -v in m/s; phi sees their invariants: of a neighbour \
-   |p_xy|, 3/2 p_z, |v_xy|, 3/2 v_z, |p_xy + v_xy / 2|, and the ground's phi -z, |v_xy|, -v_z. So the input clamp \
-   is one of invariants, and phi alone is a function of them."
-
 (* What is added for networks that are silent in some compositions, before their names. *)
 let silent =
   " Among these neighbours > vehicle, as many of each kind and no others, the set functions of that kind \
@@ -53,7 +46,6 @@ let silent =
    among other neighbours than these. Ranges hold this 0, and jumps bound the steps as well by which one \
    neighbour that comes or goes makes or ends such a composition, while all are in the box or clamp: "
 
-let text ~sorts ~keeps ~of_invariants ~silent_names =
+let text ~sorts ~keeps ~silent_names =
   common ^ (if sorts then sorting else "") ^ (if keeps then keeping else "")
-  ^ (if of_invariants then invariants else "")
   ^ if silent_names = [] then "" else silent ^ String.concat ", " silent_names ^ "."

@@ -114,7 +114,6 @@ let check (state : Claims.t) entry =
   require_keys "values" keys entry;
   let f = text "values" (find "values" "function" entry) in
   let where = "values of " ^ shown f and names = Functions.networks_of f in
-  require (not state.net.invariants) "%s: of a function of rotation invariants" where;
   let is_set = List.length names = 2 in
   require (if is_set then List.hd names <> "phi:ground" else f = "network")
     "%s: possible only for the network, or for a sum over neighbours" where;

@@ -1,7 +1,7 @@
 (** The theorems, and what they rest on; compared with assumptions.txt. *)
 From Coq Require Import List Reals.
 From Swarmcert Require Import Activations Form Network Sorting Checker Meaning Steepness Sets Enclosures Intervals
-  Claims Silent Invariants Sound.
+  Claims Silent Sound.
 Open Scope R_scope.
 Set Printing Width 120.
 Check rising_slopes.
@@ -12,8 +12,6 @@ Check values_between_lies.
 Print Assumptions values_between_lies.
 Check sorting_contracts.
 Print Assumptions sorting_contracts.
-Check invariants_contract.
-Print Assumptions invariants_contract.
 Check check_sound.
 Print Assumptions check_sound.
 Check check_parts_sound.
@@ -30,7 +28,5 @@ Check silent_slope_in_box.
 Print Assumptions silent_slope_in_box.
 Check silent_slope_among.
 Print Assumptions silent_slope_among.
-Check silent_slope_of_states.
-Print Assumptions silent_slope_of_states.
 Check silent_law.
 Print Assumptions silent_law.

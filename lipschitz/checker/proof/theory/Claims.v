@@ -20,7 +20,6 @@ Inductive proof :=
 | By_roundings (bounds : list box) (errors : list (list dyadic))
 | By_rounded_sum (sums : box) (errors : list dyadic)
 | By_steps (sums : list box)
-| By_invariants
 | By_parts_among (rho : dyadic) (o : hints) (ranges : list (box * range_tree)) (t : tree)
 | By_halves (k : nat) (m : dyadic).
 
@@ -373,55 +372,6 @@ Definition check_law_among ps accepted (stacked : bool) kinds rho u : bool :=
      | None => false
      end.
 
-(** Of states, whose invariants phi sees: how steep these are, and how many. *)
-Definition slope_of_invariants (o : observed) : dyadic := match o with Neighbour => (3, -1)%Z | Vehicle => one end.
-Definition number_of_invariants (o : observed) : nat := match o with Neighbour => 5%nat | Vehicle => 3%nat end.
-(** A bound in units of the scale, whatever moves. *)
-Fixpoint find_scaled (accepted : list claim) (phi rho : nat) (scale : list dyadic) : option dyadic :=
-  match accepted with
-  | [] => None
-  | Slope_at_most (Set_of q k) moves s u :: rest =>
-      let n := length scale in
-      if ((phi =? q) && (rho =? k))%nat%bool && same_moves moves (repeat true n) && same_numbers s scale then Some u
-      else find_scaled rest phi rho scale
-  | _ :: rest => find_scaled rest phi rho scale
-  end.
-Definition check_slope_of_states ps accepted (o : observed) phi rho u : bool :=
-  let n := number_of_invariants o in
-  (inputs_of (part_at ps phi) =? n)%nat
-  && match find_scaled accepted phi rho (repeat (slope_of_invariants o) n) with
-     | Some w => is_nonnegative w && at_most w u
-     | None => false
-     end.
-Definition same_observed (a b : observed) : bool :=
-  match a, b with Neighbour, Neighbour | Vehicle, Vehicle => true | _, _ => false end.
-Fixpoint find_of_states (accepted : list claim) (o : observed) (phi rho : nat) : option dyadic :=
-  match accepted with
-  | [] => None
-  | Slope_of_states a q k u :: rest =>
-      let others := find_of_states rest o phi rho in
-      if same_observed o a && ((phi =? q) && (rho =? k))%nat%bool then less_of u others else others
-  | _ :: rest => find_of_states rest o phi rho
-  end.
-Fixpoint total_of_states (accepted : list claim) (squares : bool) (kinds : list kind_of_states) (rho : nat) :
-    option dyadic :=
-  match kinds with
-  | [] => Some zero
-  | (o, phi, n) :: kinds' =>
-      match find_of_states accepted o phi rho, total_of_states accepted squares kinds' rho with
-      | Some k, Some rest =>
-          if is_nonnegative k && (0 <=? n)%Z then Some (add (mul (n, 0%Z) (if squares then mul k k else k)) rest)
-              else None
-      | _, _ => None
-      end
-  end.
-Definition check_law_of_states ps accepted (stacked : bool) kinds rho u : bool :=
-  is_nonnegative u && fits_part (part_at ps rho)
-  && match total_of_states accepted stacked kinds rho with
-     | Some s => at_most s (if stacked then mul u u else u)
-     | None => false
-     end.
-
 (** In a box, from bounds in its two parts. *)
 Definition same_function (f g : function) : bool :=
   match f, g with
@@ -614,8 +564,6 @@ Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p :
       check_slope_among ps p rho moves scale b others u r o ranges t
   | Law_among stacked kinds rho u, By_triangle => check_law_among ps accepted stacked kinds rho u
   | Step_at_most silent boxes p rho u, By_steps sums => check_step ps accepted silent boxes p rho u sums
-  | Slope_of_states o p rho u, By_invariants => check_slope_of_states ps accepted o p rho u
-  | Law_of_states stacked kinds rho u, By_triangle => check_law_of_states ps accepted stacked kinds rho u
   | _, _ => false
   end.
 (** The claims accepted so far with one more, if it is proved. *)

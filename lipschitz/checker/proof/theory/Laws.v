@@ -19,7 +19,7 @@ Lemma find_slope_sound ps accepted phi rho moves u : Forall (holds ps) accepted 
   find_slope accepted phi rho moves = Some u -> holds ps (Slope_at_most (Set_of phi rho) moves [] u).
 Proof.
   intros H. revert u. induction H as [|c rest Hc H IH]; intros u; [discriminate|].
-  destruct c as [| |[|q k] m [|] v| | | | | | | | | | | | | |]; simpl find_slope; auto.
+  destruct c as [| |[|q k] m [|] v| | | | | | | | | | | |]; simpl find_slope; auto.
   destruct (Nat.eqb_spec phi q), (Nat.eqb_spec rho k); cbn [andb]; try apply IH.
   destruct (same_moves moves m) eqn:E; [|apply IH]. apply same_moves_eq in E. subst.
   destruct (find_slope rest q k m) as [w|]; [destruct (at_most w v)|]; intros G; inversion G; subst;
@@ -197,7 +197,7 @@ Lemma find_slope_in_sound ps accepted phi rho moves b u : Forall (holds ps) acce
   find_slope_in accepted phi rho moves b = Some u -> holds ps (Slope_in_box (Set_of phi rho) moves [] b u).
 Proof.
   intros H. revert u. induction H as [|c rest Hc H IH]; intros u; [discriminate|].
-  destruct c as [| |[|q k] m [|] v| |[|q k] m [|] d v| | | | | | | | | | | |]; simpl find_slope_in; auto.
+  destruct c as [| |[|q k] m [|] v| |[|q k] m [|] d v| | | | | | | | | |]; simpl find_slope_in; auto.
   - destruct (Nat.eqb_spec phi q), (Nat.eqb_spec rho k); cbn [andb]; try apply IH.
     destruct (same_moves moves m) eqn:E; [|apply IH]. apply same_moves_eq in E. subst.
     assert (holds ps (Slope_in_box (Set_of q k) m [] b v)) as Hv by (intros r x y A L _ _; now apply Hc).

@@ -68,7 +68,7 @@ Lemma find_slope_among_sound ps accepted rho before k after u : Forall (holds ps
   find_slope_among accepted p rho moves b (others_of before k after) = Some u -> bound_beside ps rho before k after u.
 Proof.
   destruct k as [[[[p moves] n] b] least]. intros H. induction H as [|c rest Hc H IH]; [discriminate|].
-  destruct c as [| | | | | | | | | | |[|] |q j m [|] d ts w| | | |]; simpl find_slope_among; auto.
+  destruct c as [| | | | | | | | | | |[|] |q j m [|] d ts w| |]; simpl find_slope_among; auto.
   destruct (_ && _)%bool eqn:E; auto. intros G. inversion G. subst w. do 4 both E.
   apply Nat.eqb_eq in E, H3. apply same_moves_eq in H2. apply same_box_eq in H1. apply same_terms_eq in H0. subst.
   intros inputs x y M A L Wx Wy. destruct (there_only ps _ _ M) as (some & S & T).

@@ -129,27 +129,6 @@ Definition evaluates (p : part) (r : list dyadic) (x v : list R) : Prop :=
 Definition float_vector_sum (n : nat) (us : list (list R)) (s : list R) : Prop :=
   length s = n /\ forall i, (i < n)%nat -> float_sum (0 :: map (fun u => nth i u 0) us) (nth i s 0).
 
-(** Rotation invariants: what phi sees of a neighbour's relative position p and velocity v, and of the vehicle's own
-    state, which is its height and its velocity, both with the opposite sign. *)
-Inductive observed := Neighbour | Vehicle.
-Definition observed_numbers (o : observed) : nat := match o with Neighbour => 6%nat | Vehicle => 4%nat end.
-Definition length_of (a b : R) : R := sqrt (a * a + b * b).
-Definition invariants (o : observed) (state : list R) : list R :=
-  match o, state with
-  | Neighbour, [px; py; pz; vx; vy; vz] =>
-      [length_of px py; 3 / 2 * pz; length_of vx vy; 3 / 2 * vz; length_of (px + vx / 2) (py + vy / 2)]
-  | Vehicle, [z; vx; vy; vz] => [z; length_of vx vy; vz]
-  | _, _ => []
-  end.
-(** Several states move: of a kind (what is observed, phi, count) at most `count`. *)
-Definition kind_of_states := (observed * nat * Z)%type.
-Definition states_may_move (k : kind_of_states) (ms : list mover) : Prop :=
-  (Z.of_nat (length ms) <= snd k)%Z /\
-  Forall (fun m => let n := observed_numbers (fst (fst k)) in length (fst m) = n /\ length (snd m) = n) ms.
-Definition terms_of_states (ps : list part) (side : mover -> list R) (group : kind_of_states * list mover) :
-    list (list R) :=
-  map (fun m => value (part_at ps (snd (fst (fst group)))) (invariants (fst (fst (fst group))) (side m))) (snd group).
-
 Inductive claim :=
 | Norm_at_most (p layer : nat) (u : dyadic)
 | Norm_at_least (p layer : nat) (l : dyadic)
@@ -165,9 +144,7 @@ Inductive claim :=
 | Sum_float_error (terms : list (term * list dyadic)) (rho : nat) (u : dyadic)
 | Slope_among (phi rho : nat) (moves : list bool) (scale : list dyadic) (b : box) (others : list term) (u : dyadic)
 | Law_among (stacked : bool) (kinds : list (kind * box * Z)) (rho : nat) (u : dyadic)
-| Step_at_most (silent : list (list nat)) (boxes : list (nat * box)) (phi rho : nat) (u : dyadic)
-| Slope_of_states (o : observed) (phi rho : nat) (u : dyadic)
-| Law_of_states (stacked : bool) (kinds : list kind_of_states) (rho : nat) (u : dyadic).
+| Step_at_most (silent : list (list nat)) (boxes : list (nat * box)) (phi rho : nat) (u : dyadic).
 
 Definition weights_at (ps : list part) (p layer : nat) : list (list R) :=
   map (map real) (fst (nth layer (layers (part_at ps p)) ([], []))).
@@ -243,13 +220,4 @@ Definition holds (ps : list part) (c : claim) : Prop :=
   | Step_at_most silent boxes phi rho u =>
       forall x others, Forall (in_its_box boxes) ((phi, x) :: others) ->
         norm (minus (set_value ps silent rho ((phi, x) :: others)) (set_value ps silent rho others)) <= real u
-  | Slope_of_states o phi rho u =>
-      forall rest x y, length x = observed_numbers o -> length y = observed_numbers o ->
-        let f z := value_of ps (Set_of phi rho) rest (invariants o z) in
-        norm (minus (f x) (f y)) <= real u * norm (minus x y)
-  | Law_of_states stacked kinds rho u =>
-      forall movers, Forall2 states_may_move kinds movers ->
-        let sum side := vector_sum (flat_map (terms_of_states ps side) (combine kinds movers)) in
-        bounded_change stacked u (minus (value (part_at ps rho) (sum fst)) (value (part_at ps rho) (sum snd)))
-          (concat movers)
   end.

@@ -140,7 +140,7 @@ Lemma find_alone_sound ps accepted p n u : Forall (holds ps) accepted -> find_al
     u).
 Proof.
   intros H. induction H as [|c rest Hc H IH]; [discriminate|].
-  destruct c as [| |[q|] m [|] w| | | | | | | | | | | | | |];
+  destruct c as [| |[q|] m [|] w| | | | | | | | | | | |];
     simpl find_alone; auto.
   destruct (Nat.eqb_spec p q); simpl; auto. destruct (forallb _ m) eqn:E; auto.
   destruct (Nat.eqb_spec (length m) n); simpl; auto. intros G. inversion G. subst. exists m. auto.

@@ -34,12 +34,7 @@ Theorem silent_slope_among ps silent p rho moves scale b others u :
   let f z := unless_silent ps silent rho those (plusR (value (part_at ps p) z) rest) in
   norm (minus (f x) (f y)) <= real u * distance scale x y.
 Proof. intros H those inputs x y M A L X Y. eapply Rle_trans; [apply silent_change|]. now apply (H inputs x y). Qed.
-Theorem silent_slope_of_states ps silent o p rho u : holds ps (Slope_of_states o p rho u) ->
-  forall those rest x y, length x = observed_numbers o -> length y = observed_numbers o ->
-  let f z := unless_silent ps silent rho those (plusR (value (part_at ps p) (invariants o z)) rest) in
-  norm (minus (f x) (f y)) <= real u * norm (minus x y).
-Proof. intros H those rest x y X Y. eapply Rle_trans; [apply silent_change|]. now apply (H rest x y). Qed.
-(** What `Law`, `Law_in_box`, `Law_among` and `Law_of_states` conclude. *)
+(** What `Law`, `Law_in_box` and `Law_among` conclude. *)
 Theorem silent_law ps silent those stacked rho u s t movers :
   bounded_change stacked u (minus (value (part_at ps rho) s) (value (part_at ps rho) t)) movers ->
   bounded_change stacked u

@@ -2,7 +2,7 @@
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
     Values Enclosures Intervals Centred Claims Slopes Witness Laws Ranges Silent Roundings
-    Relaxation Increments Cover Halves Among Laws_among Everywhere Invariants.
+    Relaxation Increments Cover Halves Among Laws_among Everywhere.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -29,8 +29,6 @@ Proof.
   - now apply slope_among_sound in H.
   - now apply law_among_sound in H.
   - now apply step_at_most_sound in H.
-  - now apply slope_of_states_sound in H.
-  - now apply law_of_states_sound in H.
 Qed.
 (** What the program does claim by claim. *)
 Theorem accepted_hold ps accepted c p accepted' : Forall (holds ps) accepted -> step ps accepted c p = Some accepted' ->
