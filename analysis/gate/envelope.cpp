@@ -70,12 +70,10 @@ const EVP_MD* digest_for(const EVP_PKEY* key) {
 }
 
 std::string key_id(const EVP_PKEY* key) {
-  unsigned char* der = nullptr;
-  const int size = i2d_PUBKEY(key, &der);
-  const std::string id =
-      files::sha256({reinterpret_cast<const char*>(der), static_cast<std::size_t>(std::max(size, 0))});
-  OPENSSL_free(der);
-  return id;
+  std::string der(static_cast<std::size_t>(std::max(i2d_PUBKEY(key, nullptr), 0)), '\0');
+  auto* end = reinterpret_cast<unsigned char*>(der.data());
+  if (!der.empty()) i2d_PUBKEY(key, &end);
+  return files::sha256(der);
 }
 
 }  // namespace

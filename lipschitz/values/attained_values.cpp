@@ -118,8 +118,8 @@ class ValueSearch {
       return std::vector<double>(static_cast<std::size_t>(outputs()));
     std::vector<double> sum;
     for (std::size_t j = 0; j < point.inputs.size(); ++j) {
-      const std::vector<double> term =
-          evaluators_.at(point.networks[j])(seen_at(point.networks[j], point.inputs[j]).lower);
+      const std::vector<float>& x = point.inputs[j];
+      const std::vector<double> term = evaluators_.at(point.networks[j])({x.begin(), x.end()});
       if (sum.empty()) sum.resize(term.size());
       for (std::size_t i = 0; i < term.size(); ++i) sum[i] += term[i];
     }

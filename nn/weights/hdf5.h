@@ -1,4 +1,4 @@
-/// @file Read-only view of an HDF5 file in memory, by the HDF5 library.
+/// @file Read-only view of an HDF5 file in memory. The HDF5 library reads it in a process of its own.
 #pragma once
 
 #include <cstdint>
@@ -8,21 +8,14 @@
 #include <string_view>
 #include <vector>
 
-namespace swarmcert::files {
+#include "nn/weights/hdf5_nodes.h"
 
-/// Maximum number of links of a group, elements of an attribute, and references of a dataset.
-inline constexpr std::size_t kMostHdf5Entries = 4096;
+namespace swarmcert::files {
 
 /// Returns true if HDF5's signature is at offset 0, 512, 1024, 2048, ...
 bool looks_like_hdf5(std::string_view bytes);
 
-struct Hdf5Numbers {
-  std::vector<std::uint64_t> shape;
-  std::vector<double> numbers;  ///< row-major, exact
-  bool is_float32 = false;      ///< stored as float32 or float16
-};
-
-/// A group or a dataset. Keeps its file open.
+/// A group or a dataset.
 class Hdf5Object {
  public:
   bool is_group() const;
@@ -38,28 +31,24 @@ class Hdf5Object {
   bool flag(const std::string& attribute) const;
   /// Returns the numbers of a dataset.
   /// @throws InputError unless they are float16, float32, float64 or integers of up to 32 bits, at most kMostElements.
-  Hdf5Numbers numbers() const;
+  hdf5::Numbers numbers() const;
   /// Returns the objects to which a dataset of references refers.
   std::vector<Hdf5Object> references() const;
 
  private:
-  friend class Hdf5File;
-  struct State;
-  explicit Hdf5Object(std::shared_ptr<State> state) : state_(std::move(state)) {}
-  std::shared_ptr<State> state_;
+  friend Hdf5Object hdf5_root(const std::string& bytes, const std::string& path);
+  struct File;
+  Hdf5Object(std::shared_ptr<File> file, std::uint64_t number, std::string name);
+  [[noreturn]] void refuse(const std::string& what) const;
+  const hdf5::Node& node() const;
+
+  std::shared_ptr<File> file_;
+  std::uint64_t number_;
+  std::string name_;
 };
 
-/// Opens a file in memory. Only one may be open per thread and at a time: the library is not safe for threads.
-class Hdf5File {
- public:
-  /// @param bytes, path  must outlive the file and its objects.
-  /// @throws InputError if this is not an HDF5 file.
-  Hdf5File(const std::string& bytes, const std::string& path);
-  Hdf5Object root() const { return root_; }
-
- private:
-  static Hdf5Object opened(const std::string& bytes, const std::string& path);
-  Hdf5Object root_;
-};
+/// Returns the root group of an HDF5 file in memory.
+/// @throws InputError if this is not an HDF5 file, or so damaged that the library cannot read it.
+Hdf5Object hdf5_root(const std::string& bytes, const std::string& path);
 
 }  // namespace swarmcert::files

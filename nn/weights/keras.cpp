@@ -19,16 +19,15 @@ constexpr char kExportOnnx[] =
 class KerasReader {
  public:
   KerasReader(const std::string& bytes, const std::string& path, const LayerChoice& choice)
-      : file_(bytes, path), path_(path), choice_(choice) {}
+      : root_(hdf5_root(bytes, path)), path_(path), choice_(choice) {}
 
   Weights run() {
-    const Hdf5Object root = file_.root();
-    const Hdf5Object group = root.has("model_weights") ? root.open("model_weights") : root;
+    const Hdf5Object group = root_.has("model_weights") ? root_.open("model_weights") : root_;
     const auto layers = group.texts("layer_names");
     if (!layers)
       refuse("", "", "is an HDF5 file (.h5, .hdf5) without the layers of a Keras model",
              "write W1, b1, W2, b2, ... [outputs x inputs] with numpy.savez");
-    const auto config = root.texts("model_config");
+    const auto config = root_.texts("model_config");
     if (config && !config->empty()) read_config(config->front());
     for (const std::string& layer : *layers) read_layer(group, layer);
     const TensorReader read = [this](std::size_t i) { return numbers_[i]; };
@@ -140,7 +139,7 @@ class KerasReader {
   void read_layer(const Hdf5Object& group, const std::string& layer) {
     const Hdf5Object own = group.open(layer);
     for (const std::string& weight : own.texts("weight_names").value_or(std::vector<std::string>())) {
-      Hdf5Numbers stored = own.open(weight).numbers();
+      hdf5::Numbers stored = own.open(weight).numbers();
       std::string part = weight.substr(weight.rfind('/') + 1);  // npos + 1 is 0
       part = part.substr(0, part.find(':'));
       const bool is_kernel = part == "kernel" && stored.shape.size() == 2;
@@ -161,7 +160,7 @@ class KerasReader {
     }
   }
 
-  Hdf5File file_;
+  Hdf5Object root_;
   const std::string& path_;
   const LayerChoice& choice_;
   bool is_stated_ = false;  ///< by model_config

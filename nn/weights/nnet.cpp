@@ -1,5 +1,6 @@
 #include "nn/weights/nnet.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <string_view>
@@ -32,6 +33,7 @@ class NnetReader {
     next_line();  // minimum inputs
     next_line();  // maximum inputs
     const std::vector<double> means = numbers(inputs + 1), ranges = numbers(inputs + 1);
+    if (std::count(ranges.begin(), ranges.end(), 0.0) > 0) refuse("a range is 0");
     Weights weights;
     weights.path = path_;
     weights.precision = Precision::kFloat64;

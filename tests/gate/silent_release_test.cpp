@@ -103,6 +103,7 @@ TEST(Gate, ATrainedReleaseWithSilentCompositionsPassesAndPlantedFaultsInItAreCau
   // The force of a large vehicle is near 40 gf except in the composition where it is 0: both the range and the jump
   // change.
   change_tensor(release / "net/rho_large.safetensors", "fc2", 1, 40);
+  std::filesystem::remove(release / "net/samples.json");  // of the network before the change
   release.certify_and_export();
   const gate::GateResult pushed = release.judge();
   EXPECT_EQ(caught(pushed), std::vector<std::string>{"range"}) << told(pushed);

@@ -43,7 +43,7 @@ TEST(BoxesByDefault, OfReluNetworksComeCloseToWhatIsAttained) {
   double worst = 1, worst_everywhere = 1;
   for (int i = 0; i < 10; ++i) {
     const Network network = tests::plain(tests::random_network({3, 12, 12, 2}, generator));
-    const Certification found = certify(network, by_default(cube(3, 0.5), 400));
+    const Certification found = certify(network, by_default(cube(3, 0.5), 1000));
     const CertifiedBound& bound = bound_of(found, "network");
     ASSERT_TRUE(bound.lower.witness.has_value());
     EXPECT_GE(ratio(bound), 1 - 1e-9);
@@ -75,9 +75,9 @@ TEST(BoxesByDefault, OfASingleInputDoNotEndAtTheWholeBox) {
 
 TEST(BoxesByDefault, TheNumberOfBoxesThatATimeLimitReachedGivesTheSameBound) {
   std::mt19937 generator(303);
-  const Box box = cube(3, 1);
+  const Box box = cube(3, 2);
   for (const Activation activation : {Activation::kRelu, Activation::kTanh}) {
-    const Network network = tests::plain(with(tests::random_network({3, 16, 16, 2}, generator), activation));
+    const Network network = tests::plain(with(tests::random_network({3, 32, 32, 2}, generator), activation));
     CertifyOptions options = by_default(box, std::numeric_limits<int>::max());
     options.branch.tolerance = 0;
     options.branch.seconds = 0.3;
@@ -99,7 +99,7 @@ TEST(BoxesByDefault, OfSmoothNetworksAreBelowTheSlopesOfTheWholeBoxAndAboveAllSl
   for (const Activation activation :
        {Activation::kTanh, Activation::kSigmoid, Activation::kSilu, Activation::kGelu}) {
     const Network network = tests::plain(with(tests::random_network({3, 10, 8, 2}, generator), activation));
-    const Box box = cube(3, 1);
+    const Box box = cube(3, 2);
     const Certification found = certify(network, by_default(box, 40));
     const CertifiedBound& bound = bound_of(found, "network");
     EXPECT_EQ(bound.method, UpperMethod::kBranch);

@@ -323,7 +323,7 @@ TEST(TreeProof, IsRefusedForBoxesThatAreNone) {
 TEST(LocalBoundPublishedNetwork, OfTheGroundIsWithinFourPercentOfAnAttainedSlope) {
   SWARMCERT_NEEDS_DATA();
   const files::Network network = plain(files::load_weights(tests::data_path("weights/zip_f32/phi_G.pth")));
-  const double upper = proved_on(network, {{-1, -2, -2, -2}, {1, 2, 2, 2}}, 5000, "network", 14.8059);
+  const double upper = proved_on(network, {{-1, -2, -2, -2}, {1, 2, 2, 2}}, 10000, "network", 14.8059);
   EXPECT_GE(upper, 14.8059);
   EXPECT_LE(upper, 1.04 * 14.8059);
 }

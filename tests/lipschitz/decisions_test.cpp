@@ -165,6 +165,7 @@ Searched searched(bool is_set) {
   claim.domain = "box";
   BranchOptions options;
   options.nodes = 200;
+  options.cuts = 0;
   files::Network network;
   if (is_set) {
     network = tests::deep_set(tests::random_network({3, 10, 10, 4}, generator),

@@ -27,7 +27,9 @@ files::Weights network_with_biases(const std::vector<int>& sizes, Random& random
     for (int i = 0; i < layer.outputs; ++i) layer.biases.push_back(bias * random.bell());
     layers.push_back(std::move(layer));
   }
-  return tests::weights(std::move(layers));
+  files::Weights weights = tests::weights(std::move(layers));
+  weights.precision = files::Precision::kFloat64;
+  return weights;
 }
 
 /// Returns a random network with 1 to 4 inputs, 1 to 3 hidden layers of 2 to 8 neurons and 1 to 3 outputs; biases have
@@ -87,7 +89,7 @@ TEST(FarSlopes, LessThanOneInAHundredSmallNetworksIsBeatenByPlainSamples_slow) {
 }
 
 TEST(FarSlopes, GlobalBranchAndBoundThatStallsSaysSoAfterFewBoxes) {
-  // Without this stop, halving s down to the smallest number takes 1,500 boxes or more.
+  // Without this stop, halving s down to the smallest number takes 3,000 boxes or more, those examined again included.
   int stalls = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     Random random(seed);
@@ -102,7 +104,7 @@ TEST(FarSlopes, GlobalBranchAndBoundThatStallsSaysSoAfterFewBoxes) {
     EXPECT_EQ(summary(network, bound)["status"], "finished") << "seed " << seed;
     if (bound.branch_stop != BranchStop::kNothingToHalve) continue;
     ++stalls;
-    EXPECT_LT(bound.nodes, 1000) << "seed " << seed;
+    EXPECT_LT(bound.nodes, 2000) << "seed " << seed;
     EXPECT_LE(bound.upper.value(), bound.sdp.optimum.value() * (1 + 1e-6)) << "seed " << seed;
     const check::CheckResult verdict = check::check(certificate(network, found), network);
     EXPECT_TRUE(verdict.accepted) << verdict.reason;

@@ -280,6 +280,7 @@ TEST(Silent, TheCheckerRefusesWhatIsTrueOfTheNetworkThatIsNeverSilentOnly) {
   files::Json certificate = lipschitz::certificate(plain, found);
   ASSERT_TRUE(check::check(certificate, plain).accepted) << check::check(certificate, plain).reason;
   certificate["statement"] = check::statement_for(silent);
+  certificate["network"]["silent"] = files::silent_compositions(silent);
   const auto said = [&silent](files::Json changed) {
     changed["content_sha256"] = files::content_sha256(changed);
     return check::check(changed, silent).reason;

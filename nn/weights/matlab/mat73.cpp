@@ -19,7 +19,7 @@ std::vector<MatVariable> variables_of(const Hdf5Object& group, MatInside inside,
 /// MATLAB stores matrices column-major, whereas HDF5 is row-major, so the dimensions are reversed.
 NamedArray array_of(const Hdf5Object& object, const std::string& name) {
   if (object.flag("MATLAB_empty")) return {name, {0, 0}, {}, false};
-  Hdf5Numbers stored = object.numbers();
+  hdf5::Numbers stored = object.numbers();
   const std::vector<std::uint64_t> shape(stored.shape.rbegin(), stored.shape.rend());
   return {name, shape, rows_first(std::move(stored.numbers), shape), stored.is_float32};
 }
@@ -66,7 +66,7 @@ std::vector<MatVariable> variables_of(const Hdf5Object& group, MatInside inside,
 }  // namespace
 
 std::vector<MatVariable> mat73_variables(const std::string& bytes, const std::string& path) {
-  return variables_of(Hdf5File(bytes, path).root(), MatInside::kFile, path);
+  return variables_of(hdf5_root(bytes, path), MatInside::kFile, path);
 }
 
 }  // namespace swarmcert::files

@@ -1149,12 +1149,6 @@ let rec box_of boxes p =
   | p0 :: boxes' ->
     let (q, b) = p0 in if (=) p q then Some b else box_of boxes' p
 
-type observed =
-| Neighbour
-| Vehicle
-
-type kind_of_states = (observed * int) * Big.t
-
 type claim =
 | Norm_at_most of int * int * dyadic
 | Norm_at_least of int * int * dyadic
@@ -1173,8 +1167,6 @@ type claim =
    * dyadic
 | Law_among of bool * ((kind * box) * Big.t) list * int * dyadic
 | Step_at_most of int list list * (int * box) list * int * int * dyadic
-| Slope_of_states of observed * int * int * dyadic
-| Law_of_states of bool * kind_of_states list * int * dyadic
 
 (** val steepest : activation -> dyadic **)
 
@@ -3974,7 +3966,6 @@ type proof =
 | By_roundings of box list * dyadic list list
 | By_rounded_sum of box * dyadic list
 | By_steps of box list
-| By_invariants
 | By_parts_among of dyadic * hints * (box * range_tree) list * tree
 | By_halves of int * dyadic
 
@@ -4712,110 +4703,6 @@ let check_law_among ps accepted stacked kinds rho u =
      | Some s -> at_most s (if stacked then mul0 u u else u)
      | None -> false)
 
-(** val slope_of_invariants : observed -> dyadic **)
-
-let slope_of_invariants = function
-| Neighbour ->
-  (((fun p -> p) ((fun p -> Big.succ (Big.shift_left p 1)) Big.one)),
-    (Big.neg Big.one))
-| Vehicle -> one
-
-(** val number_of_invariants : observed -> int **)
-
-let number_of_invariants = function
-| Neighbour ->
-  Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
-    (Stdlib.Int.succ 0))))
-| Vehicle -> Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ 0))
-
-(** val find_scaled :
-    claim list -> int -> int -> dyadic list -> dyadic option **)
-
-let rec find_scaled accepted phi0 rho scale0 =
-  match accepted with
-  | [] -> None
-  | c :: rest0 ->
-    (match c with
-     | Slope_at_most (f, moves, s, u) ->
-       (match f with
-        | Alone _ -> find_scaled rest0 phi0 rho scale0
-        | Set_of (q, k) ->
-          let n = length scale0 in
-          if (&&)
-               ((&&) ((&&) ((=) phi0 q) ((=) rho k))
-                 (same_moves moves (repeat true n))) (same_numbers s scale0)
-          then Some u
-          else find_scaled rest0 phi0 rho scale0)
-     | _ -> find_scaled rest0 phi0 rho scale0)
-
-(** val check_slope_of_states :
-    part list -> claim list -> observed -> int -> int -> dyadic -> bool **)
-
-let check_slope_of_states ps accepted o phi0 rho u =
-  let n = number_of_invariants o in
-  (&&) ((=) (inputs_of (part_at ps phi0)) n)
-    (match find_scaled accepted phi0 rho (repeat (slope_of_invariants o) n) with
-     | Some w -> (&&) (is_nonnegative w) (at_most w u)
-     | None -> false)
-
-(** val same_observed : observed -> observed -> bool **)
-
-let same_observed a b =
-  match a with
-  | Neighbour -> (match b with
-                  | Neighbour -> true
-                  | Vehicle -> false)
-  | Vehicle -> (match b with
-                | Neighbour -> false
-                | Vehicle -> true)
-
-(** val find_of_states :
-    claim list -> observed -> int -> int -> dyadic option **)
-
-let rec find_of_states accepted o phi0 rho =
-  match accepted with
-  | [] -> None
-  | c :: rest0 ->
-    (match c with
-     | Slope_of_states (a, q, k, u) ->
-       let others = find_of_states rest0 o phi0 rho in
-       if (&&) (same_observed o a) ((&&) ((=) phi0 q) ((=) rho k))
-       then less_of u others
-       else others
-     | _ -> find_of_states rest0 o phi0 rho)
-
-(** val total_of_states :
-    claim list -> bool -> kind_of_states list -> int -> dyadic option **)
-
-let rec total_of_states accepted squares0 kinds rho =
-  match kinds with
-  | [] -> Some zero
-  | k :: kinds' ->
-    let (p, n) = k in
-    let (o, phi0) = p in
-    (match find_of_states accepted o phi0 rho with
-     | Some k0 ->
-       (match total_of_states accepted squares0 kinds' rho with
-        | Some rest0 ->
-          if (&&) (is_nonnegative k0) (Big.leq Big.zero n)
-          then Some
-                 (add0
-                   (mul0 (n, Big.zero) (if squares0 then mul0 k0 k0 else k0))
-                   rest0)
-          else None
-        | None -> None)
-     | None -> None)
-
-(** val check_law_of_states :
-    part list -> claim list -> bool -> kind_of_states list -> int -> dyadic
-    -> bool **)
-
-let check_law_of_states ps accepted stacked kinds rho u =
-  (&&) ((&&) (is_nonnegative u) (fits_part (part_at ps rho)))
-    (match total_of_states accepted stacked kinds rho with
-     | Some s -> at_most s (if stacked then mul0 u u else u)
-     | None -> false)
-
 (** val same_function : function0 -> function0 -> bool **)
 
 let same_function f g =
@@ -5238,14 +5125,6 @@ let check_claim ps accepted c p =
   | Step_at_most (silent, boxes, p0, rho, u) ->
     (match p with
      | By_steps sums0 -> check_step ps accepted silent boxes p0 rho u sums0
-     | _ -> false)
-  | Slope_of_states (o, p0, rho, u) ->
-    (match p with
-     | By_invariants -> check_slope_of_states ps accepted o p0 rho u
-     | _ -> false)
-  | Law_of_states (stacked, kinds, rho, u) ->
-    (match p with
-     | By_triangle -> check_law_of_states ps accepted stacked kinds rho u
      | _ -> false)
 
 (** val step :

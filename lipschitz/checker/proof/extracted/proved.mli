@@ -340,12 +340,6 @@ type term = { phi : int; inputs_in : box; fewest : Big.t; most : Big.t }
 
 val box_of : (int * box) list -> int -> box option
 
-type observed =
-| Neighbour
-| Vehicle
-
-type kind_of_states = (observed * int) * Big.t
-
 type claim =
 | Norm_at_most of int * int * dyadic
 | Norm_at_least of int * int * dyadic
@@ -364,8 +358,6 @@ type claim =
    * dyadic
 | Law_among of bool * ((kind * box) * Big.t) list * int * dyadic
 | Step_at_most of int list list * (int * box) list * int * int * dyadic
-| Slope_of_states of observed * int * int * dyadic
-| Law_of_states of bool * kind_of_states list * int * dyadic
 
 val steepest : activation -> dyadic
 
@@ -817,7 +809,6 @@ type proof =
 | By_roundings of box list * dyadic list list
 | By_rounded_sum of box * dyadic list
 | By_steps of box list
-| By_invariants
 | By_parts_among of dyadic * hints * (box * range_tree) list * tree
 | By_halves of int * dyadic
 
@@ -985,26 +976,6 @@ val total_among :
 val check_law_among :
   part list -> claim list -> bool -> ((kind * box) * Big.t) list -> int ->
   dyadic -> bool
-
-val slope_of_invariants : observed -> dyadic
-
-val number_of_invariants : observed -> int
-
-val find_scaled : claim list -> int -> int -> dyadic list -> dyadic option
-
-val check_slope_of_states :
-  part list -> claim list -> observed -> int -> int -> dyadic -> bool
-
-val same_observed : observed -> observed -> bool
-
-val find_of_states : claim list -> observed -> int -> int -> dyadic option
-
-val total_of_states :
-  claim list -> bool -> kind_of_states list -> int -> dyadic option
-
-val check_law_of_states :
-  part list -> claim list -> bool -> kind_of_states list -> int -> dyadic ->
-  bool
 
 val same_function : function0 -> function0 -> bool
 
