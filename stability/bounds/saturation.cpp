@@ -148,7 +148,7 @@ std::string why_undecided(const FlownLoop& loop, const DisturbanceSource& source
   }
   for (const ReferenceMotion& motion : source.reference) {
     if (!std::isfinite(motion.fed_forward_m_s2()))
-      return "the set point's acceleration, which is fed forward, is not bounded (--reference-accel)";
+      return "the set point's acceleration, which is fed forward, is not bounded (reference_accel_m_s2)";
   }
   return "the size of the force error is not known (--amplitude)";
 }

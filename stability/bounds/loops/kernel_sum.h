@@ -88,8 +88,8 @@ std::vector<GainNorms> force_gains(const KernelWalk& walk, const Eigen::MatrixXd
 /// The same for a single output without that part. @param at_once as in KernelSum.
 GainNorms force_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output, double at_once = 0);
 
-/// Gains from an input once per period. @param walk KernelWalk::of_samples(). @param own per output: the response to the
-///     input of its own period.
+/// Gains from an input once per period. @param walk KernelWalk::of_samples(). @param own per output: the response to
+///     the input of its own period.
 std::vector<GainNorms> sample_gains(const KernelWalk& walk, const Eigen::MatrixXd& outputs,
                                     const Eigen::VectorXd& own);
 /// Returns the gains from an error of the command, added once per period, in units of acceleration.

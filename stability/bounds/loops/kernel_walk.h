@@ -1,8 +1,8 @@
 /// @file Walks along the kernel of a sampled loop in strides of many periods where nothing happens. Not for users.
 ///
 /// The kernel is a linear functional of a row that goes from period to period by the loop's map M, r_j = r_0 M^j. Sums
-/// of a functional r_j c over the periods a to b - 1 are (r_a - r_b) (I - M)^-1 c, so a stretch of many periods costs as
-/// much as one of them.
+/// of a functional r_j c over the periods a to b - 1 are (r_a - r_b) (I - M)^-1 c, so a stretch of many periods costs
+/// as much as one of them.
 #pragma once
 
 #include <Eigen/Core>
@@ -48,8 +48,8 @@ class KernelWalk {
   double period_s() const { return adjoint_->period_s(); }
 
   /// Walks for `kLanes` outputs at once, given as rows over the state after the control.
-  /// @param sinks one per output. `period(start, end)` takes a single period, `stretch(s)` several, `rest(s)` the rest of
-  ///     the kernel; a stretch over which one of them `crosses_zero(change)` is divided. A stretch lasts at most
+  /// @param sinks one per output. `period(start, end)` takes a single period, `stretch(s)` several, `rest(s)` the rest
+  ///     of the kernel; a stretch over which one of them `crosses_zero(change)` is divided. A stretch lasts at most
   ///     Sink::kLongest_rad, in radians of the fastest mode that is left, and Sink::kLongestSwing_rad once a single
   ///     oscillation is left; single periods may be longer.
   template <std::size_t kLanes, class Sink>

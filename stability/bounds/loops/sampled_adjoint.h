@@ -41,8 +41,8 @@ class SampledAdjoint {
     std::complex<double> mode;  ///< factor per period, of positive imaginary part
   };
   const std::optional<LastPair>& last_pair() const { return last_pair_; }
-  /// Returns the largest |log eigenvalue| of the modes that have not decayed to e^-42 after `period` periods, in radians
-  /// per period; infinite while commands are on their way.
+  /// Returns the largest |log eigenvalue| of the modes that have not decayed to e^-42 after `period` periods, in
+  /// radians per period; infinite while commands are on their way.
   double fastest_mode(long period) const;
 
   /// Calls visit(start, slope, length) for consecutive segments, on which the kernel from a force to the output is

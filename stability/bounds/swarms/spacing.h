@@ -57,12 +57,12 @@ struct Spacing {
 /// of straight passes through the keep-out radius at least_speed_m_s or more (relative, horizontal), with at least
 /// dwell_s between the end of one and the start of the next, and any motion outside the radius meanwhile.
 ///
-/// Outside, the force is at most F, of which twice as much would cause max_error_m or use up the thrust; the rest of a pass is an impulse of at most
-/// J = peak s line_integral()/v. The error is at most A F + I J, with A the amplitude gain, I the impulse gain summed
-/// over all earlier passes as far as they are still felt; with the gains of the loop without integral, plus the effect
-/// of the largest integral, if the clamp may act. In the same way the feedback is at most E F + C J, and at most E times
-/// the peak, with E and C the gains to the command; the thrust must suffice for it. The bounds hold for forces within the field; `guard` accounts for its
-/// deviation from flights.
+/// Outside, the force is at most F, of which twice as much would cause max_error_m or use up the thrust; the rest of a
+/// pass is an impulse of at most J = peak s line_integral()/v. The error is at most A F + I J, with A the amplitude
+/// gain, I the impulse gain summed over all earlier passes as far as they are still felt; with the gains of the loop
+/// without integral, plus the effect of the largest integral, if the clamp may act. In the same way the feedback is at
+/// most E F + C J, and at most E times the peak, with E and C the gains to the command; the thrust must suffice for it.
+/// The bounds hold for forces within the field; `guard` accounts for its deviation from flights.
 /// @throws std::invalid_argument if Lambda or K couples the z axis to others.
 Spacing spacing(const FlownLoop& loop, const DownwashField& field, const SpacingQuestion& question);
 
