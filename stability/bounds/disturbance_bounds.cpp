@@ -170,7 +170,7 @@ double effort_of_class_N(const AxisLoop& loop, Channel channel, const Disturbanc
   return times_known(own, disturbance.largest_N()) + std::min(by_amplitude, by_impulse);
 }
 
-ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance,
+ClampBounds clamp_demand(const AxisLoop& loop, Channel channel, const Disturbance& disturbance,
                          const OtherErrors& other, double limit_m_s) {
   ClampBounds result;
   if (loop.Ki == 0 || std::isinf(limit_m_s)) return result;
@@ -184,6 +184,13 @@ ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbanc
     demand_m_s = std::min(demand_m_s, disturbance.impulse_N_s * felt);
   }
   result.set_demand(demand_m_s + integral_demand_m_s(loop, channel, other), limit_m_s);
+  return result;
+}
+
+ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance,
+                         const OtherErrors& other, double limit_m_s) {
+  ClampBounds result = clamp_demand(loop, channel, disturbance, other, limit_m_s);
+  if (!result.exists) return result;
   AxisLoop without = loop;
   without.Ki = 0;
   const GainNorms pd = continuous_norms(without, channel);

@@ -91,6 +91,10 @@ struct ClampBounds {
   }
 };
 
+/// Returns the demand on the integrator, and whether its clamp may act: clamp_bounds() without bounds.
+ClampBounds clamp_demand(const AxisLoop& loop, Channel channel, const Disturbance& disturbance,
+                         const OtherErrors& other, double limit_m_s);
+
 /// Returns the clamp's effect. For a sampled loop's own clamp see sampled_bounds.h.
 /// @param limit_m_s on |int e dt|, FlownLoop::integral_limit_m_s(); infinite: no clamp.
 ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance,

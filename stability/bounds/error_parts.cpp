@@ -253,9 +253,7 @@ double largest_output(const SampledLoop& loop, const SampledAdjoint& adjoint,
     if (channel == Channel::kCommand) {
       edge = command_gains(adjoint, output).edge;
     } else {
-      KernelSum sum;
-      add_force_kernel(adjoint, output, sum);
-      edge = sum.norms().edge;
+      edge = force_gains(adjoint, output).edge;
     }
     return edge / loop.plant.mass_kg;
   };
@@ -263,11 +261,7 @@ double largest_output(const SampledLoop& loop, const SampledAdjoint& adjoint,
   const auto position = [&] { return initial_response(adjoint, output).to_position; };
   // A jump of the velocity between two samples has moved the setpoint by at most a period of it when the law sees it.
   const auto speed_step = [&] { return speed() + loop.period_s * position(); };
-  const auto force = [&] {
-    KernelSum sum;
-    add_force_kernel(adjoint, output, sum);
-    return sum.norms().amplitude;
-  };
+  const auto force = [&] { return force_gains(adjoint, output).amplitude; };
   const auto demand = [&](const EstimateError& n, const Eigen::VectorXd& input) {
     if (n.is_zero()) return 0.0;
     const GainNorms gains = input_gains(adjoint, output, input);
@@ -295,9 +289,7 @@ double integral_demand_m_s(const SampledLoop& loop, Channel channel, const Other
 double effort_gain(const SampledLoop& loop) {
   const SampledAdjoint adjoint(loop);
   if (!adjoint.is_stable()) return kInfinity;
-  KernelSum sum;
-  add_force_kernel(adjoint, commanded(adjoint), sum);
-  return sum.norms().amplitude;
+  return force_gains(adjoint, commanded(adjoint)).amplitude;
 }
 
 double effort_N(const SampledLoop& loop, const OtherErrors& errors, Channel channel) {

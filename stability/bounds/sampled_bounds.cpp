@@ -1,82 +1,102 @@
 #include "stability/bounds/sampled_bounds.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 #include "nn/base/doubles.h"
 #include "stability/bounds/amplitude_and_rate.h"
-#include "stability/bounds/loops/sampled_adjoint.h"
+#include "stability/bounds/loops/kernel_sum.h"
 
 namespace swarmcert::stability {
 namespace {
 
 constexpr int kPhases = 5;
 
-/// The kernel of one output at one phase, in consecutive cells backwards in time; per unit of force.
+/// The kernel of one output at one phase, in consecutive cells backwards in time; per unit of force. It keeps its sign
+/// on each cell.
 struct Kernel {
   std::vector<double> length;
   std::vector<double> peak;       ///< largest |kernel| on a cell
   std::vector<double> step;       ///< its integral up to a cell's start, and to the end of the last cell
   std::vector<double> step_peak;  ///< largest |integral| on a cell
-  std::vector<double> bend;       ///< deviation of the integral from its chord, integrated over a cell
+  std::vector<double> bend;       ///< at least int |integral - its chord| over a cell
   double area = 0;                ///< int |kernel|
   double ratio = 0;            ///< of every cell after the last to the one before; 0: nothing is left there
   double step_area_after = 0;  ///< int |integral| after the last cell
 
-  void add(double start, double slope, double cell) {
-    const double end = start + slope * cell;
+  /// Adds consecutive values of one sign, monotonic between their ends; `lowest` and `highest` are signed.
+  void add_cell(double change, double duration_s, double lowest, double highest) {
     const double before = step.back();
-    length.push_back(cell);
-    peak.push_back(std::max(std::abs(start), std::abs(end)));
-    step.push_back(before + (start + end) / 2 * cell);
-    double most = std::max(std::abs(before), std::abs(step.back()));
-    if (start * end < 0) {
-      most = std::max(most, std::abs(before - start * start / slope / 2));
-      area += (start * start + end * end) / std::abs(slope) / 2;
-    } else {
-      area += std::abs(step.back() - before);
-    }
-    step_peak.push_back(most);
-    bend.push_back(std::abs(slope) * cell * cell * cell / 12);
+    length.push_back(duration_s);
+    peak.push_back(std::max(std::abs(lowest), std::abs(highest)));
+    step.push_back(before + change);
+    step_peak.push_back(std::max(std::abs(before), std::abs(step.back())));
+    // Farthest from its chord is the integral of a kernel that is `highest` first and `lowest` then.
+    bend.push_back((highest - lowest) * duration_s * duration_s / 8);
+    area += std::abs(change);
   }
 
-  /// Adds a last cell, of which every later one is `ratio` times the one before; the integral decreases in proportion.
-  void add_series(double start, double slope, double cell, double shrinks) {
-    ratio = shrinks;
-    const double before = area;
-    add(start, slope, cell);
-    area = before + (area - before) / (1 - ratio);
-    const double on_cell = (std::abs(step[step.size() - 2]) + std::abs(step.back())) / 2 * cell + bend.back();
-    step_area_after = on_cell * ratio / (1 - ratio);
+  void add(double start, double end, double duration_s) {
+    if (start * end < 0) {  // the integral is extreme where the kernel is zero
+      const double first_s = duration_s * start / (start - end);
+      add(start, 0, first_s);
+      add(0, end, duration_s - first_s);
+      return;
+    }
+    add_cell((start + end) / 2 * duration_s, duration_s, std::min(start, end), std::max(start, end));
+    bend.back() *= 2.0 / 3;  // of a parabola
+  }
+};
+
+/// Fills a kernel; a sink of KernelWalk::run().
+struct FillKernel {
+  static constexpr double kLongest_rad = 0.02, kLongestSwing_rad = 0.02;
+  Kernel kernel;
+  double period_s, ratio;
+
+  void period(double start, double end) { kernel.add(start, end, period_s); }
+  bool crosses_zero(double) const { return false; }
+  void stretch(const KernelStretch& s) {
+    const double sign = s.start < 0 ? -1 : 1;
+    const double one = sign * s.peak, other = sign * s.least;
+    kernel.add_cell(s.change, s.periods * period_s, std::min(one, other), std::max(one, other));
+  }
+  /// Adds a period, of which every later one is `ratio` times the one before; the integral decreases in proportion.
+  void rest(const KernelStretch& s) {
+    Kernel one;
+    one.step.push_back(kernel.step.back());
+    one.add(s.start, s.end, period_s);
+    kernel.add_cell(one.step.back() - one.step.front(), period_s, std::min(s.start, s.end),
+                    std::max(s.start, s.end));
+    kernel.area += one.area / (1 - ratio) - std::abs(one.step.back() - one.step.front());
+    kernel.step_peak.back() = *std::max_element(one.step_peak.begin(), one.step_peak.end());
+    kernel.ratio = ratio;
+    const double on_cell =
+        (std::abs(one.step.front()) + std::abs(one.step.back())) / 2 * period_s + kernel.bend.back();
+    kernel.step_area_after = on_cell * ratio / (1 - ratio);
   }
 };
 
 /// @param with_own whether an error of the command in the output's own period is included.
 Kernel kernel_of(const SampledAdjoint& adjoint, Channel channel, double phase_s, double mass_kg,
                  bool with_own = true) {
-  Kernel kernel;
+  const double h = adjoint.period_s();
+  const Eigen::RowVectorXd output = adjoint.output_after_control(phase_s) / mass_kg;
+  std::array fill = {FillKernel{{}, h, adjoint.ratio()}};
+  Kernel& kernel = fill[0].kernel;
   kernel.step.push_back(0);
   if (channel == Channel::kForce) {
-    adjoint.force_kernel(
-        phase_s,
-        [&](double start, double slope, double length) {
-          kernel.add(start / mass_kg, slope / mass_kg, length);
-        },
-        [&](double start, double slope, double length, double ratio) {
-          kernel.add_series(start / mass_kg, slope / mass_kg, length, ratio);
-        });
+    if (adjoint.is_error()) kernel.add(0, phase_s / mass_kg, phase_s);
+    KernelWalk::of_force(adjoint).run(output, fill);
   } else {
     // An error of one period is a force held for that period, with the same int |eps| dt.
-    const double period_s = adjoint.period_s();
-    const double scale = 1 / (mass_kg * period_s);
-    bool skips = !with_own;
-    adjoint.command_kernel(
-        phase_s,
-        [&](double response) {
-          if (!std::exchange(skips, false)) kernel.add(response * scale, 0, period_s);
-        },
-        [&](double response, double ratio) { kernel.add_series(response * scale, 0, period_s, ratio); });
+    const SampledModel& model = adjoint.model();
+    const Eigen::VectorXd input = Eigen::VectorXd::Unit(model.size() + 1, model.command_index());
+    const double own = output.dot(input) / h;
+    if (with_own) kernel.add(own, own, h);
+    KernelWalk::of_held(adjoint, input).run(output, fill);
   }
   return kernel;
 }
@@ -143,17 +163,33 @@ DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, c
   return bounds;
 }
 
+namespace {
+
+/// Returns sup |output| at the samples, per 1/kg, due to a force of the class.
+/// @param with_own as in kernel_of().
+double largest_output(const SampledAdjoint& adjoint, Channel channel, double amplitude_N,
+                      const Disturbance& disturbance, bool with_own) {
+  const Eigen::RowVectorXd output = adjoint.output_after_control(0);
+  const GainNorms gains =
+      channel == Channel::kForce ? force_gains(adjoint, output) : command_gains(adjoint, output, with_own);
+  const double by_amplitude = times_known(gains.amplitude, amplitude_N);
+  if (!std::isfinite(disturbance.impulse_N_s)) return by_amplitude;
+  double felt = gains.impulse;
+  if (disturbance.passes > 1) {
+    const Kernel kernel = kernel_of(adjoint, channel, 0, 1, with_own);
+    felt = felt_passes(disturbance, FadingKernel(kernel, kernel.peak));
+  }
+  return std::min(by_amplitude, disturbance.impulse_N_s * felt);
+}
+
+}  // namespace
+
 double effort_of_class_N(const SampledLoop& loop, Channel channel, const Disturbance& disturbance) {
   const SampledAdjoint adjoint(loop, SampledAdjoint::Output::kCommand);
   if (!adjoint.is_stable()) return kInfinity;
-  const double mass_kg = loop.plant.mass_kg, E = disturbance.largest_N(), J = disturbance.impulse_N_s;
-  const Kernel kernel = kernel_of(adjoint, channel, 0, mass_kg, false);
-  double feedback_N = times_known(mass_kg * kernel.area, E);
-  if (std::isfinite(J)) {
-    const double felt = felt_passes(disturbance, FadingKernel(kernel, kernel.peak));
-    feedback_N = std::min(feedback_N, mass_kg * J * felt);
-  }
-  return feedback_N + (channel == Channel::kCommand ? std::min(E, J / loop.period_s) : 0);
+  const double E = disturbance.largest_N();
+  return largest_output(adjoint, channel, E, disturbance, false) +
+         (channel == Channel::kCommand ? std::min(E, disturbance.impulse_N_s / loop.period_s) : 0);
 }
 
 namespace {
@@ -202,23 +238,25 @@ double effort_of_worst_force_N(const SampledLoop& loop, double amplitude_N, doub
                   command_after_N(loop, worst_signs(without), amplitude_N, limit_m_s));
 }
 
-ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturbance& disturbance,
+ClampBounds clamp_demand(const SampledLoop& loop, Channel channel, const Disturbance& disturbance,
                          const OtherErrors& other, double limit_m_s) {
   ClampBounds result;
   if (loop.plant.Ki == 0 || std::isinf(limit_m_s)) return result;
   result.exists = true;
-  const double mass_kg = loop.plant.mass_kg;
   double demand_m_s = kInfinity;
   const SampledAdjoint integral(loop, SampledAdjoint::Output::kIntegral);
-  if (integral.is_stable()) {
-    const Kernel kernel = kernel_of(integral, channel, 0, mass_kg);
-    demand_m_s = times_known(kernel.area, disturbance.amplitude_N);
-    if (std::isfinite(disturbance.impulse_N_s)) {
-      demand_m_s = std::min(
-          demand_m_s, disturbance.impulse_N_s * felt_passes(disturbance, FadingKernel(kernel, kernel.peak)));
-    }
-  }
+  if (integral.is_stable())
+    demand_m_s =
+        largest_output(integral, channel, disturbance.amplitude_N, disturbance, true) / loop.plant.mass_kg;
   result.set_demand(demand_m_s + integral_demand_m_s(loop, channel, other), limit_m_s);
+  return result;
+}
+
+ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturbance& disturbance,
+                         const OtherErrors& other, double limit_m_s) {
+  ClampBounds result = clamp_demand(loop, channel, disturbance, other, limit_m_s);
+  if (!result.exists) return result;
+  const double mass_kg = loop.plant.mass_kg;
   SampledLoop without = loop;
   without.plant.Ki = 0;
   const SampledAdjoint pd_adjoint(without);

@@ -21,6 +21,10 @@ double effort_of_class_N(const SampledLoop& loop, Channel channel, const Disturb
 /// that of the loop without integral, held over each period and simulated from rest. 0 if the loop is unstable.
 double effort_of_worst_force_N(const SampledLoop& loop, double amplitude_N, double limit_m_s);
 
+/// Returns the demand on the integrator's state, and whether its clamp may act: clamp_bounds() without bounds.
+ClampBounds clamp_demand(const SampledLoop& loop, Channel channel, const Disturbance& disturbance,
+                         const OtherErrors& other, double limit_m_s);
+
 /// Returns the effect of a clamp on the integrator's state. The demand is the exact gain to that state. The bounds that
 /// hold while the clamp acts are those of the loop without integral, with the integral as an error of its command.
 /// @param limit_m_s on the state I that firmware keeps (it adds integrator_step_s e per period).

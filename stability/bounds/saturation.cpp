@@ -18,22 +18,27 @@ std::string decimals(double value) {
   return text;
 }
 
-AxisLoop& position_loop(AxisLoop& loop) { return loop; }
-AxisLoop& position_loop(SampledLoop& loop) { return loop.plant; }
+AxisLoop& plant_of_loop(AxisLoop& loop) { return loop; }
+AxisLoop& plant_of_loop(SampledLoop& loop) { return loop.plant; }
+
+template <class AnyLoop>
+double integral_replaced_N(AnyLoop& loop, double limit_m_s) {
+  AxisLoop& plant = plant_of_loop(loop);
+  Disturbance integral;
+  integral.amplitude_N = plant.mass_kg * plant.Ki * limit_m_s;
+  plant.Ki = 0;
+  return effort_of_class_N(loop, Channel::kCommand, integral);
+}
 
 /// sup |u| due to the class and the other errors of one axis.
 template <class AnyLoop>
 double commanded_N(AnyLoop loop, Channel channel, const Disturbance& known, const OtherErrors& other,
                    double limit_m_s) {
-  const ClampBounds clamp = clamp_bounds(loop, channel, known, other, limit_m_s);
+  const ClampBounds clamp = clamp_demand(loop, channel, known, other, limit_m_s);
   if (!clamp.exists || clamp.never_acts)
     return effort_of_class_N(loop, channel, known) + effort_N(loop, other, channel);
-  AxisLoop& plant = position_loop(loop);
-  Disturbance integral;
-  integral.amplitude_N = plant.mass_kg * plant.Ki * limit_m_s;
-  plant.Ki = 0;
-  return effort_of_class_N(loop, channel, known) + effort_N(loop, other, channel) +
-         effort_of_class_N(loop, Channel::kCommand, integral);
+  const double integral_N = replace_integral_N(loop, limit_m_s);
+  return effort_of_class_N(loop, channel, known) + effort_N(loop, other, channel) + integral_N;
 }
 
 /// The same with an unknown constant thrust ratio: d u acts like a force (thrust_ratio.h).
@@ -93,7 +98,7 @@ double attained_N(const FlownLoop& loop, int axis, double amplitude_N) {
   if (!one || !is_stable(*one)) return 0;
   Disturbance force;
   force.amplitude_N = amplitude_N;
-  const ClampBounds clamp = clamp_bounds(*one, Channel::kForce, force, {}, loop.integral_limit_m_s(axis));
+  const ClampBounds clamp = clamp_demand(*one, Channel::kForce, force, {}, loop.integral_limit_m_s(axis));
   return !clamp.exists || clamp.never_acts ? effort_gain(*one) * amplitude_N : 0;
 }
 
@@ -143,7 +148,7 @@ std::string why_undecided(const FlownLoop& loop, const DisturbanceSource& source
   }
   for (const ReferenceMotion& motion : source.reference) {
     if (!std::isfinite(motion.fed_forward_m_s2()))
-      return "the set point's acceleration, which is fed forward, is not bounded (--reference-accel)";
+      return "the set point's acceleration, which is fed forward, is not bounded (reference_accel_m_s2)";
   }
   return "the size of the force error is not known (--amplitude)";
 }
@@ -154,21 +159,31 @@ double Saturation::tilt_rad() const {
   return least_N > 0 ? std::atan2(std::hypot(feedback_N[0], feedback_N[1]), least_N) : std::acos(-1.0);
 }
 
-Saturation saturation(const FlownLoop& loop, const DisturbanceSource& source, const InitialError& initial) {
+double replace_integral_N(AxisLoop& loop, double limit_m_s) { return integral_replaced_N(loop, limit_m_s); }
+double replace_integral_N(SampledLoop& loop, double limit_m_s) {
+  return integral_replaced_N(loop, limit_m_s);
+}
+
+Saturation saturation_of(const FlownLoop& loop, const PerAxis& feedback_N, double ratio_error) {
   Saturation result;
-  const double ratio = source.thrust_ratio_error, weight_N = loop.plant.mass_kg * kGravity_m_s2;
+  result.feedback_N = feedback_N;
+  const double weight_N = loop.plant.mass_kg * kGravity_m_s2;
   result.available_N = loop.thrust_range_N();
-  result.available_N.lower *= 1 + ratio;
-  result.available_N.upper *= 1 - ratio;
-  for (int axis = 0; axis < 3; ++axis)
-    result.feedback_N[static_cast<std::size_t>(axis)] = feedback_N(loop, source, initial, axis);
-  const PerAxis& u = result.feedback_N;
-  result.most_N = std::hypot(u[0], u[1], weight_N + u[2]);
-  result.least_N = weight_N - u[2];
-  if (std::isfinite(result.available_N.upper) && result.margin_N() >= 0) {
+  result.available_N.lower *= 1 + ratio_error;
+  result.available_N.upper *= 1 - ratio_error;
+  result.most_N = std::hypot(feedback_N[0], feedback_N[1], weight_N + feedback_N[2]);
+  result.least_N = weight_N - feedback_N[2];
+  if (std::isfinite(result.available_N.upper) && result.margin_N() >= 0)
     result.verdict = Saturation::Verdict::kProved;
-    return result;
-  }
+  return result;
+}
+
+Saturation saturation(const FlownLoop& loop, const DisturbanceSource& source, const InitialError& initial) {
+  PerAxis feedback{};
+  for (int axis = 0; axis < 3; ++axis)
+    feedback[static_cast<std::size_t>(axis)] = feedback_N(loop, source, initial, axis);
+  Saturation result = saturation_of(loop, feedback, source.thrust_ratio_error);
+  if (result.is_proved()) return result;
   refute(loop, source, result);
   if (result.verdict == Saturation::Verdict::kUndecided) result.why = why_undecided(loop, source, result);
   return result;

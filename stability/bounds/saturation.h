@@ -37,6 +37,15 @@ struct Saturation {
 /// with the clamp, or a ramp of a class that bounds nothing but the rate.
 Saturation saturation(const FlownLoop& loop, const DisturbanceSource& source, const InitialError& initial);
 
+/// Judges commanded forces by U alone; an undecided verdict has no reason yet.
+/// @param ratio_error on the thrust ratio, which narrows the range.
+Saturation saturation_of(const FlownLoop& loop, const PerAxis& feedback_N, double ratio_error = 0);
+
+/// Takes the integral out of the loop. Returns sup |u| due to the largest integral that its clamp allows, which then
+/// acts as an error of the command, N.
+double replace_integral_N(AxisLoop& loop, double limit_m_s);
+double replace_integral_N(SampledLoop& loop, double limit_m_s);
+
 /// Returns "proved", "refuted" or "undecided".
 const char* name(Saturation::Verdict verdict);
 

@@ -40,9 +40,7 @@ double integral_gain(const AxisLoop& loop) { return continuous_norms(loop, Chann
 double integral_gain(const SampledLoop& loop) {
   const SampledAdjoint adjoint(loop, SampledAdjoint::Output::kIntegral);
   if (!adjoint.is_stable()) return kInfinity;
-  KernelSum sum;
-  add_force_kernel(adjoint, adjoint.output_after_control(0), sum);
-  return sum.norms().amplitude / loop.plant.mass_kg;
+  return force_gains(adjoint, adjoint.output_after_control(0)).amplitude / loop.plant.mass_kg;
 }
 
 template <class AnyLoop>

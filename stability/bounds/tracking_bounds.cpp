@@ -182,7 +182,7 @@ double integrator_need_m_s(const FlownLoop& loop, int axis, const DisturbanceSou
   OtherErrors other = source.other(axis, initial, loop.plant);
   if (source.classes_contain_bias) other.bias_N = other.start_N = 0;
   const auto need = [&](const auto& one, double limit_m_s) {
-    return clamp_bounds(one, Channel::kForce, source.axis[axis], other, limit_m_s).demand_m_s;
+    return clamp_demand(one, Channel::kForce, source.axis[axis], other, limit_m_s).demand_m_s;
   };
   if (const auto sampled = loop.sampled(axis)) return need(*sampled, loop.integrator_limit_m_s(axis));
   return need(*loop.continuous(axis), loop.integral_limit_m_s(axis));

@@ -12,6 +12,7 @@
 #include "nn/base/suggest.h"
 #include "nn/base/text.h"
 #include "nn/base/toml.h"
+#include "stability/bounds/declared_disturbance.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -79,17 +80,11 @@ std::string beside(const std::string& grid, const std::string& file) {
   return (std::filesystem::path(grid).parent_path() / file).string();
 }
 
-void read_disturbance(const TomlTable& table, Disturbance& disturbance) {
-  table.allow_only({"amplitude_N", "rate_N_s", "variation_N", "impulse_N_s"});
-  const auto read = [&table](const char* key, double& into) {
-    if (!table.has(key)) return;
-    into = table.number(key);
-    if (into < 0) table.refuse(key, std::to_string(into), "must not be negative");
-  };
-  read("amplitude_N", disturbance.amplitude_N);
-  read("rate_N_s", disturbance.rate_N_s);
-  read("variation_N", disturbance.variation_N);
-  read("impulse_N_s", disturbance.impulse_N_s);
+Disturbance read_disturbance(const TomlTable& table, int axis) {
+  table.allow_only(class_keys());
+  DisturbanceSource source;
+  read_force_error(table, source);
+  return source.axis[axis];
 }
 
 }  // namespace
@@ -227,7 +222,7 @@ Grid load_grid(const std::string& path) {
   grid.compute = read_quantities(top, "compute");
   if (top.has("pareto")) read_pareto(top, grid);
   if (top.has("limits")) read_limits(top.table("limits"), grid);
-  if (top.has("disturbance")) read_disturbance(top.table("disturbance"), grid.disturbance);
+  if (top.has("disturbance")) grid.disturbance = read_disturbance(top.table("disturbance"), grid.axis);
   return grid;
 }
 

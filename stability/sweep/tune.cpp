@@ -72,12 +72,9 @@ bool rings(const AxisLoop& loop) {
   return false;
 }
 
-/// Returns the effort gain of gains with finite norms; infinite for others. Costs as much as all norms together.
+/// Returns the effort gain of gains with finite norms; infinite for others.
 double effort_of(const SampledLoop& loop, const GainNorms& norms) {
-  if (!std::isfinite(norms.amplitude)) return kInfinity;
-  AxisLoop acting = loop.plant;
-  acting.Ki = effective_Ki(loop);
-  return effort_gain(acting);
+  return std::isfinite(norms.amplitude) ? effort_gain(loop) : kInfinity;
 }
 
 /// Returns everything of evaluate_gains() but the effort, which is infinite.
@@ -89,7 +86,7 @@ TunedPoint without_effort(const SampledLoop& loop, TuneObjective objective) {
   AxisLoop acting = loop.plant;
   acting.Ki = effective_Ki(loop);
   const bool is_candidate = spectral_radius(loop) < 1 && !rings(acting);
-  point.norms = is_candidate ? continuous_norms(acting, Channel::kForce)
+  point.norms = is_candidate ? sampled_norms(loop, Channel::kForce, Instants::kAll)
                              : GainNorms{kInfinity, kInfinity, kInfinity, kInfinity};
   point.objective = objective_of(point.norms, objective);
   point.noise_m_s2 = noise_deviation(loop, 1e-3, 0.05).command_m_s2;
@@ -251,13 +248,11 @@ TuneResult tune(const SampledLoop& loop, const TuneOptions& options) {
   result.best = search.best();
   result.stopped =
       search.is_cancelled() ? "interrupted: the best gains so far" : "global " + global + ", local " + local;
-  result.shipped_sampled = sampled_norms(loop, Channel::kForce, Instants::kSampling);
   SampledLoop tuned = loop;
   tuned.plant.Kp = result.best.Kp;
   tuned.plant.Kd = result.best.Kd;
   tuned.plant.Ki = result.best.Ki;
   result.best.effort = effort_of(tuned, result.best.norms);
-  result.best_sampled = sampled_norms(tuned, Channel::kForce, Instants::kSampling);
   const auto e = excesses(result.best, options.constraints);
   for (std::size_t i = 0; i < e.size(); ++i) {
     if (e[i] > 0) result.violated.emplace_back(kConstraintNames[i]);

@@ -40,7 +40,7 @@ struct TuneOptions {
 struct TunedPoint {
   double Kp = 0, Kd = 0, Ki = 0;
   double objective = 0;
-  GainNorms norms;
+  GainNorms norms;  ///< force channel of the sampled loop, at and between its samples
   double noise_m_s2 = 0, lag_limit_s = 0, effort = 0;
   std::optional<CascadeMargins> margins;  ///< with TuneOptions::attitude
   bool feasible = false;
@@ -49,9 +49,8 @@ struct TunedPoint {
 
 struct TuneResult {
   TunedPoint shipped;
-  TunedPoint best;                          ///< the least infeasible point if none is feasible
-  GainNorms shipped_sampled, best_sampled;  ///< force channel of the sampled loop, at its samples
-  std::vector<std::string> violated;        ///< constraints violated by `best`, if it is infeasible
+  TunedPoint best;                    ///< the least infeasible point if none is feasible
+  std::vector<std::string> violated;  ///< constraints violated by `best`, if it is infeasible
   /// Why no gains in the range satisfy the constraints, if that is proved; else empty.
   std::string infeasible;
   /// Constraints within 0.1 % of their limit at the best gains, and gains at the ends of their range.
@@ -68,8 +67,8 @@ CascadeMargins margins_of(const SampledLoop& loop, const Cascade& attitude);
 
 /// Improves Kp, Kd and Ki of `loop` (only Kp and Kd if its Ki is 0, which then stays 0): a derivative-free global
 /// search (GN_ISRES, seeded) over the logarithms of the gains, then COBYLA from its best point and from the given
-/// gains. The objective is that of the continuous loop with the effective Ki; it has no derivative because of its kinks
-/// (sign changes of the kernel). The result is never worse than the given gains if those are feasible.
+/// gains. The objective is that of the sampled loop; it has no derivative because of its kinks (sign changes of the
+/// kernel). The result is never worse than the given gains if those are feasible.
 TuneResult tune(const SampledLoop& loop, const TuneOptions& options);
 
 /// "amplitude", "impulse", "edge", "rate".

@@ -218,6 +218,7 @@ TEST(BoundCommand, EveryClassOfAnErrorOfAnEstimateCounts) {
     }
     return -1.0;
   };
+  const auto stated = [&folder](const char* body) { return disturbance_file(folder, body); };
   const double amplitude_m = part_of(" --velocity-error 0.1", "velocity_error");
   EXPECT_GT(amplitude_m, 0.05);
   // The printed gains are per unit.
@@ -225,21 +226,24 @@ TEST(BoundCommand, EveryClassOfAnErrorOfAnEstimateCounts) {
   for (const Json& row : exact) {
     if (row["axis"] != "z" || row["loop"] != "sampled" || row["channel"] != "velocity") continue;
     const Json& g = row["between_samples"];
-    EXPECT_NEAR(part_of(" --velocity-error-rate 0.02", "velocity_error"), 0.02 * g["rate"].get<double>(),
-                1e-9);
-    EXPECT_NEAR(part_of(" --velocity-error-edge 0.02", "velocity_error"), 0.02 * g["edge"].get<double>(),
-                1e-9);
-    EXPECT_NEAR(part_of(" --velocity-error-impulse 0.02", "velocity_error"),
+    EXPECT_NEAR(part_of(stated("velocity_error_rate_m_s2 = 0.02"), "velocity_error"),
+                0.02 * g["rate"].get<double>(), 1e-9);
+    EXPECT_NEAR(part_of(stated("velocity_error_variation_m_s = 0.02"), "velocity_error"),
+                0.02 * g["edge"].get<double>(), 1e-9);
+    EXPECT_NEAR(part_of(stated("velocity_error_impulse_m = 0.02"), "velocity_error"),
                 0.02 * g["impulse"].get<double>(), 1e-9);
   }
-  const double both_m = part_of(" --velocity-error 0.1 --velocity-error-rate 0.1", "velocity_error");
+  const double both_m =
+      part_of(stated("velocity_error_m_s = 0.1\nvelocity_error_rate_m_s2 = 0.1"), "velocity_error");
   EXPECT_LT(both_m, amplitude_m);
   // A vehicle that follows a slowly drifting position error is off by little more than that error.
-  const double drift_m = part_of(" --position-error 0.02 --position-error-rate 0.001", "position_error");
+  const double drift_m =
+      part_of(stated("position_error_m = 0.02\nposition_error_rate_m_s = 0.001"), "position_error");
   EXPECT_LT(drift_m, part_of(" --position-error 0.02", "position_error"));
   EXPECT_GT(drift_m, 0.02);
-  EXPECT_EQ(part_of(" --velocity-error 0,0,0 --velocity-error-rate 0.1", "velocity_error"), 0);
-  const Json told = json_of(folder, "bound" + gains + " --velocity-error-rate 0,0,0.02");
+  EXPECT_EQ(
+      part_of(stated("velocity_error_m_s = [0, 0, 0]\nvelocity_error_rate_m_s2 = 0.1"), "velocity_error"), 0);
+  const Json told = json_of(folder, "bound" + gains + stated("velocity_error_rate_m_s2 = [0, 0, 0.02]"));
   ASSERT_EQ(told["disturbance"]["of_estimates"].size(), 1u);
   EXPECT_EQ(told["disturbance"]["of_estimates"][0]["rate_per_s"], 0.02);
   EXPECT_TRUE(told["disturbance"]["of_estimates"][0]["amplitude"].is_null());
@@ -250,7 +254,8 @@ TEST(BoundCommand, AMovingSetPointIsAPartOfEveryTotal) {
   const std::string gains =
       gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\nrate_hz = 100\n[lag]\nmotor_s = 0.0575\n");
   const Json still = json_of(folder, "bound" + gains + " --amplitude 0.01");
-  const Json moving = json_of(folder, "bound" + gains + " --amplitude 0.01 --reference-jerk 0,0,5");
+  const Json moving = json_of(folder, "bound" + gains + " --amplitude 0.01" +
+                                          disturbance_file(folder, "reference_jerk_m_s3 = [0, 0, 5]"));
   for (std::size_t k = 0; k < still["bounds"].size(); ++k) {
     const Json& row = moving["bounds"][k];
     const double part_m = row["parts"]["reference"].get<double>();
@@ -265,11 +270,15 @@ TEST(BoundCommand, AMovingSetPointIsAPartOfEveryTotal) {
       EXPECT_GT(part_m, moving["axes"][2]["lag_floor_rate"].get<double>() * 0.034 * 5);
     }
   }
-  const Json jumps = json_of(folder, "bound" + gains + " --reference-step 0.3 --reference-speed-step 1");
+  const Json jumps =
+      json_of(folder, "bound" + gains +
+                          disturbance_file(folder, "reference_step_m = 0.3\nreference_speed_step_m_s = 1"));
   EXPECT_GE(jumps["bounds"][0]["parts"]["reference"].get<double>(), 0.3);
-  for (const std::string& options :
-       {std::string(" --reference-jerk -1"), std::string(" --amplitude 0.1 --tube --reference-step 1")})
-    EXPECT_EQ(run_shell("swarmcert bound" + gains + options, folder.path()).exit_code, 2) << options;
+  const auto exit_code_of = [&](const std::string& options) {
+    return run_shell("swarmcert bound" + gains + options, folder.path()).exit_code;
+  };
+  EXPECT_EQ(exit_code_of(disturbance_file(folder, "reference_jerk_m_s3 = -1")), 3);
+  EXPECT_EQ(exit_code_of(" --amplitude 0.1 --tube" + disturbance_file(folder, "reference_step_m = 1")), 2);
 }
 
 TEST(BoundCommand, AJerkIsNoBoundWhereTheModelScalesTheThrustThatIsFedForward) {
@@ -281,10 +290,14 @@ TEST(BoundCommand, AJerkIsNoBoundWhereTheModelScalesTheThrustThatIsFedForward) {
   write_text(folder / "model.toml",
              model + "\n[[effect]]\nname = \"thrust_ratio\"\nparameters = { ratio = 0.3 }\n");
   const std::string scaled = "bound --gains gains.toml --model model.toml --amplitude 0.01";
-  const Outcome outcome = run_shell("swarmcert " + scaled + " --reference-jerk 5", folder.path());
+  const Outcome outcome =
+      run_shell("swarmcert " + scaled + disturbance_file(folder, "reference_jerk_m_s3 = 5"), folder.path());
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_NE(outcome.output.find("1.3"), std::string::npos) << outcome.output;
-  EXPECT_EQ(run_shell("swarmcert " + scaled + " --reference-step 0.1", folder.path()).exit_code, 0);
+  EXPECT_EQ(
+      run_shell("swarmcert " + scaled + disturbance_file(folder, "reference_step_m = 0.1"), folder.path())
+          .exit_code,
+      0);
 }
 
 TEST(BoundCommand, TheTheoremsBallIsWithheldWhereTheEstimatesErr) {
@@ -326,8 +339,8 @@ TEST(BoundCommand, TheTubeOverTimeRisesToTheBoundOfAllThatIsDeclared) {
       EXPECT_NEAR(before, row["amplitude"].get<double>(), 2e-3 * before) << tube["axis"];
     }
   }
-  const Json unknown =
-      json_of(folder, "bound" + gains + " --tube --amplitude 0.03 --velocity-error-rate 0.1");
+  const Json unknown = json_of(folder, "bound" + gains + " --tube --amplitude 0.03" +
+                                           disturbance_file(folder, "velocity_error_rate_m_s2 = 0.1"));
   EXPECT_EQ(unknown["tube"][0]["status"], "inconclusive");
 }
 
@@ -339,9 +352,9 @@ TEST(BoundCommand, WhatABoundWouldLeaveOutIsRefused) {
                            "/stability/models/crazyflie-small-effects.toml";
   for (const std::string& options :
        {std::string(" --amplitude 0.1 --tube --initial-error 0.1"), task + " --bias 0.1",
-        task + " --velocity-error-rate 0.1", std::string(" --bias 1,2"), std::string(" --bias 1,2,3,4"),
-        std::string(" --bias nan"), std::string(" --velocity-error -1"), std::string(" --position-error 1x"),
-        std::string(" --initial-error -0.1")}) {
+        task + disturbance_file(folder, "velocity_error_rate_m_s2 = 0.1"), std::string(" --bias 1,2"),
+        std::string(" --bias 1,2,3,4"), std::string(" --bias nan"), std::string(" --velocity-error -1"),
+        std::string(" --position-error 1x"), std::string(" --initial-error -0.1")}) {
     const Outcome outcome = run_shell("swarmcert bound" + setup + options, folder.path());
     EXPECT_EQ(outcome.exit_code, 2) << options << outcome.output;
     EXPECT_NE(outcome.output.find("--"), std::string::npos) << options << outcome.output;
@@ -372,8 +385,7 @@ TEST(BoundCommand, NumbersOutOfRangeAreExplainedInWords) {
   for (const auto& [options, words] :
        {std::pair(" --amplitude 1e400", "must be a finite number"),
         std::pair(" --amplitude -1", "must not be negative"),
-        std::pair(" --amplitude abc", "is not a number"), std::pair(" --battery 0", "must be positive"),
-        std::pair(" --passes 0", "must be positive")}) {
+        std::pair(" --amplitude abc", "is not a number"), std::pair(" --battery 0", "must be positive")}) {
     const Outcome outcome = run_shell("swarmcert bound" + kFlown + options, folder.path());
     EXPECT_EQ(outcome.exit_code, 2) << options;
     EXPECT_NE(outcome.output.find(words), std::string::npos) << outcome.output;
@@ -381,12 +393,41 @@ TEST(BoundCommand, NumbersOutOfRangeAreExplainedInWords) {
   }
 }
 
+TEST(BoundCommand, AFileAndTheCommandLineDeclareTheSame) {
+  const ScratchFolder folder;
+  const std::string file =
+      disturbance_file(folder, "amplitude_N = 0.02\nrate_N_s = 0.5\nvelocity_error_m_s = 0.01");
+  const Json by_file = json_of(folder, "bound" + kFlown + file);
+  const Json by_line =
+      json_of(folder, "bound" + kFlown + " --amplitude 0.02 --rate 0.5 --velocity-error 0.01");
+  EXPECT_EQ(by_file["bounds"], by_line["bounds"]);
+  EXPECT_EQ(by_file["answer"]["error_m"], by_line["answer"]["error_m"]);
+  EXPECT_EQ(
+      json_of(folder, "bound" + kFlown + file + " --amplitude 0.03")["bounds"],
+      json_of(folder, "bound" + kFlown + " --amplitude 0.03 --rate 0.5 --velocity-error 0.01")["bounds"]);
+}
+
+TEST(BoundCommand, WhatADisturbanceFileCannotMeanIsRefusedWithItsLine) {
+  const ScratchFolder folder;
+  for (const auto& [body, words] :
+       {std::pair("amplitude_N = -1", "must not be negative"), std::pair("amplitud_N = 1", "amplitude_N"),
+        std::pair("rate_N_s = [1, 2]", "needs one number for all axes, or three"),
+        std::pair("passes = 0", "must be a whole number from 1"),
+        std::pair("amplitude_N = 0.1\npasses = 3\nevery_s = 2", "repeats the impulse of one pass"),
+        std::pair("impulse_N_s = 0.1\npasses = 3", "state impulse_N_s and every_s")}) {
+    const Outcome outcome =
+        run_shell("swarmcert bound" + kFlown + disturbance_file(folder, body), folder.path());
+    EXPECT_EQ(outcome.exit_code, 3) << body << outcome.output;
+    EXPECT_NE(outcome.output.find(words), std::string::npos) << outcome.output;
+    EXPECT_NE(outcome.output.find("disturbance.toml:"), std::string::npos) << outcome.output;
+  }
+}
+
 TEST(BoundCommand, OptionsThatWouldChangeNothingAreRefused) {
   const ScratchFolder folder;
   for (const char* options :
        {" --speed 1", " --amplitude 0.1 --accel 1", " --neighbours 2", " --quantile p50",
-        " --amplitude 0.1 --gap 0.1:0.4", " --thrust-rate 1", " --impulse 0.1 --every 3",
-        " --amplitude 0.1 --passes 3 --every 2", " --tube", " --rate 1 --tube"}) {
+        " --amplitude 0.1 --gap 0.1:0.4", " --thrust-rate 1", " --tube", " --rate 1 --tube"}) {
     const Outcome outcome = run_shell("swarmcert bound" + kFlown + options, folder.path());
     EXPECT_EQ(outcome.exit_code, 2) << options << outcome.output;
     EXPECT_NE(outcome.output.find("--"), std::string::npos) << options << outcome.output;

@@ -347,10 +347,10 @@ TEST(BoundCommand, ASwarmsBoundContainsTheErrorsOfItsEstimatesOrSaysWhichAreMiss
     EXPECT_GT(own_m, 0.01);
     EXPECT_GE(errs["error_m"][vehicle].get<double>(), exact["error_m"][vehicle].get<double>() + own_m);
   }
-  for (const std::string& options : {std::string(" --velocity-error-edge 0.1 --position-error-rate 1"),
-                                     std::string(" --velocity-error-impulse 0.1")}) {
-    const Outcome missing = run_shell("swarmcert " + proved + options, folder.path());
-    EXPECT_EQ(missing.exit_code, 2) << options << missing.output;
+  for (const char* const body : {"velocity_error_variation_m_s = 0.1\nposition_error_rate_m_s = 1",
+                                 "velocity_error_impulse_m = 0.1"}) {
+    const Outcome missing = run_shell("swarmcert " + proved + disturbance_file(folder, body), folder.path());
+    EXPECT_EQ(missing.exit_code, 2) << body << missing.output;
     EXPECT_NE(missing.output.find("--position-error P"), std::string::npos) << missing.output;
   }
 }

@@ -63,7 +63,7 @@ TEST(Plausibility, ABatteryWithinTheRangeThatTheModelStatesIsTaken) {
   ASSERT_NE(two_cells.find(range), std::string::npos);
   two_cells.replace(two_cells.find(range), range.size(), "battery_range_V = [6, 8.6]");
   write_text(folder / "two.toml", two_cells);
-  const std::string bound = "bound --gains " + gains() + " --rate 0.3 --model ";
+  const std::string bound = "bound --gains " + gains() + " --amplitude 0.01 --model ";
   EXPECT_EQ(run_shell("swarmcert " + bound + "two.toml --battery 7.4", folder.path()).exit_code, 0);
   expect_refusal(folder, bound + "two.toml --battery 3.7", 2, {"two.toml", "6 .. 8.6 V"});
 }

@@ -27,4 +27,10 @@ inline std::string gains_file(const ScratchFolder& folder, const std::string& bo
   return " --gains gains.toml" + kModel;
 }
 
+/// Writes disturbance.toml and returns the option that reads it.
+inline std::string disturbance_file(const ScratchFolder& folder, const std::string& body) {
+  write_text(folder / "disturbance.toml", "schema = \"swarmcert/disturbance/1\"\n" + body + "\n");
+  return " --disturbance disturbance.toml";
+}
+
 }  // namespace swarmcert::tests

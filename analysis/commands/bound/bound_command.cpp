@@ -65,16 +65,17 @@ bool has_initial(const stability::InitialError& initial) {
 void refuse_jerk_of_scaled_thrust(const stability::DisturbanceSource& source, const Tracking& input) {
   if (source.thrust_ratio_error > 0 && source.has_moving_reference()) {
     throw UsageError(
-        "--thrust-ratio-error: it also scales the acceleration that a moving set point feeds forward, which "
-        "--reference-step, --reference-speed-step and --reference-jerk do not bound: leave one of them out");
+        "thrust_ratio_error: it also scales the acceleration that a moving set point feeds forward, which "
+        "reference_step_m, reference_speed_step_m_s and reference_jerk_m_s3 do not bound: leave one of them "
+        "out");
   }
   for (const stability::ReferenceMotion& motion : source.reference) {
     if (motion.jerk_m_s3 == 0 || input.plant.thrust_scale == 1) continue;
-    throw UsageError(
-        fmt::format("--reference-jerk: the thrust ratio {} of the model scales the acceleration that is fed "
-                    "forward, which leaves a force that the jerk does not limit; add it to --amplitude, with "
-                    "a model without the ratio",
-                    input.plant.thrust_scale));
+    throw UsageError(fmt::format(
+        "reference_jerk_m_s3: the thrust ratio {} of the model scales the acceleration that is fed "
+        "forward, which leaves a force that the jerk does not limit; add it to --amplitude, with "
+        "a model without the ratio",
+        input.plant.thrust_scale));
   }
 }
 
@@ -87,10 +88,9 @@ void refuse_what_is_left_out(const BoundOptions& options, const stability::Distu
   const bool has_task = !options.task.task.empty();
   const char* const asked = has_task ? "--tube --task" : options.tube ? "--tube" : nullptr;
   if (source.thrust_ratio_error > 0 && (asked != nullptr || !options.swarm.empty()))
-    refuse(asked != nullptr ? asked : "--swarm", "--thrust-ratio-error");
+    refuse(asked != nullptr ? asked : "--swarm", "thrust_ratio_error of --disturbance");
   if ((asked != nullptr || !options.swarm.empty()) && source.has_moving_reference()) {
-    refuse(asked != nullptr ? asked : "--swarm",
-           "--reference-step, --reference-speed-step and --reference-jerk");
+    refuse(asked != nullptr ? asked : "--swarm", "the moving set point of --disturbance");
   }
   if (asked != nullptr && has_initial(options.initial)) {
     refuse(asked, "--initial-error, --initial-speed and --initial-learning-error, as it starts from rest");

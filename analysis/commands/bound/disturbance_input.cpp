@@ -14,6 +14,7 @@
 #include "nn/base/input_error.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
+#include "stability/bounds/declared_disturbance.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -45,45 +46,22 @@ void read_axes(const char* option, const std::string& text, bool is_signed, doub
   if (count == 1) values[1] = values[2] = values[0];
 }
 
-/// Any number given for the error of an estimate replaces all that was measured for it.
-void read_estimate(const std::string& option, const EstimateArguments& arguments,
-                   stability::EstimateError (&errors)[3]) {
-  if (!arguments.are_given()) return;
-  const auto read = [&](const char* suffix, const std::string& text, double stability::EstimateError::*of) {
-    double values[3] = {kInfinity, kInfinity, kInfinity};
-    read_axes((option + suffix).c_str(), text, false, values);
-    for (int axis = 0; axis < 3; ++axis) errors[axis].*of = values[axis];
-  };
-  for (stability::EstimateError& error : errors) error = {};
-  read("", arguments.amplitude, &stability::EstimateError::amplitude);
-  read("-rate", arguments.rate, &stability::EstimateError::rate);
-  read("-edge", arguments.edge, &stability::EstimateError::variation);
-  read("-impulse", arguments.impulse, &stability::EstimateError::impulse);
-}
-
-void read_reference(const DisturbanceArguments& arguments, DisturbanceSource& source) {
-  const auto read = [&](const char* option, const std::string& text, double stability::ReferenceMotion::*of) {
-    double values[3] = {0, 0, 0};
-    read_axes(option, text, false, values);
-    for (int axis = 0; axis < 3; ++axis) source.reference[axis].*of = values[axis];
-  };
-  read("--reference-step", arguments.reference_step, &stability::ReferenceMotion::steps_m);
-  read("--reference-speed-step", arguments.reference_speed_step,
-       &stability::ReferenceMotion::speed_steps_m_s);
-  read("--reference-jerk", arguments.reference_jerk, &stability::ReferenceMotion::jerk_m_s3);
-  if (!arguments.reference_accel.empty())
-    read("--reference-accel", arguments.reference_accel, &stability::ReferenceMotion::acceleration_m_s2);
+/// The amplitude given for the error of an estimate replaces all that was known of it.
+void read_estimate(const char* option, const std::string& text, stability::EstimateError (&errors)[3]) {
+  if (text.empty()) return;
+  double values[3] = {};
+  read_axes(option, text, false, values);
+  for (int axis = 0; axis < 3; ++axis) {
+    errors[axis] = {};
+    errors[axis].amplitude = values[axis];
+  }
 }
 
 void declare_estimate(CLI::App& app, const std::string& estimate, const std::string& unit, const char* law,
-                      EstimateArguments& arguments) {
-  const std::string option = "--" + estimate + "-error", error = "(estimated - true " + estimate + ")";
-  const std::string axes = "; for all axes, or X,Y,Z";
-  app.add_option(option, arguments.amplitude, "sup |" + error + "|, " + unit + ", which " + law + axes);
-  app.add_option(option + "-rate", arguments.rate,
-                 "sup |d/dt " + error + "|, " + unit + "/s, from zero at the start" + axes);
-  app.add_option(option + "-edge", arguments.edge, "Total variation of " + error + ", " + unit + axes);
-  app.add_option(option + "-impulse", arguments.impulse, "int |" + error + "| dt, " + unit + " s" + axes);
+                      std::string& argument) {
+  app.add_option(
+      "--" + estimate + "-error", argument,
+      "sup |estimated - true " + estimate + "|, " + unit + ", which " + law + "; for all axes, or X,Y,Z");
 }
 
 /// Reads the number for `axis` from the output of compare: a number, or an object with axes, quantiles, or both.
@@ -269,7 +247,7 @@ void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& so
   source.axis[2].rate_N_s = source.f_hat_rate_N_s;  // the network's output is the force along z
 }
 
-/// Declares the disturbance itself: classes of the force error, its bias, errors of the ratio and of the estimates.
+/// Declares the disturbance itself: classes of the force error, its bias, errors of the estimates.
 void declare_force(CLI::App& app, DisturbanceArguments& arguments) {
   app.add_option("--rate", arguments.rate, "sup |eps'|, N/s: how fast the force error changes")
       ->check(CLI::NonNegativeNumber);
@@ -279,34 +257,12 @@ void declare_force(CLI::App& app, DisturbanceArguments& arguments) {
       ->check(CLI::NonNegativeNumber);
   app.add_option("--bias", arguments.bias,
                  "Constant part of the force error, N, on top of the rest; for all axes, or X,Y,Z");
-  app.add_option(
-         "--thrust-ratio-error", arguments.thrust_ratio_error,
-         "Largest constant error of the thrust ratio, as a fraction: the force that acts is (1 + d) times "
-         "that of the model, |d| at most this; weight and gains included")
-      ->check(CLI::Range(0.0, 0.9));
   declare_estimate(app, "velocity", "m/s", "the law sees through Kd", arguments.velocity_error);
   declare_estimate(app, "position", "m", "the law sees through Kp and Ki", arguments.position_error);
-}
-
-/// Declares the motion of the setpoint and the spacing of passes.
-void declare_motion_of_reference(CLI::App& app, DisturbanceArguments& arguments) {
-  const std::string axes = "; for all axes, or X,Y,Z";
-  app.add_option("--reference-step", arguments.reference_step, "Sum of all jumps of the set point, m" + axes);
-  app.add_option("--reference-speed-step", arguments.reference_speed_step,
-                 "Sum of all jumps of the set point's velocity, m/s: a ramp begins and ends with one" + axes);
   app.add_option(
-      "--reference-jerk", arguments.reference_jerk,
-      "sup |p_d'''|, m/s^3, of a set point whose acceleration is fed forward through the lags" + axes);
-  app.add_option("--reference-accel", arguments.reference_accel,
-                 "sup |p_d''|, m/s^2, for the thrust that the fed-forward acceleration takes" + axes);
-  auto* passes = app.add_option("--passes", arguments.passes, "Number of such passes (default 1)")
-                     ->check(CLI::PositiveNumber);
-  app.add_option("--every", arguments.every_s, "Least time between the starts of two passes, s")
-      ->check(CLI::NonNegativeNumber)
-      ->needs(passes);
-  app.add_option("--pass-length", arguments.pass_s, "How long one pass lasts, s")
-      ->check(CLI::NonNegativeNumber)
-      ->needs(passes);
+      "--disturbance", arguments.file,
+      "disturbance.toml: these and further parts, such as passes, a moving set point, an error of the "
+      "thrust ratio, rates of the errors of the estimates");
 }
 
 /// Declares the sources of numbers that the user does not give.
@@ -357,7 +313,6 @@ void declare_motions(CLI::App& app, DisturbanceArguments& arguments) {
 
 void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
   declare_force(app, arguments);
-  declare_motion_of_reference(app, arguments);
   declare_sources(app, arguments);
   declare_motions(app, arguments);
 }
@@ -381,13 +336,6 @@ void refuse_alone(const DisturbanceArguments& arguments) {
       }
     }
   }
-  if (arguments.passes > 1 && arguments.every_s <= 0) throw UsageError("--passes needs --every S");
-  if (arguments.passes > 1 && !arguments.from.empty()) {
-    throw UsageError("--passes: the windows of --from already follow one another");
-  }
-  if (arguments.passes > 1 && arguments.impulse < 0) {
-    throw UsageError("--passes repeats the impulse of one pass: add --impulse J");
-  }
 }
 
 }  // namespace
@@ -396,33 +344,34 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
   refuse_alone(arguments);
   LoadedDisturbance result;
   DisturbanceSource& source = result.source;
-  const bool is_declared =
+  const bool has_class =
       std::max({arguments.rate, arguments.amplitude, arguments.edge, arguments.impulse}) >= 0;
-  if (int{is_declared} + int{!arguments.from.empty()} + int{!arguments.truth.empty()} > 1) {
-    throw UsageError(
-        "--from, --truth and --rate, --amplitude, --edge, --impulse each define the disturbance: give only "
-        "one");
-  }
-  if (is_declared) {
-    source.kind = "declared";
-    for (stability::Disturbance& d : source.axis) {
-      if (arguments.rate >= 0) d.rate_N_s = arguments.rate;
-      if (arguments.amplitude >= 0) d.amplitude_N = arguments.amplitude;
-      if (arguments.edge >= 0) d.variation_N = arguments.edge;
-      if (arguments.impulse >= 0) d.impulse_N_s = arguments.impulse;
-    }
-    if (arguments.rate >= 0) source.rate_norm_N_s = arguments.rate;
-    source.note = "as given";
-  }
-  for (stability::Disturbance& d : source.axis) {
-    d.passes = arguments.passes;
-    d.pass_period_s = arguments.every_s;
-    d.pass_length_s = arguments.pass_s;
-  }
   if (!arguments.from.empty()) {
     result.inputs.push_back(arguments.from);
     read_measured(arguments, source);
   }
+  // What is declared adds to what was measured.
+  if (!arguments.file.empty()) {
+    result.inputs.push_back(arguments.file);
+    stability::read_disturbance_file(arguments.file, source);
+  }
+  const bool is_declared = has_class || source.kind == "declared";
+  if (int{is_declared} + int{!arguments.from.empty()} + int{!arguments.truth.empty()} > 1) {
+    throw UsageError(
+        "--from, --truth and a declared force error (--rate, --amplitude, --edge, --impulse, or those of "
+        "--disturbance) each define the disturbance: give only one");
+  }
+  if (has_class) {
+    source.kind = "declared";
+    source.note = "as given";
+  }
+  for (stability::Disturbance& d : source.axis) {
+    if (arguments.rate >= 0) d.rate_N_s = arguments.rate;
+    if (arguments.amplitude >= 0) d.amplitude_N = arguments.amplitude;
+    if (arguments.edge >= 0) d.variation_N = arguments.edge;
+    if (arguments.impulse >= 0) d.impulse_N_s = arguments.impulse;
+  }
+  if (arguments.rate >= 0) source.rate_norm_N_s = arguments.rate;
   if (!arguments.bias.empty()) {
     double bias_N[3] = {0, 0, 0};
     read_axes("--bias", arguments.bias, true, bias_N);
@@ -431,11 +380,9 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
       source.bias_N[axis] = std::abs(source.bias_N[axis]) + std::abs(bias_N[axis]);
     source.classes_contain_bias = false;
   }
-  source.thrust_ratio_error = arguments.thrust_ratio_error;
-  source.declares_velocity_error = arguments.velocity_error.are_given();
+  source.declares_velocity_error = source.declares_velocity_error || !arguments.velocity_error.empty();
   read_estimate("--velocity-error", arguments.velocity_error, source.velocity_error);
   read_estimate("--position-error", arguments.position_error, source.position_error);
-  read_reference(arguments, source);
   const bool has_network = !arguments.network.file.empty() || !arguments.network.phi.empty();
   if (!arguments.certificate.empty() || has_network) {
     read_lipschitz(arguments, source, result.inputs, source.further_assumptions);
@@ -445,9 +392,8 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
     result.truth = read_truth(arguments, tracking);
     add_truth(*result.truth, source);
   }
-  const bool has_others = !arguments.bias.empty() || source.thrust_ratio_error > 0 ||
-                          arguments.velocity_error.are_given() || arguments.position_error.are_given() ||
-                          source.has_moving_reference();
+  const bool has_others = !arguments.bias.empty() || !arguments.velocity_error.empty() ||
+                          !arguments.position_error.empty() || !arguments.file.empty();
   if (has_others && source.kind == "none") declare_no_class(source);
   return result;
 }

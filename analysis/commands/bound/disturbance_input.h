@@ -9,21 +9,11 @@
 
 namespace swarmcert::analysis {
 
-/// Each option holds one number for all axes, or X,Y,Z; empty: not given.
-struct EstimateArguments {
-  std::string amplitude, rate, edge, impulse;
-  bool are_given() const { return !amplitude.empty() || !rate.empty() || !edge.empty() || !impulse.empty(); }
-};
-
 struct DisturbanceArguments {
   double rate = -1, amplitude = -1, edge = -1, impulse = -1;  ///< negative: not given
-  std::string bias;  ///< a number for all axes, or X,Y,Z; empty: not given
-  double thrust_ratio_error = 0;
-  EstimateArguments velocity_error, position_error;
-  std::string reference_step, reference_speed_step, reference_jerk, reference_accel;  ///< like `bias`
-  int passes = 1;
-  double every_s = 0, pass_s = 0;
-  std::string from;  ///< compare.json
+  std::string bias, velocity_error, position_error;  ///< a number for all axes, or X,Y,Z; empty: not given
+  std::string file;                                  ///< disturbance.toml
+  std::string from;                                  ///< compare.json
   std::string quantile = "p99";
   std::string certificate;
   files::NetworkArguments network;
@@ -48,7 +38,8 @@ struct LoadedDisturbance {
 /// States that the force error consists of its constant part only.
 void declare_no_class(stability::DisturbanceSource& source);
 
-/// Evaluates the sources in this order: --rate and the other class options (declared), --from (measured), --truth
+/// Evaluates the sources in this order: --disturbance, then --rate and the other class options, which replace its
+/// numbers (declared), --from (measured), --truth
 /// (with the rate of the network if one is given), a certificate or a network with --speed (rate of f_hat, which is
 /// not the learning error). Bias and estimation errors are added; without any source they apply to a force error of
 /// zero.

@@ -26,7 +26,7 @@ void refuse_unbounded(const CoupledVerdict& verdict) {
       continue;
     throw UsageError(
         "--swarm needs the size of the errors of the estimates, or the rate of the velocity error: "
-        "add --velocity-error A or --velocity-error-rate R, and --position-error P");
+        "add --velocity-error A, or velocity_error_rate_m_s2 of --disturbance, and --position-error P");
   }
 }
 

@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <array>
+#include <cmath>
 #include <map>
 #include <memory>
 
@@ -10,7 +11,9 @@
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/iss_check/iss_check_report.h"
+#include "nn/base/input_error.h"
 #include "nn/base/pi.h"
+#include "stability/bounds/declared_disturbance.h"
 #include "stability/iss/iss_full_loop.h"
 
 namespace swarmcert::analysis {
@@ -20,7 +23,7 @@ using stability::IssCheck;
 using stability::IssRun;
 
 struct IssCheckOptions {
-  std::string gains, model, report;
+  std::string gains, model, report, disturbance;
   stability::IssOptions check;
 };
 
@@ -259,10 +262,24 @@ void print(const IssCheckOptions& options, const IssCheck& check,
   print_verdict(options, check);
 }
 
+/// Returns the bound on the rate that a disturbance.toml declares.
+double rate_of(const std::string& path) {
+  stability::DisturbanceSource source;
+  stability::read_disturbance_file(path, source);
+  if (!(source.rate_norm_N_s > 0) || std::isinf(source.rate_norm_N_s))
+    throw files::InputError({path, "", "rate_N_s", "", "is missing or zero", "the ball is that of a rate"});
+  return source.rate_norm_N_s;
+}
+
 int run_iss_check(IssCheckOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   const stability::FlownLoop loop = stability::load_flown_loop(options.gains, options.model);
+  std::vector<std::string> inputs = {options.gains, options.model};
+  if (!options.disturbance.empty()) {
+    inputs.push_back(options.disturbance);
+    options.check.rate_N_s = rate_of(options.disturbance);
+  }
   Progress progress(common.quiet);
   options.check.jobs = common.jobs;
   options.check.progress = [&progress](int done, int total) { progress.show(done, total, "integrations"); };
@@ -272,8 +289,8 @@ int run_iss_check(IssCheckOptions options, const CommonOptions& common) {
   const std::vector<stability::FullLoopRun> flown =
       check.cancelled ? std::vector<stability::FullLoopRun>{}
                       : stability::fly_full_loop(loop.gains, loop.model, check);
-  const files::Node described = result_of("iss-check", {options.gains, options.model}, options.check.seed,
-                                          IssCheckResult{options.check.runs, check, flown});
+  const files::Node described =
+      result_of("iss-check", inputs, options.check.seed, IssCheckResult{options.check.runs, check, flown});
   write_result(common, described);
   if (common.prints_text()) print(options, check, flown, described);
   if (!options.report.empty()) {
@@ -309,9 +326,12 @@ Command iss_check_command() {
         app.add_option("--model", options->model, "model.toml")->required();
         app.add_option("--runs", options->check.runs, "Integrations (default 200)")
             ->check(CLI::Range(5, 1000000));
-        app.add_option("--rate", options->check.rate_N_s,
-                       "d_m in N/s (default: a fifth of the weight over the settling time)")
-            ->check(CLI::PositiveNumber);
+        auto* const rate =
+            app.add_option("--rate", options->check.rate_N_s,
+                           "d_m in N/s (default: a fifth of the weight over the settling time)")
+                ->check(CLI::PositiveNumber);
+        app.add_option("--disturbance", options->disturbance, "disturbance.toml, of which rate_N_s counts")
+            ->excludes(rate);
         app.add_option("--seed", options->check.seed, "Seed of the random disturbances (default 0)");
         add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
         return [options](const CommonOptions& common) { return run_iss_check(*options, common); };

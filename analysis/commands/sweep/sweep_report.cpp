@@ -16,19 +16,17 @@ namespace {
 using stability::Cell;
 using stability::MergedSweep;
 
-std::string unit_of(const std::string& quantity) {
-  for (const stability::Quantity& q : stability::grid_quantities()) {
-    if (q.name == quantity) return q.unit;
+/// A quantity of a merged file that this version does not know has no unit.
+const stability::Quantity& quantity_of(const std::string& name) {
+  static const stability::Quantity unknown = {"", "", -1, ""};
+  for (const stability::Quantity& quantity : stability::grid_quantities()) {
+    if (quantity.name == name) return quantity;
   }
-  return "";
+  return unknown;
 }
-
-int better(const std::string& quantity) {
-  for (const stability::Quantity& q : stability::grid_quantities()) {
-    if (q.name == quantity) return q.better;
-  }
-  return -1;
-}
+const std::string& unit_of(const std::string& quantity) { return quantity_of(quantity).unit; }
+const std::string& meaning(const std::string& quantity) { return quantity_of(quantity).meaning; }
+int better(const std::string& quantity) { return quantity_of(quantity).better; }
 
 stability::Grid axes_of(const MergedSweep& sweep) {
   stability::Grid grid;
@@ -68,33 +66,6 @@ std::vector<std::size_t> varying(const MergedSweep& sweep) {
   return result;
 }
 
-/// Cells in the plane of the first one or two varying axes, with the other axes at their first value.
-std::string plane_data(const MergedSweep& sweep, const std::vector<std::size_t>& axes, std::size_t quantity) {
-  const stability::Grid grid = axes_of(sweep);
-  std::string data;
-  double last = NAN;
-  for (const Cell& cell : sweep.cells) {
-    const std::vector<double> at = grid.at(cell.index);
-    bool in_plane = true;
-    for (std::size_t i = 0; i < at.size(); ++i) {
-      const bool is_shown = i == axes[0] || (axes.size() > 1 && i == axes[1]);
-      if (!is_shown && at[i] != sweep.axis_values[i].front()) in_plane = false;
-    }
-    if (!in_plane) continue;
-    const double value =
-        cell.infeasible.empty() && std::isfinite(cell.values[quantity]) ? cell.values[quantity] : NAN;
-    const std::string text = std::isnan(value) ? "NaN" : fmt::format("{:.10g}", value);
-    if (axes.size() > 1) {
-      if (!std::isnan(last) && last != at[axes[0]]) data += "\n";
-      last = at[axes[0]];
-      data += fmt::format("{:.10g} {:.10g} {}\n", at[axes[0]], at[axes[1]], text);
-    } else {
-      data += fmt::format("{:.10g} {}\n", at[axes[0]], text);
-    }
-  }
-  return data;
-}
-
 bool is_geometric(const std::vector<double>& values) {
   if (values.size() < 3 || !(values.front() > 0)) return false;
   const double ratio = values[1] / values[0];
@@ -102,28 +73,123 @@ bool is_geometric(const std::vector<double>& values) {
          std::abs(values[2] - 2 * values[1] + values[0]) > 1e-9 * values[1];
 }
 
+/// Returns the edges of the cells along an axis: halfway between its values, one more than there are values.
+std::vector<double> edges_of(const std::vector<double>& values) {
+  const bool is_log = is_geometric(values);
+  const auto at = [&](double v) { return is_log ? std::log(v) : v; };
+  std::vector<double> edges;
+  for (std::size_t i = 0; i <= values.size(); ++i) {
+    const std::size_t right = std::clamp<std::size_t>(i, 1, values.size() - 1);
+    const double low = at(values[right - 1]), high = at(values[right]);
+    const double edge = (low + high) / 2 + (i == 0 ? low - high : i == values.size() ? high - low : 0);
+    edges.push_back(is_log ? std::exp(edge) : edge);
+  }
+  return edges;
+}
+
+/// The plane of the first one or two varying axes, with the other axes at their first value.
+struct Plane {
+  std::vector<std::size_t> axes;
+  std::string data;  ///< values of the axes, edges of the cell, value, whether on the front
+  const Cell* best = nullptr;
+};
+
+Plane plane_of(const MergedSweep& sweep, std::size_t quantity) {
+  Plane plane;
+  plane.axes = varying(sweep);
+  if (plane.axes.size() > 2) plane.axes.resize(2);
+  const stability::Grid grid = axes_of(sweep);
+  const int sign = better(sweep.compute[quantity]);
+  std::vector<std::vector<double>> edges;
+  for (const std::size_t axis : plane.axes) edges.push_back(edges_of(sweep.axis_values[axis]));
+  for (const Cell& cell : sweep.cells) {
+    const std::vector<double> at = grid.at(cell.index);
+    bool is_shown = cell.infeasible.empty() && std::isfinite(cell.values[quantity]);
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      const bool is_of_plane = std::count(plane.axes.begin(), plane.axes.end(), i) > 0;
+      is_shown = is_shown && (is_of_plane || at[i] == sweep.axis_values[i].front());
+    }
+    if (!is_shown) continue;
+    std::string place, box;
+    for (std::size_t k = 0; k < plane.axes.size(); ++k) {
+      const std::vector<double>& values = sweep.axis_values[plane.axes[k]];
+      const double value = at[plane.axes[k]];
+      const auto index =
+          static_cast<std::size_t>(std::find(values.begin(), values.end(), value) - values.begin());
+      place += fmt::format("{:.10g} ", value);
+      box += fmt::format("{:.10g} {:.10g} ", edges[k][index], edges[k][index + 1]);
+    }
+    const bool is_on_front = std::count(sweep.front.begin(), sweep.front.end(), cell.index) > 0;
+    plane.data += fmt::format("{}{}{:.10g} {}\n", place, box, cell.values[quantity], is_on_front ? 1 : 0);
+    if (plane.best == nullptr || sign * cell.values[quantity] > sign * plane.best->values[quantity])
+      plane.best = &cell;
+  }
+  return plane;
+}
+
+/// Returns whether the values are positive and span more than a decade.
+bool spans_decades(const MergedSweep& sweep, std::size_t quantity) {
+  double least = INFINITY, most = 0;
+  for (const Cell& cell : sweep.cells) {
+    if (!cell.infeasible.empty() || !std::isfinite(cell.values[quantity])) continue;
+    least = std::min(least, cell.values[quantity]);
+    most = std::max(most, cell.values[quantity]);
+  }
+  return least > 0 && most > 10 * least;
+}
+
+/// Draws every feasible cell in the colour of its value, over grey for the infeasible ones, with the Pareto front as
+/// circles and the best cell as a labelled star.
+std::string heat_map(const MergedSweep& sweep, const Plane& plane, std::size_t quantity,
+                     const std::string& file) {
+  const char* const names[] = {"x", "y"};
+  std::string script =
+      "set object 1 rectangle from graph 0,0 to graph 1,1 behind fillcolor rgb '#dddddd' "
+      "fillstyle solid noborder\nset style fill solid noborder\nunset grid\nset tics out\n";
+  const std::vector<double> best_at = axes_of(sweep).at(plane.best->index);
+  std::string place;
+  bool is_right = false, is_high = false;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const std::vector<double>& values = sweep.axis_values[plane.axes[k]];
+    const std::vector<double> edges = edges_of(values);
+    const double at = best_at[plane.axes[k]];
+    script += fmt::format("set {}range [{:.10g}:{:.10g}]\n", names[k], edges.front(), edges.back());
+    place += fmt::format("{}{:.10g}", k > 0 ? "," : "", at);
+    (k == 0 ? is_right : is_high) = at > values[values.size() / 2];
+  }
+  if (spans_decades(sweep, quantity)) script += "set logscale cb\n";
+  const double best = plane.best->values[quantity];
+  script += "set label 1 " + plot_string(fmt::format("{:.3g} {}", best, unit_of(sweep.compute[quantity]))) +
+            " at " + place + (is_right ? " right offset character -1," : " left offset character 1,") +
+            (is_high ? "-1" : "1") + " front textcolor rgb 'white' point pointtype 3 linecolor rgb 'white'\n";
+  return script + "plot '" + file +
+         ".dat' using 1:2:3:4:5:6:7 with boxxyerror fillcolor palette, '' using ($8 > 0 ? $1 : NaN):2 "
+         "with points pointtype 6 pointsize 0.4 linecolor rgb 'white'\n";
+}
+
 void add_plane(Report& report, const MergedSweep& sweep, std::size_t quantity) {
-  std::vector<std::size_t> axes = varying(sweep);
-  if (axes.empty()) return;
-  if (axes.size() > 2) axes.resize(2);
+  if (varying(sweep).empty()) return;
+  const Plane plane = plane_of(sweep, quantity);
+  if (plane.best == nullptr) return;
   const std::string& name = sweep.compute[quantity];
   const std::string file = "sweep_" + name;
-  std::string script = "set xlabel " + plot_string(sweep.axis_names[axes[0]]) + "\nset key off\n";
-  if (is_geometric(sweep.axis_values[axes[0]])) script += "set logscale x\n";
   const std::string label = name + " [" + unit_of(name) + "]";
-  if (axes.size() > 1) {
-    if (is_geometric(sweep.axis_values[axes[1]])) script += "set logscale y\n";
-    script += "set ylabel " + plot_string(sweep.axis_names[axes[1]]) + "\nset cblabel " + plot_string(label) +
-              "\nset view map\nset pm3d map corners2color c1\n"
-              "if (exists('narrow')) { set lmargin at screen 0.17 }\n"
-              "splot '" +
-              file + ".dat' using 1:2:3 with pm3d\n";
+  const bool is_map = plane.axes.size() > 1;
+  std::string script = "set key off\nset title " + plot_string(meaning(name)) + "\nset xlabel " +
+                       plot_string(sweep.axis_names[plane.axes[0]]) + "\nset " + (is_map ? "cb" : "y") +
+                       "label " + plot_string(label) + "\n";
+  if (is_geometric(sweep.axis_values[plane.axes[0]])) script += "set logscale x\n";
+  if (is_map) {
+    if (is_geometric(sweep.axis_values[plane.axes[1]])) script += "set logscale y\n";
+    script += "set ylabel " + plot_string(sweep.axis_names[plane.axes[1]]) +
+              "\nif (exists('narrow')) { set lmargin at screen 0.17 }\n" +
+              heat_map(sweep, plane, quantity, file);
   } else {
-    script +=
-        "set ylabel " + plot_string(label) + "\nplot '" + file + ".dat' using 1:2 with lines linewidth 2\n";
+    script += "plot '" + file + ".dat' using 1:4 with lines linewidth 2\n";
   }
-  report.figure(file, plane_data(sweep, axes, quantity), script,
-                label + ". Empty: infeasible." +
+  report.figure(file, plane.data, script,
+                label +
+                    (is_map ? ". Grey: infeasible. Star: the best cell; circles: the Pareto front." : ".") +
                     (varying(sweep).size() > 2 ? " Further axes at their first value." : ""));
 }
 

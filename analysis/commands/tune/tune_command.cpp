@@ -48,15 +48,13 @@ std::vector<TunedQuantity> quantities(const std::string& axis, const TuneResult&
   std::vector<TunedQuantity> all;
   for (const FirmwareGain& gain : kFirmwareGains)
     all.push_back({fmt::format("{} {}", gain.name, axis), a.*gain.value, b.*gain.value, gain.unit});
-  all.insert(all.end(),
-             {{"rate", a.norms.rate, b.norms.rate, "m per N/s"},
-              {"amplitude", a.norms.amplitude, b.norms.amplitude, "m/N"},
-              {"edge", a.norms.edge, b.norms.edge, "m/N"},
-              {"impulse", a.norms.impulse, b.norms.impulse, "m per N s"},
-              {"impulse, sampled", found.shipped_sampled.impulse, found.best_sampled.impulse, "m per N s"},
-              {"noise of the command", a.noise_m_s2, b.noise_m_s2, "m/s^2"},
-              {"additional lag allowed", a.lag_limit_s, b.lag_limit_s, "s"},
-              {"effort", a.effort, b.effort, "N/N"}});
+  all.insert(all.end(), {{"rate", a.norms.rate, b.norms.rate, "m per N/s"},
+                         {"amplitude", a.norms.amplitude, b.norms.amplitude, "m/N"},
+                         {"edge", a.norms.edge, b.norms.edge, "m/N"},
+                         {"impulse", a.norms.impulse, b.norms.impulse, "m per N s"},
+                         {"noise of the command", a.noise_m_s2, b.noise_m_s2, "m/s^2"},
+                         {"additional lag allowed", a.lag_limit_s, b.lag_limit_s, "s"},
+                         {"effort", a.effort, b.effort, "N/N"}});
   return all;
 }
 
@@ -140,13 +138,11 @@ struct TuneOutcome {
   TuneResult found;
 };
 
-void describe_point(files::Record& record, const TunedPoint& p, const stability::GainNorms& sampled) {
+void describe_point(files::Record& record, const TunedPoint& p) {
   record.field("Kp", p.Kp, "Position gain.", "1/s^2");
   record.field("Kd", p.Kd, "Velocity gain.", "1/s");
   record.field("Ki", p.Ki, "Integral gain.", "1/s^3");
   record.field("objective", p.objective, "The gain that is minimised.");
-  record.object("sampled", "Gains of the sampled loop.",
-                [&](files::Record& norms) { describe_norms(norms, sampled); });
   record.field("noise_command_m_s2", p.noise_m_s2, "Of the command, for 1 mm and 0.05 m/s of sensor noise.",
                "m/s^2");
   record.field("lag_limit_s", p.lag_limit_s, "Additional first-order lag that the loop tolerates.", "s");
@@ -210,8 +206,8 @@ void describe(files::Record& record, const TuneOutcome& outcome) {
       "The gains under the names of the published firmware; null: none found.",
       [&](files::Record& one, const FirmwareGain& gain) { describe_firmware_gain(one, gain, outcome); });
   record.object("shipped", "The gains given, and what they reach.",
-                [&](files::Record& point) { describe_point(point, found.shipped, found.shipped_sampled); });
-  const auto best = [&](files::Record& point) { describe_point(point, found.best, found.best_sampled); };
+                [&](files::Record& point) { describe_point(point, found.shipped); });
+  const auto best = [&](files::Record& point) { describe_point(point, found.best); };
   record.object_or_null(is_feasible, "tuned", "The gains found, and what they reach; null: none found.",
                         best);
   record.object_or_null(!is_feasible, "nearest",

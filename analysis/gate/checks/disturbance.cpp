@@ -10,6 +10,7 @@
 #include "analysis/residuals/velocity_error.h"
 #include "analysis/tracking/measured_source.h"
 #include "nn/base/toml.h"
+#include "stability/bounds/declared_disturbance.h"
 
 namespace swarmcert::gate {
 namespace {
@@ -45,35 +46,17 @@ stability::DisturbanceSource measured(const LearningError& error, const std::str
 }  // namespace
 
 std::vector<std::string> disturbance_keys() {
-  return {"rate_N_s", "amplitude_N", "variation_N", "impulse_N_s", "bias_N", "quantile"};
+  std::vector<std::string> keys = stability::class_keys();
+  keys.insert(keys.end(), {"bias_N", "quantile"});
+  return keys;
 }
 
 DisturbanceTable read_disturbance(const files::TomlTable& table) {
   DisturbanceTable result;
-  const auto number = [&](const char* key, double otherwise) {
-    if (!table.has(key)) return otherwise;
-    const double value = table.number(key);
-    if (value < 0) table.refuse(key, fmt::format("{}", value), "must not be negative");
-    result.declared.kind = "declared";
-    return value;
-  };
-  const double unknown = std::numeric_limits<double>::infinity();
-  const double rate = number("rate_N_s", unknown), amplitude = number("amplitude_N", unknown),
-               variation = number("variation_N", unknown), impulse = number("impulse_N_s", unknown);
-  const bool has_bias = table.has("bias_N");
-  if (has_bias && !result.is_declared())
+  stability::read_force_error(table, result.declared);
+  if (table.has("bias_N") && !result.is_declared())
     table.refuse("bias_N", "", "stands alone",
                  "declare rate_N_s, amplitude_N, variation_N or impulse_N_s too");
-  const double bias = number("bias_N", 0);
-  for (int axis = 0; axis < 3; ++axis) {
-    stability::Disturbance& d = result.declared.axis[axis];
-    d.rate_N_s = rate;
-    d.amplitude_N = amplitude;
-    d.variation_N = variation;
-    d.impulse_N_s = impulse;
-    result.declared.bias_N[axis] = bias;
-  }
-  result.declared.rate_norm_N_s = rate;
   result.declared.note = "as the policy declares";
   if (table.has("quantile")) {
     if (result.is_declared())

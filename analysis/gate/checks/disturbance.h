@@ -10,7 +10,7 @@
 
 namespace swarmcert::gate {
 
-/// rate_N_s, amplitude_N, variation_N, impulse_N_s and bias_N; or a quantile of the learning error from `compare`.
+/// stability::read_force_error(); or a quantile of the learning error from `compare`.
 struct DisturbanceTable {
   stability::DisturbanceSource declared;  ///< kind "none" if nothing is declared
   std::string quantile = "p99";

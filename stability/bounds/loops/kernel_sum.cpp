@@ -1,6 +1,7 @@
 #include "stability/bounds/loops/kernel_sum.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace swarmcert::stability {
@@ -48,40 +49,129 @@ void KernelSum::add_signed(double start, double slope, double length) {
   integral_ = after;
 }
 
-GainNorms command_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after, bool with_own) {
+void KernelSum::add_sample(double kernel, double period_s) {
+  integral_ += kernel;
+  norms_.amplitude += std::abs(kernel);
+  norms_.impulse = std::max(norms_.impulse, std::abs(kernel) / period_s);
+  norms_.edge = std::max(norms_.edge, std::abs(integral_ - at_once_));
+  norms_.rate += std::abs(integral_) * period_s;
+}
+
+void KernelSum::add_stretch(const KernelStretch& stretch, double period_s) {
+  const double at_end = integral_ + stretch.left;
+  norms_.rate +=
+      std::abs(stretch.area + (std::isfinite(stretch.periods) ? at_end * stretch.periods * period_s : 0));
+  norms_.amplitude += std::abs(stretch.change);
+  norms_.impulse = std::max(norms_.impulse, stretch.peak);
+  integral_ += stretch.change;
+  norms_.edge = std::max(norms_.edge, std::abs(integral_ - at_once_));
+}
+
+KernelVariation force_variation(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after) {
+  KernelVariation variation;
+  adjoint.force_kernel(
+      after, [&](double start, double slope, double length) { variation.add_linear(start, slope, length); },
+      [&](double start, double slope, double length, double ratio) {
+        variation.add_series(start, slope, length, ratio);
+      });
+  return variation;
+}
+
+namespace {
+
+/// Sums of a kernel that is linear on each period.
+struct OfForce {
+  static constexpr double kLongest_rad = 0.5, kLongestSwing_rad = 1e300;
+  KernelSum sum;
+  double period_s;
+
+  void period(double start, double end) { sum.add_linear(start, (end - start) / period_s, period_s); }
+  bool crosses_zero(double change) const { return sum.crosses_zero(change); }
+  void stretch(const KernelStretch& s) { sum.add_stretch(s, period_s); }
+  void rest(const KernelStretch& s) { sum.add_stretch(s, period_s); }
+};
+
+/// Sums of samples, one per period.
+struct OfSamples {
+  static constexpr double kLongest_rad = 0.5, kLongestSwing_rad = 1e300;
+  KernelSum sum;
+  double period_s;
+
+  void period(double kernel, double) { sum.add_sample(kernel, period_s); }
+  bool crosses_zero(double change) const { return sum.crosses_zero(change); }
+  void stretch(KernelStretch s) {
+    s.peak /= period_s;
+    sum.add_stretch(s, period_s);
+  }
+  void rest(const KernelStretch& s) { stretch(s); }
+};
+
+/// @param sinks of the next outputs.
+template <std::size_t kLanes, class Sink>
+void add_gains(const KernelWalk& walk, const Eigen::MatrixXd& outputs, std::array<Sink, kLanes> sinks,
+               std::vector<GainNorms>& gains) {
+  walk.run(outputs.middleRows(static_cast<Eigen::Index>(gains.size()), kLanes), sinks);
+  for (const Sink& sink : sinks) gains.push_back(sink.sum.norms());
+}
+
+/// Walks for four outputs at once while there are four.
+/// @param first returns the sink of an output, by its number.
+template <class First>
+std::vector<GainNorms> gains_of(const KernelWalk& walk, const Eigen::MatrixXd& outputs, const First& first) {
+  std::vector<GainNorms> gains;
+  const Eigen::Index count = outputs.rows();
+  Eigen::Index i = 0;
+  for (; i + 4 <= count; i += 4)
+    add_gains(walk, outputs, std::array{first(i), first(i + 1), first(i + 2), first(i + 3)}, gains);
+  for (; i < count; ++i) add_gains(walk, outputs, std::array{first(i)}, gains);
+  return gains;
+}
+
+}  // namespace
+
+std::vector<GainNorms> force_gains(const KernelWalk& walk, const Eigen::MatrixXd& outputs,
+                                   const std::vector<double>& own_s) {
+  return gains_of(walk, outputs, [&](Eigen::Index output) {
+    OfForce sums = {KernelSum(), walk.period_s()};
+    sums.sum.add_linear(0, 1, own_s[static_cast<std::size_t>(output)]);
+    return sums;
+  });
+}
+
+GainNorms force_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output, double at_once) {
+  const KernelWalk walk = KernelWalk::of_force(adjoint);
+  return gains_of(walk, output,
+                  [&](Eigen::Index) {
+                    return OfForce{KernelSum(at_once), adjoint.period_s()};
+                  })
+      .front();
+}
+
+std::vector<GainNorms> sample_gains(const KernelWalk& walk, const Eigen::MatrixXd& outputs,
+                                    const Eigen::VectorXd& own) {
+  return gains_of(walk, outputs, [&](Eigen::Index output) {
+    OfSamples sums = {KernelSum(), walk.period_s()};
+    sums.sum.add_sample(own[output], walk.period_s());
+    return sums;
+  });
+}
+
+GainNorms command_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output, bool with_own) {
   const SampledModel& model = adjoint.model();
-  return input_gains(adjoint, after, Eigen::VectorXd::Unit(model.size() + 1, model.command_index()),
+  return input_gains(adjoint, output, Eigen::VectorXd::Unit(model.size() + 1, model.command_index()),
                      with_own);
 }
 
-GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after,
+GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output,
                       const Eigen::VectorXd& input, bool with_own, double at_once) {
-  const double period_s = adjoint.period_s();
-  GainNorms gains;
-  double step = 0;
-  bool skips = !with_own;
-  const auto add = [&](double kernel) {
-    if (skips) {
-      skips = false;
-      return;
-    }
-    step += kernel;
-    gains.amplitude += std::abs(kernel);
-    gains.impulse = std::max(gains.impulse, std::abs(kernel) / period_s);
-    gains.edge = std::max(gains.edge, std::abs(step));
-    gains.rate += std::abs(step + at_once) * period_s;
-  };
-  adjoint.input_kernel(after, input, add, [&](double kernel, double ratio) {
-    // The rest decreases in proportion, and so does the distance of the step response from its limit.
-    const double rate = gains.rate;
-    const double amplitude = gains.amplitude;
-    const double from = step;
-    add(kernel);
-    gains.rate = rate + (gains.rate - rate) / (1 - ratio);
-    gains.amplitude = amplitude + (gains.amplitude - amplitude) / (1 - ratio);
-    gains.edge = std::max(gains.edge, std::abs(from + (step - from) / (1 - ratio)));
-  });
-  return gains;
+  const KernelWalk walk = KernelWalk::of_samples(adjoint, input);
+  return gains_of(walk, output,
+                  [&](Eigen::Index) {
+                    OfSamples sums = {KernelSum(at_once), adjoint.period_s()};
+                    if (with_own) sums.sum.add_sample(output.dot(input), adjoint.period_s());
+                    return sums;
+                  })
+      .front();
 }
 
 }  // namespace swarmcert::stability

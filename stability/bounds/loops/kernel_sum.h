@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "stability/bounds/loops/axis_loop.h"
-#include "stability/bounds/loops/sampled_adjoint.h"
+#include "stability/bounds/loops/kernel_walk.h"
 
 namespace swarmcert::stability {
 
@@ -19,6 +19,16 @@ class KernelSum {
 
   /// Adds a segment of `length` on which the kernel is slope u + start, u growing backwards in time.
   void add_linear(double start, double slope, double length);
+  /// Adds a sample of a kernel that is summed once per period.
+  void add_sample(double kernel, double period_s);
+  /// @param period_s length of the periods. The rest of a kernel requires that the integral tends to zero.
+  void add_stretch(const KernelStretch& stretch, double period_s);
+  /// Returns whether the integral changes its sign, by more than round-off, when it changes by `change`.
+  bool crosses_zero(double change) const {
+    const double after = integral_ + change;
+    return integral_ * after < 0 &&
+           std::min(std::abs(integral_), std::abs(after)) > kRoundOff * (norms_.edge + std::abs(at_once_));
+  }
   /// Adds a jump of the integral alone.
   void add_jump(double jump) { integral_ += jump; }
   /// Adds the segment and infinitely many repetitions, each scaled by `ratio`; the integral converges in proportion.
@@ -34,6 +44,7 @@ class KernelSum {
   /// Adds a segment on which the kernel keeps its sign, so that its integral is monotonic and has at most one zero.
   void add_signed(double start, double slope, double length);
 
+  static constexpr double kRoundOff = 1e-13;
   GainNorms norms_;
   double at_once_, integral_;
 };
@@ -66,22 +77,28 @@ class KernelVariation {
   double total_ = 0, most_ = 0, start_ = 0, end_ = 0;
 };
 
-/// @param after the output as a row over the state after the control. Sum: KernelSum or KernelVariation.
-template <class Sum>
-void add_force_kernel(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after, Sum& sum) {
-  adjoint.force_kernel(
-      after, [&](double start, double slope, double length) { sum.add_linear(start, slope, length); },
-      [&](double start, double slope, double length, double ratio) {
-        sum.add_series(start, slope, length, ratio);
-      });
-}
+/// Returns the variation of the kernel of a force. @param after the output as a row over the state after the control.
+KernelVariation force_variation(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after);
 
+/// Gains to outputs, given as rows over the state after the control, in units of acceleration or of the input.
+/// @param walk KernelWalk::of_force(). @param own_s per output: how long before its time a force acts on it at once, as
+///     it does on e, by 1 m/s per m/s^2 and second; else 0.
+std::vector<GainNorms> force_gains(const KernelWalk& walk, const Eigen::MatrixXd& outputs,
+                                   const std::vector<double>& own_s);
+/// The same for a single output without that part. @param at_once as in KernelSum.
+GainNorms force_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output, double at_once = 0);
+
+/// Gains from an input once per period. @param walk KernelWalk::of_samples(). @param own per output: the response to
+///     the input of its own period.
+std::vector<GainNorms> sample_gains(const KernelWalk& walk, const Eigen::MatrixXd& outputs,
+                                    const Eigen::VectorXd& own);
 /// Returns the gains from an error of the command, added once per period, in units of acceleration.
 /// @param with_own whether the error in the output's own period is included.
-GainNorms command_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after, bool with_own = true);
+GainNorms command_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output,
+                        bool with_own = true);
 /// The same for an input that adds `input` [size + 1] to the state after the control, once per period.
 /// @param at_once as in KernelSum: `rate` is the gain to the output plus at_once times the latest input.
-GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after,
+GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output,
                       const Eigen::VectorXd& input, bool with_own = true, double at_once = 0);
 
 }  // namespace swarmcert::stability

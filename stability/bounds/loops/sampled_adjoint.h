@@ -2,16 +2,14 @@
 #pragma once
 
 #include <cmath>
+#include <complex>
+#include <optional>
 #include <vector>
 
 #include "stability/bounds/loops/sampled_model.h"
 
 namespace swarmcert::stability {
 
-/// Returns `map` without the integral if Ki is 0: nothing reads the integral then, and its eigenvalue 1 would be
-/// misleading.
-Eigen::MatrixXd without_unread(const Eigen::MatrixXd& map, const SampledModel& model, double Ki);
-Eigen::MatrixXd without_row(const Eigen::MatrixXd& m, Eigen::Index row);
 /// Returns the largest modulus of an eigenvalue.
 double largest_modulus(const Eigen::MatrixXd& map);
 
@@ -27,8 +25,25 @@ class SampledAdjoint {
   /// kernels, and all gains are infinite.
   bool is_stable() const { return is_stable_; }
   double period_s() const { return period_s_; }
+  /// Returns true if the output is e, on which a force acts at once.
+  bool is_error() const { return output_ == Output::kError; }
   const SampledModel& model() const { return model_; }
   static constexpr double kMostPeriods = 3e6;
+  /// Map of the row of an output from one period to the one before.
+  const Eigen::MatrixXd& map() const { return map_; }
+  /// Periods after which the kernel has fallen to e^-42, or only one real mode is left.
+  long periods() const { return periods_; }
+  /// Shrinking per period of that mode; 0: no mode is left.
+  double ratio() const { return ratio_; }
+  /// The last pair of complex modes, and the periods after which it is alone; empty if it never is before periods().
+  struct LastPair {
+    long alone_after = 0;
+    std::complex<double> mode;  ///< factor per period, of positive imaginary part
+  };
+  const std::optional<LastPair>& last_pair() const { return last_pair_; }
+  /// Returns the largest |log eigenvalue| of the modes that have not decayed to e^-42 after `period` periods, in
+  /// radians per period; infinite while commands are on their way.
+  double fastest_mode(long period) const;
 
   /// Calls visit(start, slope, length) for consecutive segments, on which the kernel from a force to the output is
   /// start + slope u, with u growing backwards in time. The first segment is the part of the period before the output's
@@ -51,10 +66,6 @@ class SampledAdjoint {
 
   /// Calls visit(kernel) with the response to an error of 1 m/s^2 in the command of this period, of the one before,
   /// ..., and finish(kernel, ratio) as above.
-  template <class Visit, class Finish>
-  void command_kernel(double phase_s, const Visit& visit, const Finish& finish) const {
-    command_kernel(output_after_control(phase_s), visit, finish);
-  }
   template <class Visit, class Finish>
   void command_kernel(const Eigen::RowVectorXd& after, const Visit& visit, const Finish& finish) const {
     input_kernel(after, Eigen::VectorXd::Unit(model_.size() + 1, model_.command_index()), visit, finish);
@@ -103,9 +114,14 @@ class SampledAdjoint {
   Output output_;
   SampledModel model_;
   Eigen::MatrixXd map_;
+  struct Mode {
+    double gone_after, rate;  ///< periods, radians per period
+  };
+  std::vector<Mode> modes_;
   bool is_stable_ = false;
   long periods_ = 0;
-  double ratio_ = 0;  ///< of the only real mode left after periods_; 0: no mode is left
+  double ratio_ = 0;
+  std::optional<LastPair> last_pair_;
 };
 
 }  // namespace swarmcert::stability

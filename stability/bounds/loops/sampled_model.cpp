@@ -59,6 +59,15 @@ SampledModel::SampledModel(const SampledLoop& loop) : loop_(loop) {
   for (Index i = 0; i < past_; ++i) hold_(plant_ + 1 + i, command_index() + i) = 1;
 }
 
+MatrixXd SampledModel::map() const {
+  MatrixXd result = hold_ * control_;
+  if (loop_.plant.Ki == 0) {
+    result.row(integral_index()).setZero();
+    result.col(integral_index()).setZero();
+  }
+  return result;
+}
+
 MatrixXd SampledModel::plant_step(double duration_s) const {
   return exponential(generator_ * duration_s).topRows(plant_);
 }

@@ -21,6 +21,9 @@ class SampledModel {
   const Eigen::MatrixXd& control() const { return control_; }
   /// Map from after the control to before the next control, [size x size + 1].
   const Eigen::MatrixXd& hold() const { return hold_; }
+  /// Map from one sample to the next, hold() control(). Without Ki nothing reads the integral: it then stays zero,
+  /// since its eigenvalue 1 would be misleading.
+  Eigen::MatrixXd map() const;
   /// Returns the row that gives e at `phase_s` into a period from the state after its control.
   Eigen::RowVectorXd error_at(double phase_s) const;
   /// Changes of the state after the control per unit error of the measured position or velocity, [size + 1].

@@ -10,7 +10,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// The error of the lower vehicle under a lasting force F and passes of impulse J: linear in both.
+/// The error and the feedback of the lower vehicle under a lasting force F and passes of impulse J: linear in both.
 class LowerVehicle {
  public:
   LowerVehicle(const FlownLoop& loop, double dwell_s) {
@@ -21,15 +21,22 @@ class LowerVehicle {
     passes.passes = Disturbance::kManyPasses;
     passes.pass_period_s = dwell_s;  // from the end of a pass, so that its length does not matter
     const ExactGains gains = flown_gains(loop, 2, Channel::kForce);
-    const auto set = [&](const auto& one, double limit_m_s, double by_impulse) {
+    const auto effort = [&](const auto& one, double constant_N) -> Linear {
+      return {effort_of_class_N(one, Channel::kForce, force), effort_of_class_N(one, Channel::kForce, passes),
+              constant_N};
+    };
+    const auto set = [&](auto one, double limit_m_s, double by_impulse) {
       const ClampBounds of_force = clamp_bounds(one, Channel::kForce, force, {}, limit_m_s);
       const ClampBounds of_passes = clamp_bounds(one, Channel::kForce, passes, {}, limit_m_s);
       linear_ = {gains.all_times.amplitude, by_impulse, 0};
+      effort_ = effort(one, 0);
       if (!of_force.exists) return;
       limit_m_s_ = limit_m_s;
       demand_ = {of_force.demand_m_s, of_passes.demand_m_s, 0};
       const double constant_m = clamp_bounds(one, Channel::kForce, nothing, {}, limit_m_s).by_amplitude;
       clamped_ = {of_force.by_amplitude - constant_m, of_passes.by_impulse - constant_m, constant_m};
+      const double integral_N = replace_integral_N(one, limit_m_s);
+      clamped_effort_ = effort(one, integral_N);
     };
     if (const auto sampled = loop.sampled(2)) {
       set(*sampled, loop.integrator_limit_m_s(2),
@@ -47,16 +54,10 @@ class LowerVehicle {
     return std::min(linear_.at(force_N, impulse_N_s), clamped_m);
   }
 
-  /// Returns the largest x in [0, most] for which error(x) <= limit_m; 0 if there is none.
-  template <class Error>
-  static double largest(double most, double limit_m, const Error& error) {
-    double low = 0, high = most;
-    if (error(high) <= limit_m) return high;
-    for (int i = 0; i < 60; ++i) {
-      const double middle = (low + high) / 2;
-      (error(middle) <= limit_m ? low : high) = middle;
-    }
-    return low;
+  /// Returns sup |u| of the feedback.
+  double feedback_N(double force_N, double impulse_N_s) const {
+    const bool may_clamp = demand_.at(force_N, impulse_N_s) > limit_m_s_;
+    return (may_clamp ? clamped_effort_ : effort_).at(force_N, impulse_N_s);
   }
 
  private:
@@ -67,16 +68,20 @@ class LowerVehicle {
     }
     static double times(double gain, double size) { return size == 0 ? 0 : gain * size; }
   };
-  Linear linear_, demand_, clamped_;
+  Linear linear_, demand_, clamped_, effort_, clamped_effort_;
   double limit_m_s_ = kInfinity;
 };
 
-Saturation saturation_under(const FlownLoop& loop, double force_N) {
-  DisturbanceSource source;
-  source.kind = "declared";
-  for (Disturbance& d : source.axis) d.amplitude_N = 0;
-  source.axis[2].amplitude_N = force_N;
-  return saturation(loop, source, {});
+/// Returns the largest x in [0, most] that is allowed, where every smaller one is allowed as well; 0 if there is none.
+template <class Allowed>
+double largest_allowed(double most, const Allowed& allowed) {
+  if (allowed(most)) return most;
+  double low = 0, high = most;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2;
+    (allowed(middle) ? low : high) = middle;
+  }
+  return low;
 }
 
 }  // namespace
@@ -117,24 +122,30 @@ Spacing spacing(const FlownLoop& loop, const DownwashField& field, const Spacing
     const double nearest_gap_m = row.height_gap_m - limit_m;
     row.peak_force_N = question.guard * question.neighbours * field.peak_N(std::max(nearest_gap_m, 0.0));
     const double spread_m = field.spread_at_m(row.height_gap_m + limit_m);
-    const Saturation thrust = saturation_under(loop, row.peak_force_N);
-    row.thrust_margin_N = thrust.margin_N();
-    const bool has_thrust = thrust.is_proved() && nearest_gap_m > 0;
+    // No force is larger than the peak, so that staying below also bounds the feedback of a pass.
+    const double stay_N = lower.feedback_N(row.peak_force_N, 0);
+    const auto thrust = [&](double force_N, double impulse_N_s) {
+      return saturation_of(loop, {0, 0, std::min(stay_N, lower.feedback_N(force_N, impulse_N_s))});
+    };
+    const auto holds = [&](double force_N, double impulse_N_s) {
+      return lower.error_m(force_N, impulse_N_s) <= limit_m && thrust(force_N, impulse_N_s).is_proved();
+    };
     row.stay_error_m = lower.error_m(row.peak_force_N, 0);
-    row.may_stay = has_thrust && row.stay_error_m <= limit_m;
+    row.thrust_margin_N = thrust(row.peak_force_N, 0).margin_N();
+    row.may_stay = nearest_gap_m > 0 && holds(row.peak_force_N, 0);
     if (row.may_stay) {
       result.least_gap_to_stay_m = std::min(result.least_gap_to_stay_m, row.height_gap_m);
     } else {
-      const double outside_N = LowerVehicle::largest(
-          row.peak_force_N, limit_m / 2, [&](double force_N) { return lower.error_m(force_N, 0); });
+      const double outside_N =
+          largest_allowed(row.peak_force_N, [&](double force_N) { return holds(2 * force_N, 0); });
       const double at_1_m_s = row.peak_force_N * spread_m * field.line_integral();
       constexpr double kSlowest_m_s = 1e-3;
-      const double impulse_N_s = LowerVehicle::largest(at_1_m_s / kSlowest_m_s, limit_m, [&](double impulse) {
-        return lower.error_m(outside_N, impulse);
-      });
+      const double impulse_N_s =
+          largest_allowed(at_1_m_s / kSlowest_m_s, [&](double impulse) { return holds(outside_N, impulse); });
       row.keep_out_radius_m = spread_m * field.spreads_at(outside_N / row.peak_force_N);
-      row.least_speed_m_s =
-          has_thrust && impulse_N_s > 0 && outside_N > 0 ? at_1_m_s / impulse_N_s : kInfinity;
+      const bool may_cross = nearest_gap_m > 0 && impulse_N_s > 0 && outside_N > 0;
+      row.least_speed_m_s = may_cross ? at_1_m_s / impulse_N_s : kInfinity;
+      if (may_cross) row.thrust_margin_N = thrust(outside_N, impulse_N_s).margin_N();
     }
     if (std::isfinite(row.least_speed_m_s))
       result.least_gap_to_cross_m = std::min(result.least_gap_to_cross_m, row.height_gap_m);

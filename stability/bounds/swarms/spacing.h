@@ -42,7 +42,8 @@ struct SpacingRow {
   bool may_stay = false;         ///< stay_error_m <= max_error_m and the thrust suffices
   double keep_out_radius_m = 0;  ///< see spacing(); 0 if may_stay
   double least_speed_m_s = 0;    ///< see spacing(); infinite if no speed suffices, 0 if may_stay
-  double thrust_margin_N = 0;    ///< Saturation::margin_N() at the peak force; negative: no bound holds
+  /// Saturation::margin_N() of crossing at the least speed, else of staying; negative: no bound holds
+  double thrust_margin_N = 0;
 };
 
 struct Spacing {
@@ -56,11 +57,12 @@ struct Spacing {
 /// of straight passes through the keep-out radius at least_speed_m_s or more (relative, horizontal), with at least
 /// dwell_s between the end of one and the start of the next, and any motion outside the radius meanwhile.
 ///
-/// Outside, the force is at most F, which alone causes half of max_error_m; the rest of a pass is an impulse of at most
-/// J = peak s line_integral()/v. The error is at most A F + I J, with A the amplitude gain, I the impulse gain summed
-/// over all earlier passes as far as they are still felt; with the gains of the loop without integral, plus the effect
-/// of the largest integral, if the clamp may act. The bounds hold for forces within the field; `guard` accounts for its
-/// deviation from flights.
+/// Outside, the force is at most F, of which twice as much would cause max_error_m or use up the thrust; the rest of a
+/// pass is an impulse of at most J = peak s line_integral()/v. The error is at most A F + I J, with A the amplitude
+/// gain, I the impulse gain summed over all earlier passes as far as they are still felt; with the gains of the loop
+/// without integral, plus the effect of the largest integral, if the clamp may act. In the same way the feedback is at
+/// most E F + C J, and at most E times the peak, with E and C the gains to the command; the thrust must suffice for it.
+/// The bounds hold for forces within the field; `guard` accounts for its deviation from flights.
 /// @throws std::invalid_argument if Lambda or K couples the z axis to others.
 Spacing spacing(const FlownLoop& loop, const DownwashField& field, const SpacingQuestion& question);
 

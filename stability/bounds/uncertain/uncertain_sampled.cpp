@@ -45,22 +45,10 @@ struct OutputGains {
 OutputGains output_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after, bool with_force,
                          Channel channel) {
   OutputGains gains;
-  struct {
-    KernelSum gains;
-    KernelVariation variation;
-    void add_linear(double start, double slope, double length) {
-      gains.add_linear(start, slope, length);
-      variation.add_linear(start, slope, length);
-    }
-    void add_series(double start, double slope, double length, double ratio) {
-      gains.add_series(start, slope, length, ratio);
-      variation.add_series(start, slope, length, ratio);
-    }
-  } sum{KernelSum(with_force ? 1 : 0), {}};
-  add_force_kernel(adjoint, after, sum);
-  gains.force = sum.gains.norms();
-  gains.variation = sum.variation.total();
-  gains.change_of_pulse = sum.variation.most_per_period() / adjoint.period_s();
+  gains.force = force_gains(adjoint, after, with_force ? 1 : 0);
+  const KernelVariation variation = force_variation(adjoint, after);
+  gains.variation = variation.total();
+  gains.change_of_pulse = variation.most_per_period() / adjoint.period_s();
   if (channel == Channel::kCommand) {
     gains.command = command_gains(adjoint, after);
     gains.answer = command_gains(adjoint, after, false);
