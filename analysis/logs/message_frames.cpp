@@ -138,24 +138,21 @@ void add_motors(RawTopic& topic) {
   }
 }
 
-/// Removes the values that the estimator marks as not valid, and notes the columns that are never valid.
+/// Removes the columns that the estimator never marks as valid, and notes them.
 void remove_invalid(RawTopic& topic, std::vector<std::string>& notes) {
   static const std::vector<std::pair<std::string, std::vector<std::string>>> flags = {
       {"xy_valid", {"x", "y"}}, {"z_valid", {"z"}}, {"v_xy_valid", {"vx", "vy"}}, {"v_z_valid", {"vz"}}};
   for (const auto& [flag, columns] : flags) {
     const RawColumn* const valid = topic.find(flag);
-    if (valid == nullptr) continue;
-    const bool never =
-        std::all_of(valid->values.begin(), valid->values.end(), [](double x) { return x == 0; });
-    std::string names;
+    if (valid == nullptr ||
+        std::any_of(valid->values.begin(), valid->values.end(), [](double x) { return x != 0; }))
+      continue;
     for (RawColumn& column : topic.columns) {
       if (std::find(columns.begin(), columns.end(), column.name) == columns.end()) continue;
-      names += (names.empty() ? "" : ", ") + column.name;
-      for (std::size_t i = 0; i < column.values.size(); ++i)
-        if (valid->values[i] == 0) column.values[i] = NAN;
+      column.values.assign(column.values.size(), NAN);
+      notes.push_back("not used: " + topic.name + ": " + column.name + ": the estimator says " + flag +
+                      " = 0");
     }
-    if (never)
-      notes.push_back("not used: " + topic.name + ": " + names + ": the estimator says " + flag + " = 0");
   }
 }
 

@@ -11,7 +11,7 @@ namespace swarmcert::logs {
 /// Adds columns named position_x, attitude_w, motor_command_1, ... to the topics of PX4 (ULog, px4_msgs in ROS) and
 /// ArduPilot that carry these signals. NED and FRD become z up and FLU: (x, -y, -z), q = (w, x, -y, -z). If a message
 /// has several instances, the first one that is not constant is used. Positions and velocities that PX4's estimator
-/// marks as not valid become NaN; `notes` gets the columns that are never valid.
+/// never marks as valid become NaN and are named in `notes`.
 void add_own_names(RawLog& log, std::vector<std::string>& notes);
 
 /// Adds an event "landed" to `log`, on the clock of `raw`, whenever the land detector of PX4 or ArduPilot reports it.

@@ -224,7 +224,7 @@ bool shows_gravity(const RawTopic& topic, const Carried& carried) {
 }
 
 /// Returns whether motion confirms a group whose name fits only without its first word: "drone_vel_x" may be the
-/// velocity, "wind_vel_x" is not. True if there is nothing to compare with.
+/// velocity, "wind_vel_x" is not. A velocity needs a position to be confirmed by.
 bool is_confirmed(const RawLog& log, const Recognition& found, const Carried& carried) {
   const RawTopic& topic = log.topics[carried.topic];
   const auto same_topic = [&](int signal) {
@@ -237,7 +237,7 @@ bool is_confirmed(const RawLog& log, const Recognition& found, const Carried& ca
     case kPosition:
       return velocity == nullptr || is_derivative(topic, carried, *velocity);
     case kVelocity:
-      return position == nullptr || is_derivative(topic, *position, carried);
+      return position != nullptr && is_derivative(topic, *position, carried);
     case kForceWorld:
     case kForceBody:
       return shows_gravity(topic, carried) ||

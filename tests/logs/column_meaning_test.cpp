@@ -12,6 +12,7 @@
 #include "analysis/logs/formats/formats.h"
 #include "analysis/logs/read_log.h"
 #include "dataflash_writer.h"
+#include "nn/base/input_error.h"
 #include "topics.h"
 #include "ulog_writer.h"
 
@@ -101,6 +102,7 @@ TEST(ColumnMeaning, WhatTheMotionContradictsIsNotUsedAndSaid) {
     EXPECT_LT(error_of(log), 0.1) << other << ": the velocity is derived from the position";
     EXPECT_NE(fmt::format("{}", fmt::join(log.interpretation, "\n")).find(other), std::string::npos);
   }
+  EXPECT_THROW(read(table({{axes("wind_vel_"), decoy}})), files::InputError) << "nothing confirms it";
   const logs::Log log = read(table({{axes("ang_acc_"), decoy}, {axes(""), position}, {axes("v"), velocity}}));
   EXPECT_EQ(source(log, "specific_force").find("ang_acc"), std::string::npos);
 }
