@@ -48,11 +48,11 @@ void make_room(SignalTable& table) {
   for (int k = 0; k < 4; ++k) table[kAttitude + k].assign(table.size(), 0);
 }
 
-/// Decides between the orders x, y, z, w and w, x, y, z: the thrust axis must follow the lateral acceleration or, at
-/// rest, be upright.
+/// Decides between the orders x, y, z, w and w, x, y, z: a vehicle that flies is upright most of the time. An order
+/// that names state is given up only if it lays the vehicle on its side or back and the other order keeps it upright.
 void settle_order(Draft& draft) {
   const Carried* const carried = draft.recognition.find(kAttitude);
-  if (carried == nullptr || carried->ask != Ask::kQuaternion || !draft.asks_physics) return;
+  if (carried == nullptr || !draft.asks_physics) return;
   SignalTable& t = draft.table;
   double last_is_w = 0, first_is_w = 0;  // sum of the cosines of the tilt
   for (std::size_t i = 0; i < t.size(); ++i) {
@@ -60,7 +60,12 @@ void settle_order(Draft& draft) {
     last_is_w += 1 - 2 * (a * a + b * b);
     first_is_w += 1 - 2 * (b * b + c * c);
   }
-  const bool w_first = first_is_w > last_is_w;
+  constexpr double kOnItsSide = 0.5, kUpright = 0.9;  // mean cosine of the tilt
+  const auto n = static_cast<double>(t.size());
+  const bool is_open = carried->ask == Ask::kQuaternion;
+  const bool w_first =
+      is_open ? first_is_w > last_is_w : last_is_w < kOnItsSide * n && first_is_w > kUpright * n;
+  if (!is_open && !w_first) return;
   if (w_first) {
     for (int k = 0; k < 3; ++k) std::swap(t[kAttitude + k], t[kAttitude + k + 1]);
   }

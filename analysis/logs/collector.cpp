@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
@@ -26,12 +27,46 @@ int clock_by_name(const RawTopic& topic) {
        {"t",       "time",        "timestamp",    "time.s",       "time.ms",      "time.us",
         "time.ns", "timestamp.s", "timestamp.ms", "timestamp.us", "timestamp.ns", "t.s",
         "t.ms",    "t.us",        "t.ns",         "date.time",    "datetime",     "sec",
-        "secs",    "seconds",     "stamp",        "header.stamp", "time.sec",     "rosbag.timestamp"}) {
+        "secs",    "seconds",     "stamp",        "header.stamp", "time.sec",     "rosbag.timestamp",
+        "tick"}) {
     for (std::size_t c = 0; c < topic.columns.size(); ++c) {
       if (plain_name(topic.columns[c].name) == name) return static_cast<int>(c);
     }
   }
   return -1;
+}
+
+void separate_blocks(RawLog& log) {
+  constexpr double kWhole = 0.9;
+  constexpr std::size_t kFew = 20;  // too few to tell blocks from damage
+  RawTopic& joined = log.topics.back();
+  const std::size_t records = joined.time_s.size();
+  if (records < kFew) return;
+  std::map<std::vector<bool>, RawTopic> blocks;  // by the records that have numbers
+  std::vector<RawColumn> whole;
+  for (RawColumn& column : joined.columns) {
+    std::vector<bool> has_number;
+    for (const double value : column.values) has_number.push_back(std::isfinite(value));
+    const auto count = static_cast<std::size_t>(std::count(has_number.begin(), has_number.end(), true));
+    if (count == 0 || static_cast<double>(count) > kWhole * static_cast<double>(records)) {
+      whole.push_back(std::move(column));
+      continue;
+    }
+    RawTopic& block = blocks[has_number];
+    const bool is_first = block.columns.empty();
+    block.columns.push_back({column.name, column.unit, {}});
+    for (std::size_t i = 0; i < records; ++i) {
+      if (!has_number[i]) continue;
+      block.columns.back().values.push_back(column.values[i]);
+      if (is_first) block.time_s.push_back(joined.time_s[i]);
+    }
+  }
+  joined.columns = std::move(whole);
+  const std::string name = joined.name + (joined.name.empty() ? "block " : " block ");
+  for (auto& [has_number, block] : blocks) {
+    block.name = name + std::to_string(log.topics.size());
+    log.topics.push_back(std::move(block));
+  }
 }
 
 void Collector::begin(const std::vector<std::string>& names) {
@@ -44,6 +79,7 @@ void Collector::begin(const std::vector<std::string>& names) {
     scale_s_ = 1e-6 * stated.multiply / stated.divide;
   else if (map_.empty())
     clock = clock_by_name(topic);
+  if (log_.format == "usd") scale_s_ = 1e-6;  // the ticks of the deck
   if (clock < 0) {
     throw files::InputError({log_.path, "line 1", "time", "", "no column carries it",
                              "log it, or name its column in a columns.toml (--columns)"});
@@ -69,6 +105,10 @@ void Collector::end() {
   const double scale_s = scale_s_ > 0 ? scale_s_ : seconds_per_unit(clock);
   topic.time_s.reserve(clock.size());
   for (const double time : clock) topic.time_s.push_back(time * scale_s);
+  const std::string name = topic.columns[time_].name;
+  separate_blocks(log_);
+  const std::vector<RawColumn>& left = log_.topics.front().columns;
+  while (left[time_].name != name) --time_;
 }
 
 }  // namespace swarmcert::logs

@@ -89,7 +89,8 @@ void add_crazyflie(Table& t) {
   t.push_back({kRates, axes("gyro.#"), "deg/s", kDegree_rad, 1, Ask::kRates});
   t.push_back({kRates, each("ctrlmel.r.#", {"roll", "pitch", "yaw"}), "rad/s", 1, 1, Ask::kLegacyPitch});
   t.push_back({kDuty, rotors("pwm.m#.pwm"), "1/65536", 1, 65536});
-  t.push_back({kRequested, rotors("motor.m#req"), "1/65536", 1, 65536});
+  // The request before battery compensation; since November 2022 the duty after it, without an upper limit.
+  t.push_back({kRequested, rotors("motor.m#req"), "1/65536", 1, 65536, Ask::kMotors});
   t.push_back({kRequested, rotors("motor.m#"), "1/65536", 1, 65536, Ask::kMotors});
   t.push_back({kRotorSpeed, rotors("rpm.m#"), "rpm", 2 * kPi, 60});
   t.push_back({kBattery, {"pm.vbatmv"}, "mV", 1, 1000});
@@ -113,12 +114,12 @@ void add_crazyflie(Table& t) {
 
 /// Hand-made CSV files. The first name of each group is the one this tool would write.
 void add_generic(Table& t) {
-  for (const char* group :
-       {"position.#", "pos.#", "p#", "p.#", "pose.position.#", "pose.pose.position.#", "odom.position.#",
-        "transform.translation.#", "point.#", "drone.#", "vicon.#", "mocap.#", "pos#", "position#", "#"})
+  for (const char* group : {"position.#", "pos.#", "p#", "p.#", "pose.position.#", "pose.pose.position.#",
+                            "odom.position.#", "transform.translation.#", "point.#", "drone.#", "vicon.#",
+                            "mocap.#", "pos#", "position#", "t#", "#.position", "#.pos", "#"})
     t.push_back({kPosition, axes(group), "m"});
-  for (const char* group :
-       {"velocity.#", "vel.#", "v#", "v.#", "vel#", "velocity#", "linear.velocity.#", "d#", "#dot"})
+  for (const char* group : {"velocity.#", "vel.#", "v#", "v.#", "vel#", "velocity#", "linear.velocity.#",
+                            "#.velocity", "#.vel", "d#", "#dot"})
     t.push_back({kVelocity, axes(group), "m/s"});
   const std::vector<std::string> ned = {"north", "east", "down"}, n_e_d = {"n", "e", "d"};
   const std::vector<std::string> enu = {"east", "north", "up"}, e_n_u = {"e", "n", "u"};
@@ -136,7 +137,7 @@ void add_generic(Table& t) {
     t.push_back({kVelocity, each(group, n_e_d), "m/s", 1, 1, Ask::kNorthEastDown});
     t.push_back({kVelocity, each(group, e_n_u), "m/s", 1, 1, Ask::kEastNorthUp});
   }
-  for (const char* group : {"twist.linear.#", "twist.twist.linear.#"})
+  for (const char* group : {"twist.twist.linear.#", "twist.linear.#"})
     t.push_back({kVelocity, axes(group), "m/s", 1, 1, Ask::kVelocityFrame});
   for (const char* group : {"imu.acc.#", "accel.#", "accelerometer.#", "imu.linear.acceleration.#", "acc#",
                             "accel#", "linear.acceleration.#", "acceleration.#", "a#", "a.#"})
@@ -151,18 +152,18 @@ void add_generic(Table& t) {
                             each("#", {"phi", "theta", "psi"}), axes("rpy.#"), axes("euler.#")})
     t.push_back({kEuler, names, "", 1, 1, Ask::kAngles});
   for (const char* group :
-       {"imu.gyro.#", "gyr.#", "angular.velocity.#", "omega.#", "w#", "w.#", "gyro#", "omega#", "body.rate.#",
-        "body.rates.#", "twist.angular.#", "twist.twist.angular.#"})
+       {"imu.gyro.#", "gyr.#", "angular.velocity.#", "ang.vel.#", "omega.#", "w#", "w.#", "gyro#", "omega#",
+        "body.rate.#", "body.rates.#", "twist.angular.#", "twist.twist.angular.#"})
     t.push_back({kRates, axes(group), "", 1, 1, Ask::kRates});
   t.push_back({kRates, {"p", "q", "r"}, "", 1, 1, Ask::kRates});
   t.push_back({kForceBody, axes("imu.a#"), "", 1, 1, Ask::kAcceleration});
   t.push_back({kRates, axes("imu.g#"), "", 1, 1, Ask::kRates});
   for (const char* group : {"motor.#", "motor#", "m#", "u#", "pwm#", "pwm.#", "duty.#", "thrust.#", "cmd.#",
-                            "motor.cmd.#", "motor.cmd#", "motorcmd#"})
-    t.push_back({kDuty, rotors(group), "", 1, 1, Ask::kMotors});
-  // Motors counted from 0.
-  for (const char* group : {"motor.#", "motor#", "m#", "u#", "pwm#", "pwm.#", "duty.#"})
+                            "motor.cmd.#", "motor.cmd#", "motorcmd#"}) {
+    // An array that has an element 0 is counted from 0.
     t.push_back({kDuty, each(group, {"0", "1", "2", "3"}), "", 1, 1, Ask::kMotors});
+    t.push_back({kDuty, rotors(group), "", 1, 1, Ask::kMotors});
+  }
   for (const char* group : {"rpm#", "rpm.#", "motor.rpm.#", "rotor.speed.#", "motor.speed.#", "omega.m#"})
     t.push_back({kRotorSpeed, rotors(group), "rpm", 2 * kPi, 60});
   for (const char* group : {"m#.rads", "m#.rad.s", "motor#.rad.s", "rotor.speed.#.rad.s"})
@@ -196,9 +197,12 @@ void add_generic(Table& t) {
 Table make_table() {
   Table table;
   add_own(table);
+  for (NamedColumns& row : table) row.origin = Origin::kOwn;
   add_published(table);
   add_crazyflie(table);
+  const std::size_t programs = table.size();
   add_generic(table);
+  for (std::size_t i = programs; i < table.size(); ++i) table[i].origin = Origin::kPeople;
   return table;
 }
 

@@ -26,6 +26,13 @@ enum class Ask {
   kEastNorthUp     ///< nothing open
 };
 
+/// Where names come from.
+enum class Origin {
+  kOwn,       ///< columns.toml; message_frames.h converts messages of known firmware to them
+  kPrograms,  ///< known programs: specific enough to be found after another first word
+  kPeople     ///< hand-made files: common words
+};
+
 /// Columns of one topic that together carry a group of signals, starting with `signal`.
 struct NamedColumns {
   int signal;
@@ -33,6 +40,7 @@ struct NamedColumns {
   std::string unit;
   double multiply = 1, divide = 1;
   Ask ask = Ask::kNothing;
+  Origin origin = Origin::kPrograms;
 };
 
 /// Returns the table, in order of preference: if several rows give the same signal, the first one in the file is used.

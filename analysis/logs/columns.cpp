@@ -46,7 +46,7 @@ std::map<std::string, NamedSignal> named_signals() {
   const std::vector<Unit> length = of_both_signs({{"m", 1, 1}, {"cm", 1, 100}, {"mm", 1, 1000}});
   const std::vector<Unit> speed = of_both_signs({{"m/s", 1, 1}, {"cm/s", 1, 100}, {"mm/s", 1, 1000}});
   const std::vector<Unit> force = {{"N", 1, 1}, {"gf", kGravity_m_s2, 1000}};
-  add("time", {""}, kTime, {{"s", 1e6, 1}, {"ms", 1e3, 1}, {"us", 1, 1}});
+  add("time", {""}, kTime, {{"s", 1e6, 1}, {"ms", 1e3, 1}, {"us", 1, 1}, {"ns", 1, 1000}});
   add("position", axes, kPosition, length);
   add("velocity", axes, kVelocity, speed);
   add("specific_force", axes, kForceWorld,

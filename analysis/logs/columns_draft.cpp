@@ -126,7 +126,7 @@ std::string time_unit(const RawTopic& topic, const RawColumn& column) {
     const double stored = column.values[i] - column.values[0], taken = topic.time_s[i] - topic.time_s[0];
     if (!(stored > 0) || !(taken > 0)) continue;
     const double per_second = stored / taken;
-    return per_second > 3e4 ? "us" : per_second > 30 ? "ms" : "s";
+    return per_second > 3e7 ? "ns" : per_second > 3e4 ? "us" : per_second > 30 ? "ms" : "s";
   }
   return "s";
 }
@@ -269,13 +269,14 @@ std::string columns_draft(const std::string& path) {
       for (std::size_t k = 0; k < words.parts.size(); ++k) {
         const std::size_t at = k + static_cast<std::size_t>(offset);
         if (at >= carried.size() || carried.columns[at] < 0) continue;
-        const RawColumn& column = topic.columns[static_cast<std::size_t>(carried.columns[at])];
+        const RawTopic& carrier = table.raw.topics[carried.topic];
+        const RawColumn& column = carrier.columns[static_cast<std::size_t>(carried.columns[at])];
         // Some stored records may have been dropped, so samples are matched by their times.
         std::vector<double> stored, taken;
         std::size_t record = 0;
         for (std::size_t i = 0; i < log.samples.size(); ++i) {
           const double time_s = 1e-6 * log.samples[i].time_us + log.epoch_s;
-          while (record + 1 < topic.time_s.size() && topic.time_s[record] < time_s - 1e-6) ++record;
+          while (record + 1 < carrier.time_s.size() && carrier.time_s[record] < time_s - 1e-6) ++record;
           stored.push_back(column.values[record]);
           taken.push_back(interpreted(log, i, words.signal + static_cast<int>(k)));
         }

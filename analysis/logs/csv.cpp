@@ -119,6 +119,7 @@ std::optional<LineFault> parse_line(std::string_view line, char separator, const
                                     std::vector<double>& values) {
   std::size_t at = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
+    if (separator == ' ') at = std::min(line.find_first_not_of(' ', at), line.size());
     const std::size_t end = std::min(line.find(separator, at), line.size());
     const std::string_view cell = line.substr(at, end - at);
     if (!parse_cell(cell, separator != ',', values[i]) && sink.needs(i)) return LineFault{i, cell};
@@ -143,7 +144,8 @@ class Header {
       comment = line.substr(1);
     }
     double number = 0;
-    const std::string_view first = std::string_view(line).substr(0, line.find_first_of(",;\t"));
+    const std::string_view first =
+        std::string_view(line).substr(0, line.find(files::csv_separator(line, ' ')));
     if (comment.empty() || (!line.empty() && !parse_cell(first, false, number))) return true;
     if (complete || !line.empty()) first_record = line;
     line = comment;
@@ -164,13 +166,13 @@ std::optional<files::InputFault> read_csv(std::istream& in, const std::string& p
     throw files::InputError(
         {path, "line 1", "", "", "the file is empty", "the recording failed; exclude this file"});
   }
-  const char separator = files::csv_separator(header.line, ',');
+  const char separator = files::csv_separator(header.line, ' ');
   const std::vector<std::string_view> cells = files::csv_cells(header.line, separator);
   const std::vector<std::string> names(cells.begin(), cells.end());
   const std::string where = "line " + std::to_string(header.lines - (header.first_record ? 1 : 0));
   if (names.size() < 2 || header.line.size() > kLongestLine_bytes) {
     throw files::InputError({path, where, "header", files::in_quotes(header.line), "does not name columns",
-                             "the first line names them, separated by commas, semicolons or tabs"});
+                             "the first line names them, separated by commas, semicolons, tabs or blanks"});
   }
   if (std::set<std::string>(names.begin(), names.end()).size() != names.size())
     throw files::InputError({path, where, "header", "", "names a column twice", "rename one of them"});

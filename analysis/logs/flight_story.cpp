@@ -276,6 +276,8 @@ FlightStory tell(const Log& log) {
   }
   if (log.armed == Armed::kNever)
     story.no_flight = "never armed";
+  else if (!log.signals.not_multirotor.empty())
+    story.no_flight = "the vehicle is a " + log.signals.not_multirotor;
   else if (log.samples.empty())
     story.no_flight = "no record";
   else if (story.air_s == 0)

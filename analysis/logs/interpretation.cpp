@@ -91,6 +91,9 @@ Sample sample_of(const SignalTable& t, std::size_t i, const Signals& signals) {
 }
 
 void refuse_without_motion(const Draft& draft) {
+  if (draft.log.channels.empty())
+    throw files::InputError({draft.raw.path, "", "columns", "", "no variable was logged",
+                             "name them where the logger is configured: config.txt of a micro-SD deck"});
   for (const Carried& carried : draft.recognition.groups) {
     if (carried.signal < kAttitude) return;  // position, velocity or acceleration
   }
@@ -209,6 +212,9 @@ void settle_judgement(Draft& draft) {
   for (const auto& [present, what] : needed) {
     if (!present) signals.force_lacks += (signals.force_lacks.empty() ? "" : "; ") + std::string(what);
   }
+  if (!signals.not_multirotor.empty())
+    signals.force_lacks =
+        "rotors that carry it: the log says that the vehicle is a " + signals.not_multirotor;
   signals.force = signals.force_lacks.empty();
   for (std::size_t k = 0; k < 3 && signals.force; ++k) {
     const bool moves =
@@ -221,7 +227,7 @@ void settle_judgement(Draft& draft) {
   // Torques need the thrust of each rotor, and their dynamics are aliased below the rate of the attitude loop.
   const bool each_rotor = t.has_group(kDuty, 4) || t.has_group(kRotorSpeed, 4) ||
                           t.has_group(kRequested, 4) || signals.motor_commands > 0;
-  signals.torque = !each_rotor                                                 ? TorqueUse::kNone
+  signals.torque = !each_rotor || !signals.not_multirotor.empty()              ? TorqueUse::kNone
                    : signals.rates && t.step_s() > 0 && t.step_s() < 1 / 400.0 ? TorqueUse::kDynamic
                                                                                : TorqueUse::kMean;
 }
@@ -232,12 +238,13 @@ Log interpret(RawLog raw, const SignalMap& map) {
   log.format = raw.format;
   log.health = raw.health;
   log.armed = was_armed(raw);
+  log.signals.not_multirotor = vehicle_without_rotors(raw);
   log.parameters = raw.parameters;
   keep_one_vehicle(raw, log);
   for (const RawTopic& topic : raw.topics) {
     for (const RawColumn& column : topic.columns) log.channels.push_back(column.name);
   }
-  add_own_names(raw);
+  add_own_names(raw, log.interpretation);
   Draft draft{raw, recognise(raw, map), {}, log, {}, map.empty()};
   draft.table = signal_table(raw, draft.recognition, map, log.health, log.events);
   for (const std::string& rejected : draft.recognition.rejected) draft.note("not used: " + rejected);

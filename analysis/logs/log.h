@@ -78,8 +78,9 @@ enum class TorqueUse {
 
 /// Which optional groups of signals a log has.
 struct Signals {
-  bool force = false;                ///< a force residual can be formed along at least one axis
-  std::string force_lacks;           ///< the signals missing for that, in words; empty if `force`
+  bool force = false;          ///< a force residual can be formed along at least one axis
+  std::string force_lacks;     ///< the signals missing for that, in words; empty if `force`
+  std::string not_multirotor;  ///< what the vehicle is if the log says that it is none, e.g. "fixed wing"
   std::array<bool, 3> force_axes{};  ///< axes of W along which a force can be judged
   ThrustSource thrust = ThrustSource::kNone;
   int motor_commands = 0;  ///< motors whose normalised commands gave `thrust`; 0: it has another source

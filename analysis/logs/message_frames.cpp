@@ -138,9 +138,28 @@ void add_motors(RawTopic& topic) {
   }
 }
 
-void add_px4(RawTopic& topic, const std::string& message) {
+/// Removes the columns that the estimator never marks as valid, and notes them.
+void remove_invalid(RawTopic& topic, std::vector<std::string>& notes) {
+  static const std::vector<std::pair<std::string, std::vector<std::string>>> flags = {
+      {"xy_valid", {"x", "y"}}, {"z_valid", {"z"}}, {"v_xy_valid", {"vx", "vy"}}, {"v_z_valid", {"vz"}}};
+  for (const auto& [flag, columns] : flags) {
+    const RawColumn* const valid = topic.find(flag);
+    if (valid == nullptr ||
+        std::any_of(valid->values.begin(), valid->values.end(), [](double x) { return x != 0; }))
+      continue;
+    for (RawColumn& column : topic.columns) {
+      if (std::find(columns.begin(), columns.end(), column.name) == columns.end()) continue;
+      column.values.assign(column.values.size(), NAN);
+      notes.push_back("not used: " + topic.name + ": " + column.name + ": the estimator says " + flag +
+                      " = 0");
+    }
+  }
+}
+
+void add_px4(RawTopic& topic, const std::string& message, std::vector<std::string>& notes) {
   Renamer renamer(topic);
   if (message == "vehicle_local_position") {
+    remove_invalid(topic, notes);
     renamer.add_vector({"#"}, kXyz, "position");
     renamer.add_vector({"v#"}, kXyz, "velocity");
   } else if (message == "vehicle_attitude") {
@@ -217,7 +236,7 @@ Armed any_record(const RawLog& log, const std::string& message, const std::strin
 
 }  // namespace
 
-void add_own_names(RawLog& log) {
+void add_own_names(RawLog& log, std::vector<std::string>& notes) {
   // Use the first instance of each message; otherwise other instances would fill in columns that the first one lacks.
   // Constant instances are skipped: they belong to a missing battery or to outputs without motors.
   std::map<std::string, std::pair<bool, int>> first;  // whether it is constant, and its number
@@ -235,39 +254,72 @@ void add_own_names(RawLog& log) {
     else if (message == "actuator_outputs" && first.count("actuator_motors") != 0)
       continue;  // the same commands, scaled to servo signals
     else if (log.format == "ulog" || topic.type.rfind("px4_msgs", 0) == 0)
-      add_px4(topic, message);
+      add_px4(topic, message, notes);
   }
 }
 
 void add_landed(const RawLog& raw, Log& log) {
-  for (const RawTopic& topic : raw.topics) {
-    const RawColumn* const landed = topic.find("landed");
-    if (message_of(topic) != "vehicle_land_detected" || landed == nullptr) continue;
-    const std::size_t n = std::min(landed->values.size(), topic.time_s.size());
-    for (std::size_t i = 0; i < n;) {
-      std::size_t end = i;
-      while (end < n && landed->values[end] != 0) ++end;
-      const double start_s = topic.time_s[i];
-      // The last state holds until the end of the log.
-      const double end_s = end < n ? topic.time_s[end] : INFINITY;
-      if (end > i)
-        log.events.push_back({"landed", start_s, end_s - start_s, "reported by the land detector"});
-      i = std::max(end, i + 1);
+  struct Detector {
+    const char *message, *column;
+    bool landed;  ///< what a value other than zero means
+  };
+  for (const Detector& detector :
+       {Detector{"vehicle_land_detected", "landed", true}, Detector{"STAT", "isFlying", false}}) {
+    for (const RawTopic& topic : raw.topics) {
+      const RawColumn* const state = topic.find(detector.column);
+      if (message_of(topic) != detector.message || state == nullptr) continue;
+      const std::size_t n = std::min(state->values.size(), topic.time_s.size());
+      const auto is_landed = [&](std::size_t i) { return (state->values[i] != 0) == detector.landed; };
+      for (std::size_t i = 0; i < n;) {
+        std::size_t end = i;
+        while (end < n && is_landed(end)) ++end;
+        const double start_s = topic.time_s[i];
+        // The last state holds until the end of the log.
+        const double end_s = end < n ? topic.time_s[end] : INFINITY;
+        if (end > i)
+          log.events.push_back({"landed", start_s, end_s - start_s, "reported by the land detector"});
+        i = std::max(end, i + 1);
+      }
+      return;
     }
-    return;
   }
 }
 
 Armed was_armed(const RawLog& log) {
   constexpr double kArmedState = 2;  // vehicle_status.ARMING_STATE_ARMED
   for (const Armed armed :
-       {any_record(log, "actuator_armed", "armed", [](double x) { return x != 0; }),
+       // ArduPilot writes ARM when the state changes: a vehicle that was disarmed had been armed.
+       {any_record(log, "ARM", "ArmState", [](double) { return true; }),
+        any_record(log, "actuator_armed", "armed", [](double x) { return x != 0; }),
         any_record(log, "vehicle_status", "arming_state", [](double x) { return x == kArmedState; }),
-        any_record(log, "ARM", "ArmState", [](double x) { return x != 0; }),
         any_record(log, "STAT", "Armed", [](double x) { return x != 0; })}) {
     if (armed != Armed::kUnknown) return armed;
   }
   return Armed::kUnknown;
+}
+
+std::string vehicle_without_rotors(const RawLog& log) {
+  // VehicleStatus.msg of PX4; a vehicle that is at times a rotary wing counts as one.
+  constexpr double kRotaryWing = 1, kFixedWing = 2, kRover = 3;
+  double type = 0;
+  for (const RawTopic& topic : log.topics) {
+    const RawColumn* const found =
+        message_of(topic) == "vehicle_status" ? topic.find("vehicle_type") : nullptr;
+    if (found == nullptr) continue;
+    for (const double value : found->values) {
+      if (value == kRotaryWing) return "";
+      if (value == kFixedWing || value == kRover) type = value;
+    }
+  }
+  if (type != 0) return type == kFixedWing ? "fixed wing" : "rover";
+  // ArduPilot writes the name and version of its firmware.
+  static const std::pair<const char*, const char*> firmwares[] = {
+      {"ArduPlane", "fixed wing"}, {"ArduRover", "rover"}, {"ArduSub", "submarine"}};
+  for (const RawMessage& message : log.messages) {
+    for (const auto& [firmware, vehicle] : firmwares)
+      if (message.text.rfind(firmware, 0) == 0) return vehicle;
+  }
+  return "";
 }
 
 }  // namespace swarmcert::logs

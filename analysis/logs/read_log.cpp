@@ -90,7 +90,7 @@ RawLog raw_of(std::istream& in, const std::string& path, const SignalMap& map) {
       log.format = "csv";
       const std::optional<files::InputFault> damage = read_csv(in, path, collector, log.health);
       collector.end();
-      if (damage && log.topics.back().time_s.empty())
+      if (damage && log.topics.front().time_s.empty())
         throw files::InputError(*damage);  // no line can be read
       break;
     }
@@ -142,6 +142,7 @@ bool looks_like_log(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) return false;
   const Format format = kind_of(in);
+  if (format == Format::kCsv) return is_flight_table(path);
   return format == Format::kUsd || format == Format::kUsdEvents;
 }
 
@@ -200,7 +201,7 @@ Interval time_span_s(const std::string& path) {
     Collector collector(log, known_columns());
     read_csv(in, path, collector, log.health);
     collector.end();
-    const std::vector<double>& times = log.topics.back().time_s;
+    const std::vector<double>& times = log.topics.front().time_s;
     return times.empty() ? Interval() : Interval(times.front(), times.back());
   } catch (const files::InputError&) {
     return {0, 0};

@@ -40,9 +40,9 @@ void read_usd(std::istream& in, const std::string& path, RecordSink& sink, LogHe
 int read_usd_events(std::istream& in, const std::string& path, RawLog& log);
 
 /// Reads text: a header line, which may start with "#" and follow comment lines starting with "#", and lines with the
-/// same number of cells. The separator is the first of comma, semicolon and tab that occurs in the header. Cells are
-/// numbers or empty; columns that the sink does not need may hold anything. If the separator is not a comma, commas are
-/// decimal points. Dates become seconds since 1970, times of day seconds since midnight.
+/// same number of cells. The separator is the first of comma, semicolon, tab and blank that occurs in the header.
+/// Cells are numbers or empty; columns that the sink does not need may hold anything. If the separator is not a comma,
+/// commas are decimal points. Dates become seconds since 1970, times of day seconds since midnight.
 /// @return what is wrong with the first damaged line
 /// @throws files::InputError if the header is empty or contains a name twice.
 std::optional<files::InputFault> read_csv(std::istream& in, const std::string& path, RecordSink& sink,

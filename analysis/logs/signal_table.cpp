@@ -15,7 +15,6 @@ namespace swarmcert::logs {
 namespace {
 
 constexpr double kLongestPause_us = 10e6;
-constexpr double kTickRange_us = 4294967296.0;
 constexpr double kInt16Range = 65536;
 
 double median_step(const std::vector<double>& times) {
@@ -98,23 +97,40 @@ Series in_order(const std::vector<double>& time_s, const std::vector<double>& va
   return series;
 }
 
-/// Returns the times of a topic in microseconds.
-std::vector<double> times_us(const RawTopic& topic, const SignalMap& map, bool& wraps) {
+/// Undoes wraps of a clock that counts milliseconds in 24 or 32 bits or microseconds in 32 bits: where it falls by one
+/// of these ranges, up to a pause, it has wrapped.
+void undo_wraps(std::vector<double>& times_us) {
+  constexpr double kRanges_us[] = {4294967296.0, 16777216.0 * 1e3, 4294967296.0 * 1e3};
+  double added_us = 0, last_us = kNaN;
+  for (double& time_us : times_us) {
+    const double step_us = time_us - last_us;
+    for (const double range_us : kRanges_us) {
+      if (step_us < 0 && std::abs(step_us + range_us) < kLongestPause_us) added_us += range_us;
+      // A record from before the wrap, out of order.
+      if (added_us > 0 && step_us > 0 && std::abs(step_us - range_us) < kLongestPause_us)
+        added_us -= range_us;
+    }
+    if (std::isfinite(time_us)) last_us = time_us;
+    time_us += added_us;
+  }
+}
+
+/// Returns the times of a topic in microseconds, without wraps.
+std::vector<double> times_us(const RawTopic& topic, const SignalMap& map) {
   const Carried time = time_column(topic, map);
   std::vector<double> times;
   times.reserve(topic.time_s.size());
-  wraps = false;
   if (time.columns[0] >= 0) {
-    const RawColumn& column = topic.columns[static_cast<std::size_t>(time.columns[0])];
-    wraps = column.name == "tick";
-    for (const double value : column.values) times.push_back(value * time.multiply / time.divide);
-    return times;
+    for (const double value : topic.columns[static_cast<std::size_t>(time.columns[0])].values)
+      times.push_back(value * time.multiply / time.divide);
+  } else {
+    for (const double time_s : topic.time_s) {
+      // Formats store whole microseconds or nanoseconds: undo the rounding of the conversion to seconds.
+      const double time_us = 1e6 * time_s, whole_us = std::nearbyint(time_us);
+      times.push_back(std::abs(time_us - whole_us) < 1e-3 ? whole_us : time_us);
+    }
   }
-  for (const double time_s : topic.time_s) {
-    // Formats store whole microseconds or nanoseconds: undo the rounding of the conversion to seconds.
-    const double time_us = 1e6 * time_s, whole_us = std::nearbyint(time_us);
-    times.push_back(std::abs(time_us - whole_us) < 1e-3 ? whole_us : time_us);
-  }
+  undo_wraps(times);
   return times;
 }
 
@@ -124,10 +140,6 @@ class RecordFilter {
   RecordFilter(SignalTable& table, LogHealth& health) : table_(table), health_(health) {}
 
   void take(std::size_t record, double time_us, bool is_finite) {
-    if (wraps && !kept_.empty()) {
-      // Of all times that a 32-bit tick can mean, take the one closest to the last.
-      time_us += kTickRange_us * std::round((table_.time_us.back() - time_us) / kTickRange_us);
-    }
     if (!is_finite || !std::isfinite(time_us)) {
       ++health_.not_finite;
       return;
@@ -161,7 +173,6 @@ class RecordFilter {
     return std::move(kept_);
   }
 
-  bool wraps = false;
   double longest_gap_s = kLongestGap_s;
 
  private:
@@ -255,17 +266,16 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, cons
   if (log.topics.empty()) return table;
   const RawTopic& clock = log.topics[recognition.clock];
   RecordFilter filter(table, health);
-  const std::vector<double> clock_us = times_us(clock, map, filter.wraps);
+  const std::vector<double> clock_us = times_us(clock, map);
   std::vector<double> clock_s;
   for (const double time_us : clock_us) clock_s.push_back(1e-6 * time_us);
   std::array<std::vector<double>, kNumSignals> all;
   std::array<char, kNumSignals> is_own{};  // carried by the topic of the clock
   for (const Carried& carried : recognition.groups) {
     const RawTopic& topic = log.topics[carried.topic];
-    bool ignored = false;
     std::vector<double> topic_s;
     if (carried.topic != recognition.clock) {
-      for (const double time_us : times_us(topic, map, ignored)) topic_s.push_back(1e-6 * time_us);
+      for (const double time_us : times_us(topic, map)) topic_s.push_back(1e-6 * time_us);
     }
     std::vector<double> signs;
     if (carried.topic != recognition.clock && carried.signal == kAttitude && carried.size() == 4)

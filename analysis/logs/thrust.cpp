@@ -1,6 +1,8 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "analysis/logs/battery_compensation.h"
 #include "analysis/logs/interpretation.h"
@@ -285,8 +287,10 @@ void settle_thrust(Draft& draft) {
   } else if (has_request) {
     const std::string from = names_of(draft.raw, *draft.recognition.find(kRequested));
     if (!is_requested(draft)) {
-      for (int k = 0; k < kFour; ++k) t[kDuty + k] = std::move(t[kRequested + k]);
-      for (int k = 0; k < kFour; ++k) t[kRequested + k].clear();
+      for (int k = 0; k < kFour; ++k) {
+        t[kDuty + k] = std::exchange(t[kRequested + k], {});
+        for (double& duty : t[kDuty + k]) duty = std::min(duty, 1.0);
+      }
       draft.add_measured("duty", kRequested);
       has_request = false;
     } else {

@@ -23,7 +23,11 @@ char csv_separator(std::string_view line, char otherwise) {
 std::vector<std::string_view> csv_cells(std::string_view line, char separator) {
   std::vector<std::string_view> cells;
   for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(separator, begin), line.size());
+    // Separators between quotes belong to the cell.
+    const std::size_t first = line.find_first_not_of(' ', begin);
+    const bool is_quoted = first < line.size() && line[first] == '"';
+    const std::size_t end =
+        std::min(line.find(separator, is_quoted ? line.find('"', first + 1) : begin), line.size());
     const std::string_view cell = without_blanks(line.substr(begin, end - begin));
     if (separator != ' ' || !cell.empty()) cells.push_back(cell);
     begin = end + 1;

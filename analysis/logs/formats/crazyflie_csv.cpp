@@ -11,6 +11,7 @@
 #include <set>
 #include <utility>
 
+#include "analysis/logs/collector.h"
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/formats.h"
 #include "analysis/logs/formats/merge.h"
@@ -145,7 +146,8 @@ RawLog read_crazyflie_csv(std::istream& in, const std::string& path) {
   log.health.not_finite = sink.without_time;
   log.health.records = topic.time_s.size();
   if (topic.time_s.empty()) return log;
-  std::string unit = topic.columns[0].unit;
+  const bool counts_us = time_column(topic, known_columns()).columns[0] == 0;
+  std::string unit = counts_us ? "us" : topic.columns[0].unit;
   if (!per_second(unit)) unit = unit_of_steps(topic.time_s);
   for (double& time : topic.time_s) time /= *per_second(unit);
   log.texts["time_unit"] = unit;
@@ -160,6 +162,7 @@ RawLog read_crazyflie_csv(std::istream& in, const std::string& path) {
   topic.columns.erase(std::remove_if(topic.columns.begin(), topic.columns.end(), has_no_number),
                       topic.columns.end());
   log.topics.push_back(std::move(topic));
+  separate_blocks(log);
   return log;
 }
 

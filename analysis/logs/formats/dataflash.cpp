@@ -156,7 +156,9 @@ class DataflashReader {
         const char unit = i < units.size() ? units[i] : '-';
         const char multiplier = i < multipliers.size() ? multipliers[i] : '-';
         const auto found_unit = units_.find(unit);
-        field.is_instance = unit == '#' && field.type.number;
+        // Files without FMTU mark instances only by the names that ArduPilot gives these fields in LogStructure.h.
+        const bool is_called_instance = field.name == "I" || field.name == "C" || field.name == "Inst";
+        field.is_instance = (unit == '#' || (units.empty() && is_called_instance)) && field.type.number;
         // "-" means none, "?" means unknown.
         if (found_unit != units_.end() && unit != '-' && unit != '?' && !field.is_instance)
           field.unit = found_unit->second;
