@@ -20,10 +20,18 @@
 namespace swarmcert::identification {
 namespace {
 
-ThrustScale thrust_scale(const Passes& passes, const Coverage& covered) {
+/// @param found all effects and formulas of the verdict; the scale and the force among them are fitted anew, without
+/// the selection's choice between the two
+ThrustScale thrust_scale(const Passes& passes, const Coverage& covered, const std::vector<Refined>& found) {
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
-  const auto checks = instrument(
-      passes, {candidate("thrust_ratio", model, covered), candidate("constant_force", model, covered)});
+  std::vector<Candidate> effects = {
+      candidate("thrust_ratio", model, covered),
+      candidate(covered.vehicles.size() < 2 ? "constant_force" : kVehicleOffset, model, covered)};
+  for (Candidate& effect : candidates_of(found)) {
+    const bool is_present = effect.name == effects[0].name || effect.name == effects[1].name;
+    if (!is_present) effects.push_back(std::move(effect));
+  }
+  const auto checks = instrument(passes, effects);
   ThrustScale scale;
   if (checks.empty()) return scale;
   scale.is_known = true;
@@ -210,13 +218,15 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
     }
   }
   result.ranking = std::move(settled.ranking);
-  result.thrust_scale = thrust_scale(all, covered);
+  result.thrust_scale = thrust_scale(all, covered, selected.refined);
   name_hidden_scale(*inputs.model_of(kind), result.thrust_scale, result.ranking);
   name_time_beside_battery(all, result.ranking);
   result.remainder = std::move(settled.rest);
   result.scan = std::move(explained.scan);
   result.formulas = std::move(explained.formulas);
   name_what_halves(all, passes, result);
+  // A force that nothing explains may follow the set points, and then the instrument's interval does not hold.
+  if (result.remainder.stands_out() || !result.scan.entries.empty()) result.thrust_scale.is_known = false;
   scan_balance(passes, result);
   return result;
 }
