@@ -66,6 +66,12 @@ Json hex_floats(const std::vector<double>& numbers) {
 
 // --- reading
 
+/// Returns `json`, which must be an array: the members of an object would be iterated as well.
+const Json& list(const Json& json, const std::string& where) {
+  require(json.is_array(), where + " is not an array");
+  return json;
+}
+
 std::vector<std::string> texts(const Json& json) { return json.get<std::vector<std::string>>(); }
 
 /// Sets the activation and the number of outputs that keep their values: "tanh", or "tanh:8" for the first 8 only.
@@ -94,7 +100,7 @@ Layer layer_of(const Json& json, const std::string& where) {
   layer.name = json["name"].get<std::string>();
   if (!json["tensor"].is_null()) layer.tensor = json["tensor"].get<std::string>();
   layer.biases = hex_floats_in(json["biases"]);
-  for (const Json& row : json["weights"]) {
+  for (const Json& row : list(json["weights"], where + ".weights")) {
     const std::vector<double> numbers = hex_floats_in(row);
     require(!numbers.empty() && numbers.size() < kMostWidth &&
                 (layer.inputs == 0 || numbers.size() == static_cast<std::size_t>(layer.inputs)),
@@ -128,16 +134,18 @@ Weights weights_of(const Json& json, const std::string& where) {
   Weights weights;
   weights.path = json.at("file").get<std::string>();
   weights.sha256 = json.at("sha256").get<std::string>();
+  require(json.at("data_files").is_object(), where + ".data_files is not an object");
   for (const auto& [name, hash] : json.at("data_files").items())
     weights.data_files.emplace_back(name, hash.get<std::string>());
   weights.assumed = texts(json.at("assumed"));
   const std::string precision = json.at("precision").get<std::string>();
   require(precision == "float32" || precision == "float64", where + ": unknown precision");
   weights.precision = precision == "float32" ? files::Precision::kFloat32 : files::Precision::kFloat64;
-  for (const Json& layer : json.at("layers")) weights.layers.push_back(layer_of(layer, where + ".layers"));
+  for (const Json& layer : list(json.at("layers"), where + ".layers"))
+    weights.layers.push_back(layer_of(layer, where + ".layers"));
   require(!weights.layers.empty() && weights.layers.size() <= 10000, where + ".layers is empty or too long");
   std::size_t next = 0;
-  for (const Json& step : json.at("chain")) {
+  for (const Json& step : list(json.at("chain"), where + ".chain")) {
     const std::string op = step.at("op").get<std::string>();
     if (op == "linear" || op == "clamp") continue;
     require(next + 1 < weights.layers.size(), where + ".chain has more activations than layers allow");

@@ -30,11 +30,16 @@ std::vector<std::string> input_names(const Network& network, const FunctionId& f
   const bool is_ground = function.input_part().is_ground_phi();
   if (is_ground) return ground_names();
   if (!network.input_order.empty()) return network.input_order;
-  if (inputs != 6) return {};
-  return {"dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"};
+  return inputs == static_cast<int>(relative_state().size()) ? relative_state() : std::vector<std::string>();
 }
 
 }  // namespace
+
+const std::vector<std::string>& relative_state() {
+  static const std::vector<std::string> kNames = {"dp_x_m",   "dp_y_m",   "dp_z_m",
+                                                  "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"};
+  return kNames;
+}
 
 Parts parts(const Network& network) {
   Parts result;

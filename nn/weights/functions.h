@@ -17,6 +17,9 @@ Parts parts(const Network& network);
 /// Returns every function of NET: its parts, then every set function, in alphabetical order.
 std::vector<FunctionId> functions(const Network& network);
 
+/// Returns the names of the inputs of a phi of relative states, in order: "dp_x_m" .. "dv_z_m_s".
+const std::vector<std::string>& relative_state();
+
 /// Returns the number of inputs of `function`.
 int inputs(const Network& network, const FunctionId& function);
 

@@ -229,14 +229,18 @@ class Derived:
     def compare(self, entry):
         axis = "xyz".index(entry["axis"])
         keys, sampling = ["mass_kg", "Kp", "Kd", "Ki", "delay_s"], []
+        kp, kd, ki = self.gains(axis)
+        rate = self.position.get("rate_hz", 0)
+        step = self.position.get("integrator_step_s", 1 / rate) if rate > 0 else 0
         if "period_s" in entry:
-            rate = self.position.get("rate_hz", 0)
             require(rate > 0, "the loop of the files is not sampled")
             keys = keys + ["period_s", "integrator_step_s"]
-            sampling = [1 / rate, self.position.get("integrator_step_s", 1 / rate)]
+            sampling = [1 / rate, step]
+        elif rate > 0:  # in continuous time, the integral grows by as much per second of error as the sampled sum does
+            ki *= step * rate
         stated = [exact(entry[key]) for key in keys] + sorted(map(exact, entry["lags_s"]))
         lags = sorted(x for x in (self.motor, self.attitude if axis < 2 else 0) if x > 0)
-        derived = [self.mass] + [self.ratio * x for x in self.gains(axis)] + [self.delay] + sampling + lags
+        derived = [self.mass] + [self.ratio * x for x in (kp, kd, ki)] + [self.delay] + sampling + lags
         require(len(stated) == len(derived) and
                 all(abs(x - Fraction(y)) <= Fraction(1, 10 ** 12) * abs(Fraction(y)) for x, y in zip(stated, derived)),
                 f"the loop of axis {entry['axis']} is not that of the files")

@@ -298,6 +298,22 @@ def hold_for_random_loops(folder):
     print(f"{compared} gains of random loops compared")
 
 
+def integral_that_acts(folder, of_gains, kp, kd, ki, rate, lag):
+    """A sampled loop states the Ki of gains.toml and the integrator's step; a continuous one the Ki that acts. True
+    certificates of the same loop with the one in place of the other are refused for these files."""
+    written, acting = f"Kp = {kp}\nKd = {kd}\nKi = {ki}\n", f"Kp = {kp}\nKd = {kd}\nKi = {0.8 * ki}\n"
+    continuous = certificate(folder, f"{written}rate_hz = {rate}", lag)["loops"]
+    sampled = certificate(folder, f"{acting}rate_hz = {rate}\nintegrator_step_s = {0.8 / rate}", lag)["sampled_loops"]
+    document = of_gains()
+    own = ["--gains", str(folder / "gains.toml"), "--model", str(MODEL)]
+    assert {float.fromhex(loop["Ki"]) for loop in document["sampled_loops"]} == {ki}
+    assert all(math.isclose(float.fromhex(loop["Ki"]), 0.8 * ki, rel_tol=1e-12) for loop in document["loops"])
+    assert continuous and sampled and document["loops"]
+    for others in {"loops": continuous}, {"sampled_loops": sampled}:
+        other = {**document, **others}
+        assert [exit_codes(folder, forged(other)), exit_codes(folder, forged(other), *own)] == [[0, 0], [1, 1]], others
+
+
 def hold_for_random_sampled_loops(folder):
     """The same for sampled loops: with and without integral, lags, delays of a fraction of a period and of several."""
     generator, compared = random.Random(29), 0
@@ -305,9 +321,12 @@ def hold_for_random_sampled_loops(folder):
         kp, kd, rate = generator.uniform(6, 20), generator.uniform(5, 8), (50, 100, 200, 100)[run]
         ki = 0.3 * kp * kd if run % 2 else 0
         lag = f"[lag]\nmotor_s = {generator.uniform(0.01, 0.04)}\ndelay_s = {delay_periods / rate}\n"
-        document = certificate(folder,
-                               f"Kp = {kp}\nKd = {kd}\nKi = {ki}\nrate_hz = {rate}\nintegrator_step_s = {0.8 / rate}",
-                               lag)
+        def of_gains():
+            return certificate(folder, f"Kp = {kp}\nKd = {kd}\nKi = {ki}\nrate_hz = {rate}\n"
+                                       f"integrator_step_s = {0.8 / rate}", lag)
+        if run == 1:
+            integral_that_acts(folder, of_gains, kp, kd, ki, rate, lag)
+        document = of_gains()
         own = ["--gains", str(folder / "gains.toml"), "--model", str(MODEL)]
         assert exit_codes(folder, forged(document), *own) == [0, 0]
         assert [loop["axis"] for loop in document["sampled_loops"]] == ["x", "y", "z"], document["left_out"]
