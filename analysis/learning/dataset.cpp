@@ -20,7 +20,7 @@ namespace {
 using Eigen::Index;
 using residuals::Track;
 
-constexpr int kNeighbourInputs = nn::kRelativeState;
+constexpr int kNeighbourInputs = 6;  ///< relative position and velocity
 constexpr double kBlock_s = 2, kPurge_s = 0.15;
 
 /// Samples of one track, before the kinds in all flights are known.
