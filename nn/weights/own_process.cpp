@@ -1,5 +1,6 @@
 #include "nn/weights/own_process.h"
 
+#include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -33,6 +34,7 @@ std::uint64_t data_bytes() {
 [[noreturn]] void run(const std::function<void(std::FILE*)>& work, std::FILE* file,
                       std::uint64_t most_bytes) {
   for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL}) std::signal(signal, SIG_DFL);
+  dup2(open("/dev/null", O_WRONLY), STDERR_FILENO);  // where a crash would be told
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_CPU, kMostSeconds);
   limit(RLIMIT_FSIZE, most_bytes);

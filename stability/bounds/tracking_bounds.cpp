@@ -49,7 +49,7 @@ void assume(Fact fact, const FlownLoop& loop, const DisturbanceSource& source, c
     case Fact::kThrustScale:      // scales the gains
       return;
     case Fact::kSampling:
-      return add("continuous position loop", "assumed", "not needed for rows named 'sampled'");
+      return add(kContinuousLoop, "assumed", "not needed for rows named 'sampled'");
     case Fact::kMotorLag:
       return add("first-order lag of the thrust", "assumed", "as in [lag]");
     case Fact::kAttitudeLag:

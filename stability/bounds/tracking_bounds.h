@@ -74,6 +74,9 @@ struct AxisFacts {
   NoiseDeviation noise;          ///< for 1 mm and 0.05 m/s, sampled loop
 };
 
+/// Name of the assumption on which only the bounds of the continuous loop rest.
+inline constexpr char kContinuousLoop[] = "continuous position loop";
+
 struct Assumption {
   std::string name;
   std::string status;  ///< "proved", "measured", "assumed", or "refuted" with the counterexample in the note

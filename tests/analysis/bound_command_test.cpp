@@ -105,6 +105,8 @@ TEST(BoundCommand, BeginsWithAnAnswerOfAtMostSixLinesWhichIsItsExitCode) {
   EXPECT_EQ(flies["flies"], true);
   for (const char* const axis : {"x", "y", "z"}) EXPECT_GT(flies["error_m"][axis].get<double>(), 0);
   EXPECT_FALSE(flies["conditions"].empty());
+  for (const Json& condition : flies["conditions"])
+    EXPECT_NE(condition["name"], "continuous position loop") << "the errors are those of the sampled loop";
   const Json ramp = answer_of(stable + " --rate 0.3", 1);
   EXPECT_EQ(ramp["flies"], false) << ramp.dump();
   EXPECT_TRUE(ramp["error_m"]["z"].is_null());

@@ -11,6 +11,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/json.h"
 #include "nn/weights/activation.h"
+#include "nn/weights/hdf5.h"
 #include "nn/weights/weights.h"
 #include "pth_writer.h"
 #include "refusal.h"
@@ -211,8 +212,9 @@ TEST(ForeignFiles, EveryTruncationAndManyFlippedBitsAreRefusedOrGiveASoundNetwor
        {"onnx_digits.onnx", "scipy_weights.mat", "scipy_biases.mat", "scipy_struct.mat", "numpy_list.npz",
         "h5py_cells.mat", "h5py_chunked.mat", "h5py_struct.mat"}) {
     const std::string good = read_file(foreign(name));
-    for (std::size_t size = 0; size < good.size(); size += 3) try_to_load(good.substr(0, size));
-    for (std::size_t bit = 0; bit < 8 * good.size(); bit += 5) {
+    const std::size_t step = looks_like_hdf5(good) ? 61 : 1;  // reading HDF5 takes a process each time
+    for (std::size_t size = 0; size < good.size(); size += 3 * step) try_to_load(good.substr(0, size));
+    for (std::size_t bit = 0; bit < 8 * good.size(); bit += 5 * step) {
       std::string bytes = good;
       bytes[bit / 8] = static_cast<char>(bytes[bit / 8] ^ 1 << bit % 8);
       try_to_load(bytes);

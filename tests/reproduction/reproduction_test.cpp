@@ -91,7 +91,7 @@ TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
 
   reproduce("symmetry -o out");
   const Json symmetry = result("symmetry");
-  ASSERT_EQ(symmetry["by_data"].size(), 6u);
+  ASSERT_EQ(symmetry["by_data"].size(), 4u);
   ASSERT_EQ(symmetry["by_bound"].size(), 8u);
   for (const Json& row : symmetry["by_bound"]) {
     if (row["limited"] == "joint bound") {

@@ -84,7 +84,8 @@ std::string change_of(const Tracking& input, const DisturbanceSource& source, co
 BoundAnswer bound_answer(const Tracking& input, const DisturbanceSource& source, const InitialError& initial,
                          const TrackingReport& report) {
   BoundAnswer answer;
-  answer.conditions = report.assumptions;
+  for (const Assumption& one : report.assumptions)
+    if (one.name != kContinuousLoop || !input.is_sampled()) answer.conditions.push_back(one);
   add_limits(input, report, answer);
   answer.change = change_of(input, source, initial, report);
   const Saturation::Verdict thrust = report.saturation.verdict;

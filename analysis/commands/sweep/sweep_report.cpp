@@ -139,7 +139,7 @@ bool spans_decades(const MergedSweep& sweep, std::size_t quantity) {
 }
 
 /// Draws every feasible cell in the colour of its value, over grey for the infeasible ones, with the Pareto front as
-/// circles and the best cell as a labelled star.
+/// circles and the best cell as a star.
 std::string heat_map(const MergedSweep& sweep, const Plane& plane, std::size_t quantity,
                      const std::string& file) {
   const char* const names[] = {"x", "y"};
@@ -148,20 +148,15 @@ std::string heat_map(const MergedSweep& sweep, const Plane& plane, std::size_t q
       "fillstyle solid noborder\nset style fill solid noborder\nunset grid\nset tics out\n";
   const std::vector<double> best_at = axes_of(sweep).at(plane.best->index);
   std::string place;
-  bool is_right = false, is_high = false;
   for (std::size_t k = 0; k < 2; ++k) {
     const std::vector<double>& values = sweep.axis_values[plane.axes[k]];
     const std::vector<double> edges = edges_of(values);
     const double at = best_at[plane.axes[k]];
     script += fmt::format("set {}range [{:.10g}:{:.10g}]\n", names[k], edges.front(), edges.back());
     place += fmt::format("{}{:.10g}", k > 0 ? "," : "", at);
-    (k == 0 ? is_right : is_high) = at > values[values.size() / 2];
   }
   if (spans_decades(sweep, quantity)) script += "set logscale cb\n";
-  const double best = plane.best->values[quantity];
-  script += "set label 1 " + plot_string(fmt::format("{:.3g} {}", best, unit_of(sweep.compute[quantity]))) +
-            " at " + place + (is_right ? " right offset character -1," : " left offset character 1,") +
-            (is_high ? "-1" : "1") + " front textcolor rgb 'white' point pointtype 3 linecolor rgb 'white'\n";
+  script += "set label 1 '' at " + place + " front point pointtype 3 linecolor rgb 'white'\n";
   return script + "plot '" + file +
          ".dat' using 1:2:3:4:5:6:7 with boxxyerror fillcolor palette, '' using ($8 > 0 ? $1 : NaN):2 "
          "with points pointtype 6 pointsize 0.4 linecolor rgb 'white'\n";
@@ -182,15 +177,20 @@ void add_plane(Report& report, const MergedSweep& sweep, std::size_t quantity) {
   if (is_map) {
     if (is_geometric(sweep.axis_values[plane.axes[1]])) script += "set logscale y\n";
     script += "set ylabel " + plot_string(sweep.axis_names[plane.axes[1]]) +
-              "\nif (exists('narrow')) { set lmargin at screen 0.17 }\n" +
+              "\nif (exists('narrow')) { set lmargin at screen 0.22 }\n" +
               heat_map(sweep, plane, quantity, file);
   } else {
     script += "plot '" + file + ".dat' using 1:4 with lines linewidth 2\n";
   }
+  std::string best;
+  const std::vector<double> at = axes_of(sweep).at(plane.best->index);
+  for (std::size_t axis = 0; axis < at.size(); ++axis)
+    best += fmt::format("{} {} {:.4g}", axis > 0 ? "," : "", sweep.axis_names[axis], at[axis]);
   report.figure(file, plane.data, script,
-                label +
-                    (is_map ? ". Grey: infeasible. Star: the best cell; circles: the Pareto front." : ".") +
-                    (varying(sweep).size() > 2 ? " Further axes at their first value." : ""));
+                fmt::format("{}. The best cell has {:.3g} {} at{}.{}{}", label, plane.best->values[quantity],
+                            unit_of(name), best,
+                            is_map ? " Star: that cell; circles: the Pareto front; grey: infeasible." : "",
+                            varying(sweep).size() > 2 ? " Further axes at their first value." : ""));
 }
 
 void add_front(Report& report, const MergedSweep& sweep) {
