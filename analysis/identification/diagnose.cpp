@@ -20,17 +20,17 @@
 namespace swarmcert::identification {
 namespace {
 
-/// @param found all effects and formulas of the verdict; the scale and the force among them are fitted anew, without
-/// the selection's choice between the two
+/// @param found all effects and formulas of the verdict; the scale and a constant force are fitted beside them, whether
+/// the selection chose these or not
 ThrustScale thrust_scale(const Passes& passes, const Coverage& covered, const std::vector<Refined>& found) {
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
-  std::vector<Candidate> effects = {
-      candidate("thrust_ratio", model, covered),
-      candidate(covered.vehicles.size() < 2 ? "constant_force" : kVehicleOffset, model, covered)};
+  std::vector<Candidate> effects = {candidate("thrust_ratio", model, covered)};
+  bool has_force = false;
   for (Candidate& effect : candidates_of(found)) {
-    const bool is_present = effect.name == effects[0].name || effect.name == effects[1].name;
-    if (!is_present) effects.push_back(std::move(effect));
+    has_force = has_force || effect.name == "constant_force" || effect.name == kVehicleOffset;
+    if (effect.name != effects[0].name) effects.push_back(std::move(effect));
   }
+  if (!has_force) effects.push_back(candidate("constant_force", model, covered));
   const auto checks = instrument(passes, effects);
   ThrustScale scale;
   if (checks.empty()) return scale;

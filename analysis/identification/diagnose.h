@@ -9,7 +9,7 @@
 
 namespace swarmcert::identification {
 
-/// The factor 1 + ratio, estimated beside a constant force of each vehicle and all effects found, by least squares and
+/// The factor 1 + ratio, estimated beside a constant force and all effects found, by least squares and
 /// by instrumental variables; the reaction of the controller to disturbances biases the former. Unknown if a log has no
 /// setpoints, or if a force is left that nothing explains.
 struct ThrustScale {
