@@ -44,7 +44,7 @@ void add_data(const Setting& setting, const Source& source, Finding& finding) {
   finding.tables.push_back(std::move(table));
 }
 
-/// Test error over the largest joint bound, for each way to limit it, with rotated samples and with samples as recorded.
+/// Test error over the largest joint bound, for each way to limit it, with samples rotated or as recorded.
 void add_bounds(const Setting& setting, const Source& source, Finding& finding) {
   const int seeds = setting.full ? 3 : 1;
   const std::vector<double> gammas =

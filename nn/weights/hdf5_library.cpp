@@ -14,7 +14,7 @@
 namespace swarmcert::files::hdf5 {
 namespace {
 
-constexpr std::size_t kMostNodes = 1 << 16;
+constexpr std::size_t kMostObjects = 1 << 16;
 constexpr std::size_t kMostText = std::size_t{1} << 24;
 /// Deflate, the strongest of the usual filters, makes 1032 bytes of one at most.
 constexpr std::uint64_t kMostExpansion = 1032;
@@ -137,7 +137,7 @@ class Walk {
       H5Oclose(object);
       return found->second;
     }
-    demand(nodes_.size() < kMostNodes, "is one of too many objects");
+    demand(nodes_.size() < kMostObjects, "is one of too many objects");
     nodes_.emplace_back();
     objects_.push_back(object);
     return found->second;

@@ -28,9 +28,9 @@ void transfer(Stream& stream, Value& node, const Node*) {
   stream(node.references);
 }
 
-class Writer {
+class NodeWriter {
  public:
-  explicit Writer(std::FILE* file) : file_(file) {}
+  explicit NodeWriter(std::FILE* file) : file_(file) {}
   template <class Value>
   void operator()(const Value& value) {
     if constexpr (std::is_arithmetic_v<Value>)
@@ -63,9 +63,9 @@ class Writer {
   std::FILE* file_;
 };
 
-class Reader {
+class NodeReader {
  public:
-  explicit Reader(std::FILE* file) : file_(file) {}
+  explicit NodeReader(std::FILE* file) : file_(file) {}
   bool is_good() const { return is_good_; }
 
   template <class Value>
@@ -124,11 +124,11 @@ bool refers_within(const std::vector<Node>& nodes) {
 
 }  // namespace
 
-void write(const std::vector<Node>& nodes, std::FILE* file) { Writer{file}(nodes); }
+void write(const std::vector<Node>& nodes, std::FILE* file) { NodeWriter{file}(nodes); }
 
 std::vector<Node> read_nodes(std::FILE* file) {
   std::vector<Node> nodes;
-  Reader reader(file);
+  NodeReader reader(file);
   reader(nodes);
   if (!reader.is_good() || !refers_within(nodes)) return {};
   return nodes;

@@ -60,7 +60,7 @@ TEST_F(Match, EveryFileOfAnExportIsComparedAndNamed) {
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder_ / "out"))
       files += entry.is_regular_file() ? 1 : 0;
     EXPECT_EQ(json["files"].size(), files) << json;
-    EXPECT_EQ(files, 8u);
+    EXPECT_EQ(files, 7u);
   }
 }
 
