@@ -219,7 +219,8 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   }
   result.ranking = std::move(settled.ranking);
   result.thrust_scale = thrust_scale(all, covered, selected.refined);
-  name_hidden_scale(*inputs.model_of(kind), result.thrust_scale, result.ranking);
+  // A rival may be hidden in any of the effects found, such as the battery's: it is fitted without them.
+  name_hidden_scale(*inputs.model_of(kind), thrust_scale(all, covered, {}), result.ranking);
   name_time_beside_battery(all, result.ranking);
   result.remainder = std::move(settled.rest);
   result.scan = std::move(explained.scan);
