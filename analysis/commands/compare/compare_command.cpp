@@ -382,9 +382,10 @@ Command compare_command() {
         app.add_option(
             "--promise", options->promise,
             "Result of bound --coverage: how often its promise holds on the FLIGHTS not used to make it");
-        app.add_option("--horizon", options->horizon_s,
-                       "Predict this many seconds from every measured state with the logged motor commands or "
-                       "rotor speeds: error of position, velocity, rotation and rate against the horizon")
+        app.add_option(
+               "--horizon", options->horizon_s,
+               "Predict this many seconds from every measured state with the logged motor commands or "
+               "rotor speeds: error of position, velocity, rotation and rate against the horizon")
             ->check(CLI::Range(0.001, 60.0));
         add_output(app, "--predictions", options->predictions,
                    "Folder for what --horizon predicts: FLIGHT.npy, float32, [starts x steps x 13]");
