@@ -24,13 +24,15 @@ namespace {
 /// the selection chose these or not
 ThrustScale thrust_scale(const Passes& passes, const Coverage& covered, const std::vector<Refined>& found) {
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
-  std::vector<Candidate> effects = {candidate("thrust_ratio", model, covered)};
-  bool has_force = false;
-  for (Candidate& effect : candidates_of(found)) {
-    has_force = has_force || effect.name == "constant_force" || effect.name == kVehicleOffset;
-    if (effect.name != effects[0].name) effects.push_back(std::move(effect));
+  std::vector<Candidate> others = candidates_of(found);
+  const bool each = std::any_of(others.begin(), others.end(),
+                                [](const Candidate& effect) { return effect.name == kVehicleOffset; });
+  std::vector<Candidate> effects = {candidate("thrust_ratio", model, covered),
+                                    candidate(each ? kVehicleOffset : "constant_force", model, covered)};
+  for (Candidate& effect : others) {
+    if (effect.name != effects[0].name && effect.name != effects[1].name)
+      effects.push_back(std::move(effect));
   }
-  if (!has_force) effects.push_back(candidate("constant_force", model, covered));
   const auto checks = instrument(passes, effects);
   ThrustScale scale;
   if (checks.empty()) return scale;

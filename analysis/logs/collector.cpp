@@ -40,13 +40,16 @@ void separate_blocks(RawLog& log) {
   constexpr double kWhole = 0.9;
   constexpr std::size_t kFew = 20;  // too few to tell blocks from damage
   RawTopic& joined = log.topics.back();
-  const std::size_t records = joined.time_s.size();
+  const auto has_time = [&](std::size_t i) { return std::isfinite(joined.time_s[i]); };
+  std::size_t records = 0;
+  for (std::size_t i = 0; i < joined.time_s.size(); ++i) records += has_time(i) ? 1 : 0;
   if (records < kFew) return;
   std::map<std::vector<bool>, RawTopic> blocks;  // by the records that have numbers
   std::vector<RawColumn> whole;
   for (RawColumn& column : joined.columns) {
     std::vector<bool> has_number;
-    for (const double value : column.values) has_number.push_back(std::isfinite(value));
+    for (std::size_t i = 0; i < joined.time_s.size(); ++i)
+      has_number.push_back(has_time(i) && std::isfinite(column.values[i]));
     const auto count = static_cast<std::size_t>(std::count(has_number.begin(), has_number.end(), true));
     if (count == 0 || static_cast<double>(count) > kWhole * static_cast<double>(records)) {
       whole.push_back(std::move(column));
@@ -55,7 +58,7 @@ void separate_blocks(RawLog& log) {
     RawTopic& block = blocks[has_number];
     const bool is_first = block.columns.empty();
     block.columns.push_back({column.name, column.unit, {}});
-    for (std::size_t i = 0; i < records; ++i) {
+    for (std::size_t i = 0; i < has_number.size(); ++i) {
       if (!has_number[i]) continue;
       block.columns.back().values.push_back(column.values[i]);
       if (is_first) block.time_s.push_back(joined.time_s[i]);
@@ -107,8 +110,9 @@ void Collector::end() {
   for (const double time : clock) topic.time_s.push_back(time * scale_s);
   const std::string name = topic.columns[time_].name;
   separate_blocks(log_);
-  const std::vector<RawColumn>& left = log_.topics.front().columns;
-  while (left[time_].name != name) --time_;
+  const std::vector<RawColumn>& left = log_.topics.front().columns;  // that of the time among them
+  const auto same = [&name](const RawColumn& column) { return column.name == name; };
+  time_ = static_cast<std::size_t>(std::find_if(left.begin(), left.end(), same) - left.begin());
 }
 
 }  // namespace swarmcert::logs

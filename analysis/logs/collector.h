@@ -14,7 +14,7 @@ int clock_by_name(const RawTopic& topic);
 double seconds_per_unit(const std::vector<double>& clock);
 
 /// Log blocks of several rates, joined over time, leave blanks: columns of the last topic that have numbers in the same
-/// records, in less than nine tenths of all, become a topic of these records only.
+/// records, in less than nine tenths of those that have a time, become a topic of these records only.
 void separate_blocks(RawLog& log);
 
 /// Collects records. The unit of the time column is decided at the end, from its steps.

@@ -9,28 +9,22 @@ namespace {
 
 /// Writes, or reads, every member in the same order: `Stream` is one of the two below.
 template <class Stream, class Value>
-void transfer(Stream& stream, Value& attribute, const Attribute*) {
-  stream(attribute.problem);
-  stream(attribute.is_text);
-  stream(attribute.texts);
-  stream(attribute.number);
+void transfer(Stream& stream, Value& value, const Attribute*) {
+  stream.all(value.problem, value.is_text, value.texts, value.number);
 }
 template <class Stream, class Value>
-void transfer(Stream& stream, Value& node, const Node*) {
-  stream(node.problem);
-  stream(node.is_group);
-  stream(node.links);
-  stream(node.attributes);
-  stream(node.numbers.shape);
-  stream(node.numbers.numbers);
-  stream(node.numbers.is_float32);
-  stream(node.has_references);
-  stream(node.references);
+void transfer(Stream& stream, Value& value, const Node*) {
+  stream.all(value.problem, value.is_group, value.links, value.attributes, value.numbers.shape,
+             value.numbers.numbers, value.numbers.is_float32, value.has_references, value.references);
 }
 
 class NodeWriter {
  public:
   explicit NodeWriter(std::FILE* file) : file_(file) {}
+  template <class... Values>
+  void all(const Values&... values) {
+    ((*this)(values), ...);
+  }
   template <class Value>
   void operator()(const Value& value) {
     if constexpr (std::is_arithmetic_v<Value>)
@@ -67,7 +61,10 @@ class NodeReader {
  public:
   explicit NodeReader(std::FILE* file) : file_(file) {}
   bool is_good() const { return is_good_; }
-
+  template <class... Values>
+  void all(Values&... values) {
+    ((*this)(values), ...);
+  }
   template <class Value>
   void operator()(Value& value) {
     if constexpr (std::is_same_v<Value, bool>) {

@@ -164,7 +164,7 @@ Searched searched(bool is_set) {
   Claim claim;
   claim.domain = "box";
   BranchOptions options;
-  options.nodes = 600;  // so many parts that none is polished with conflicts
+  options.nodes = 600;  // too many boxes at the end for a second solution, which would add conflicts
   files::Network network;
   if (is_set) {
     network = tests::deep_set(tests::random_network({3, 10, 10, 4}, generator),

@@ -134,6 +134,20 @@ TEST(ColumnMeaning, BlocksOfSeveralRatesJoinedWithBlanksAreRead) {
   EXPECT_NEAR(log.samples[300].battery_V, 3.97, 1e-3);
 }
 
+TEST(ColumnMeaning, RecordsWithoutATimeAreCountedAndTheOthersRead) {
+  std::string text = "time,x,y,z,vx,vy,vz\n";
+  for (int k = 0; k < kRecords; ++k) {
+    const Flight f{0.01 * k};
+    text += k % 5 == 1 ? "" : fmt::format("{:.3f}", f.t);
+    text += fmt::format(",{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f}\n", f.x(), f.y(), f.z(), f.vx(), f.vy(),
+                        f.vz());
+  }
+  const logs::Log log = read(text);
+  EXPECT_EQ(log.samples.size(), kRecords * 4u / 5);
+  EXPECT_EQ(log.health.not_finite, kRecords / 5);
+  EXPECT_LT(error_of(log), 1e-5);
+}
+
 TEST(ColumnMeaning, AnArrayWithAnElementZeroIsCountedFromZero) {
   const Vector3 low{{"motor[0]", "motor[1]", "motor[2]"}, [](const Flight&) {
                       return std::array<double, 3>{10000, 20000, 30000};

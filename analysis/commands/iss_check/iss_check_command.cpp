@@ -267,7 +267,9 @@ double rate_of(const std::string& path) {
   stability::DisturbanceSource source;
   stability::read_disturbance_file(path, source);
   if (!(source.rate_norm_N_s > 0) || std::isinf(source.rate_norm_N_s))
-    throw files::InputError({path, "", "rate_N_s", "", "is missing or zero", "the ball is that of a rate"});
+    throw files::InputError(
+        {path, "", "rate_N_s", "", "is missing or 0",
+         "state how fast the learning error can change: the theorem's ball is proportional to it"});
   return source.rate_norm_N_s;
 }
 

@@ -237,7 +237,7 @@ class KernelWalk::Run {
     return false;
   }
 
-  /// A change within the round-off of both values is none.
+  /// Ignores changes of sign that are smaller than the round-off of both values.
   bool changes_sign(const Point& a, int of_a, const Point& b, int of_b) const {
     constexpr double kRoundOff = 1e-13;
     const Lanes& at_a = a.value[static_cast<std::size_t>(of_a)];

@@ -72,7 +72,7 @@ class LowerVehicle {
   double limit_m_s_ = kInfinity;
 };
 
-/// Returns the largest x in [0, most] that is allowed, where every smaller one is allowed as well; 0 if there is none.
+/// Returns the largest allowed x in [0, most]; 0 if none is allowed. Precondition: below an allowed x, all are allowed.
 template <class Allowed>
 double largest_allowed(double most, const Allowed& allowed) {
   if (allowed(most)) return most;
