@@ -105,7 +105,7 @@ Json layer_json(const CertifiedLayer& layer) {
 }
 
 Json bound_json(const files::Network& network, const CertifiedBound& bound) {
-  Json json = summary(network, bound);
+  Json json = files::to_json(files::record_of(summary(network, bound)));
   json.update({{"scale", hex_floats(bound.scale)},
                {"upper_hex", hex_float(bound.upper.value())},
                {"lower_hex", nullptr},
@@ -183,37 +183,55 @@ Json values_json(const CertifiedValues& values) {
 
 }  // namespace
 
-Json summary(const files::Network& network, const CertifiedBound& bound) {
-  Json json = {{"function", bound.function.name()},
-               {"domain", bound.domain},
-               {"block", bound.block},
-               {"law", bound.function.is_set() ? "one_neighbour" : "none"},
-               {"norm", bound.scale.empty() ? "l2" : "weighted_l2"},
-               {"scale", bound.scale},
-               {"unit", files::unit(network, bound.function, bound.block)},
-               {"upper", bound.upper.value()},
-               {"upper_method", name(bound.method)},
-               {"status", status(bound.is_interrupted())},
-               {"lower", nullptr}};
-  if (!bound.neighbours.empty()) json["neighbours"] = bound.neighbours;
-  if (bound.lower.witness) json["lower"] = bound.lower.witness->slope.value();
-  return json;
+BoundSummary summary(const files::Network& network, const CertifiedBound& bound) {
+  BoundSummary result;
+  result.function = bound.function.name();
+  result.domain = bound.domain;
+  result.block = bound.block;
+  result.law = bound.function.is_set() ? "one_neighbour" : "none";
+  result.norm = bound.scale.empty() ? "l2" : "weighted_l2";
+  result.scale = bound.scale;
+  result.unit = files::unit(network, bound.function, bound.block);
+  result.upper = bound.upper.value();
+  result.upper_method = name(bound.method);
+  result.status = status(bound.is_interrupted());
+  if (bound.lower.witness) result.lower = bound.lower.witness->slope.value();
+  if (!bound.neighbours.empty()) result.neighbours = bound.neighbours;
+  return result;
 }
 
-Json summary(const files::Network& network, const CertifiedLaw& law) {
+BoundSummary summary(const files::Network& network, const CertifiedLaw& law) {
   const std::string kind = law.neighbours.begin()->first;
   const std::string shown = law.neighbours.size() == 1 ? kind : "mixed";
-  return {{"function", files::FunctionId::set(shown, law.rho).name()},
-          {"domain", law.domain},
-          {"block", law.block},
-          {"law", name(law.law)},
-          {"neighbours", law.neighbours},
-          {"norm", "l2"},
-          {"unit", files::unit(network, files::FunctionId::set(kind, law.rho), law.block)},
-          {"upper", law.upper.value()},
-          {"upper_method", "law"},
-          {"status", status(law.interrupted)},
-          {"lower", nullptr}};
+  BoundSummary result;
+  result.function = files::FunctionId::set(shown, law.rho).name();
+  result.domain = law.domain;
+  result.block = law.block;
+  result.law = name(law.law);
+  result.norm = "l2";
+  result.unit = files::unit(network, files::FunctionId::set(kind, law.rho), law.block);
+  result.upper = law.upper.value();
+  result.upper_method = "law";
+  result.status = status(law.interrupted);
+  result.neighbours = law.neighbours;
+  return result;
+}
+
+void describe(files::Record& record, const BoundSummary& summary) {
+  record.field("function", summary.function, "network, phi:KIND, rho:KIND or set:PHI:RHO.");
+  record.field("domain", summary.domain, "global: all inputs, or box.");
+  record.field("block", summary.block, "Inputs that change: all, position or velocity.");
+  record.field("law", summary.law, "What moves: none, one_neighbour, all_stacked, all_max or own_state.");
+  record.field("norm", summary.norm, "l2 or weighted_l2.");
+  record.may("scale", summary.scale, "Units of the inputs in the weighted norm; empty: l2.");
+  record.field("unit", summary.unit, "Output per input.");
+  record.field("upper", summary.upper, "Lipschitz constant.", "", "proved upper bound");
+  record.field("upper_method", summary.upper_method,
+               "product, sdp, eclipse_fast, local_product, local_sdp, branch or law.");
+  record.field("status", summary.status, "finished or interrupted; bounds hold in either case.");
+  record.field("lower", summary.lower, "Slope between two points that were found; null: none.", "",
+               "proved lower bound");
+  record.may("neighbours", summary.neighbours, "Most neighbours of each kind.");
 }
 
 Json certificate(const files::Network& network, const Certification& certification) {

@@ -18,6 +18,7 @@
 #include "lipschitz/upper/spectral_norm.h"
 #include "lipschitz/values/value_bounds.h"
 #include "nn/base/json.h"
+#include "nn/base/record.h"
 #include "nn/weights/network.h"
 #include "nn/weights/samples.h"
 
@@ -137,9 +138,19 @@ Certification certify(const files::Network& network, const CertifyOptions& optio
 /// @param terms pairs of the bound for one neighbour and the number of such neighbours.
 UpperBound law_bound(LawKind law, const std::vector<std::pair<UpperBound, int>>& terms);
 
-/// Returns the statement of a claim or a law without its proof: the fields shared by JSON results and certificates.
-files::Json summary(const files::Network& network, const CertifiedBound& bound);
-files::Json summary(const files::Network& network, const CertifiedLaw& law);
+/// The statement of a claim or a law without its proof: the fields shared by results and certificates.
+struct BoundSummary {
+  std::string function, domain, block, law, norm;
+  std::optional<std::vector<double>> scale;  ///< of a claim
+  std::string unit;
+  double upper = 0;
+  std::string upper_method, status;
+  std::optional<double> lower;
+  std::optional<Neighbours> neighbours;
+};
+BoundSummary summary(const files::Network& network, const CertifiedBound& bound);
+BoundSummary summary(const files::Network& network, const CertifiedLaw& law);
+void describe(files::Record& record, const BoundSummary& summary);
 
 /// Returns the certificate of a certification: the network and everything that check::check() needs.
 files::Json certificate(const files::Network& network, const Certification& certification);

@@ -44,14 +44,16 @@ END
 }
 trap leave_results EXIT
 
-# Unpacks the released package into the cache, and sets `tool`.
+# Installs the package that the release has for this distribution, with what it depends on.
 released() {
   [ -n "${GATE_RELEASE:-}" ] && command -v gh >/dev/null || return
+  distribution=$(. /etc/os-release && printf '%s' "$ID$VERSION_ID")
   rm -rf "$cache/download" && mkdir -p "$cache/download" || return
-  gh release download "${GATE_RELEASE##*@}" --repo "${GATE_RELEASE%@*}" --pattern 'swarmcert*.deb' \
-    --dir "$cache/download" || return
-  for package in "$cache"/download/*.deb; do dpkg -x "$package" "$cache/usr" || return; done
-  tool=$cache/usr/usr/bin/swarmcert
+  gh release download "${GATE_RELEASE##*@}" --repo "${GATE_RELEASE%@*}" \
+    --pattern "swarmcert_*_$distribution.deb" --dir "$cache/download" || return
+  as_root=(); [ "$(id -u)" = 0 ] || as_root=(sudo)
+  "${as_root[@]}" apt-get install -y --no-install-recommends "$cache"/download/*.deb || return
+  tool=swarmcert
   "$tool" --version
 }
 

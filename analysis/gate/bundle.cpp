@@ -18,6 +18,7 @@
 #include "analysis/gate/documents.h"
 #include "analysis/gate/envelope.h"
 #include "analysis/gate/outputs.h"
+#include "analysis/gate/text.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
@@ -199,8 +200,7 @@ bool is_same_value(const Json& a, const Json& b) {
 
 /// Compares the stated result with the one derived again; words that explain a row may name paths and are not compared.
 void verify_result(const Json& stated, const GateResult& again, const GateSettings& settings) {
-  Json derived;
-  add_json(again, derived);
+  Json derived = files::to_json(files::record_of(again));
   for (const char* const member : {"verdict", "changes", "not_run"})
     if (stated.at(member) != derived[member]) reject(fmt::format("gate.json states another {}", member));
   if (stated.at("updates_baseline") != settings.updates_baseline) reject("gate.json is not of this run");
@@ -325,6 +325,15 @@ std::string write_bundle(const std::string& folder, const Policy& policy, const 
   }
   unfinished.move_to(target);
   return files::sha256(documents.statement);
+}
+
+void describe(files::Record& record, const BundleVerdict& verdict) {
+  record.field("accepted", verdict.accepted, "Whether everything was verified.");
+  record.field("reason", printable(verdict.reason), "Why not; empty where accepted.");
+  record.field("statement_sha256", verdict.statement_sha256, "SHA-256 of statement.json.");
+  record.field("files", verdict.files, "Number of files of the bundle.");
+  record.field("verified", verdict.verified, "What was verified, in words.");
+  record.field("not_verified", verdict.not_verified, "What the verdict does not cover, in words.");
 }
 
 BundleVerdict verify_bundle(const std::string& folder, const std::string& public_key,

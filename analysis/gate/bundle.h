@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "analysis/gate/gate.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::gate {
 
@@ -33,6 +34,8 @@ struct BundleVerdict {
   std::vector<std::string> verified;      ///< descriptions of what was verified
   std::vector<std::string> not_verified;  ///< what the verdict does not cover
 };
+
+void describe(files::Record& record, const BundleVerdict& verdict);
 
 /// Verifies a bundle. The folder must contain exactly the files of its statement, as regular files with their hashes;
 /// the policy that the statement names must refer to exactly these files. Everything else is derived again from the

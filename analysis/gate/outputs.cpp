@@ -69,32 +69,36 @@ std::string to_table(const GateResult& result) {
   return text + fmt::format("\n{}\nverdict: {}\n", summary(result), name(result.verdict()));
 }
 
-void add_json(const GateResult& result, files::Json& json) {
-  json["policy"] = printable(result.policy);
-  json["verdict"] = name(result.verdict());
-  json["checks"] = files::Json::array();
-  for (const Check& check : result.checks) {
-    json["checks"].push_back(
-        {{"name", printable(check.name)},
-         {"value", number_json(check.value)},
-         {"limit", number_json(check.limit)},
-         {"sense", check.limit ? files::Json(check.more_is_worse ? "at_most" : "at_least") : files::Json()},
-         {"baseline", number_json(check.baseline)},
-         {"unit", printable(check.unit)},
-         {"verdict", name(check.verdict)},
-         {"line", check.line},
-         {"witness", printable(check.witness)},
-         {"reason", printable(check.reason)},
-         {"bad_input", check.is_bad_input}});
-  }
-  json["changes"] = files::Json::array();
-  for (const Change& change : result.changes) {
-    json["changes"].push_back({{"condition", printable(change.key)},
-                               {"before", change.before},
-                               {"now", change.now},
-                               {"claim", name(change.claim)}});
-  }
-  json["not_run"] = result.not_run;
+void describe(files::Record& record, const GateResult& result) {
+  record.field("policy", printable(result.policy), "The policy file.");
+  record.field("verdict", std::string(name(result.verdict())),
+               "pass, fail or inconclusive: fail if one check fails, pass if all pass.");
+  record.list("checks", result.checks, "One entry per check.", [](files::Record& r, const Check& check) {
+    const auto sense =
+        check.limit ? std::optional<std::string>(check.more_is_worse ? "at_most" : "at_least") : std::nullopt;
+    r.field("name", printable(check.name), "Table of the policy; further limits of it: table.limit.");
+    r.field("value", check.value, "What was proved or measured.");
+    r.field("limit", check.limit, "What the policy allows.");
+    r.field("sense", sense, "at_most or at_least; null: there is no limit.");
+    r.field("baseline", check.baseline, "The value of the last release.");
+    r.field("unit", printable(check.unit), "Of these three.");
+    r.field("verdict", std::string(name(check.verdict)), "pass, fail or inconclusive.");
+    r.field("line", check.line, "Of the policy.");
+    r.field("witness", printable(check.witness), "Evidence of a failure, or source of the value.");
+    r.field("reason", printable(check.reason), "Why the check did not pass.");
+    r.field("bad_input", check.is_bad_input, "Whether a file is missing or damaged.");
+  });
+  record.list("changes", result.changes, "Conditions that differ from those of the baseline.",
+              [](files::Record& r, const Change& change) {
+                r.field("condition", printable(change.key), "Dotted key, such as tracking.amplitude_N.");
+                r.field("before", change.before, "Null: not there.");
+                r.field("now", change.now, "Null: not there.");
+                r.field(
+                    "claim", std::string(name(change.claim)),
+                    "What the release claims now: stronger, the same, weaker, or open, where nothing shows "
+                    "that it claims as much. Weaker and open fail.");
+              });
+  record.field("not_run", result.not_run, "Checks that the policy does not ask for.");
 }
 
 std::string to_junit(const GateResult& result) {

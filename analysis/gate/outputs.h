@@ -5,15 +5,15 @@
 #include <string>
 
 #include "analysis/gate/gate.h"
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::gate {
 
 /// Returns a table for terminals.
 std::string to_table(const GateResult& result);
 
-/// Adds `verdict`, `checks` and `not_run` to the result of a command. Non-finite numbers become null.
-void add_json(const GateResult& result, files::Json& json);
+/// Describes policy, verdict, rows, changes of conditions, and checks that are not asked for.
+void describe(files::Record& record, const GateResult& result);
 
 /// Returns JUnit XML as read by Jenkins, GitLab and GitHub's test reporters. A failed check is a failure; a check
 /// that is inconclusive or has bad input is an error; a check that the policy does not request is skipped.

@@ -74,5 +74,32 @@ TEST(GateAction, RunsAsGitHubRunsItAndLeavesAnnotationsSummaryAndBundle) {
   files::parse_json(read_text(release / "gate/gate.sarif"), "gate.sarif");
 }
 
+TEST(GateAction, InstallsTheReleasedPackageOfItsDistribution) {
+  const ReleaseFolder release;
+  release.policy({{"regression", ""}, {"float32_error", ""}, {"range", ""}});
+  std::filesystem::create_directory(release / "bin");
+  const auto program = [&release](const std::string& name, const std::string& script) {
+    write_text(release / ("bin/" + name), "#!/bin/sh\n" + script);
+    std::filesystem::permissions(release / ("bin/" + name), std::filesystem::perms::owner_all);
+  };
+  // Stands for GitHub's program: writes the package that the pattern asks for into the folder asked for.
+  program("gh", "echo \"$*\" >gh.txt; for last; do :; done; : >\"$last/of_release.deb\"\n");
+  program("sudo", "exec \"$@\"\n");
+  // Stands for the package manager: the tool is found afterwards.
+  program("apt-get",
+          "echo \"$*\" >apt.txt; ln -s \"$TOOL\" bin/installed-swarmcert; mv bin/installed-swarmcert "
+          "bin/swarmcert\n");
+  write_text(release / "gate.sh", read_text(source_path("analysis/ci/gate.sh")));
+  const Outcome outcome = release.run(
+      "env TOOL=\"$(command -v swarmcert)\" PATH=\"$PWD/bin:/usr/bin:/bin\" GATE_POLICY=policy.toml "
+      "GATE_SWARMCERT=absent GATE_CACHE=cache GATE_RELEASE=owner/fleet@v1.2.0 bash gate.sh");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  const std::string asked = read_text(release / "gh.txt"), installed = read_text(release / "apt.txt");
+  EXPECT_NE(asked.find("release download v1.2.0 --repo owner/fleet"), std::string::npos) << asked;
+  EXPECT_NE(asked.find("--pattern swarmcert_*_"), std::string::npos) << asked;
+  EXPECT_NE(installed.find("cache/download/of_release.deb"), std::string::npos) << installed;
+  EXPECT_NE(read_text(release / "gate/gate.xml").find("failures=\"0\""), std::string::npos);
+}
+
 }  // namespace
 }  // namespace swarmcert::tests

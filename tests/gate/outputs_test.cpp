@@ -150,8 +150,7 @@ TEST(GateOutputs, MarkdownTerminalAndJsonKeepTheirFrameWhateverTheNamesHold) {
   }
   EXPECT_EQ(rows, 5);  // the header and four checks
   EXPECT_FALSE(has_controls(to_table(result)));
-  files::Json json;
-  add_json(result, json);
+  const files::Json json = files::to_json(files::record_of(result));
   const std::string text = files::to_text(json);  // throws for invalid UTF-8
   EXPECT_EQ(json["checks"][2]["value"], nullptr);
   EXPECT_EQ(json["checks"][2]["verdict"], "inconclusive");

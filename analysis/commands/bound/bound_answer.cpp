@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/commands/bound/bound_output.h"
+
 namespace swarmcert::analysis {
 namespace {
 
@@ -106,19 +108,19 @@ BoundAnswer bound_answer(const Tracking& input, const DisturbanceSource& source,
   return answer;
 }
 
-files::Json answer_json(const BoundAnswer& answer) {
-  files::Json json = {{"flies", answer.flies ? files::Json(*answer.flies) : files::Json()},
-                      {"error_m", files::Json::object()},
-                      {"conditions", files::Json::array()},
-                      {"limits", answer.limits},
-                      {"change", answer.change}};
-  for (int axis = 0; axis < 3; ++axis)
-    json["error_m"][axis_name(axis)] =
-        answer.error_m[axis] ? files::Json(*answer.error_m[axis]) : files::Json();
-  for (const Assumption& condition : answer.conditions)
-    json["conditions"].push_back(
-        {{"name", condition.name}, {"status", condition.status}, {"note", condition.note}});
-  return json;
+void describe(files::Record& record, const BoundAnswer& answer) {
+  record.field(
+      "flies", answer.flies,
+      "True: the loop is stable and every condition is proved or declared. False: it diverges, or a declared "
+      "input breaks a condition. Null: undecided.");
+  record.object("error_m", "Largest error for all that was declared, per axis; null: no bound.",
+                [&answer](files::Record& r) {
+                  for (int axis = 0; axis < 3; ++axis)
+                    r.field(axis_name(axis), answer.error_m[axis], "", "m", "upper bound");
+                });
+  record.field("conditions", answer.conditions, "What the answer rests on.");
+  record.field("limits", answer.limits, "What limits the loop or the answer, with numbers.");
+  record.field("change", answer.change, "What would change the answer; empty: nothing.");
 }
 
 void print_answer(const Tracking& input, const BoundAnswer& answer) {

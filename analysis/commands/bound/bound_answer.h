@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "analysis/commands/shared/tracking_input.h"
-#include "nn/base/json_number.h"
+#include "nn/base/record.h"
 #include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::analysis {
@@ -26,7 +26,7 @@ struct BoundAnswer {
 BoundAnswer bound_answer(const Tracking& input, const stability::DisturbanceSource& source,
                          const stability::InitialError& initial, const stability::TrackingReport& report);
 
-files::Json answer_json(const BoundAnswer& answer);
+void describe(files::Record& record, const BoundAnswer& answer);
 /// Prints at most six lines.
 void print_answer(const Tracking& input, const BoundAnswer& answer);
 /// Returns kDone, kViolated or kInconclusive.

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "analysis/commands/bound/bound_output.h"
+#include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -28,14 +28,6 @@ std::array<double, 3> read_attitude_gains(const std::string& words) {
     at = end + 1;
   }
   return gains;
-}
-
-files::Json gains_json(const stability::Cascade& loop, CascadeInput input, const char* unit) {
-  const stability::ResponseNorms h = response_norms(cascade_transfer(loop, input));
-  return {{"unit", unit},
-          {"amplitude", finite(h.integral_abs)},
-          {"edge", finite(h.step_max_abs)},
-          {"impulse", finite(h.max_abs())}};
 }
 
 /// Axes that Lambda or K couples to other axes.
@@ -72,55 +64,47 @@ stability::CascadeMargins left_by_delay(stability::CascadeMargins margins, const
   return margins.delay_s == 0 ? stability::CascadeMargins{} : margins;
 }
 
-files::Json margins_json(const stability::CascadeMargins& margins) {
-  return {{"gain_margin", finite(margins.gain)},
-          {"least_gain", finite(margins.low_gain)},
-          {"delay_margin_s", finite(margins.delay_s)}};
-}
-
-files::Json axis_json(const Tracking& input, const std::string& words, int axis) {
+AttitudeRow decoupled_row(const Tracking& input, const std::string& words, int axis) {
   const stability::Cascade loop = attitude_cascade(input, words, axis);
-  const stability::CascadeMargins margins = left_by_delay(cascade_margins(loop), input);
-  files::Json row = margins_json(margins);
-  row.update({{"axis", stability::axis_name(axis)},
-              {"stable", margins.gain > 0},
-              {"verdict", name(nearness_to_limit_cycle(margins))},
-              {"damping", margins.damping},
-              {"frequency_rad_s", margins.frequency_rad_s},
-              {"exact",
-               {{"force", gains_json(loop, CascadeInput::kAcceleration, "m per m/s^2")},
-                {"velocity_error", gains_json(loop, CascadeInput::kVelocityError, "m per m/s")},
-                {"torque", gains_json(loop, CascadeInput::kAngularAcceleration, "m per rad/s^2")}}}});
+  const auto gains = [&loop](CascadeInput of) { return response_norms(cascade_transfer(loop, of)); };
+  AttitudeRow row;
+  row.axes = {axis};
+  row.margins = left_by_delay(cascade_margins(loop), input);
+  row.nearness = nearness_to_limit_cycle(row.margins);
+  row.exact = CascadeGains{gains(CascadeInput::kAcceleration), gains(CascadeInput::kVelocityError),
+                           gains(CascadeInput::kAngularAcceleration)};
   return row;
 }
 
-files::Json coupled_json(const Tracking& input, const std::string& words, const std::vector<int>& axes) {
-  const stability::CoupledCascade loop = coupled_attitude_cascade(input, words, axes);
-  stability::CoupledMargins margins = coupled_margins(loop);
+AttitudeRow coupled_row(const Tracking& input, const std::string& words, const std::vector<int>& axes) {
+  stability::CoupledMargins margins = coupled_margins(coupled_attitude_cascade(input, words, axes));
   margins.together = left_by_delay(margins.together, input);
-  std::string all;
-  files::Json channels = files::Json::array();
-  for (std::size_t i = 0; i < axes.size(); ++i) {
+  for (stability::CascadeMargins& alone : margins.alone) {
     // If the delay of all motors makes the loop unstable, no channel has a margin left.
-    stability::CascadeMargins& alone = margins.alone[i];
     alone = margins.together.gain > 0 ? left_by_delay(alone, input) : stability::CascadeMargins{};
-    all += stability::axis_name(axes[i]);
-    files::Json channel = margins_json(alone);
-    channel["axis"] = stability::axis_name(axes[i]);
-    channels.push_back(std::move(channel));
   }
-  files::Json row = margins_json(margins.together);
-  row.update({{"axis", all},
-              {"stable", margins.together.gain > 0},
-              {"verdict", name(nearness_to_limit_cycle(margins))},
-              {"damping", margins.together.damping},
-              {"frequency_rad_s", margins.together.frequency_rad_s},
-              {"channels", std::move(channels)},
-              {"exact", nullptr},
-              {"why_no_exact",
-               "a disturbance along one coupled axis moves the others: the gain of one axis alone does "
-               "not bound its error"}});
-  return row;
+  return {axes, margins.together, nearness_to_limit_cycle(margins), std::nullopt, margins.alone};
+}
+
+void describe_margins(files::Record& record, const stability::CascadeMargins& margins) {
+  record.field("gain_margin", margins.gain, "Factor by which thrust and torque can grow; null: by any.");
+  record.field("least_gain", margins.low_gain, "Factor to which they can shrink; 0: to nothing.");
+  record.field(
+      "delay_margin_s", margins.delay_s,
+      "Delay between state and motors, beside [lag], at which the loop becomes unstable; null: none.", "s");
+}
+
+void describe_cascade_gains(files::Record& record, const stability::ResponseNorms& h, const char* unit) {
+  record.field("unit", unit, "Of the amplitude.");
+  record.field("amplitude", h.integral_abs, "");
+  record.field("edge", h.step_max_abs, "");
+  record.field("impulse", h.max_abs(), "");
+}
+
+std::string names_of_axes(const std::vector<int>& axes) {
+  std::string all;
+  for (const int axis : axes) all += stability::axis_name(axis);
+  return all;
 }
 
 }  // namespace
@@ -150,32 +134,67 @@ stability::CoupledCascade coupled_attitude_cascade(const Tracking& input, const 
   return loop;
 }
 
-files::Json attitude_json(const Tracking& input, const std::string& words) {
-  files::Json rows = files::Json::array();
+void describe(files::Record& record, const AttitudeRow& row) {
+  const bool is_coupled = row.axes.size() > 1;
+  describe_margins(record, row.margins);
+  record.field("axis", names_of_axes(row.axes),
+               "One axis, or all that Lambda or K couples, as one loop: \"xy\".");
+  record.field("stable", row.margins.gain > 0, "");
+  record.field("verdict", name(row.nearness),
+               "clear, close to a limit cycle, or unstable: by the smallest gain margin of the row.");
+  record.field("damping", row.margins.damping, "Of the least damped pair of poles.");
+  record.field("frequency_rad_s", row.margins.frequency_rad_s, "Of the same.", "rad/s");
+  std::vector<std::pair<std::string, stability::CascadeMargins>> alone;
+  for (std::size_t i = 0; i < row.alone.size(); ++i)
+    alone.emplace_back(stability::axis_name(row.axes[i]), row.alone[i]);
+  record.may_fields(is_coupled, [&alone](files::Record& r) {
+    r.list("channels", alone, "The same margins where the gain, or the delay, of one axis changes alone.",
+           [](files::Record& one, const std::pair<std::string, stability::CascadeMargins>& channel) {
+             one.field("axis", channel.first, "");
+             describe_margins(one, channel.second);
+           });
+  });
+  const CascadeGains exact = row.exact.value_or(CascadeGains());
+  record.object_or_null(
+      row.exact.has_value(), "exact", "Worst error per unit of a disturbance; null: axes are coupled.",
+      [&exact](files::Record& r) {
+        const auto add = [&r](const char* of, const stability::ResponseNorms& h, const char* unit) {
+          r.object(of, "", [&](files::Record& one) { describe_cascade_gains(one, h, unit); });
+        };
+        add("force", exact.force, "m per m/s^2");
+        add("velocity_error", exact.velocity_error, "m per m/s");
+        add("torque", exact.torque, "m per rad/s^2");
+      });
+  constexpr char kWhyNot[] =
+      "a disturbance along one coupled axis moves the others: the gain of one axis alone does not bound its "
+      "error";
+  record.may("why_no_exact", is_coupled ? std::optional<std::string>(kWhyNot) : std::nullopt, "");
+}
+
+std::vector<AttitudeRow> attitude_rows(const Tracking& input, const std::string& words) {
+  std::vector<AttitudeRow> rows;
   const std::vector<int> coupled = coupled_axes(input);
   for (int axis = 0; axis < 2; ++axis)
-    if (input.continuous(axis)) rows.push_back(axis_json(input, words, axis));
-  if (!coupled.empty()) rows.push_back(coupled_json(input, words, coupled));
+    if (input.continuous(axis)) rows.push_back(decoupled_row(input, words, axis));
+  if (!coupled.empty()) rows.push_back(coupled_row(input, words, coupled));
   return rows;
 }
 
-void print_attitude(const files::Json& attitude) {
+void print(const std::vector<AttitudeRow>& attitude) {
   fmt::print("\nAround the attitude loop, linear; gain margin: factor that destabilises\n");
-  const auto number = [](const files::Json& row, const char* key, const char* format) {
-    return row[key].is_number() ? fmt::format(fmt::runtime(format), row[key].get<double>())
-                                : std::string("any");
+  const auto number = [](double x) {
+    return std::isfinite(x) ? fmt::format("{:.3g}", x) : std::string("any");
   };
-  for (const files::Json& row : attitude) {
+  for (const AttitudeRow& row : attitude) {
+    const stability::CascadeMargins& m = row.margins;
     fmt::print("  {} {:<24} gain margin {}, delay margin {} s, least damping {} at {} rad/s\n",
-               row["axis"].get<std::string>(), row["verdict"].get<std::string>(),
-               number(row, "gain_margin", "{:.3g}"), number(row, "delay_margin_s", "{:.3g}"),
-               number(row, "damping", "{:.3g}"), number(row, "frequency_rad_s", "{:.3g}"));
-    if (!row.contains("channels")) continue;
+               names_of_axes(row.axes), name(row.nearness), number(m.gain), number(m.delay_s),
+               number(m.damping), number(m.frequency_rad_s));
+    if (row.alone.empty()) continue;
     fmt::print("    as one loop with all motors; margins of each axis alone:\n");
-    for (const files::Json& channel : row["channels"]) {
-      fmt::print("    {} gain margin {}, delay margin {} s\n", channel["axis"].get<std::string>(),
-                 number(channel, "gain_margin", "{:.3g}"), number(channel, "delay_margin_s", "{:.3g}"));
-    }
+    for (std::size_t i = 0; i < row.alone.size(); ++i)
+      fmt::print("    {} gain margin {}, delay margin {} s\n", stability::axis_name(row.axes[i]),
+                 number(row.alone[i].gain), number(row.alone[i].delay_s));
   }
 }
 

@@ -3,10 +3,12 @@
 /// gains.toml.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/commands/shared/tracking_input.h"
+#include "nn/base/record.h"
 #include "stability/bounds/loops/coupled_cascade.h"
 
 namespace swarmcert::analysis {
@@ -26,10 +28,25 @@ stability::Cascade attitude_cascade(const Tracking& input, const std::string& wo
 stability::CoupledCascade coupled_attitude_cascade(const Tracking& input, const std::string& words,
                                                    const std::vector<int>& axes);
 
-/// Returns how far the loop is from a limit cycle: one row per decoupled horizontal axis with its exact gains for a
-/// force, an error of the estimated velocity and a torque, and one row without gains for all coupled axes. Parameters
-/// and exceptions as in attitude_cascade().
-files::Json attitude_json(const Tracking& input, const std::string& words);
-void print_attitude(const files::Json& attitude);
+/// Exact gains of the cascade of one axis, per unit of one disturbance.
+struct CascadeGains {
+  stability::ResponseNorms force, velocity_error, torque;
+};
+
+/// How far the loop of an axis, or of all coupled axes as one, is from a limit cycle.
+struct AttitudeRow {
+  std::vector<int> axes;
+  stability::CascadeMargins margins;
+  stability::Nearness nearness = stability::Nearness::kUnstable;
+  std::optional<CascadeGains> exact;  ///< of a single axis
+  std::vector<stability::CascadeMargins>
+      alone;  ///< of coupled axes: where the gain or the delay of one changes
+};
+void describe(files::Record& record, const AttitudeRow& row);
+
+/// Returns one row per decoupled horizontal axis with its exact gains for a force, an error of the estimated velocity
+/// and a torque, and one row without gains for all coupled axes. Parameters and exceptions as in attitude_cascade().
+std::vector<AttitudeRow> attitude_rows(const Tracking& input, const std::string& words);
+void print(const std::vector<AttitudeRow>& attitude);
 
 }  // namespace swarmcert::analysis

@@ -9,14 +9,16 @@
 #include "analysis/cli/progress.h"
 #include "analysis/commands/bound/bound_answer.h"
 #include "analysis/commands/bound/bound_attitude.h"
-#include "analysis/commands/bound/bound_extras.h"
 #include "analysis/commands/bound/bound_output.h"
 #include "analysis/commands/bound/bound_promise.h"
 #include "analysis/commands/bound/bound_report.h"
 #include "analysis/commands/bound/disturbance_input.h"
 #include "analysis/commands/bound/float_errors.h"
+#include "analysis/commands/bound/swarm_bound.h"
 #include "analysis/commands/bound/tracking_certificate.h"
 #include "analysis/commands/bound/tube_output.h"
+#include "analysis/commands/bound/tube_over_time.h"
+#include "analysis/commands/bound/uncertain.h"
 #include "analysis/commands/commands.h"
 #include "nn/base/file_io.h"
 
@@ -127,8 +129,7 @@ LoadedDisturbance checked_disturbance(const BoundOptions& options, const Trackin
   return disturbance;
 }
 
-files::Json uncertain_result(const BoundOptions& options, const Tracking& input,
-                             const CommonOptions& common) {
+Uncertain uncertain_result(const BoundOptions& options, const Tracking& input, const CommonOptions& common) {
   const CancelOnInterrupt interrupt;
   Progress progress(common.quiet);
   UncertainRun run;
@@ -138,42 +139,92 @@ files::Json uncertain_result(const BoundOptions& options, const Tracking& input,
     progress.show(done, total, "of the enclosures over the intervals");
   };
   run.cancelled = interrupt.flag();
-  return uncertain_json(input, options.uncertain, run);
+  return uncertain_gains(input, options.uncertain, run);
 }
 
-/// Adds the results requested in addition to the bounds, one member each.
+struct BoundResult {
+  BoundAnswer answer;
+  TrackingResult tracking;
+  stability::FloatErrors float32;
+  std::optional<Truth> truth;
+  // What was requested in addition to the bounds:
+  std::optional<Uncertain> uncertain;
+  std::optional<CoverageBound> coverage;
+  std::optional<std::vector<AttitudeRow>> attitude;
+  std::optional<VerifiedGains> verified;
+  std::optional<std::vector<AxisTube>> tube;
+  std::optional<TaskTube> local_tube;
+  std::optional<SwarmBound> swarm;
+  std::optional<files::Json> certificate;
+};
+
+void describe(files::Record& record, const BoundResult& result) {
+  record.field("answer", result.answer, "Does this loop fly, and how large can its error become?");
+  describe(record, result.tracking);
+  record.field("float32", result.float32, "Error of the controller's own float32 arithmetic.");
+  record.may("truth", result.truth, "The declared truth, enclosed.");
+  record.may("uncertain", result.uncertain, "Worst gains over intervals of the parameters.");
+  record.may("coverage", result.coverage, "A bound for a further flight, with the flights that it rests on.");
+  record.may("attitude", result.attitude, "Margins and gains of the position loop around the attitude loop.");
+  record.may("verified", result.verified, "Gains, enclosed in interval arithmetic.");
+  record.may("tube", result.tube, "Bound of every error over time, from rest.");
+  record.may("local_tube", result.local_tube, "The tube around a task flown by several vehicles.");
+  record.may("swarm", result.swarm, "Stability of vehicles that disturb one another.");
+  record.may_object(
+      result.certificate.has_value(), "certificate", "Certificate of the gains, with -o.",
+      [&result](files::Record& r) { describe_certificate(r, result.certificate.value_or(files::Json())); });
+}
+
+/// Computes the results requested in addition to the bounds.
 void add_extras(const BoundOptions& options, const CommonOptions& common, const Tracking& input,
-                const stability::DisturbanceSource& source, const stability::TrackingReport& report,
-                const std::optional<LocalTube>& local, const std::optional<MeasuredTruth>& measured,
-                files::Json& result) {
-  if (options.is_uncertain) result["uncertain"] = uncertain_result(options, input, common);
-  if (options.coverage > 0 && !measured) {
+                BoundResult& result) {
+  const stability::DisturbanceSource& source = result.tracking.source;
+  if (options.is_uncertain) result.uncertain = uncertain_result(options, input, common);
+  if (options.coverage > 0 && !(result.local_tube && result.local_tube->measured)) {
     // Only what was given on the command line is added to the classes of the file.
     DisturbanceArguments others = options.disturbance;
     others.from.clear();
-    result["coverage"] = promise_json(input, report, load_disturbance(others, input).source, options.initial,
-                                      options.disturbance.from, options.coverage);
+    result.coverage = promise_of(input, result.tracking.report, load_disturbance(others, input).source,
+                                 options.initial, options.disturbance.from, options.coverage);
   }
-  if (has_attitude_gains(input, options.attitude))
-    result["attitude"] = attitude_json(input, options.attitude);
-  if (options.verified) result["verified"] = verified_json(input);
-  if (options.tube) result["tube"] = tube_json(input, source, 101);
-  if (local) result["local_tube"] = local_tube_json(options.task, *local, measured ? &*measured : nullptr);
-  if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm, source);
+  if (has_attitude_gains(input, options.attitude)) result.attitude = attitude_rows(input, options.attitude);
+  if (options.verified) result.verified = verified_gains(input);
+  if (options.tube) result.tube = tubes_over_time(input, source, 101);
+  if (!options.swarm.empty()) result.swarm = swarm_bound(input, options.swarm, source);
 }
 
-/// Prints the additional results as text.
-void print_extras(const files::Json& result) {
-  const auto print = [&result](const char* field, void (*print_field)(const files::Json&)) {
-    if (result.contains(field)) print_field(result[field]);
-  };
-  print("uncertain", print_uncertain);
-  print("coverage", print_promise);
-  print("attitude", print_attitude);
-  print("verified", print_verified);
-  print("local_tube", print_local_tube);
-  if (result.contains("tube")) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
-  print("swarm", print_swarm);
+void print_extras(const BoundResult& result) {
+  if (result.uncertain) print(*result.uncertain);
+  if (result.coverage) print(*result.coverage);
+  if (result.attitude) print(*result.attitude);
+  if (result.verified) print(*result.verified);
+  if (result.local_tube) print(*result.local_tube);
+  if (result.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
+  if (result.swarm) print(*result.swarm);
+}
+
+/// Searches for the tube around the task, calibrated by the flights of --from with --coverage.
+TaskTube task_tube(const BoundOptions& options, const Tracking& input,
+                   const stability::DisturbanceSource& source, const CommonOptions& common,
+                   std::vector<std::string>& inputs) {
+  TaskTube result;
+  result.task = options.task.task;
+  result.vehicles = options.task.vehicles;
+  if (options.coverage > 0) {
+    result.measured = load_measured_truth(options.disturbance, input.model.kind, options.coverage);
+    inputs.push_back(options.disturbance.from);
+  }
+  result.tube = load_local_tube(options.task, options.disturbance, input, source,
+                                result.measured ? &*result.measured : nullptr, common, inputs);
+  return result;
+}
+
+int exit_code(const BoundResult& result) {
+  const bool is_refuted = result.swarm && result.swarm->found.is_refuted();
+  if (result.answer.flies == false || is_refuted) return kViolated;
+  const bool is_proved = (!result.swarm || result.swarm->found.small_gain.proved) &&
+                         (!result.local_tube || result.local_tube->tube.proved);
+  return is_proved ? exit_code(result.answer) : kInconclusive;
 }
 
 int run_bound(const BoundOptions& options, const CommonOptions& common) {
@@ -186,53 +237,39 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   if (!options.swarm.empty()) inputs.push_back(options.swarm);
   const LoadedDisturbance disturbance = checked_disturbance(options, input, inputs);
   const stability::DisturbanceSource& source = disturbance.source;
-  std::optional<MeasuredTruth> measured;
-  std::optional<LocalTube> local;
-  if (!options.task.task.empty()) {
-    if (options.coverage > 0) {
-      measured = load_measured_truth(options.disturbance, input.model.kind, options.coverage);
-      inputs.push_back(options.disturbance.from);
-    }
-    local = load_local_tube(options.task, options.disturbance, input, source, measured ? &*measured : nullptr,
-                            common, inputs);
-  }
-  stability::TrackingReport report = tracking_bounds(input, source, options.initial);
-  const FloatErrors float32 = float_errors(input, report);
-  for (stability::AxisBounds& row : report.bounds) row.float32_m = float32.tracking_error_m[row.axis];
-
-  const BoundAnswer answer = bound_answer(input, source, options.initial, report);
-  files::Json result = result_head("bound", inputs);
-  result["answer"] = answer_json(answer);
-  add_tracking_json(result, input, source, report);
-  result["float32"] = float_errors_json(float32);
-  if (disturbance.truth) result["truth"] = truth_json(*disturbance.truth);
-  add_extras(options, common, input, source, report, local, measured, result);
-  std::optional<files::Json> certificate;
+  BoundResult result;
+  if (!options.task.task.empty()) result.local_tube = task_tube(options, input, source, common, inputs);
+  result.tracking = {input.plant.mass_kg, input.plant.thrust_scale, source,
+                     tracking_bounds(input, source, options.initial)};
+  stability::TrackingReport& report = result.tracking.report;
+  result.float32 = float_errors(input, report);
+  for (stability::AxisBounds& row : report.bounds) row.float32_m = result.float32.tracking_error_m[row.axis];
+  result.answer = bound_answer(input, source, options.initial, report);
+  result.truth = disturbance.truth;
+  add_extras(options, common, input, result);
   if (!options.certificate.empty()) {
-    certificate = tracking_certificate(input, options.tracking, result["verified"]);
-    result["certificate"] = certificate_summary(*certificate);
-    if (!is_empty_certificate(*certificate))
-      files::write_file(options.certificate, files::to_text(*certificate), common.force);
+    result.certificate = tracking_certificate(input, options.tracking, *result.verified);
+    if (!is_empty_certificate(*result.certificate))
+      files::write_file(options.certificate, files::to_text(*result.certificate), common.force);
   }
+  const files::Node described = result_of("bound", inputs, std::nullopt, result);
   std::string report_path;
   if (!options.report.empty())
-    report_path = write_bound_report(input, disturbance, report, local, result, options.report, common.force);
-  write_result(common, result);
+    report_path = write_bound_report(input, disturbance, report, result.local_tube, described, options.report,
+                                     common.force);
+  write_result(common, described);
   if (common.prints_text()) {
-    print_answer(input, answer);
+    print_answer(input, result.answer);
     if (options.details) {
       print_tracking(input, source, report);
-      print_float_errors(float32);
-      if (disturbance.truth) print_truth(*disturbance.truth);
+      print(result.float32);
+      if (result.truth) print(*result.truth);
     }
     print_extras(result);
-    if (certificate) print_certificate_summary(*certificate, options.certificate);
+    if (result.certificate) print_certificate_summary(*result.certificate, options.certificate);
     if (!report_path.empty()) fmt::print("\nreport: {}\n", report_path);
   }
-  const std::string swarm = options.swarm.empty() ? "proved" : result["swarm"]["verdict"];
-  if (answer.flies == false || swarm == "refuted") return kViolated;
-  const bool is_proved = swarm == "proved" && !(local && !local->proved);
-  return is_proved ? exit_code(answer) : kInconclusive;
+  return exit_code(result);
 }
 
 void declare_initial(CLI::App& app, stability::InitialError& initial) {
@@ -319,7 +356,8 @@ Command bound_command() {
           options->is_uncertain = uncertain->count() > 0;
           return run_bound(*options, common);
         };
-      }};
+      },
+      fields_of<BoundResult>()};
 }
 
 }  // namespace swarmcert::analysis

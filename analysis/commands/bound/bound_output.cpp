@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -12,41 +13,12 @@
 namespace swarmcert::analysis {
 namespace {
 
-using files::Json;
 using namespace stability;  // NOLINT: every name below is of that library
 
-Json theorem_json(const TrackingReport& report) {
-  const Theorem& theorem = report.theorem;
-  Json json = {{"applies", theorem.applies},
-               {"why_not", theorem.why_not},
-               {"ball", report.ball_m ? Json(*report.ball_m) : Json()},
-               {"ball_of_flown_loop", report.flown_ball_m ? Json(*report.flown_ball_m) : Json()},
-               {"ball_unit", "m"},
-               {"ball_per_rate", nullptr},
-               {"lambda_min_Lambda", nullptr},
-               {"lambda_min_K", nullptr},
-               {"transient", nullptr}};
-  if (!theorem.composite) return json;
-  json["ball_per_rate"] = theorem.ball_per_rate();
-  json["lambda_min_Lambda"] = theorem.min_Lambda;
-  json["lambda_min_K"] = theorem.min_K;
-  if (!report.transient) return json;
-  Json at = Json::array();
-  for (const double t_s : {0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0}) {
-    at.push_back({{"t_s", t_s}, {"error_m", report.transient->at(t_s)}});
-  }
-  json["transient"] = {{"decay_1_s", report.transient->decay_1_s()},
-                       {"s_dot_m_s2", report.transient->s_dot_m_s2},
-                       {"rate_N_s", report.transient->rate_N_s},
-                       {"valid", theorem.applies},
-                       {"bound", std::move(at)}};
-  return json;
-}
-
-/// What every total is subject to; null if it is proved.
-Json condition(const TrackingReport& report) {
+/// What every total is subject to; nothing if it is proved.
+std::optional<std::string> condition(const TrackingReport& report) {
   const Saturation& thrust = report.saturation;
-  if (thrust.is_proved()) return nullptr;
+  if (thrust.is_proved()) return std::nullopt;
   return std::string("the thrust does not saturate, which is ") + name(thrust.verdict) + ": " + thrust.why;
 }
 
@@ -55,81 +27,6 @@ std::string smallest(const AxisBounds& row) {
   if (row.least() == row.bounds.least() && row.clamp.never_acts) return row.bounds.which();
   if (!std::isfinite(row.least())) return "none";
   return row.clamp.by_amplitude < row.clamp.by_impulse ? "amplitude with clamp" : "impulse with clamp";
-}
-
-Json bounds_json(const AxisBounds& row, const TrackingReport& report) {
-  const DisturbanceBounds& b = row.bounds;
-  return {{"axis", axis_name(row.axis)},
-          {"channel", name(row.channel)},
-          {"loop", name(row.loop)},
-          {"unit", "m"},
-          {"rate", finite(b.by_rate)},
-          {"amplitude", finite(b.by_amplitude)},
-          {"edge", finite(b.by_edges)},
-          {"impulse", finite(b.by_impulse)},
-          {"amplitude_and_rate", finite(b.by_both)},
-          {"integrator_demand_m_s", finite(row.clamp.demand_m_s)},
-          {"clamp_never_acts", row.clamp.never_acts},
-          {"amplitude_with_clamp", finite(row.clamp.by_amplitude)},
-          {"impulse_with_clamp", finite(row.clamp.by_impulse)},
-          {"minimum", finite(row.least())},
-          {"guarantee", "bound"},
-          {"condition", condition(report)},
-          {"smallest", smallest(row)},
-          {"parts",
-           {{"bias", finite(row.parts.bias_m)},
-            {"initial", finite(row.parts.initial_m)},
-            {"velocity_error", finite(row.parts.velocity_error_m)},
-            {"position_error", finite(row.parts.position_error_m)},
-            {"reference", finite(row.parts.reference_m)},
-            {"thrust_ratio", finite(row.parts.thrust_ratio_m)}}},
-          {"staircase", finite(row.staircase_m)},
-          {"float32", finite(row.float32_m)},
-          {"total", finite(row.total_m())}};
-}
-
-Json facts_json(const AxisFacts& f) {
-  return {{"axis", axis_name(f.axis)},
-          {"stable", f.stable},
-          {"spectral_radius", f.spectral_radius > 0 ? Json(f.spectral_radius) : Json()},
-          {"lag_limit_s", finite(f.lag_limit_s)},
-          {"delay_limit_s", finite(f.delay_limit_s)},
-          {"lag_floor_rate", finite(f.lag_floor.rate)},
-          {"lag_floor_impulse", finite(f.lag_floor.impulse)},
-          {"effort_gain", finite(f.effort_gain)},
-          {"written_Ki", f.written_Ki},
-          {"effective_Ki", f.effective_Ki},
-          {"integral_authority_N", finite(f.clamp_authority_N)},
-          {"clamp_residual_m", f.clamp_residual_m},
-          {"noise_error_m", finite(f.noise.error_m)},
-          {"noise_command_m_s2", finite(f.noise.command_m_s2)}};
-}
-
-Json amplitudes_json(const EstimateError (&errors)[3]) {
-  return {finite(errors[0].amplitude), finite(errors[1].amplitude), finite(errors[2].amplitude)};
-}
-
-/// All stated errors of both estimates, one row per axis with an error.
-Json estimate_errors_json(const DisturbanceSource& source) {
-  Json rows = Json::array();
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const auto& [estimate, unit] :
-         {std::pair(Estimate::kVelocity, "m/s"), std::pair(Estimate::kPosition, "m")}) {
-      const EstimateError& n =
-          estimate == Estimate::kVelocity ? source.velocity_error[axis] : source.position_error[axis];
-      if (n.is_zero()) continue;
-      rows.push_back({{"axis", axis_name(axis)},
-                      {"channel", name(estimate)},
-                      {"unit", unit},
-                      {"amplitude", finite(n.amplitude)},
-                      {"rate_per_s", finite(n.rate)},
-                      {"variation", finite(n.variation)},
-                      {"impulse_s", finite(n.impulse)},
-                      {"constant", n.constant},
-                      {"window_s", n.window_s > 0 ? Json(n.window_s) : Json()}});
-    }
-  }
-  return rows;
 }
 
 /// Axes that Lambda or K couples to other axes; they have no loops of their own and therefore no rows.
@@ -148,6 +45,189 @@ std::optional<double> vector_error_m(const DisturbanceSource& source, const Trac
   return report.vector->upper * source.rate_norm_N_s;
 }
 
+void describe_theorem(files::Record& record, const TrackingReport& report) {
+  const Theorem& theorem = report.theorem;
+  const auto of_gains = [&theorem](double x) { return theorem.composite ? std::optional(x) : std::nullopt; };
+  record.field("applies", theorem.applies, "Whether all its hypotheses hold.");
+  record.field("why_not", theorem.why_not, "One sentence for each that fails.");
+  record.field("ball", report.ball_m,
+               "Of the continuous loop in the long run; null: it does not apply, or the rate is unknown.",
+               "m", "upper bound");
+  record.field("ball_of_flown_loop", report.flown_ball_m,
+               "The same for the loop that flies, sampled if it has a rate; null: not known.", "m",
+               "upper bound");
+  record.constant("ball_unit", "m", "");
+  record.field("ball_per_rate", of_gains(theorem.ball_per_rate()), "", "m per N/s",
+               "upper bound if it applies");
+  record.field("lambda_min_Lambda", of_gains(theorem.min_Lambda), "", "1/s");
+  record.field("lambda_min_K", of_gains(theorem.min_K), "", "kg/s");
+  const bool has_transient = theorem.composite && report.transient;
+  const Transient transient = has_transient ? *report.transient : Transient{1, 1, 1, 0, 0, 0, 0};
+  std::vector<ErrorAtTime> at;
+  for (const double t_s : {0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0}) at.push_back({t_s, transient.at(t_s)});
+  record.object_or_null(has_transient, "transient", "The closed-form bound at all times.",
+                        [&](files::Record& r) {
+                          r.field("decay_1_s", transient.decay_1_s(), "", "1/s");
+                          r.field("s_dot_m_s2", transient.s_dot_m_s2, "|s'| at t = 0.", "m/s^2");
+                          r.field("rate_N_s", transient.rate_N_s, "d_m.", "N/s");
+                          r.field("valid", theorem.applies, "Whether it holds.");
+                          r.field("bound", at, "");
+                        });
+}
+
+/// Gains of one loop from a force error or an error of an estimate.
+struct GainRow {
+  int axis = 0;
+  const char* channel = "";
+  Loop loop = Loop::kContinuous;
+  GainNorms norms, all_times;
+};
+
+std::vector<GainRow> gain_rows(const TrackingReport& report) {
+  std::vector<GainRow> rows;
+  for (const ExactGains& row : report.exact)
+    rows.push_back({row.axis, name(row.channel), row.loop, row.norms, row.all_times});
+  for (const EstimateGains& row : report.of_estimates)
+    rows.push_back({row.axis, name(row.estimate), row.loop, row.norms, row.all_times});
+  return rows;
+}
+
+void describe_gain_row(files::Record& record, const GainRow& row) {
+  record.field("axis", axis_name(row.axis), "");
+  record.field("channel", row.channel,
+               "force, command, or velocity and position for errors of these estimates, whose gains are per "
+               "m/s and m.");
+  record.field("loop", name(row.loop), "continuous or sampled.");
+  describe_norms(record, row.norms);
+  record.may_object(row.loop == Loop::kSampled, "between_samples", "The same at all times.",
+                    [&row](files::Record& r) { describe_norms(r, row.all_times); });
+}
+
+void describe_axis_bounds(files::Record& record, const AxisBounds& row, const TrackingResult& result) {
+  const auto bound = [&record](const char* name, double x_m, const char* meaning) {
+    record.field(name, x_m, meaning, "m", "upper bound");
+  };
+  const DisturbanceBounds& b = row.bounds;
+  record.field("axis", axis_name(row.axis), "");
+  record.field("channel", name(row.channel), "force or command: where the force error enters.");
+  record.field("loop", name(row.loop), "continuous or sampled.");
+  record.constant("unit", "m", "");
+  bound("rate", b.by_rate, "By the bound on the rate; null: not bounded.");
+  bound("amplitude", b.by_amplitude, "By the bound on the force.");
+  bound("edge", b.by_edges, "By the total variation.");
+  bound("impulse", b.by_impulse, "By the impulse of every pass.");
+  bound("amplitude_and_rate", b.by_both, "By both.");
+  record.field("integrator_demand_m_s", row.clamp.demand_m_s, "Largest state that is demanded.", "m s");
+  record.field("clamp_never_acts", row.clamp.never_acts,
+               "Otherwise the five above hold for the linear loop only.");
+  bound("amplitude_with_clamp", row.clamp.by_amplitude, "Holds though the clamp may act.");
+  bound("impulse_with_clamp", row.clamp.by_impulse, "Likewise.");
+  bound("minimum", row.least(), "The smallest that holds.");
+  record.constant("guarantee", "bound", "");
+  record.field("condition", condition(result.report), "What the totals are subject to; null: proved.");
+  record.field("smallest", smallest(row), "Name of the smallest.");
+  record.object("parts", "Contained in every bound.", [&row](files::Record& r) {
+    r.field("bias", row.parts.bias_m, "", "m");
+    r.field("initial", row.parts.initial_m, "", "m");
+    r.field("velocity_error", row.parts.velocity_error_m, "", "m");
+    r.field("position_error", row.parts.position_error_m, "", "m");
+    r.field("reference", row.parts.reference_m, "", "m");
+    r.field("thrust_ratio", row.parts.thrust_ratio_m, "", "m");
+  });
+  bound("staircase", row.staircase_m, "Added for a learned force that is updated in steps.");
+  bound("float32", row.float32_m, "Added for float32 arithmetic; null: not bounded.");
+  bound("total", row.total_m(), "With every declared part.");
+  const bool is_of_network = result.source.kind == "rate of f_hat";
+  record.may("of", is_of_network ? std::optional(result.source.kind) : std::nullopt,
+             "The learned force alone is bounded, not its error.");
+}
+
+void describe_facts(files::Record& record, const AxisFacts& f) {
+  record.field("axis", axis_name(f.axis), "");
+  record.field("stable", f.stable, "");
+  record.field("spectral_radius", f.spectral_radius > 0 ? std::optional(f.spectral_radius) : std::nullopt,
+               "Of the sampled loop; null: there is none.");
+  record.field("lag_limit_s", f.lag_limit_s, "Further lag that the loop tolerates; null: any.", "s");
+  record.field("delay_limit_s", f.delay_limit_s, "Likewise delay.", "s");
+  record.field("lag_floor_rate", f.lag_floor.rate, "Gain that remains, whatever the gains, for this lag.",
+               "m per N/s", "lower bound");
+  record.field("lag_floor_impulse", f.lag_floor.impulse, "Likewise.", "m per N s", "lower bound");
+  record.field("effort_gain", f.effort_gain, "Largest commanded force per force error.", "N/N");
+  record.field("written_Ki", f.written_Ki, "As gains.toml states it.", "1/s^3");
+  record.field("effective_Ki", f.effective_Ki, "As it acts, with the integrator's step.", "1/s^3");
+  record.field("integral_authority_N", f.clamp_authority_N,
+               "Constant force that the integrator cancels; null: any.", "N");
+  record.field("clamp_residual_m", f.clamp_residual_m, "Error due to the bias that the clamp leaves.", "m");
+  record.field("noise_error_m", f.noise.error_m, "Standard deviation for 1 mm and 0.05 m/s of noise.", "m");
+  record.field("noise_command_m_s2", f.noise.command_m_s2, "Likewise of the command.", "m/s^2");
+}
+
+/// A stated error of an estimate along one axis.
+struct EstimateRow {
+  int axis = 0;
+  Estimate estimate = Estimate::kVelocity;
+  EstimateError error;
+};
+
+std::vector<EstimateRow> estimate_rows(const DisturbanceSource& source) {
+  std::vector<EstimateRow> rows;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const Estimate estimate : {Estimate::kVelocity, Estimate::kPosition}) {
+      const EstimateError& error =
+          estimate == Estimate::kVelocity ? source.velocity_error[axis] : source.position_error[axis];
+      if (!error.is_zero()) rows.push_back({axis, estimate, error});
+    }
+  }
+  return rows;
+}
+
+std::array<double, 3> amplitudes(const EstimateError (&errors)[3]) {
+  return {errors[0].amplitude, errors[1].amplitude, errors[2].amplitude};
+}
+
+void describe_disturbance_source(files::Record& record, const DisturbanceSource& source) {
+  record.field("source", source.kind, "declared, declared truth, measured, rate of f_hat, or none.");
+  record.field("f_hat_rate_N_s",
+               source.f_hat_rate_known ? std::optional(source.f_hat_rate_N_s) : std::nullopt,
+               "Of the learned force; null: not known.", "N/s", "upper bound");
+  record.field("bias_N", std::array<double, 3>{source.bias_N[0], source.bias_N[1], source.bias_N[2]}, "",
+               "N");
+  record.field("velocity_error_m_s", amplitudes(source.velocity_error),
+               "Estimated minus true; null: not bounded.", "m/s", "upper bound");
+  record.field("thrust_ratio_error", source.thrust_ratio_error,
+               "Largest |d|, where (1 + d) times the modelled thrust acts.");
+  record.field("position_error_m", amplitudes(source.position_error), "Estimated minus true.", "m",
+               "upper bound");
+  record.list("of_estimates", estimate_rows(source), "Stated errors of the estimates, null: not bounded.",
+              [](files::Record& r, const EstimateRow& row) {
+                const EstimateError& error = row.error;
+                r.field("axis", axis_name(row.axis), "");
+                r.field("channel", name(row.estimate), "velocity or position.");
+                r.field("unit", row.estimate == Estimate::kVelocity ? "m/s" : "m", "Of the amplitude.");
+                r.field("amplitude", error.amplitude, "");
+                r.field("rate_per_s", error.rate, "");
+                r.field("variation", error.variation, "");
+                r.field("impulse_s", error.impulse, "");
+                r.field("constant", error.constant, "");
+                r.field("window_s", error.window_s > 0 ? std::optional(error.window_s) : std::nullopt,
+                        "Over which it was measured; null: at all times.", "s");
+              });
+}
+
+void describe_thrust(files::Record& record, const Saturation& thrust) {
+  record.field("verdict", name(thrust.verdict),
+               "proved, refuted or undecided: no declared input saturates it.");
+  record.field("why", thrust.why, "The counterexample, or what is missing.");
+  record.field("feedback_N", thrust.feedback_N, "Largest commanded force beside the weight, per axis.", "N",
+               "upper bound");
+  record.field("least_N", thrust.least_N, "Smallest vertical force that may be commanded.", "N",
+               "lower bound");
+  record.field("most_N", thrust.most_N, "Largest collective force that may be commanded.", "N",
+               "upper bound");
+  record.field("available_N", thrust.available_N, "Smallest and largest force of all rotors.", "N");
+  record.field("tilt_rad", thrust.tilt_rad(), "Of the commanded force.", "rad", "upper bound");
+}
+
 void print_theorem(const DisturbanceSource& source, const TrackingReport& report) {
   const Theorem& theorem = report.theorem;
   fmt::print("Theorem (limsup |e| <= d_m / (lmin(Lambda)^2 lmin(K)), continuous loop): {}\n",
@@ -161,8 +241,7 @@ void print_theorem(const DisturbanceSource& source, const TrackingReport& report
     fmt::print("  ball of the continuous loop, in the long run: {:.6g} m; of the loop that flies: {}\n",
                *report.ball_m,
                report.flown_ball_m ? fmt::format("{:.6g} m", *report.flown_ball_m) : "unknown");
-    if (const Json unmet = condition(report); !unmet.is_null())
-      fmt::print("  both only if {}\n", unmet.get<std::string>());
+    if (const auto unmet = condition(report)) fmt::print("  both only if {}\n", *unmet);
   }
   if (report.vector) {
     fmt::print(
@@ -284,75 +363,44 @@ void describe_norms(files::Record& record, const GainNorms& norms) {
   record.field("impulse", norms.impulse, "Error per impulse of the force.", "m per N s", "exact");
 }
 
-namespace {
-
-Json norms_json(const GainNorms& norms) {
-  files::Node node;
-  files::Record record(node, false);
-  describe_norms(record, norms);
-  return files::to_json(node);
-}
-
-}  // namespace
-
 std::string cell(double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : "-"; }
 
-void add_tracking_json(Json& result, const Tracking& input, const DisturbanceSource& source,
-                       const TrackingReport& report) {
-  result["mass_kg"] = input.plant.mass_kg;
-  result["thrust_scale"] = input.plant.thrust_scale;
-  result["disturbance"] = {{"source", source.kind},
-                           {"f_hat_rate_N_s", source.f_hat_rate_known ? Json(source.f_hat_rate_N_s) : Json()},
-                           {"bias_N", source.bias_N},
-                           {"velocity_error_m_s", amplitudes_json(source.velocity_error)},
-                           {"thrust_ratio_error", source.thrust_ratio_error},
-                           {"position_error_m", amplitudes_json(source.position_error)},
-                           {"of_estimates", estimate_errors_json(source)}};
-  result["theorem"] = theorem_json(report);
-  result["exact"] = Json::array();
-  for (const ExactGains& row : report.exact) {
-    Json json = {{"axis", axis_name(row.axis)}, {"channel", name(row.channel)}, {"loop", name(row.loop)}};
-    json.update(norms_json(row.norms));
-    if (row.loop == Loop::kSampled) json["between_samples"] = norms_json(row.all_times);
-    result["exact"].push_back(std::move(json));
-  }
-  for (const EstimateGains& row : report.of_estimates) {
-    Json json = {{"axis", axis_name(row.axis)}, {"channel", name(row.estimate)}, {"loop", name(row.loop)}};
-    json.update(norms_json(row.norms));
-    if (row.loop == Loop::kSampled) json["between_samples"] = norms_json(row.all_times);
-    result["exact"].push_back(std::move(json));
-  }
-  result["coupled_axes"] = coupled_axes(report);
-  result["vector"] = nullptr;
-  if (report.vector) {
-    result["vector"] = {{"peak_gain", {report.vector->lower, report.vector->upper}},
-                        {"direction", report.vector->direction},
-                        {"exact", report.vector->is_exact()}};
-    const auto error_m = vector_error_m(source, report);
-    result["vector"]["worst_error_m"] = error_m ? Json(*error_m) : Json();
-  }
-  result["bounds"] = Json::array();
-  for (const AxisBounds& row : report.bounds) {
-    result["bounds"].push_back(bounds_json(row, report));
-    if (source.kind == "rate of f_hat") result["bounds"].back()["of"] = "rate of f_hat";
-  }
-  result["axes"] = Json::array();
-  for (const AxisFacts& f : report.facts) result["axes"].push_back(facts_json(f));
-  const Saturation& thrust = report.saturation;
-  result["thrust_margin_N"] = finite(thrust.margin_N());
-  result["thrust"] = {
-      {"verdict", name(thrust.verdict)},
-      {"why", thrust.why},
-      {"feedback_N",
-       {finite(thrust.feedback_N[0]), finite(thrust.feedback_N[1]), finite(thrust.feedback_N[2])}},
-      {"least_N", finite(thrust.least_N)},
-      {"most_N", finite(thrust.most_N)},
-      {"available_N", {thrust.available_N.lower, finite(thrust.available_N.upper)}},
-      {"tilt_rad", thrust.tilt_rad()}};
-  result["assumptions"] = Json::array();
-  for (const Assumption& a : report.assumptions) {
-    result["assumptions"].push_back({{"name", a.name}, {"status", a.status}, {"note", a.note}});
-  }
+void describe(files::Record& record, const ErrorAtTime& point) {
+  record.field("t_s", point.t_s, "", "s");
+  record.field("error_m", point.error_m, "", "m", "upper bound");
+}
+
+void describe(files::Record& record, const TrackingResult& result) {
+  const TrackingReport& report = result.report;
+  record.field("mass_kg", result.mass_kg, "Of the vehicle.", "kg");
+  record.field("thrust_scale", result.thrust_scale, "Actual over modelled thrust.");
+  record.object("disturbance", "What was declared, and from where it comes.",
+                [&result](files::Record& r) { describe_disturbance_source(r, result.source); });
+  record.object("theorem", "The paper's: limsup |e| <= d_m / (lambda_min(Lambda)^2 lambda_min(K)).",
+                [&report](files::Record& r) { describe_theorem(r, report); });
+  record.list("exact", gain_rows(report), "Gains of every loop: the worst error per unit of a disturbance.",
+              describe_gain_row);
+  record.field("coupled_axes", coupled_axes(report),
+               "Axes that Lambda or K couples to others: they have no loop of their own, and no rows.");
+  const VectorGain vector = report.vector.value_or(VectorGain());
+  record.object_or_null(
+      report.vector.has_value(), "vector", "Gain of all axes together, from rate to error.",
+      [&](files::Record& r) {
+        r.field("peak_gain", Interval{vector.lower, vector.upper}, "", "m per N/s", "enclosure");
+        r.field("direction", vector.direction, "Of the worst force error.");
+        r.field("exact", vector.is_exact(), "Whether both ends agree.");
+        r.field("worst_error_m", vector_error_m(result.source, report), "In the long run; null: not known.",
+                "m", "upper bound");
+      });
+  record.list("bounds", report.bounds, "Of the error, per axis, channel and loop; null: not bounded.",
+              [&result](files::Record& r, const AxisBounds& row) { describe_axis_bounds(r, row, result); });
+  record.list("axes", report.facts, "Limits of every loop.", describe_facts);
+  record.field("thrust_margin_N", report.saturation.margin_N(),
+               "Distance of the commanded forces from the nearer limit; null: not known.", "N",
+               "lower bound");
+  record.object("thrust", "What all declared inputs together can make the law command.",
+                [&report](files::Record& r) { describe_thrust(r, report.saturation); });
+  record.field("assumptions", report.assumptions, "What the numbers rest on.");
 }
 
 void print_tracking(const Tracking& input, const DisturbanceSource& source, const TrackingReport& report) {
@@ -366,8 +414,8 @@ void print_tracking(const Tracking& input, const DisturbanceSource& source, cons
                source.f_hat_rate_N_s);
   }
   print_bounds(source, report);
-  if (const Json unmet = condition(report); source.kind != "none" && !unmet.is_null())
-    fmt::print("\nThese totals hold only if {}\n", unmet.get<std::string>());
+  if (const auto unmet = condition(report); unmet && source.kind != "none")
+    fmt::print("\nThese totals hold only if {}\n", *unmet);
   fmt::print("\nRests on\n");
   for (const Assumption& a : report.assumptions) {
     fmt::print("  {:<9} {}{}\n", a.status, a.name, a.note.empty() ? "" : " (" + a.note + ")");
@@ -375,3 +423,14 @@ void print_tracking(const Tracking& input, const DisturbanceSource& source, cons
 }
 
 }  // namespace swarmcert::analysis
+
+namespace swarmcert::stability {
+
+void describe(files::Record& record, const Assumption& assumption) {
+  record.field("name", assumption.name, "");
+  record.field("status", assumption.status,
+               "proved, measured, assumed or refuted, with the counterexample as note.");
+  record.field("note", assumption.note, "");
+}
+
+}  // namespace swarmcert::stability

@@ -103,8 +103,8 @@ void add_tube_plot(Report& report, const Tracking& input, const Disturbance& dis
 }  // namespace
 
 std::string write_bound_report(const Tracking& input, const LoadedDisturbance& disturbance,
-                               const TrackingReport& tracking, const std::optional<LocalTube>& local_tube,
-                               const files::Json& result, const std::string& folder, bool overwrite) {
+                               const TrackingReport& tracking, const std::optional<TaskTube>& task_tube,
+                               const files::Node& result, const std::string& folder, bool overwrite) {
   Report report("Tracking bounds");
   report.made_by(command_to_copy());
   report.result(result);
@@ -156,7 +156,7 @@ std::string write_bound_report(const Tracking& input, const LoadedDisturbance& d
     report.bars("bounds", totals, "bound on the error [m]", "The total of each row above.");
     for (int axis = 0; axis < 3; ++axis) add_tube_plot(report, input, disturbance.source.axis[axis], axis);
   }
-  if (local_tube) add_local_tube_plot(report, *local_tube, result["local_tube"]);
+  if (task_tube) add_plot(report, *task_tube);
   report.heading("Rests on");
   rows.clear();
   for (const Assumption& a : tracking.assumptions) rows.push_back({a.status, a.name, a.note});

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "analysis/commands/bound/disturbance_input.h"
-#include "analysis/tracking/tube/local_tube.h"
+#include "analysis/commands/bound/tube_output.h"
 
 namespace swarmcert::analysis {
 
@@ -15,7 +15,7 @@ namespace swarmcert::analysis {
 /// @throws files::InputError as Report::write().
 std::string write_bound_report(const Tracking& input, const LoadedDisturbance& disturbance,
                                const stability::TrackingReport& report,
-                               const std::optional<LocalTube>& local_tube, const files::Json& result,
+                               const std::optional<TaskTube>& task_tube, const files::Node& result,
                                const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

@@ -3,24 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace swarmcert::analysis {
 
-files::Json float_errors_json(const FloatErrors& errors) {
-  files::Json json = {{"applies", errors.applies}, {"why_not", errors.why_not}};
-  json["thrust_N"] = errors.thrust_N;
-  for (int i = 0; i < 3; ++i) {
-    json["force_N"].push_back(errors.force_N[i]);
-    json["torque_N_m"].push_back(errors.torque_N_m[i]);
-    json["integral_m_s"].push_back(errors.integral_m_s[i]);
-    const double e = errors.tracking_error_m[i];
-    json["tracking_error_m"].push_back(std::isfinite(e) ? files::Json(e) : files::Json());
-  }
-  return json;
-}
-
-void print_float_errors(const FloatErrors& errors) {
+void print(const stability::FloatErrors& errors) {
   if (!errors.applies) {
     fmt::print("\nfloat32 against double: not bounded: {}\n", errors.why_not);
     return;
@@ -39,3 +27,22 @@ void print_float_errors(const FloatErrors& errors) {
 }
 
 }  // namespace swarmcert::analysis
+
+namespace swarmcert::stability {
+
+void describe(files::Record& record, const FloatErrors& errors) {
+  const auto three = [&record](const char* name, const double(&values)[3], const char* meaning,
+                               const char* unit) {
+    record.field(name, std::array<double, 3>{values[0], values[1], values[2]}, meaning, unit, "upper bound");
+  };
+  record.field("applies", errors.applies, "Whether they are bounded.");
+  record.field("why_not", errors.why_not, "Why they are not.");
+  record.field("thrust_N", errors.thrust_N, "Of the collective thrust.", "N", "upper bound");
+  three("force_N", errors.force_N, "Of the commanded force, each cycle.", "N");
+  three("torque_N_m", errors.torque_N_m, "Of the attitude law, each cycle.", "N m");
+  three("integral_m_s", errors.integral_m_s, "Of the integrator, each cycle.", "m s");
+  three("tracking_error_m", errors.tracking_error_m,
+        "What that adds to the tracking error; null: not bounded.", "m");
+}
+
+}  // namespace swarmcert::stability

@@ -1,15 +1,17 @@
-/// @file Errors added by float32 arithmetic on the vehicle, as text and as JSON.
+/// @file Errors added by float32 arithmetic on the vehicle.
 #pragma once
 
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 #include "stability/simulation/float_errors.h"
 
 namespace swarmcert::analysis {
 
-using stability::float_errors;
-using stability::FloatErrors;
-
-files::Json float_errors_json(const FloatErrors& errors);
-void print_float_errors(const FloatErrors& errors);
+void print(const stability::FloatErrors& errors);
 
 }  // namespace swarmcert::analysis
+
+namespace swarmcert::stability {
+
+void describe(files::Record& record, const FloatErrors& errors);
+
+}  // namespace swarmcert::stability

@@ -1,14 +1,11 @@
+#include "analysis/commands/bound/swarm_bound.h"
+
 #include <fmt/core.h>
 
 #include <cmath>
 
-#include "analysis/commands/bound/bound_extras.h"
-#include "analysis/commands/bound/bound_output.h"
-#include "stability/bounds/swarms/coupled_swarm.h"
-
 namespace swarmcert::analysis {
 
-using files::Json;
 using namespace stability;  // NOLINT: every name below is of that library
 
 namespace {
@@ -30,10 +27,69 @@ void refuse_unbounded(const CoupledVerdict& verdict) {
   }
 }
 
+void describe_motion(files::Record& record, const OwnMotion& own) {
+  record.field("error_m", own.error_m, "", "m", "upper bound");
+  record.field("speed_m_s", own.speed_m_s, "", "m/s", "upper bound");
+  record.field("acceleration_m_s2", own.acceleration_m_s2, "", "m/s^2", "upper bound");
+}
+
+void describe_unstable(files::Record& record, const UnstableSwarm& unstable) {
+  record.field("of", unstable.is_declared ? "the swarm as declared" : "one swarm of the class", "");
+  record.field("signs", unstable.sign, "Of each coupling; +1 pushes the vehicles apart.");
+  record.field("growth_1_s", unstable.growth_1_s, "Of the errors.", "1/s");
+  record.field("simulated_s", unstable.seconds, "", "s");
+  record.field("error_over_initial", unstable.largest_error, "In the simulation.");
+}
+
+struct CouplingRow {
+  int on = 0, by = 0;
+  std::optional<double> missing_factor;
+};
+
 }  // namespace
 
-Json swarm_json(const Tracking& input, const std::string& path, const DisturbanceSource& source) {
-  const CoupledSwarm swarm = read_coupled_swarm(path);
+const char* SwarmBound::verdict() const {
+  return found.small_gain.proved ? "proved" : found.is_refuted() ? "refuted" : "inconclusive";
+}
+
+void describe(files::Record& record, const SwarmBound& bound) {
+  const SmallGain& gain = bound.found.small_gain;
+  std::vector<CouplingRow> couplings;
+  for (std::size_t i = 0; i < bound.swarm.couplings.size(); ++i) {
+    const Coupling& one = bound.swarm.couplings[i];
+    couplings.push_back(
+        {one.on, one.by, gain.proved ? std::nullopt : std::optional(gain.missing_factor_of[i])});
+  }
+  record.field("verdict", bound.verdict(), "proved, refuted or inconclusive: errors stay bounded.");
+  record.object_or_null(
+      bound.found.unstable.has_value(), "witness", "A swarm whose errors grow; null: none was found.",
+      [&bound](files::Record& r) { describe_unstable(r, bound.found.unstable.value_or(UnstableSwarm())); });
+  record.constant("loop", "continuous", "");
+  record.constant("axis", "z", "");
+  record.field("Gamma", gain.Gamma, "Gain from every vehicle's rate of the force error to every other's.");
+  record.field("spectral_radius", Interval{gain.spectral_radius_lower, gain.spectral_radius_upper},
+               "Of Gamma; below 1 proves.", "", "enclosure");
+  record.field("rate_N_s", gain.rate_N_s, "Rate of every vehicle's force error in the long run.", "N/s",
+               "upper bound");
+  record.field("error_m", gain.error_m, "Of every vehicle in the long run.", "m", "upper bound");
+  record.object("of_estimates",
+                "What errors of the estimates add to every vehicle's error_m, without the couplings.",
+                [&bound](files::Record& r) { describe_motion(r, bound.found.of_estimates); });
+  record.object("of_force", "Likewise the force error that is declared beside the couplings.",
+                [&bound](files::Record& r) { describe_motion(r, bound.found.of_force); });
+  record.field("missing_factor", gain.missing_factor, "By which all couplings would have to shrink.");
+  record.list("couplings", couplings, "In the order of the file.",
+              [](files::Record& r, const CouplingRow& row) {
+                r.field("on", row.on, "Vehicle that feels the force.");
+                r.field("by", row.by, "Vehicle that causes it.");
+                r.field("missing_factor", row.missing_factor,
+                        "By which it alone would have to shrink; 0: it does not suffice.");
+              });
+}
+
+SwarmBound swarm_bound(const Tracking& input, const std::string& path, const DisturbanceSource& source) {
+  SwarmBound bound;
+  bound.swarm = read_coupled_swarm(path);
   if (!input.continuous(2))
     throw UsageError("Lambda or K couples the z axis to others: a swarm needs its own loop");
   OtherErrors others;
@@ -41,77 +97,41 @@ Json swarm_json(const Tracking& input, const std::string& path, const Disturbanc
   others.position_error = source.position_error[2];
   const bool has_force = source.kind == "declared" || source.kind == "measured";
   if (has_force) others.bias_N = source.bias_N[2];
-  const CoupledVerdict verdict = couple(swarm, input, others, has_force ? source.axis[2] : no_force());
-  refuse_unbounded(verdict);
-  const SmallGain& found = verdict.small_gain;
-  Json entries = Json::array();
-  for (std::size_t i = 0; i < swarm.couplings.size(); ++i) {
-    entries.push_back({{"on", swarm.couplings[i].on},
-                       {"by", swarm.couplings[i].by},
-                       {"missing_factor", found.proved ? Json() : Json(found.missing_factor_of[i])}});
-  }
-  const std::optional<UnstableSwarm>& unstable = verdict.unstable;
-  Json witness;
-  if (unstable) {
-    witness = {{"of", unstable->is_declared ? "the swarm as declared" : "one swarm of the class"},
-               {"signs", unstable->sign},
-               {"growth_1_s", unstable->growth_1_s},
-               {"simulated_s", unstable->seconds},
-               {"error_over_initial", unstable->largest_error}};
-  }
-  const auto motion = [](const OwnMotion& own) {
-    return Json{{"error_m", finite(own.error_m)},
-                {"speed_m_s", finite(own.speed_m_s)},
-                {"acceleration_m_s2", finite(own.acceleration_m_s2)}};
-  };
-  return {{"verdict", found.proved           ? "proved"
-                      : verdict.is_refuted() ? "refuted"
-                                             : "inconclusive"},
-          {"witness", std::move(witness)},
-          {"loop", "continuous"},
-          {"axis", "z"},
-          {"Gamma", found.Gamma},
-          {"spectral_radius", {found.spectral_radius_lower, found.spectral_radius_upper}},
-          {"rate_N_s", found.rate_N_s},
-          {"error_m", found.error_m},
-          {"of_estimates", motion(verdict.of_estimates)},
-          {"of_force", motion(verdict.of_force)},
-          {"missing_factor", found.missing_factor},
-          {"couplings", std::move(entries)}};
+  bound.found = couple(bound.swarm, input, others, has_force ? source.axis[2] : no_force());
+  refuse_unbounded(bound.found);
+  return bound;
 }
 
-void print_swarm(const Json& swarm) {
-  fmt::print("\nSwarm small gain (z, continuous): rho(Gamma) <= {:.6g}: {}\n",
-             swarm["spectral_radius"][1].get<double>(), swarm["verdict"].get<std::string>());
-  if (swarm["verdict"] == "proved") {
-    for (std::size_t i = 0; i < swarm["rate_N_s"].size(); ++i) {
+void print(const SwarmBound& bound) {
+  const SmallGain& gain = bound.found.small_gain;
+  fmt::print("\nSwarm small gain (z, continuous): rho(Gamma) <= {:.6g}: {}\n", gain.spectral_radius_upper,
+             bound.verdict());
+  if (gain.proved) {
+    for (std::size_t i = 0; i < gain.rate_N_s.size(); ++i) {
       fmt::print("  vehicle {}: |eps'| at most {:.6g} N/s, |e| at most {:.6g} m in the long run\n", i,
-                 swarm["rate_N_s"][i].get<double>(), swarm["error_m"][i].get<double>());
+                 gain.rate_N_s[i], gain.error_m[i]);
     }
-    const double of_estimates_m = swarm["of_estimates"]["error_m"];
-    if (of_estimates_m > 0) {
+    if (bound.found.of_estimates.error_m > 0) {
       fmt::print(
           "  of which {:.6g} m directly from errors of the estimates; their effect through a network is not "
           "included and belongs in cross_rate_N_s\n",
-          of_estimates_m);
+          bound.found.of_estimates.error_m);
     }
-    const double of_force_m = swarm["of_force"]["error_m"];
-    if (of_force_m > 0)
+    if (bound.found.of_force.error_m > 0)
       fmt::print("  of which {:.6g} m directly from the force error not caused by the couplings\n",
-                 of_force_m);
+                 bound.found.of_force.error_m);
     return;
   }
-  if (!swarm["witness"].is_null()) {
-    fmt::print("  {}: errors grow by {:.4g} 1/s; simulated, {:.4g} times the initial error\n",
-               swarm["verdict"] == "refuted" ? "with the directions stated"
-                                             : "if all forces of the class are allowed",
-               swarm["witness"]["growth_1_s"].get<double>(),
-               swarm["witness"]["error_over_initial"].get<double>());
+  if (const auto& unstable = bound.found.unstable) {
+    fmt::print(
+        "  {}: errors grow by {:.4g} 1/s; simulated, {:.4g} times the initial error\n",
+        bound.found.is_refuted() ? "with the directions stated" : "if all forces of the class are allowed",
+        unstable->growth_1_s, unstable->largest_error);
   }
-  fmt::print("  all couplings times {:.4g} would do\n", swarm["missing_factor"].get<double>());
-  for (const Json& c : swarm["couplings"]) {
-    const double factor = c["missing_factor"].get<double>();
-    fmt::print("  force on {} by {}: {}\n", c["on"].get<int>(), c["by"].get<int>(),
+  fmt::print("  all couplings times {:.4g} would do\n", gain.missing_factor);
+  for (std::size_t i = 0; i < bound.swarm.couplings.size(); ++i) {
+    const double factor = gain.missing_factor_of[i];
+    fmt::print("  force on {} by {}: {}\n", bound.swarm.couplings[i].on, bound.swarm.couplings[i].by,
                factor > 0 ? fmt::format("alone times {:.4g} would do", factor)
                           : std::string("alone does not suffice"));
   }

@@ -90,32 +90,22 @@ Json sampled_entry(const ProvedSampledGains& found) {
   return entry;
 }
 
-stability::VerifiedNorms enclosures_of(const Json& gains) {
-  stability::VerifiedNorms known;
-  const auto upper = [&gains](const char* key) {
-    const Json& x = gains.at(key).at(1);
-    return x.is_null() ? std::numeric_limits<double>::infinity() : x.get<double>();
-  };
-  known.rate.upper = upper("rate"), known.amplitude.upper = upper("amplitude");
-  known.edge.upper = upper("edge"), known.impulse.upper = upper("impulse");
-  return known;
-}
-
 /// Returns the certificate entry of the loop with an empty axis, or a string with the reason why there is none.
-Json entry_or_reason(const stability::AxisLoop& loop, const Json& row) {
-  if (row["status"] != "proved") return row["why"];
+Json entry_or_reason(const stability::AxisLoop& loop, const VerifiedRow& row) {
+  if (!row.norms) return row.why;
   std::string why;
-  const auto found = gain_witness(loop, row["channel"].get<std::string>(), enclosures_of(row), why);
+  const auto found = gain_witness(loop, row.input, *row.norms, why);
   return found ? loop_entry(*found) : Json(why);
 }
 
+/// Rows of the inputs of one sampled loop: force, command, velocity and position.
+using SampledRows = std::map<std::string, VerifiedRow>;
+
 /// The same for a sampled loop.
-/// @param rows rows of its inputs: force, command, velocity and position.
-Json sampled_entry_or_reason(const stability::SampledLoop& loop, const std::map<std::string, Json>& rows) {
-  for (const auto& [input, row] : rows) {
-    if (row["status"] != "proved") return row["why"];
-  }
-  const auto known = [&rows](const char* input) { return enclosures_of(rows.at(input)["between_samples"]); };
+Json sampled_entry_or_reason(const stability::SampledLoop& loop, const SampledRows& rows) {
+  for (const auto& [input, row] : rows)
+    if (!row.norms) return row.why;
+  const auto known = [&rows](const char* input) { return *rows.at(input).between_samples; };
   std::string why;
   const auto found = sampled_gain_witness(
       loop, {known("force"), known("command"), known("velocity"), known("position")}, why);
@@ -125,17 +115,19 @@ Json sampled_entry_or_reason(const stability::SampledLoop& loop, const std::map<
 /// Collects certificate entries, and the rows of --verified that have none.
 class Entries {
  public:
-  void add(const Json& row, Json entry) {
+  void add(const VerifiedRow& row, Json entry) {
     if (entry.is_object()) {
-      entry["axis"] = row["axis"];
-      (row["loop"] == "sampled" ? sampled : continuous).push_back(std::move(entry));
+      entry["axis"] = stability::axis_name(row.axis);
+      (row.loop == stability::Loop::kSampled ? sampled : continuous).push_back(std::move(entry));
     } else {
       leave_out(row, entry);
     }
   }
-  void leave_out(const Json& row, const Json& why) {
-    left_out.push_back(
-        {{"axis", row["axis"]}, {"input", row["channel"]}, {"loop", row["loop"]}, {"why", why}});
+  void leave_out(const VerifiedRow& row, const Json& why) {
+    left_out.push_back({{"axis", stability::axis_name(row.axis)},
+                        {"input", row.input},
+                        {"loop", name(row.loop)},
+                        {"why", why}});
   }
   Json continuous = Json::array(), sampled = Json::array(), left_out = Json::array();
 };
@@ -145,24 +137,21 @@ std::string numbers_of(const stability::AxisLoop& loop) {
 }
 
 /// Searches only once for axes with identical loops.
-void add_continuous(const Tracking& input, const Json& verified, Entries& entries) {
+void add_continuous(const Tracking& input, const VerifiedGains& verified, Entries& entries) {
   std::map<std::string, Json> known;
-  for (const Json& row : verified) {
-    if (row["loop"] != "continuous") continue;
-    const stability::AxisLoop loop =
-        *input.continuous(stability::axis_of_name(row["axis"].get<std::string>()));
-    const auto [place, is_new] = known.try_emplace(numbers_of(loop) + row["channel"].get<std::string>());
+  for (const VerifiedRow& row : verified) {
+    if (row.loop != stability::Loop::kContinuous) continue;
+    const stability::AxisLoop loop = *input.continuous(row.axis);
+    const auto [place, is_new] = known.try_emplace(numbers_of(loop) + row.input);
     if (is_new) place->second = entry_or_reason(loop, row);
     entries.add(row, place->second);
   }
 }
 
-void add_sampled(const Tracking& input, const Json& verified, Entries& entries) {
-  std::map<int, std::map<std::string, Json>> rows;
-  for (const Json& row : verified) {
-    if (row["loop"] == "sampled")
-      rows[stability::axis_of_name(row["axis"].get<std::string>())][row["channel"].get<std::string>()] = row;
-  }
+void add_sampled(const Tracking& input, const VerifiedGains& verified, Entries& entries) {
+  std::map<int, SampledRows> rows;
+  for (const VerifiedRow& row : verified)
+    if (row.loop == stability::Loop::kSampled) rows[row.axis][row.input] = row;
   std::map<std::string, Json> known;
   for (const auto& [axis, inputs] : rows) {
     const stability::SampledLoop loop = *input.sampled(axis);
@@ -178,7 +167,8 @@ void add_sampled(const Tracking& input, const Json& verified, Entries& entries) 
 
 }  // namespace
 
-Json tracking_certificate(const Tracking& input, const TrackingArguments& arguments, const Json& verified) {
+Json tracking_certificate(const Tracking& input, const TrackingArguments& arguments,
+                          const VerifiedGains& verified) {
   Entries entries;
   add_continuous(input, verified, entries);
   add_sampled(input, verified, entries);
@@ -198,11 +188,28 @@ bool is_empty_certificate(const Json& certificate) {
   return certificate["loops"].empty() && certificate["sampled_loops"].empty();
 }
 
-Json certificate_summary(const Json& certificate) {
-  return {{"content_sha256", certificate["content_sha256"]},
-          {"loops", certificate["loops"].size()},
-          {"sampled_loops", certificate["sampled_loops"].size()},
-          {"left_out", certificate["left_out"]}};
+void describe_certificate(files::Record& record, const Json& certificate) {
+  struct LeftOut {
+    std::string axis, input, loop, why;
+  };
+  const bool is_shape = certificate.is_null();
+  std::vector<LeftOut> left_out;
+  for (const Json& row : is_shape ? Json::array() : certificate["left_out"])
+    left_out.push_back({row["axis"], row["input"], row["loop"], row["why"]});
+  const auto size = [&](const char* of) { return is_shape ? std::size_t{0} : certificate[of].size(); };
+  record.field("content_sha256", is_shape ? "" : certificate["content_sha256"].get<std::string>(),
+               "Of the certificate.");
+  record.field("loops", size("loops"), "Continuous loops whose gains it holds, by axis and input.");
+  record.field(
+      "sampled_loops", size("sampled_loops"),
+      "Axes whose sampled loop it holds with all inputs; where there is no loop at all, no file is written.");
+  record.list("left_out", left_out, "Rows of verified that it does not hold.",
+              [](files::Record& r, const LeftOut& row) {
+                r.field("axis", row.axis, "");
+                r.field("input", row.input, "Where the disturbance enters.");
+                r.field("loop", row.loop, "continuous or sampled.");
+                r.field("why", row.why, "Why it is not certified.");
+              });
 }
 
 void print_certificate_summary(const Json& certificate, const std::string& path) {

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "analysis/commands/bound/disturbance_input.h"
@@ -11,7 +12,6 @@
 namespace swarmcert::analysis {
 namespace {
 
-using files::Json;
 using stability::DisturbanceSource;
 
 /// Parses "0.15:0.8".
@@ -89,31 +89,28 @@ std::string domain_text(const stability::MotionSet& m) {
   return text;
 }
 
-Json three(const double* values) {
-  const auto one = [](double x) { return std::isfinite(x) ? Json(x) : Json(); };
-  return {one(values[0]), one(values[1]), one(values[2])};
-}
+std::array<double, 3> per_axis(const double (&values)[3]) { return {values[0], values[1], values[2]}; }
 
 }  // namespace
 
-Json truth_json(const Truth& truth) {
-  const auto finite = [](double x) { return std::isfinite(x) ? Json(x) : Json(); };
-  Json effects = Json::array();
-  for (const stability::EffectBounds& e : truth.effects) {
-    effects.push_back({{"effect", e.effect},
-                       {"bias_N", three(e.bias_N)},
-                       {"amplitude_N", three(e.amplitude_N)},
-                       {"rate_N_s", three(e.rate_N_s)},
-                       {"slope_across_N_m", finite(e.slope_across_N_m)},
-                       {"slope_along_N_m", finite(e.slope_along_N_m)},
-                       {"reached_rate_N_s", e.reached_rate_N_s},
-                       {"unbounded", e.unbounded},
-                       {"note", e.note}});
-  }
-  return {{"file", truth.path}, {"over", domain_text(truth.motion)}, {"effects", std::move(effects)}};
+void describe(files::Record& record, const Truth& truth) {
+  record.field("file", truth.path, "The model.");
+  record.field("over", domain_text(truth.motion), "Motions over which the force is enclosed.");
+  record.list(
+      "effects", truth.effects, "Null: not bounded.", [](files::Record& r, const stability::EffectBounds& e) {
+        r.field("effect", e.effect, "");
+        r.field("bias_N", per_axis(e.bias_N), "Constant part.", "N", "upper bound");
+        r.field("amplitude_N", per_axis(e.amplitude_N), "Of the rest.", "N", "upper bound");
+        r.field("rate_N_s", per_axis(e.rate_N_s), "", "N/s", "upper bound");
+        r.field("slope_across_N_m", e.slope_across_N_m, "Of one neighbour's force.", "N/m", "upper bound");
+        r.field("slope_along_N_m", e.slope_along_N_m, "Likewise along z.", "N/m", "upper bound");
+        r.field("reached_rate_N_s", e.reached_rate_N_s, "At some motion; 0: unknown.", "N/s", "lower bound");
+        r.field("unbounded", e.unbounded, "Why it is not bounded.");
+        r.field("note", e.note, "");
+      });
 }
 
-void print_truth(const Truth& truth) {
+void print(const Truth& truth) {
   fmt::print("\nDeclared truth {}, enclosed over {}\n", truth.path, domain_text(truth.motion));
   for (const stability::EffectBounds& e : truth.effects) {
     const auto largest = [](const double* v) { return std::max({v[0], v[1], v[2]}); };

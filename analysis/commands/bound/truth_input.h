@@ -25,7 +25,7 @@ Truth read_truth(const DisturbanceArguments& arguments, const Tracking& tracking
 /// f_hat is 0.
 void add_truth(const Truth& truth, stability::DisturbanceSource& source);
 
-files::Json truth_json(const Truth& truth);
-void print_truth(const Truth& truth);
+void describe(files::Record& record, const Truth& truth);
+void print(const Truth& truth);
 
 }  // namespace swarmcert::analysis

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "analysis/cli/counted.h"
@@ -23,22 +24,7 @@ constexpr int kCurvePoints = 200;
 /// Far above the lag of any motor; larger numbers are probably milliseconds.
 constexpr double kLongestLag_s = 1;
 
-Json radii_json(const LeastTube& tube) {
-  if (!tube.proved) return Json();
-  return {tube.radius_m(0), tube.radius_m(1), tube.radius_m(2)};
-}
-
-Json verdict_json(const LeastTube& tube) {
-  Json json = {{"verdict", tube.proved ? "proved" : "inconclusive"}};
-  if (!tube.proved) json["why"] = tube.why;
-  json["radius_m"] = tube.proved ? finite(tube.radius_m()) : Json();
-  json["radius_xyz_m"] = radii_json(tube);
-  json["loop_gain"] = finite(tube.loop_gain);
-  return json;
-}
-
-Json tube_row_json(const TubeRow& row) {
-  Json json = verdict_json(row.tube);
+ForceConstants worst_of(const TubeRow& row) {
   ForceConstants worst;
   for (const ForceConstants& c : row.constants) {
     worst.together = std::max(worst.together, c.together);
@@ -46,32 +32,65 @@ Json tube_row_json(const TubeRow& row) {
     worst.velocity = std::max(worst.velocity, c.velocity);
     worst.own = std::max(worst.own, c.own);
   }
-  json["lipschitz"] = {{"all_N", finite(worst.together)},
-                       {"position_N_m", finite(worst.position)},
-                       {"velocity_N_s_m", finite(worst.velocity)},
-                       {"own_N", finite(worst.own)}};
-  return json;
+  return worst;
 }
 
-Json force_bounds_json(const ForceErrorBounds& b) {
-  return {{"vehicle", b.vehicle + 1},
-          {"axis", "z"},
-          {"force_error",
-           {{"amplitude_N", finite(b.amplitude_N)},
-            {"rate_N_s", finite(b.rate_N_s)},
-            {"variation_N", finite(b.variation_N)},
-            {"impulse_N_s", finite(b.impulse_N_s)}}},
-          {"rate", finite(b.by_rate_m)},
-          {"amplitude", finite(b.by_amplitude_m)},
-          {"edges", finite(b.by_edges_m)},
-          {"impulse", finite(b.by_impulse_m)},
-          {"slices", finite(b.by_slices_m)},
-          {"lag", finite(b.lag_m)},
-          {"minimum", finite(b.least_m())}};
+void describe_verdict(files::Record& record, const LeastTube& tube) {
+  using Radii = std::optional<std::array<double, 3>>;
+  record.field("verdict", tube.proved ? "proved" : "inconclusive", "");
+  record.may("why", tube.proved ? std::nullopt : std::optional(tube.why), "Why nothing was proved.");
+  record.field("radius_m", tube.proved ? tube.radius_m() : INFINITY, "Of all axes; null: not proved.", "m",
+               "upper bound");
+  record.field("radius_xyz_m",
+               tube.proved ? Radii({tube.radius_m(0), tube.radius_m(1), tube.radius_m(2)}) : Radii(),
+               "Null: not proved.", "m", "upper bound");
+  record.field("loop_gain", tube.loop_gain,
+               "Factor by which an error adds to its own bound; below 1 proves.");
 }
 
-std::string radius_text(const Json& value) {
-  return value.is_number() ? fmt::format("{:.4g} m", value.get<double>()) : std::string("none");
+void describe_tube_row(files::Record& record, const TubeRow& row) {
+  describe_verdict(record, row.tube);
+  const ForceConstants worst = worst_of(row);
+  record.object("lipschitz", "Largest of all vehicles; null: not part of this bound.",
+                [&worst](files::Record& r) {
+                  r.field("all_N", worst.together, "Per (m, m/s).", "N", "upper bound");
+                  r.field("position_N_m", worst.position, "", "N/m", "upper bound");
+                  r.field("velocity_N_s_m", worst.velocity, "", "N s/m", "upper bound");
+                  r.field("own_N", worst.own, "", "N", "upper bound");
+                });
+}
+
+void describe_force_error(files::Record& record, const ForceErrorBounds& b) {
+  const auto bound = [&record](const char* name, double x_m) {
+    record.field(name, x_m, "", "m", "upper bound");
+  };
+  record.field("vehicle", b.vehicle + 1, "From 1.");
+  record.constant("axis", "z", "");
+  record.object("force_error", "f_hat - f_a within the tube.", [&b](files::Record& r) {
+    r.field("amplitude_N", b.amplitude_N, "", "N", "upper bound");
+    r.field("rate_N_s", b.rate_N_s, "", "N/s", "upper bound");
+    r.field("variation_N", b.variation_N, "", "N", "upper bound");
+    r.field("impulse_N_s", b.impulse_N_s, "", "N s", "upper bound");
+  });
+  bound("rate", b.by_rate_m);
+  bound("amplitude", b.by_amplitude_m);
+  bound("edges", b.by_edges_m);
+  bound("impulse", b.by_impulse_m);
+  bound("slices", b.by_slices_m);
+  bound("lag", b.lag_m);
+  bound("minimum", b.least_m());
+}
+
+std::string radius_text(const LeastTube& tube) {
+  return tube.proved ? fmt::format("{:.4g} m", tube.radius_m()) : std::string("none");
+}
+
+/// The combined tube, with the verdict of all results together.
+LeastTube combined(const LocalTube& tube) {
+  LeastTube all = tube.tube;
+  all.proved = tube.proved;
+  all.why = tube.why;
+  return all;
 }
 
 }  // namespace
@@ -193,179 +212,207 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
 
 namespace {
 
-Json measured_json(const MeasuredTruth& measured, const LocalTube& tube) {
-  const ConformalThreshold& promise = measured.promise;
-  int with_flights = 0;
-  for (const ResidualEnvelope::Cell& cell : measured.envelope.cells) with_flights += cell.flights > 0 ? 1 : 0;
-  double widest_N[3] = {0, 0, 0};
-  for (const ResidualEnvelope::Cell& cell : measured.envelope.cells)
-    for (int k = 0; k < 3; ++k)
-      widest_N[k] = std::max(widest_N[k], cell.force_N[static_cast<std::size_t>(k)].mag());
-  return {
-      {"level", promise.level},
-      {"flights", promise.flights},
-      {"shape_flights", measured.shape_flights},
-      {"interval", {promise.coverage_90.lower, promise.coverage_90.upper}},
-      {"factor", finite(promise.threshold)},
-      {"largest_residual_N", {finite(widest_N[0]), finite(widest_N[1]), finite(widest_N[2])}},
-      {"mean_s", measured.mean_s},
-      {"cells_with_flights", with_flights},
-      {"cells_in_tube", tube.residual_cells},
-      {"cells_in_tube_without_flights", tube.residual_cells_without_flights},
-      {"elsewhere", "the hull of all cells with flights"},
-      {"like_them",
-       "a flight whose residual is drawn from the same distribution as in these flights: same vehicles, task "
-       "and model"},
-      {"rests_on", fmt::format("forces are means over {:g} s, so that the ranges do not cover faster ones; "
-                               "neighbours are at their logged positions",
-                               measured.mean_s)}};
+constexpr char kElsewhere[] = "the hull of all cells with flights";
+constexpr char kLikeTheFlights[] =
+    "a flight whose residual is drawn from the same distribution as in these flights: same vehicles, task "
+    "and model";
+
+std::string what_it_rests_on(const MeasuredTruth& measured) {
+  return fmt::format(
+      "forces are means over {:g} s, so that the ranges do not cover faster ones; neighbours are at "
+      "their logged positions",
+      measured.mean_s);
 }
 
-void print_measured(const Json& measured) {
+void describe_measured(files::Record& record, const MeasuredTruth& measured, const LocalTube& tube) {
+  const ConformalThreshold& promise = measured.promise;
+  int with_flights = 0;
+  std::array<double, 3> widest_N{};
+  for (const ResidualEnvelope::Cell& cell : measured.envelope.cells) {
+    with_flights += cell.flights > 0 ? 1 : 0;
+    for (std::size_t k = 0; k < 3; ++k) widest_N[k] = std::max(widest_N[k], cell.force_N[k].mag());
+  }
+  record.field("level", promise.level, "Probability with which a further flight keeps the tube.");
+  record.field("flights", promise.flights, "That give scores.");
+  record.field("shape_flights", measured.shape_flights, "That give the middle and the width in each cell.");
+  record.field("interval", promise.coverage_90,
+               "5 % and 95 % quantiles of the probability, given these flights.");
+  record.field("factor", promise.threshold, "By which the widths of the shape are scaled.");
+  record.field("largest_residual_N", widest_N, "", "N");
+  record.field("mean_s", measured.mean_s, "Over which forces are averaged.", "s");
+  record.field("cells_with_flights", with_flights, "");
+  record.field("cells_in_tube", tube.residual_cells, "That vehicles in the tube can reach.");
+  record.field("cells_in_tube_without_flights", tube.residual_cells_without_flights, "");
+  record.field("elsewhere", kElsewhere, "What cells without flights use.");
+  record.field("like_them", kLikeTheFlights, "Which flights are promised.");
+  record.field("rests_on", what_it_rests_on(measured), "");
+}
+
+void print_measured(const MeasuredTruth& measured, const LocalTube& tube) {
+  const ConformalThreshold& promise = measured.promise;
   fmt::print(
       "  a further flight like the {} that were compared keeps it with probability {:g} "
       "({:.3f} to {:.3f} for these flights, 90 %)\n",
-      measured["flights"].get<int>() + measured["shape_flights"].get<int>(), measured["level"].get<double>(),
-      measured["interval"][0].get<double>(), measured["interval"][1].get<double>());
+      promise.flights + measured.shape_flights, promise.level, promise.coverage_90.lower,
+      promise.coverage_90.upper);
   fmt::print(
       "  residual by the place of the neighbour: shape of {} flights, {:.3g} times as wide for {} others\n",
-      measured["shape_flights"].get<int>(), measured["factor"].get<double>(), measured["flights"].get<int>());
+      measured.shape_flights, promise.threshold, promise.flights);
   fmt::print("  {} of the {} cells that the tube reaches have no such flight and use {}\n",
-             measured["cells_in_tube_without_flights"].get<int>(), measured["cells_in_tube"].get<int>(),
-             measured["elsewhere"].get<std::string>());
-  fmt::print("  like them: {}\n", measured["like_them"].get<std::string>());
-  fmt::print("  rests on: {}\n", measured["rests_on"].get<std::string>());
+             tube.residual_cells_without_flights, tube.residual_cells, kElsewhere);
+  fmt::print("  like them: {}\n  rests on: {}\n", kLikeTheFlights, what_it_rests_on(measured));
 }
 
-}  // namespace
+/// Ranges of the errors of all vehicles up to a time.
+struct Curve {
+  double until_s = 0;
+  std::vector<std::array<Interval, 3>> error_xyz_m;
+};
 
-Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube, const MeasuredTruth* measured) {
-  Json json = {{"task", arguments.task},
-               {"vehicles", arguments.vehicles},
-               {"duration_s", tube.duration_s},
-               {"loop", tube.is_sampled ? "sampled" : "continuous"},
-               {"velocity_error_m_s", tube.estimates.velocity_m_s},
-               {"position_error_m", tube.estimates.position_m},
-               {"motor_lag_s", {tube.motor_lag_s.lower, tube.motor_lag_s.upper}}};
-  LeastTube shown = tube.tube;
-  shown.proved = tube.proved;
-  shown.why = tube.why;
-  json.update(verdict_json(shown));
-  json["interrupted"] = tube.cancelled;
-  Json radii = Json::array();
-  for (std::size_t i = 0; tube.proved && i < tube.tube.radii.position_m.size(); ++i) {
-    radii.push_back({{"vehicle", i + 1},
-                     {"position_m", tube.tube.radii.position_m[i]},
-                     {"velocity_m_s", tube.tube.radii.velocity_m_s[i]}});
-  }
-  json["radii"] = std::move(radii);
-  for (const TubeRow& row : tube.rows) json[row.name] = tube_row_json(row);
-  Json bounds = Json::array();
-  for (const ForceErrorBounds& b : tube.bounds) bounds.push_back(force_bounds_json(b));
-  json["bounds"] = std::move(bounds);
-  Json assumptions = Json::array();
-  for (const stability::Assumption& a : tube.assumptions)
-    assumptions.push_back({{"name", a.name}, {"status", a.status}, {"note", a.note}});
-  json["assumptions"] = std::move(assumptions);
-  Json at = Json::array();
-  Json slices = Json::array();
+/// The slices of a proved tube, joined to about kCurvePoints.
+std::vector<Curve> curves_of(const LocalTube& tube) {
+  std::vector<Curve> curves;
   const std::size_t count = tube.proved ? tube.slices.size() : 0;
   const std::size_t every = std::max<std::size_t>(1, (count + kCurvePoints - 1) / kCurvePoints);
   for (std::size_t first = 0; first < count; first += every) {
     const std::size_t last = std::min(count, first + every);
-    Json largest = Json::array();
-    Json vehicles = Json::array();
+    Curve curve{static_cast<double>(last) * tube.slice_s, {}};
     for (std::size_t i = 0; i < tube.slices.front().size(); ++i) {
-      Json axes = Json::array();
-      for (std::size_t k = 0; k < 3; ++k) {
-        Interval e = tube.slices[first][i].position_m[k];
-        for (std::size_t n = first + 1; n < last; ++n) e = hull(e, tube.slices[n][i].position_m[k]);
-        axes.push_back({e.lower, e.upper});
-        if (k == 2) largest.push_back(e.mag());
-      }
-      vehicles.push_back(std::move(axes));
+      auto& range = curve.error_xyz_m.emplace_back(tube.slices[first][i].position_m);
+      for (std::size_t n = first + 1; n < last; ++n)
+        for (std::size_t k = 0; k < 3; ++k) range[k] = hull(range[k], tube.slices[n][i].position_m[k]);
     }
-    const double until_s = static_cast<double>(last) * tube.slice_s;
-    at.push_back({{"until_s", until_s}, {"error_z_m", std::move(largest)}});
-    slices.push_back({{"until_s", until_s}, {"error_xyz_m", std::move(vehicles)}});
+    curves.push_back(std::move(curve));
   }
-  json["slices"] = std::move(slices);
-  json["one_radius"] = verdict_json(tube.one_radius);
-  if (measured != nullptr) json["measured"] = measured_json(*measured, tube);
-  json["at"] = std::move(at);
-  return json;
+  return curves;
 }
 
-void print_local_tube(const Json& tube) {
-  const bool proved = tube["verdict"] == "proved";
-  fmt::print("\nTube around {} with {}, {:g} s, {} loop: {}\n", tube["task"].get<std::string>(),
-             counted(tube["vehicles"].get<std::size_t>(), "vehicle"), tube["duration_s"].get<double>(),
-             tube["loop"].get<std::string>(), tube["verdict"].get<std::string>());
-  if (proved) {
-    const Json& r = tube["radius_xyz_m"];
-    fmt::print("  errors stay below x {:.4g} m, y {:.4g} m, z {:.4g} m\n", r[0].get<double>(),
-               r[1].get<double>(), r[2].get<double>());
-    const Json& one = tube["one_radius"];
+struct VehicleRadii {
+  std::size_t vehicle = 0;
+  std::array<double, 3> position_m{}, velocity_m_s{};
+};
+
+std::array<double, 3> axes_of_estimates(const double (&values)[3]) {
+  return {values[0], values[1], values[2]};
+}
+
+const char* loop_name(const LocalTube& tube) { return tube.is_sampled ? "sampled" : "continuous"; }
+
+const char* verdict_name(const LocalTube& tube) { return tube.proved ? "proved" : "inconclusive"; }
+
+}  // namespace
+
+void describe(files::Record& record, const TaskTube& result) {
+  const LocalTube& tube = result.tube;
+  record.field("task", result.task, "");
+  record.field("vehicles", result.vehicles, "");
+  record.field("duration_s", tube.duration_s, "", "s");
+  record.field("loop", loop_name(tube), "For which it holds: continuous or sampled.");
+  record.field("velocity_error_m_s", axes_of_estimates(tube.estimates.velocity_m_s),
+               "Of the estimates, for which it holds.", "m/s");
+  record.field("position_error_m", axes_of_estimates(tube.estimates.position_m), "Likewise.", "m");
+  record.field("motor_lag_s", tube.motor_lag_s, "Least and largest lag of the motors for which it holds.",
+               "s");
+  describe_verdict(record, combined(tube));
+  record.field("interrupted", tube.cancelled, "");
+  std::vector<VehicleRadii> radii;
+  for (std::size_t i = 0; tube.proved && i < tube.tube.radii.position_m.size(); ++i)
+    radii.push_back({i + 1, tube.tube.radii.position_m[i], tube.tube.radii.velocity_m_s[i]});
+  record.list("radii", radii, "Largest errors of every vehicle.",
+              [](files::Record& r, const VehicleRadii& one) {
+                r.field("vehicle", one.vehicle, "From 1.");
+                r.field("position_m", one.position_m, "", "m", "upper bound");
+                r.field("velocity_m_s", one.velocity_m_s, "", "m/s", "upper bound");
+              });
+  for (const char* const name : {"product", "global", "local"}) {
+    const auto row = std::find_if(tube.rows.begin(), tube.rows.end(),
+                                  [name](const TubeRow& one) { return one.name == name; });
+    const bool is_present = row != tube.rows.end();
+    record.may_object(is_present, name, "What a Lipschitz bound of the network alone would prove.",
+                      [&](files::Record& r) { describe_tube_row(r, is_present ? *row : TubeRow()); });
+  }
+  record.list("bounds", tube.bounds, "Of the error along z, by class of the force error; null: not bounded.",
+              describe_force_error);
+  record.field("assumptions", tube.assumptions, "");
+  const std::vector<Curve> curves = curves_of(tube);
+  record.list("slices", curves, "Ranges of the errors over time.", [](files::Record& r, const Curve& curve) {
+    r.field("until_s", curve.until_s, "", "s");
+    r.field("error_xyz_m", curve.error_xyz_m, "Per vehicle and axis.", "m", "enclosure");
+  });
+  record.object("one_radius", "With one radius for the whole flight.",
+                [&tube](files::Record& r) { describe_verdict(r, tube.one_radius); });
+  record.may_object(result.measured.has_value(), "measured",
+                    "The residual of flights that the tube contains.", [&](files::Record& r) {
+                      describe_measured(r, result.measured ? *result.measured : MeasuredTruth(), tube);
+                    });
+  record.list("at", curves, "Largest height errors over time.", [](files::Record& r, const Curve& curve) {
+    std::vector<double> largest_m;
+    for (const auto& range : curve.error_xyz_m) largest_m.push_back(range[2].mag());
+    r.field("until_s", curve.until_s, "", "s");
+    r.field("error_z_m", largest_m, "Per vehicle.", "m", "upper bound");
+  });
+}
+
+void print(const TaskTube& result) {
+  const LocalTube& tube = result.tube;
+  fmt::print("\nTube around {} with {}, {:g} s, {} loop: {}\n", result.task,
+             counted(static_cast<std::size_t>(result.vehicles), "vehicle"), tube.duration_s, loop_name(tube),
+             verdict_name(tube));
+  if (tube.proved) {
+    fmt::print("  errors stay below x {:.4g} m, y {:.4g} m, z {:.4g} m\n", tube.tube.radius_m(0),
+               tube.tube.radius_m(1), tube.tube.radius_m(2));
     fmt::print("  with one radius for the whole flight: {} (loop gain {:.3g})\n",
-               radius_text(one["radius_m"]),
-               one["loop_gain"].is_number() ? one["loop_gain"].get<double>() : INFINITY);
-    for (const Json& b : tube["bounds"]) {
-      const auto number = [](const Json& x) {
-        return x.is_number() ? fmt::format("{:.4g}", x.get<double>()) : std::string("-");
-      };
-      const Json& e = b["force_error"];
+               radius_text(tube.one_radius), tube.one_radius.loop_gain);
+    const auto number = [](double x) {
+      return std::isfinite(x) ? fmt::format("{:.4g}", x) : std::string("-");
+    };
+    for (const ForceErrorBounds& b : tube.bounds) {
       fmt::print(
           "  vehicle {}: |f_hat - f_a| <= {} N, rate {} N/s, int {} N s; error by rate {}, amplitude {}, "
           "edges {}, impulse {}, slices {} m\n",
-          b["vehicle"].get<int>(), number(e["amplitude_N"]), number(e["rate_N_s"]), number(e["impulse_N_s"]),
-          number(b["rate"]), number(b["amplitude"]), number(b["edges"]), number(b["impulse"]),
-          number(b["slices"]));
+          b.vehicle + 1, number(b.amplitude_N), number(b.rate_N_s), number(b.impulse_N_s),
+          number(b.by_rate_m), number(b.by_amplitude_m), number(b.by_edges_m), number(b.by_impulse_m),
+          number(b.by_slices_m));
     }
-    if (tube.contains("measured")) print_measured(tube["measured"]);
+    if (result.measured) print_measured(*result.measured, tube);
   } else {
-    fmt::print("  {}\n", tube["why"].get<std::string>());
+    fmt::print("  {}\n", tube.why);
   }
-  for (const char* const name : {"product", "global", "local"}) {
-    if (!tube.contains(name)) continue;
-    const Json& row = tube[name];
-    const Json& L = row["lipschitz"];
+  for (const TubeRow& row : tube.rows) {
+    const ForceConstants worst = worst_of(row);
     const std::string constants =
-        L["position_N_m"].is_number()
-            ? fmt::format("{:.4g} N/m, {:.4g} N s/m", L["position_N_m"].get<double>(),
-                          L["velocity_N_s_m"].get<double>())
-            : fmt::format("{:.4g} N per (m, m/s)", L["all_N"].get<double>());
-    fmt::print("  {:<8} Lipschitz bound alone, {}: radius {} (loop gain {:.3g})\n", name, constants,
-               radius_text(row["radius_m"]),
-               row["loop_gain"].is_number() ? row["loop_gain"].get<double>() : INFINITY);
+        std::isfinite(worst.position)
+            ? fmt::format("{:.4g} N/m, {:.4g} N s/m", worst.position, worst.velocity)
+            : fmt::format("{:.4g} N per (m, m/s)", worst.together);
+    fmt::print("  {:<8} Lipschitz bound alone, {}: radius {} (loop gain {:.3g})\n", row.name, constants,
+               radius_text(row.tube), row.tube.loop_gain);
   }
-  for (const Json& a : tube["assumptions"]) {
-    const std::string note = a["note"].get<std::string>();
-    fmt::print("  {:<8} {}{}\n", a["status"].get<std::string>(), a["name"].get<std::string>(),
-               note.empty() ? "" : " (" + note + ")");
-  }
+  for (const stability::Assumption& a : tube.assumptions)
+    fmt::print("  {:<8} {}{}\n", a.status, a.name, a.note.empty() ? "" : " (" + a.note + ")");
 }
 
-void add_local_tube_plot(Report& report, const LocalTube& tube, const Json& json) {
+void add_plot(Report& report, const TaskTube& result) {
+  const LocalTube& tube = result.tube;
   report.heading("Tube around the task");
-  report.paragraph(fmt::format("{} with {}, {:g} s, {} loop: {}.", json["task"].get<std::string>(),
-                               counted(json["vehicles"].get<std::size_t>(), "vehicle"), tube.duration_s,
-                               json["loop"].get<std::string>(), json["verdict"].get<std::string>()));
+  report.paragraph(fmt::format("{} with {}, {:g} s, {} loop: {}.", result.task,
+                               counted(static_cast<std::size_t>(result.vehicles), "vehicle"), tube.duration_s,
+                               loop_name(tube), verdict_name(tube)));
   if (!tube.proved) report.paragraph(tube.why + ".");
   std::vector<std::vector<std::string>> rows;
-  rows.push_back({"difference of both forces, slice by slice", radius_text(json["radius_m"]), "any"});
-  rows.push_back({"difference of both forces, one radius", radius_text(json["one_radius"]["radius_m"]),
+  rows.push_back({"difference of both forces, slice by slice", radius_text(combined(tube)), "any"});
+  rows.push_back({"difference of both forces, one radius", radius_text(tube.one_radius),
                   fmt::format("{:.3g}", tube.one_radius.loop_gain)});
   for (const TubeRow& row : tube.rows) {
-    rows.push_back({row.name + " Lipschitz bound alone", radius_text(json[row.name]["radius_m"]),
+    rows.push_back({row.name + " Lipschitz bound alone", radius_text(row.tube),
                     fmt::format("{:.3g}", row.tube.loop_gain)});
   }
   report.table({"force error from", "radius", "loop gain"}, rows);
   if (!tube.proved) return;
   std::string data = "# until_s, then least and largest e_z per vehicle, m\n";
-  for (const Json& at : json["slices"]) {
-    data += fmt::format("{:.6g}", at["until_s"].get<double>());
-    for (const Json& e : at["error_xyz_m"])
-      data += fmt::format(" {:.6g} {:.6g}", e[2][0].get<double>(), e[2][1].get<double>());
+  for (const Curve& curve : curves_of(tube)) {
+    data += fmt::format("{:.6g}", curve.until_s);
+    for (const auto& range : curve.error_xyz_m)
+      data += fmt::format(" {:.6g} {:.6g}", range[2].lower, range[2].upper);
     data += "\n";
   }
   std::string script = "set xlabel 'time [s]'\nset ylabel 'height error [m]'\nplot ";

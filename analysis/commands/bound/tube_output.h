@@ -1,6 +1,7 @@
-/// @file `bound --tube --task`: the tube around a task, from the command line to JSON, text and a plot.
+/// @file `bound --tube --task`: the tube around a task, from the command line to the result, text and a plot.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,10 +39,15 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
                           const MeasuredTruth* measured, const CommonOptions& common,
                           std::vector<std::string>& inputs);
 
-files::Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube,
-                            const MeasuredTruth* measured);
-void print_local_tube(const files::Json& tube);
+struct TaskTube {
+  std::string task;
+  int vehicles = 2;
+  LocalTube tube;
+  std::optional<MeasuredTruth> measured;  ///< from the flights of --from
+};
+void describe(files::Record& record, const TaskTube& result);
+void print(const TaskTube& result);
 /// Adds a plot of the allowed errors over time, per vehicle, inside the radius.
-void add_local_tube_plot(Report& report, const LocalTube& tube, const files::Json& json);
+void add_plot(Report& report, const TaskTube& result);
 
 }  // namespace swarmcert::analysis

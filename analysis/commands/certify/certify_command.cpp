@@ -357,7 +357,7 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   CertifyOutput output = find_all(network, options, samples, progress);
   write_certificate(network, output, options.output, common.force);
   if (!options.output.empty() && host() == nullptr) compare_with_files(options, network);
-  const files::Json result = certify_json(network, output);
+  const files::Node result = certify_result(network, output);
   write_result(common, result);
   if (common.prints_text()) print_all(network, options, output);
   if (!options.report.empty()) {
@@ -487,7 +487,8 @@ Command certify_command() {
           if (blocks->count() > 0 && options->blocks.empty()) options->blocks = "every";
           return run_certify(*options, common);
         };
-      }};
+      },
+      [](files::Record& record) { describe_certify(record, files::Network(), CertifyOutput()); }};
 }
 
 }  // namespace swarmcert::analysis

@@ -1,4 +1,4 @@
-/// @file Results of `certify` as text and as JSON.
+/// @file Results of `certify`: described, and as text.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 #include "lipschitz/upper/comparison.h"
 #include "lipschitz/values/float32_error.h"
 #include "lipschitz/values/range.h"
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::analysis {
@@ -61,8 +61,9 @@ std::string label(const lipschitz::CertifiedBound& bound);
 std::vector<std::string> explain(const lipschitz::Comparison& comparison, double product, double upper,
                                  double lower);
 
-/// Returns the fields of schema swarmcert/certify/1.
-files::Json certify_json(const files::Network& network, const CertifyOutput& output);
+/// Describes the fields of the result after its head.
+void describe_certify(files::Record& record, const files::Network& network, const CertifyOutput& output);
+files::Node certify_result(const files::Network& network, const CertifyOutput& output);
 
 void print_certification(const files::Network& network, const CertifyOutput& output);
 

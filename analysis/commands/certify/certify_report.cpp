@@ -82,7 +82,7 @@ void add_layers(Report& report, const CertifyOutput& output) {
 }  // namespace
 
 std::string write_certify_report(const files::Network& network, const CertifyOutput& output,
-                                 const files::Json& result, const std::string& folder, bool overwrite) {
+                                 const files::Node& result, const std::string& folder, bool overwrite) {
   Report report("Lipschitz certificate");
   report.made_by(command_to_copy());
   report.result(result);

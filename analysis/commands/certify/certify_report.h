@@ -11,6 +11,6 @@ namespace swarmcert::analysis {
 /// `output`; the page embeds the JSON `result`.
 /// @throws files::InputError if the folder is not empty and `overwrite` is false.
 std::string write_certify_report(const files::Network& network, const CertifyOutput& output,
-                                 const files::Json& result, const std::string& folder, bool overwrite);
+                                 const files::Node& result, const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

@@ -25,6 +25,23 @@ struct CheckOptions {
   std::string gains, model;  ///< for a certificate of tracking gains
 };
 
+struct CheckResult {
+  bool accepted = false;
+  std::string reason, chain;
+  int spectral_norms = 0, upper_bounds = 0, lower_bounds = 0, values = 0;
+};
+
+void describe(files::Record& record, const CheckResult& result) {
+  record.field("accepted", result.accepted, "Whether every statement was verified in exact arithmetic.");
+  record.field("reason", result.reason, "Why, or why not.");
+  record.field("chain", result.chain, "The chain of operations that the certificate is about.");
+  record.field("spectral_norms", result.spectral_norms, "Spectral norms that were verified.");
+  record.field("upper_bounds", result.upper_bounds, "Upper bounds that were verified.");
+  record.field("lower_bounds", result.lower_bounds, "Lower bounds that were verified.");
+  record.field("values", result.values,
+               "Functions whose range, jump and float32 error over a box were verified.");
+}
+
 /// Whether the text is a certificate of tracking gains. Certificates of networks can be long, so they are parsed only
 /// once.
 bool is_of_tracking(const std::string& text, const std::string& path) {
@@ -91,15 +108,9 @@ int check_gains(const CheckOptions& options, const CommonOptions& common, const 
   const std::string gains = hash(options.gains), model = hash(options.model);
   check::TrackingVerdict verdict = check::check_tracking(certificate, gains, model);
   if (verdict.accepted && !gains.empty() && !model.empty()) compare_loops(options, certificate, verdict);
-  files::Json result = result_head("check", inputs);
-  result["accepted"] = verdict.accepted;
-  result["reason"] = verdict.reason;
-  result["chain"] = "tracking gains";
-  result["spectral_norms"] = 0;
-  result["upper_bounds"] = verdict.gains;
-  result["lower_bounds"] = 0;
-  result["values"] = 0;
-  write_result(common, result);
+  write_result(common, result_of("check", inputs, std::nullopt,
+                                 CheckResult{verdict.accepted, verdict.reason, "tracking gains", 0,
+                                             verdict.gains, 0, 0}));
   if (common.prints_text()) {
     if (verdict.accepted) {
       fmt::print("accepted: {}: {} gains of {} loops\n", verdict.reason, verdict.gains, verdict.loops);
@@ -130,15 +141,10 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
   std::vector<std::string> inputs;
   if (!is_in_memory) inputs.push_back(options.certificate);
   for (const std::string& path : input_files(network)) inputs.push_back(path);
-  files::Json result = result_head("check", inputs);
-  result["accepted"] = verdict.accepted;
-  result["reason"] = verdict.reason;
-  result["chain"] = files::chain_words(network);
-  result["spectral_norms"] = verdict.spectral_norms;
-  result["upper_bounds"] = verdict.upper_bounds;
-  result["lower_bounds"] = verdict.lower_bounds;
-  result["values"] = verdict.values;
-  write_result(common, result);
+  write_result(common, result_of("check", inputs, std::nullopt,
+                                 CheckResult{verdict.accepted, verdict.reason, files::chain_words(network),
+                                             verdict.spectral_norms, verdict.upper_bounds,
+                                             verdict.lower_bounds, verdict.values}));
   if (common.prints_text()) {
     if (verdict.accepted) {
       fmt::print("accepted: {}: {} spectral norms, {} upper bounds, {} lower bounds{}\n", verdict.reason,
@@ -181,7 +187,8 @@ Command check_command() {
         app.add_option("--model", options->model,
                        "model.toml to which a certificate of tracking gains must belong");
         return [options](const CommonOptions& common) { return run_check(*options, common); };
-      }};
+      },
+      fields_of<CheckResult>()};
 }
 
 }  // namespace swarmcert::analysis

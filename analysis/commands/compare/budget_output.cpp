@@ -3,6 +3,8 @@
 #include <fmt/core.h>
 
 #include <filesystem>
+#include <map>
+#include <optional>
 
 #include "nn/base/file_io.h"
 
@@ -33,26 +35,35 @@ double drop(const Budget& budget, const std::string& group) {
 
 }  // namespace
 
-files::Json json_of(const Budget& budget) {
-  files::Json json = {{"unit", "N"},
-                      {"quantity", "root mean square of the vertical force residual"},
-                      {"fit_flights", budget.fit_flights},
-                      {"test_flights", budget.test_flights},
-                      {"nominal_mass_kg", budget.masses_kg}};
-  json["rows"] = files::Json::array();
-  for (const BudgetRow& row : budget.rows) {
-    files::Json entry = {{"name", row.name}};
-    for (const auto& [group, statistics] : row.of) entry["rmse_z"][group] = statistics.rmse.z;
-    json["rows"].push_back(std::move(entry));
+void describe_budget(files::Record& record, const Budget& budget) {
+  using Values = std::map<std::string, double>;
+  std::map<std::string, std::size_t> records;
+  Values drops, rest;
+  if (!budget.rows.empty()) {
+    const BudgetRow* const network = network_row(budget);
+    for (const auto& [group, statistics] : budget.rows[0].of) {
+      records[group] = statistics.samples;
+      drops[group] = drop(budget, group);
+      if (network != nullptr && rmse_z(*network, group) > 0)
+        rest[group] = rmse_z(last_row(budget), group) / rmse_z(*network, group);
+    }
   }
-  const BudgetRow* const network = network_row(budget);
-  for (const auto& [group, statistics] : budget.rows[0].of) {
-    json["records"][group] = statistics.samples;
-    json["drop"][group] = drop(budget, group);
-    if (network != nullptr && rmse_z(*network, group) > 0)
-      json["rest_over_network"][group] = rmse_z(last_row(budget), group) / rmse_z(*network, group);
-  }
-  return json;
+  record.constant("unit", "N", "");
+  record.field("quantity", "root mean square of the vertical force residual", "");
+  record.field("fit_flights", budget.fit_flights, "");
+  record.field("test_flights", budget.test_flights, "");
+  record.field("nominal_mass_kg", budget.masses_kg, "By kind.", "kg");
+  record.list("rows", budget.rows, "Each with the effects of the rows above.",
+              [](files::Record& r, const BudgetRow& row) {
+                Values values;
+                for (const auto& [group, statistics] : row.of) values[group] = statistics.rmse.z;
+                r.field("name", row.name, "");
+                r.field("rmse_z", values, "By composition, kind, and all.", "N");
+              });
+  record.field("records", records, "By the same groups.");
+  record.field("drop", drops, "Share of the first row's error that the last removes.");
+  record.may("rest_over_network", rest.empty() ? std::nullopt : std::optional(rest),
+             "Error of the last model row over the network's.");
 }
 
 void print(const Budget& budget) {

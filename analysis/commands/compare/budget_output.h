@@ -1,16 +1,15 @@
-/// @file An error budget as JSON, as text and as model files.
+/// @file An error budget: described, as text and as model files.
 #pragma once
 
 #include <string>
 
 #include "analysis/identification/budget.h"
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::analysis {
 
-/// Returns `rows[]: {name, rmse_z: {composition: newton}}`, `drop` of the last model row relative to the first, and
-/// its ratio to the network's row.
-files::Json json_of(const identification::Budget& budget);
+/// Describes the rows, the drop of the last model row relative to the first, and its ratio to the network's row.
+void describe_budget(files::Record& record, const identification::Budget& budget);
 
 void print(const identification::Budget& budget);
 

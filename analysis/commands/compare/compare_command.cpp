@@ -19,6 +19,7 @@
 #include "analysis/commands/compare/budget_output.h"
 #include "analysis/commands/compare/compare_output.h"
 #include "analysis/commands/compare/compare_report.h"
+#include "analysis/commands/compare/compare_result.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/shared/prediction_output.h"
 #include "analysis/residuals/comparison.h"
@@ -98,9 +99,9 @@ identification::Budget budget_of(const CompareOptions& options, const residuals:
 
 /// Writes every log with the contribution of the model's effects added to its accelerometer; logs of vehicles without
 /// a model are copied unchanged. Folder and file names are kept, so that flights remain flights.
-files::Json inject(const residuals::Inputs& inputs, const std::string& folder, bool overwrite) {
+InjectedLogs inject(const residuals::Inputs& inputs, const std::string& folder, bool overwrite) {
   namespace fs = std::filesystem;
-  files::Json injected = files::Json::array(), unchanged = files::Json::array();
+  InjectedLogs result;
   const auto place_of = [](const std::string& log) {
     const fs::path from = fs::absolute(log).lexically_normal();
     return (from.parent_path().filename() / from.filename()).string();
@@ -125,120 +126,48 @@ files::Json inject(const residuals::Inputs& inputs, const std::string& folder, b
                         track.position_only ? files::read_file(track.path)
                                             : stability::to_usd_log(residuals::injected_log(inputs, track)),
                         overwrite);
-      (track.position_only ? unchanged : injected).push_back(place);
+      (track.position_only ? result.unchanged : result.logs).push_back(place);
     }
   }
-  return {{"loop", "open: vehicles do not react"},
-          {"logs", std::move(injected)},
-          {"unchanged", std::move(unchanged)}};
+  return result;
 }
 
-/// The largest values over the windows of a flight; axes that are not judged are null.
-files::Json largest_json(const residuals::ErrorOfFlight& error, const std::function<bool(int)>& is_judged) {
-  const auto axes = [&is_judged](const Eigen::Vector4d& v) {
-    files::Json json = files::Json::object();
-    for (int k = 0; k < 4; ++k) {
-      const char* const kNames[] = {"x", "y", "z", "total"};
-      json[kNames[k]] = is_judged(k) ? files::Json(v[k]) : files::Json();
-    }
-    return json;
-  };
-  const residuals::ErrorWindow largest = error.largest();
-  return {{"windows", error.windows.size()},      {"bias", axes(error.bias)},
-          {"amplitude", axes(largest.amplitude)}, {"rate", axes(largest.rate)},
-          {"variation", axes(largest.variation)}, {"impulse", axes(largest.impulse)}};
+ErrorsOfFlights errors_of(const std::vector<std::vector<residuals::FlightError>>& by_flight) {
+  std::vector<residuals::FlightError> all;
+  for (const auto& errors : by_flight) all.insert(all.end(), errors.begin(), errors.end());
+  ErrorsOfFlights result;
+  result.velocity = residuals::velocity_error(all);
+  for (residuals::FlightError& error : all) result.by_log.emplace(error.path, std::move(error));
+  return result;
 }
 
-files::Json places_json(const std::vector<residuals::PlaceResidual>& places) {
-  files::Json cells = files::Json::array();
-  for (const residuals::PlaceResidual& place : places) {
-    cells.push_back({{"cell", place.cell},
-                     {"records", place.records},
-                     {"least", {place.least_N[0], place.least_N[1], place.least_N[2]}},
-                     {"largest", {place.largest_N[0], place.largest_N[1], place.largest_N[2]}}});
-  }
-  return cells;
-}
-
-files::Json place_grid_json() {
-  using Grid = residuals::PlaceGrid;
-  return {{"lowest_m", Grid::kLowest_m}, {"height_step_m", Grid::kHeightStep_m},
-          {"heights", Grid::kHeights},   {"lateral_step_m", Grid::kLateralStep_m},
-          {"laterals", Grid::kLateral},  {"mean_s", residuals::kPlaceMean_s}};
-}
-
-/// Adds flights[].learning_error, flights[].velocity_error and flights[].residual_by_place, from which bound
-/// --coverage computes its promise, and the quantiles of the velocity error over all windows.
-void add_flight_errors(const std::vector<residuals::FlightError>& all, files::Json& result) {
-  std::map<std::string, const residuals::FlightError*> errors;
-  for (const residuals::FlightError& error : all) errors[error.path] = &error;
-  for (files::Json& flight : result["flights"]) {
-    flight["learning_error"] = flight["velocity_error"] = flight["residual_by_place"] = nullptr;
-    const auto found = errors.find(flight["file"].get<std::string>());
-    if (found == errors.end()) continue;
-    // The same axes as in the errors of the flight.
-    const auto is_judged = [&flight](int k) {
-      const char* const kNames[] = {"x", "y", "z"};
-      return k == 3 || !flight["rmse"][kNames[k]].is_null();
-    };
-    flight["learning_error"] = largest_json(found->second->force, is_judged);
-    // A tube needs all three axes.
-    if (is_judged(0) && is_judged(1) && is_judged(2))
-      flight["residual_by_place"] = places_json(found->second->places);
-    if (!found->second->velocity.windows.empty())
-      flight["velocity_error"] = largest_json(found->second->velocity, [](int) { return true; });
-  }
-  result["place_grid"] = place_grid_json();
-  const std::optional<residuals::VelocityError> velocity = residuals::velocity_error(all);
-  result["velocity_error"] = velocity ? json_of(*velocity) : files::Json();
-}
-
-/// How often the promise held on FLIGHTS, and where it failed.
-files::Json kept_promise_json(const residuals::Inputs& inputs, const std::string& path, int jobs) {
-  const Promise promise = read_promise(path);
-  const KeptPromise kept = kept_promise(promise, residuals::flight_peaks(inputs, jobs));
-  files::Json axes = files::Json::array();
+void print_promise_kept(const JudgedPromise& judged) {
+  fmt::print("\nThe promise of {} (probability {:g}) on flights that it was not made from\n", judged.file,
+             judged.promise.level);
   for (int axis = 0; axis < 3; ++axis) {
-    const auto i = static_cast<std::size_t>(axis);
-    const KeptAlong& along = kept.axes[i];
-    axes.push_back(
-        {{"axis", stability::axis_name(axis)},
-         {"bound", std::isfinite(promise.bound_m[i]) ? files::Json(promise.bound_m[i]) : files::Json()},
-         {"unit", "m"},
-         {"flights", along.flights},
-         {"held", along.held},
-         {"share", along.flights > 0 ? files::Json(along.share()) : files::Json()},
-         {"interval_90", along.interval_90}});
-  }
-  return {{"file", path}, {"level", promise.level}, {"axes", axes}, {"left_out", kept.used}};
-}
-
-void print_promise_kept(const files::Json& promise) {
-  fmt::print("\nThe promise of {} (probability {:g}) on flights that it was not made from\n",
-             promise["file"].get<std::string>(), promise["level"].get<double>());
-  for (const files::Json& row : promise["axes"]) {
-    if (row["flights"] == 0) {
-      fmt::print("  {}: no flight has a set point\n", row["axis"].get<std::string>());
+    const KeptAlong& along = judged.kept.axes[static_cast<std::size_t>(axis)];
+    const char* const name = stability::axis_name(axis);
+    if (along.flights == 0) {
+      fmt::print("  {}: no flight has a set point\n", name);
       continue;
     }
-    fmt::print("  {}: held in {} of {} flights ({:.3g}, 90 % interval {:.3f} to {:.3f})\n",
-               row["axis"].get<std::string>(), row["held"].get<int>(), row["flights"].get<int>(),
-               row["share"].get<double>(), row["interval_90"][0].get<double>(),
-               row["interval_90"][1].get<double>());
+    fmt::print("  {}: held in {} of {} flights ({:.3g}, 90 % interval {:.3f} to {:.3f})\n", name, along.held,
+               along.flights, along.share(), along.interval_90.lower, along.interval_90.upper);
   }
-  if (!promise["left_out"].empty())
+  if (!judged.kept.used.empty())
     fmt::print("  left out: {} logs that it was made from, and all of their flights\n",
-               promise["left_out"].size());
+               judged.kept.used.size());
 }
 
-/// Returns the errors of the prediction over --horizon, and writes it where --predictions says.
-files::Json prediction_json(const CompareOptions& options, const residuals::Inputs& inputs,
-                            const CommonOptions& common) {
+/// Predicts over --horizon, and writes the predictions where --predictions says.
+std::optional<Prediction> predict(const CompareOptions& options, const residuals::Inputs& inputs,
+                                  const CommonOptions& common) {
   const bool keeps = !options.predictions.empty();
-  const std::vector<residuals::FlightPrediction> flights =
+  std::vector<residuals::FlightPrediction> flights =
       residuals::predict(inputs, options.horizon_s, keeps, common.jobs);
   if (keeps) write_predictions(flights, options.predictions, common.force);
-  return json_of(flights);
+  for (residuals::FlightPrediction& flight : flights) flight.states = {};
+  return prediction_of(std::move(flights));
 }
 
 /// Output files must not exist yet, unless --force is given.
@@ -258,30 +187,26 @@ void check_outputs(const CompareOptions& options, const CommonOptions& common) {
   }
 }
 
-/// Results requested in addition to the comparison.
-struct Extras {
-  std::optional<residuals::Comparison> own;  ///< with this tool's filter instead of the published one
-  std::optional<identification::Budget> budget;
-};
-
-Extras add_extras(const CompareOptions& options, const residuals::Inputs& inputs, const CommonOptions& common,
-                  const residuals::Progress& show, files::Json& result) {
-  Extras extras;
+/// Computes what was requested in addition to the comparison.
+void add_extras(const CompareOptions& options, const CommonOptions& common, const residuals::Progress& show,
+                CompareResult& result) {
+  const residuals::Inputs& inputs = result.inputs;
   if (options.flights.published_filter) {
     FlightOptions without = options.flights;
     without.published_filter = false;
-    extras.own = residuals::compare(read_flights(without, true), common.jobs, show);
-    result["mean_square_z_gf2_own_filter"] = mean_squares_gf2(*extras.own);
+    result.own = residuals::compare(read_flights(without, true), common.jobs, show);
   }
   if (!options.budget.empty()) {
-    extras.budget = budget_of(options, inputs, common);
-    result["budget"] = json_of(*extras.budget);
-    if (!options.fitted.empty()) write_fitted(*extras.budget, inputs.fleet, options.fitted, common.force);
+    result.budget = budget_of(options, inputs, common);
+    if (!options.fitted.empty()) write_fitted(*result.budget, inputs.fleet, options.fitted, common.force);
   }
-  if (!options.inject.empty()) result["injected"] = inject(inputs, options.inject, common.force);
-  if (!options.promise.empty()) result["promise"] = kept_promise_json(inputs, options.promise, common.jobs);
-  if (options.horizon_s > 0) result["prediction"] = prediction_json(options, inputs, common);
-  return extras;
+  if (!options.inject.empty()) result.injected = inject(inputs, options.inject, common.force);
+  if (!options.promise.empty()) {
+    const Promise promise = read_promise(options.promise);
+    result.promise = {options.promise, promise,
+                      kept_promise(promise, residuals::flight_peaks(inputs, common.jobs))};
+  }
+  if (options.horizon_s > 0) result.prediction = predict(options, inputs, common);
 }
 
 /// If no log could be read, the input is bad; if the flights contain too little data, the result is inconclusive.
@@ -301,7 +226,9 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   const auto start = std::chrono::steady_clock::now();
   check_outputs(options, common);
   const residuals::GainsOfKinds gains = read_gains(options.gains);
-  residuals::Inputs inputs = read_flights(options.flights, true, true);
+  CompareResult result;
+  residuals::Inputs& inputs = result.inputs;
+  inputs = read_flights(options.flights, true, true);
   // A single pass reads each log once, or twice in succession, so a small cache suffices.
   constexpr std::size_t kOfOnePass_bytes = std::size_t{64} << 20;
   if (options.budget.empty() && options.inject.empty() && options.promise.empty())
@@ -317,34 +244,28 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
     if (!wants_errors) return;
     if (auto error = residuals::flight_error(inputs, track)) errors[flight].push_back(std::move(*error));
   };
-  const residuals::Comparison comparison = residuals::compare(inputs, common.jobs, show, gains, add_error);
+  result.comparison = residuals::compare(inputs, common.jobs, show, gains, add_error);
   std::vector<std::string> files = inputs.files();
   for (const auto& [kind, file] : gains) files.push_back(file.path);
   if (!options.promise.empty()) files.push_back(options.promise);
-  files::Json result = result_head("compare", files);
-  add_comparison(comparison, inputs, result);
-  if (wants_errors) {
-    std::vector<residuals::FlightError> all;
-    for (auto& flight : errors) std::move(flight.begin(), flight.end(), std::back_inserter(all));
-    add_flight_errors(all, result);
-  }
-  const Extras extras = add_extras(options, inputs, common, show, result);
-  write_result(common, result);
+  if (wants_errors) result.errors = errors_of(errors);
+  add_extras(options, common, show, result);
+  const files::Node described = result_of("compare", files, std::nullopt, result);
+  write_result(common, described);
   if (common.prints_text()) {
-    print_comparison(comparison, inputs, extras.own ? &*extras.own : nullptr);
-    if (!options.promise.empty()) print_promise_kept(result["promise"]);
-    if (extras.budget) print(*extras.budget);
-    if (options.horizon_s > 0) print_prediction(result["prediction"]);
+    print_comparison(result.comparison, inputs, result.own ? &*result.own : nullptr);
+    if (result.promise) print_promise_kept(*result.promise);
+    if (result.budget) print(*result.budget);
+    if (result.prediction) print_prediction(*result.prediction);
     const std::chrono::duration<double> run = std::chrono::steady_clock::now() - start;
     if (inputs.found.flights.size() > 1)
       fmt::print("Run time: {:.1f} s for {}.\n", run.count(), counted(inputs.found.flights.size(), "flight"));
   }
   if (!options.report.empty()) {
-    const std::string path =
-        write_compare_report(comparison, inputs, unit, result, options.report, common.force);
+    const std::string path = write_compare_report(result, unit, described, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
-  return exit_code_of(comparison);
+  return exit_code_of(result.comparison);
 }
 
 }  // namespace
@@ -398,7 +319,8 @@ Command compare_command() {
             "per record, clocks as they are, |f_a,z| < 50 gf, contact kept; also prints the mean squares "
             "with this project's own filter");
         return [options](const CommonOptions& common) { return run_compare(*options, common); };
-      }};
+      },
+      fields_of<CompareResult>()};
 }
 
 }  // namespace swarmcert::analysis

@@ -172,12 +172,13 @@ void add_learning_error(Report& report, const residuals::LearningError& learning
 
 }  // namespace
 
-std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
-                                 const residuals::ForceUnit& unit, const files::Json& result,
-                                 const std::string& folder, bool overwrite) {
+std::string write_compare_report(const CompareResult& result, const residuals::ForceUnit& unit,
+                                 const files::Node& described, const std::string& folder, bool overwrite) {
+  const residuals::Comparison& comparison = result.comparison;
+  const residuals::Inputs& inputs = result.inputs;
   Report report("Model against flights");
   report.made_by(command_to_copy());
-  report.result(result);
+  report.result(described);
   for (const stability::Model& model : inputs.models) {
     std::string effects;
     for (const stability::EffectSpec& effect : model.effects)
@@ -217,7 +218,7 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
   add_time_series(report, comparison, nullptr, unit.name, 1 / unit.size_N);
   add_trajectories(report, comparison);
   add_learning_error(report, comparison.learning_error, unit);
-  if (result.contains("prediction")) add_prediction(report, result["prediction"]);
+  if (result.prediction) add_prediction(report, *result.prediction);
 
   report.heading("Flights");
   rows.clear();

@@ -63,12 +63,12 @@ void print_clocks(const Comparison& comparison) {
 
 }  // namespace
 
-files::Json clocks_json(const Comparison& comparison) {
+void describe_clocks(files::Record& record, const Comparison& comparison) {
   const Clocks clocks = clocks_of(comparison);
-  return {{"reference", clocks.reference},
-          {"absolute", clocks.absolute},
-          {"estimated", clocks.estimated},
-          {"unknown", clocks.unknown}};
+  record.field("reference", clocks.reference, "First of their flight.");
+  record.field("absolute", clocks.absolute, "With absolute times, or in the file of the first.");
+  record.field("estimated", clocks.estimated, "By common starts of commanded movements.");
+  record.field("unknown", clocks.unknown, "Taken as synchronous.");
 }
 
 const char* clock_of(const TrackErrors& track) {

@@ -2,12 +2,12 @@
 #pragma once
 
 #include "analysis/residuals/comparison.h"
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::analysis {
 
-/// Returns {reference, estimated, unknown}: the number of logs by the state of their clocks.
-files::Json clocks_json(const residuals::Comparison& comparison);
+/// Describes the number of logs by the state of their clocks.
+void describe_clocks(files::Record& record, const residuals::Comparison& comparison);
 
 /// Returns "reference" for the first log of its flight, to which the other clocks are related; "estimated"; or
 /// "unknown": taken as synchronous, because no common start of a commanded movement gave an offset.

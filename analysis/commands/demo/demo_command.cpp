@@ -81,8 +81,8 @@ std::string certify_network(const files::Network& network, const std::string& fi
   CertifyOutput output;
   output.found = found;
   output.verdict = lipschitz::Verdict::kProved;
-  const files::Json json = files::to_json(result_of("demo", input_files(network), std::nullopt, result));
-  return write_certify_report(network, output, json, (folder / "report").string(), common.force);
+  return write_certify_report(network, output, result_of("demo", input_files(network), std::nullopt, result),
+                              (folder / "report").string(), common.force);
 }
 
 /// Simulates random walks of two vehicles with the effects of crazyflie-small-effects.toml into FOLDER/1 .. FOLDER/3.

@@ -29,6 +29,16 @@ struct GateOptions {
   bool hashes = false;
 };
 
+struct GateRun {
+  gate::GateResult result;
+  bool updates_baseline = false;
+};
+
+void describe(files::Record& record, const GateRun& run) {
+  describe(record, run.result);
+  record.field("updates_baseline", run.updates_baseline, "Whether the baseline is replaced by these values.");
+}
+
 struct VerifyOptions {
   std::string folder, sha256, key;
 };
@@ -75,15 +85,15 @@ bool may_become_baseline(const gate::GateResult& result) {
 }
 
 /// Writes the result in every format that was asked for, and prints it.
-void write_outputs(const gate::GateResult& result, const files::Json& json, const GateOptions& options,
+void write_outputs(const gate::GateResult& result, const files::Node& record, const GateOptions& options,
                    const CommonOptions& common) {
   const bool allow = options.allow_inconclusive;
   if (!options.junit.empty()) files::write_file(options.junit, to_junit(result), common.force);
   if (!options.sarif.empty()) files::write_file(options.sarif, to_sarif(result, allow), common.force);
   if (!options.markdown.empty()) files::write_file(options.markdown, to_markdown(result), common.force);
   std::string report;
-  if (!options.report.empty()) report = write_gate_report(result, json, options.report, common.force);
-  write_result(common, json);
+  if (!options.report.empty()) report = write_gate_report(result, record, options.report, common.force);
+  write_result(common, record);
   if (common.prints_text()) fmt::print("{}", to_table(result));
   if (common.prints_text() && !report.empty()) fmt::print("report: {}\n", report);
   if (options.github) {
@@ -92,13 +102,10 @@ void write_outputs(const gate::GateResult& result, const files::Json& json, cons
   }
 }
 
-files::Json json_of(const gate::GateResult& result, const GateOptions& options) {
+files::Node described(const gate::GateResult& result, const GateOptions& options) {
   std::vector<std::string> inputs;
   for (const gate::EvidenceFile& file : result.files) inputs.push_back(file.path);
-  files::Json json = result_head("gate", inputs);
-  add_json(result, json);
-  json["updates_baseline"] = options.update_baseline;
-  return json;
+  return result_of("gate", inputs, std::nullopt, GateRun{result, options.update_baseline});
 }
 
 void refuse_outputs(const GateOptions& options, const CommonOptions& common) {
@@ -117,12 +124,12 @@ void refuse_outputs(const GateOptions& options, const CommonOptions& common) {
 }
 
 /// Writes the bundle, then replaces the baseline: the bundle contains the one against which the release was checked.
-void keep_release(const gate::Policy& policy, const gate::GateResult& result, const files::Json& json,
+void keep_release(const gate::Policy& policy, const gate::GateResult& result, const files::Node& record,
                   const GateOptions& options, const CommonOptions& common) {
   if (!options.bundle.empty()) {
     const bool may = result.verdict() == gate::Verdict::kPass;
     const std::string sha256 =
-        may ? write_bundle(options.bundle, policy, result, json, options.key, common.force) : "";
+        may ? write_bundle(options.bundle, policy, result, to_json(record), options.key, common.force) : "";
     if (common.prints_text()) {
       if (may) fmt::print("bundle: {}\nSHA-256 of its statement: {}\n", options.bundle, sha256);
       if (!may) fmt::print("no bundle: the release does not pass\n");
@@ -146,7 +153,7 @@ int run_gate(const GateOptions& options, const CommonOptions& common) {
     if (options.hashes) throw;
     // Whoever reads the outputs learns about a broken policy from them.
     const gate::GateResult refused = gate::refused_policy(options.policy, error);
-    write_outputs(refused, json_of(refused, options), options, common);
+    write_outputs(refused, described(refused, options), options, common);
     throw;
   }
   if (options.hashes) {
@@ -158,9 +165,9 @@ int run_gate(const GateOptions& options, const CommonOptions& common) {
   settings.baseline = options.baseline;
   settings.may_lack_baseline = settings.updates_baseline = options.update_baseline;
   const gate::GateResult result = run_gate(*policy, settings);
-  const files::Json json = json_of(result, options);
-  write_outputs(result, json, options, common);
-  keep_release(*policy, result, json, options, common);
+  const files::Node record = described(result, options);
+  write_outputs(result, record, options, common);
+  keep_release(*policy, result, record, options, common);
   return exit_code(result, options.allow_inconclusive);
 }
 
@@ -173,14 +180,7 @@ int verify(const VerifyOptions& options, const CommonOptions& common) {
     verdict.accepted = false;
     verdict.reason = "the statement's SHA-256 is " + verdict.statement_sha256 + ": this is another release";
   }
-  files::Json json = result_head("verify-bundle", {});
-  json["accepted"] = verdict.accepted;
-  json["reason"] = gate::printable(verdict.reason);
-  json["statement_sha256"] = verdict.statement_sha256;
-  json["files"] = verdict.files;
-  json["verified"] = verdict.verified;
-  json["not_verified"] = verdict.not_verified;
-  write_result(common, json);
+  write_result(common, result_of("verify-bundle", {}, std::nullopt, verdict));
   if (common.prints_text()) {
     for (const std::string& what : verdict.verified) fmt::print("  {}\n", what);
     for (const std::string& what : verdict.not_verified) fmt::print("  not verified: {}\n", what);
@@ -226,7 +226,8 @@ Command gate_command() {
         app.add_flag("--hashes", options->hashes,
                      "Print a table [hashes] of the release's files for the policy, and check nothing");
         return [options](const CommonOptions& common) { return run_gate(*options, common); };
-      }};
+      },
+      fields_of<GateRun>()};
 }
 
 Command verify_bundle_command() {
@@ -245,7 +246,8 @@ Command verify_bundle_command() {
                            "Expected SHA-256 of the statement, as printed by gate");
             app.add_flag("--rerun", "Accepted for older scripts: all checks always run again");
             return [options](const CommonOptions& common) { return verify(*options, common); };
-          }};
+          },
+          fields_of<gate::BundleVerdict>()};
 }
 
 }  // namespace swarmcert::analysis

@@ -48,11 +48,11 @@ void add_checks(Report& report, const gate::GateResult& result) {
 
 }  // namespace
 
-std::string write_gate_report(const gate::GateResult& result, const files::Json& json,
+std::string write_gate_report(const gate::GateResult& result, const files::Node& record,
                               const std::string& folder, bool overwrite) {
   Report report("May this release ship?");
   report.made_by(command_to_copy());
-  report.result(json);
+  report.result(record);
   const std::string not_run = fmt::format("{}", fmt::join(result.not_run, ", "));
   report.paragraph(fmt::format("Verdict: {}. {} checks passed, {} failed, {} inconclusive.{}",
                                gate::name(result.verdict()), result.count(gate::Verdict::kPass),

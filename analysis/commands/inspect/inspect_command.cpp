@@ -363,7 +363,7 @@ int run_inspect(InspectOptions options, const CommonOptions& common) {
     result["flights"] = std::move(flights);
     result["skipped"] = std::move(skipped);
   }
-  if (!rows.empty()) result["collections"] = json_of(rows);
+  if (!rows.empty()) result["collections"] = files::to_json(files::record_of(rows));
   if (!options.report.empty()) {
     if (seen.logs.empty()) throw UsageError("--report is a page of flight logs, and none was read");
     const std::string page = write_inspect_report(seen.logs, rows, result, options.report, common.force);

@@ -106,7 +106,7 @@ files::Json describe_log(const logs::Log& log) {
                        {"least_V", story.battery_least_V}};
   json["interpretation"] = log.interpretation;
   json["health"] = health_of(log.health);
-  json["plausibility"] = json_of(logs::doubts_of(log));
+  json["plausibility"] = files::to_json(files::record_of(logs::doubts_of(log)));
   return json;
 }
 

@@ -1,6 +1,8 @@
 #include <fmt/core.h>
 
 #include <memory>
+#include <optional>
+#include <variant>
 #include <vector>
 
 #include "analysis/commands/commands.h"
@@ -21,46 +23,67 @@ struct MatchOptions {
   int most_neighbours = firmware::ExportOptions().most_neighbours;
 };
 
-/// Members for a changed number and a changed file; null if the difference is neither.
-files::Json first_difference_of(const firmware::ArtefactMatch& match) {
-  if (!match.first_difference) return {};
-  files::Json json = {{"what", *match.first_difference}};
-  if (const auto& file = match.file_difference) {
-    json["file"] = file->file;
-    json["line"] = file->line > 0 ? files::Json(file->line) : files::Json();
-    json["expected"] = file->expected;
-    json["found"] = file->found;
-  }
-  if (const auto& number = match.number_difference) {
-    json["network"] = number->part;
-    json["layer"] = number->layer;
-    json["entry"] = number->entry;
-    json["expected"] = number->expected;
-    json["expected_hex"] = files::hex_float(static_cast<double>(number->expected));
-    json["found"] = number->found ? files::Json(*number->found) : files::Json();
-    if (number->found) json["found_hex"] = files::hex_float(static_cast<double>(*number->found));
-    json["name"] = number->name;
-    json["place"] = number->place;
-  }
-  return json;
+void describe_difference(files::Record& record, const firmware::ArtefactMatch& match) {
+  using NumberOrText = std::variant<double, std::string>;
+  const auto number = match.number_difference.value_or(firmware::Difference());
+  const auto file = match.file_difference.value_or(firmware::FileDifference());
+  const bool has_number = match.number_difference.has_value(), has_file = match.file_difference.has_value();
+  const std::optional<double> found = number.found;
+  record.field("what", match.first_difference.value_or(""), "The difference in words.");
+  record.may_fields(has_file && !has_number, [&](files::Record& r) {
+    r.field("file", file.file, "Exported file that differs.");
+    r.field("line", file.line > 0 ? std::optional(file.line) : std::nullopt, "Null: the whole file.");
+  });
+  record.may_fields(has_file || has_number, [&](files::Record& r) {
+    r.field("expected", has_number ? NumberOrText(double{number.expected}) : NumberOrText(file.expected),
+            "The network's number, or the line of the export.");
+    r.field("found",
+            has_number && !found
+                ? std::nullopt
+                : std::optional(has_number ? NumberOrText(*found) : NumberOrText(file.found)),
+            "Null: no numbers resemble the array.");
+  });
+  record.may_fields(has_number, [&](files::Record& r) {
+    r.field("network", number.part, "As \"phi:small\".");
+    r.field("layer", number.layer, "");
+    r.field("entry", number.entry, "As \"weight[3][2]\" or \"bias[7]\".");
+    r.field("expected_hex", files::hex_float(double{number.expected}), "", "", "exact");
+    r.may("found_hex", found ? std::optional(files::hex_float(*found)) : std::nullopt, "", "", "exact");
+    r.field("name", number.name, "Variable or symbol.");
+    r.field("place", number.place, "Line or address.");
+  });
 }
 
-void add_json(const firmware::ArtefactMatch& match, files::Json& json) {
-  const bool is_open = match.verdict == firmware::ArtefactVerdict::kInconclusive;
-  json["verdict"] = firmware::name(match.verdict);
-  json["equal"] = is_open ? files::Json() : files::Json(match.verdict == firmware::ArtefactVerdict::kEqual);
-  json["arrays"] = match.arrays;
-  json["numbers"] = match.numbers;
-  json["files"] = match.files;
-  json["compared"] = match.compared;
-  json["not_checked"] = match.not_checked;
-  json["not_covered"] = match.not_covered;
-  json["parameters"] = nullptr;
-  if (match.parameters)
-    json["parameters"] = {{"most_neighbours", match.parameters->most_neighbours},
-                          {"seed", match.parameters->seed},
-                          {"certificate", match.parameters->certificate_sha256}};
-  json["first_difference"] = first_difference_of(match);
+struct Result {
+  firmware::ArtefactMatch match;
+  bool is_rounded = false;
+};
+
+void describe(files::Record& record, const Result& result) {
+  using firmware::ArtefactVerdict;
+  const firmware::ArtefactMatch& match = result.match;
+  const bool is_open = match.verdict == ArtefactVerdict::kInconclusive;
+  record.field("as", result.is_rounded ? std::optional<std::string>("float32") : std::nullopt,
+               "Arithmetic in which the network flies; null: as stored.");
+  record.field("verdict", std::string(name(match.verdict)), "equal, different or inconclusive.");
+  record.field("equal", is_open ? std::nullopt : std::optional(match.verdict == ArtefactVerdict::kEqual),
+               "Null: neither was shown.");
+  record.field("arrays", match.arrays, "Arrays of weights that were compared.");
+  record.field("numbers", match.numbers, "Weights and biases in them.");
+  record.field("files", match.files, "Files that were read.");
+  record.field("compared", match.compared, "What was compared, in words.");
+  record.field("not_checked", match.not_checked, "What could not be compared, and why.");
+  record.field("not_covered", match.not_covered, "What no comparison covers.");
+  const auto parameters = match.parameters.value_or(firmware::ExportOptions());
+  record.object_or_null(match.parameters.has_value(), "parameters",
+                        "Those of the export, as its files state them; null: there is no export.",
+                        [&](files::Record& r) {
+                          r.field("most_neighbours", parameters.most_neighbours, "");
+                          r.field("seed", parameters.seed, "Of the golden vectors.");
+                          r.field("certificate", parameters.certificate_sha256, "Its SHA-256; empty: none.");
+                        });
+  record.object_or_null(match.first_difference.has_value(), "first_difference", "Null: there is none.",
+                        [&](files::Record& r) { describe_difference(r, match); });
 }
 
 void print(const firmware::ArtefactMatch& match, const std::string& file) {
@@ -117,10 +140,7 @@ int run_match(MatchOptions options, const CommonOptions& common) {
   }
   const firmware::ArtefactMatch match = match_artefact(network, options.file, artefact);
   inputs.insert(inputs.end(), match.files.begin(), match.files.end());
-  files::Json json = result_head("match", inputs);
-  json["as"] = is_rounded ? files::Json("float32") : files::Json();
-  add_json(match, json);
-  write_result(common, json);
+  write_result(common, result_of("match", inputs, std::nullopt, Result{match, is_rounded}));
   if (common.prints_text()) print(match, options.file);
   return exit_code(match.verdict);
 }
@@ -164,7 +184,8 @@ Command match_command() {
                 ->check(CLI::Range(1, 64))
                 ->capture_default_str();
             return [options](const CommonOptions& common) { return run_match(*options, common); };
-          }};
+          },
+          fields_of<Result>()};
 }
 
 }  // namespace swarmcert::analysis

@@ -68,20 +68,27 @@ std::vector<CollectionRow> collection_rows(const std::vector<std::string>& words
   return rows;
 }
 
-files::Json json_of(const std::vector<CollectionRow>& rows) {
-  files::Json json = files::Json::array();
-  for (const CollectionRow& row : rows) {
-    files::Json left_out = files::Json::array();
-    for (const auto& [why, count] : row.left_out) left_out.push_back({{"why", why}, {"logs", count}});
-    json.push_back({{"name", row.name},
-                    {"logs", row.logs},
-                    {"opened", row.opened},
-                    {"force", {{"x", row.force[0]}, {"y", row.force[1]}, {"z", row.force[2]}}},
-                    {"torque", row.torque},
-                    {"seconds", row.seconds},
-                    {"left_out", std::move(left_out)}});
-  }
-  return json;
+void describe(files::Record& record, const CollectionRow& row) {
+  struct LeftOut {
+    std::string why;
+    std::size_t logs = 0;
+  };
+  std::vector<LeftOut> left_out;
+  for (const auto& [why, count] : row.left_out) left_out.push_back({why, count});
+  record.field("name", row.name, "");
+  record.field("logs", row.logs, "");
+  record.field("opened", row.opened, "");
+  record.object("force", "Logs that can be judged along each axis.", [&row](files::Record& r) {
+    r.field("x", row.force[0], "");
+    r.field("y", row.force[1], "");
+    r.field("z", row.force[2], "");
+  });
+  record.field("torque", row.torque, "Logs with at least its mean in slow flight.");
+  record.field("seconds", row.seconds, "Of flight.", "s");
+  record.list("left_out", left_out, "", [](files::Record& r, const LeftOut& one) {
+    r.field("why", one.why, "");
+    r.field("logs", one.logs, "");
+  });
 }
 
 void print_collections(const std::vector<CollectionRow>& rows, const std::string& seconds) {

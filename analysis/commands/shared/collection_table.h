@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::analysis {
 
@@ -35,7 +35,7 @@ std::vector<CollectionRow> collection_rows(const std::vector<std::string>& words
                                            const std::vector<LogOutcome>& logs);
 
 /// Without run_s, because a result depends on its inputs only.
-files::Json json_of(const std::vector<CollectionRow>& rows);
+void describe(files::Record& record, const CollectionRow& row);
 
 /// Prints the table to standard output: flight seconds, labelled by `seconds`, and the run time if it was measured.
 void print_collections(const std::vector<CollectionRow>& rows, const std::string& seconds);

@@ -18,17 +18,6 @@ std::string kind_of(const std::string& line) {
 
 }  // namespace
 
-files::Json json_of(const std::vector<logs::Doubt>& doubts) {
-  files::Json json = files::Json::array();
-  for (const logs::Doubt& doubt : doubts) {
-    json.push_back({{"signal", doubt.signal},
-                    {"value", doubt.value},
-                    {"words", doubt.words},
-                    {"refused", doubt.refuses_force}});
-  }
-  return json;
-}
-
 std::vector<std::string> few_of_each(const std::vector<std::string>& lines) {
   constexpr int kShown = 3;
   std::vector<std::string> shown;
@@ -44,3 +33,14 @@ std::vector<std::string> few_of_each(const std::vector<std::string>& lines) {
 }
 
 }  // namespace swarmcert::analysis
+
+namespace swarmcert::logs {
+
+void describe(files::Record& record, const Doubt& doubt) {
+  record.field("signal", doubt.signal, "");
+  record.field("value", doubt.value, "That is implausible.");
+  record.field("words", doubt.words, "");
+  record.field("refused", doubt.refuses_force, "Whether no force is judged for it.");
+}
+
+}  // namespace swarmcert::logs

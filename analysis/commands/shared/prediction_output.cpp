@@ -26,18 +26,16 @@ constexpr std::array<QuantityName, residuals::kNumErrors> kQuantities = {
      {"rotation_rad", "rotation", "rad"},
      {"rate_rad_s", "body rate", "rad/s"}}};
 
-files::Json json_of_horizon(const HorizonErrors& errors) {
-  const auto at = [&errors](int step) {
-    const double value = errors.at(step);
-    return std::isfinite(value) ? files::Json(value) : files::Json();
-  };
-  return {{"h1", at(1)}, {"h10", at(10)}, {"h50", at(50)}, {"sum", errors.sum()}};
-}
-
-void add_quantities(const PredictionErrors& errors, bool by_step, files::Json& json) {
+void describe_quantities(files::Record& record, const PredictionErrors& errors, bool by_step) {
   for (std::size_t k = 0; k < kQuantities.size(); ++k) {
-    json[kQuantities[k].key] = json_of_horizon(errors[k]);
-    if (by_step) json[kQuantities[k].key]["by_step"] = errors[k].mean;
+    const HorizonErrors& of = errors[k];
+    record.object(kQuantities[k].key, "Mean of the norm of the error.", [&](files::Record& r) {
+      r.field("h1", of.at(1), "After one step.");
+      r.field("h10", of.at(10), "After ten.");
+      r.field("h50", of.at(50), "After fifty.");
+      r.field("sum", of.sum(), "Of all steps.");
+      if (by_step) r.field("by_step", of.mean, "After 1, 2, ... steps.");
+    });
   }
 }
 
@@ -65,66 +63,71 @@ std::string npy_of(const FlightPrediction& flight) {
 
 }  // namespace
 
-files::Json json_of(const std::vector<FlightPrediction>& flights) {
-  const PredictionErrors errors = residuals::mean_errors(flights, &FlightPrediction::errors);
-  const std::size_t steps = errors[0].mean.size();
-  if (steps == 0) return nullptr;
-  files::Json json = {{"steps", steps}, {"step_s", nullptr}, {"starts", 0}};
-  add_quantities(errors, true, json);
-  json["held"] = files::Json::object();
-  add_quantities(residuals::mean_errors(flights, &FlightPrediction::held), false, json["held"]);
-  std::size_t starts = 0;
-  json["flights"] = files::Json::array();
+std::optional<Prediction> prediction_of(std::vector<FlightPrediction> flights) {
+  Prediction prediction;
+  prediction.errors = residuals::mean_errors(flights, &FlightPrediction::errors);
+  if (prediction.steps() == 0) return std::nullopt;
+  prediction.held = residuals::mean_errors(flights, &FlightPrediction::held);
   for (const FlightPrediction& flight : flights) {
-    files::Json entry = {{"file", flight.path}, {"starts", flight.starts}};
-    if (!flight.refused.empty()) {
-      entry["refused"] = flight.refused;
-    } else {
-      entry["torque"] = flight.has_torque;
-      add_quantities(flight.errors, false, entry);
-      starts += flight.starts;
-      if (flight.errors[0].mean.size() == steps && json["step_s"].is_null()) json["step_s"] = flight.step_s;
-    }
-    json["flights"].push_back(std::move(entry));
+    if (!flight.refused.empty()) continue;
+    prediction.starts += flight.starts;
+    if (flight.errors[0].mean.size() == prediction.steps() && prediction.step_s == 0)
+      prediction.step_s = flight.step_s;
   }
-  json["starts"] = starts;
-  return json;
+  prediction.flights = std::move(flights);
+  return prediction;
 }
 
-void print_prediction(const files::Json& prediction) {
-  if (prediction.is_null()) {
+void describe(files::Record& record, const Prediction& prediction) {
+  record.field("steps", prediction.steps(), "");
+  record.field("step_s", prediction.step_s, "", "s");
+  record.field("starts", prediction.starts, "Measured states from which was predicted.");
+  describe_quantities(record, prediction.errors, true);
+  record.object("held", "The same of a prediction that nothing changes.",
+                [&](files::Record& r) { describe_quantities(r, prediction.held, false); });
+  record.list("flights", prediction.flights, "", [](files::Record& r, const FlightPrediction& flight) {
+    const bool is_refused = !flight.refused.empty();
+    r.field("file", flight.path, "");
+    r.field("starts", flight.starts, "");
+    r.may("refused", is_refused ? std::optional(flight.refused) : std::nullopt, "Why nothing was predicted.");
+    r.may("torque", is_refused ? std::nullopt : std::optional(flight.has_torque),
+          "The log gives the force of each rotor; otherwise rates are held.");
+    r.may_fields(!is_refused,
+                 [&](files::Record& inner) { describe_quantities(inner, flight.errors, false); });
+  });
+}
+
+void print_prediction(const std::optional<Prediction>& prediction) {
+  if (!prediction) {
     fmt::print("\nNo flight could be predicted: that takes position, velocity, attitude and rates.\n");
     return;
   }
-  const double step_s = prediction["step_s"].get<double>();
-  const int steps = prediction["steps"].get<int>();
-  fmt::print("\nPredicted from {} measured states, {} steps of {:.3g} ms\n", prediction["starts"].get<long>(),
-             steps, 1000 * step_s);
-  fmt::print("  {:18}  after {:.3g} s   mean of all steps   nothing changes\n", "", steps * step_s);
-  for (const QuantityName& quantity : kQuantities) {
-    const files::Json& errors = prediction[quantity.key];
+  const auto steps = static_cast<double>(prediction->steps());
+  fmt::print("\nPredicted from {} measured states, {} steps of {:.3g} ms\n", prediction->starts,
+             prediction->steps(), 1000 * prediction->step_s);
+  fmt::print("  {:18}  after {:.3g} s   mean of all steps   nothing changes\n", "",
+             steps * prediction->step_s);
+  for (std::size_t k = 0; k < kQuantities.size(); ++k) {
     fmt::print("  {:18}  {:10.4g}   {:17.4g}   {:15.4g}\n",
-               fmt::format("{} [{}]", quantity.words, quantity.unit), errors["by_step"].back().get<double>(),
-               errors["sum"].get<double>() / steps,
-               prediction["held"][quantity.key]["sum"].get<double>() / steps);
+               fmt::format("{} [{}]", kQuantities[k].words, kQuantities[k].unit),
+               prediction->errors[k].mean.back(), prediction->errors[k].sum() / steps,
+               prediction->held[k].sum() / steps);
   }
-  for (const files::Json& flight : prediction["flights"]) {
-    if (flight.contains("refused"))
-      fmt::print("  {}: {}\n", flight["file"].get<std::string>(), flight["refused"].get<std::string>());
-    else if (!flight["torque"].get<bool>())
-      fmt::print("  {}: without the force of each rotor, rates are held\n",
-                 flight["file"].get<std::string>());
+  for (const FlightPrediction& flight : prediction->flights) {
+    if (!flight.refused.empty())
+      fmt::print("  {}: {}\n", flight.path, flight.refused);
+    else if (!flight.has_torque)
+      fmt::print("  {}: without the force of each rotor, rates are held\n", flight.path);
   }
 }
 
-void add_prediction(Report& report, const files::Json& prediction) {
-  if (prediction.is_null()) return;
+void add_prediction(Report& report, const std::optional<Prediction>& prediction) {
+  if (!prediction) return;
   report.heading("Prediction");
   std::string data;
-  for (std::size_t h = 0; h < prediction["steps"].get<std::size_t>(); ++h) {
-    data += fmt::format("{}", static_cast<double>(h + 1) * prediction["step_s"].get<double>());
-    for (const QuantityName& quantity : kQuantities)
-      data += fmt::format(" {}", prediction[quantity.key]["by_step"][h].get<double>());
+  for (std::size_t h = 0; h < prediction->steps(); ++h) {
+    data += fmt::format("{}", static_cast<double>(h + 1) * prediction->step_s);
+    for (const HorizonErrors& errors : prediction->errors) data += fmt::format(" {}", errors.mean[h]);
     data += "\n";
   }
   std::string script = "set xlabel 'horizon [s]'\nset ylabel 'mean error'\nset logscale y\nplot ";

@@ -1,26 +1,36 @@
-/// @file Multi-step predictions as JSON, as text, as a figure and as arrays for NumPy.
+/// @file Multi-step predictions: described, as text, as a figure and as arrays for NumPy.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/report/report.h"
 #include "analysis/residuals/prediction.h"
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::analysis {
 
-/// Returns {steps, step_s, starts, position_m, velocity_m_s, rotation_rad, rate_rad_s, held, flights[]}. Each quantity
-/// is {h1, h10, h50, sum, by_step[]}: the mean over starts and flights of the error after 1, 10, 50 steps (null beyond
-/// the horizon), and its sum over all steps. `held`: the same of a prediction that nothing changes. Null if no flight
-/// could be predicted.
-files::Json json_of(const std::vector<residuals::FlightPrediction>& flights);
+/// Multi-step predictions from all measured states.
+struct Prediction {
+  residuals::PredictionErrors errors,
+      held;  ///< means over flights; `held`: of a prediction that nothing changes
+  double step_s = 0;
+  std::size_t starts = 0;
+  std::vector<residuals::FlightPrediction> flights;
 
-/// Prints the JSON of json_of() as a table.
-void print_prediction(const files::Json& prediction);
+  std::size_t steps() const { return errors[0].mean.size(); }
+};
+/// Each quantity is the error after 1, 10, 50 steps (null beyond the horizon), and its sum over all steps.
+void describe(files::Record& record, const Prediction& prediction);
 
-/// Adds the error against the horizon to the report. @param prediction of json_of()
-void add_prediction(Report& report, const files::Json& prediction);
+/// Returns the means over flights; nothing if no flight could be predicted.
+std::optional<Prediction> prediction_of(std::vector<residuals::FlightPrediction> flights);
+
+void print_prediction(const std::optional<Prediction>& prediction);
+
+/// Adds the error against the horizon to the report.
+void add_prediction(Report& report, const std::optional<Prediction>& prediction);
 
 /// Writes FLIGHT.npy for each predicted log, FLIGHT being its file name without ending: float32, [starts x steps x 13],
 /// the state predicted from each record: x y z vx vy vz qx qy qz qw wx wy wz. NaN where nothing is predicted.
