@@ -10,6 +10,7 @@
 
 #include "analysis/logs/read_log.h"
 #include "analysis/logs/vehicles_in_file.h"
+#include "analysis/residuals/log_copies.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
@@ -243,10 +244,16 @@ FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules&
   FoundFlights result;
   std::vector<FoundLog> logs;
   std::set<std::string> seen;
+  LogCopies copies;
   for (const std::string& path : paths) {
     const Candidates found = candidates_below(path);
     result.skipped.insert(result.skipped.end(), found.skipped.begin(), found.skipped.end());
     for (const std::string& file : found.logs) {
+      const std::string whole = logs::address_of(file).file, first = copies.add(whole);
+      if (!first.empty() && first != whole) {
+        result.copies.emplace_back(file, first);
+        continue;
+      }
       for (const std::string& address : logs::addresses_in(file, by_columns)) {
         if (!seen.insert(address).second) continue;
         const LogRule rule = rule_for(rules, address);

@@ -41,6 +41,8 @@ struct FoundFlights {
   std::vector<FlightFiles> flights;   ///< sorted by name and run
   std::vector<std::string> skipped;   ///< files in the folders that are not logs
   std::vector<std::string> left_out;  ///< logs excluded by flights.toml
+  std::vector<std::pair<std::string, std::string>>
+      copies;  ///< files that are left out, and what each is a copy of
 };
 
 /// Returns the patterns of `rules` that match none of the logs: they are misspelt or belong to other flights.
@@ -53,6 +55,7 @@ std::vector<std::string> patterns_without_log(const LogRules& rules, const Found
 /// - a CSV file holds the logs of several vehicles, which get the addresses FILE#VEHICLE (logs/vehicles_in_file.h);
 /// - `rules` assign them to one flight;
 /// - logs of one folder have absolute times (of their clock or of a satellite receiver) that overlap by more than half.
+/// A file with the same bytes as an earlier one is left out (log_copies.h).
 /// A vehicle without a given name is named after its file, `<vehicle>_log07`, or else after its folder.
 /// @throws files::InputError if a path does not exist, a given file is not a log, or no log is left.
 /// @param by_columns false: a columns.toml names the columns, so that none belong to one of several vehicles by their

@@ -41,6 +41,28 @@ class Study : public testing::Test {
   const ScratchFolder folder_;
 };
 
+TEST_F(Study, ACopyOfALogIsNoFurtherFlightAndCannotBeHeldOut) {
+  fly(1);
+  for (const char* const name : {"second", "third"})
+    std::filesystem::copy(folder_ / "flights/1", folder_ / name, std::filesystem::copy_options::recursive);
+  const std::string model = source_path("stability/models/crazyflie-small.toml");
+  const auto compare = [&](const std::string& flights) {
+    const Outcome outcome =
+        run_shell("swarmcert compare " + model + " " + flights + " --force -q --json c.json", folder_.path());
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return files::read_json(folder_ / "c.json", "swarmcert/compare/1");
+  };
+  const files::Json one = compare("flights"), three = compare("flights second third");
+  EXPECT_EQ(three["overall"], one["overall"]);
+  EXPECT_EQ(three["left_out"].size(), one["flights"].size() * 2) << three["left_out"].dump();
+  const Outcome held_out = study("flights --select second --test third -o out -q");
+  EXPECT_EQ(held_out.exit_code, 2);
+  EXPECT_NE(held_out.output.find("would not be held out"), std::string::npos) << held_out.output;
+  const Outcome against = study("flights --against second -o out -q");
+  EXPECT_EQ(against.exit_code, 2);
+  EXPECT_NE(against.output.find("on both sides"), std::string::npos) << against.output;
+}
+
 TEST_F(Study, AddsWhatIsMissingAndLowersTheErrorOfTestFlights) {
   fly(3);
   const Outcome outcome = study("flights -o out -q --json copy.json");

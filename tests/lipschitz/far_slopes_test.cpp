@@ -110,7 +110,7 @@ TEST(FarSlopes, GlobalBranchAndBoundThatStallsSaysSoAfterFewBoxes) {
     const Certification found = certify(network, options);
     const CertifiedBound& bound = found.bounds.front();
     EXPECT_NE(bound.branch_stop, BranchStop::kNothingRun) << "seed " << seed;
-    EXPECT_EQ(summary(network, bound)["status"], "finished") << "seed " << seed;
+    EXPECT_EQ(summary(network, bound).status, "finished") << "seed " << seed;
     if (bound.branch_stop != BranchStop::kNothingToHalve) continue;
     ++stalls;
     EXPECT_LT(boxes_of(bound.local->tree.tree), 1000) << "seed " << seed;

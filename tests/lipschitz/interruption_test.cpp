@@ -46,8 +46,8 @@ TEST(Interruption, LeavesALayerWiseBoundOfEveryFunction) {
       EXPECT_EQ(bound.method, UpperMethod::kEclipseFast) << bound.function;
       EXPECT_LT(bound.upper.value(), bound.product.value()) << bound.function;
       EXPECT_TRUE(bound.is_interrupted()) << bound.function;
-      EXPECT_EQ(summary(network, bound)["status"], "interrupted");
-      EXPECT_EQ(summary(network, bound)["upper_method"], "eclipse_fast");
+      EXPECT_EQ(summary(network, bound).status, "interrupted");
+      EXPECT_EQ(summary(network, bound).upper_method, "eclipse_fast");
     }
     EXPECT_TRUE(is_interrupted(found));
     expect_accepted(network, found);
@@ -71,7 +71,7 @@ TEST(Interruption, FinishedSearchesSaySo) {
   const files::Network network = network_of({4, 10, 10, 2});
   const Certification found = certify(network, few_rounds());
   EXPECT_EQ(found.bounds.front().method, UpperMethod::kSdp);
-  EXPECT_EQ(summary(network, found.bounds.front())["status"], "finished");
+  EXPECT_EQ(summary(network, found.bounds.front()).status, "finished");
   expect_accepted(network, found);
 }
 

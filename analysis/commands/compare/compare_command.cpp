@@ -26,6 +26,7 @@
 #include "analysis/residuals/flight_errors.h"
 #include "analysis/residuals/flight_peaks.h"
 #include "analysis/residuals/injected_log.h"
+#include "analysis/residuals/log_copies.h"
 #include "analysis/residuals/prediction.h"
 #include "analysis/tracking/kept_promise.h"
 #include "nn/base/file_io.h"
@@ -82,15 +83,12 @@ identification::Budget budget_of(const CompareOptions& options, const residuals:
   }
   words.words.insert(words.words.end(), options.budget.begin(), options.budget.end());
   residuals::Inputs fit = read_flights(words, true, false, true);
-  std::set<std::filesystem::path> judged;
-  for (const residuals::FlightFiles& flight : inputs.found.flights) {
-    for (const auto& [vehicle, log] : flight.logs) judged.insert(std::filesystem::weakly_canonical(log));
-  }
-  for (const residuals::FlightFiles& flight : fit.found.flights) {
-    for (const auto& [vehicle, log] : flight.logs) {
-      if (judged.count(std::filesystem::weakly_canonical(log)) > 0)
-        throw UsageError("--budget names a flight that is also judged: " + log);
-    }
+  residuals::LogCopies copies;
+  for (const std::string& log : log_files(inputs.found)) copies.add(log);
+  for (const std::string& log : log_files(fit.found)) {
+    const std::string judged = copies.add(log);
+    if (!judged.empty())
+      throw UsageError("--budget names a flight that is also judged: " + log + " is " + judged);
   }
   Progress progress(common.quiet);
   return identification::error_budget(fit, inputs, options.flights.network, common.jobs,

@@ -4,6 +4,8 @@
 #include <filesystem>
 
 #include "analysis/cli/bundled.h"
+#include "analysis/cli/host.h"
+#include "analysis/residuals/log_copies.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::analysis {
@@ -52,6 +54,8 @@ residuals::Inputs read_flights(const FlightOptions& options, bool own_models, bo
   arguments.rules.published_signals = options.published_signals;
   arguments.rules.keep_impacts = options.published_filter || options.published_signals;
   residuals::Inputs inputs = residuals::read_inputs(arguments);
+  for (const auto& [copy, first] : inputs.found.copies)
+    note(copy + " is left out: it has the bytes of " + first);
   if (!own_models && !inputs.vehicle_models.empty()) {
     throw files::InputError({arguments.fleet, "",
                              "vehicle." + inputs.vehicle_models.begin()->first + ".model", "",
@@ -96,11 +100,13 @@ residuals::Inputs read_others(const FlightOptions& options, const std::vector<st
                     words.words.end());
   words.words.insert(words.words.end(), against.begin(), against.end());
   residuals::Inputs others = read_flights(words, false, false, true);
-  for (const residuals::FlightFiles& flight : inputs.found.flights) {
-    for (const residuals::FlightFiles& other : others.found.flights) {
-      if (flight.logs == other.logs)
-        throw UsageError("the flight " + flight.name + " is on both sides of --against");
-    }
+  residuals::LogCopies copies;
+  for (const std::string& file : log_files(inputs.found)) copies.add(file);
+  for (const std::string& file : log_files(others.found)) {
+    const std::string first = copies.add(file);
+    if (!first.empty())
+      throw UsageError("--against " + file + " is on both sides" +
+                       (first == file ? "" : ": it has the bytes of " + first));
   }
   return others;
 }
