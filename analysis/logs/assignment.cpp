@@ -194,7 +194,7 @@ class MotionSearch {
         : c[from] != kNone
             ? tilt_rate_bits(knots_, accelerations_[from][static_cast<std::size_t>(c[from])], rates)
             : 0;
-    return bits - (rates.is_down != is_down ? 8 : 0);
+    return bits - (rates.is_down != is_down ? 6 : 0);
   }
 
   void complete(Scored& scored) const {
@@ -204,28 +204,16 @@ class MotionSearch {
         kRateSlot, [&](const Reading& rates) { return rate_evidence(scored.choice, rates); }, scored);
   }
 
-  /// Bits of each position beside this velocity. Any derivative agrees, so they end at kMost; but of several positions
-  /// the one counts whose derivative it is best.
-  std::vector<double> derivative_bits_of(int velocity) const {
-    constexpr double kMost = 30, kMostBehind = 60;
-    std::vector<double> bits;
-    if (velocity == kNone) return bits;
-    for (const Reading& position : readings_[kPositionSlot])
-      bits.push_back(derivative_bits(knots_, position, reading(kVelocitySlot, velocity)));
-    const double best = bits.empty() ? 0 : *std::max_element(bits.begin(), bits.end());
-    for (double& each : bits) each = std::min(each, kMost) - std::min(kMostBehind, (best - each) / 10);
-    return bits;
-  }
-
   void score_all() {
     std::vector<Scored> all;
     const auto count = [&](std::size_t slot) { return static_cast<int>(readings_[slot].size()); };
-    for (int v = kNone; v < count(kVelocitySlot); ++v) {
-      const std::vector<double> pair_bits = derivative_bits_of(v);
-      for (int p = kNone; p < count(kPositionSlot); ++p) {
+    for (int p = kNone; p < count(kPositionSlot); ++p) {
+      for (int v = kNone; v < count(kVelocitySlot); ++v) {
         if (p != kNone && v != kNone && overlap(reading(kPositionSlot, p), reading(kVelocitySlot, v)))
           continue;
-        const double of_pair = p == kNone || v == kNone ? 0 : pair_bits[static_cast<std::size_t>(p)];
+        const double of_pair = p == kNone || v == kNone ? 0
+                                                        : derivative_bits(knots_, reading(kPositionSlot, p),
+                                                                          reading(kVelocitySlot, v));
         for (int a = kNone; a < count(kAttitudeSlot); ++a) {
           const Choice choice = {p, v, a, kNone, kNone};
           if (a != kNone && ((p != kNone && overlap(reading(kAttitudeSlot, a), reading(kPositionSlot, p))) ||

@@ -171,7 +171,9 @@ void settle_specific_force(Draft& draft) {
   if (t.has_group(kForceWorld, 3)) {
     signals.specific_force = ForceSource::kAccelerometer;
     draft.add_measured("specific_force", kForceWorld);
-  } else if (t.has_group(kForceBody, 3) && signals.attitude) {
+  } else if (t.has_group(kForceBody, 3) && (signals.attitude || draft.acceleration_m_s2[2].empty())) {
+    // Without any attitude the body's axes stand for those of the world, of which only the thrust axis is judged.
+    if (!signals.attitude) draft.note("no attitude: the force is judged along the thrust axis of the body");
     for (int k = 0; k < 3; ++k) t[kForceWorld + k].resize(t.size());
     for (std::size_t i = 0; i < t.size(); ++i) {
       const Vector world = rotated(t, i, t.three(kForceBody, i));

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+
+#include "analysis/logs/angles.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -38,10 +41,10 @@ double mean_of_finite(const std::vector<double>& values) {
 }  // namespace
 
 double derivative_bits(const Knots& knots, const Reading& position, const Reading& velocity) {
-  constexpr double kTolerance_m_s = 0.1;
+  constexpr double kTolerance_m_s = 0.1, kMostBits = 10;
   double bits = 0;
   for (std::size_t k = 0; k < 3; ++k)
-    bits += agreement_bits(knots, position.slope[k], velocity.value[k], kTolerance_m_s);
+    bits += std::min(kMostBits, agreement_bits(knots, position.slope[k], velocity.value[k], kTolerance_m_s));
   return bits;
 }
 
@@ -94,39 +97,50 @@ double specific_force_bits(const Knots& knots, const ThreeSeries& acceleration, 
 }
 
 double rate_bits(const Knots& knots, const Reading& attitude, const Reading& rates) {
-  constexpr double kTolerance_rad_s = 0.1, kMostBits = 40;
+  constexpr double kTolerance_rad_s = 0.1, kMostBits = 15;
   double bits = 0;
   for (std::size_t k = 0; k < 3; ++k)
-    bits += agreement_bits(knots, attitude.value[k], rates.value[k], kTolerance_rad_s);
-  return std::min(bits, kMostBits);
+    bits += std::min(kMostBits, agreement_bits(knots, attitude.value[k], rates.value[k], kTolerance_rad_s));
+  return bits;
 }
 
 double tilt_rate_bits(const Knots& knots, const ThreeSeries& acceleration, const Reading& rates) {
-  constexpr double kTolerance_rad_s = 0.3, kMostBits = 40;
+  constexpr double kTolerance_rad_s = 0.2, kLeastBits = -3, kMostBits = 15;
   if (acceleration[0].empty() || acceleration[1].empty()) return 0;
-  std::array<std::vector<double>, 2> tilt;
-  for (std::size_t k = 0; k < 2; ++k) {
-    for (std::size_t i = 0; i < knots.time_s.size(); ++i) {
-      const double up = acceleration[2].empty() ? 0 : acceleration[2][i];
-      tilt[k].push_back(acceleration[k][i] / std::max(up + kGravity_m_s2, 1.0));
-    }
-    tilt[k] = difference_of(knots, tilt[k]);
+  const std::size_t n = knots.time_s.size();
+  // The tilt as a complex number, x + i y, turned by the yaw since the start.
+  std::vector<double> forward(n), left(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double up = acceleration[2].empty() ? 0 : acceleration[2][i];
+    forward[i] = acceleration[0][i] / std::max(up + kGravity_m_s2, 1.0);
+    left[i] = acceleration[1][i] / std::max(up + kGravity_m_s2, 1.0);
   }
-  std::vector<double> expected, measured;
-  for (std::size_t i = 0; i < knots.time_s.size(); ++i) {
-    expected.push_back(std::hypot(tilt[0][i], tilt[1][i]));
-    measured.push_back(std::hypot(rates.value[0][i], rates.value[1][i]));
-  }
-  // Knots follow each other within the memory of the motion: their differences are mostly noise.
-  double squares = 0, count = 0;
-  for (std::size_t i = 1; i < expected.size(); ++i) {
-    const double step = expected[i] - expected[i - 1];
+  forward = difference_of(knots, forward), left = difference_of(knots, left);
+  std::vector<std::complex<double>> turned(n);
+  std::complex<double> fit = 0;
+  double yaw = 0, squares = 0, count = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (std::isfinite(rates.value[2][i])) yaw += rates.value[2][i] * knots.step_s;
+    turned[i] = std::polar(1.0, -yaw) * std::complex<double>(forward[i], left[i]);
+    const std::complex<double> measured(rates.value[1][i], -rates.value[0][i]);
+    const std::complex<double> product = measured * std::conj(turned[i]);
+    if (std::isfinite(std::abs(product))) fit += product;
+    // Knots follow each other within the memory of the motion: their differences are mostly noise.
+    const double step = i == 0 ? kNaN : std::abs(turned[i] - turned[i - 1]);
     if (!std::isfinite(step)) continue;
-    squares += step * step;
+    squares += step * step / 2;
     ++count;
   }
   const double tolerance = kTolerance_rad_s + (count > 0 ? std::sqrt(squares / count) : 0);
-  return std::min(kMostBits, agreement_bits(knots, expected, measured, tolerance));
+  std::vector<double> pitching(n), rolling(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::complex<double> expected = turned[i] * std::polar(1.0, std::arg(fit));
+    pitching[i] = expected.real(), rolling[i] = -expected.imag();
+  }
+  const auto bits = [&](const std::vector<double>& expected, std::size_t axis) {
+    return std::clamp(agreement_bits(knots, expected, rates.value[axis], tolerance), kLeastBits, kMostBits);
+  };
+  return bits(pitching, 1) + bits(rolling, 0);
 }
 
 double following_bits(const Knots& knots, const Reading& a, const Reading& b) {

@@ -9,7 +9,8 @@
 
 namespace swarmcert::logs {
 
-/// Bits that a velocity is the derivative of a position: dp/dt = v.
+/// Bits that a velocity is the derivative of a position: dp/dt = v. Set points and other vehicles have velocities too:
+/// at most 10 per axis.
 double derivative_bits(const Knots& knots, const Reading& position, const Reading& velocity);
 
 /// Returns the acceleration in W, m/s^2: the slope of a velocity, or the curvature of a position.
@@ -23,11 +24,12 @@ double thrust_axis_bits(const Knots& knots, const ThreeSeries& acceleration, con
 double specific_force_bits(const Knots& knots, const ThreeSeries& acceleration, const Reading* attitude,
                            const Reading& force);
 
-/// Bits that the body rates are those of the attitude: w = 2 q* dq/dt. Other derivatives agree as well: at most 40.
+/// Bits that the body rates are those of the attitude: w = 2 q* dq/dt. Other derivatives agree as well: at most 15 per
+/// axis.
 double rate_bits(const Knots& knots, const Reading& attitude, const Reading& rates);
 
-/// Bits that, where no attitude is known, the body rates turn the thrust axis as the acceleration asks:
-/// |(w_x, w_y)| = |d/dt (a_x, a_y) / (a_z + g)|, whatever the yaw.
+/// Bits that, where no attitude is known, the body rates turn the thrust axis as the acceleration asks: with the yaw
+/// psi integrated from w_z and its best start, w_y - i w_x = exp(-i psi) d/dt (a_x + i a_y) / (a_z + g).
 double tilt_rate_bits(const Knots& knots, const ThreeSeries& acceleration, const Reading& rates);
 
 /// Bits that two positions or two velocities follow each other.

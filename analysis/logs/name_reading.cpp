@@ -1,9 +1,11 @@
 #include "analysis/logs/name_reading.h"
 
 #include <cctype>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <vector>
 
 #include "analysis/logs/column_names.h"
@@ -12,69 +14,73 @@ namespace swarmcert::logs {
 namespace {
 
 constexpr double kNamed = 10,
-                 kNamedOther = 20;  ///< bits for the quantity that a word names, and against the others
-constexpr double kForeign = 25;     ///< bits against the vehicle's own motion
+                 kNamedOther = 20;   ///< bits for the quantity that a word names, and against the others
+constexpr double kUnknownWord = 12;  ///< bits against a word that may be any thing's
+constexpr double kForeign = 25;      ///< bits against the vehicle's own motion
 
 using WordBits = std::map<int, double>;
+
+std::set<std::string> words_in(const std::string& text) {
+  std::istringstream in(text);
+  return {std::istream_iterator<std::string>(in), {}};
+}
 
 /// Words that name a quantity; other quantities lose kNamedOther bits.
 const std::map<std::string, WordBits>& quantity_words() {
   static const std::map<std::string, WordBits> words = [] {
     std::map<std::string, WordBits> all;
-    const auto add = [&](const WordBits& bits, std::initializer_list<const char*> spellings) {
-      for (const char* const word : spellings) all[word] = bits;
+    const auto add = [&](const WordBits& bits, const std::string& spellings) {
+      for (const std::string& word : words_in(spellings)) all[word] = bits;
     };
-    add({{kIsPosition, kNamed}}, {"pos", "position", "p", "loc", "location", "translation", "t", "point"});
-    add({{kIsVelocity, kNamed}}, {"vel", "velocity", "v", "speed"});
-    add({{kIsVelocity, kNamed}}, {"linvel", "dot", "d"});
-    add({{kIsSpecificForce, kNamed}}, {"acc", "accel", "acceleration", "accelerometer", "a", "acel", "xl"});
-    add({{kIsRates, kNamed}}, {"gyro", "gyr", "gyroscope", "omega", "rate", "rates", "w", "g", "angvel",
-                               "bodyrate", "bodyrates", "om"});
-    add({{kIsQuaternion, kNamed}}, {"q", "quat", "quaternion"});
-    add({{kIsQuaternion, kNamed}, {kIsAngles, kNamed}},
-        {"att", "attitude", "ori", "orient", "orientation", "rot", "rotation"});
-    add({{kIsAngles, kNamed}}, {"rpy", "euler", "angle", "angles"});
-    add({{kIsMotors, kNamed}}, {"motor", "motors", "m", "u", "pwm", "duty", "rotor", "act", "actuator", "esc",
-                                "throttle", "servo", "mot"});
-    add({{kIsMotors, 6}}, {"thrust", "out", "output"});
-    add({{kIsBattery, kNamed}}, {"vbat", "battery", "bat", "batt", "voltage", "volt", "volts", "vbatt"});
+    add({{kIsPosition, kNamed}}, "pos position p loc location translation t point coord");
+    add({{kIsVelocity, kNamed}}, "vel velocity v speed linvel dot d");
+    add({{kIsSpecificForce, kNamed}}, "acc accel acceleration accelerometer a acel xl");
+    add({{kIsSpecificForce, 3 * kNamed}}, "specific");
+    add({}, "force f jerk snap torque tau moment");
+    add({{kIsRates, kNamed}}, "gyro gyr gyroscope omega om rate rates w g angvel bodyrate bodyrates");
+    add({{kIsQuaternion, kNamed}}, "q quat quaternion");
+    add({{kIsQuaternion, kNamed}, {kIsAngles, kNamed}}, "att attitude ori orient orientation rot rotation");
+    add({{kIsAngles, kNamed}}, "rpy euler angle angles");
+    add({{kIsMotors, kNamed}}, "motor motors mot m u pwm duty rotor act actuator esc throttle servo");
+    add({{kIsMotors, 6}}, "thrust out output");
+    add({{kIsBattery, kNamed}}, "vbat vbatt battery bat batt voltage volt volts");
     return all;
   }();
   return words;
 }
 
 const std::set<std::string>& wish_words() {
-  static const std::set<std::string> words = {
-      "target",  "ref",       "reference", "des",  "desired",    "sp",         "setpoint", "set",    "cmd",
-      "command", "commanded", "goal",      "traj", "trajectory", "ctrltarget", "plan",     "planned"};
+  static const std::set<std::string> words = words_in(
+      "target ref reference des desired sp setpoint set cmd command commanded goal traj trajectory "
+      "ctrltarget plan "
+      "planned nominal");
   return words;
 }
 
 const std::set<std::string>& foreign_words() {
-  static const std::set<std::string> words = {
-      "wind",   "payload", "load",     "home",         "neighbour", "neighbor", "leader",   "ball",
-      "gate",   "error",   "err",      "bias",         "cov",       "var",      "std",      "variance",
-      "noise",  "mag",     "magn",     "magnetometer", "waypoint",  "wp",       "initial",  "init",
-      "origin", "torque",  "integral", "current",      "temp",      "baro",     "airspeed", "obstacle",
-      "other",  "anchor",  "marker",   "flow",         "innov",     "residual", "offset",   "jerk",
-      "snap",   "moment",  "tau",      "force",        "imu2",      "imu1",     "peer",     "follower",
-      "sling",  "cargo",   "base",     "tag",          "cov"};
+  static const std::set<std::string> words = words_in(
+      "wind gust airspeed payload load cargo sling cable tether home neighbour neighbor leader follower peer "
+      "other ball "
+      "gate obstacle anchor tag beacon marker waypoint wp landing pad boat ship truck platform person human "
+      "origin "
+      "initial init error err bias offset residual innov innovation cov var std variance noise integral mag "
+      "magn "
+      "magnetometer mag1 baro temp current flow imu2");
   return words;
 }
 
 /// Words that say how the vehicle's own motion was found.
 const std::set<std::string>& neutral_words() {
-  static const std::set<std::string> words = {
-      "est",       "estimate",      "estimated", "estimator", "state",  "drone",
-      "uav",       "quad",          "vehicle",   "cf",        "body",   "world",
-      "mocap",     "vicon",         "opti",      "ekf",       "kf",     "kalman",
-      "odom",      "pose",          "local",     "global",    "enu",    "ned",
-      "flu",       "frd",           "meas",      "measured",  "fused",  "filt",
-      "filtered",  "sensor",        "log",       "data",      "nav",    "gt",
-      "truth",     "robot",         "copter",    "raw",       "linear", "lin",
-      "optitrack", "rigid",         "self",      "own",       "ins",    "ahrs",
-      "twist",     "stateestimate", "ext",       "value",     "values", "ros",
-      "inertial",  "signal",        "true",      "ground"};
+  static const std::set<std::string> words = words_in(
+      "est estimate estimated estimator state stateestimate drone uav quad quadrotor copter vehicle robot "
+      "agent cf "
+      "crazyflie fc px4 body base link world local global map inertial enu ned flu frd mocap vicon opti "
+      "optitrack "
+      "qualisys motive rigid pose odom odometry twist ekf kf kalman vio slam lighthouse uwb gps meas "
+      "measured fused filt "
+      "filtered raw sensor nav ins ahrs log data value values ros signal gt ground truth true self own ext "
+      "lin linear "
+      "actual now");
   return words;
 }
 
@@ -84,18 +90,20 @@ struct Index {
 };
 
 std::optional<Index> index_of(const std::string& word) {
-  static const std::map<std::string, Index> known = {
-      {"x", {IndexKind::kAxis, 0}},        {"y", {IndexKind::kAxis, 1}},
-      {"z", {IndexKind::kAxis, 2}},        {"w", {IndexKind::kAxis, 3}},
-      {"north", {IndexKind::kCompass, 0}}, {"east", {IndexKind::kCompass, 1}},
-      {"down", {IndexKind::kCompass, 2}},  {"up", {IndexKind::kCompass, 3}},
-      {"n", {IndexKind::kCompass, 0}},     {"e", {IndexKind::kCompass, 1}},
-      {"d", {IndexKind::kCompass, 2}},     {"u", {IndexKind::kCompass, 3}},
-      {"roll", {IndexKind::kAngle, 0}},    {"pitch", {IndexKind::kAngle, 1}},
-      {"yaw", {IndexKind::kAngle, 2}},     {"phi", {IndexKind::kAngle, 0}},
-      {"theta", {IndexKind::kAngle, 1}},   {"psi", {IndexKind::kAngle, 2}},
-      {"rol", {IndexKind::kAngle, 0}},     {"pit", {IndexKind::kAngle, 1}},
-      {"heading", {IndexKind::kAngle, 2}}};
+  static const std::map<std::string, Index> known = [] {
+    std::map<std::string, Index> all;
+    const auto add = [&](IndexKind kind, std::initializer_list<const char*> words) {
+      int index = 0;
+      for (const char* const spelling : words) all[spelling] = {kind, index++};
+    };
+    add(IndexKind::kAxis, {"x", "y", "z", "w"});
+    add(IndexKind::kCompass, {"north", "east", "down", "up"});
+    add(IndexKind::kCompass, {"n", "e", "d", "u"});
+    add(IndexKind::kAngle, {"roll", "pitch", "yaw"});
+    add(IndexKind::kAngle, {"phi", "theta", "psi"});
+    add(IndexKind::kAngle, {"rol", "pit", "heading"});
+    return all;
+  }();
   const auto found = known.find(word);
   if (found != known.end()) return found->second;
   bool is_number = !word.empty() && word.size() < 3;
@@ -228,7 +236,8 @@ NameReading read_name(const std::string& column) {
     } else if (foreign_words().count(word) > 0) {
       name.is_foreign = true;
     } else if (word != "imu") {
-      for (double& bits : name.bits) bits -= neutral_words().count(word) > 0 ? 1 : 4;
+      const bool is_neutral = neutral_words().count(word) > 0 || index_of(word);
+      for (double& bits : name.bits) bits -= is_neutral ? 1 : kUnknownWord;
     }
   }
   if (index && !is_quantity && !is_angular) add_index_bits(*index, name);

@@ -326,7 +326,7 @@ class Reader {
       least = std::min(least, sum), most = std::max(most, sum);
     }
     if (2 * unit < count || count == 0) return -1;
-    return most > least ? 15 : 4;
+    return most > least ? 40 : 4;
   }
 
   /// R = Rz(yaw) Ry(pitch) Rx(roll).

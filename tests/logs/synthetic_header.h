@@ -30,9 +30,10 @@ struct SyntheticTable {
        has_duty = false;
 };
 
-/// Writes the flight with the habits that `seed` draws: names, stated and unstated units (m, cm, mm; s, ms, us, ns; rad,
-/// deg; g), z up or north, east, down, quaternions of either order or angles, which signals there are, their order, and
-/// up to four decoys (set points, wind, a payload, a neighbour, a home position, a second accelerometer, a magnetometer).
+/// Writes the flight with the habits that `seed` draws: names, stated and unstated units (m, cm, mm; s, ms, us, ns;
+/// rad, deg; g), z up or north, east, down, an IMU that differs in that, quaternions of either order or angles, which
+/// signals there are, their order, the rate, a calm or a lively flight, and up to four decoys (set points, wind, a
+/// payload, a neighbour, a home position, a second accelerometer, a magnetometer).
 SyntheticTable synthetic_table(std::uint32_t seed);
 
 /// Names of the signals of `log` that differ from the flight; and of those that the table has and the log lacks.
