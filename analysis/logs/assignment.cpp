@@ -78,6 +78,14 @@ class MotionSearch {
     return odds;
   }
 
+  /// Bits of what holds between the signals, without those of names and ranges.
+  double confirmation() const {
+    double bits = best().bits;
+    for (std::size_t slot = 0; slot < kNumSlots; ++slot)
+      if (best().choice[slot] != kNone) bits -= reading(slot, best().choice[slot]).bits;
+    return bits;
+  }
+
   /// The lead over the best reading of the file in which the signal is `named`; 0 if that is the best.
   double lead_over(std::size_t slot, const Carried& named) const {
     for (const Scored& other : scored_) {
@@ -418,7 +426,7 @@ class Assigner {
       if (index == kNone) continue;
       const Reading& winner = search.reading(slot, index);
       if (known(signals[slot]) != nullptr) {
-        correct(winner, search.lead_over(slot, *known(signals[slot])));
+        correct(winner, std::min(search.lead_over(slot, *known(signals[slot])), search.confirmation()));
         continue;
       }
       const MotionSearch::Odds odds = search.odds_of(slot);
