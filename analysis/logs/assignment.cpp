@@ -140,7 +140,7 @@ class MotionSearch {
            thrust_axis_[from][static_cast<std::size_t>(c[from])][static_cast<std::size_t>(c[kAttitudeSlot])];
   }
 
-  /// Most people log z up, and rarely mix frames.
+  /// Most people log z up, and rarely mix frames or units.
   double frame_bits(const Choice& c) const {
     constexpr double kDown = 8, kMixed = 8;
     const Reading *const position = chosen(c, kPositionSlot), *const velocity = chosen(c, kVelocitySlot),
@@ -148,6 +148,10 @@ class MotionSearch {
     const Reading* const world = velocity != nullptr ? velocity : position;
     const bool is_down = world != nullptr && world->is_down;
     double bits = is_down ? -kDown : 0;
+    // Who logs positions in centimetres logs velocities in centimetres per second: one habit, not two.
+    const bool is_one_habit = position != nullptr && velocity != nullptr && velocity->carried.divide > 1 &&
+                              position->carried.divide == velocity->carried.divide;
+    if (is_one_habit) bits += kOtherUnit;
     if (position != nullptr && position->is_down != is_down) bits -= kMixed;
     if (attitude != nullptr && attitude->is_down != is_down) bits -= kMixed;
     return bits;

@@ -14,7 +14,7 @@ namespace swarmcert::logs {
 namespace {
 
 // Bits against what people rarely write.
-constexpr double kOtherUnit = 9, kOtherThanStated = 16, kOtherFrame = 12, kOtherOrder = 8, kFrameWord = 6;
+constexpr double kOtherThanStated = 16, kOtherFrame = 12, kOtherOrder = 8, kFrameWord = 6;
 constexpr double kNeighboursOnly = 6;  // columns that only their places in the file join
 
 using Four = std::array<double, 4>;

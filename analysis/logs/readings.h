@@ -11,6 +11,9 @@
 
 namespace swarmcert::logs {
 
+/// Bits against a unit that people rarely use and that no name states.
+inline constexpr double kOtherUnit = 9;
+
 using ThreeSeries = std::array<std::vector<double>, 3>;
 
 /// A group of columns read in one way. Series are at the knots, in SI units, with W z up and B forward, left, up; an
