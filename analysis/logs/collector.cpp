@@ -36,6 +36,25 @@ int clock_by_name(const RawTopic& topic) {
   return -1;
 }
 
+int clock_by_steps(const RawTopic& topic) {
+  int best = -1;
+  double least = INFINITY;
+  for (std::size_t c = 0; c < topic.columns.size(); ++c) {
+    const std::vector<double>& values = topic.columns[c].values;
+    std::vector<double> steps;
+    for (std::size_t i = 1; i < values.size(); ++i) steps.push_back(values[i] - values[i - 1]);
+    const double step = median(steps);
+    if (steps.size() < 10 || !(step > 0) || !(quantile_of(steps, 0.01) > 0)) continue;
+    // A constant step of exactly one means a record counter; a clock has another unit or some jitter.
+    double spread = (quantile_of(steps, 0.9) - quantile_of(steps, 0.1)) / step;
+    if (step == 1 && spread == 0) spread = 1;
+    if (spread > 1 || spread >= least) continue;
+    least = spread;
+    best = static_cast<int>(c);
+  }
+  return best;
+}
+
 void separate_blocks(RawLog& log) {
   constexpr double kWhole = 0.9;
   constexpr std::size_t kFew = 20;  // too few to tell blocks from damage
@@ -83,13 +102,11 @@ void Collector::begin(const std::vector<std::string>& names) {
   else if (map_.empty())
     clock = clock_by_name(topic);
   if (log_.format == "usd") scale_s_ = 1e-6;  // the ticks of the deck
-  if (clock < 0) {
-    throw files::InputError({log_.path, "line 1", "time", "", "no column carries it",
-                             "log it, or name its column in a columns.toml (--columns)"});
-  }
-  time_ = static_cast<std::size_t>(clock);
+  if (clock < 0 && !map_.empty()) refuse_without_clock();
   needs_.assign(names.size(), 0);
-  needs_[time_] = 1;
+  has_clock_ = clock >= 0;
+  if (has_clock_) time_ = static_cast<std::size_t>(clock);
+  if (has_clock_) needs_[time_] = 1;
   for (const Carried& carried : recognise(log_, map_).groups) {
     for (const int column : carried.columns) {
       if (column >= 0) needs_[static_cast<std::size_t>(column)] = 1;
@@ -102,8 +119,18 @@ void Collector::record(const std::vector<double>& values) {
   for (std::size_t c = 0; c < values.size(); ++c) topic.columns[c].values.push_back(values[c]);
 }
 
+void Collector::refuse_without_clock() const {
+  throw files::InputError({log_.path, "line 1", "time", "", "no column carries it",
+                           "log it, or name its column in a columns.toml (--columns)"});
+}
+
 void Collector::end() {
   RawTopic& topic = log_.topics.back();
+  if (!has_clock_) {
+    const int clock = clock_by_steps(topic);
+    if (clock < 0) refuse_without_clock();
+    time_ = static_cast<std::size_t>(clock);
+  }
   const std::vector<double>& clock = topic.columns[time_].values;
   const double scale_s = scale_s_ > 0 ? scale_s_ : seconds_per_unit(clock);
   topic.time_s.reserve(clock.size());

@@ -9,6 +9,10 @@ namespace swarmcert::logs {
 /// Returns the column whose name says that it is a clock; -1 if there is none.
 int clock_by_name(const RawTopic& topic);
 
+/// Returns the column that rises by nearly the same step with nearly every record, preferably by something other than
+/// one per record; -1 if there is none.
+int clock_by_steps(const RawTopic& topic);
+
 /// Returns the seconds per unit of a clock, judged by its median step: the largest common unit that gives a plausible
 /// logging rate.
 double seconds_per_unit(const std::vector<double>& clock);
@@ -23,19 +27,23 @@ class Collector : public RecordSink {
   /// @param log receives one topic. `log` and `map` must outlive this object.
   Collector(RawLog& log, const SignalMap& map) : log_(log), map_(map) {}
 
-  /// @throws files::InputError if no column carries the time.
+  /// @throws files::InputError if the map names no time.
   void begin(const std::vector<std::string>& names) override;
   void record(const std::vector<double>& values) override;
   bool needs(std::size_t column) const override { return needs_[column] != 0; }
   /// Call once after the last record: fills RawTopic::time_s.
+  /// @throws files::InputError if no column can be the time.
   void end();
-  /// After begin(): the column that holds the time.
+  /// After end(): the column that holds the time.
   std::size_t time_index() const { return time_; }
 
  private:
+  [[noreturn]] void refuse_without_clock() const;
+
   RawLog& log_;
   const SignalMap& map_;
   std::vector<char> needs_;
+  bool has_clock_ = false;  ///< by its name
   std::size_t time_ = 0;
   double scale_s_ = 0;  ///< seconds per unit of the time column; 0: decided from its steps
 };

@@ -69,13 +69,10 @@ void add_crazyflie(Table& t) {
   t.push_back({kPosition, axes("locsrv.#"), "m"});
   t.push_back({kPosition, axes("locsrvz.#"), "mm", 1, 1000});
   t.push_back({kPosition, axes("extpos.#"), "m"});
-  t.push_back({kPosition, axes("ext.pos.#"), "m"});
   t.push_back({kVelocity, axes("stateestimatez.v#"), "mm/s", 1, 1000});
   t.push_back({kVelocity, axes("stateestimate.v#"), "m/s"});
   // kalman.stateP* is a velocity in the body frame, so for kalman.state* the velocity is derived from the position.
   t.push_back({kForceWorld, axes("stateestimatez.a#"), "mm/s^2", 1, 1000});
-  // acc.x of the firmware is in g; other programs use the name acc_x with any unit.
-  t.push_back({kForceBody, axes("acc.#"), "g", kGravity_m_s2, 1, Ask::kGravityUnit});
   t.push_back({kAttitude, quaternion("stateestimate.q#"), "1"});
   t.push_back({kPackedAttitude, {"stateestimatez.quat"}, "packed"});
   t.push_back({kAttitude, each("kalman.q#", {"1", "2", "3", "0"}), "1"});
@@ -83,16 +80,22 @@ void add_crazyflie(Table& t) {
   t.push_back({kEuler, axes("ctrllee.rpy#"), "rad"});
   // The firmware's legacy convention: degrees, and positive pitch raises the nose.
   for (const char* group : {"stateestimate.#", "stabilizer.#"})
-    t.push_back({kEuler, euler(group), "deg", kDegree_rad, 1, Ask::kLegacyPitch});
+    t.push_back(
+        {kEuler, euler(group), "deg", kDegree_rad, 1, Ask::kNothing, Origin::kPrograms, {1, -1, 1, 1}});
   t.push_back({kRates, each("stateestimatez.rate#", {"roll", "pitch", "yaw"}), "mrad/s", 1, 1000});
   t.push_back({kRates, axes("ctrllee.omega#"), "rad/s"});
-  t.push_back({kRates, axes("gyro.#"), "deg/s", kDegree_rad, 1, Ask::kRates});
-  t.push_back({kRates, each("ctrlmel.r.#", {"roll", "pitch", "yaw"}), "rad/s", 1, 1, Ask::kLegacyPitch});
+  t.push_back({kRates,
+               each("ctrlmel.r.#", {"roll", "pitch", "yaw"}),
+               "rad/s",
+               1,
+               1,
+               Ask::kNothing,
+               Origin::kPrograms,
+               {1, -1, 1, 1}});
   t.push_back({kDuty, rotors("pwm.m#.pwm"), "1/65536", 1, 65536});
   // The request before battery compensation; since November 2022 the duty after it, without an upper limit.
   t.push_back({kRequested, rotors("motor.m#req"), "1/65536", 1, 65536, Ask::kMotors});
   t.push_back({kRequested, rotors("motor.m#"), "1/65536", 1, 65536, Ask::kMotors});
-  t.push_back({kRotorSpeed, rotors("rpm.m#"), "rpm", 2 * kPi, 60});
   t.push_back({kBattery, {"pm.vbatmv"}, "mV", 1, 1000});
   t.push_back({kBattery, {"pm.vbat"}, "V"});
   t.push_back({kTargetPosition, axes("ctrltargetz.#"), "mm", 1, 1000});
@@ -112,97 +115,58 @@ void add_crazyflie(Table& t) {
   t.push_back({kAccelerationWorld, axes("stateestimate.a#"), "g", kGravity_m_s2, 1});
 }
 
-/// Hand-made CSV files. The first name of each group is the one this tool would write.
-void add_generic(Table& t) {
-  for (const char* group : {"position.#", "pos.#", "p#", "p.#", "pose.position.#", "pose.pose.position.#",
-                            "odom.position.#", "transform.translation.#", "point.#", "drone.#", "vicon.#",
-                            "mocap.#", "pos#", "position#", "t#", "#.position", "#.pos", "#"})
+/// Log variables of the Crazyflie firmware that other programs use too.
+void add_common_words(Table& t) {
+  t.push_back({kForceBody, axes("acc.#"), "g", kGravity_m_s2, 1});
+  t.push_back({kRates, axes("gyro.#"), "deg/s", kDegree_rad, 1});
+  t.push_back({kPosition, axes("ext.pos.#"), "m"});
+}
+
+/// Fields of ROS messages.
+void add_messages(Table& t) {
+  for (const char* group : {"pose.position.#", "pose.pose.position.#", "odom.position.#",
+                            "transform.translation.#", "point.#", "position.#"})
     t.push_back({kPosition, axes(group), "m"});
-  for (const char* group : {"velocity.#", "vel.#", "v#", "v.#", "vel#", "velocity#", "linear.velocity.#",
-                            "#.velocity", "#.vel", "d#", "#dot"})
-    t.push_back({kVelocity, axes(group), "m/s"});
-  const std::vector<std::string> ned = {"north", "east", "down"}, n_e_d = {"n", "e", "d"};
-  const std::vector<std::string> enu = {"east", "north", "up"}, e_n_u = {"e", "n", "u"};
-  for (const char* group : {"#", "pos.#", "position.#"}) {
-    t.push_back({kPosition, each(group, ned), "m", 1, 1, Ask::kNorthEastDown});
-    t.push_back({kPosition, each(group, enu), "m", 1, 1, Ask::kEastNorthUp});
-  }
-  for (const char* group : {"p#", "pos.#"})
-    t.push_back({kPosition, each(group, n_e_d), "m", 1, 1, Ask::kNorthEastDown});
-  for (const char* group : {"v.#", "vel.#", "velocity.#"}) {
-    t.push_back({kVelocity, each(group, ned), "m/s", 1, 1, Ask::kNorthEastDown});
-    t.push_back({kVelocity, each(group, enu), "m/s", 1, 1, Ask::kEastNorthUp});
-  }
-  for (const char* group : {"v#", "vel.#"}) {
-    t.push_back({kVelocity, each(group, n_e_d), "m/s", 1, 1, Ask::kNorthEastDown});
-    t.push_back({kVelocity, each(group, e_n_u), "m/s", 1, 1, Ask::kEastNorthUp});
-  }
+  t.push_back({kVelocity, axes("velocity.#"), "m/s"});
+  t.push_back({kForceBody, axes("linear.acceleration.#"), "m/s^2"});
+  for (const char* group :
+       {"pose.orientation.#", "pose.pose.orientation.#", "transform.rotation.#", "orientation.#"})
+    t.push_back({kAttitude, quaternion(group), "1"});
+  for (const char* group : {"angular.velocity.#", "twist.angular.#", "twist.twist.angular.#"})
+    t.push_back({kRates, axes(group), "rad/s"});
+  t.push_back({kBattery, {"voltage"}, "V"});
+}
+
+/// Rotor speeds, collective commands, and velocities in a frame that only the motion tells.
+void add_stated(Table& t) {
   for (const char* group : {"twist.twist.linear.#", "twist.linear.#"})
     t.push_back({kVelocity, axes(group), "m/s", 1, 1, Ask::kVelocityFrame});
-  for (const char* group : {"imu.acc.#", "accel.#", "accelerometer.#", "imu.linear.acceleration.#", "acc#",
-                            "accel#", "linear.acceleration.#", "acceleration.#", "a#", "a.#"})
-    t.push_back({kForceBody, axes(group), "", 1, 1, Ask::kAcceleration});
   for (const char* group :
-       {"q#", "q.#", "quat.#", "quat#", "quaternion.#", "quaternion#", "pose.orientation.#",
-        "pose.pose.orientation.#", "transform.rotation.#", "orientation.#", "att.q#"})
-    t.push_back({kAttitude, quaternion(group), "1"});
-  for (const char* group : {"q#", "q.#", "quat.#", "quaternion.#"})
-    t.push_back({kAttitude, each(group, {"0", "1", "2", "3"}), "1", 1, 1, Ask::kQuaternion});
-  for (const auto& names : {euler("#"), euler("att.#"), euler("attitude.#"), euler("euler.#"),
-                            each("#", {"phi", "theta", "psi"}), axes("rpy.#"), axes("euler.#")})
-    t.push_back({kEuler, names, "", 1, 1, Ask::kAngles});
-  for (const char* group :
-       {"imu.gyro.#", "gyr.#", "angular.velocity.#", "ang.vel.#", "omega.#", "w#", "w.#", "gyro#", "omega#",
-        "body.rate.#", "body.rates.#", "twist.angular.#", "twist.twist.angular.#"})
-    t.push_back({kRates, axes(group), "", 1, 1, Ask::kRates});
-  t.push_back({kRates, {"p", "q", "r"}, "", 1, 1, Ask::kRates});
-  t.push_back({kForceBody, axes("imu.a#"), "", 1, 1, Ask::kAcceleration});
-  t.push_back({kRates, axes("imu.g#"), "", 1, 1, Ask::kRates});
-  for (const char* group : {"motor.#", "motor#", "m#", "u#", "pwm#", "pwm.#", "duty.#", "thrust.#", "cmd.#",
-                            "motor.cmd.#", "motor.cmd#", "motorcmd#"}) {
-    // An array that has an element 0 is counted from 0.
-    t.push_back({kDuty, each(group, {"0", "1", "2", "3"}), "", 1, 1, Ask::kMotors});
-    t.push_back({kDuty, rotors(group), "", 1, 1, Ask::kMotors});
-  }
-  for (const char* group : {"rpm#", "rpm.#", "motor.rpm.#", "rotor.speed.#", "motor.speed.#", "omega.m#"})
+       {"rpm#", "rpm.#", "rpm.m#", "motor.rpm.#", "rotor.speed.#", "motor.speed.#", "omega.m#"})
     t.push_back({kRotorSpeed, rotors(group), "rpm", 2 * kPi, 60});
   for (const char* group : {"m#.rads", "m#.rad.s", "motor#.rad.s", "rotor.speed.#.rad.s"})
     t.push_back({kRotorSpeed, rotors(group), "rad/s"});
   // Electrical revolutions per minute: the brushless motors of a Crazyflie have six pole pairs.
   for (const char* group : {"m#.erpm", "erpm.m#", "erpm#", "erpm.#", "motor#.erpm"})
     t.push_back({kRotorSpeed, rotors(group), "erpm", 2 * kPi, 60 * 6});
-  for (const char* name : {"battery", "vbat", "voltage", "battery.voltage", "batteryvoltage", "batt", "bat",
-                           "v.bat", "battery.v"})
-    t.push_back({kBattery, {name}, "V"});
-  for (const char* group : {"target.#",    "ref.#",
-                            "des.#",       "setpoint.#",
-                            "sp.#",        "desired.#",
-                            "target.p#",   "#.ref",
-                            "#.des",       "#.d",
-                            "p#.ref",      "p#.des",
-                            "#.sp",        "target.position.#",
-                            "reference.#", "ref#",
-                            "sp#",         "des#",
-                            "target#",     "#.setpoint",
-                            "pos.sp.#",    "pos.ref.#",
-                            "pos.des.#",   "position.setpoint.#"})
-    t.push_back({kTargetPosition, axes(group), "m"});
-  for (const char* group :
-       {"target.v#", "ref.v#", "des.v#", "setpoint.v#", "sp.v#", "v#.ref", "v#.des", "v#.sp"})
-    t.push_back({kTargetVelocity, axes(group), "m/s"});
   for (const char* name : {"thrust", "thrust.cmd", "cmd.thrust", "collective.thrust", "thrust.setpoint"})
     t.push_back({kThrustCommand, {name}, "1"});
 }
 
+void add_rows(Table& table, void (*add)(Table&), Origin origin) {
+  const std::size_t first = table.size();
+  add(table);
+  for (std::size_t i = first; i < table.size(); ++i) table[i].origin = origin;
+}
+
 Table make_table() {
   Table table;
-  add_own(table);
-  for (NamedColumns& row : table) row.origin = Origin::kOwn;
-  add_published(table);
-  add_crazyflie(table);
-  const std::size_t programs = table.size();
-  add_generic(table);
-  for (std::size_t i = programs; i < table.size(); ++i) table[i].origin = Origin::kPeople;
+  add_rows(table, add_own, Origin::kOwn);
+  add_rows(table, add_published, Origin::kPrograms);
+  add_rows(table, add_crazyflie, Origin::kPrograms);
+  add_rows(table, add_common_words, Origin::kCommonWords);
+  add_rows(table, add_messages, Origin::kMessages);
+  add_rows(table, add_stated, Origin::kUnits);
   return table;
 }
 
@@ -261,10 +225,6 @@ std::vector<std::string> called_names(const std::string& column) {
   std::vector<std::string> names = {column};
   const std::size_t dot = column.find('.');
   if (dot == std::string::npos || column.find('.', dot + 1) == std::string::npos) return names;
-  for (const char* const wish : {"target.", "ref.", "reference.", "des.", "desired.", "setpoint.", "cmd.",
-                                 "command.", "goal.", "error.", "err.", "initial.", "angular."}) {
-    if (column.rfind(wish, 0) == 0) return names;
-  }
   names.push_back(column.substr(dot + 1));
   return names;
 }

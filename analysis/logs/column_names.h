@@ -4,6 +4,7 @@
 /// first converted to the names of columns.toml (message_frames.h), so that each signal is interpreted in one place.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -14,23 +15,17 @@ namespace swarmcert::logs {
 /// What the names leave open and the data must decide.
 enum class Ask {
   kNothing,
-  kAcceleration,   ///< unit, frame, and whether gravity is in it
-  kGravityUnit,    ///< nothing if its norm is 1 g in its unit; otherwise the same as kAcceleration
-  kAngles,         ///< degrees or radians, and the signs
-  kLegacyPitch,    ///< nothing open: the second component is minus the rotation about y
-  kRates,          ///< degrees or radians per second
-  kQuaternion,     ///< x, y, z, w or w, x, y, z
-  kMotors,         ///< requested thrust or applied duty; scale
-  kVelocityFrame,  ///< along the axes of the world or of the body
-  kNorthEastDown,  ///< nothing open: north, east, down, with body axes forward, right, down
-  kEastNorthUp     ///< nothing open
+  kMotors,        ///< requested thrust or applied duty; scale
+  kVelocityFrame  ///< along the axes of the world or of the body
 };
 
 /// Where names come from.
 enum class Origin {
-  kOwn,       ///< columns.toml; message_frames.h converts messages of known firmware to them
-  kPrograms,  ///< known programs: specific enough to be found after another first word
-  kPeople     ///< hand-made files: common words
+  kOwn,         ///< columns.toml; message_frames.h converts messages of known firmware to them
+  kPrograms,    ///< known programs: specific enough to be found after another first word
+  kMessages,    ///< fields of ROS messages: only in topics of a known type
+  kUnits,       ///< names that state what they are: only as they are
+  kCommonWords  ///< of the Crazyflie firmware, but common words: only beside its other names
 };
 
 /// Columns of one topic that together carry a group of signals, starting with `signal`.
@@ -41,6 +36,7 @@ struct NamedColumns {
   double multiply = 1, divide = 1;
   Ask ask = Ask::kNothing;
   Origin origin = Origin::kPrograms;
+  std::array<double, 4> sign{1, 1, 1, 1};
 };
 
 /// Returns the table, in order of preference: if several rows give the same signal, the first one in the file is used.

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -62,6 +63,9 @@ std::map<std::string, NamedSignal> named_signals() {
   add("requested", motors, kRequested, {{"1", 1, 1}, {"%", 1, 100}, {"PWM", 1, 65536}});
   add("rate", axes, kRates, of_both_signs({{"rad/s", 1, 1}, {"mrad/s", 1, 1000}, {"deg/s", kDegree_rad, 1}}));
   add("duty", motors, kDuty, {{"1", 1, 1}, {"%", 1, 100}, {"PWM", 1, 65536}});
+  add("rotor_speed", motors, kRotorSpeed, {{"rad/s", 1, 1}, {"rpm", 2 * kPi, 60}, {"erpm", 2 * kPi, 60 * 6}});
+  add("motor_command", {"_1", "_2", "_3", "_4", "_5", "_6", "_7", "_8"}, kMotorCommand,
+      {{"1", 1, 1}, {"%", 1, 100}, {"permille", 1, 1000}, {"PWM", 1, 65536}});
   add("battery", {""}, kBattery, {{"V", 1, 1}, {"mV", 1, 1000}});
   add("target_position", axes, kTargetPosition, length);
   add("target_velocity", axes, kTargetVelocity, speed);
@@ -73,17 +77,40 @@ std::map<std::string, NamedSignal> named_signals() {
 
 }  // namespace
 
-std::optional<UnitFactor> unit_factor(int signal, const std::string& unit) {
+namespace {
+
+/// Returns name and units; nullptr if columns.toml does not know the signal. Forces in B and accelerations are as
+/// forces in W.
+const std::pair<const std::string, NamedSignal>* named_signal(int signal) {
   static const std::map<std::string, NamedSignal> named = named_signals();
-  // Forces in B and accelerations have the same units as forces in W.
-  const int alike = signal >= kForceBody && signal < kAttitude ? kForceWorld : signal;
-  for (const auto& [name, known] : named) {
-    if (known.signal != alike) continue;
-    for (const Unit& candidate : known.units) {
-      if (unit == candidate.name) return UnitFactor{candidate.multiply, candidate.divide};
-    }
-  }
+  const int alike =
+      signal >= kForceBody && signal < kAttitude ? kForceWorld + (signal - kForceWorld) % 3 : signal;
+  for (const auto& entry : named)
+    if (entry.second.signal == alike) return &entry;
+  return nullptr;
+}
+
+}  // namespace
+
+std::optional<UnitFactor> unit_factor(int signal, const std::string& unit) {
+  const auto* const named = named_signal(signal);
+  if (named == nullptr) return std::nullopt;
+  for (const Unit& candidate : named->second.units)
+    if (unit == candidate.name) return UnitFactor{candidate.multiply, candidate.divide};
   return std::nullopt;
+}
+
+std::string columns_name(int signal) {
+  const auto* const named = named_signal(signal);
+  return named == nullptr ? "" : named->first;
+}
+
+std::string unit_of_factor(int signal, double factor) {
+  const auto* const named = named_signal(signal);
+  if (named == nullptr) return "";
+  for (const Unit& unit : named->second.units)
+    if (std::abs(unit.multiply / unit.divide / factor - 1) < 1e-9) return unit.name;
+  return "";
 }
 
 const SignalMap& known_columns() {

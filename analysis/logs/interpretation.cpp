@@ -97,9 +97,10 @@ void refuse_without_motion(const Draft& draft) {
   for (const Carried& carried : draft.recognition.groups) {
     if (carried.signal < kAttitude) return;  // position, velocity or acceleration
   }
-  throw files::InputError({draft.raw.path, "", "position", "",
-                           "no column carries it, nor a velocity or an acceleration",
-                           "log it, or name its column in a columns.toml (--columns)"});
+  std::string hint = "log it, or name its column in a columns.toml (--columns)";
+  for (const std::string& rejected : draft.recognition.rejected) hint += "; not used: " + rejected;
+  throw files::InputError(
+      {draft.raw.path, "", "position", "", "no column carries it, nor a velocity or an acceleration", hint});
 }
 
 /// Makes clocks that count from 1970 start at zero and stores the offset in Log::epoch_s. Other clocks keep their
@@ -179,8 +180,8 @@ void Draft::add(const std::string& name, SignalInfo::Source source, const std::s
 }
 
 void Draft::add_measured(const std::string& name, int signal) const {
-  std::string from, unit, topic;
-  double rate_hz = 0;
+  std::string from, unit, topic, runner_up;
+  double rate_hz = 0, odds_bits = kNaN;
   const bool is_four = signal == kAttitude || signal == kDuty || signal == kMotorForce ||
                        signal == kRequested || signal == kRotorSpeed;
   const int width = signal == kMotorCommand ? 8 : is_four ? 4 : 3;
@@ -197,8 +198,10 @@ void Draft::add_measured(const std::string& name, int signal) const {
     from += names_of(raw, carried);
     unit = carried.unit;
     rate_hz = rate_hz_of(carrier);
+    odds_bits = carried.odds_bits;
+    runner_up = carried.runner_up;
   }
-  log.sources.push_back({name, Source::kMeasured, from, unit, rate_hz, kNaN});
+  log.sources.push_back({name, Source::kMeasured, from, unit, rate_hz, kNaN, odds_bits, runner_up});
 }
 
 void settle_judgement(Draft& draft) {
@@ -247,6 +250,7 @@ Log interpret(RawLog raw, const SignalMap& map) {
   add_own_names(raw, log.interpretation);
   Draft draft{raw, recognise(raw, map), {}, log, {}, map.empty()};
   draft.table = signal_table(raw, draft.recognition, map, log.health, log.events);
+  for (const std::string& corrected : draft.recognition.corrected) draft.note(corrected);
   for (const std::string& rejected : draft.recognition.rejected) draft.note("not used: " + rejected);
   refuse_without_motion(draft);
   drop_bad_quaternions(draft);

@@ -20,8 +20,7 @@ struct Draft {
   Log& log;
   /// Smoothed acceleration in W without gravity; empty for an axis that has neither velocity nor position.
   std::array<std::vector<double>, 3> acceleration_m_s2;
-  bool asks_physics = true;             ///< decide from the data; false if a columns.toml states the meaning
-  bool has_forward_right_down = false;  ///< of the body axes; the quaternion must still be converted
+  bool asks_physics = true;  ///< decide from the data; false if a columns.toml states the meaning
 
   bool is_measured(int signal) const { return recognition.find(signal) != nullptr; }
   void note(const std::string& words) const { log.interpretation.push_back(words); }

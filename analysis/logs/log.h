@@ -118,6 +118,9 @@ struct SignalInfo {
   double rate_hz = 0;  ///< of the records that contain it
   /// Standard deviation, in SI units; NaN: not estimated.
   double noise = std::numeric_limits<double>::quiet_NaN();
+  /// Evidence, in bits, for what the columns were taken as, over `runner_up`; NaN: their names are known.
+  double odds_bits = std::numeric_limits<double>::quiet_NaN();
+  std::string runner_up{};
 };
 
 /// An event in a log.

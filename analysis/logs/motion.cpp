@@ -70,169 +70,6 @@ Vector rotated(const SignalTable& t, std::size_t i, const Vector& body) {
   return world;
 }
 
-/// Returns the distance of `force` (specific force in W, per axis) from acceleration + g: the root mean square over
-/// axes and records after subtracting the mean.
-double misfit(const Draft& draft, const std::array<std::vector<double>, 3>& force) {
-  double squares = 0;
-  int axes = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (draft.acceleration_m_s2[k].empty()) continue;
-    std::vector<double> difference;
-    for (std::size_t i = 0; i < force[k].size(); ++i)
-      difference.push_back(force[k][i] - draft.acceleration_m_s2[k][i] - (k == 2 ? kGravity_m_s2 : 0));
-    const double rms = root_mean_square(difference);
-    if (!std::isfinite(rms)) continue;
-    squares += rms * rms;
-    ++axes;
-  }
-  return axes > 0 ? std::sqrt(squares / axes) : std::nan("");
-}
-
-std::array<std::vector<double>, 3> as_world(const SignalTable& t, int signal, double scale, bool body,
-                                            bool without_gravity) {
-  std::array<std::vector<double>, 3> world;
-  for (auto& axis : world) axis.resize(t.size());
-  for (std::size_t i = 0; i < t.size(); ++i) {
-    Vector f = t.three(signal, i);
-    for (double& x : f) x *= scale;
-    if (body) f = rotated(t, i, f);
-    if (without_gravity) f[2] += kGravity_m_s2;
-    for (std::size_t k = 0; k < 3; ++k) world[k][i] = f[k];
-  }
-  return world;
-}
-
-/// Returns whether the vector has about this norm when gravity is included: vehicles rest and hover most of the time.
-bool is_about(double size, double gravity) { return size > 0.7 * gravity && size < 1.4 * gravity; }
-
-/// Returns whether an accelerometer whose name implies a unit keeps it: its norm is about 1 g in this unit, or no other
-/// unit fits better. Otherwise the columns get their stored values again, with an unknown unit.
-bool keeps_unit(Draft& draft, double size_m_s2) {
-  SignalTable& t = draft.table;
-  for (Carried& carried : draft.recognition.groups) {
-    if (carried.signal != kForceBody) continue;
-    const double factor = carried.multiply / carried.divide;
-    const double stored = size_m_s2 / factor;
-    const bool suits_other = is_about(stored, kGravity_m_s2) || is_about(stored, 1) ||
-                             is_about(stored, 1000) || is_about(stored, 1000 * kGravity_m_s2);
-    if (is_about(size_m_s2, kGravity_m_s2) || !suits_other) return true;
-    for (int k = 0; k < 3; ++k) {
-      for (double& value : t[kForceBody + k]) value /= factor;
-    }
-    carried.unit = "";
-  }
-  return false;
-}
-
-/// The median norm shows the unit and whether gravity is included; the acceleration shows the frame.
-void settle_accelerometer(Draft& draft) {
-  const Carried& carried = *draft.recognition.find(kForceBody);
-  SignalTable& t = draft.table;
-  const bool is_open = carried.ask == Ask::kAcceleration || carried.ask == Ask::kGravityUnit;
-  if (!is_open || !draft.asks_physics) return;
-  std::vector<double> sizes;
-  for (std::size_t i = 0; i < t.size(); ++i) {
-    const Vector f = t.three(kForceBody, i);
-    sizes.push_back(std::hypot(f[0], f[1], f[2]));
-  }
-  double size = median(sizes);
-  if (carried.ask == Ask::kGravityUnit) {
-    const double factor = carried.multiply / carried.divide;
-    if (keeps_unit(draft, size)) return;
-    size /= factor;
-  }
-  struct Unit {
-    const char* name;
-    double gravity, scale;
-  };
-  const Unit units[] = {{"m/s^2", kGravity_m_s2, 1},
-                        {"g", 1, kGravity_m_s2},
-                        {"mg", 1000, kGravity_m_s2 / 1000},
-                        {"mm/s^2", 1000 * kGravity_m_s2, 0.001}};
-  const Unit* unit = nullptr;
-  for (const Unit& candidate : units) {
-    if (is_about(size, candidate.gravity)) unit = &candidate;
-  }
-  const bool without_gravity = unit == nullptr;
-  double best = std::nan(""), best_scale = 1;
-  bool best_body = true;
-  for (const Unit& candidate : units) {
-    if (unit != nullptr && unit != &candidate) continue;
-    for (const bool body : {true, false}) {
-      const double rms = misfit(draft, as_world(t, kForceBody, candidate.scale, body, without_gravity));
-      if (std::isfinite(best) && !(rms < best)) continue;
-      best = rms;
-      best_scale = candidate.scale;
-      best_body = body;
-    }
-  }
-  const char* unit_name = "m/s^2";
-  for (const Unit& candidate : units) {
-    if (candidate.scale == best_scale) unit_name = candidate.name;
-  }
-  draft.note(fmt::format(
-      "{}: median size {:.4g}, {} gravity, unit {}, frame {}; {:.2f} m/s^2 from the derivative of "
-      "the velocity",
-      names_of(draft.raw, carried), size, without_gravity ? "without" : "with", unit_name,
-      best_body ? "body" : "world", best));
-  const auto world = as_world(t, kForceBody, best_scale, best_body, without_gravity);
-  for (int k = 0; k < 3; ++k) t[kForceWorld + k] = world[static_cast<std::size_t>(k)];
-}
-
-/// Compares the derivative of the position with the velocity to detect millimetres or centimetres in either, unless
-/// their names state a unit.
-void settle_lengths(Draft& draft) {
-  SignalTable& t = draft.table;
-  const Carried *const position = draft.recognition.find(kPosition), *const velocity =
-                                                                         draft.recognition.find(kVelocity);
-  if (!draft.asks_physics || position == nullptr || velocity == nullptr) return;
-  const auto is_open = [&](const Carried& carried, const char* unit) {
-    return carried.unit == unit && carried.divide == 1 &&
-           names_of(draft.raw, carried).find('[') == std::string::npos;
-  };
-  std::vector<double> slopes, velocities;
-  for (int k = 0; k < 3; ++k) {
-    if (!t.has(kPosition + k) || !t.has(kVelocity + k)) continue;
-    const std::vector<double> slope =
-        local_derivative(t, t[kPosition + k], velocity_window_s(t.step_s()), 2, 1);
-    slopes.insert(slopes.end(), slope.begin(), slope.end());
-    velocities.insert(velocities.end(), t[kVelocity + k].begin(), t[kVelocity + k].end());
-  }
-  const Line line = line_through(velocities, slopes);
-  if (line.count < 100 || !(line.correlation > 0.9)) return;
-  for (const double unit : {1000.0, 100.0}) {
-    const bool small_position = std::abs(line.slope / unit - 1) < 0.2,
-               small_velocity = std::abs(line.slope * unit - 1) < 0.2;
-    const Carried& carried = small_position ? *position : *velocity;
-    if ((!small_position && !small_velocity) || !is_open(carried, small_position ? "m" : "m/s")) continue;
-    const int first = small_position ? kPosition : kVelocity;
-    for (int k = 0; k < 3; ++k) {
-      for (double& value : t[first + k]) value /= unit;
-    }
-    draft.note(fmt::format("{}: read as {}{}; the position moves {:.4g} times as far as the velocity implies",
-                           names_of(draft.raw, carried), unit == 1000 ? "mm" : "cm",
-                           small_position ? "" : "/s", line.slope));
-    return;
-  }
-}
-
-/// Converts north, east, down to z up. With such names the body axes are forward, right and down.
-void settle_north_east_down(Draft& draft) {
-  const Carried* const position = draft.recognition.find(kPosition);
-  const Carried* const velocity = draft.recognition.find(kVelocity);
-  SignalTable& t = draft.table;
-  std::string names;
-  for (const Carried* const carried : {position, velocity}) {
-    if (carried == nullptr || carried->ask != Ask::kNorthEastDown) continue;
-    names += (names.empty() ? "" : ", ") + names_of(draft.raw, *carried);
-    t.turn_half_about_x(carried->signal);
-  }
-  if (names.empty()) return;
-  draft.has_forward_right_down = true;
-  for (const int body : {kForceBody, kRates, kEuler}) t.turn_half_about_x(body);
-  draft.note(names + ": north, east, down; the body's axes are taken as forward, right, down");
-}
-
 /// nav_msgs/Odometry specifies velocities in the body frame, but Crazyswarm2 and motion capture write world-frame
 /// velocities into it and into TwistStamped. The derivative of the position shows which it is.
 void settle_velocity_frame(Draft& draft) {
@@ -275,8 +112,6 @@ void settle_velocity_frame(Draft& draft) {
 void derive_kinematics(Draft& draft) {
   SignalTable& t = draft.table;
   Signals& signals = draft.log.signals;
-  settle_north_east_down(draft);
-  settle_lengths(draft);
   settle_velocity_frame(draft);
   signals.position = t.has_group(kPosition, 3);
   const char* const axes[] = {"x", "y", "z"};
@@ -336,11 +171,13 @@ void settle_specific_force(Draft& draft) {
   if (t.has_group(kForceWorld, 3)) {
     signals.specific_force = ForceSource::kAccelerometer;
     draft.add_measured("specific_force", kForceWorld);
-  } else if (t.has_group(kForceBody, 3) && signals.attitude) {
-    settle_accelerometer(draft);
-    if (!t.has(kForceWorld)) {
-      const auto world = as_world(t, kForceBody, 1, true, false);
-      for (int k = 0; k < 3; ++k) t[kForceWorld + k] = world[static_cast<std::size_t>(k)];
+  } else if (t.has_group(kForceBody, 3) && (signals.attitude || draft.acceleration_m_s2[2].empty())) {
+    // Without any attitude the body's axes stand for those of the world, of which only the thrust axis is judged.
+    if (!signals.attitude) draft.note("no attitude: the force is judged along the thrust axis of the body");
+    for (int k = 0; k < 3; ++k) t[kForceWorld + k].resize(t.size());
+    for (std::size_t i = 0; i < t.size(); ++i) {
+      const Vector world = rotated(t, i, t.three(kForceBody, i));
+      for (int k = 0; k < 3; ++k) t[kForceWorld + k][i] = world[static_cast<std::size_t>(k)];
     }
     signals.specific_force = ForceSource::kAccelerometer;
     draft.add_measured("specific_force", kForceBody);

@@ -179,6 +179,7 @@ bool is_flight_table(const std::string& path) {
     RawLog log;
     Collector collector(log, known_columns());
     read_csv(in, path, collector, log.health);
+    collector.end();
     const Recognition found = recognise(log, known_columns());
     return found.find(kPosition) != nullptr || found.find(kVelocity) != nullptr ||
            found.find(kForceBody) != nullptr;

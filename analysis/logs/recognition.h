@@ -1,7 +1,9 @@
 /// @file Finds the columns of a log that carry known signals.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -18,20 +20,25 @@ struct Carried {
   std::string unit;
   double multiply = 1, divide = 1;
   Ask ask = Ask::kNothing;
+  std::array<double, 4> sign{1, 1, 1, 1};  ///< of the columns of vectors and quaternions
+  /// Evidence for this reading over `runner_up` if it was found by assignment.h; NaN: the names are known.
+  double odds_bits = std::numeric_limits<double>::quiet_NaN();
+  std::string runner_up{};
 
   std::size_t size() const { return columns.size(); }
 };
 
 struct Recognition {
-  std::vector<Carried> groups;        ///< at most one per first signal
-  std::size_t clock = 0;              ///< the topic whose records become samples
-  std::vector<std::string> rejected;  ///< groups with known names but dead values, in words
+  std::vector<Carried> groups;         ///< at most one per first signal
+  std::size_t clock = 0;               ///< the topic whose records become samples
+  std::vector<std::string> rejected;   ///< groups with dead values or several possible meanings, in words
+  std::vector<std::string> corrected;  ///< units of known names that the motion contradicts, in words
 
   const Carried* find(int signal) const;
 };
 
-/// Recognises columns by name, or by `map` if it is not empty. Dead groups (only zeros or NaN, quaternions without unit
-/// norm) are ignored.
+/// Recognises columns by the names of known programs and then by evidence (assignment.h), or by `map` if it is not
+/// empty. Dead groups (only zeros or NaN, quaternions without unit norm) are ignored.
 /// @throws files::InputError if `map` names a column that no topic has.
 Recognition recognise(const RawLog& log, const SignalMap& map);
 

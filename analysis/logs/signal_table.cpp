@@ -211,12 +211,6 @@ bool is_needed(int signal) {
 
 double longest_gap_s(double step_s) { return std::max(kLongestGap_s, step_s > 0.02 ? 2.5 * step_s : 0); }
 
-void SignalTable::turn_half_about_x(int first) {
-  for (const int signal : {first + 1, first + 2}) {
-    for (double& value : (*this)[signal]) value = -value;
-  }
-}
-
 double SignalTable::step_s() const { return 1e-6 * median_step(time_us); }
 
 std::vector<double> resampled(const std::vector<double>& from_s, const std::vector<double>& series,
@@ -288,7 +282,8 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, cons
               ? without_wraps(column, topic.time_s,
                               carried.signal == kPosition || carried.signal == kTargetPosition, events)
               : column.values;
-      for (double& value : values) value = value * carried.multiply / carried.divide;
+      const double sign = k < carried.sign.size() ? carried.sign[k] : 1;
+      for (double& value : values) value = sign * value * carried.multiply / carried.divide;
       for (std::size_t i = 0; i < signs.size(); ++i) values[i] *= signs[i];
       const int signal = carried.signal + static_cast<int>(k);
       if (carried.topic != recognition.clock) {

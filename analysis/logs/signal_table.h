@@ -32,8 +32,6 @@ struct SignalTable {
     const Vector xyz = three(kAttitude, record);
     return {xyz[0], xyz[1], xyz[2], (*this)[kAttitude + 3][record]};
   }
-  /// Negates y and z of a group: converts between the axes forward, right, down and forward, left, up.
-  void turn_half_about_x(int first);
   /// Returns the median step between records in seconds; 0 if there are fewer than two. Goes through all records.
   double step_s() const;
 };

@@ -54,6 +54,12 @@ struct UnitFactor {
 /// Returns the factor of `unit`, spelled as in columns.toml; nothing if `signal` has no such unit.
 std::optional<UnitFactor> unit_factor(int signal, const std::string& unit);
 
+/// Returns the name of one signal in columns.toml, "position_x"; empty if it has none.
+std::string columns_name(int signal);
+
+/// Returns the unit of columns.toml in which a stored number times `factor` is the signal; empty if there is none.
+std::string unit_of_factor(int signal, double factor);
+
 /// Returns the empty map.
 const SignalMap& known_columns();
 

@@ -257,7 +257,9 @@ TEST(Keep, DamagedLogsAreLeftOutOfFitsAndNamedUnlessTheyAreKept) {
 
 TEST(Keep, ImplausibleLogsAreJudgedWhereTheyAreKept) {
   const ScratchFolder folder;
-  std::string text = "t,px,py,pz,vx,vy,vz,qx,qy,qz,qw,m1,m2,m3,m4,vbat\n";
+  std::string text =
+      "t,stateEstimate.x,stateEstimate.y,stateEstimate.z,stateEstimate.vx,stateEstimate.vy,stateEstimate.vz,"
+      "qx,qy,qz,qw,m1,m2,m3,m4,vbat\n";
   for (int k = 0; k < 1500; ++k)  // the position moves 30 times as far as the velocity implies
     text += fmt::format("{:.2f},{:.5f},0,1,{:.6f},0,0,0,0,0,1,0.6,0.6,0.6,0.6,3.8\n", 0.01 * k,
                         0.9 * std::sin(0.01 * k), 0.03 * std::cos(0.01 * k));

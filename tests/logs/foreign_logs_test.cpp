@@ -79,9 +79,18 @@ logs::Log turned_flight(bool body, bool has_position = true) {
   text += ",twist.linear.x,twist.linear.y,twist.linear.z";
   text += has_position ? ",pose.position.x,pose.position.y,pose.position.z\n" : "\n";
   for (int k = 0; k < 400; ++k) {
-    const double t = 0.01 * k, vx = 0.9 * std::cos(3 * t), vy = 0.4 * std::cos(2 * t), yaw = body ? 1 : 0;
-    text += fmt::format("{:.3f},0,0,{:.9f},{:.9f},{:.9f},{:.9f},0", t, std::sin(0.5), std::cos(0.5),
-                        std::cos(yaw) * vx + std::sin(yaw) * vy, -std::sin(yaw) * vx + std::cos(yaw) * vy);
+    const double t = 0.01 * k, vx = 0.9 * std::cos(3 * t), vy = 0.4 * std::cos(2 * t), yaw = 1;
+    // The thrust axis leans along the acceleration; before that the nose is turned.
+    const double ax = -2.7 * std::sin(3 * t), ay = -0.8 * std::sin(2 * t), lean = std::hypot(ax, ay);
+    const double half = std::atan2(lean, logs::kGravity_m_s2) / 2, s = lean > 0 ? std::sin(half) / lean : 0;
+    const double qx = -s * ay, qy = s * ax, qw = std::cos(half), c2 = std::cos(yaw / 2),
+                 s2 = std::sin(yaw / 2);
+    const logs::Attitude q{qx * c2 + qy * s2, qy * c2 - qx * s2, qw * s2, qw * c2};
+    logs::Vector v = {vx, vy, 0};
+    const auto R = q.rotation();
+    for (std::size_t j = 0; j < 3 && body; ++j) v[j] = R[0][j] * vx + R[1][j] * vy;
+    text += fmt::format("{:.3f},{:.12f},{:.12f},{:.12f},{:.12f},{:.9f},{:.9f},{:.9f}", t, q.x, q.y, q.z, q.w,
+                        v[0], v[1], v[2]);
     text +=
         has_position ? fmt::format(",{:.9f},{:.9f},1\n", 0.3 * std::sin(3 * t), 0.2 * std::sin(2 * t)) : "\n";
   }

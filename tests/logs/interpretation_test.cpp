@@ -1,6 +1,7 @@
 /// From columns to signals: units, frames and signs decided from the data, derived signals, and the flights of several
 /// collections.
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -157,8 +158,11 @@ TEST(Interpretation, AnAccelerometerThatIsCalledAsTheFirmwaresIsInTheUnitThatItS
   };
   for (const double per_m_s2 : {1.0, 1 / logs::kGravity_m_s2, 1000.0, 1000 / logs::kGravity_m_s2})
     EXPECT_LT(force_error_m_s2(flown(per_m_s2)), 0.01) << per_m_s2;
-  // A norm of 0.3 g fits no unit: it is a fault, which must be reported rather than scaled away.
-  EXPECT_GT(force_error_m_s2(flown(0.3 / logs::kGravity_m_s2)), 5);
+  // A norm of 0.3 g fits no unit: it is not used, and that is said.
+  const logs::Log faulty = flown(0.3 / logs::kGravity_m_s2);
+  EXPECT_EQ(faulty.signals.specific_force, logs::ForceSource::kVelocity);
+  EXPECT_NE(fmt::format("{}", fmt::join(faulty.interpretation, "\n")).find("not used: acc_x"),
+            std::string::npos);
 }
 
 TEST(Interpretation, DecidesTheOrderOfAQuaternion) {
@@ -252,8 +256,9 @@ TEST(Interpretation, TellsRequestedThrustFromAppliedDutyByTheBatterysSag) {
                    vz = -0.075 * std::cos(4 * t);
       const double load = 1 + az / logs::kGravity_m_s2;
       const double m = 65536 * (requested ? 0.55 * load : std::pow(load, 1 / 1.5) * 0.6 * 4.1 / volt);
-      text += fmt::format("{0:.4f},0.01,0,1,0,0,{1:.6f},{2:.1f},{2:.1f},{2:.1f},{2:.1f},{3:.4f}\n", t, vz, m,
-                          volt);
+      const double z = 1 - 0.01875 * std::sin(4 * t);
+      text += fmt::format("{0:.4f},0.01,0,{4:.6f},0,0,{1:.6f},{2:.1f},{2:.1f},{2:.1f},{2:.1f},{3:.4f}\n", t,
+                          vz, m, volt, z);
     }
     std::istringstream in(text);
     const logs::Log log = logs::parse_log(in, "sag.csv");

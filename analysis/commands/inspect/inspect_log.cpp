@@ -71,12 +71,15 @@ files::Json describe_log(const logs::Log& log) {
   json["signals"] = files::Json::array();
   for (const logs::SignalInfo& signal : log.sources) {
     const bool missing = signal.source == logs::SignalInfo::Source::kMissing;
-    json["signals"].push_back({{"name", signal.name},
-                               {"source", name(signal.source)},
-                               {"from", missing ? files::Json(nullptr) : files::Json(signal.from)},
-                               {"unit", signal.unit},
-                               {"rate_hz", missing ? files::Json(nullptr) : files::Json(signal.rate_hz)},
-                               {"noise", finite(signal.noise)}});
+    json["signals"].push_back(
+        {{"name", signal.name},
+         {"source", name(signal.source)},
+         {"from", missing ? files::Json(nullptr) : files::Json(signal.from)},
+         {"unit", signal.unit},
+         {"rate_hz", missing ? files::Json(nullptr) : files::Json(signal.rate_hz)},
+         {"noise", finite(signal.noise)},
+         {"odds_bits", finite(signal.odds_bits)},
+         {"runner_up", signal.runner_up.empty() ? files::Json(nullptr) : files::Json(signal.runner_up)}});
   }
   json["judged"] = {{"force", force_axes(log)}, {"torque", torque_axes(log)}};
   json["judged_torque"] = torque_use(log.signals.torque);
@@ -144,6 +147,8 @@ void print_log(const logs::Log& log) {
     fmt::print("  {:<18} {:<9}{:>7.1f} Hz  {}{}{}\n", signal.name, name(signal.source), signal.rate_hz,
                signal.from, signal.unit.empty() || signal.unit == "1" ? "" : " [" + signal.unit + "]",
                std::isfinite(signal.noise) ? fmt::format(", noise {:.2g}", signal.noise) : "");
+    if (std::isfinite(signal.odds_bits))
+      fmt::print("  {:<18} odds 2^{:.0f} against {}\n", "", signal.odds_bits, signal.runner_up);
   }
   for (const std::string& words : log.interpretation) fmt::print("  seen: {}\n", words);
   for (const logs::SignalDelay& delay : log.delays)

@@ -105,8 +105,9 @@ void add_signals(Report& report, const Json& d) {
   for (const Json& signal : d["signals"])
     table.push_back({text_of(signal["name"]), text_of(signal["source"]), text_of(signal["from"]),
                      text_of(signal["unit"]), number_of(signal["rate_hz"], "{:.1f}"),
-                     number_of(signal["noise"], "{:.2g}")});
-  report.table({"signal", "source", "from", "unit", "rate [Hz]", "noise"}, table);
+                     number_of(signal["noise"], "{:.2g}"), number_of(signal["odds_bits"], "{:.0f}"),
+                     text_of(signal["runner_up"])});
+  report.table({"signal", "source", "from", "unit", "rate [Hz]", "noise", "odds [bits]", "against"}, table);
   for (const Json& words : d["interpretation"]) report.paragraph("Seen in the data: " + text_of(words) + ".");
 }
 
