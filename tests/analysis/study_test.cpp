@@ -18,15 +18,16 @@ class Study : public testing::Test {
  protected:
   /// Random walks of two vehicles with downwash, motor lag and drag: flights/1 .. flights/`count`.
   void fly(int count) {
-    for (int run = 1; run <= count; ++run) {
-      const Outcome outcome = run_shell(
-          fmt::format("swarmcert simulate random-walk -q --vehicles 2 --duration 25 --seed {0} --model {1} "
-                      "--gains {2} -o flights/{0}",
-                      run, source_path("stability/models/crazyflie-small-effects.toml"),
-                      source_path("controller/gains/crazyflie-small.toml")),
-          folder_.path());
-      ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-    }
+    for (int run = 1; run <= count; ++run) fly(run, run);
+  }
+  void fly(int run, int seed) {
+    const Outcome outcome = run_shell(
+        fmt::format("swarmcert simulate random-walk -q --vehicles 2 --duration 25 --seed {} --model {} "
+                    "--gains {} -o flights/{}",
+                    seed, source_path("stability/models/crazyflie-small-effects.toml"),
+                    source_path("controller/gains/crazyflie-small.toml"), run),
+        folder_.path());
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   }
 
   Outcome study(const std::string& words) {
@@ -92,7 +93,7 @@ TEST_F(Study, FlightsThatAreNamedForTheTestDecideNothing) {
   const std::string log = folder_ / "flights/4/cf1_00";
   ASSERT_TRUE(std::filesystem::exists(log));
   std::filesystem::remove_all(folder_.path() / "flights/4");
-  std::filesystem::copy(folder_.path() / "flights/1", folder_.path() / "flights/4");
+  fly(4, 5);
   ASSERT_EQ(study(words + "--test flights/4 -o two").exit_code, 0);
   const files::Json one = result("one"), two = result("two");
   EXPECT_EQ(one["effects"], two["effects"]);
