@@ -18,7 +18,12 @@ class Battery : public Effect {
              "repeat the same accelerations over more than 0.3 V of discharge; once, begin with a discharged "
              "battery",
              {{"sensitivity_1_V", "relative thrust per volt", 0, 0, 1}},
-             {}}) {}
+             {}},
+            {Family::kThrustScale,
+             Family::kThrustScale,
+             ShownBy::kForce,
+             SetPoints::kBesideRemainder,
+             {"battery"}}) {}
   void columns(const Instant& now, const double*, Wrench* columns) const override {
     columns[0] = {(now.battery_V - kFullBattery_V) * now.thrust_N * now.b3_W(), Eigen::Vector3d::Zero()};
   }

@@ -19,7 +19,8 @@ class ComOffset : public Effect {
                 "load by 180 degrees and fly again to distinguish it from a weak rotor",
                 {{"offset_x_m", "c_x: of the centre of mass, body x", 0, -0.1, 0.1},
                  {"offset_y_m", "c_y", 0, -0.1, 0.1}},
-                {}}) {}
+                {}},
+               {Family::kLever, Family::kNone, ShownBy::kTorques}) {}
   void columns(const Instant& now, const double*, Wrench* columns) const override {
     columns[0] = {Eigen::Vector3d::Zero(), now.thrust_N * Eigen::Vector3d::UnitY()};
     columns[1] = {Eigen::Vector3d::Zero(), -now.thrust_N * Eigen::Vector3d::UnitX()};

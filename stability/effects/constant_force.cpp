@@ -17,7 +17,8 @@ class ConstantForce : public Effect {
              {{"force_x_N", "world x", 0, -0.3, 0.3},
               {"force_y_N", "world y", 0, -0.3, 0.3},
               {"force_z_N", "world z", 0, -0.3, 0.3}},
-             {}}) {}
+             {}},
+            {Family::kPush}) {}
   void columns(const Instant&, const double*, Wrench* columns) const override {
     for (int axis = 0; axis < 3; ++axis)
       columns[axis] = {Eigen::Vector3d::Unit(axis), Eigen::Vector3d::Zero()};

@@ -74,7 +74,8 @@ EffectInfo Downwash::describe() {
            {"mass_exponent", "e: 0.5 is momentum theory at equal rotor area", 0.5, 0, 2},
            {"tail", "q: 0 is a Gaussian profile, 1 a Lorentzian one", 0, 0, 1, {0, 1}}},
           false,
-          true};
+          true,
+          {Family::kWake}};
 }
 
 void Downwash::columns(const Instant& now, const double* shape, Wrench* columns) const {

@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "stability/effects/traits.h"
 #include "stability/model.h"
 
 namespace swarmcert::stability {
@@ -86,6 +87,7 @@ struct EffectInfo {
   std::vector<Parameter> shape;
   bool remembers = false;         ///< has a memory: use stream(), since no column exists for a single instant
   bool needs_neighbours = false;  ///< cannot be fitted from flights of one vehicle
+  EffectTraits traits = {};
 };
 
 inline constexpr int kMostColumns = 8;
@@ -119,13 +121,16 @@ class ColumnStream {
   virtual void advance_along(const Instant* instants, int count, int width, Wrench* columns);
 };
 
+struct Hint;
 struct SignalPath;
+struct Start;
 class SwarmPairs;
 
 /// One effect. Instances may keep scratch memory: use one instance per thread.
 class Effect {
  public:
   explicit Effect(EffectInfo info) : info_(std::move(info)) {}
+  Effect(EffectInfo info, EffectTraits traits) : info_(std::move(info)) { info_.traits = std::move(traits); }
   virtual ~Effect() = default;
   Effect(const Effect&) = delete;
   Effect& operator=(const Effect&) = delete;
@@ -166,6 +171,11 @@ class Effect {
 
   /// Returns the thetas that identification tries: by default all combinations of the parameters' grids.
   virtual std::vector<std::vector<double>> grid(const FlightRange& range) const;
+
+  /// Sets where the effect starts if a scan has found `hint`, a formula over one of its variables; by default on its
+  /// grid, for vertical forces.
+  /// @return false if the formula does not suggest the effect.
+  virtual bool start_at(const Hint& hint, Start& start) const;
 
   /// Enters an effect with a memory, with its coefficients and theta, into the simulated signal path.
   virtual void add_to(SignalPath& path, const double* coefficients, const double* shape) const;

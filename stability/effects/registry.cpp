@@ -50,11 +50,23 @@ std::deque<EffectEntry>& entries() {
   return all;
 }
 
+std::deque<EffectEntry>::iterator place_of(const std::string& name) {
+  return std::find_if(entries().begin(), entries().end(),
+                      [&](const EffectEntry& entry) { return entry.info.name == name; });
+}
+
 const EffectEntry& find(const std::string& name) {
+  const auto place = place_of(name);
+  if (place == entries().end()) throw std::invalid_argument("there is no effect named " + name);
+  return *place;
+}
+
+template <typename Is>
+std::string first_with(const Is& is) {
   for (const EffectEntry& entry : entries()) {
-    if (entry.info.name == name) return entry;
+    if (is(entry.info.traits)) return entry.info.name;
   }
-  throw std::invalid_argument("there is no effect named " + name);
+  throw std::invalid_argument("the library lacks an effect that identification needs");
 }
 
 }  // namespace
@@ -76,7 +88,27 @@ void register_effect(EffectInfo info, EffectMaker make) {
   entries().push_back({std::move(info), std::move(make)});
 }
 
+EffectEntry withdraw_effect(const std::string& name) {
+  EffectEntry entry = find(name);
+  entries().erase(place_of(name));
+  return entry;
+}
+
 const EffectInfo& effect_info(const std::string& name) { return find(name).info; }
+
+const EffectTraits& traits_of(const std::string& name) {
+  static const EffectTraits ordinary;
+  const auto place = place_of(name);
+  return place == entries().end() ? ordinary : place->info.traits;
+}
+
+std::string plain_effect(Family family) {
+  return first_with([&](const EffectTraits& traits) { return traits.is_plain(family); });
+}
+
+std::string effect_shown_by(ShownBy data) {
+  return first_with([&](const EffectTraits& traits) { return traits.shown_by == data; });
+}
 
 std::unique_ptr<Effect> make_effect(const EffectSpec& spec, const EffectContext& context) {
   if (spec.is_expression()) return std::make_unique<ExpressionEffect>(spec, context.path);

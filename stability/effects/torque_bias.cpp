@@ -16,7 +16,8 @@ class TorqueBias : public Effect {
                 {{"torque_x_Nm", "body x", 0, -0.02, 0.02},
                  {"torque_y_Nm", "body y", 0, -0.02, 0.02},
                  {"torque_z_Nm", "body z", 0, -0.02, 0.02}},
-                {}}) {}
+                {}},
+               {Family::kTorque, Family::kNone, ShownBy::kTorques}) {}
   void columns(const Instant&, const double*, Wrench* columns) const override {
     for (int axis = 0; axis < 3; ++axis)
       columns[axis] = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Unit(axis)};

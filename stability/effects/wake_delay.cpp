@@ -67,7 +67,8 @@ class WakeDelay : public Effect {
                  {"wind_x_m_s", "w: wind that carries the wake", 0, -5, 5, {0, 1.6}},
                  {"wind_y_m_s", "", 0, -5, 5, {0, 1.6}}},
                 false,
-                true}) {}
+                true},
+               {Family::kWake, Family::kWake}) {}
   void columns(const Instant& now, const double* shape, Wrench* columns) const override {
     columns_along(&now, 1, shape, columns);
   }

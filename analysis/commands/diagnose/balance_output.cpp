@@ -102,9 +102,9 @@ files::Json ranking_entry_of(const AccelerometerBalance& balance) {
 /// A weak rotor that is in the ranking explains an offset towards it.
 bool is_of_named_rotor(const TorqueBalance& balance, const files::Json& ranking) {
   const auto& rivals = balance.rivals;
-  if (std::find(rivals.begin(), rivals.end(), identification::kRotorThrust) == rivals.end()) return false;
+  if (std::find(rivals.begin(), rivals.end(), identification::rotor_effect()) == rivals.end()) return false;
   return std::any_of(ranking.begin(), ranking.end(), [&](const files::Json& entry) {
-    return entry["effect"] == identification::kRotorThrust && entry["kind"] == balance.kind;
+    return entry["effect"] == identification::rotor_effect() && entry["kind"] == balance.kind;
   });
 }
 

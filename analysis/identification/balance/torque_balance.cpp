@@ -7,8 +7,10 @@
 
 #include "analysis/identification/balance/mean_fit.h"
 #include "analysis/identification/balance/vehicle_blocks.h"
+#include "analysis/identification/candidates.h"
 #include "analysis/identification/rotors/rotor_balance.h"
 #include "analysis/residuals/torque_blocks.h"
+#include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -22,10 +24,11 @@ constexpr std::size_t kFewestTorqueBlocks = 10;
 /// @param is_surely_constant the torque explains most of the means, and surely more than the offset
 void decide_torque_cause(double longest_m, double weight_N, bool is_surely_constant, TorqueBalance& balance) {
   constexpr double kSurely_z = 2, kDiagonal = 0.5;
+  const std::string constant = stability::plain_effect(stability::Family::kTorque);
   if (is_surely_constant &&
       balance.torque_Nm.norm() - balance.torque_half_Nm.norm() > balance.least_torque_Nm &&
       balance.torque_Nm.norm() <= longest_m * weight_N) {
-    balance.effect = "torque_bias";
+    balance.effect = constant;
     return;
   }
   const bool is_constant = balance.z < -kSurely_z;
@@ -34,11 +37,10 @@ void decide_torque_cause(double longest_m, double weight_N, bool is_surely_const
   const Eigen::Vector2d half_m =
       is_constant ? Eigen::Vector2d(balance.torque_half_Nm / weight_N) : balance.offset_half_m;
   if (!(size_m.norm() - half_m.norm() > balance.least_offset_m) || size_m.norm() > longest_m) return;
-  balance.effect = is_constant ? "torque_bias" : "com_offset";
-  if (std::abs(balance.z) <= kSurely_z) balance.rivals.emplace_back("torque_bias");
+  balance.effect = is_constant ? constant : stability::plain_effect(stability::Family::kLever);
+  if (std::abs(balance.z) <= kSurely_z) balance.rivals.push_back(constant);
   const Eigen::Vector2d both = size_m.cwiseAbs();
-  if (!is_constant && both.minCoeff() > kDiagonal * both.maxCoeff())
-    balance.rivals.emplace_back("rotor_thrust");
+  if (!is_constant && both.minCoeff() > kDiagonal * both.maxCoeff()) balance.rivals.push_back(rotor_effect());
 }
 
 }  // namespace
@@ -102,17 +104,15 @@ stability::EffectSpec spec_of(const TorqueBalance& balance, const std::string& e
   stability::EffectSpec spec;
   spec.name = effect;
   spec.vehicle = balance.vehicle;
-  const auto set = [&](const char* name, double value, double half) {
-    spec.parameters[name] = value;
-    spec.fit.interval[name] = {value - half, value + half};
-  };
-  if (effect == "com_offset") {
-    set("offset_x_m", balance.offset_m.x(), balance.offset_half_m.x());
-    set("offset_y_m", balance.offset_m.y(), balance.offset_half_m.y());
-  } else {
-    set("torque_x_Nm", balance.torque_Nm.x(), balance.torque_half_Nm.x());
-    set("torque_y_Nm", balance.torque_Nm.y(), balance.torque_half_Nm.y());
-    set("torque_z_Nm", 0, 0);
+  const bool is_offset = stability::traits_of(effect).family == stability::Family::kLever;
+  const Eigen::Vector2d& value = is_offset ? balance.offset_m : balance.torque_Nm;
+  const Eigen::Vector2d& half = is_offset ? balance.offset_half_m : balance.torque_half_Nm;
+  const std::vector<stability::Parameter>& linear = stability::effect_info(effect).linear;
+  for (std::size_t k = 0; k < linear.size(); ++k) {
+    const auto axis = static_cast<Eigen::Index>(k);
+    spec.parameters[linear[k].name] = k < 2 ? value[axis] : 0;
+    spec.fit.interval[linear[k].name] =
+        k < 2 ? Interval{value[axis] - half[axis], value[axis] + half[axis]} : Interval{0, 0};
   }
   return spec;
 }
@@ -124,7 +124,7 @@ std::string in_words(const TorqueBalance& balance) {
       text += (text.empty() ? "; the same on these flights: " : ", ") + rival;
     return text;
   };
-  if (balance.effect == "torque_bias") {
+  if (stability::traits_of(balance.effect).family == stability::Family::kTorque) {
     return fmt::format(
         "a constant torque of {:.2e} N m about x and {:.2e} N m about y (90 %: +- {:.1e} and {:.1e}){}",
         balance.torque_Nm.x(), balance.torque_Nm.y(), balance.torque_half_Nm.x(), balance.torque_half_Nm.y(),
