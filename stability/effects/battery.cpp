@@ -1,4 +1,5 @@
-/// @file Thrust error of the map as the battery drains: f = k (V - 4.2 V) T b3.
+/// @file Thrust error of the map as the battery drains: f = k (V - V_0) T b3.
+#include <algorithm>
 #include <cmath>
 
 #include "stability/effects/effect.h"
@@ -12,23 +13,30 @@ class Battery : public Effect {
   Battery()
       : Effect(
             {"battery",
-             "f = k (V - 4.2) T b3",
+             "f = k (V - V_0) T b3, V_0 the voltage of the full pack",
              "first-order remainder of a thrust map that already includes the voltage",
              "battery",
              "repeat the same accelerations over more than 0.3 V of discharge; once, begin with a discharged "
              "battery",
              {{"sensitivity_1_V", "relative thrust per volt", 0, 0, 1}},
-             {}},
+             {{"full_V", "V_0: 4.2 V for each cell in series", kFullBattery_V, 1, 100}}},
             {Family::kThrustScale,
              Family::kThrustScale,
              ShownBy::kForce,
              SetPoints::kBesideRemainder,
              {"battery"}}) {}
-  void columns(const Instant& now, const double*, Wrench* columns) const override {
-    columns[0] = {(now.battery_V - kFullBattery_V) * now.thrust_N * now.b3_W(), Eigen::Vector3d::Zero()};
+  void columns(const Instant& now, const double* shape, Wrench* columns) const override {
+    columns[0] = {(now.battery_V - shape[0]) * now.thrust_N * now.b3_W(), Eigen::Vector3d::Zero()};
   }
-  bool in_support(const Instant& now, const double*) const override {
-    return std::abs(now.battery_V - kFullBattery_V) > 0.1;
+  bool in_support(const Instant& now, const double* shape) const override {
+    constexpr double kClear = 0.025;
+    return std::abs(now.battery_V / shape[0] - 1) > kClear;
+  }
+  std::vector<std::vector<double>> grid(const FlightRange& range) const override {
+    // A charged cell has at most 4.35 V, and no pack takes off with so little that it seems to have a cell less. With
+    // another reference, part of the effect would be a constant fraction of the thrust.
+    constexpr double kMostOfCell_V = 4.35;
+    return {{kFullBattery_V * std::max(std::ceil(range.battery_most_V / kMostOfCell_V), 1.0)}};
   }
 };
 

@@ -104,6 +104,7 @@ struct EffectContext {
 struct FlightRange {
   double z_min_m = 0;
   double z_max_m = 1;
+  double battery_most_V = kFullBattery_V;
 };
 
 /// The columns of one effect with one theta, along one vehicle's time series.
