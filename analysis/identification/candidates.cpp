@@ -22,6 +22,9 @@ using stability::EffectInfo;
 using stability::EffectSpec;
 using stability::ShownBy;
 
+/// For which grids of lengths are stated.
+constexpr double kCrazyflieArm_m = 0.046;
+
 const EffectSpec* find(const stability::Model& model, const std::string& name,
                        const std::string& vehicle = "") {
   for (const EffectSpec& spec : model.effects) {
@@ -67,8 +70,7 @@ void hold_within_flights(Candidate& candidate, double height_span_m) {
 Candidate vehicle_offset(const stability::Model& model, const Coverage& coverage) {
   Candidate result;
   result.name = result.spec.name = stability::plain_effect(stability::Family::kPush);
-  result.info = stability::effect_info(result.name);
-  stability::scale_bounds(model.mass_kg, result.info);
+  result.info = stability::effect_info(result.name, model);
   result.thetas = {{}};
   result.vehicles = coverage.vehicles;
   std::vector<stability::Parameter> all;
@@ -182,9 +184,17 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
   } else {
     result.spec.name = name;
   }
-  result.info = info_of(result.spec, model.path);
-  if (!result.spec.is_expression()) stability::scale_bounds(model.mass_kg, result.info);
+  result.info =
+      result.spec.is_expression() ? info_of(result.spec, model.path) : stability::effect_info(name, model);
   result.thetas = stability::make_effect(result.spec, {"", {}, model.path})->grid(coverage.range);
+  for (std::size_t i = 0; i < result.info.shape.size(); ++i) {
+    stability::Parameter& parameter = result.info.shape[i];
+    if (parameter.unit != stability::Unit::kArm) continue;
+    const double size = model.arm_m / kCrazyflieArm_m;
+    parameter.value *= size;
+    for (double& value : parameter.grid) value *= size;
+    for (std::vector<double>& theta : result.thetas) theta[i] *= size;
+  }
   if (result.info.remembers) {
     // A lag or delay has gain 1. Some tolerance lets a coarse grid of times find it.
     result.info.linear[0].lower = 1 - kMemoryTolerance;
@@ -245,7 +255,7 @@ std::vector<Candidate> all_candidates(const stability::Model& model, const Cover
     if ((needs_scan(name) || swings(name)) && find(model, name) == nullptr) continue;
     Candidate next = candidate(name, model, coverage);
     if (next.info.needs_neighbours && coverage.most_neighbours == 0) continue;
-    if (coverage.range.z_min_m > next.info.traits.seen_below_m) continue;
+    if (coverage.range.z_min_m > next.info.traits.seen_below_arms * model.arm_m) continue;
     if (next.info.traits.within_flights) hold_within_flights(next, coverage.height_span_m);
     if (next.thetas.empty()) continue;
     all.push_back(std::move(next));

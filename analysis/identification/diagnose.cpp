@@ -206,6 +206,9 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   const Selection selection(selected.grams);
   result.contradicted = selected.contradicted;
   result.suspected = std::move(settled.suspected);
+  for (const std::string& name : result.suspected) {
+    if (settled.at_bound.count(name) == 1) result.at_bound.push_back(name);
+  }
   result.rmse_before_N = std::sqrt(selection.mean_square({}));
   Members named;
   for (const Member& member : selected.members) {

@@ -21,12 +21,30 @@ namespace {
 /// A formula replaces named effects if it leaves less than this fraction of the mean square, which favours names.
 constexpr double kClearlyLess = 0.9;
 
-/// Returns the effects whose shape ended at a bound other than its start, i.e. that really fit something else. Shapes
-/// of effects of neighbours may end anywhere, because nothing else acts where neighbours are.
+/// Returns whether a coefficient is as large as it may be. A bound of zero is one of the sign, which no effect reaches.
+bool is_at_bound(const stability::EffectInfo& library, const Refined& refined) {
+  constexpr double kClose = 1e-6;
+  const std::vector<stability::Parameter>& linear = refined.candidate.info.linear;
+  for (std::size_t c = 0; c < linear.size(); ++c) {
+    const stability::Parameter& stated = library.linear[c % library.linear.size()];
+    const double close = kClose * (linear[c].upper - linear[c].lower), value = refined.coefficients[c];
+    if (close == 0) continue;
+    if (stated.upper != 0 && value >= linear[c].upper - close) return true;
+    if (stated.lower != 0 && value <= linear[c].lower + close) return true;
+  }
+  return false;
+}
+
+/// Returns the effects that ended at a bound: with a coefficient, or with a shape that did not start there, i.e. that
+/// really fit something else. Shapes of effects of neighbours may end anywhere, because nothing else acts where
+/// neighbours are.
 std::set<std::string> out_of_bounds(const Selected& selected) {
   std::set<std::string> names;
   for (const Refined& refined : selected.refined) {
     const stability::EffectInfo& info = refined.candidate.info;
+    if (is_of_library(refined.candidate.name) && !info.remembers &&
+        is_at_bound(stability::effect_info(refined.candidate.name), refined))
+      names.insert(refined.candidate.name);
     if (info.remembers || info.needs_neighbours || is_formula(refined.candidate.name)) continue;
     for (std::size_t i = 0; i < refined.theta.size(); ++i) {
       const stability::Parameter& p = info.shape[i];
@@ -56,6 +74,7 @@ Settled settle(const Passes& passes, const Coverage& covered, const std::vector<
     result.selected =
         doubts_slope ? without_slope(passes, candidates, {}) : select(passes, candidates, start);
     std::set<std::string> doubtful = out_of_bounds(result.selected);
+    result.at_bound.insert(doubtful.begin(), doubtful.end());
     doubtful.merge(unconfirmed_loads(result.selected));
     doubtful.merge(wakes_without_delay(result.selected));
     if (!doubtful.empty() && round + 1 < kMostRounds) {

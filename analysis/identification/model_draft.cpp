@@ -316,8 +316,9 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
   if (ratio.count > 0) {
     stability::EffectSpec effect;
     effect.name = stability::plain_effect(stability::Family::kThrustScale);
+    const stability::Parameter& bounds = stability::effect_info(effect.name).linear[0];
     // The effect's parameter is the excess over one.
-    effect.parameters["ratio"] = std::clamp(ratio.value - 1, -0.7, 0.7);
+    effect.parameters["ratio"] = std::clamp(ratio.value - 1, bounds.lower, bounds.upper);
     effect.fit.interval["ratio"] = {ratio.lower - 1, ratio.upper - 1};
     effect.fit.note = "drafted from hovering thrust";
     model.effects.push_back(effect);

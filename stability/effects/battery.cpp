@@ -18,7 +18,7 @@ class Battery : public Effect {
              "battery",
              "repeat the same accelerations over more than 0.3 V of discharge; once, begin with a discharged "
              "battery",
-             {{"sensitivity_1_V", "relative thrust per volt", 0, 0, 1}},
+             {{"sensitivity_1_V", "relative thrust per volt", 0, 0, 4.5, {}, Unit::kPerBattery}},
              {{"full_V", "V_0: 4.2 V for each cell in series", kFullBattery_V, 1, 100}}},
             {Family::kThrustScale,
              Family::kThrustScale,

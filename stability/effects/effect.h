@@ -64,6 +64,20 @@ struct ForceRows {
   int stride;
 };
 
+/// What the bounds of a parameter are multiples of: properties of the vehicle, so that they suit one of 30 g as well as
+/// one of 3 kg. A body length is twice the arm.
+enum class Unit {
+  kOwn,           ///< the unit in the parameter's name
+  kWeight,        ///< N
+  kMass,          ///< kg
+  kArm,           ///< m
+  kWeightArm,     ///< N m
+  kWeightPerArm,  ///< N/m
+  kDrag,          ///< the weight at one body length per second
+  kSquaredDrag,   ///< likewise, against the squared velocity
+  kPerBattery     ///< 1/V, of the largest voltage
+};
+
 /// A coefficient or a shape parameter.
 struct Parameter {
   std::string name;  ///< with its unit, as in model.toml: "drag_N_s_m"
@@ -71,6 +85,7 @@ struct Parameter {
   double value;                   ///< default in simulation
   double lower, upper;            ///< physical bounds on sign and size; infinite if free
   std::vector<double> grid = {};  ///< shape parameters: values that identification tries; empty: only `value`
+  Unit unit = Unit::kOwn;  ///< of the bounds; for kArm, values and grid are those for a Crazyflie's arm
 };
 
 /// Static description of an effect, independent of any flight.

@@ -13,7 +13,7 @@ enum GroundShape { kGroundDecay, kGroundReference };
 EffectTraits ground_traits() {
   EffectTraits traits;
   traits.variables = {"z"};
-  traits.seen_below_m = 0.4;  // nothing is measurable higher up
+  traits.seen_below_arms = 9;  // nothing is measurable higher up
   return traits;
 }
 
@@ -27,7 +27,13 @@ class Ground : public Effect {
                 "ground",
                 "at least a fifth of the time below two rotor radii above the height on the ground",
                 {{"amplitude", "relative thrust gained at the height z0", 0, 0, 1}},
-                {{"decay_m", "b", 0.0268, 0.005, 0.5, {0.015, 0.02, 0.027, 0.035, 0.05, 0.07, 0.1, 0.14}},
+                {{"decay_m",
+                  "b",
+                  0.0268,
+                  0.1,
+                  11,
+                  {0.015, 0.02, 0.027, 0.035, 0.05, 0.07, 0.1, 0.14},
+                  Unit::kArm},
                  {"height_reference_m", "z0: about the height at which the vehicle stands", 0.06, 0, 1}}},
                ground_traits()) {}
   void columns(const Instant& now, const double* shape, Wrench* columns) const override {

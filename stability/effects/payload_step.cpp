@@ -18,8 +18,8 @@ class PayloadStep : public Effect {
              "constant velocity",
              "payload_step",
              "half a minute with the load and half a minute without, the same motion in both",
-             {{"mass_before_kg", "of the load before the step", 0, -0.05, 0.2},
-              {"mass_after_kg", "of the load after the step", 0, -0.05, 0.2}},
+             {{"mass_before_kg", "of the load before the step", 0, -1, 5, {}, Unit::kMass},
+              {"mass_after_kg", "of the load after the step", 0, -1, 5, {}, Unit::kMass}},
              {{"time_s", "t_0, on the log's clock", 10, 0, 1e5}}},
             {Family::kNone, Family::kNone, ShownBy::kCurve, SetPoints::kNotNeeded, {"time"}}) {}
   void columns(const Instant& now, const double* shape, Wrench* columns) const override {

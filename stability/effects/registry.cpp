@@ -115,18 +115,41 @@ std::unique_ptr<Effect> make_effect(const EffectSpec& spec, const EffectContext&
   return find(spec.name).make(spec, context);
 }
 
-void scale_bounds(double mass_kg, EffectInfo& info) {
-  constexpr double kStatedFor_kg = 0.067;  // the larger one of the published vehicles
-  const double factor = std::max(1.0, mass_kg / kStatedFor_kg);
-  for (Parameter& coefficient : info.linear) {
-    // "force_x_N", "drag_N_s_m", "stiffness_N_m", "torque_x_Nm"
-    const std::size_t unit = coefficient.name.find("_N");
-    if (unit == std::string::npos) continue;
-    const std::string rest = coefficient.name.substr(unit + 2);
-    if (!rest.empty() && rest[0] != '_' && rest != "m") continue;
-    coefficient.lower *= factor;
-    coefficient.upper *= factor;
+double size_of(Unit unit, const Model& model) {
+  const double body_m = 2 * model.arm_m;
+  switch (unit) {
+    case Unit::kOwn:
+      return 1;
+    case Unit::kWeight:
+      return model.weight_N();
+    case Unit::kMass:
+      return model.mass_kg;
+    case Unit::kArm:
+      return model.arm_m;
+    case Unit::kWeightArm:
+      return model.weight_N() * model.arm_m;
+    case Unit::kWeightPerArm:
+      return model.weight_N() / model.arm_m;
+    case Unit::kDrag:
+      return model.weight_N() / body_m;
+    case Unit::kSquaredDrag:
+      return model.weight_N() / (body_m * body_m);
+    case Unit::kPerBattery:
+      return 1 / model.battery_range_V.upper;
   }
+  return 1;
+}
+
+EffectInfo effect_info(const std::string& name, const Model& model) {
+  EffectInfo info = find(name).info;
+  for (std::vector<Parameter>* parameters : {&info.linear, &info.shape}) {
+    for (Parameter& parameter : *parameters) {
+      const double size = size_of(parameter.unit, model);
+      parameter.lower *= size;
+      parameter.upper *= size;
+    }
+  }
+  return info;
 }
 
 EffectValues effect_values(const EffectInfo& info, const EffectSpec& spec) {

@@ -47,10 +47,11 @@ std::string effect_shown_by(ShownBy data);
 /// @throws files::InputError if a network or a formula cannot be read; std::invalid_argument for an unknown name.
 std::unique_ptr<Effect> make_effect(const EffectSpec& spec, const EffectContext& context);
 
-/// Scales the bounds of the forces and torques among the coefficients of `info`, an effect of the registry, to a
-/// vehicle of this mass. The registry states them for vehicles of up to 67 g; above that they grow in proportion to the
-/// mass, so that the drag of a vehicle of a kilogram, or the force of wind on it, is not cut off.
-void scale_bounds(double mass_kg, EffectInfo& info);
+/// Returns the size of a unit for a vehicle. Precondition: its mass and arm are positive.
+double size_of(Unit unit, const Model& model);
+
+/// Returns the description of a registered effect with bounds for this vehicle.
+EffectInfo effect_info(const std::string& name, const Model& model);
 
 /// Coefficients and theta of `spec` in the order of the effect's info: the parameters that `spec` names, and the
 /// effect's defaults for the others.

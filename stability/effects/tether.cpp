@@ -25,7 +25,7 @@ class Tether : public Effect {
              "tether",
              "slow flight in all directions from the anchor, up to 1.5 times the distance at which the "
              "line is taut",
-             {{"stiffness_N_m", "k", 0, 0, 10}},
+             {{"stiffness_N_m", "k", 0, 0, 2, {}, Unit::kWeightPerArm}},
              {{"anchor_x_m", "a", 0, -1000, 1000, {}},
               {"anchor_y_m", "", 0, -1000, 1000, {}},
               {"anchor_z_m", "", 0, -1000, 1000, {}},

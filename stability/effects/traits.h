@@ -61,8 +61,8 @@ struct EffectTraits {
   std::vector<std::string> variables = {};
   Place place = Place::kVehicle;
   double drag_exponent = 0;  ///< n of a drag -c |v|^(n - 1) v; 0: none
-  /// Flights that stay above this height do not show it.
-  double seen_below_m = std::numeric_limits<double>::infinity();
+  /// Flights that stay above this height, in arms of the vehicle, do not show it.
+  double seen_below_arms = std::numeric_limits<double>::infinity();
   /// Only changes within a flight show it: it varies with the height, by which flights with other thrust scales differ.
   bool within_flights = false;
   /// Flights hardly reach where it acts, so that its curve stays hidden: it is tried beside any remainder.

@@ -30,7 +30,7 @@ class Wall : public Effect {
              {{"push", "p: force at the wall over the thrust, negative if it attracts", 0, -1, 1}},
              {{"bearing_rad", "direction from the origin to the wall, from x towards y", 0, -3.2, 3.2, {}},
               {"place_m", "the wall's distance from the origin along the bearing", 1, -1000, 1000, {}},
-              {"decay_m", "b", 0.1, 0.005, 10, {0.05, 0.1, 0.2, 0.4}}}},
+              {"decay_m", "b", 0.1, 0.1, 200, {0.05, 0.1, 0.2, 0.4}, Unit::kArm}}},
             {Family::kNone, Family::kNone, ShownBy::kCurve, SetPoints::kNotNeeded, {"x", "y"}}) {}
   void columns(const Instant& now, const double* shape, Wrench* columns) const override {
     const Eigen::Vector3d into(-std::cos(shape[kBearing]), -std::sin(shape[kBearing]), 0);

@@ -22,12 +22,12 @@ constexpr std::size_t kFewestTorqueBlocks = 10;
 
 /// Decides which of the two explains the data, and lists alternative explanations.
 /// @param is_surely_constant the torque explains most of the means, and surely more than the offset
-void decide_torque_cause(double longest_m, double weight_N, bool is_surely_constant, TorqueBalance& balance) {
+void decide_torque_cause(double weight_N, bool is_surely_constant, TorqueBalance& balance) {
   constexpr double kSurely_z = 2, kDiagonal = 0.5;
   const std::string constant = stability::plain_effect(stability::Family::kTorque);
   if (is_surely_constant &&
       balance.torque_Nm.norm() - balance.torque_half_Nm.norm() > balance.least_torque_Nm &&
-      balance.torque_Nm.norm() <= longest_m * weight_N) {
+      balance.torque_Nm.norm() <= balance.longest_offset_m * weight_N) {
     balance.effect = constant;
     return;
   }
@@ -36,7 +36,8 @@ void decide_torque_cause(double longest_m, double weight_N, bool is_surely_const
       is_constant ? Eigen::Vector2d(balance.torque_Nm / weight_N) : balance.offset_m;
   const Eigen::Vector2d half_m =
       is_constant ? Eigen::Vector2d(balance.torque_half_Nm / weight_N) : balance.offset_half_m;
-  if (!(size_m.norm() - half_m.norm() > balance.least_offset_m) || size_m.norm() > longest_m) return;
+  if (!(size_m.norm() - half_m.norm() > balance.least_offset_m) || size_m.norm() > balance.longest_offset_m)
+    return;
   balance.effect = is_constant ? constant : stability::plain_effect(stability::Family::kLever);
   if (std::abs(balance.z) <= kSurely_z) balance.rivals.push_back(constant);
   const Eigen::Vector2d both = size_m.cwiseAbs();
@@ -79,11 +80,12 @@ void fit_torques(const std::vector<TorqueBlock>& blocks, const stability::Model&
   const double lever_m = model.arm_m * std::sqrt(0.5), count = static_cast<double>(blocks.size());
   balance.rmse_before_N = std::sqrt(before / count) / (4 * lever_m);
   balance.rmse_after_N = std::sqrt(std::min(by_offset, by_torque) / count) / (4 * lever_m);
+  balance.longest_offset_m = model.arm_m;
   balance.least_offset_m = kBatteryPlay_m + kRotorSpread * lever_m;
   balance.least_torque_Nm = kConstantPartOfSpread * kRotorSpread * lever_m * model.weight_N();
   constexpr double kQuarter = 0.25;  // of the mean square: the torque halves the imbalance
   const bool is_surely_constant = by_torque <= kQuarter * before && surely_positive(losses, 1);
-  decide_torque_cause(model.arm_m, model.weight_N(), is_surely_constant, balance);
+  decide_torque_cause(model.weight_N(), is_surely_constant, balance);
 }
 
 std::vector<TorqueBalance> torque_balances(const residuals::Inputs& inputs, const std::string& kind,
@@ -130,6 +132,8 @@ std::string in_words(const TorqueBalance& balance) {
         balance.torque_Nm.x(), balance.torque_Nm.y(), balance.torque_half_Nm.x(), balance.torque_half_Nm.y(),
         and_rivals());
   }
+  if (!balance.has_offset())
+    return "no offset centre of mass: to explain the mean torques, it would have to be beyond the rotors";
   return fmt::format(
       "the centre of mass is {:.1f} mm along x and {:.1f} mm along y from the rotors' centre (90 %: +- "
       "{:.1f} and {:.1f} mm){}{}",
