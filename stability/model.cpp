@@ -334,6 +334,10 @@ void refuse_other_rotors(const Model& model, const std::string& what) {
                            "give arm_m instead of rotors if it has four rotors in X"});
 }
 
+double full_battery_V(double most_V) {
+  return kFullBattery_V * std::max(std::ceil(most_V / kOneCell_V.upper), 1.0);
+}
+
 std::string battery_problem(const Model& model, double battery_V) {
   const auto& [lower_V, upper_V] = model.battery_range_V;
   if (battery_V >= lower_V && battery_V <= upper_V) return "";

@@ -109,7 +109,7 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
   std::vector<Part> parts(which.size());
   files::parallel_for(static_cast<int>(which.size()), jobs, [&](int i) {
     Part& part = parts[static_cast<std::size_t>(i)];
-    part.covered.range = {INFINITY, -INFINITY, 0};
+    part.covered.range = {INFINITY, -INFINITY};
     for (const Track& track :
          inputs.load(static_cast<std::size_t>(which[static_cast<std::size_t>(i)]), part.covered.problems)) {
       for (const logs::Doubt& doubt : track.doubts) {
@@ -130,7 +130,7 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
         highest_m = std::max(highest_m, now.p_W_m.z());
         range.z_min_m = std::min(range.z_min_m, now.p_W_m.z());
         range.z_max_m = std::max(range.z_max_m, now.p_W_m.z());
-        range.battery_most_V = std::max(range.battery_most_V, now.battery_V);
+        part.covered.battery_most_V = std::max(part.covered.battery_most_V, now.battery_V);
         part.covered.most_neighbours = std::max(part.covered.most_neighbours, now.num_neighbours);
         part.vehicles.insert(track.vehicle);
         ++part.covered.records;
@@ -139,12 +139,12 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
     }
   });
   Coverage all;
-  all.range = {INFINITY, -INFINITY, 0};
+  all.range = {INFINITY, -INFINITY};
   std::set<std::string> vehicles;
   for (const Part& part : parts) {
     all.range.z_min_m = std::min(all.range.z_min_m, part.covered.range.z_min_m);
     all.range.z_max_m = std::max(all.range.z_max_m, part.covered.range.z_max_m);
-    all.range.battery_most_V = std::max(all.range.battery_most_V, part.covered.range.battery_most_V);
+    all.battery_most_V = std::max(all.battery_most_V, part.covered.battery_most_V);
     all.height_span_m = std::max(all.height_span_m, part.covered.height_span_m);
     all.most_neighbours = std::max(all.most_neighbours, part.covered.most_neighbours);
     all.records += part.covered.records;
@@ -186,7 +186,11 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
   }
   result.info =
       result.spec.is_expression() ? info_of(result.spec, model.path) : stability::effect_info(name, model);
-  result.thetas = stability::make_effect(result.spec, {"", {}, model.path})->grid(coverage.range);
+  stability::FlightRange range = coverage.range;
+  const bool is_stated = model.battery_range_V != stability::kOneCell_V;
+  range.full_battery_V =
+      is_stated ? model.full_battery_V() : stability::full_battery_V(coverage.battery_most_V);
+  result.thetas = stability::make_effect(result.spec, {"", {}, model.path})->grid(range);
   for (std::size_t i = 0; i < result.info.shape.size(); ++i) {
     stability::Parameter& parameter = result.info.shape[i];
     if (parameter.unit != stability::Unit::kArm) continue;

@@ -30,6 +30,7 @@ inline constexpr std::size_t kFewestBlocks = 10;
 /// What the flights of one kind of vehicle cover.
 struct Coverage {
   stability::FlightRange range;
+  double battery_most_V = 0;
   double height_span_m = 0;  ///< largest height range of a vehicle in one flight
   int most_neighbours = 0;
   std::size_t records = 0;
@@ -62,8 +63,8 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
 /// Returns true if an effect of this name cannot be fitted to the force in flight: it acts as a torque or is a network.
 bool is_written_by_hand(const std::string& name);
 
-/// Returns the effect of single rotors, which is fitted to their loads in slow flight (rotors/rotor_fit.h), as the force
-/// in flight shows only their sum.
+/// Returns the effect of single rotors. It is fitted to their loads in slow flight (rotors/rotor_fit.h), as the
+/// force in flight shows only their sum.
 std::string rotor_effect();
 
 /// Returns the names that candidate() accepts for `model`.

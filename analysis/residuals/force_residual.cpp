@@ -54,7 +54,7 @@ double commanded_thrust_N(const stability::Model& model, const Track& track, std
   double thrust_N = 0;
   if (track.thrust_source == logs::ThrustSource::kHoverMultiple) {
     for (std::size_t k = 0; k < model.num_rotors(); ++k)
-      thrust_N += model.thrust.force_N(track.motor_command[record][k], stability::kFullBattery_V);
+      thrust_N += model.thrust.force_N(track.motor_command[record][k], model.full_battery_V());
     return thrust_N;
   }
   for (const double duty : track.duty[record])

@@ -1,5 +1,4 @@
 /// @file Thrust error of the map as the battery drains: f = k (V - V_0) T b3.
-#include <algorithm>
 #include <cmath>
 
 #include "stability/effects/effect.h"
@@ -33,10 +32,8 @@ class Battery : public Effect {
     return std::abs(now.battery_V / shape[0] - 1) > kClear;
   }
   std::vector<std::vector<double>> grid(const FlightRange& range) const override {
-    // A charged cell has at most 4.35 V, and no pack takes off with so little that it seems to have a cell less. With
-    // another reference, part of the effect would be a constant fraction of the thrust.
-    constexpr double kMostOfCell_V = 4.35;
-    return {{kFullBattery_V * std::max(std::ceil(range.battery_most_V / kMostOfCell_V), 1.0)}};
+    // With another reference, part of the effect would be a constant fraction of the thrust.
+    return {{range.full_battery_V}};
   }
 };
 

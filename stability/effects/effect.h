@@ -119,7 +119,7 @@ struct EffectContext {
 struct FlightRange {
   double z_min_m = 0;
   double z_max_m = 1;
-  double battery_most_V = kFullBattery_V;
+  double full_battery_V = kFullBattery_V;  ///< of the pack
 };
 
 /// The columns of one effect with one theta, along one vehicle's time series.
