@@ -2,7 +2,10 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -53,6 +56,68 @@ TEST(HiddenEffect, OfTheBatteryHasNoSecondNameWithSeveralCells) {
                   0.1 * truth.battery_1_V);
     }
   }
+}
+
+/// Expects that one effect is named, with these values to a tenth.
+void expect_only(const std::string& effect, const std::map<std::string, double>& values,
+                 const files::Json& diagnosis) {
+  ASSERT_EQ(names_of(diagnosis), std::vector<std::string>{effect}) << diagnosis["ranking"].dump(1);
+  for (const auto& [name, value] : values) {
+    EXPECT_NEAR(diagnosis["ranking"][0]["parameters"][name]["value"].get<double>(), value,
+                0.1 * std::abs(value))
+        << name;
+  }
+}
+
+Truth truth_of(std::function<Eigen::Vector3d(const Moment&)> force_N) {
+  Truth truth;
+  truth.force_N = std::move(force_N);
+  return truth;
+}
+
+constexpr Craft kLarge = {2.6, 6};
+
+TEST(HiddenEffect, OfWindOnALargeVehicleIsFoundAsLargeAsItIs) {
+  const Truth wind = truth_of([](const Moment&) { return Eigen::Vector3d(-15.6, 0, 0); });
+  expect_only("constant_force", {{"force_x_N", -15.6}}, diagnosis_of(wind, plan_of(kLarge, 1)));
+}
+
+TEST(HiddenEffect, OfTwiceTheThrustIsFoundAsLargeAsItIs) {
+  Truth strong;
+  strong.thrust_factor = 2.2;
+  expect_only("thrust_ratio", {{"ratio", 2.2}}, diagnosis_of(strong, plan_of({1.5, 3}, 1)));
+}
+
+TEST(HiddenEffect, OfADroppedLoadOnALargeVehicleIsFoundAsLargeAsItIs) {
+  const Truth drop =
+      truth_of([](const Moment& now) { return Eigen::Vector3d(0, 0, now.time_s < 20 ? -0.6 * 9.81 : 0); });
+  expect_only("payload_step", {{"mass_before_kg", 0.6}}, diagnosis_of(drop, plan_of(kLarge, 1)));
+}
+
+TEST(HiddenEffect, ThatEndsAtItsBoundIsNotIdentified) {
+  // No rotor loses 60 % of its thrust per metre per second of climb.
+  const Truth loss = truth_of([](const Moment& now) {
+    return Eigen::Vector3d(-0.6 * now.thrust_N * now.b3.dot(now.v_m_s) * now.b3);
+  });
+  const files::Json diagnosis = diagnosis_of(loss, plan_of({}, 1));
+  const std::vector<std::string> names = names_of(diagnosis);
+  EXPECT_EQ(std::count(names.begin(), names.end(), "inflow"), 0);
+  EXPECT_EQ(diagnosis["kinds"][0]["at_bound"], std::vector<std::string>{"inflow"})
+      << diagnosis["kinds"].dump(1);
+  EXPECT_FALSE(diagnosis["remainder"].empty());
+}
+
+TEST(HiddenEffect, IsFoundInTenRecordsPerSecond) {
+  FlightPlan plan = plan_of({}, 1);
+  plan.duration_s = 90;
+  plan.log_hz = 10;
+  Truth truth;
+  truth.thrust_factor = 1.08;
+  expect_only("thrust_ratio", {{"ratio", 1.08}}, diagnosis_of(truth, plan));
+  const Truth drag = truth_of([](const Moment& now) { return Eigen::Vector3d(-0.03 * now.v_m_s); });
+  expect_only("drag_linear", {{"drag_N_s_m", 0.03}}, diagnosis_of(drag, plan));
+  const files::Json nothing = diagnosis_of({}, plan);
+  EXPECT_EQ(nothing["verdict"], "nothing_missing") << nothing.dump(1);
 }
 
 }  // namespace
