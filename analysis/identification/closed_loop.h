@@ -55,8 +55,8 @@ bool has_vertical_push(const std::vector<Refined>& effects);
 /// Diagnosis::suspected.
 std::set<std::string> suspects(const Selected& selected);
 
-/// Returns the names of effects that setpoints must always confirm, and do not: if the thrust needed to carry the weight
-/// differs between flights for any reason, that looks like a loss of high thrust.
+/// Returns the names of effects that setpoints must always confirm, and do not: if the thrust needed to carry the
+/// weight differs between flights for any reason, that looks like a loss of high thrust.
 std::set<std::string> unconfirmed_loads(const Selected& selected);
 
 /// Returns `names` plus those effects that would merely replace a doubtful one: for a scale the scales that vary,

@@ -62,8 +62,8 @@ class Selection : public CrossValidation {
   int plain_form(int candidate) const;
   /// Returns the index of the plain candidate of a family; -1 if there is none.
   int plain_of(stability::Family family) const;
-  /// For an effect that only changes within flights show: returns whether it reduces the error of held-out blocks about the mean of each track, beside a
-  /// thrust scale.
+  /// For an effect that only changes within flights show: returns whether it reduces the error of held-out blocks about
+  /// the mean of each track, beside a thrust scale.
   bool is_shown_within_flights(const Members& before, const Member& added) const;
   /// Returns whether held-out blocks prefer `after` by two standard errors and by the gain required of an effect.
   bool is_clearly_better(const Members& after, const Members& before) const;

@@ -12,7 +12,7 @@ struct PublishedVehicle {
   double standing_height_m;  ///< of the tracked centre when the vehicle is on the ground
 };
 
-/// A stage of their error budget: the effects of the model up to it, and whether each vehicle has its own constant force.
+/// A stage of their error budget: the effects of the model up to it, and whether vehicles have constant forces.
 struct PublishedStage {
   const char* name;
   std::vector<std::string> effects;
