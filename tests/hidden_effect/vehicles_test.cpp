@@ -58,10 +58,11 @@ TEST(HiddenEffect, OfTheBatteryHasNoSecondNameWithSeveralCells) {
   }
 }
 
-/// Expects that one effect is named, with these values to a tenth.
+/// Expects that one effect is named, with these values to a tenth, and that nothing is left.
 void expect_only(const std::string& effect, const std::map<std::string, double>& values,
                  const files::Json& diagnosis) {
   ASSERT_EQ(names_of(diagnosis), std::vector<std::string>{effect}) << diagnosis["ranking"].dump(1);
+  EXPECT_TRUE(diagnosis["remainder"].empty()) << diagnosis["remainder"].dump(1);
   for (const auto& [name, value] : values) {
     EXPECT_NEAR(diagnosis["ranking"][0]["parameters"][name]["value"].get<double>(), value,
                 0.1 * std::abs(value))
@@ -118,6 +119,7 @@ TEST(HiddenEffect, IsFoundInTenRecordsPerSecond) {
   expect_only("drag_linear", {{"drag_N_s_m", 0.03}}, diagnosis_of(drag, plan));
   const files::Json nothing = diagnosis_of({}, plan);
   EXPECT_EQ(nothing["verdict"], "nothing_missing") << nothing.dump(1);
+  EXPECT_TRUE(nothing["remainder"].empty());
 }
 
 }  // namespace
