@@ -257,9 +257,10 @@ Members Selection::select(const std::vector<std::string>& names) const {
 
 Members Selection::ordered(Members members) const {
   constexpr double kLocalShare = 0.25;
-  // A shape without memory: ground, jets, ...
+  // A shape without memory that is no share of all thrust: ground, jets, ...
   const auto is_local = [&](const Member& m) {
-    return !candidate(m).info.shape.empty() && !candidate(m).info.remembers;
+    const stability::EffectInfo& info = candidate(m).info;
+    return !info.shape.empty() && !info.remembers && info.traits.family != stability::Family::kThrustScale;
   };
   Members result;
   while (!members.empty()) {
