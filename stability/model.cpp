@@ -228,7 +228,7 @@ void check_parameters(const TomlTable& effect, const EffectSpec& spec, const Eff
   table.allow_only(known);
 }
 
-EffectSpec read_effect(const TomlTable& effect, const std::string& path, double mass_kg) {
+EffectSpec read_effect(const TomlTable& effect, const Model& model) {
   effect.allow_only({"name", "vehicle", "parameters", "network", "expression", "fit"});
   EffectSpec spec;
   spec.name = effect.text("name");
@@ -247,7 +247,7 @@ EffectSpec read_effect(const TomlTable& effect, const std::string& path, double 
                     "choose another name");
     }
     spec.expression = read_expression(effect.table("expression"));
-    check_parameters(effect, spec, make_effect(spec, {"", {}, path})->info());
+    check_parameters(effect, spec, make_effect(spec, {"", {}, model.path})->info());
     return spec;
   }
   if (!is_known) {
@@ -257,8 +257,7 @@ EffectSpec read_effect(const TomlTable& effect, const std::string& path, double 
   if (!spec.network.empty() && spec.name != "deep_set") {
     effect.refuse("network", files::in_quotes(spec.network), "is allowed only for the effect deep_set");
   }
-  EffectInfo info = effect_info(spec.name);
-  scale_bounds(mass_kg, info);
+  const EffectInfo info = effect_info(spec.name, model);
   if (info.remembers && !spec.vehicle.empty()) {
     effect.refuse("vehicle", files::in_quotes(spec.vehicle), "cannot have its own lag or delay",
                   "give it its own model in flights.toml");
@@ -303,7 +302,7 @@ Model parse_model(const std::string& text, const std::string& path) {
   }
   if (!top.has("effect")) return model;
   for (const TomlTable& effect : top.tables("effect")) {
-    EffectSpec spec = read_effect(effect, path, model.mass_kg);
+    EffectSpec spec = read_effect(effect, model);
     for (const EffectSpec& other : model.effects) {
       if (other.name == spec.name && other.vehicle == spec.vehicle) {
         effect.refuse("name", files::in_quotes(spec.name), "appears twice", "keep one of the two");
@@ -333,6 +332,10 @@ void refuse_other_rotors(const Model& model, const std::string& what) {
   throw files::InputError({model.path.empty() ? model.kind : model.path, "", "vehicle.rotors",
                            fmt::format("{} rotors", model.rotors.size()), what + " needs four rotors in X",
                            "give arm_m instead of rotors if it has four rotors in X"});
+}
+
+double full_battery_V(double most_V) {
+  return kFullBattery_V * std::max(std::ceil(most_V / kOneCell_V.upper), 1.0);
 }
 
 std::string battery_problem(const Model& model, double battery_V) {

@@ -17,10 +17,13 @@ namespace swarmcert::stability {
 using controller::kGravity_m_s2;
 /// One gram-force, the unit of the thrust map and of the published networks.
 inline constexpr double kGramForce_N = controller::kNewtonPerGramForce;
-/// The battery voltage to which the thrust map and the effect `battery` refer.
+/// The voltage of a full cell, to which the thrust maps of Crazyflies refer.
 inline constexpr double kFullBattery_V = controller::kReferenceVoltage_V;
 /// Voltages of one lithium-polymer cell: from empty under load to a full high-voltage cell plus measurement error.
 inline constexpr Interval kOneCell_V = {2.5, 4.5};
+/// Returns the voltage of a full pack of which `most_V` is the largest voltage: 4.2 V for each cell in series. Packs
+/// that take off have more than those with a cell less can have.
+double full_battery_V(double most_V);
 
 /// Force of one rotor, by the thrust map used in flight. Outside the calibrated range the polynomial may decrease with
 /// p.
@@ -126,6 +129,8 @@ struct Model {
 
   double weight_N() const { return mass_kg * kGravity_m_s2; }
   std::size_t num_rotors() const { return rotors.empty() ? 4 : rotors.size(); }
+  /// Voltage of the full pack, from the stated range.
+  double full_battery_V() const { return stability::full_battery_V(battery_range_V.upper); }
   /// Thrust of all rotors together.
   double largest_thrust_N(double battery_V) const {
     return static_cast<double>(num_rotors()) * thrust.largest_N(battery_V);

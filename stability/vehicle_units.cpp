@@ -26,7 +26,7 @@ bool fits_arm(double gyration_to_arm) { return gyration_to_arm > 0.05 && gyratio
 
 /// If the rotors cannot lift the vehicle, rejects the mass if it is plausible in gram, else the thrust map.
 void check_lift(const files::TomlTable& vehicle, const Model& model) {
-  const double lift_N = model.largest_thrust_N(kFullBattery_V);
+  const double lift_N = model.largest_thrust_N(model.full_battery_V());
   const std::string rotors = fmt::format("{} rotors", model.num_rotors());
   const double mass_kg = model.mass_kg;
   const std::string mass = fmt::format("{:g}", mass_kg);
@@ -55,8 +55,8 @@ void check_lift(const files::TomlTable& vehicle, const Model& model) {
   }
   vehicle.refuse(
       "thrust", "",
-      fmt::format("{} give {:.4g} N at 4.2 V, but the vehicle weighs {:.4g} N", rotors, lift_N,
-                  model.weight_N()),
+      fmt::format("{} give {:.4g} N at {:.4g} V, but the vehicle weighs {:.4g} N", rotors, lift_N,
+                  model.full_battery_V(), model.weight_N()),
       "the polynomial is in gram-force (not newton) of p = PWM / 65536 (not percent or counts) and "
       "v = V / 4.2");
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <set>
 
 #include "analysis/identification/kind_fit.h"
@@ -16,12 +15,9 @@ using residuals::Inputs;
 using stability::EffectSpec;
 using stability::Model;
 
-const std::vector<std::string> kKnown = {"motor_lag", "ground", "downwash"};
-const std::vector<std::string> kRest = {"upper_lift", "drag_linear", "battery", "inflow"};
-
 EffectSpec offset_spec(const Eigen::Vector3d& offset_N) {
   EffectSpec spec;
-  spec.name = "constant_force";
+  spec.name = stability::plain_effect(stability::Family::kPush);
   spec.parameters = {{"force_x_N", offset_N.x()}, {"force_y_N", offset_N.y()}, {"force_z_N", offset_N.z()}};
   return spec;
 }
@@ -73,28 +69,11 @@ std::set<std::string> vehicles_of(const Inputs& inputs, const std::string& kind)
   return names;
 }
 
-/// A row of the budget between the nominal one and the network's.
-struct Stage {
-  const char* name;
-  std::set<std::string> effects;
-  bool has_offsets;
-};
-
-std::vector<Stage> all_stages() {
-  std::set<std::string> everything(kKnown.begin(), kKnown.end());
-  everything.insert(kRest.begin(), kRest.end());
-  return {{"lag", {"motor_lag"}, false},
-          {"offset", {"motor_lag"}, true},
-          {"ground", {"motor_lag", "ground"}, true},
-          {"jet", {"motor_lag", "ground", "downwash"}, true},
-          {"rest", everything, true}};
-}
-
 /// Gives the vehicles of the model's kind in `inputs` the model with the fitted values of the stage's effects.
-void apply(const Stage& stage, const KindFit& joint, const Model& model, Inputs& inputs) {
+void apply(const residuals::PublishedStage& stage, const KindFit& joint, const Model& model, Inputs& inputs) {
   for (const std::string& vehicle : vehicles_of(inputs, model.kind)) {
     Model own = model;
-    own.effects = joint.specs(stage.effects);
+    own.effects = joint.specs({stage.effects.begin(), stage.effects.end()});
     const auto offset = joint.offsets_N().find(vehicle);
     if (stage.has_offsets && offset != joint.offsets_N().end())
       own.effects.push_back(offset_spec(offset->second));
@@ -107,10 +86,8 @@ Inputs with_network(Inputs inputs, const std::string& network) {
   inputs.rules.published_signals = true;
   for (Model& model : inputs.models) {
     if (const auto* published = residuals::published_vehicle(model.kind)) model.mass_kg = published->mass_kg;
-    EffectSpec spec;
-    spec.name = "deep_set";
-    spec.network = std::filesystem::absolute(network).string();
-    model.effects = {spec};
+    model.effects.clear();
+    residuals::set_network(model, network);
   }
   return inputs;
 }
@@ -133,17 +110,18 @@ Budget error_budget(const Inputs& given_fit, const Inputs& given_test, const std
   const int work = static_cast<int>(test.models.size()) * (kPasses + kRestPasses);
   int done = 0;
   const auto show = [&](int, int) { progress(++done, work); };
-  const std::vector<Stage> stages = all_stages();
+  const std::vector<residuals::PublishedStage>& stages = residuals::published_stages();
   const std::size_t last = stages.size() - 1;
   std::vector<Inputs> staged(stages.size(), test);
   for (const Model& model : test.models) {
     budget.masses_kg[model.kind] = model.mass_kg;
     KindFit joint(fit, model.kind, jobs);
     if (joint.is_empty()) continue;
-    joint.add(kKnown);
+    const std::vector<std::string>& known = stages[last - 1].effects;
+    joint.add(known);
     joint.search(kPasses, show);
     for (std::size_t k = 0; k < last; ++k) apply(stages[k], joint, model, staged[k]);
-    joint.add(kRest);
+    joint.add({stages[last].effects.begin() + known.size(), stages[last].effects.end()});
     joint.search(kRestPasses, show);
     apply(stages[last], joint, model, staged[last]);
   }

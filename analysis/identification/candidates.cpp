@@ -20,6 +20,10 @@ namespace {
 
 using stability::EffectInfo;
 using stability::EffectSpec;
+using stability::ShownBy;
+
+/// For which grids of lengths are stated.
+constexpr double kCrazyflieArm_m = 0.046;
 
 const EffectSpec* find(const stability::Model& model, const std::string& name,
                        const std::string& vehicle = "") {
@@ -48,15 +52,15 @@ void make_change(Candidate& candidate, const EffectSpec& present) {
   }
 }
 
-/// Excludes ceilings that decay over more than half of the height range of a flight: they act almost uniformly, so a
-/// thrust scale that differs between flights, as their heights do, explains the same without a ceiling.
-void hold_within_flights(Candidate& ceiling, double height_span_m) {
+/// Excludes effects of a surface that decay over more than half of the height range of a flight: they act almost
+/// uniformly, so a thrust scale that differs between flights, as their heights do, explains the same without them.
+void hold_within_flights(Candidate& candidate, double height_span_m) {
   constexpr double kDecays = 2;
-  for (std::size_t i = 0; i < ceiling.info.shape.size(); ++i) {
-    stability::Parameter& decay_m = ceiling.info.shape[i];
+  for (std::size_t i = 0; i < candidate.info.shape.size(); ++i) {
+    stability::Parameter& decay_m = candidate.info.shape[i];
     if (decay_m.name != "decay_m" || decay_m.grid.empty()) continue;
     decay_m.upper = std::min(decay_m.upper, height_span_m / kDecays);
-    std::vector<std::vector<double>>& thetas = ceiling.thetas;
+    std::vector<std::vector<double>>& thetas = candidate.thetas;
     thetas.erase(std::remove_if(thetas.begin(), thetas.end(),
                                 [&](const std::vector<double>& theta) { return theta[i] > decay_m.upper; }),
                  thetas.end());
@@ -65,14 +69,13 @@ void hold_within_flights(Candidate& ceiling, double height_span_m) {
 
 Candidate vehicle_offset(const stability::Model& model, const Coverage& coverage) {
   Candidate result;
-  result.name = result.spec.name = "constant_force";
-  result.info = stability::effect_info("constant_force");
-  stability::scale_bounds(model.mass_kg, result.info);
+  result.name = result.spec.name = stability::plain_effect(stability::Family::kPush);
+  result.info = stability::effect_info(result.name, model);
   result.thetas = {{}};
   result.vehicles = coverage.vehicles;
   std::vector<stability::Parameter> all;
   for (const std::string& vehicle : coverage.vehicles) {
-    const EffectSpec* present = find(model, "constant_force", vehicle);
+    const EffectSpec* present = find(model, result.name, vehicle);
     for (stability::Parameter parameter : result.info.linear) {
       const double value = present == nullptr || present->parameters.count(parameter.name) == 0
                                ? 0
@@ -127,6 +130,7 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
         highest_m = std::max(highest_m, now.p_W_m.z());
         range.z_min_m = std::min(range.z_min_m, now.p_W_m.z());
         range.z_max_m = std::max(range.z_max_m, now.p_W_m.z());
+        part.covered.battery_most_V = std::max(part.covered.battery_most_V, now.battery_V);
         part.covered.most_neighbours = std::max(part.covered.most_neighbours, now.num_neighbours);
         part.vehicles.insert(track.vehicle);
         ++part.covered.records;
@@ -140,6 +144,7 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
   for (const Part& part : parts) {
     all.range.z_min_m = std::min(all.range.z_min_m, part.covered.range.z_min_m);
     all.range.z_max_m = std::max(all.range.z_max_m, part.covered.range.z_max_m);
+    all.battery_most_V = std::max(all.battery_most_V, part.covered.battery_most_V);
     all.height_span_m = std::max(all.height_span_m, part.covered.height_span_m);
     all.most_neighbours = std::max(all.most_neighbours, part.covered.most_neighbours);
     all.records += part.covered.records;
@@ -151,11 +156,15 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
   return all;
 }
 
+bool is_plain_scale(const std::string& effect) {
+  return stability::traits_of(effect).is_plain(stability::Family::kThrustScale);
+}
+
 double own_thrust_ratio(const stability::Model& model) {
   double sum = 0;
   for (const EffectSpec& spec : model.effects) {
     const auto ratio = spec.parameters.find("ratio");
-    if (spec.name == "thrust_ratio" && ratio != spec.parameters.end()) sum += ratio->second;
+    if (is_plain_scale(spec.name) && ratio != spec.parameters.end()) sum += ratio->second;
   }
   return sum;
 }
@@ -175,18 +184,31 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
   } else {
     result.spec.name = name;
   }
-  result.info = info_of(result.spec, model.path);
-  if (!result.spec.is_expression()) stability::scale_bounds(model.mass_kg, result.info);
-  result.thetas = stability::make_effect(result.spec, {"", {}, model.path})->grid(coverage.range);
+  result.info =
+      result.spec.is_expression() ? info_of(result.spec, model.path) : stability::effect_info(name, model);
+  stability::FlightRange range = coverage.range;
+  const bool is_stated = model.battery_range_V != stability::kOneCell_V;
+  range.full_battery_V =
+      is_stated ? model.full_battery_V() : stability::full_battery_V(coverage.battery_most_V);
+  result.thetas = stability::make_effect(result.spec, {"", {}, model.path})->grid(range);
+  for (std::size_t i = 0; i < result.info.shape.size(); ++i) {
+    stability::Parameter& parameter = result.info.shape[i];
+    if (parameter.unit != stability::Unit::kArm) continue;
+    const double size = model.arm_m / kCrazyflieArm_m;
+    parameter.value *= size;
+    for (double& value : parameter.grid) value *= size;
+    for (std::vector<double>& theta : result.thetas) theta[i] *= size;
+  }
   if (result.info.remembers) {
     // A lag or delay has gain 1. Some tolerance lets a coarse grid of times find it.
     result.info.linear[0].lower = 1 - kMemoryTolerance;
     result.info.linear[0].upper = 1 + kMemoryTolerance;
   }
   if (residuals::is_thrust_stage(name)) {
-    const EffectSpec* ratio = find(model, "thrust_ratio");
-    if (ratio != nullptr)
-      result.scale = 1 + stability::effect_values(info_of(*ratio, model.path), *ratio).linear[0];
+    for (const EffectSpec& spec : model.effects) {
+      if (is_plain_scale(spec.name) && spec.vehicle.empty())
+        result.scale = 1 + stability::effect_values(info_of(spec, model.path), spec).linear[0];
+    }
   }
   if (present == nullptr) return result;
   const stability::EffectValues values = stability::effect_values(result.info, *present);
@@ -200,23 +222,26 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
 std::vector<ScaledStage> scaled_stages(const std::vector<const Candidate*>& effects) {
   std::vector<ScaledStage> pairs;
   for (std::size_t scale = 0; scale < effects.size(); ++scale) {
-    if (effects[scale]->name != "thrust_ratio") continue;
+    if (!effects[scale]->info.traits.is_plain(stability::Family::kThrustScale)) continue;
     for (std::size_t stage = 0; stage < effects.size(); ++stage) {
-      if (residuals::is_thrust_stage(effects[stage]->name)) pairs.push_back({stage, scale});
+      if (effects[stage]->info.traits.place == stability::Place::kThrust) pairs.push_back({stage, scale});
     }
   }
   return pairs;
 }
 
 bool is_written_by_hand(const std::string& name) {
-  return name == "deep_set" || name == "torque_bias" || name == "downwash_torque" || name == "com_offset" ||
-         name == "accelerometer_scale";
+  const ShownBy shown_by = stability::traits_of(name).shown_by;
+  return shown_by == ShownBy::kTorques || shown_by == ShownBy::kAccelerometer ||
+         shown_by == ShownBy::kNothing;
 }
+
+std::string rotor_effect() { return stability::effect_shown_by(ShownBy::kRotors); }
 
 std::vector<std::string> candidate_names(const stability::Model& model) {
   std::vector<std::string> names;
   for (const std::string& name : stability::effect_names()) {
-    if (!is_written_by_hand(name) && name != kRotorThrust) names.push_back(name);
+    if (!is_written_by_hand(name) && name != rotor_effect()) names.push_back(name);
   }
   for (const EffectSpec& spec : model.effects) {
     if (spec.is_expression()) names.push_back(spec.name);
@@ -226,18 +251,16 @@ std::vector<std::string> candidate_names(const stability::Model& model) {
 }
 
 std::vector<Candidate> all_candidates(const stability::Model& model, const Coverage& coverage) {
-  constexpr double kGroundReach_m = 0.4;
   std::vector<Candidate> all;
   for (const std::string& name : candidate_names(model)) {
     if (name == kVehicleOffset && coverage.vehicles.size() < 2) continue;
     if (is_taken(name, model)) continue;
     // Effects that the model already has may still need a change.
-    if ((needs_scan(name) || name == kPendulum) && find(model, name) == nullptr) continue;
+    if ((needs_scan(name) || swings(name)) && find(model, name) == nullptr) continue;
     Candidate next = candidate(name, model, coverage);
     if (next.info.needs_neighbours && coverage.most_neighbours == 0) continue;
-    // No ground effect is measurable higher up.
-    if (name == "ground" && coverage.range.z_min_m > kGroundReach_m) continue;
-    if (name == "ceiling") hold_within_flights(next, coverage.height_span_m);
+    if (coverage.range.z_min_m > next.info.traits.seen_below_arms * model.arm_m) continue;
+    if (next.info.traits.within_flights) hold_within_flights(next, coverage.height_span_m);
     if (next.thetas.empty()) continue;
     all.push_back(std::move(next));
   }

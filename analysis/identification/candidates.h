@@ -30,6 +30,7 @@ inline constexpr std::size_t kFewestBlocks = 10;
 /// What the flights of one kind of vehicle cover.
 struct Coverage {
   stability::FlightRange range;
+  double battery_most_V = 0;
   double height_span_m = 0;  ///< largest height range of a vehicle in one flight
   int most_neighbours = 0;
   std::size_t records = 0;
@@ -46,29 +47,34 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
                   int jobs);
 
 /// Returns all effects of the registry that a force can reveal, with grids adapted to the coverage, and those that the
-/// model file defines by formulas. A ceiling is included only with thetas whose region a flight leaves. Not included
+/// model file defines by formulas. A ceiling is included only with thetas whose region a flight
+/// leaves. Not included
 /// are effects of neighbours if no vehicle has one, lags and delays that `model` already has, deep sets (which need a
-/// network), and effects of needs_scan() and the pendulum unless `model` has them. If several vehicles flew, a constant
+/// network), and effects of needs_scan() and swings() unless `model` has them. If several vehicles flew, a constant
 /// force per vehicle is included.
 std::vector<Candidate> all_candidates(const stability::Model& model, const Coverage& coverage);
 
 /// Returns a single candidate by name. If `model` already has the effect, the candidate is a change of its
 /// coefficients; for a formula whose coefficients in `model` are all zero, it is the formula with all its thetas.
-/// @param name name of an effect such as "constant_force", or "vehicle_offset" for a constant force per vehicle
+/// @param name name of an effect, or "vehicle_offset" for a constant force per vehicle
 /// @throws std::invalid_argument if there is none.
 Candidate candidate(const std::string& name, const stability::Model& model, const Coverage& coverage);
 
 /// Returns true if an effect of this name cannot be fitted to the force in flight: it acts as a torque or is a network.
 bool is_written_by_hand(const std::string& name);
 
-/// Fitted to the loads of the rotors in slow flight (rotors/rotor_fit.h), as the force in flight shows only their sum.
-inline constexpr char kRotorThrust[] = "rotor_thrust";
+/// Returns the effect of single rotors. It is fitted to their loads in slow flight (rotors/rotor_fit.h), as the
+/// force in flight shows only their sum.
+std::string rotor_effect();
 
 /// Returns the names that candidate() accepts for `model`.
 std::vector<std::string> candidate_names(const stability::Model& model);
 
 /// Returns true for lags and delays that `model` has, because a second one cannot be written as a change of the first.
 bool is_taken(const std::string& name, const stability::Model& model);
+
+/// Returns whether an effect is a constant fraction of the thrust.
+bool is_plain_scale(const std::string& effect);
 
 /// Returns the sum of the excesses over 1 of the model's thrust ratios.
 double own_thrust_ratio(const stability::Model& model);

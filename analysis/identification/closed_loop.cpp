@@ -7,9 +7,12 @@
 
 #include "analysis/identification/scan/formulas.h"
 #include "nn/base/text.h"
+#include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
 namespace {
+
+using stability::Family;
 
 /// With more records, thetas off the grid are not used in a second selection.
 constexpr std::size_t kManyRecords = 400'000;
@@ -55,18 +58,11 @@ bool is_vertical_push(const stability::Parameter& parameter) {
 /// Removes the vertical component from the constant forces of `candidates`.
 void hold_vertical_push(std::vector<Candidate>& candidates) {
   for (Candidate& candidate : candidates) {
-    if (candidate.name != "constant_force") continue;
+    if (!is_push(candidate.name)) continue;
     for (stability::Parameter& parameter : candidate.info.linear) {
       if (is_vertical_push(parameter)) parameter.lower = parameter.upper = 0;
     }
   }
-}
-
-/// Returns true for effects of the thrust. Thrust reacts to all disturbances, so effects of its history need
-/// confirmation.
-bool is_of_thrust(const Candidate& candidate) {
-  const std::string& name = candidate.name;
-  return candidate.info.remembers || is_scale(name) || is_of_load(name) || name == "inflow";
 }
 
 /// Returns true if the instrument confirms the effect's coefficient.
@@ -86,16 +82,20 @@ void erase(std::vector<Candidate>& candidates, const std::set<std::string>& name
                    candidates.end());
 }
 
-bool is_scale(const std::string& effect) { return effect == "thrust_ratio" || effect == "battery"; }
+bool is_scale(const std::string& effect) {
+  return stability::traits_of(effect).family == Family::kThrustScale;
+}
 
-bool is_of_load(const std::string& effect) {
-  return effect == "voltage_sag" || effect == "thrust_saturation";
+bool is_push(const std::string& effect) { return stability::traits_of(effect).family == Family::kPush; }
+
+bool is_of_thrust(const stability::EffectInfo& info) {
+  return info.remembers || info.traits.set_points != stability::SetPoints::kNotNeeded;
 }
 
 bool has_vertical_push(const std::vector<Refined>& effects) {
   return std::any_of(effects.begin(), effects.end(), [](const Refined& effect) {
     const std::vector<stability::Parameter>& linear = effect.candidate.info.linear;
-    return effect.candidate.name == "constant_force" &&
+    return is_push(effect.candidate.name) &&
            std::any_of(linear.begin(), linear.end(), [](const stability::Parameter& parameter) {
              return is_vertical_push(parameter) && !is_held_at_zero(parameter);
            });
@@ -159,7 +159,7 @@ Selected select(const Passes& passes, std::vector<Candidate> candidates,
 /// both leave the same, the scale is chosen.
 double feedback_share(const Selected& scale) {
   for (const Refined& effect : scale.refined) {
-    if (effect.candidate.name != "thrust_ratio") continue;
+    if (!effect.candidate.info.traits.is_plain(Family::kThrustScale)) continue;
     const double factor = 1 + effect.coefficients[0];
     return std::max(factor * factor, 1.0);
   }
@@ -173,24 +173,26 @@ Selected without_slope(const Passes& passes, std::vector<Candidate> candidates,
   std::vector<Candidate> one = candidates;
   hold_vertical_push(one);
   Selected scale = select(passes, std::move(one));
-  erase(candidates, {"thrust_ratio", "battery"});
+  candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
+                                  [](const Candidate& c) { return is_scale(c.name); }),
+                   candidates.end());
   Selected push = select(passes, std::move(candidates));
   const auto left = [](const Selected& s) { return Selection(s.grams).mean_square(s.members); };
   const auto has = [](const Selected& s, const auto& is_one) {
     return std::any_of(s.refined.begin(), s.refined.end(),
                        [&](const Refined& effect) { return is_one(effect.candidate.name); });
   };
-  const auto is_constant = [](const std::string& name) { return name == "constant_force"; };
-  const bool has_scale = has(scale, is_scale), has_push = has(push, is_constant);
+  const bool has_scale = has(scale, is_scale), has_push = has(push, is_push);
+  const std::string plain_scale = stability::plain_effect(Family::kThrustScale);
   const bool takes_scale = has_scale && left(scale) <= alike * feedback_share(scale) * left(push);
   if (takes_scale) {
-    scale.instead = "constant_force";
+    scale.instead = stability::plain_effect(Family::kPush);
   } else {
     const double none = Selection(push.grams).mean_square({});
     if (has_scale && has_push && none - left(scale) > kShare * (none - left(push)))
-      push.instead = "thrust_ratio";
+      push.instead = plain_scale;
     else
-      contradicted.emplace_back("thrust_ratio");
+      contradicted.push_back(plain_scale);
   }
   Selected result = takes_scale ? std::move(scale) : std::move(push);
   contradicted.insert(contradicted.end(), result.contradicted.begin(), result.contradicted.end());
@@ -210,7 +212,7 @@ std::set<std::string> suspects(const Selected& selected) {
     if (loss >= kPlain) continue;
     // Without setpoints a lag can be confirmed only by its size. A scale has its rivals, see without_slope().
     const bool has_check = !selected.checks.empty();
-    const bool unconfirmed = is_of_thrust(candidate) &&
+    const bool unconfirmed = is_of_thrust(candidate.info) &&
                              (has_check ? !is_confirmed(selected.checks[i]) : !candidate.info.remembers);
     if (loss < kShare || unconfirmed) names.insert(candidate.name);
   }
@@ -220,18 +222,23 @@ std::set<std::string> suspects(const Selected& selected) {
 std::set<std::string> unconfirmed_loads(const Selected& selected) {
   std::set<std::string> names;
   for (std::size_t i = 0; i < selected.refined.size(); ++i) {
-    const std::string& name = selected.refined[i].candidate.name;
-    if (is_of_load(name) && (selected.checks.empty() || !is_confirmed(selected.checks[i])))
-      names.insert(name);
+    const Candidate& candidate = selected.refined[i].candidate;
+    if (candidate.info.traits.set_points == stability::SetPoints::kAlways &&
+        (selected.checks.empty() || !is_confirmed(selected.checks[i])))
+      names.insert(candidate.name);
   }
   return names;
 }
 
 std::set<std::string> with_substitutes(std::set<std::string> names, const std::vector<Refined>& selected) {
   std::set<std::string> substitutes;
-  if (names.count("thrust_ratio") == 1) substitutes = {"battery"};
-  for (const char* late : {"motor_lag", "delay", "sensor_delay"}) {
-    if (names.count(late) == 1) substitutes.insert({"motor_lag", "delay", "sensor_delay"});
+  for (const std::string& name : names) {
+    const Family family = stability::traits_of(name).family;
+    const bool is_answer = family == Family::kThrustScale || family == Family::kLate;
+    if (!is_answer || !stability::traits_of(name).is_plain(family)) continue;
+    for (const std::string& other : stability::effect_names()) {
+      if (stability::traits_of(other).family == family) substitutes.insert(other);
+    }
   }
   for (const Refined& effect : selected) substitutes.erase(effect.candidate.name);
   names.merge(substitutes);

@@ -40,11 +40,13 @@ Selected without_slope(const Passes& passes, std::vector<Candidate> candidates,
 /// Returns `effects` as candidates for instrument(): the gain of a lag is free, because it is what the check is about.
 std::vector<Candidate> candidates_of(const std::vector<Refined>& effects);
 
-/// Returns true for thrust_ratio and battery, which scale the thrust.
+/// Returns whether an effect is a fraction of the thrust, or a constant force.
 bool is_scale(const std::string& effect);
+bool is_push(const std::string& effect);
 
-/// Returns true for voltage_sag and thrust_saturation, which reduce high thrust.
-bool is_of_load(const std::string& effect);
+/// Returns whether an effect needs confirmation by setpoints: thrust, which reacts to all disturbances, or its history
+/// enters it.
+bool is_of_thrust(const stability::EffectInfo& info);
 
 /// Returns true if `effects` include a constant vertical force.
 bool has_vertical_push(const std::vector<Refined>& effects);
@@ -53,12 +55,12 @@ bool has_vertical_push(const std::vector<Refined>& effects);
 /// Diagnosis::suspected.
 std::set<std::string> suspects(const Selected& selected);
 
-/// Returns the names of effects of is_of_load() that setpoints do not confirm: if the thrust needed to carry the weight
-/// differs between flights for any reason, that looks like a loss of high thrust.
+/// Returns the names of effects that setpoints must always confirm, and do not: if the thrust needed to carry the
+/// weight differs between flights for any reason, that looks like a loss of high thrust.
 std::set<std::string> unconfirmed_loads(const Selected& selected);
 
-/// Returns `names` plus those effects that would merely replace a doubtful one: for a scale the one that follows the
-/// battery, for a lag or delay the other lags and delays. Effects in `selected` are not added.
+/// Returns `names` plus those effects that would merely replace a doubtful one: for a scale the scales that vary,
+/// for a lag or delay the other lags and delays. Effects in `selected` are not added.
 std::set<std::string> with_substitutes(std::set<std::string> names, const std::vector<Refined>& selected);
 
 /// Removes candidates with these names.

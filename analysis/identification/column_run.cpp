@@ -9,8 +9,8 @@ namespace swarmcert::identification {
 namespace {
 
 constexpr double kBlock_s = 2, kPurge_s = 0.15, kLongestPause_s = 0.5;
-constexpr int kFewestRecords = 40;
-constexpr std::size_t kAtOnce = 32;  ///< records per call to an effect
+constexpr double kLeastCovered_s = 0.395;  // 0.4 s, with some jitter
+constexpr std::size_t kAtOnce = 32;        ///< records per call to an effect
 
 }  // namespace
 
@@ -101,7 +101,11 @@ TrackBlocks cut_into_blocks(const residuals::Track& track) {
     if (members.empty()) return;
     std::size_t kept = members.size();
     while (kept > 0 && last_s - track.instants[members[kept - 1]].time_s < kPurge_s) --kept;
-    if (static_cast<int>(kept) >= kFewestRecords) {
+    double covered_s = 0;
+    for (std::size_t k = 0; k < kept; ++k)
+      covered_s +=
+          members[k] == 0 ? 0 : track.instants[members[k]].time_s - track.instants[members[k] - 1].time_s;
+    if (covered_s >= kLeastCovered_s) {
       for (std::size_t i = 0; i < kept; ++i)
         result.of_record[members[i]] = static_cast<int>(result.blocks.size());
       result.blocks.push_back({static_cast<int>(kept), result.rows(), follows && !dropped});

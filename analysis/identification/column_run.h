@@ -51,7 +51,8 @@ struct TrackBlock {
 };
 
 /// A track divided into blocks of 2 s without cut records. The records within 0.15 s of both ends belong to no block,
-/// so that the memory of filters does not leak into another fold. Blocks of fewer than 40 records are dropped.
+/// so that the memory of filters does not leak into another fold. Blocks whose records cover less than 0.4 s are
+/// dropped.
 struct TrackBlocks {
   std::vector<int> of_record;  ///< index into `blocks`; -1: none
   std::vector<TrackBlock> blocks;

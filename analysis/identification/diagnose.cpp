@@ -27,8 +27,10 @@ ThrustScale thrust_scale(const Passes& passes, const Coverage& covered, const st
   std::vector<Candidate> others = candidates_of(found);
   const bool each = std::any_of(others.begin(), others.end(),
                                 [](const Candidate& effect) { return effect.name == kVehicleOffset; });
-  std::vector<Candidate> effects = {candidate("thrust_ratio", model, covered),
-                                    candidate(each ? kVehicleOffset : "constant_force", model, covered)};
+  const std::string push = each ? kVehicleOffset : stability::plain_effect(stability::Family::kPush);
+  std::vector<Candidate> effects = {
+      candidate(stability::plain_effect(stability::Family::kThrustScale), model, covered),
+      candidate(push, model, covered)};
   for (Candidate& effect : others) {
     if (effect.name != effects[0].name && effect.name != effects[1].name)
       effects.push_back(std::move(effect));
@@ -54,13 +56,14 @@ void name_hidden_scale(const stability::Model& model, const ThrustScale& scale,
   const Interval& interval = scale.value.interval;
   const double excess = std::abs(scale.value.instrument - own_thrust_ratio(model));
   if (!scale.is_known || excess <= kSurely * (interval.upper - interval.lower) / 2) return;
-  const auto names_scale = [](const Missing& missing) { return missing.effect == "thrust_ratio"; };
+  const std::string name = stability::plain_effect(stability::Family::kThrustScale);
+  const auto names_scale = [&](const Missing& missing) { return missing.effect == name; };
   if (std::any_of(ranking.begin(), ranking.end(), names_scale)) return;
   for (Missing& missing : ranking) {
-    if (missing.effect != "constant_force") continue;
+    if (!is_push(missing.effect)) continue;
     const std::vector<std::string> rivals = missing.finding.confounded_with();
-    if (std::find(rivals.begin(), rivals.end(), "thrust_ratio") != rivals.end()) continue;
-    missing.finding.rivals.push_back({"thrust_ratio", stability::effect_info("thrust_ratio").excitation});
+    if (std::find(rivals.begin(), rivals.end(), name) != rivals.end()) continue;
+    missing.finding.rivals.push_back({name, stability::effect_info(name).excitation});
   }
 }
 
@@ -83,8 +86,10 @@ void name_what_halves(const Passes& all, const Passes& passes, Diagnosis& result
   const std::vector<int> flights = every_flight(left);
   const Coverage covered = coverage(left, passes.kind, flights, passes.jobs);
   std::vector<Candidate> candidates;
-  for (const char* const name : {"thrust_ratio", "battery", "constant_force"})
-    candidates.push_back(candidate(name, *left.model_of(passes.kind), covered));
+  for (const std::string& name : stability::effect_names()) {
+    if (is_scale(name) || is_push(name))
+      candidates.push_back(candidate(name, *left.model_of(passes.kind), covered));
+  }
   const Grams grams =
       block_grams({left, passes.kind, flights, passes.records, passes.jobs, [](int, int) {}}, candidates);
   const Selection selection(grams);
@@ -122,7 +127,7 @@ std::vector<stability::EffectSpec> named_balances(const Passes& passes) {
   const residuals::Inputs inputs = inputs_with(passes, {});
   for (const TorqueBalance& balance : torque_balances(inputs, passes.kind, passes.jobs)) {
     const auto& rivals = balance.rivals;
-    if (balance.is_named() && std::find(rivals.begin(), rivals.end(), "rotor_thrust") == rivals.end())
+    if (balance.is_named() && std::find(rivals.begin(), rivals.end(), rotor_effect()) == rivals.end())
       specs.push_back(spec_of(balance, balance.effect));
   }
   return specs;
@@ -145,7 +150,7 @@ Candidate candidate_to_fit(const Passes& passes, const std::string& name, const 
                            const std::vector<stability::EffectSpec>& others) {
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
   Candidate result = candidate(name, model, covered);
-  if (name == kPendulum && result.thetas.size() > 1) return best_pendulum(passes, covered, others);
+  if (swings(name) && result.thetas.size() > 1) return best_pendulum(passes, covered, others);
   if (!needs_scan(name)) return result;
   const ScanSamples samples = scan_samples(passes, others);
   const std::vector<Formula> formulas =
@@ -201,6 +206,9 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   const Selection selection(selected.grams);
   result.contradicted = selected.contradicted;
   result.suspected = std::move(settled.suspected);
+  for (const std::string& name : result.suspected) {
+    if (settled.at_bound.count(name) == 1) result.at_bound.push_back(name);
+  }
   result.rmse_before_N = std::sqrt(selection.mean_square({}));
   Members named;
   for (const Member& member : selected.members) {
@@ -250,7 +258,7 @@ std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::str
   std::vector<Candidate> candidates;
   std::vector<std::string> others;
   std::remove_copy_if(names.begin(), names.end(), std::back_inserter(others),
-                      [](const std::string& name) { return needs_scan(name) || name == kPendulum; });
+                      [](const std::string& name) { return needs_scan(name) || swings(name); });
   std::vector<stability::EffectSpec> beside;
   if (others.size() < names.size() && !others.empty())
     beside = specs_of(fit_effects(inputs, kind, others, which, jobs, progress));

@@ -25,6 +25,7 @@ struct Diagnosis {
   std::vector<std::string> contradicted;  ///< selected, but only an artefact of the controller's reaction
   /// Selected, but too small beside the remainder, see explain().
   std::vector<std::string> suspected;
+  std::vector<std::string> at_bound;  ///< of those: not identified, because a value ended at its bound
   std::vector<Detectable> detectable;
   Remainder remainder;
   Scan scan;                      ///< the variables on which the remainder depends

@@ -4,43 +4,34 @@
 #include <vector>
 
 #include "analysis/identification/closed_loop.h"
-#include "analysis/identification/scan/named_forms.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
-namespace {
 
-bool is_answer_of_thrust(const Missing& missing) {
-  if (!is_of_library(missing.effect)) return false;
-  const stability::EffectInfo& info = stability::effect_info(missing.effect);
-  return info.remembers || is_scale(missing.effect) || is_of_load(missing.effect) ||
-         missing.effect == "inflow";
-}
-
-/// Returns whether a curve over this variable is a drag.
-bool is_drag_over(const std::string& variable, const std::string& effect) {
-  const bool is_drag = is_fixed_drag(effect) || effect == "drag_rotor";
-  return is_drag && (variable == "vx" || variable == "vy" || variable == "vz" || variable == "speed" ||
-                     variable == "airspeed");
-}
-
-}  // namespace
+using stability::EffectTraits;
+using stability::Family;
 
 bool is_of_library(const std::string& effect) {
   const std::vector<std::string> library = stability::effect_names();
   return std::find(library.begin(), library.end(), effect) != library.end();
 }
 
-std::set<std::string> fixed_drags() { return {"drag_linear", "drag_quadratic"}; }
-
-bool is_fixed_drag(const std::string& effect) { return fixed_drags().count(effect) > 0; }
+std::set<std::string> fixed_drags() {
+  std::set<std::string> drags;
+  for (const std::string& name : stability::effect_names()) {
+    if (stability::traits_of(name).drag_exponent > 0) drags.insert(name);
+  }
+  return drags;
+}
 
 std::set<std::string> wakes_without_delay(const Selected& selected) {
-  const auto place_of = [&](const char* name) {
-    return std::find_if(selected.refined.begin(), selected.refined.end(),
-                        [&](const Refined& refined) { return refined.candidate.name == name; });
+  const auto place_of = [&](Family reduces_to) {
+    return std::find_if(selected.refined.begin(), selected.refined.end(), [&](const Refined& refined) {
+      const EffectTraits& traits = refined.candidate.info.traits;
+      return traits.family == Family::kWake && traits.reduces_to == reduces_to;
+    });
   };
-  const auto delayed = place_of("wake_delay"), at_once = place_of("downwash");
+  const auto delayed = place_of(Family::kWake), at_once = place_of(Family::kNone);
   if (delayed == selected.refined.end()) return {};
   const stability::Parameter& delay = delayed->candidate.info.shape[0];
   const double least_s =
@@ -62,10 +53,10 @@ double taken_N2(const Missing& missing) {
 
 bool may_be_part(const Missing& missing, double weight_N) {
   constexpr double kSmall = 0.02;
-  const std::string& effect = missing.effect;
-  if (effect == "thrust_ratio" || effect == "constant_force")
+  if (is_plain_scale(missing.effect) || is_push(missing.effect))
     return taken_N2(missing) < kSmall * weight_N * (kSmall * weight_N);
-  return needs_scan(effect) || effect == "ground" || effect == "ceiling" || effect == "inflow";
+  const EffectTraits& traits = stability::traits_of(missing.effect);
+  return traits.family == Family::kNone && !traits.variables.empty();
 }
 
 bool is_doubtful(const Missing& missing, const Remainder& rest, const Scan& scan, double weight_N) {
@@ -78,11 +69,10 @@ bool is_doubtful(const Missing& missing, const Remainder& rest, const Scan& scan
   const ScanEntry& first = scan.entries[0];
   const double left = first.rmse_before * first.rmse_before - first.rmse_after * first.rmse_after;
   // If one variable explains most of the remainder, thrust and its history react to it.
-  if (is_answer_of_thrust(missing) && taken <= left) return true;
+  if (is_of_library(missing.effect) && is_of_thrust(stability::effect_info(missing.effect)) && taken <= left)
+    return true;
   // An effect of this variable that leaves most of the dependence on it has the wrong form.
-  const bool is_same =
-      points_to(first.variable, missing.effect) || is_drag_over(first.variable, missing.effect);
-  return is_same && kOfSameVariable * taken < left;
+  return stability::traits_of(missing.effect).varies_with(first.variable) && kOfSameVariable * taken < left;
 }
 
 }  // namespace swarmcert::identification

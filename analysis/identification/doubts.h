@@ -19,7 +19,6 @@ bool is_of_library(const std::string& effect);
 
 /// Returns the drags against the velocity whose exponent is fixed at 1 or 2.
 std::set<std::string> fixed_drags();
-bool is_fixed_drag(const std::string& effect);
 
 /// Returns wakes that the flights do not show beside the others: a delayed wake whose delay may be zero within its
 /// interval, which is a downwash; and of a delayed wake beside a downwash the one that explains less, because the wake

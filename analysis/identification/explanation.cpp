@@ -21,12 +21,30 @@ namespace {
 /// A formula replaces named effects if it leaves less than this fraction of the mean square, which favours names.
 constexpr double kClearlyLess = 0.9;
 
-/// Returns the effects whose shape ended at a bound other than its start, i.e. that really fit something else. Shapes
-/// of effects of neighbours may end anywhere, because nothing else acts where neighbours are.
+/// Returns whether a coefficient is as large as it may be. A bound of zero is one of the sign, which no effect reaches.
+bool is_at_bound(const stability::EffectInfo& library, const Refined& refined) {
+  constexpr double kClose = 1e-6;
+  const std::vector<stability::Parameter>& linear = refined.candidate.info.linear;
+  for (std::size_t c = 0; c < linear.size(); ++c) {
+    const stability::Parameter& stated = library.linear[c % library.linear.size()];
+    const double close = kClose * (linear[c].upper - linear[c].lower), value = refined.coefficients[c];
+    if (close == 0) continue;
+    if (stated.upper != 0 && value >= linear[c].upper - close) return true;
+    if (stated.lower != 0 && value <= linear[c].lower + close) return true;
+  }
+  return false;
+}
+
+/// Returns the effects that ended at a bound: with a coefficient, or with a shape that did not start there, i.e. that
+/// really fit something else. Shapes of effects of neighbours may end anywhere, because nothing else acts where
+/// neighbours are.
 std::set<std::string> out_of_bounds(const Selected& selected) {
   std::set<std::string> names;
   for (const Refined& refined : selected.refined) {
     const stability::EffectInfo& info = refined.candidate.info;
+    if (is_of_library(refined.candidate.name) && !info.remembers &&
+        is_at_bound(stability::effect_info(refined.candidate.name), refined))
+      names.insert(refined.candidate.name);
     if (info.remembers || info.needs_neighbours || is_formula(refined.candidate.name)) continue;
     for (std::size_t i = 0; i < refined.theta.size(); ++i) {
       const stability::Parameter& p = info.shape[i];
@@ -56,6 +74,7 @@ Settled settle(const Passes& passes, const Coverage& covered, const std::vector<
     result.selected =
         doubts_slope ? without_slope(passes, candidates, {}) : select(passes, candidates, start);
     std::set<std::string> doubtful = out_of_bounds(result.selected);
+    result.at_bound.insert(doubtful.begin(), doubtful.end());
     doubtful.merge(unconfirmed_loads(result.selected));
     doubtful.merge(wakes_without_delay(result.selected));
     if (!doubtful.empty() && round + 1 < kMostRounds) {
@@ -89,9 +108,7 @@ bool is_ranked(const std::string& name, const Settled& settled) {
 
 /// Returns whether a payload may be missing, i.e. whether part of the weight is.
 bool may_be_load(const Settled& settled) {
-  const auto is_of_weight = [](const std::string& name) {
-    return is_scale(name) || name == "constant_force";
-  };
+  const auto is_of_weight = [](const std::string& name) { return is_scale(name) || is_push(name); };
   const auto has = [&](const std::vector<std::string>& names) {
     return std::any_of(names.begin(), names.end(), is_of_weight);
   };
@@ -105,17 +122,17 @@ bool may_be_load(const Settled& settled) {
 std::vector<Candidate> name_swinging_load(const Passes& passes, const Coverage& covered, Settled& settled) {
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
   const bool is_in_model = std::any_of(model.effects.begin(), model.effects.end(),
-                                       [](const auto& spec) { return spec.name == kPendulum; });
+                                       [](const auto& spec) { return swings(spec.name); });
   if (is_in_model || !may_be_load(settled)) return {};
   std::vector<stability::EffectSpec> beside;
   for (const Missing& missing : settled.ranking) {
-    if (is_scale(missing.effect) || missing.effect == "constant_force") continue;
+    if (is_scale(missing.effect) || is_push(missing.effect)) continue;
     beside.insert(beside.end(), missing.specs.begin(), missing.specs.end());
   }
   const std::optional<Candidate> load = visible_pendulum(passes, covered, beside);
   if (!load) return {};
-  Settled swinging = settle(passes, covered, {*load}, {kPendulum});
-  if (!is_ranked(kPendulum, swinging)) return {};
+  Settled swinging = settle(passes, covered, {*load}, {load->name});
+  if (!is_ranked(load->name, swinging)) return {};
   settled = std::move(swinging);
   return {*load};
 }
@@ -148,16 +165,18 @@ std::vector<Formula> rivals_of_names(const Passes& passes, const Explained& expl
 FixedDrag fixed_drag(const std::vector<Missing>& ranking) {
   FixedDrag drag;
   for (const Missing& missing : ranking) {
-    if (missing.effect == "drag_linear") drag.linear_N_s_m = missing.parameters.at("drag_N_s_m");
-    if (missing.effect == "drag_quadratic") drag.quadratic_N_s2_m2 = missing.parameters.at("drag_N_s2_m2");
+    const double exponent = stability::traits_of(missing.effect).drag_exponent;
+    if (exponent == 1) drag.linear_N_s_m = missing.parameters.at(missing.coefficients[0]);
+    if (exponent == 2) drag.quadratic_N_s2_m2 = missing.parameters.at(missing.coefficients[0]);
   }
   return drag;
 }
 
 /// Returns the drag law for the samples beside the effects of `ranking`, if it clearly explains more than their drags.
 std::optional<DragLaw> better_drag_law(const ScanSamples& left, const std::vector<Missing>& ranking) {
-  const bool has_drag = std::any_of(ranking.begin(), ranking.end(),
-                                    [](const Missing& missing) { return is_fixed_drag(missing.effect); });
+  const bool has_drag = std::any_of(ranking.begin(), ranking.end(), [](const Missing& missing) {
+    return stability::traits_of(missing.effect).drag_exponent > 0;
+  });
   if (!has_drag) return std::nullopt;
   std::optional<DragLaw> law = drag_law(left, fixed_drag(ranking));
   if (law && !(law->mean_square_N2 < kClearlyLess * mean_square_N2(left))) law.reset();
@@ -239,7 +258,7 @@ bool has_plain_scale(const std::vector<Missing>& ranking) {
 /// The contribution of a battery vanishes when the battery is full.
 bool is_only_thrust_ratio(const std::vector<Missing>& ranking) {
   return std::all_of(ranking.begin(), ranking.end(), [](const Missing& missing) {
-    return !is_scale(missing.effect) || missing.effect == "thrust_ratio";
+    return !is_scale(missing.effect) || is_plain_scale(missing.effect);
   });
 }
 
@@ -300,14 +319,18 @@ Settled settle_with_formulas(const Passes& passes, const Coverage& covered, std:
   return result;
 }
 
-/// Returns whether the force of an effect is a curve over this variable of the scan. A ratio beside a battery shifts
-/// it.
-bool is_curve_over(const std::string& variable, const std::string& effect, bool has_battery) {
-  if (effect == "inflow") return variable == "vz" || variable == "climb";
-  if (effect == "ground" || effect == "ceiling") return variable == "z";
-  if (effect == "sensor_delay") return variable == "rate_x" || variable == "rate_y";
-  if (effect == "thrust_ratio") return has_battery && variable == "battery";
-  return points_to(variable, effect);
+/// Returns whether the force of an effect is a curve over this variable of the scan, or shifts one that is found beside
+/// it, as a plain form does.
+bool is_curve_over(const std::string& variable, const std::string& effect,
+                   const std::vector<Missing>& ranking) {
+  const stability::EffectTraits& traits = stability::traits_of(effect);
+  const auto is_shifted = [&](const Missing& other) {
+    const stability::EffectTraits& varying = stability::traits_of(other.effect);
+    return traits.is_plain(varying.family) && varying.reduces_to == traits.family &&
+           varying.varies_with(variable);
+  };
+  return traits.varies_with(variable) || (traits.family != stability::Family::kNone &&
+                                          std::any_of(ranking.begin(), ranking.end(), is_shifted));
 }
 
 /// Returns effects that may be part of something else and after which the remainder still varies with their own
@@ -316,27 +339,30 @@ bool is_curve_over(const std::string& variable, const std::string& effect, bool 
 std::set<std::string> refuted_names(const Explained& explained, double weight_N) {
   constexpr double kOfTaken = 0.1;
   const std::vector<Missing>& ranking = explained.settled.ranking;
-  const bool has_battery = std::any_of(ranking.begin(), ranking.end(),
-                                       [](const Missing& missing) { return missing.effect == "battery"; });
   std::set<std::string> names;
   for (const Missing& missing : ranking) {
-    if (!may_be_part(missing, weight_N) && missing.effect != "sensor_delay") continue;
+    const bool is_late = stability::traits_of(missing.effect).family == stability::Family::kLate;
+    if (!may_be_part(missing, weight_N) && !is_late) continue;
     for (const ScanEntry& entry : explained.scan.entries) {
       const double left = entry.rmse_before * entry.rmse_before - entry.rmse_after * entry.rmse_after;
-      if (is_curve_over(entry.variable, missing.effect, has_battery) && left > kOfTaken * taken_N2(missing))
+      if (is_curve_over(entry.variable, missing.effect, ranking) && left > kOfTaken * taken_N2(missing))
         names.insert(missing.effect);
     }
   }
   return names;
 }
 
-/// Returns whether thrust may saturate. Saturation close to hover makes the vehicle tumble, and its setpoints hardly
-/// reach beyond the knee, so no curve over the thrust can be confirmed. With any remainder, the effect itself is tried.
-bool may_saturate(const Explained& explained, const stability::Model& model,
-                  const std::vector<Candidate>& rivals) {
-  const auto is_it = [](const auto& one) { return one.name == "thrust_saturation"; };
-  return explained.settled.rest.flag && std::none_of(model.effects.begin(), model.effects.end(), is_it) &&
-         std::none_of(rivals.begin(), rivals.end(), is_it);
+/// Adds effects that hide their curve to `rivals` if anything is left.
+void add_hidden(const Explained& explained, const stability::Model& model, const Coverage& covered,
+                std::vector<Candidate>& rivals) {
+  if (!explained.settled.rest.flag) return;
+  for (const std::string& name : stability::effect_names()) {
+    const auto is_it = [&](const auto& one) { return one.name == name; };
+    if (stability::traits_of(name).hides_its_curve &&
+        std::none_of(model.effects.begin(), model.effects.end(), is_it) &&
+        std::none_of(rivals.begin(), rivals.end(), is_it))
+      rivals.push_back(candidate(name, model, covered));
+  }
 }
 
 /// Returns a selection with a drag law in place of drags of fixed exponents, if held-out blocks clearly prefer it.
@@ -368,7 +394,7 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   const std::vector<Formula> formulas = rivals_of_names(passes, result, nominal ? &*nominal : nullptr);
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
   std::vector<Candidate> rivals = named_forms(formulas, model, covered);
-  if (may_saturate(result, model, rivals)) rivals.push_back(candidate("thrust_saturation", model, covered));
+  add_hidden(result, model, covered, rivals);
   const bool has_rivals = !rivals.empty() || law;
   if (!has_rivals && (formulas.empty() || result.settled.ranking.empty())) return result;
   for (const Formula& formula : formulas) rivals.push_back(candidate_of(formula, model));
@@ -477,7 +503,7 @@ Explained explain(const Passes& passes, const Coverage& covered) {
   Explained explained = explain_by_formulas(passes, covered);
   drop_doubtful_names(passes, explained);
   if (is_mean_of_a_force(passes, explained.settled.ranking, explained.formulas))
-    drop_names(passes, explained, [](const Missing& missing) { return missing.effect == "thrust_ratio"; });
+    drop_names(passes, explained, [](const Missing& missing) { return is_plain_scale(missing.effect); });
   const std::map<std::string, double> kept = correct_memories(passes, explained);
   drop_names(passes, explained,
              [&](const Missing& missing) { return may_be_no_lag(missing, explained.settled.rest, kept); });

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +20,7 @@ struct Settled {
   std::vector<Missing> ranking;
   Remainder rest;
   std::vector<std::string> suspected;
+  std::set<std::string> at_bound;  ///< of those: not identified, because a value ended at its bound
 };
 
 /// Named effects that hold against formulas, and the remainder beside them.

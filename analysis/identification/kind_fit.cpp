@@ -6,6 +6,7 @@
 #include "analysis/identification/box_least_squares.h"
 #include "analysis/identification/passes.h"
 #include "nn/base/doubles.h"
+#include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
 
@@ -157,7 +158,8 @@ void KindFit::step(bool moves) {
     if (!part.proposal.empty()) trial.thetas.push_back(part.proposal);
     candidates.push_back(std::move(trial));
   }
-  candidates.push_back(candidate("constant_force", *inputs_.model_of(kind_), covered_));
+  candidates.push_back(
+      candidate(stability::plain_effect(stability::Family::kPush), *inputs_.model_of(kind_), covered_));
   Grams grams;
   std::map<std::string, Sum> sums;
   for (const auto& [vehicle, flights] : flights_of_) {

@@ -148,7 +148,7 @@ void withdraw(residuals::Inputs& inputs, const std::string& name) {
 std::vector<Missing> fit_with_rotors(const residuals::Inputs& inputs, const std::string& kind,
                                      std::vector<std::string> names, const std::vector<int>& which, int jobs,
                                      const residuals::Progress& progress) {
-  const auto rotors = std::remove(names.begin(), names.end(), kRotorThrust);
+  const auto rotors = std::remove(names.begin(), names.end(), rotor_effect());
   const bool has_rotors = rotors != names.end();
   names.erase(rotors, names.end());
   std::vector<Missing> fitted;
@@ -258,11 +258,11 @@ class Climb {
     }
     std::vector<std::string> names = accepted_;
     names.push_back(name);
-    const bool is_rotors = name == kRotorThrust;
+    const bool is_rotors = name == rotor_effect();
     std::vector<Missing> fitted =
         fit_with_rotors(working_, kind_, names, ladder_.split.fit, jobs_, progress_);
     const auto fresh = std::find_if(fitted.rbegin(), fitted.rend(), [&](const Missing& missing) {
-      return (missing.effect == kRotorThrust) == is_rotors;
+      return (missing.effect == rotor_effect()) == is_rotors;
     });
     if (fresh == fitted.rend())
       return refuse(name, "no flight of the fit has slow flight with the duty of each of four motors");

@@ -12,6 +12,7 @@
 #include "analysis/logs/read_log.h"
 #include "nn/base/input_error.h"
 #include "nn/base/median.h"
+#include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -314,14 +315,15 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
   set_battery_range(fits, draft);
   if (ratio.count > 0) {
     stability::EffectSpec effect;
-    effect.name = "thrust_ratio";
+    effect.name = stability::plain_effect(stability::Family::kThrustScale);
+    const stability::Parameter& bounds = stability::effect_info(effect.name).linear[0];
     // The effect's parameter is the excess over one.
-    effect.parameters["ratio"] = std::clamp(ratio.value - 1, -0.7, 0.7);
+    effect.parameters["ratio"] = std::clamp(ratio.value - 1, bounds.lower, bounds.upper);
     effect.fit.interval["ratio"] = {ratio.lower - 1, ratio.upper - 1};
     effect.fit.note = "drafted from hovering thrust";
     model.effects.push_back(effect);
-    draft.parameters.push_back({"thrust_ratio.ratio", ratio.value, ratio.count > 1, ratio.lower, ratio.upper,
-                                "fit: mass divided by the mass carried by the thrust"});
+    draft.parameters.push_back({effect.name + ".ratio", ratio.value, ratio.count > 1, ratio.lower,
+                                ratio.upper, "fit: mass divided by the mass carried by the thrust"});
   }
   if (!delays_s.empty()) {
     const DraftEstimate delay = estimate(delays_s);

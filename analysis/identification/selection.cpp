@@ -30,26 +30,22 @@ bool is_supported(const Grams& grams, std::size_t candidate, std::size_t theta, 
 /// wake of slowly moving neighbours has no delay; and a load that never swings is a thrust scale. The plain form is
 /// used unless the flights clearly show more.
 int Selection::plain_form(int which) const {
-  const std::string& name = grams().candidates[static_cast<std::size_t>(which)].name;
-  if (name == "battery") return index_of("thrust_ratio");
-  if (name == "drag_quadratic" || name == "drag_rotor") return index_of("drag_linear");
-  if (name == "wake_delay") return index_of("downwash");
-  if (name == "pendulum") return index_of("thrust_ratio");
-  return -1;
+  return plain_of(grams().candidates[static_cast<std::size_t>(which)].info.traits.reduces_to);
 }
 
-int Selection::index_of(const char* name) const {
-  for (int k = 0; k < static_cast<int>(grams().candidates.size()); ++k) {
-    if (grams().candidates[static_cast<std::size_t>(k)].name == name) return k;
+int Selection::plain_of(stability::Family family) const {
+  for (int k = 0; family != stability::Family::kNone && k < static_cast<int>(grams().candidates.size());
+       ++k) {
+    if (grams().candidates[static_cast<std::size_t>(k)].info.traits.is_plain(family)) return k;
   }
   return -1;
 }
 
 /// Flights differ in their thrust scale and in their heights, so only changes within flights can show a ceiling.
 bool Selection::is_shown_within_flights(const Members& before, const Member& added) const {
-  if (candidate(added).name != "ceiling") return true;
+  if (!candidate(added).info.traits.within_flights) return true;
   Members rest = before;
-  const int scale = index_of("thrust_ratio");
+  const int scale = plain_of(stability::Family::kThrustScale);
   if (scale >= 0 && !is_present(before, scale)) rest.push_back({scale, 0});
   const Members after = with(rest, added);
   const Folds& folds = folds_for(after);
@@ -261,9 +257,10 @@ Members Selection::select(const std::vector<std::string>& names) const {
 
 Members Selection::ordered(Members members) const {
   constexpr double kLocalShare = 0.25;
-  // A shape without memory: ground, jets, ...
+  // A shape without memory that is no share of all thrust: ground, jets, ...
   const auto is_local = [&](const Member& m) {
-    return !candidate(m).info.shape.empty() && !candidate(m).info.remembers;
+    const stability::EffectInfo& info = candidate(m).info;
+    return !info.shape.empty() && !info.remembers && info.traits.family != stability::Family::kThrustScale;
   };
   Members result;
   while (!members.empty()) {

@@ -60,10 +60,10 @@ class Selection : public CrossValidation {
   std::vector<double> errors(const Members& members, const Folds& folds, bool trims) const;
   /// Returns the candidate to which `candidate` reduces if the quantity it varies with is constant; -1: none.
   int plain_form(int candidate) const;
-  /// Returns the index of the candidate with this name; -1 if there is none.
-  int index_of(const char* name) const;
-  /// For a ceiling: returns whether it reduces the error of held-out blocks about the mean of each track, beside a
-  /// thrust scale.
+  /// Returns the index of the plain candidate of a family; -1 if there is none.
+  int plain_of(stability::Family family) const;
+  /// For an effect that only changes within flights show: returns whether it reduces the error of held-out blocks about
+  /// the mean of each track, beside a thrust scale.
   bool is_shown_within_flights(const Members& before, const Member& added) const;
   /// Returns whether held-out blocks prefer `after` by two standard errors and by the gain required of an effect.
   bool is_clearly_better(const Members& after, const Members& before) const;

@@ -6,6 +6,7 @@
 
 #include "analysis/identification/remainder.h"
 #include "analysis/identification/selection.h"
+#include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -18,7 +19,7 @@ double frequency_rad_s(double length_m) { return std::sqrt(stability::kGravity_m
 
 /// Returns a constant horizontal force; the vertical part is explained by the weight.
 Candidate horizontal_push(const stability::Model& model, const Coverage& covered) {
-  Candidate push = candidate("constant_force", model, covered);
+  Candidate push = candidate(stability::plain_effect(stability::Family::kPush), model, covered);
   push.info.linear[2].lower = push.info.linear[2].upper = 0;
   return push;
 }
@@ -51,8 +52,9 @@ class PendulumSearch {
       : passes_(passes), inputs_(inputs_with(passes, beside)), flights_(inputs_.found.flights.size()) {
     std::iota(flights_.begin(), flights_.end(), 0);
     const stability::Model& model = *inputs_.model_of(passes.kind);
-    fixed_ = {candidate("thrust_ratio", model, covered), horizontal_push(model, covered)};
-    load_ = candidate(kPendulum, model, covered);
+    fixed_ = {candidate(stability::plain_effect(stability::Family::kThrustScale), model, covered),
+              horizontal_push(model, covered)};
+    load_ = candidate(stability::effect_shown_by(stability::ShownBy::kSwing), model, covered);
     condense();
   }
 
@@ -122,6 +124,10 @@ class PendulumSearch {
 };
 
 }  // namespace
+
+bool swings(const std::string& effect) {
+  return stability::traits_of(effect).shown_by == stability::ShownBy::kSwing;
+}
 
 Candidate best_pendulum(const Passes& passes, const Coverage& covered,
                         const std::vector<stability::EffectSpec>& beside) {

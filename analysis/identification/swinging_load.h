@@ -8,8 +8,8 @@
 
 namespace swarmcert::identification {
 
-/// The effect that is fitted here.
-inline constexpr char kPendulum[] = "pendulum";
+/// Returns whether an effect is fitted here.
+bool swings(const std::string& effect);
 
 /// Returns the pendulum with the best length and damping beside a thrust scale and a constant horizontal force, with
 /// neighbouring shapes for the fit.

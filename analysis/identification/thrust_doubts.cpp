@@ -14,7 +14,6 @@ namespace swarmcert::identification {
 namespace {
 
 constexpr double kClearlyBetter_z = 2;
-constexpr char kNameOfRatio[] = "thrust_ratio";
 
 /// The same flights with all effects of `ranking` except the thrust_ratio in the model.
 class Beside {
@@ -35,7 +34,7 @@ class Beside {
   static std::vector<stability::EffectSpec> others(const std::vector<Missing>& ranking) {
     std::vector<Missing> kept;
     std::copy_if(ranking.begin(), ranking.end(), std::back_inserter(kept),
-                 [](const Missing& missing) { return missing.effect != kNameOfRatio; });
+                 [](const Missing& missing) { return !is_plain_scale(missing.effect); });
     return specs_of(kept);
   }
 
@@ -63,7 +62,7 @@ std::optional<Candidate> without_offset(const Formula& formula, const stability:
 bool is_mean_of(const Candidate& force, const Beside& beside, const Missing& ratio) {
   constexpr double kMost = 0.5;  // of the ratio
   enum Place { kOfRatio, kOfForce };
-  const Grams grams = block_grams(beside.passes(), {beside.named(kNameOfRatio), force});
+  const Grams grams = block_grams(beside.passes(), {beside.named(ratio.effect), force});
   const Selection selection(grams);
   if (!selection.is_sound()) return false;
   const Members by_ratio = {{kOfRatio, 0}}, by_force = {selection.best_theta({}, kOfForce)};
@@ -73,7 +72,7 @@ bool is_mean_of(const Candidate& force, const Beside& beside, const Missing& rat
   const std::vector<Refined> refined = refine(beside.passes(), grams, both);
   if (refined.size() != both.size()) return false;
   const Interval& left = refined[0].linear_intervals[0];
-  const double most = kMost * std::abs(ratio.parameters.at("ratio"));
+  const double most = kMost * std::abs(ratio.parameters.at(ratio.coefficients[0]));
   return left.lower > -most && left.upper < most;
 }
 
@@ -82,7 +81,7 @@ bool is_mean_of(const Candidate& force, const Beside& beside, const Missing& rat
 bool is_mean_of_a_force(const Passes& passes, const std::vector<Missing>& ranking,
                         const std::vector<Formula>& formulas) {
   const auto ratio = std::find_if(ranking.begin(), ranking.end(),
-                                  [](const Missing& missing) { return missing.effect == kNameOfRatio; });
+                                  [](const Missing& missing) { return is_plain_scale(missing.effect); });
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
   if (ratio == ranking.end() || !may_be_part(*ratio, model.weight_N()) || formulas.empty()) return false;
   const Beside beside(passes, ranking);

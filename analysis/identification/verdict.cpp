@@ -11,8 +11,7 @@ namespace {
 std::string not_judged(const Diagnosis& diagnosis) {
   if (!diagnosis.too_poor.empty()) return diagnosis.too_poor;
   if (diagnosis.remainder.ratio > 0) return "";
-  return "the remainder has no spectrum: no stretch of 64 records without a cut, or fewer than 24 records "
-         "per second";
+  return "the remainder has no spectrum: no stretch of 256 records without a cut";
 }
 
 }  // namespace

@@ -54,7 +54,7 @@ double commanded_thrust_N(const stability::Model& model, const Track& track, std
   double thrust_N = 0;
   if (track.thrust_source == logs::ThrustSource::kHoverMultiple) {
     for (std::size_t k = 0; k < model.num_rotors(); ++k)
-      thrust_N += model.thrust.force_N(track.motor_command[record][k], stability::kFullBattery_V);
+      thrust_N += model.thrust.force_N(track.motor_command[record][k], model.full_battery_V());
     return thrust_N;
   }
   for (const double duty : track.duty[record])
@@ -191,9 +191,14 @@ void apply_model(const stability::Model& model, const Kinds& kinds, const CutRul
     pass_published_lag(track);
     return;
   }
-  for (const char* stage : {"delay", "motor_lag"}) {
+  // Delays before lags: the registry has them the other way round.
+  std::vector<std::string> stages = stability::effect_names();
+  stages.erase(std::remove_if(stages.begin(), stages.end(),
+                              [](const std::string& name) { return !is_thrust_stage(name); }),
+               stages.end());
+  for (auto stage = stages.rbegin(); stage != stages.rend(); ++stage) {
     for (const stability::EffectSpec& spec : model.effects) {
-      if (spec.name == stage) pass_stage(stability::AppliedEffect(spec, context_of(model, kinds)), track);
+      if (spec.name == *stage) pass_stage(stability::AppliedEffect(spec, context_of(model, kinds)), track);
     }
   }
 }

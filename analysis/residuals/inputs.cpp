@@ -31,17 +31,6 @@ void set_published_mass(stability::Model& model) {
   if (const auto* published = published_vehicle(model.kind)) model.mass_kg = published->mass_kg;
 }
 
-void set_network(stability::Model& model, const std::string& network) {
-  auto& effects = model.effects;
-  effects.erase(std::remove_if(effects.begin(), effects.end(),
-                               [](const stability::EffectSpec& e) { return e.name == "deep_set"; }),
-                effects.end());
-  stability::EffectSpec spec;
-  spec.name = "deep_set";
-  spec.network = std::filesystem::absolute(network).string();
-  effects.push_back(std::move(spec));
-}
-
 /// Uses the fleet's models: the first one of each kind, and separate ones for vehicles that differ from it.
 void use_fleet_models(Inputs& inputs, const std::map<std::string, std::string>& flown) {
   std::map<std::string, std::string> of_kind;
@@ -146,6 +135,17 @@ void complete_models(const InputArguments& arguments, Inputs& inputs) {
 }
 
 }  // namespace
+
+void set_network(stability::Model& model, const std::string& network) {
+  auto& effects = model.effects;
+  effects.erase(std::remove_if(effects.begin(), effects.end(),
+                               [](const stability::EffectSpec& e) { return e.name == "deep_set"; }),
+                effects.end());
+  stability::EffectSpec spec;
+  spec.name = "deep_set";
+  spec.network = std::filesystem::absolute(network).string();
+  effects.push_back(std::move(spec));
+}
 
 Inputs read_inputs(const InputArguments& arguments) {
   Inputs inputs;

@@ -69,4 +69,7 @@ struct Inputs {
 /// @throws files::InputError as the readers of these files do, and if two models have the same kind.
 Inputs read_inputs(const InputArguments& arguments);
 
+/// Makes `network`, a file, the only learned force of `model`.
+void set_network(stability::Model& model, const std::string& network);
+
 }  // namespace swarmcert::residuals

@@ -18,7 +18,7 @@ constexpr double kNotPredicted = std::numeric_limits<double>::quiet_NaN();
 
 /// Returns true for effects that change the log and not the motion.
 bool is_of_sensors(const std::string& effect) {
-  return effect == "sensor_delay" || effect == "accelerometer_scale" || effect == "imu_tilt";
+  return stability::traits_of(effect).place == stability::Place::kLog;
 }
 
 /// Returns q turned by the body rate `omega_B_rad_s` for `step_s`.

@@ -133,16 +133,20 @@ Eigen::Matrix3d Spectrum::median_and_mean() const {
   Eigen::Matrix3d result = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
   if (windows_ == 0) return result;
   const double step_hz = windows_ / (period_sum_s_ * kWindow);
+  // Below 50 records per second, both bands shrink with the highest frequency of the log.
+  constexpr double kHighest_hz = 25;
+  const double share = std::min(step_hz * kWindow / 2 / kHighest_hz, 1.0);
   for (int axis = 0; axis < 3; ++axis) {
     double low = 0, count = 0;
     std::vector<double> high;
     for (int k = 1; k < kWindow / 2; ++k) {
       const double frequency_hz = k * step_hz;
-      if (frequency_hz >= 0.3 && frequency_hz <= 4) {
+      if (frequency_hz >= 0.3 && frequency_hz <= 4 * share) {
         low += power_(axis, k) / passed_[k];
         count += 1;
       }
-      if (frequency_hz >= 12 && frequency_hz <= 25) high.push_back(power_(axis, k) / passed_[k]);
+      if (frequency_hz >= 12 * share && frequency_hz <= kHighest_hz * share)
+        high.push_back(power_(axis, k) / passed_[k]);
     }
     if (count == 0 || high.empty()) continue;
     result(axis, 0) = low / count;

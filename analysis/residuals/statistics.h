@@ -61,8 +61,8 @@ class Spectrum {
   void add(const std::vector<Eigen::Vector3d>& residual, double period_s,
            const std::function<double(double)>& passes = {});
   void add(const Spectrum& other);
-  /// Returns the mean power in 0.3 .. 4 Hz divided by the median power in 12 .. 25 Hz: about 1 if only white noise is
-  /// left. NaN if no piece was long enough.
+  /// Returns the mean power in 0.3 .. 4 Hz divided by the median power in 12 .. 25 Hz, of which slower logs have only
+  /// a lower part: about 1 if only white noise is left. NaN if no piece was long enough.
   Eigen::Vector3d low_band_to_floor() const;
   /// Returns the root of the power of the white noise floor over all frequencies, N rms: what no model can explain.
   Eigen::Vector3d noise_floor_N() const;

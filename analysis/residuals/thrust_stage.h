@@ -3,9 +3,13 @@
 
 #include <string>
 
+#include "stability/effects/registry.h"
+
 namespace swarmcert::residuals {
 
-/// Returns true for such an effect. The other effects of a model, including `thrust_ratio`, see the thrust after it.
-inline bool is_thrust_stage(const std::string& effect) { return effect == "delay" || effect == "motor_lag"; }
+/// Returns true for such an effect. The other effects of a model, including a scale of it, see the thrust after it.
+inline bool is_thrust_stage(const std::string& effect) {
+  return stability::traits_of(effect).place == stability::Place::kThrust;
+}
 
 }  // namespace swarmcert::residuals

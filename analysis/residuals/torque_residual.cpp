@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/residuals/thrust_stage.h"
 #include "analysis/residuals/torque_blocks.h"
 #include "stability/effects/registry.h"
 
@@ -68,7 +69,7 @@ std::vector<Eigen::Vector3d> modelled_torque_B_Nm(const stability::Model& model,
                                                   const Track& track) {
   std::vector<Eigen::Vector3d> torque = rotor_torques(model, kinds, track);
   for (const stability::EffectSpec& spec : model.effects) {
-    if (spec.name != "motor_lag" && spec.name != "delay" && spec.acts_on(track.vehicle))
+    if (!is_thrust_stage(spec.name) && spec.acts_on(track.vehicle))
       add_effect(spec, model, kinds, track, torque);
   }
   return torque;

@@ -17,16 +17,19 @@ class AccelerometerScaleStream : public ColumnStream {
 class AccelerometerScale : public MemoryEffect {
  public:
   AccelerometerScale()
-      : MemoryEffect({"accelerometer_scale",
-                      "r = (scale - 1) T b3, the measured specific force being scale times the true one",
-                      "scale errors of inexpensive accelerometers are 1 to 3 %, and a wrong range or unit "
-                      "gives far more",
-                      "accelerometer scale",
-                      "climbs and descents with more than 1 m/s^2, in a log with positions or velocities",
-                      {{"scale", "measured over true specific force; 1 is nominal", 1, 0.3, 3},
-                       {"nominal", "the true reading, which the factor replaces", -1, -1, -1}},
-                      {},
-                      true}) {}
+      : MemoryEffect(
+            {"accelerometer_scale",
+             "r = (scale - 1) T b3, the measured specific force being scale times the true one",
+             "scale errors of inexpensive accelerometers are 1 to 3 %, and a wrong range or unit "
+             "gives far more",
+             "accelerometer scale",
+             "climbs and descents with more than 1 m/s^2, in a log with positions or velocities",
+             {{"scale", "measured over true specific force; 1 is nominal", 1, 0.3, 3},
+              {"nominal", "the true reading, which the factor replaces", -1, -1, -1}},
+             {},
+             true},
+            {Family::kNone, Family::kNone, ShownBy::kAccelerometer, SetPoints::kNotNeeded, {}, Place::kLog}) {
+  }
   std::unique_ptr<ColumnStream> stream(const double*) const override {
     return std::make_unique<AccelerometerScaleStream>();
   }

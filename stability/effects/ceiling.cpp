@@ -10,6 +10,13 @@ namespace {
 
 enum CeilingShape { kCeilingDecay, kCeilingHeight, kCeilingTail };
 
+EffectTraits ceiling_traits() {
+  EffectTraits traits;
+  traits.variables = {"z"};
+  traits.within_flights = true;
+  return traits;
+}
+
 class Ceiling : public Effect {
  public:
   Ceiling()
@@ -20,10 +27,11 @@ class Ceiling : public Effect {
                 "ceiling",
                 "a fifth of the time within two rotor radii of the ceiling",
                 {{"amplitude", "relative thrust gained at the height h", 0, 0, 1}},
-                {{"decay_m", "b", 0.05, 0.005, 0.5, {0.03, 0.05, 0.08, 0.12, 0.2}},
+                {{"decay_m", "b", 0.05, 0.1, 11, {0.03, 0.05, 0.08, 0.12, 0.2}, Unit::kArm},
                  {"height_m", "h: height of the ceiling; for q = 0, a and h enter only as a exp(-h / b)", 2.5,
                   0, 20},
-                 {"tail", "q: 0 is exponential, 0.5 an inverse square", 0, 0, 1, {0, 0.5}}}}) {}
+                 {"tail", "q: 0 is exponential, 0.5 an inverse square", 0, 0, 1, {0, 0.5}}}},
+               ceiling_traits()) {}
   void columns(const Instant& now, const double* shape, Wrench* columns) const override {
     const double gap_m = std::max(shape[kCeilingHeight] - now.p_W_m.z(), 0.0);
     const double x = gap_m / shape[kCeilingDecay], tail = shape[kCeilingTail];

@@ -17,9 +17,10 @@ class ComOffset : public Effect {
                 "climbs and descents that change the thrust by more than 10 % of the weight; turn the "
                 "battery or the "
                 "load by 180 degrees and fly again to distinguish it from a weak rotor",
-                {{"offset_x_m", "c_x: of the centre of mass, body x", 0, -0.1, 0.1},
-                 {"offset_y_m", "c_y", 0, -0.1, 0.1}},
-                {}}) {}
+                {{"offset_x_m", "c_x: of the centre of mass, body x", 0, -1, 1, {}, Unit::kArm},
+                 {"offset_y_m", "c_y", 0, -1, 1, {}, Unit::kArm}},
+                {}},
+               {Family::kLever, Family::kNone, ShownBy::kTorques}) {}
   void columns(const Instant& now, const double*, Wrench* columns) const override {
     columns[0] = {Eigen::Vector3d::Zero(), now.thrust_N * Eigen::Vector3d::UnitY()};
     columns[1] = {Eigen::Vector3d::Zero(), -now.thrust_N * Eigen::Vector3d::UnitX()};

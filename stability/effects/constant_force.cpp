@@ -14,10 +14,11 @@ class ConstantForce : public Effect {
              "common effect of wind times linear drag, a tilted thrust axis and a biased accelerometer",
              "wind / tilt / IMU bias",
              "yaw through more than 90 degrees (world against body), tilt changes (bias against thrust axis)",
-             {{"force_x_N", "world x", 0, -0.3, 0.3},
-              {"force_y_N", "world y", 0, -0.3, 0.3},
-              {"force_z_N", "world z", 0, -0.3, 0.3}},
-             {}}) {}
+             {{"force_x_N", "world x", 0, -1, 1, {}, Unit::kWeight},
+              {"force_y_N", "world y", 0, -1, 1, {}, Unit::kWeight},
+              {"force_z_N", "world z", 0, -1, 1, {}, Unit::kWeight}},
+             {}},
+            {Family::kPush}) {}
   void columns(const Instant&, const double*, Wrench* columns) const override {
     for (int axis = 0; axis < 3; ++axis)
       columns[axis] = {Eigen::Vector3d::Unit(axis), Eigen::Vector3d::Zero()};

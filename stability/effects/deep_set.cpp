@@ -30,7 +30,8 @@ EffectInfo DeepSetEffect::describe() {
           {{"gain", "1 is the network itself", 1, 0, 1.5}},
           {},
           false,
-          true};
+          true,
+          {Family::kNone, Family::kNone, ShownBy::kNothing}};
 }
 
 DeepSetEffect::DeepSetEffect(const EffectSpec& spec, const EffectContext& context)

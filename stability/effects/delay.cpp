@@ -38,7 +38,13 @@ class Delay : public MemoryEffect {
              {{"gain", "1 is a pure delay; a fit far from 1 indicates another cause", 1, 0, 1.3}},
              // A delay of less than one record cannot be separated from the time at which the log reads the command.
              {{"delay_s", "d", 0.01, 0, 0.5, {0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06}}},
-             true}) {}
+             true},
+            {Family::kLate,
+             Family::kNone,
+             ShownBy::kForce,
+             SetPoints::kBesideRemainder,
+             {},
+             Place::kThrust}) {}
   std::unique_ptr<ColumnStream> stream(const double* shape) const override {
     return std::make_unique<DelayStream>(shape[0]);
   }

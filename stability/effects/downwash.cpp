@@ -64,8 +64,13 @@ EffectInfo Downwash::describe() {
           "least squares on 103 230 samples of two published Crazyflies; composition from flights of three",
           "downwash",
           "pass and stay below another vehicle, 0.2 .. 0.6 m, and fly alone in the same flights",
-          {{"amplitude_N", "force 0.3 m straight below a vehicle of 0.034 kg", 10.03299049 * kGramForce_N, 0,
-            0.6}},
+          {{"amplitude_N",
+            "force 0.3 m straight below a vehicle of 0.034 kg",
+            10.03299049 * kGramForce_N,
+            0,
+            2,
+            {},
+            Unit::kWeight}},
           {{"decay_exponent", "n", 0.44084819, 0, 4, {0.44084819, 1}},
            {"spread_m", "s0", 0.0259477, 0.005, 0.3, {0.0259477, 0.06}},
            {"spread_slope", "s1", 0.08181592, 0, 1, {0.028, 0.08181592}},
@@ -74,7 +79,8 @@ EffectInfo Downwash::describe() {
            {"mass_exponent", "e: 0.5 is momentum theory at equal rotor area", 0.5, 0, 2},
            {"tail", "q: 0 is a Gaussian profile, 1 a Lorentzian one", 0, 0, 1, {0, 1}}},
           false,
-          true};
+          true,
+          {Family::kWake}};
 }
 
 void Downwash::columns(const Instant& now, const double* shape, Wrench* columns) const {

@@ -13,8 +13,10 @@ class DragLinear : public Effect {
                 "Stokes form; published Crazyflie flights give 0.012 .. 0.014 N s/m horizontally",
                 "drag_linear",
                 "horizontal speeds over a range of 3 to 1",
-                {{"drag_N_s_m", "force per speed", 0, 0, 0.3}},
-                {}}) {}
+                {{"drag_N_s_m", "force per speed", 0, 0, 0.1, {}, Unit::kDrag}},
+                {}},
+               {Family::kDrag, Family::kNone, ShownBy::kForce, SetPoints::kNotNeeded, velocity_variables(),
+                Place::kVehicle, 1}) {}
   void columns(const Instant& now, const double*, Wrench* columns) const override {
     columns[0] = {-now.v_W_m_s, Eigen::Vector3d::Zero()};
   }

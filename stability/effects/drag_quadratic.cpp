@@ -13,8 +13,10 @@ class DragQuadratic : public Effect {
                 "dynamic pressure; c = density x drag area / 2",
                 "drag_quadratic",
                 "horizontal speeds over a range of 3 to 1, the larger the better",
-                {{"drag_N_s2_m2", "force per squared speed", 0, 0, 0.3}},
-                {}}) {}
+                {{"drag_N_s2_m2", "force per squared speed", 0, 0, 0.01, {}, Unit::kSquaredDrag}},
+                {}},
+               {Family::kDrag, Family::kDrag, ShownBy::kForce, SetPoints::kNotNeeded, velocity_variables(),
+                Place::kVehicle, 2}) {}
   void columns(const Instant& now, const double*, Wrench* columns) const override {
     columns[0] = {-now.v_W_m_s.norm() * now.v_W_m_s, Eigen::Vector3d::Zero()};
   }

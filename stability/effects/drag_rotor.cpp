@@ -13,8 +13,16 @@ class DragRotor : public Effect {
                 "induced drag of rotors: Mahony, Kumar and Corke 2012; Faessler, Franchi and Scaramuzza 2018",
                 "drag_rotor",
                 "horizontal speeds over a range of 3 to 1 while thrust changes; tilt of more than 10 degrees",
-                {{"drag_N_s_m", "force per speed in the rotor plane, at hover thrust", 0, 0, 0.3}},
-                {}}) {}
+                {{"drag_N_s_m",
+                  "force per speed in the rotor plane, at hover thrust",
+                  0,
+                  0,
+                  0.1,
+                  {},
+                  Unit::kDrag}},
+                {}},
+               {Family::kDrag, Family::kDrag, ShownBy::kForce, SetPoints::kNotNeeded, velocity_variables()}) {
+  }
   void columns(const Instant& now, const double*, Wrench* columns) const override {
     const Eigen::Vector3d b3 = now.b3_W();
     const Eigen::Vector3d in_plane = now.v_W_m_s - b3 * b3.dot(now.v_W_m_s);

@@ -1,5 +1,6 @@
 #include "stability/effects/effect.h"
 
+#include "stability/effects/hint.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::stability {
@@ -52,6 +53,8 @@ std::vector<std::vector<double>> Effect::grid(const FlightRange&) const {
   }
   return thetas;
 }
+
+bool Effect::start_at(const Hint& hint, Start&) const { return hint.is_vertical(); }
 
 void Effect::add_to(SignalPath&, const double*, const double*) const {}
 

@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "stability/effects/traits.h"
 #include "stability/model.h"
 
 namespace swarmcert::stability {
@@ -63,6 +64,20 @@ struct ForceRows {
   int stride;
 };
 
+/// What the bounds of a parameter are multiples of: properties of the vehicle, so that they suit one of 30 g as well as
+/// one of 3 kg. A body length is twice the arm.
+enum class Unit {
+  kOwn,           ///< the unit in the parameter's name
+  kWeight,        ///< N
+  kMass,          ///< kg
+  kArm,           ///< m
+  kWeightArm,     ///< N m
+  kWeightPerArm,  ///< N/m
+  kDrag,          ///< the weight at one body length per second
+  kSquaredDrag,   ///< likewise, against the squared velocity
+  kPerBattery     ///< 1/V, of the largest voltage
+};
+
 /// A coefficient or a shape parameter.
 struct Parameter {
   std::string name;  ///< with its unit, as in model.toml: "drag_N_s_m"
@@ -70,6 +85,7 @@ struct Parameter {
   double value;                   ///< default in simulation
   double lower, upper;            ///< physical bounds on sign and size; infinite if free
   std::vector<double> grid = {};  ///< shape parameters: values that identification tries; empty: only `value`
+  Unit unit = Unit::kOwn;  ///< of the bounds; for kArm, values and grid are those for a Crazyflie's arm
 };
 
 /// Static description of an effect, independent of any flight.
@@ -86,6 +102,7 @@ struct EffectInfo {
   std::vector<Parameter> shape;
   bool remembers = false;         ///< has a memory: use stream(), since no column exists for a single instant
   bool needs_neighbours = false;  ///< cannot be fitted from flights of one vehicle
+  EffectTraits traits = {};
 };
 
 inline constexpr int kMostColumns = 8;
@@ -102,6 +119,7 @@ struct EffectContext {
 struct FlightRange {
   double z_min_m = 0;
   double z_max_m = 1;
+  double full_battery_V = kFullBattery_V;  ///< of the pack
 };
 
 /// The columns of one effect with one theta, along one vehicle's time series.
@@ -119,13 +137,16 @@ class ColumnStream {
   virtual void advance_along(const Instant* instants, int count, int width, Wrench* columns);
 };
 
+struct Hint;
 struct SignalPath;
+struct Start;
 class SwarmPairs;
 
 /// One effect. Instances may keep scratch memory: use one instance per thread.
 class Effect {
  public:
   explicit Effect(EffectInfo info) : info_(std::move(info)) {}
+  Effect(EffectInfo info, EffectTraits traits) : info_(std::move(info)) { info_.traits = std::move(traits); }
   virtual ~Effect() = default;
   Effect(const Effect&) = delete;
   Effect& operator=(const Effect&) = delete;
@@ -166,6 +187,11 @@ class Effect {
 
   /// Returns the thetas that identification tries: by default all combinations of the parameters' grids.
   virtual std::vector<std::vector<double>> grid(const FlightRange& range) const;
+
+  /// Sets where the effect starts if a scan has found `hint`, a formula over one of its variables; by default on its
+  /// grid, for vertical forces.
+  /// @return false if the formula does not suggest the effect.
+  virtual bool start_at(const Hint& hint, Start& start) const;
 
   /// Enters an effect with a memory, with its coefficients and theta, into the simulated signal path.
   virtual void add_to(SignalPath& path, const double* coefficients, const double* shape) const;

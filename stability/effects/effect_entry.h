@@ -8,11 +8,6 @@
 
 namespace swarmcert::stability {
 
-struct EffectEntry {
-  EffectInfo info;
-  EffectMaker make;
-};
-
 /// Returns the entry of a class with a default constructor, or with describe() and a constructor from the model file's
 /// entry.
 template <typename T>

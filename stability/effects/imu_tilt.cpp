@@ -18,11 +18,18 @@ class ImuTilt : public Effect {
              "yaw through more than 90 degrees: a wind keeps its direction, a tilt turns with the vehicle",
              {{"tilt_x_rad", "tilt of the rotors relative to the inertial unit, about body x", 0, -0.3, 0.3},
               {"tilt_y_rad", "about body y", 0, -0.3, 0.3}},
-             {}}) {}
+             {}},
+            {Family::kNone,
+             Family::kNone,
+             ShownBy::kCurve,
+             SetPoints::kNotNeeded,
+             {"body_constant"},
+             Place::kLog}) {}
   void columns(const Instant& now, const double*, Wrench* columns) const override {
     columns[0] = {-now.thrust_N * now.R_WB.col(1), Eigen::Vector3d::Zero()};
     columns[1] = {now.thrust_N * now.R_WB.col(0), Eigen::Vector3d::Zero()};
   }
+  bool start_at(const Hint&, Start&) const override { return true; }
 };
 
 }  // namespace

@@ -61,7 +61,13 @@ class MotorLag : public MemoryEffect {
                         0.001,
                         1,
                         {0.015, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.1}}},
-                      true}) {}
+                      true},
+                     {Family::kLate,
+                      Family::kNone,
+                      ShownBy::kForce,
+                      SetPoints::kBesideRemainder,
+                      {},
+                      Place::kThrust}) {}
   std::unique_ptr<ColumnStream> stream(const double* shape) const override {
     return std::make_unique<MotorLagStream>(shape[0]);
   }

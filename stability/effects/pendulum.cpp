@@ -98,9 +98,12 @@ EffectInfo Pendulum::describe() {
           "Newton's law of a mass point on a taut string",
           "pendulum",
           "sideways steps and turns at the period of the load, 2 pi sqrt(l / g), and slower",
-          {{"mass_kg", "m_l: of the load", 0, 0, 5}},
+          {{"mass_kg", "m_l: of the load", 0, 0, 5, {}, Unit::kMass}},
           {{"length_m", "l: from the vehicle's centre of mass to the load's", 0.5, 0.02, 20},
-           {"damping_1_s", "d: the swing decays as exp(-d t / 2)", 0.2, 0.01, 10}}};
+           {"damping_1_s", "d: the swing decays as exp(-d t / 2)", 0.2, 0.01, 10}},
+          false,
+          false,
+          {Family::kNone, Family::kThrustScale, ShownBy::kSwing}};
 }
 
 void Pendulum::columns(const Instant&, const double*, Wrench* columns) const {

@@ -50,11 +50,23 @@ std::deque<EffectEntry>& entries() {
   return all;
 }
 
+std::deque<EffectEntry>::iterator place_of(const std::string& name) {
+  return std::find_if(entries().begin(), entries().end(),
+                      [&](const EffectEntry& entry) { return entry.info.name == name; });
+}
+
 const EffectEntry& find(const std::string& name) {
+  const auto place = place_of(name);
+  if (place == entries().end()) throw std::invalid_argument("there is no effect named " + name);
+  return *place;
+}
+
+template <typename Is>
+std::string first_with(const Is& is) {
   for (const EffectEntry& entry : entries()) {
-    if (entry.info.name == name) return entry;
+    if (is(entry.info.traits)) return entry.info.name;
   }
-  throw std::invalid_argument("there is no effect named " + name);
+  throw std::invalid_argument("the library lacks an effect that identification needs");
 }
 
 }  // namespace
@@ -76,25 +88,68 @@ void register_effect(EffectInfo info, EffectMaker make) {
   entries().push_back({std::move(info), std::move(make)});
 }
 
+EffectEntry withdraw_effect(const std::string& name) {
+  EffectEntry entry = find(name);
+  entries().erase(place_of(name));
+  return entry;
+}
+
 const EffectInfo& effect_info(const std::string& name) { return find(name).info; }
+
+const EffectTraits& traits_of(const std::string& name) {
+  static const EffectTraits ordinary;
+  const auto place = place_of(name);
+  return place == entries().end() ? ordinary : place->info.traits;
+}
+
+std::string plain_effect(Family family) {
+  return first_with([&](const EffectTraits& traits) { return traits.is_plain(family); });
+}
+
+std::string effect_shown_by(ShownBy data) {
+  return first_with([&](const EffectTraits& traits) { return traits.shown_by == data; });
+}
 
 std::unique_ptr<Effect> make_effect(const EffectSpec& spec, const EffectContext& context) {
   if (spec.is_expression()) return std::make_unique<ExpressionEffect>(spec, context.path);
   return find(spec.name).make(spec, context);
 }
 
-void scale_bounds(double mass_kg, EffectInfo& info) {
-  constexpr double kStatedFor_kg = 0.067;  // the larger one of the published vehicles
-  const double factor = std::max(1.0, mass_kg / kStatedFor_kg);
-  for (Parameter& coefficient : info.linear) {
-    // "force_x_N", "drag_N_s_m", "stiffness_N_m", "torque_x_Nm"
-    const std::size_t unit = coefficient.name.find("_N");
-    if (unit == std::string::npos) continue;
-    const std::string rest = coefficient.name.substr(unit + 2);
-    if (!rest.empty() && rest[0] != '_' && rest != "m") continue;
-    coefficient.lower *= factor;
-    coefficient.upper *= factor;
+double size_of(Unit unit, const Model& model) {
+  const double body_m = 2 * model.arm_m;
+  switch (unit) {
+    case Unit::kOwn:
+      return 1;
+    case Unit::kWeight:
+      return model.weight_N();
+    case Unit::kMass:
+      return model.mass_kg;
+    case Unit::kArm:
+      return model.arm_m;
+    case Unit::kWeightArm:
+      return model.weight_N() * model.arm_m;
+    case Unit::kWeightPerArm:
+      return model.weight_N() / model.arm_m;
+    case Unit::kDrag:
+      return model.weight_N() / body_m;
+    case Unit::kSquaredDrag:
+      return model.weight_N() / (body_m * body_m);
+    case Unit::kPerBattery:
+      return 1 / model.battery_range_V.upper;
   }
+  return 1;
+}
+
+EffectInfo effect_info(const std::string& name, const Model& model) {
+  EffectInfo info = find(name).info;
+  for (std::vector<Parameter>* parameters : {&info.linear, &info.shape}) {
+    for (Parameter& parameter : *parameters) {
+      const double size = size_of(parameter.unit, model);
+      parameter.lower *= size;
+      parameter.upper *= size;
+    }
+  }
+  return info;
 }
 
 EffectValues effect_values(const EffectInfo& info, const EffectSpec& spec) {

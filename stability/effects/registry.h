@@ -16,23 +16,42 @@ std::vector<std::string> effect_names();
 /// Makes an effect for one vehicle's model.
 using EffectMaker = std::function<std::unique_ptr<Effect>(const EffectSpec&, const EffectContext&)>;
 
+struct EffectEntry {
+  EffectInfo info;
+  EffectMaker make;
+};
+
 /// Registers a user-defined effect: model files may name it, the simulator applies it, and identification tries it like
 /// the built-in ones. Call this before models are read, from one thread.
 /// @throws std::invalid_argument if the name is empty or taken, or if the effect has no coefficient or too many.
 void register_effect(EffectInfo info, EffectMaker make);
 
+/// Removes an effect from the registry and returns it, so that tests can look for what the library lacks, or register
+/// the effect under another name. Call this when no model or reference from effect_info() is in use.
+/// @throws std::invalid_argument if no effect has that name.
+EffectEntry withdraw_effect(const std::string& name);
+
 /// Returns the description of a registered effect.
 /// @throws std::invalid_argument if no effect has that name.
 const EffectInfo& effect_info(const std::string& name);
+
+/// Returns the traits of a registered effect, and those of an ordinary force for any other name, such as a formula's.
+const EffectTraits& traits_of(const std::string& name);
+
+/// Returns the name of the first effect that is the plain form of `family`, or that `data` show.
+/// @throws std::invalid_argument if there is none.
+std::string plain_effect(Family family);
+std::string effect_shown_by(ShownBy data);
 
 /// Makes the effect that `spec` names or, if it has formulas, defines.
 /// @throws files::InputError if a network or a formula cannot be read; std::invalid_argument for an unknown name.
 std::unique_ptr<Effect> make_effect(const EffectSpec& spec, const EffectContext& context);
 
-/// Scales the bounds of the forces and torques among the coefficients of `info`, an effect of the registry, to a
-/// vehicle of this mass. The registry states them for vehicles of up to 67 g; above that they grow in proportion to the
-/// mass, so that the drag of a vehicle of a kilogram, or the force of wind on it, is not cut off.
-void scale_bounds(double mass_kg, EffectInfo& info);
+/// Returns the size of a unit for a vehicle. Precondition: its mass and arm are positive.
+double size_of(Unit unit, const Model& model);
+
+/// Returns the description of a registered effect with bounds for this vehicle.
+EffectInfo effect_info(const std::string& name, const Model& model);
 
 /// Coefficients and theta of `spec` in the order of the effect's info: the parameters that `spec` names, and the
 /// effect's defaults for the others.

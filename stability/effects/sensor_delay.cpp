@@ -34,7 +34,13 @@ class SensorDelay : public MemoryEffect {
              "tilt of more than 5 degrees at more than 1 Hz: a motor lag does not delay the thrust axis",
              {{"gain", "1 is a pure delay; a fit far from 1 indicates another cause", 1, 0, 1.3}},
              {{"delay_s", "d", 0.0075, 0, 0.5, {0.01, 0.015, 0.02, 0.03, 0.04}}},
-             true}) {}
+             true},
+            {Family::kLate,
+             Family::kNone,
+             ShownBy::kForce,
+             SetPoints::kBesideRemainder,
+             {"rate_x", "rate_y"},
+             Place::kLog}) {}
   std::unique_ptr<ColumnStream> stream(const double* shape) const override {
     return std::make_unique<SensorDelayStream>(shape[0]);
   }

@@ -13,8 +13,9 @@ class ThrustRatio : public Effect {
                 "m a = s T: kinematics reveal only s / m",
                 "mass / payload / thrust scale",
                 "thrust changes of more than 15 %; weigh the vehicle to separate mass from thrust",
-                {{"ratio", "relative excess of thrust over mass", 0, -0.7, 0.7}},
-                {}}) {}
+                {{"ratio", "relative excess of thrust over mass", 0, -0.9, 4}},
+                {}},
+               {Family::kThrustScale, Family::kNone, ShownBy::kForce, SetPoints::kBesideRemainder}) {}
   void columns(const Instant& now, const double*, Wrench* columns) const override {
     columns[0] = {now.thrust_N * now.b3_W(), Eigen::Vector3d::Zero()};
   }

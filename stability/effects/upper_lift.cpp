@@ -30,7 +30,7 @@ class UpperLift : public Effect {
              "maps of published flights: +0.15 gf (small) and +1.9 gf (large) at 0.3 .. 0.6 m above another",
              "upper_lift",
              "stay 0.2 .. 0.6 m above another vehicle, and pass over it",
-             {{"amplitude_N", "lift 0.3 m straight above a neighbour", 0, 0, 0.1}},
+             {{"amplitude_N", "lift 0.3 m straight above a neighbour", 0, 0, 0.3, {}, Unit::kWeight}},
              {{"spread_m", "s", 0.1, 0.02, 0.5, {0.06, 0.1, 0.15}}, {"decay_exponent", "n", 0.5, 0, 3}},
              false,
              true}) {}

@@ -21,7 +21,8 @@ class VoltageSag : public Effect {
              "or "
              "not at all",
              {{"sag", "fraction of the thrust lost per multiple of the hovering power", 0, 0, 0.5}},
-             {}}) {}
+             {}},
+            {Family::kNone, Family::kNone, ShownBy::kCurve, SetPoints::kAlways, thrust_variables()}) {}
   void columns(const Instant& now, const double*, Wrench* columns) const override {
     const double load = std::max(now.thrust_N, 0.0) / (now.mass_kg * kGravity_m_s2);
     columns[0] = {-now.thrust_N * (load * std::sqrt(load) - 1) * now.b3_W(), Eigen::Vector3d::Zero()};

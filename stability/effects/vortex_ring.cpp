@@ -3,6 +3,7 @@
 
 #include "stability/effects/effect.h"
 #include "stability/effects/effect_entry.h"
+#include "stability/effects/hint.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -30,13 +31,20 @@ class VortexRing : public Effect {
                0.05,
                20,
                {0.3, 0.5, 0.8, 1.2, 2, 4}},
-              {"width_m_s", "w", 0.3, 0.02, 10, {0.1, 0.2, 0.5, 1}}}}) {}
+              {"width_m_s", "w", 0.3, 0.02, 10, {0.1, 0.2, 0.5, 1}}}},
+            {Family::kNone, Family::kNone, ShownBy::kCurve, SetPoints::kNotNeeded, {"vz", "climb"}}) {}
   void columns(const Instant& now, const double* shape, Wrench* columns) const override {
     const double x = descent_offset(now, shape);
     columns[0] = {-now.thrust_N * std::exp(-x * x / 2) * now.b3_W(), Eigen::Vector3d::Zero()};
   }
   bool in_support(const Instant& now, const double* shape) const override {
     return std::abs(descent_offset(now, shape)) < 2;
+  }
+  bool start_at(const Hint& hint, Start& start) const override {
+    if (!hint.is_vertical()) return false;
+    const auto at_m_s = hint.number_of("centre"), width_m_s = hint.first_of({"width", "core"});
+    if (at_m_s && width_m_s && *at_m_s < 0) start.thetas.push_back({-*at_m_s, *width_m_s});
+    return true;
   }
 };
 

@@ -58,7 +58,13 @@ class WakeDelay : public Effect {
                 "a wake sinks at 2 to 7 m/s: what arrives now left the rotors 0.05 to 0.3 s ago",
                 "wake_delay",
                 "pass below a vehicle that crosses at 0.5 m/s or more, in all directions",
-                {{"amplitude_N", "force 0.3 m straight below a vehicle of 0.034 kg", 0.09, 0, 0.6}},
+                {{"amplitude_N",
+                  "force 0.3 m straight below a vehicle of 0.034 kg",
+                  0.09,
+                  0,
+                  2,
+                  {},
+                  Unit::kWeight}},
                 {{"delay_s", "d", 0, 0, 0.5, {0.1, 0.2, 0.3, 0.4}},
                  {"decay_exponent", "as of downwash", 0.44084819, 0, 4, {0, 0.44084819}},
                  {"spread_m", "as of downwash", 0.0259477, 0.005, 0.3, {0.0259477, 0.06}},
@@ -67,7 +73,8 @@ class WakeDelay : public Effect {
                  {"wind_x_m_s", "w: wind that carries the wake", 0, -5, 5, {0, 1.6}},
                  {"wind_y_m_s", "", 0, -5, 5, {0, 1.6}}},
                 false,
-                true}) {}
+                true},
+               {Family::kWake, Family::kWake}) {}
   void columns(const Instant& now, const double* shape, Wrench* columns) const override {
     columns_along(&now, 1, shape, columns);
   }

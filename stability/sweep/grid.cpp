@@ -136,7 +136,7 @@ std::string parameter_problem(const Grid& grid, const std::string& name, double 
   if (name == "battery_V") return battery_problem(grid.model, value);
   if (name == "rate_hz" && (value < kLeast_hz || value > kLargest_hz))
     return fmt::format("{:g} Hz is not a plausible rate; the value is in hertz: write 100 for 100 Hz", value);
-  const double lifted_kg = grid.model.largest_thrust_N(kFullBattery_V) / kGravity_m_s2;
+  const double lifted_kg = grid.model.largest_thrust_N(grid.model.full_battery_V()) / kGravity_m_s2;
   if (name == "mass_kg" && value > 100 * lifted_kg)
     return fmt::format("{:g} kg, but the rotors lift only {:.3g} kg; the value is in kg: {:g} g is {:g}",
                        value, lifted_kg, value, value / 1000);

@@ -163,7 +163,7 @@ TEST(LoneRotor, IsSureOfOneRandomDirectionInAHundred) {
 TEST(LoneRotor, OfTheModelIsNotFoundAgain) {
   stability::Model model = small();
   stability::EffectSpec spec;
-  spec.name = kRotorThrust;
+  spec.name = rotor_effect();
   spec.parameters = {{"rotor_2", 0.8}};
   model.effects.push_back(spec);
   EXPECT_EQ(lone_rotor({loads_with({1, 0.8, 1, 1}, model.weight_N())}, model).rotor, 0);

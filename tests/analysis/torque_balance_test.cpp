@@ -72,5 +72,15 @@ TEST(TorqueBalance, AnOffsetOfFourMillimetresIsACentreOfMass) {
   EXPECT_NEAR(balance.offset_m.x(), 0.004, 1e-4);
 }
 
+TEST(TorqueBalance, AnOffsetBeyondTheRotorsIsNeitherNamedNorPrinted) {
+  const double torque_Nm = 1.2 * crazyflie().arm_m * crazyflie().weight_N();
+  const TorqueBalance balance =
+      balance_of([&](double thrust) { return Eigen::Vector2d(0, torque_Nm * thrust); });
+  EXPECT_EQ(balance.effect, "");
+  EXPECT_GT(balance.offset_m.norm(), crazyflie().arm_m);
+  EXPECT_FALSE(balance.has_offset());
+  EXPECT_EQ(in_words(balance).find(" mm"), std::string::npos) << in_words(balance);
+}
+
 }  // namespace
 }  // namespace swarmcert::identification

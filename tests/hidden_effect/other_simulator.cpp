@@ -21,8 +21,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kG_m_s2 = 9.81;
 constexpr double kNominalMass_kg = 0.034;
 constexpr double kStep_s = 1e-3;
-constexpr int kLogEvery = 10, kControlEvery = 4;
-constexpr double kFloor_m = 0.055;
+constexpr int kControlEvery = 4;
+constexpr double kFloor_m = 0.055, kFullCell_V = 4.2;
 
 /// Load-cell map of the small vehicle, gram-force per rotor; see stability/models/crazyflie-small.toml.
 double rotor_gf(double p, double v) {
@@ -202,7 +202,7 @@ Vector3d hidden_force(const Truth& truth, const std::vector<Vehicle>& all, std::
 
 /// Position control based on an estimator with slowly varying errors: sets the command and returns the desired thrust
 /// axis.
-Vector3d control(Vehicle& vehicle, const Target& target, Noise& noise) {
+Vector3d control(const Craft& craft, Vehicle& vehicle, const Target& target, Noise& noise) {
   const double decay = std::exp(-kControlEvery * kStep_s / 0.02), fresh = std::sqrt(1 - decay * decay);
   for (int axis = 0; axis < 3; ++axis) {
     vehicle.position_error[axis] = decay * vehicle.position_error[axis] + fresh * 2e-4 * noise.bell();
@@ -212,10 +212,11 @@ Vector3d control(Vehicle& vehicle, const Target& target, Noise& noise) {
   const Vector3d ev = target.v - vehicle.v - vehicle.velocity_error;
   vehicle.integral = (vehicle.integral + kControlEvery * kStep_s * ep).cwiseMax(-0.3).cwiseMin(0.3);
   const Vector3d wanted =
-      kNominalMass_kg * (target.a + Vector3d(0, 0, kG_m_s2) + 16 * ep + 6 * ev + 5 * vehicle.integral);
+      craft.mass_kg * (target.a + Vector3d(0, 0, kG_m_s2) + 16 * ep + 6 * ev + 5 * vehicle.integral);
   const Vector3d b3 = vehicle.q * Vector3d::UnitZ();
-  vehicle.duty =
-      duty_for(std::clamp(wanted.dot(b3), 0.1, 0.55) / 4 * 1000 / kG_m_s2, vehicle.battery_V / 4.2);
+  const double size = craft.mass_kg / kNominalMass_kg;
+  vehicle.duty = duty_for(std::clamp(wanted.dot(b3) / size, 0.1, 0.55) / 4 * 1000 / kG_m_s2,
+                          vehicle.battery_V / (kFullCell_V * craft.cells));
   return wanted.normalized();
 }
 
@@ -246,6 +247,21 @@ stability::LogRecord record(const Vehicle& vehicle, const Target& target, double
 
 }  // namespace
 
+std::string model_of(const Craft& craft) {
+  const double size = craft.mass_kg / kNominalMass_kg, length = std::cbrt(size);
+  const auto each = [&](double gf, int cells) { return gf * size / cells; };
+  return fmt::format(
+      "schema = \"swarmcert/model/1\"\n\n[vehicle]\nkind = \"small\"\nmass_kg = {}\n"
+      "inertia_kg_m2 = [{}, {}, {}]\narm_m = {}\ntorque_per_thrust_m = {}\n"
+      "battery_range_V = [{}, {}]\n\n"
+      "[vehicle.thrust]\nc00 = {}\nc10 = {}\nc01 = {}\nc20 = {}\nc11 = {}\n",
+      craft.mass_kg, 1.6572e-05 * size * length * length, 1.6656e-05 * size * length * length,
+      2.9262e-05 * size * length * length, 0.046 * length, 0.00596 * length, 2.5 * craft.cells,
+      4.5 * craft.cells, each(11.093358483549203, 1), each(-39.08104165843915, 1),
+      each(-9.525647087583181, craft.cells), each(20.573302305476638, 1),
+      each(38.42885066644033, craft.cells));
+}
+
 void fly(const Truth& truth, const FlightPlan& plan, const std::string& folder, int run) {
   Noise noise(plan.seed * 7919 + 17);
   const std::vector<Path> paths = paths_of(plan, noise);
@@ -260,10 +276,13 @@ void fly(const Truth& truth, const FlightPlan& plan, const std::string& folder, 
     const Target start = target_of(i, 0);
     vehicles[i].p = start.p;
     vehicles[i].v = start.v;
-    vehicles[i].command_N = vehicles[i].stage_N = vehicles[i].thrust_N = kNominalMass_kg * kG_m_s2;
+    vehicles[i].command_N = vehicles[i].stage_N = vehicles[i].thrust_N = plan.craft.mass_kg * kG_m_s2;
+    vehicles[i].battery_V *= plan.craft.cells;
     vehicles[i].clock_s = noise.uniform(0, 0.02);
   }
-  const double mass_kg = kNominalMass_kg * truth.mass_factor;
+  const double mass_kg = plan.craft.mass_kg * truth.mass_factor, cells = plan.craft.cells;
+  const double size = plan.craft.mass_kg / kNominalMass_kg;
+  const int log_every = static_cast<int>(std::lround(1 / (kStep_s * plan.log_hz)));
   const auto steps = static_cast<int>(plan.duration_s / kStep_s);
   const auto late = [](const auto& past, double delay_s) {
     const auto back = static_cast<std::size_t>(std::lround(delay_s / kStep_s));
@@ -277,14 +296,15 @@ void fly(const Truth& truth, const FlightPlan& plan, const std::string& folder, 
     for (std::size_t i = 0; i < vehicles.size(); ++i) {
       Vehicle& it = vehicles[i];
       const Target target = target_of(i, time_s);
-      if (k % kControlEvery == 0) wanted_axis[i] = control(it, target, noise);
+      if (k % kControlEvery == 0) wanted_axis[i] = control(plan.craft, it, target, noise);
       // A cell with internal resistance that is empty after a few minutes.
       it.spent_J += it.command_N * kStep_s;
-      it.battery_V = 4.15 - 0.012 * it.spent_J - 0.35 * it.command_N;
-      const double mapped_N = 4 * rotor_gf(it.duty, it.battery_V / 4.2) * kG_m_s2 / 1000;
+      it.battery_V = cells * (4.15 - (0.012 * it.spent_J + 0.35 * it.command_N) / size);
+      const double mapped_N =
+          size * 4 * rotor_gf(it.duty, it.battery_V / (kFullCell_V * cells)) * kG_m_s2 / 1000;
       it.command_N = mapped_N;
       it.commands_N.push_back(mapped_N * truth.thrust_factor *
-                              (1 + truth.battery_1_V * (it.battery_V - 4.2)));
+                              (1 + truth.battery_1_V * (it.battery_V - kFullCell_V * cells)));
       const double command_N = late(it.commands_N, truth.command_delay_s);
       const auto follow = [](double& x, double u, double tau_s) {
         x += tau_s > 0 ? (1 - std::exp(-kStep_s / tau_s)) * (u - x) : u - x;
@@ -313,7 +333,7 @@ void fly(const Truth& truth, const FlightPlan& plan, const std::string& folder, 
       it.q = (it.q * Eigen::Quaterniond(1, half.x(), half.y(), half.z())).normalized();
       it.felt.push_back(specific);
       it.accelerometer.step(it.q.conjugate() * late(it.felt, truth.sensor_delay_s) + truth.imu_bias_m_s2);
-      if (k % kLogEvery == 0 && time_s > it.clock_s + 0.01)
+      if (k % log_every == 0 && time_s > it.clock_s + 0.01)
         it.records.push_back(record(it, target, time_s, noise));
     }
   }

@@ -31,7 +31,7 @@ struct Moment {
 struct Truth {
   double mass_factor = 1;
   double thrust_factor = 1;
-  double battery_1_V = 0;   ///< relative thrust per volt above 4.2 V
+  double battery_1_V = 0;   ///< relative thrust per volt above that of a full battery
   double motor_lag_s = 0;   ///< first pole
   double motor_lag2_s = 0;  ///< second pole: with both, a second-order motor
   double command_delay_s = 0;
@@ -48,12 +48,23 @@ enum class Program {
   kHover,  ///< stays within a few millimetres of 0.5 m
 };
 
+/// A Crazyflie, or a larger vehicle with the same flight: its thrust grows with its mass.
+struct Craft {
+  double mass_kg = 0.034;
+  int cells = 1;  ///< in series
+};
+
+/// Returns the model file of the vehicle.
+std::string model_of(const Craft& craft);
+
 struct FlightPlan {
   Program program = Program::kRich;
   int vehicles = 1;
   double duration_s = 40;
   std::uint64_t seed = 0;
   double lowest_m = 0.085;  ///< of the rich program
+  Craft craft = {};
+  double log_hz = 100;  ///< a divisor of 1000
 };
 
 /// Simulates a flight and writes `folder`/cf<1 ...>_<run>.

@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "stability/effects/registry.h"
+
 namespace swarmcert {
 namespace {
 
@@ -370,6 +372,30 @@ TEST(Layout, LinesOfSourcesHaveAtMost120Columns) {
   }
   EXPECT_GT(lines[".cpp"], 50'000U);
   for (const char* ending : {".py", ".ml", ".v"}) EXPECT_GT(lines[ending], 1'000U) << ending;
+}
+
+// What identification knows of an effect are the traits that it declares.
+TEST(Layout, NoStringOfIdentificationNamesAnEffectOfTheLibrary) {
+  // A variable of the scan, a signal of the log and a column of a load cell's table have the name of an effect.
+  const std::set<std::pair<std::string, std::string>> others = {{"scan/samples.cpp", "battery"},
+                                                                {"labels/wrong_kind.cpp", "battery"},
+                                                                {"thrust/thrust_data.cpp", "battery"}};
+  const std::string root = "analysis/identification/";
+  const std::regex literal("\"([^\"]*)\"");
+  std::size_t seen = 0;
+  for (const std::string& source : files_in({root}, {".h", ".cpp"})) {
+    std::ifstream in(fs::path(SWARMCERT_SOURCE_DIR) / source);
+    for (std::string line; std::getline(in, line);) {
+      line = line.substr(0, line.find("//"));
+      for (std::sregex_iterator it(line.begin(), line.end(), literal), end; it != end; ++it, ++seen) {
+        const std::string text = (*it)[1], word = text.substr(0, text.find('.'));
+        for (const std::string& name : stability::effect_names())
+          EXPECT_TRUE(word != name || others.count({source.substr(root.size()), word}) == 1)
+              << source << " names the effect " << text;
+      }
+    }
+  }
+  EXPECT_GT(seen, 1'000U);
 }
 
 }  // namespace

@@ -10,28 +10,28 @@
 namespace swarmcert::tests {
 namespace {
 
-using stability::EffectInfo;
-
-double largest_coefficient(const std::string& effect, double mass_kg) {
-  EffectInfo info = stability::effect_info(effect);
-  stability::scale_bounds(mass_kg, info);
-  return info.linear[0].upper;
+double largest_coefficient(const std::string& effect, double mass_kg, double arm_m) {
+  stability::Model model;
+  model.mass_kg = mass_kg;
+  model.arm_m = arm_m;
+  return stability::effect_info(effect, model).linear[0].upper;
 }
 
-TEST(EffectBounds, OfForcesAndTorquesGrowWithTheWeight) {
-  // Stated for the published vehicles, of 34 g and 67 g.
-  for (const std::string& effect : stability::effect_names()) {
-    if (stability::effect_info(effect).linear.empty()) continue;
-    for (const double mass_kg : {0.034, 0.067})
-      EXPECT_EQ(largest_coefficient(effect, mass_kg), stability::effect_info(effect).linear[0].upper)
-          << effect;
-  }
-  for (const char* const effect :
-       {"drag_linear", "drag_quadratic", "drag_rotor", "constant_force", "torque_bias", "tether"})
-    EXPECT_DOUBLE_EQ(largest_coefficient(effect, 0.67), 10 * largest_coefficient(effect, 0.067)) << effect;
-  // A share of the thrust, or an offset in metres, has the same bounds for all vehicles.
-  for (const char* const effect : {"thrust_ratio", "ground", "com_offset"})
-    EXPECT_EQ(largest_coefficient(effect, 0.67), largest_coefficient(effect, 0.067)) << effect;
+TEST(EffectBounds, AreMultiplesOfWeightArmAndBodyLengthsPerSecond) {
+  const double ten = 10 * largest_coefficient("constant_force", 0.067, 0.06);
+  EXPECT_DOUBLE_EQ(largest_coefficient("constant_force", 0.67, 0.12), ten);
+  EXPECT_DOUBLE_EQ(ten, 0.67 * 9.81);
+  const auto growth = [](const std::string& effect) {
+    return largest_coefficient(effect, 0.67, 0.12) / largest_coefficient(effect, 0.067, 0.06);
+  };
+  EXPECT_DOUBLE_EQ(growth("torque_bias"), 20);
+  EXPECT_DOUBLE_EQ(growth("com_offset"), 2);
+  EXPECT_DOUBLE_EQ(growth("payload_step"), 10);
+  for (const char* const drag : {"drag_linear", "drag_rotor", "tether"})
+    EXPECT_DOUBLE_EQ(growth(drag), 5) << drag;
+  EXPECT_DOUBLE_EQ(growth("drag_quadratic"), 2.5);
+  // A share of the thrust has the same bounds for all vehicles.
+  for (const char* const share : {"thrust_ratio", "ground"}) EXPECT_EQ(growth(share), 1) << share;
 }
 
 /// Returns the error for a vehicle of `mass_kg`, with a thrust of twice its weight, and a drag of 0.35 N s/m; empty if
@@ -53,7 +53,7 @@ std::string refusal_of_drag(double mass_kg) {
 
 TEST(EffectBounds, OfAModelFileAreThoseOfItsVehicle) {
   EXPECT_EQ(refusal_of_drag(1.3), "");
-  EXPECT_NE(refusal_of_drag(0.034).find("drag_N_s_m = 0.350000: must lie in [0.000000, 0.300000]"),
+  EXPECT_NE(refusal_of_drag(0.034).find("drag_N_s_m = 0.350000: must lie in [0.000000, 0.083385]"),
             std::string::npos)
       << refusal_of_drag(0.034);
 }

@@ -71,10 +71,13 @@ TEST(Effects, HaveTheNamesOfTheCommandLine) {
   EXPECT_EQ(std::set<std::string>(names.begin(), names.end()), wanted);
 }
 
-TEST(Effects, DescribeThemselvesWithBoundsThatHoldTheirDefaults) {
+TEST(Effects, DescribeThemselvesWithBoundsThatHoldTheirDefaultsForACrazyflie) {
+  Model crazyflie;
+  crazyflie.mass_kg = 0.034;
+  crazyflie.arm_m = 0.046;
   for (const std::string& name : effect_names()) {
     SCOPED_TRACE(name);
-    const EffectInfo& info = effect_info(name);
+    const EffectInfo info = effect_info(name, crazyflie);
     EXPECT_FALSE(info.equation.empty());
     EXPECT_FALSE(info.source.empty());
     EXPECT_FALSE(info.excitation.empty());

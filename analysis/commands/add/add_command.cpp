@@ -23,6 +23,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/suggest.h"
 #include "nn/base/text.h"
+#include "stability/effects/registry.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -44,10 +45,12 @@ std::vector<std::string> split_names(const std::string& text) {
 void check(const std::vector<std::string>& names, const stability::Model& model) {
   if (names.empty()) throw UsageError("no effect is named: add EFFECT[,EFFECT], auto, undo or show");
   std::vector<std::string> known = identification::candidate_names(model);
-  known.emplace_back(identification::kRotorThrust);
+  known.emplace_back(identification::rotor_effect());
   std::vector<std::string> all = known;
-  all.insert(all.end(), {"accelerometer_scale", "auto", "com_offset", "deep_set", "downwash_torque",
-                         "formula", "shape", "show", "torque_bias", "undo"});
+  all.insert(all.end(), {"auto", "formula", "shape", "show", "undo"});
+  for (const std::string& name : stability::effect_names()) {
+    if (identification::is_written_by_hand(name)) all.push_back(name);
+  }
   for (const std::string& name : names) {
     if (identification::is_proposal(name)) continue;
     if (identification::is_balanced(name)) {

@@ -26,6 +26,7 @@ files::Json value_json(double value, double half) {
 }
 
 files::Json offset_json(const TorqueBalance& balance) {
+  if (!balance.has_offset()) return files::Json::object();
   return {{"offset_x_m", value_json(balance.offset_m.x(), balance.offset_half_m.x())},
           {"offset_y_m", value_json(balance.offset_m.y(), balance.offset_half_m.y())}};
 }
@@ -75,8 +76,9 @@ files::Json ranking_entry(const Balance& balance, const Entry& entry) {
 }
 
 files::Json ranking_entry_of(const TorqueBalance& balance) {
-  const bool is_offset = balance.effect == "com_offset";
-  const bool is_ambiguous = !balance.rivals.empty() && balance.rivals.front() == "torque_bias";
+  const bool is_offset = stability::traits_of(balance.effect).family == stability::Family::kLever;
+  const bool is_ambiguous = !balance.rivals.empty() &&
+                            stability::traits_of(balance.rivals.front()).family == stability::Family::kTorque;
   return ranking_entry(balance,
                        {balance.effect,
                         is_offset && is_ambiguous ? "centre of mass / torque bias / weak rotor"
@@ -90,21 +92,22 @@ files::Json scale_json(const AccelerometerBalance& balance) {
 
 files::Json ranking_entry_of(const AccelerometerBalance& balance) {
   const bool is_ambiguous = balance.may_be_offset();
-  const std::string effect = "accelerometer_scale";
+  const std::string effect = stability::effect_shown_by(stability::ShownBy::kAccelerometer);
   return ranking_entry(
       balance,
       {effect,
        is_ambiguous ? "accelerometer scale / IMU bias" : stability::effect_info(effect).equivalence_class,
        scale_json(balance),
-       is_ambiguous ? std::vector<std::string>{"constant_force"} : std::vector<std::string>{}});
+       is_ambiguous ? std::vector<std::string>{stability::plain_effect(stability::Family::kPush)}
+                    : std::vector<std::string>{}});
 }
 
 /// A weak rotor that is in the ranking explains an offset towards it.
 bool is_of_named_rotor(const TorqueBalance& balance, const files::Json& ranking) {
   const auto& rivals = balance.rivals;
-  if (std::find(rivals.begin(), rivals.end(), identification::kRotorThrust) == rivals.end()) return false;
+  if (std::find(rivals.begin(), rivals.end(), identification::rotor_effect()) == rivals.end()) return false;
   return std::any_of(ranking.begin(), ranking.end(), [&](const files::Json& entry) {
-    return entry["effect"] == identification::kRotorThrust && entry["kind"] == balance.kind;
+    return entry["effect"] == identification::rotor_effect() && entry["kind"] == balance.kind;
   });
 }
 
@@ -112,7 +115,7 @@ bool is_of_named_rotor(const TorqueBalance& balance, const files::Json& ranking)
 bool explain_ratio(const std::vector<AccelerometerBalance>& balances, const std::string& kind,
                    const files::Json& ranking) {
   const auto ratio = std::find_if(ranking.begin(), ranking.end(), [&](const files::Json& entry) {
-    return entry["effect"] == "thrust_ratio" && entry["kind"] == kind;
+    return identification::is_plain_scale(entry["effect"]) && entry["kind"] == kind;
   });
   if (ratio == ranking.end()) return false;
   const files::Json& value = (*ratio)["parameters"]["ratio"];
@@ -127,7 +130,7 @@ bool explain_ratio(const std::vector<AccelerometerBalance>& balances, const std:
 /// The force residual of a flight shows an accelerometer scale error as a thrust ratio.
 bool is_explained_ratio(const files::Json& entry, const AccelerometerBalance& balance) {
   constexpr double kAlike = 0.02;
-  if (entry["effect"] != "thrust_ratio" || entry["kind"] != balance.kind) return false;
+  if (!identification::is_plain_scale(entry["effect"]) || entry["kind"] != balance.kind) return false;
   const files::Json& ratio = entry["parameters"]["ratio"]["value"];
   return ratio.is_number() && std::abs(ratio.get<double>() - balance.scale.value) < kAlike;
 }

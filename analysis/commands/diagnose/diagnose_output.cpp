@@ -108,7 +108,8 @@ files::Json json_of(const Diagnosis& diagnosis) {
                       {"rmse_after", diagnosis.rmse_after_N},
                       {"too_poor", diagnosis.too_poor},
                       {"closed_loop_artefacts", diagnosis.contradicted},
-                      {"suspected", diagnosis.suspected}};
+                      {"suspected", diagnosis.suspected},
+                      {"at_bound", diagnosis.at_bound}};
   if (diagnosis.thrust_scale.is_known) {
     const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
     kind["thrust_scale"] = {{"least_squares", 1 + scale.least_squares},
@@ -152,12 +153,14 @@ void print_diagnosis(const Diagnosis& diagnosis) {
         "else\n",
         effect);
   }
-  for (const std::string& effect : diagnosis.suspected)
-    fmt::print(
-        "  Not counted: {} fits, but explains little of the remainder, another form explains more, or set "
-        "points "
-        "do not confirm it\n",
-        effect);
+  for (const std::string& effect : diagnosis.suspected) {
+    const std::vector<std::string>& at_bound = diagnosis.at_bound;
+    fmt::print("  Not counted: {} {}\n", effect,
+               std::find(at_bound.begin(), at_bound.end(), effect) != at_bound.end()
+                   ? "ends at its bound: not identified"
+                   : "fits, but explains little of the remainder, another form explains more, or set points "
+                     "do not confirm it");
+  }
   if (diagnosis.thrust_scale.is_known) {
     const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
     fmt::print("  Thrust scale: {:.3f} by least squares, {:.3f} by instrument (90 %: {:.3f} .. {:.3f})\n",

@@ -87,6 +87,7 @@ struct Shown {
 /// Merges both scans, each sorted best first. The force precedes torques and rotors if its scan explains much;
 /// otherwise entries are sorted by their share.
 std::vector<Listed> all_listed(const Diagnosis& diagnosis) {
+  if (!identification::leaves_something(diagnosis)) return {};
   const std::vector<Listed> forces = listed(diagnosis.scan, diagnosis.formulas),
                             balances = listed(diagnosis.balance, diagnosis.balance_formulas);
   const bool is_force_first = !forces.empty() && forces.front().entry->share >= identification::kMuchOfForce;

@@ -42,7 +42,7 @@ files::Json ranking_entry(const RotorBalance& balance, const std::string& kind) 
   Eigen::Vector4d left_N = balance.rise_N;
   left_N[balance.rotor - 1] = 0;
   const double before_N = balance.rise_N.norm() / 2, after_N = left_N.norm() / 2;
-  const stability::EffectInfo& info = stability::effect_info("rotor_thrust");
+  const stability::EffectInfo& info = stability::effect_info(identification::rotor_effect());
   return {{"effect", info.name},
           {"kind", kind},
           {"vehicle", balance.vehicle},

@@ -2,10 +2,13 @@
 
 #include <fmt/core.h>
 
+#include "stability/effects/registry.h"
+
 namespace swarmcert::analysis {
 
 double shown_beyond_file(const std::string& effect, const std::string& parameter) {
-  return effect == "thrust_ratio" && parameter == "ratio" ? 1 : 0;
+  return stability::traits_of(effect).is_plain(stability::Family::kThrustScale) && parameter == "ratio" ? 1
+                                                                                                        : 0;
 }
 
 std::string interval_words(const std::string& effect, const std::string& parameter,
@@ -30,7 +33,7 @@ files::Json values_json(const std::string& effect, const std::map<std::string, d
 }
 
 bool is_sensor_error(const std::string& effect) {
-  return effect == "accelerometer_scale" || effect == "imu_tilt" || effect == "sensor_delay";
+  return stability::traits_of(effect).place == stability::Place::kLog;
 }
 
 std::string sensor_words(const std::string& effect) {

@@ -7,6 +7,7 @@
 
 #include "analysis/identification/balance/force_means.h"
 #include "analysis/identification/balance/vehicle_blocks.h"
+#include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -96,7 +97,9 @@ bool explains_ratio(const AccelerometerBalance& balance, double ratio, double ha
 double modelled_accelerometer_scale(const stability::Model& model, const std::string& vehicle) {
   double scale = 1;
   for (const stability::EffectSpec& spec : model.effects) {
-    if (spec.name != kAccelerometerScale || !spec.acts_on(vehicle)) continue;
+    if (stability::traits_of(spec.name).shown_by != stability::ShownBy::kAccelerometer ||
+        !spec.acts_on(vehicle))
+      continue;
     const auto value = spec.parameters.find("scale");
     if (value != spec.parameters.end()) scale *= value->second;
   }
@@ -105,7 +108,7 @@ double modelled_accelerometer_scale(const stability::Model& model, const std::st
 
 stability::EffectSpec spec_of(const AccelerometerBalance& balance) {
   stability::EffectSpec spec;
-  spec.name = kAccelerometerScale;
+  spec.name = stability::effect_shown_by(stability::ShownBy::kAccelerometer);
   spec.vehicle = balance.vehicle;
   spec.parameters["scale"] = balance.scale.value;
   spec.fit.interval["scale"] = {balance.scale.value - balance.scale.half,

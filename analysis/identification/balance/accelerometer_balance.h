@@ -16,8 +16,6 @@ namespace swarmcert::identification {
 /// Scale errors below this are normal for commercial accelerometers and for the assumed value of gravity.
 inline constexpr double kOrdinaryScaleError = 0.03;
 
-inline constexpr char kAccelerometerScale[] = "accelerometer_scale";
-
 struct AccelerometerBalance {
   std::string kind, vehicle;
   int flights = 0;
@@ -49,7 +47,7 @@ double modelled_accelerometer_scale(const stability::Model& model, const std::st
 std::vector<AccelerometerBalance> accelerometer_balances(const residuals::Inputs& inputs,
                                                          const std::string& kind, int jobs);
 
-/// Returns the effect accelerometer_scale with the value and interval of `balance`, for its vehicle.
+/// Returns the effect with the value and interval of `balance`, for its vehicle.
 stability::EffectSpec spec_of(const AccelerometerBalance& balance);
 
 /// Describes the balance: "the accelerometer reads 1.080 times what the velocity says (90 %: 1.078 .. 1.082)".

@@ -8,6 +8,7 @@
 #include "analysis/identification/balance/accelerometer_balance.h"
 #include "analysis/identification/balance/torque_balance.h"
 #include "analysis/residuals/comparison.h"
+#include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -66,9 +67,13 @@ std::map<std::string, double> values_of_effects(const stability::Model& model) {
 
 }  // namespace
 
-bool is_of_torques(const std::string& effect) { return effect == "com_offset" || effect == "torque_bias"; }
+bool is_of_torques(const std::string& effect) {
+  return stability::traits_of(effect).shown_by == stability::ShownBy::kTorques;
+}
 
-bool is_balanced(const std::string& effect) { return is_of_torques(effect) || effect == kAccelerometerScale; }
+bool is_balanced(const std::string& effect) {
+  return is_of_torques(effect) || stability::traits_of(effect).shown_by == stability::ShownBy::kAccelerometer;
+}
 
 Ladder balance_ladder(const residuals::Inputs& inputs, const std::string& effect, bool keep_anyway,
                       int jobs) {

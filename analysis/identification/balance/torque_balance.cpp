@@ -7,8 +7,10 @@
 
 #include "analysis/identification/balance/mean_fit.h"
 #include "analysis/identification/balance/vehicle_blocks.h"
+#include "analysis/identification/candidates.h"
 #include "analysis/identification/rotors/rotor_balance.h"
 #include "analysis/residuals/torque_blocks.h"
+#include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -20,12 +22,13 @@ constexpr std::size_t kFewestTorqueBlocks = 10;
 
 /// Decides which of the two explains the data, and lists alternative explanations.
 /// @param is_surely_constant the torque explains most of the means, and surely more than the offset
-void decide_torque_cause(double longest_m, double weight_N, bool is_surely_constant, TorqueBalance& balance) {
+void decide_torque_cause(double weight_N, bool is_surely_constant, TorqueBalance& balance) {
   constexpr double kSurely_z = 2, kDiagonal = 0.5;
+  const std::string constant = stability::plain_effect(stability::Family::kTorque);
   if (is_surely_constant &&
       balance.torque_Nm.norm() - balance.torque_half_Nm.norm() > balance.least_torque_Nm &&
-      balance.torque_Nm.norm() <= longest_m * weight_N) {
-    balance.effect = "torque_bias";
+      balance.torque_Nm.norm() <= balance.longest_offset_m * weight_N) {
+    balance.effect = constant;
     return;
   }
   const bool is_constant = balance.z < -kSurely_z;
@@ -33,12 +36,12 @@ void decide_torque_cause(double longest_m, double weight_N, bool is_surely_const
       is_constant ? Eigen::Vector2d(balance.torque_Nm / weight_N) : balance.offset_m;
   const Eigen::Vector2d half_m =
       is_constant ? Eigen::Vector2d(balance.torque_half_Nm / weight_N) : balance.offset_half_m;
-  if (!(size_m.norm() - half_m.norm() > balance.least_offset_m) || size_m.norm() > longest_m) return;
-  balance.effect = is_constant ? "torque_bias" : "com_offset";
-  if (std::abs(balance.z) <= kSurely_z) balance.rivals.emplace_back("torque_bias");
+  if (!(size_m.norm() - half_m.norm() > balance.least_offset_m) || size_m.norm() > balance.longest_offset_m)
+    return;
+  balance.effect = is_constant ? constant : stability::plain_effect(stability::Family::kLever);
+  if (std::abs(balance.z) <= kSurely_z) balance.rivals.push_back(constant);
   const Eigen::Vector2d both = size_m.cwiseAbs();
-  if (!is_constant && both.minCoeff() > kDiagonal * both.maxCoeff())
-    balance.rivals.emplace_back("rotor_thrust");
+  if (!is_constant && both.minCoeff() > kDiagonal * both.maxCoeff()) balance.rivals.push_back(rotor_effect());
 }
 
 }  // namespace
@@ -77,11 +80,12 @@ void fit_torques(const std::vector<TorqueBlock>& blocks, const stability::Model&
   const double lever_m = model.arm_m * std::sqrt(0.5), count = static_cast<double>(blocks.size());
   balance.rmse_before_N = std::sqrt(before / count) / (4 * lever_m);
   balance.rmse_after_N = std::sqrt(std::min(by_offset, by_torque) / count) / (4 * lever_m);
+  balance.longest_offset_m = model.arm_m;
   balance.least_offset_m = kBatteryPlay_m + kRotorSpread * lever_m;
   balance.least_torque_Nm = kConstantPartOfSpread * kRotorSpread * lever_m * model.weight_N();
   constexpr double kQuarter = 0.25;  // of the mean square: the torque halves the imbalance
   const bool is_surely_constant = by_torque <= kQuarter * before && surely_positive(losses, 1);
-  decide_torque_cause(model.arm_m, model.weight_N(), is_surely_constant, balance);
+  decide_torque_cause(model.weight_N(), is_surely_constant, balance);
 }
 
 std::vector<TorqueBalance> torque_balances(const residuals::Inputs& inputs, const std::string& kind,
@@ -102,17 +106,15 @@ stability::EffectSpec spec_of(const TorqueBalance& balance, const std::string& e
   stability::EffectSpec spec;
   spec.name = effect;
   spec.vehicle = balance.vehicle;
-  const auto set = [&](const char* name, double value, double half) {
-    spec.parameters[name] = value;
-    spec.fit.interval[name] = {value - half, value + half};
-  };
-  if (effect == "com_offset") {
-    set("offset_x_m", balance.offset_m.x(), balance.offset_half_m.x());
-    set("offset_y_m", balance.offset_m.y(), balance.offset_half_m.y());
-  } else {
-    set("torque_x_Nm", balance.torque_Nm.x(), balance.torque_half_Nm.x());
-    set("torque_y_Nm", balance.torque_Nm.y(), balance.torque_half_Nm.y());
-    set("torque_z_Nm", 0, 0);
+  const bool is_offset = stability::traits_of(effect).family == stability::Family::kLever;
+  const Eigen::Vector2d& value = is_offset ? balance.offset_m : balance.torque_Nm;
+  const Eigen::Vector2d& half = is_offset ? balance.offset_half_m : balance.torque_half_Nm;
+  const std::vector<stability::Parameter>& linear = stability::effect_info(effect).linear;
+  for (std::size_t k = 0; k < linear.size(); ++k) {
+    const auto axis = static_cast<Eigen::Index>(k);
+    spec.parameters[linear[k].name] = k < 2 ? value[axis] : 0;
+    spec.fit.interval[linear[k].name] =
+        k < 2 ? Interval{value[axis] - half[axis], value[axis] + half[axis]} : Interval{0, 0};
   }
   return spec;
 }
@@ -124,12 +126,14 @@ std::string in_words(const TorqueBalance& balance) {
       text += (text.empty() ? "; the same on these flights: " : ", ") + rival;
     return text;
   };
-  if (balance.effect == "torque_bias") {
+  if (stability::traits_of(balance.effect).family == stability::Family::kTorque) {
     return fmt::format(
         "a constant torque of {:.2e} N m about x and {:.2e} N m about y (90 %: +- {:.1e} and {:.1e}){}",
         balance.torque_Nm.x(), balance.torque_Nm.y(), balance.torque_half_Nm.x(), balance.torque_half_Nm.y(),
         and_rivals());
   }
+  if (!balance.has_offset())
+    return "no offset centre of mass: to explain the mean torques, it would have to be beyond the rotors";
   return fmt::format(
       "the centre of mass is {:.1f} mm along x and {:.1f} mm along y from the rotors' centre (90 %: +- "
       "{:.1f} and {:.1f} mm){}{}",

@@ -35,8 +35,9 @@ struct TorqueBalance {
   /// Estimates with the offset alone and with the torque alone; 90 % intervals from blocks of 1 s.
   Eigen::Vector2d offset_m = Eigen::Vector2d::Zero(), torque_Nm = Eigen::Vector2d::Zero();
   Eigen::Vector2d offset_half_m = Eigen::Vector2d::Zero(), torque_half_Nm = Eigen::Vector2d::Zero();
-  double least_offset_m = 0;   ///< smallest offset that is reported
-  double least_torque_Nm = 0;  ///< smallest torque that is reported if it is surely constant
+  double longest_offset_m = 0;  ///< the vehicle's arm
+  double least_offset_m = 0;    ///< smallest offset that is reported
+  double least_torque_Nm = 0;   ///< smallest torque that is reported if it is surely constant
   /// Imbalance of the rotor forces, rms over blocks and rotors: as measured, and with the better explanation.
   double rmse_before_N = 0, rmse_after_N = 0;
   double z = 0;                     ///< of the offset over the torque, from the squared errors of the blocks
@@ -44,6 +45,8 @@ struct TorqueBalance {
   std::vector<std::string> rivals;  ///< alternative explanations of these flights
 
   bool is_named() const { return !effect.empty(); }
+  /// Returns whether the centre of mass may be where the offset alone puts it: not beyond the rotors.
+  bool has_offset() const { return offset_m.norm() <= longest_offset_m; }
 };
 
 /// Fits both explanations to the blocks of one vehicle, in their order, and decides. Precondition: at least two blocks.

@@ -8,35 +8,41 @@
 #include "analysis/identification/fleet/flight_groups.h"
 #include "analysis/identification/rotors/rotor_fit.h"
 #include "analysis/residuals/statistics.h"
+#include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
 namespace {
 
 using residuals::Inputs;
 using stability::EffectSpec;
+using stability::Family;
 
 constexpr std::size_t kFewestForOutliers = 5, kFewestForDrift = 5;
 
+constexpr char kLag[] = "lag_s";
+
 /// The effect and parameter from which a value of the table is taken.
 struct NumberSource {
-  const char *number, *effect, *parameter;
+  std::string number, effect, parameter;
   double nominal;  ///< added to the parameter
 };
-constexpr NumberSource kSources[] = {{"thrust_ratio", "thrust_ratio", "ratio", 1},
-                                     {"drag_N_s_m", "drag_linear", "drag_N_s_m", 0},
-                                     {"lag_s", "motor_lag", "tau_s", 0}};
-
-bool is_fitted(const std::string& effect) {
-  return std::any_of(std::begin(kSources), std::end(kSources),
-                     [&](const NumberSource& source) { return effect == source.effect; });
+std::vector<NumberSource> number_sources() {
+  const std::string ratio = stability::plain_effect(Family::kThrustScale),
+                    drag = stability::plain_effect(Family::kDrag),
+                    lag = stability::plain_effect(Family::kLate);
+  const std::string per_speed = stability::effect_info(drag).linear[0].name;
+  return {{ratio, ratio, stability::effect_info(ratio).linear[0].name, 1},
+          {per_speed, drag, per_speed, 0},
+          {kLag, lag, stability::effect_info(lag).shape[0].name, 0}};
 }
 
 void erase_fitted(std::vector<EffectSpec>& effects, bool keeps_lag) {
-  effects.erase(std::remove_if(effects.begin(), effects.end(),
-                               [&](const EffectSpec& spec) {
-                                 return is_fitted(spec.name) && !(keeps_lag && spec.name == "motor_lag");
-                               }),
-                effects.end());
+  for (const NumberSource& source : number_sources()) {
+    if (keeps_lag && source.number == kLag) continue;
+    effects.erase(std::remove_if(effects.begin(), effects.end(),
+                                 [&](const EffectSpec& spec) { return spec.name == source.effect; }),
+                  effects.end());
+  }
 }
 
 double error_of(const FlightNumber& number) {
@@ -50,7 +56,7 @@ double error_of(const FlightNumber& number) {
 bool shows(const NumberSource& source, const Missing& fit, const Interval& interval, double weight_N) {
   const double half = (interval.upper - interval.lower) / 2;
   if (!(half > 0) || !std::isfinite(half)) return false;
-  if (std::string(source.effect) == "motor_lag") {
+  if (source.number == kLag) {
     const auto gain = fit.intervals.find("gain");
     const double value = fit.parameters.at("gain");
     const bool is_lag = std::abs(value - 1) < 0.999 * kMemoryTolerance;
@@ -61,7 +67,7 @@ bool shows(const NumberSource& source, const Missing& fit, const Interval& inter
 
 FlightNumbers flight_numbers(const std::vector<Missing>& fitted, double weight_N) {
   FlightNumbers numbers;
-  for (const NumberSource& source : kSources) {
+  for (const NumberSource& source : number_sources()) {
     FlightNumber& number = numbers[source.number];
     for (const Missing& fit : fitted) {
       const auto interval = fit.intervals.find(source.parameter);
@@ -83,12 +89,13 @@ struct Fleet {
 /// Fits all three values if the flight shows a lag, else ratio and drag beside the common lag.
 FlightNumbers fit_flight(const Fleet& own, const std::string& kind, int flight, double weight_N, int jobs) {
   const auto silent = [](int, int) {};
-  FlightNumbers numbers = flight_numbers(
-      fit_effects(own.bare, kind, {"thrust_ratio", "drag_linear", "motor_lag"}, {flight}, jobs, silent),
-      weight_N);
-  if (numbers["lag_s"].is_observable) return numbers;
-  return flight_numbers(
-      fit_effects(own.with_lag, kind, {"thrust_ratio", "drag_linear"}, {flight}, jobs, silent), weight_N);
+  std::vector<std::string> names;
+  for (const NumberSource& source : number_sources()) names.push_back(source.effect);
+  FlightNumbers numbers =
+      flight_numbers(fit_effects(own.bare, kind, names, {flight}, jobs, silent), weight_N);
+  if (numbers[kLag].is_observable) return numbers;
+  names.pop_back();
+  return flight_numbers(fit_effects(own.with_lag, kind, names, {flight}, jobs, silent), weight_N);
 }
 
 /// Adds the factor of each rotor in one flight of a vehicle, if the flight contains slow flight.
@@ -238,9 +245,10 @@ std::vector<EachFlight> flights_of(const Fleet& own, const std::string& vehicle,
 
 }  // namespace
 
-const std::vector<std::string>& each_numbers() {
-  static const std::vector<std::string> names = {"thrust_ratio", "drag_N_s_m", "lag_s",  "rotor_1",
-                                                 "rotor_2",      "rotor_3",    "rotor_4"};
+std::vector<std::string> each_numbers() {
+  std::vector<std::string> names;
+  for (const NumberSource& source : number_sources()) names.push_back(source.number);
+  for (const char* rotor : {"rotor_1", "rotor_2", "rotor_3", "rotor_4"}) names.emplace_back(rotor);
   return names;
 }
 

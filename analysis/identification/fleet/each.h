@@ -56,7 +56,7 @@ struct Each {
 };
 
 /// Returns the names of the values in the order of tables.
-const std::vector<std::string>& each_numbers();
+std::vector<std::string> each_numbers();
 
 /// Evaluates each flight of each vehicle of `kind`. A value is an outlier if it differs from the median of its
 /// vehicle's flights (five or more) by more than 3.5 standard deviations, which combine the scatter, estimated by the

@@ -54,7 +54,7 @@ LoneRotor lone_rotor(const std::vector<RotorLoads>& flights, const stability::Mo
 void name_lone_rotor(const residuals::Inputs& inputs, const std::string& kind, const std::vector<int>& which,
                      int jobs, std::vector<Missing>& ranking) {
   const auto ratio = std::find_if(ranking.begin(), ranking.end(), [](const Missing& missing) {
-    return missing.effect == "thrust_ratio" && missing.parameters.at("ratio") < 0;
+    return is_plain_scale(missing.effect) && missing.parameters.at(missing.coefficients[0]) < 0;
   });
   const stability::Model& model = *inputs.model_of(kind);
   if (ratio == ranking.end() || model.num_rotors() != 4) return;
@@ -67,14 +67,14 @@ void name_lone_rotor(const residuals::Inputs& inputs, const std::string& kind, c
   const LoneRotor found = lone_rotor(loads, model);
   if (found.rotor == 0) return;
   if (!found.is_sure) {
-    ratio->finding.rivals.push_back({kRotorThrust, stability::effect_info(kRotorThrust).excitation});
+    const std::string name = rotor_effect();
+    ratio->finding.rivals.push_back({name, stability::effect_info(name).excitation});
     return;
   }
   std::vector<Missing> fitted = fit_rotors(inputs, kind, which, jobs);
   fitted[0].finding = std::move(ratio->finding);
   fitted[0].finding.model_form.clear();
-  fitted[0].finding.rivals.insert(fitted[0].finding.rivals.begin(),
-                                  {"thrust_ratio", stability::effect_info("thrust_ratio").excitation});
+  fitted[0].finding.rivals.insert(fitted[0].finding.rivals.begin(), {ratio->effect, ratio->excitation});
   *ratio = std::move(fitted[0]);
 }
 

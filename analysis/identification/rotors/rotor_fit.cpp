@@ -19,7 +19,7 @@ double student_95(double freedom) { return boost::math::quantile(boost::math::st
 const stability::EffectSpec* present_in(const stability::Model& model) {
   const auto found =
       std::find_if(model.effects.begin(), model.effects.end(),
-                   [](const stability::EffectSpec& spec) { return spec.name == kRotorThrust; });
+                   [](const stability::EffectSpec& spec) { return spec.name == rotor_effect(); });
   return found == model.effects.end() ? nullptr : &*found;
 }
 
@@ -28,7 +28,7 @@ stability::EffectSpec spec_for(const stability::Model& model, const RotorFactors
   const stability::EffectSpec* const present = present_in(model);
   const RotorFactors before = rotor_factors_of(model);
   stability::EffectSpec spec;
-  spec.name = kRotorThrust;
+  spec.name = rotor_effect();
   for (std::size_t k = 0; k < kRotorCount; ++k) {
     const double off = present == nullptr ? 0 : before[k].value;
     const RotorFactor& factor = factors[k];
@@ -123,9 +123,9 @@ std::vector<Missing> fit_rotors(const residuals::Inputs& inputs, const std::stri
   for (const RotorLoads& flight : loads)
     scale.push_back(model.weight_N() / flight.mean_N.sum() - own_thrust_ratio(model));
   const RotorFactors factors = rotor_factors(loads, scale, model);
-  const stability::EffectInfo& info = stability::effect_info(kRotorThrust);
   Missing missing;
-  missing.effect = kRotorThrust;
+  missing.effect = rotor_effect();
+  const stability::EffectInfo& info = stability::effect_info(missing.effect);
   missing.equivalence_class = info.equivalence_class;
   missing.kind = kind;
   missing.excitation = info.excitation;

@@ -17,9 +17,6 @@ namespace swarmcert::identification {
 /// Returns true for effects that are candidates only through named_forms().
 bool needs_scan(const std::string& effect);
 
-/// Returns true if formulas over this variable of the scan make `effect` a candidate.
-bool points_to(const std::string& variable, const std::string& effect);
-
 /// Returns the candidates suggested by `formulas`, in their order; each effect once for every formula that suggests it
 /// with another shape. Effects that `model` has are skipped.
 std::vector<Candidate> named_forms(const std::vector<Formula>& formulas, const stability::Model& model,

@@ -12,6 +12,7 @@
 #include "analysis/identification/scan/balance_columns.h"
 #include "analysis/residuals/force_residual.h"
 #include "nn/base/parallel.h"
+#include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -55,14 +56,13 @@ double heading_of(const Eigen::Matrix3d& R) { return std::atan2(R(1, 0), R(0, 0)
 Eigen::Vector3d wind_of(const stability::Model& model) {
   Eigen::Vector3d force_N = Eigen::Vector3d::Zero();
   double drag_N_s_m = 0;
-  const auto value = [](const stability::EffectSpec& spec, const char* name) {
-    const auto found = spec.parameters.find(name);
-    return found == spec.parameters.end() ? 0.0 : found->second;
-  };
   for (const stability::EffectSpec& spec : model.effects) {
-    if (spec.name == "constant_force" && spec.vehicle.empty())
-      force_N += Eigen::Vector3d(value(spec, "force_x_N"), value(spec, "force_y_N"), 0);
-    if (spec.name == "drag_linear") drag_N_s_m += value(spec, "drag_N_s_m");
+    if (spec.is_expression()) continue;
+    const stability::EffectInfo& info = stability::effect_info(spec.name);
+    const std::vector<double> values = stability::effect_values(info, spec).linear;
+    if (info.traits.family == stability::Family::kPush && spec.vehicle.empty())
+      force_N += Eigen::Vector3d(values[0], values[1], 0);
+    if (info.traits.drag_exponent == 1) drag_N_s_m += values[0];
   }
   if (force_N.isZero() || !(drag_N_s_m > 0))
     return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
