@@ -400,7 +400,8 @@ void describe_comparison(Record& record, const CompareResult& result) {
   record.may("collections", rows.empty() ? std::nullopt : std::optional(rows),
              "Per folder: logs, how many can be judged along which axis, and why others cannot.");
   std::vector<std::string> left_out = inputs.found.left_out;
-  for (const auto& [copy, first] : inputs.found.copies) left_out.push_back(copy + ": has the bytes of " + first);
+  for (const auto& [copy, first] : inputs.found.copies)
+    left_out.push_back(copy + ": has the bytes of " + first);
   record.field("left_out", left_out, "Logs that were left out, with the reason.");
   record.field("skipped_files", inputs.found.skipped, "Files in the folders that are no logs.");
 }
