@@ -244,16 +244,10 @@ FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules&
   FoundFlights result;
   std::vector<FoundLog> logs;
   std::set<std::string> seen;
-  LogCopies copies;
   for (const std::string& path : paths) {
     const Candidates found = candidates_below(path);
     result.skipped.insert(result.skipped.end(), found.skipped.begin(), found.skipped.end());
     for (const std::string& file : found.logs) {
-      const std::string whole = logs::address_of(file).file, first = copies.add(whole);
-      if (!first.empty() && first != whole) {
-        result.copies.emplace_back(file, first);
-        continue;
-      }
       for (const std::string& address : logs::addresses_in(file, by_columns)) {
         if (!seen.insert(address).second) continue;
         const LogRule rule = rule_for(rules, address);
@@ -301,6 +295,21 @@ FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules&
                              "'swarmcert inspect FILE' identifies a file"});
   }
   return result;
+}
+
+void leave_out_copies(FoundFlights& found) {
+  LogCopies known;
+  const auto is_copy = [&](const std::pair<std::string, std::string>& log) {
+    const std::string file = logs::address_of(log.second).file, first = known.add(file);
+    if (first.empty() || first == file) return false;
+    if (found.copies.empty() || found.copies.back().first != file) found.copies.emplace_back(file, first);
+    return true;
+  };
+  for (FlightFiles& flight : found.flights)
+    flight.logs.erase(std::remove_if(flight.logs.begin(), flight.logs.end(), is_copy), flight.logs.end());
+  found.flights.erase(std::remove_if(found.flights.begin(), found.flights.end(),
+                                     [](const FlightFiles& flight) { return flight.logs.empty(); }),
+                      found.flights.end());
 }
 
 std::vector<std::string> log_files(const FoundFlights& found) {

@@ -42,7 +42,7 @@ struct FoundFlights {
   std::vector<std::string> skipped;   ///< files in the folders that are not logs
   std::vector<std::string> left_out;  ///< logs excluded by flights.toml
   std::vector<std::pair<std::string, std::string>>
-      copies;  ///< files that are left out, and what each is a copy of
+      copies;  ///< files of leave_out_copies(), and of what each is one
 };
 
 /// Returns the patterns of `rules` that match none of the logs: they are misspelt or belong to other flights.
@@ -55,13 +55,15 @@ std::vector<std::string> patterns_without_log(const LogRules& rules, const Found
 /// - a CSV file holds the logs of several vehicles, which get the addresses FILE#VEHICLE (logs/vehicles_in_file.h);
 /// - `rules` assign them to one flight;
 /// - logs of one folder have absolute times (of their clock or of a satellite receiver) that overlap by more than half.
-/// A file with the same bytes as an earlier one is left out (log_copies.h).
 /// A vehicle without a given name is named after its file, `<vehicle>_log07`, or else after its folder.
 /// @throws files::InputError if a path does not exist, a given file is not a log, or no log is left.
 /// @param by_columns false: a columns.toml names the columns, so that none belong to one of several vehicles by their
 ///   names
 FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules& rules = {},
                           bool by_columns = true);
+
+/// Leaves out logs with the bytes of an earlier one (log_copies.h), and flights that have no other.
+void leave_out_copies(FoundFlights& found);
 
 /// Returns the files that hold the logs of `found`, each once.
 std::vector<std::string> log_files(const FoundFlights& found);

@@ -159,6 +159,7 @@ Inputs read_inputs(const InputArguments& arguments) {
   }
   inputs.words = arguments.flights;
   inputs.found = find_flights(arguments.flights, inputs.log_rules, inputs.map.empty());
+  leave_out_copies(inputs.found);
   read_models(arguments.models, inputs);
   const std::map<std::string, std::string> flown = flown_models(inputs);
   for (const auto& [vehicle, use] : inputs.fleet) {

@@ -175,7 +175,8 @@ TEST(AnyFlight, WithoutAModelResidualsArePerMass) {
 
 TEST(AnyFlight, AModelOfASingleLogGivesForcesAndLogsWithoutOneAreNamed) {
   const ScratchFolder folder;
-  for (const char* name : {"one.csv", "two.csv"}) write_text(folder / name, hover_csv(0, 8));
+  write_text(folder / "one.csv", hover_csv(0, 8));
+  write_text(folder / "two.csv", hover_csv(0, 9));
   write_text(folder / "flights.toml",
              "schema = \"swarmcert/flights/1\"\n[log.\"one\"]\nmodel = \"" + small_model() + "\"\n");
   const files::Json named = result_of(folder, "compare " + small_model() + " one.csv", "compare");

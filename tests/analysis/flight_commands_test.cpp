@@ -72,7 +72,7 @@ TEST(FlightCommands, RefuseKindsThatNobodyHasAndSuggestNamesOfEffects) {
 TEST(FlightCommands, RefuseToInjectTwoLogsIntoOneFile) {
   const ScratchFolder folder;
   fly(folder, 4, "one/flights");
-  fly(folder, 4, "two/flights");
+  fly(folder, 5, "two/flights");
   const Outcome outcome =
       run_shell("swarmcert compare " + small_model() + " one two --inject injected --force", folder.path());
   EXPECT_EQ(outcome.exit_code, 2) << outcome.output;

@@ -34,12 +34,18 @@ std::optional<identification::Split> split_of(const StudyOptions& options, const
     throw UsageError("--select and --test go together: name the flights of both");
   const residuals::FoundFlights select = residuals::find_flights(options.select),
                                 test = residuals::find_flights(options.test);
+  const auto role = [&](const std::string& file) {
+    const auto holds = [&file](const residuals::FoundFlights& found) {
+      const std::vector<std::string> logs = log_files(found);
+      return std::find(logs.begin(), logs.end(), file) != logs.end();
+    };
+    return holds(test) ? "--test" : holds(select) ? "--select" : "the fit";
+  };
   for (const auto& [copy, first] : inputs.found.copies) {
-    for (const auto& [option, found] : {std::pair("--select ", &select), std::pair("--test ", &test)}) {
-      const std::vector<std::string> logs = log_files(*found);
-      if (std::find(logs.begin(), logs.end(), copy) != logs.end())
-        throw UsageError(option + copy + ": has the bytes of " + first + ", so it would not be held out");
-    }
+    const std::string of_copy = role(copy), of_first = role(first);
+    if (of_copy != of_first)
+      throw UsageError(copy + " (" + of_copy + ") has the bytes of " + first + " (" + of_first +
+                       "): it would not be held out");
   }
   identification::Split split;
   for (std::size_t i = 0; i < inputs.found.flights.size(); ++i) {
