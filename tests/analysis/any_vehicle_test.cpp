@@ -281,7 +281,7 @@ TEST(Inspect, AFolderEndsInATableOfWhatCanBeJudged) {
   std::filesystem::create_directories(folder.path() / "all/monday");
   std::filesystem::create_directories(folder.path() / "all/tuesday");
   write_text(folder / "all/monday/a.csv", hexacopter_csv(1));
-  write_text(folder / "all/monday/b.csv", hexacopter_csv(1));
+  write_text(folder / "all/monday/b.csv", hexacopter_csv(1) + "\n");
   std::string ground = "t,px,py,pz,vx,vy,vz,m1,m2,m3,m4,vbat\n";
   for (int k = 0; k < 500; ++k) ground += fmt::format("{:.2f},0.1,0,0.05,0,0,0,0,0,0,0,4.1\n", 0.01 * k);
   write_text(folder / "all/tuesday/ground.csv", ground);
