@@ -146,7 +146,7 @@ void describe_facts(files::Record& record, const AxisFacts& f) {
   record.field("axis", axis_name(f.axis), "");
   record.field("stable", f.stable, "");
   record.field("spectral_radius", f.spectral_radius > 0 ? std::optional(f.spectral_radius) : std::nullopt,
-               "Of the sampled loop; null: there is none.");
+               "Of the sampled loop; null: the loop is not sampled.");
   record.field("lag_limit_s", f.lag_limit_s, "Further lag that the loop tolerates; null: any.", "s");
   record.field("delay_limit_s", f.delay_limit_s, "Likewise delay.", "s");
   record.field("lag_floor_rate", f.lag_floor.rate, "Gain that remains, whatever the gains, for this lag.",

@@ -16,6 +16,8 @@ using residuals::Comparison;
 
 constexpr double kNotJudged = std::numeric_limits<double>::quiet_NaN();
 const Eigen::Vector3d kAllJudged = Eigen::Vector3d::Ones();
+/// The unit that the field `unit` states: N, or m/s^2 where no mass is known.
+constexpr char kForceUnit[] = "force";
 
 // Numbers along axes that cannot be judged are null.
 
@@ -83,7 +85,8 @@ void describe_trajectory(Record& record, const residuals::TrajectoryErrors& traj
   const auto axes = [&](Record& r, const char* name, const residuals::Axes& a, const char* meaning) {
     add(r, name, a, kAllJudged, meaning, "m");
   };
-  record.may("refused", is_refused ? std::optional(trajectory.refused) : std::nullopt, "Why there is none.");
+  record.may("refused", is_refused ? std::optional(trajectory.refused) : std::nullopt,
+             "Why nothing was simulated.");
   record.may_fields(!is_refused, [&](Record& r) {
     r.field("seconds", trajectory.seconds, "Of judged flight.", "s");
     r.field("pieces", trajectory.pieces, "Stretches that were simulated.");
@@ -160,8 +163,8 @@ void describe_place_residual(Record& record, const residuals::PlaceResidual& pla
   record.field("cell", place.cell,
                "Height of the neighbour and lateral distance, counted from the grid's least.");
   record.field("records", place.records, "");
-  record.field("least", three(place.least_N), "", "N");
-  record.field("largest", three(place.largest_N), "", "N");
+  record.field("least", three(place.least_N), "", kForceUnit);
+  record.field("largest", three(place.largest_N), "", kForceUnit);
 }
 
 void describe_errors_of_flight(Record& record, const residuals::TrackErrors& track,
@@ -247,11 +250,11 @@ void describe_learning_error(Record& record, const Comparison& comparison) {
   record.field("windows", learning.windows, "");
   record.field("window_s", residuals::LearningError::kWindow_s, "", "s");
   record.field("bandwidth_hz", residuals::LearningError::kBandwidth_hz, "", "Hz");
-  describe_quantiles(record, learning.bias_N, "bias", "N", judged);
-  describe_quantiles(record, learning.amplitude_N, "amplitude", "N", judged);
-  describe_quantiles(record, learning.rate_N_s, "rate", "N/s", judged);
-  describe_quantiles(record, learning.variation_N, "variation", "N", judged);
-  describe_quantiles(record, learning.impulse_N_s, "impulse", "N s", judged);
+  describe_quantiles(record, learning.bias_N, "bias", kForceUnit, judged);
+  describe_quantiles(record, learning.amplitude_N, "amplitude", kForceUnit, judged);
+  describe_quantiles(record, learning.rate_N_s, "rate", "force/s", judged);
+  describe_quantiles(record, learning.variation_N, "variation", kForceUnit, judged);
+  describe_quantiles(record, learning.impulse_N_s, "impulse", "force s", judged);
   const residuals::Trajectories::PeakRatio& ratio = comparison.trajectories.peak_ratio;
   record.object_or_null(
       ratio.tracks > 0, "peak_ratio",
@@ -391,7 +394,7 @@ void describe_comparison(Record& record, const CompareResult& result) {
   const TorqueSummary torque = torque_summary(comparison);
   record.object("torque", "Logs with a torque residual.", [&](Record& r) {
     const bool has_some = torque.tracks > 0;
-    r.may("refused", has_some ? std::nullopt : std::optional(torque.refused), "Why there is none.");
+    r.may("refused", has_some ? std::nullopt : std::optional(torque.refused), "Why no log has one.");
     r.may("tracks", has_some ? std::optional(torque.tracks) : std::nullopt, "");
     r.may("where", has_some ? std::optional<std::string>("flights[].torque") : std::nullopt, "");
   });

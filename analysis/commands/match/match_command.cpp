@@ -82,7 +82,7 @@ void describe(files::Record& record, const Result& result) {
                           r.field("seed", parameters.seed, "Of the golden vectors.");
                           r.field("certificate", parameters.certificate_sha256, "Its SHA-256; empty: none.");
                         });
-  record.object_or_null(match.first_difference.has_value(), "first_difference", "Null: there is none.",
+  record.object_or_null(match.first_difference.has_value(), "first_difference", "Null: nothing differs.",
                         [&](files::Record& r) { describe_difference(r, match); });
 }
 
