@@ -22,9 +22,6 @@ using stability::EffectInfo;
 using stability::EffectSpec;
 using stability::ShownBy;
 
-/// For which grids of lengths are stated.
-constexpr double kCrazyflieArm_m = 0.046;
-
 const EffectSpec* find(const stability::Model& model, const std::string& name,
                        const std::string& vehicle = "") {
   for (const EffectSpec& spec : model.effects) {
@@ -194,7 +191,7 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
   for (std::size_t i = 0; i < result.info.shape.size(); ++i) {
     stability::Parameter& parameter = result.info.shape[i];
     if (parameter.unit != stability::Unit::kArm) continue;
-    const double size = model.arm_m / kCrazyflieArm_m;
+    const double size = model.arm_m / stability::kCrazyflieArm_m;
     parameter.value *= size;
     for (double& value : parameter.grid) value *= size;
     for (std::vector<double>& theta : result.thetas) theta[i] *= size;

@@ -60,7 +60,7 @@ class Selection : public CrossValidation {
   std::vector<double> errors(const Members& members, const Folds& folds, bool trims) const;
   /// Returns the candidate to which `candidate` reduces if the quantity it varies with is constant; -1: none.
   int plain_form(int candidate) const;
-  /// Returns the index of the plain candidate of a family; -1 if there is none.
+  /// Returns the index of the plain candidate of a family; -1 without one.
   int plain_of(stability::Family family) const;
   /// For an effect that only changes within flights show: returns whether it reduces the error of held-out blocks about
   /// the mean of each track, beside a thrust scale.

@@ -6,11 +6,11 @@
 
 namespace swarmcert::logs {
 
-/// Returns the column whose name says that it is a clock; -1 if there is none.
+/// Returns the column whose name says that it is a clock; -1 without one.
 int clock_by_name(const RawTopic& topic);
 
 /// Returns the column that rises by nearly the same step with nearly every record, preferably by something other than
-/// one per record; -1 if there is none.
+/// one per record; -1 without one.
 int clock_by_steps(const RawTopic& topic);
 
 /// Returns the seconds per unit of a clock, judged by its median step: the largest common unit that gives a plausible

@@ -30,7 +30,8 @@ class DownwashTorque : public Effect {
     info.excitation =
         "logs at the rate of the attitude loop: pass below another vehicle, 0.2 .. 0.6 m, to all sides of it";
     for (Parameter& parameter : info.shape) parameter.grid.clear();
-    info.shape.push_back({"arm_m", "from the centre to each of the four rotors, in X", 0.046, 0.01, 1});
+    info.shape.push_back(
+        {"arm_m", "from the centre to each of the four rotors, in X", kCrazyflieArm_m, 0.01, 1});
     info.traits = {Family::kNone, Family::kNone, ShownBy::kNothing};
     return info;
   }

@@ -78,6 +78,9 @@ enum class Unit {
   kPerBattery     ///< 1/V, of the largest voltage
 };
 
+/// From the centre to each rotor of a Crazyflie, for which lengths of effects are stated.
+inline constexpr double kCrazyflieArm_m = 0.046;
+
 /// A coefficient or a shape parameter.
 struct Parameter {
   std::string name;  ///< with its unit, as in model.toml: "drag_N_s_m"
@@ -85,7 +88,7 @@ struct Parameter {
   double value;                   ///< default in simulation
   double lower, upper;            ///< physical bounds on sign and size; infinite if free
   std::vector<double> grid = {};  ///< shape parameters: values that identification tries; empty: only `value`
-  Unit unit = Unit::kOwn;  ///< of the bounds; for kArm, values and grid are those for a Crazyflie's arm
+  Unit unit = Unit::kOwn;         ///< of the bounds; for kArm, values and grid are those for kCrazyflieArm_m
 };
 
 /// Static description of an effect, independent of any flight.

@@ -36,7 +36,7 @@ class RotorThrust : public Effect {
            2});
     }
     info.linear.push_back({"model", "the model's own thrust, which the factors replace", -1, -1, -1});
-    info.shape = {{"arm_m", "from the centre to a rotor, as in the vehicle", 0.046, 0.005, 2},
+    info.shape = {{"arm_m", "from the centre to a rotor, as in the vehicle", kCrazyflieArm_m, 0.005, 2},
                   {"torque_per_thrust_m", "as in the vehicle", 0.006, 0.0001, 1}};
     info.traits.shown_by = ShownBy::kRotors;
     return info;
