@@ -117,6 +117,7 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
             fmt::format("{}: {}", track.path, fmt::join(logs::findings(track.health), "; ")));
       }
       if (track.position_only || track.kind != kind) continue;
+      part.covered.has_set_points = part.covered.has_set_points || !track.targets.empty();
       double lowest_m = INFINITY, highest_m = -INFINITY;
       part.covered.blocks += cut_into_blocks(track).blocks.size();
       for (std::size_t s = 0; s < track.instants.size(); ++s) {
@@ -144,6 +145,7 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
     all.battery_most_V = std::max(all.battery_most_V, part.covered.battery_most_V);
     all.height_span_m = std::max(all.height_span_m, part.covered.height_span_m);
     all.most_neighbours = std::max(all.most_neighbours, part.covered.most_neighbours);
+    all.has_set_points = all.has_set_points || part.covered.has_set_points;
     all.records += part.covered.records;
     all.blocks += part.covered.blocks;
     vehicles.insert(part.vehicles.begin(), part.vehicles.end());

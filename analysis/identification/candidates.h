@@ -33,6 +33,7 @@ struct Coverage {
   double battery_most_V = 0;
   double height_span_m = 0;  ///< largest height range of a vehicle in one flight
   int most_neighbours = 0;
+  bool has_set_points = false;  ///< in at least one log
   std::size_t records = 0;
   std::size_t blocks = 0;             ///< of cut_into_blocks()
   std::vector<std::string> vehicles;  ///< of the kind that flew, without position-only vehicles

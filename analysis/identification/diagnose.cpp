@@ -188,6 +188,7 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   result.records = covered.records;
   result.flights = static_cast<int>(which.size());
   result.blocks = covered.blocks;
+  result.has_set_points = covered.has_set_points;
   result.too_poor = covered.too_poor();
   result.problems = covered.problems;
   if (!result.too_poor.empty()) return result;

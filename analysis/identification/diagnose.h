@@ -38,6 +38,7 @@ struct Diagnosis {
   std::size_t records = 0, blocks = 0;
   std::size_t searched_blocks = 0;  ///< number of `blocks` in which effects were searched, see kMostSearched
   int flights = 0;
+  bool has_set_points = false;        ///< in at least one log
   std::vector<std::string> problems;  ///< Coverage::problems
 };
 

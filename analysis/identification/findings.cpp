@@ -75,14 +75,24 @@ void find_rivals(const Selection& selection, const Members& members, Finding& fi
     // A constant force for all and one per vehicle have the same name.
     const bool is_known = std::any_of(finding.rivals.begin(), finding.rivals.end(),
                                       [&](const Rival& r) { return r.effect == other.name; });
-    if (!is_known && paired_z(selection.block_errors(instead), full_errors) < kClearlyBetter_z)
-      finding.rivals.push_back({other.name, other.info.excitation});
+    if (!is_known && paired_z(selection.block_errors(instead), full_errors) < kClearlyBetter_z) {
+      const double kept = (rest_square - selection.mean_square(instead)) / (rest_square - full_square);
+      const double squared = finding.wald_z * finding.wald_z;
+      finding.rivals.push_back({other.name, other.info.excitation,
+                                std::exp(log_likelihood_ratio(kept * squared, full_errors.size()) -
+                                         log_likelihood_ratio(squared, full_errors.size()))});
+    }
     const Members both = with(instead, members.back());
     widen(finding.model_form, selection.in_model(both, selection.coefficients(both)).tail(p));
   }
 }
 
 }  // namespace
+
+double log_likelihood_ratio(double squared_wald, std::size_t blocks) {
+  const auto n = static_cast<double>(blocks);
+  return n / 2 * std::log1p(squared_wald / n);
+}
 
 std::vector<std::string> Finding::confounded_with() const {
   std::vector<std::string> names;
@@ -108,6 +118,10 @@ std::vector<Finding> findings(const Selection& selection, const Members& members
     finding.paired_z = paired_z(selection.block_errors(rest), selection.block_errors(last));
     finding.wald_z = selection.wald(last);
     const Eigen::Index p = selection.candidate(members[i]).columns();
+    const std::size_t blocks = selection.grams().blocks.size();
+    finding.evidence_bits = (log_likelihood_ratio(finding.wald_z * finding.wald_z, blocks) -
+                             static_cast<double>(p) / 2 * std::log(static_cast<double>(blocks))) /
+                            std::log(2.0);
     const Eigen::VectorXd own = selection.in_model(last, selection.coefficients(last)).tail(p);
     for (Eigen::Index c = 0; c < p; ++c) finding.model_form.emplace_back(own[c], own[c]);
     for (const Eigen::VectorXd& fold : selection.fold_coefficients(last))

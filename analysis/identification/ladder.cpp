@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
+#include "analysis/identification/remainder.h"
 #include "analysis/identification/rotors/rotor_fit.h"
 #include "analysis/identification/scan/proposal.h"
 #include "analysis/residuals/comparison.h"
 #include "analysis/residuals/force_residual.h"
+#include "nn/base/doubles.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
 
@@ -18,6 +21,12 @@ namespace {
 using stability::LadderRow;
 
 constexpr double kLeastFall = 0.005;
+/// Of formulas and shapes, which are chosen among many: the gain at which an effect counts as found.
+constexpr double kLeastFallOfForm = Thresholds{}.gain;
+/// Formulas and shapes that an automatic ladder adds at most.
+constexpr int kMostForms = 6;
+/// Parts of a flight are at least this long. Errors are correlated over blocks of 2 s, so as much lies between parts.
+constexpr double kShortestPart_s = 8, kGuard_s = 2;
 
 /// Returns the root mean square of the residual vector of `model` on the flights `which`, in newton.
 double rmse(residuals::Inputs inputs, const stability::Model& model, const std::vector<int>& which,
@@ -93,7 +102,7 @@ std::string too_poor(const residuals::Inputs& inputs, const std::string& kind, c
   };
   const std::string poor = look(split.fit).too_poor();
   is_tested = poor.empty();
-  if (!split.by_flight) return poor.empty() ? "" : "flights for the fit: " + poor;
+  if (split.by == Split::By::kNothing) return poor.empty() ? "" : "flights for the fit: " + poor;
   const bool has_select = look(split.select).records > 0;
   is_tested = look(split.test).records > 0;
   if (!is_tested) problems.push_back("nothing is tested: no usable record in the flights to test");
@@ -169,6 +178,46 @@ std::optional<double> imbalance_N(const residuals::Inputs& inputs, const stabili
   return rotor_imbalance_N(loads, rotor_factors_of(model));
 }
 
+/// Returns the parts of `flight`, five or, of a long one, ten; none if they would be too short.
+std::vector<residuals::FlightFiles> parts_of(const residuals::FlightFiles& flight, Interval span_s) {
+  constexpr int kFew = 5, kMany = 10;
+  constexpr double kLong_s = 200;
+  const double whole_s = span_s.upper - span_s.lower;
+  const int count = whole_s < kLong_s ? kFew : kMany;
+  std::vector<residuals::FlightFiles> parts;
+  if (!(whole_s / count >= kShortestPart_s + kGuard_s)) return parts;
+  for (int k = 0; k < count; ++k) {
+    residuals::FlightFiles part = flight;
+    const double begin_s = span_s.lower + whole_s * k / count;
+    part.part_s = {begin_s, begin_s + whole_s / count - kGuard_s};
+    part.name += fmt::format(" {:.0f}..{:.0f} s", part.part_s->lower, part.part_s->upper);
+    parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+/// Replaces the flights of `inputs` by their parts. Returns false, and changes nothing, if a flight is too short.
+bool split_in_time(residuals::Inputs& inputs) {
+  std::vector<residuals::FlightFiles> parts;
+  for (std::size_t i = 0; i < inputs.found.flights.size(); ++i) {
+    Interval span_s = {kInfinity, -kInfinity};
+    std::vector<std::string> problems;
+    for (const residuals::Track& track : inputs.load(i, problems)) {
+      if (track.position_only) continue;
+      for (std::size_t k = 0; k < track.cut.size(); ++k) {
+        if (track.cut[k] != residuals::Cut::kNone) continue;
+        span_s.lower = std::min(span_s.lower, track.instants[k].time_s);
+        span_s.upper = std::max(span_s.upper, track.instants[k].time_s);
+      }
+    }
+    std::vector<residuals::FlightFiles> own = parts_of(inputs.found.flights[i], span_s);
+    if (own.empty()) return false;
+    std::move(own.begin(), own.end(), std::back_inserter(parts));
+  }
+  inputs.found.flights = std::move(parts);
+  return true;
+}
+
 /// A candidate added to the model of the last accepted row.
 struct Trial {
   LadderRow row;
@@ -177,14 +226,16 @@ struct Trial {
 
 }  // namespace
 
-Split split_flights(const residuals::Inputs& inputs) {
-  const auto count = static_cast<int>(inputs.found.flights.size());
+Split split_flights(residuals::Inputs& inputs) {
   Split split;
-  if (count < 3) {
-    split.by_flight = false;
-    split.fit = split.select = split.test = every_flight(inputs);
-    return split;
+  if (inputs.found.flights.size() < 3) {
+    split.by = split_in_time(inputs) ? Split::By::kTime : Split::By::kNothing;
+    if (split.by == Split::By::kNothing) {
+      split.fit = split.select = split.test = every_flight(inputs);
+      return split;
+    }
   }
+  const auto count = static_cast<int>(inputs.found.flights.size());
   for (int i = 0; i < count; ++i) {
     const bool few = count < 5;
     const bool test = few ? i == count - 1 : i % 5 == 4;
@@ -203,6 +254,7 @@ class Climb {
         const residuals::Progress& progress, Ladder& ladder)
       : inputs_(inputs),
         kind_(inputs.models[0].kind),
+        is_automatic_(options.automatic),
         keeps_anyway_(options.keep_anyway),
         jobs_(jobs),
         progress_(progress),
@@ -214,7 +266,8 @@ class Climb {
   }
 
   void run() {
-    for (const std::string& asked : wanted_) attempt(asked);
+    for (const std::string& asked : wanted_) attempt(asked, kLeastFall);
+    if (is_automatic_) ladder_.stopped = add_forms();
     finish();
   }
 
@@ -228,6 +281,19 @@ class Climb {
     }
   }
 
+  Passes passes() const { return {working_, kind_, ladder_.split.fit, 0, jobs_, progress_}; }
+
+  /// Adds formulas, or else shapes, for what is left. Returns why it stops.
+  std::string add_forms() {
+    for (int k = 0; k < kMostForms; ++k) {
+      if (!remainder(passes(), specs_of(ladder_.fitted)).stands_out())
+        return "nothing stands out above the noise of the flights to fit";
+      if (!attempt("formula", kLeastFallOfForm) && !attempt("shape", kLeastFallOfForm))
+        return "no formula or shape lowers the error of the select flights further";
+    }
+    return fmt::format("{} formulas and shapes were added, which is enough for one ladder", kMostForms);
+  }
+
   Trial trial(const std::string& effect, stability::Model model) const {
     Trial next{{}, std::move(model)};
     next.row.effect = effect;
@@ -237,19 +303,21 @@ class Climb {
     return next;
   }
 
-  /// Adds a row that repeats the best one.
-  void refuse(const std::string& effect, const std::string& why) {
+  /// Adds a row that repeats the best one. Returns false.
+  bool refuse(const std::string& effect, const std::string& why) {
     trials_.push_back(best());
     trials_.back().row.effect = effect;
     trials_.back().row.accepted = false;
     trials_.back().row.note = why;
+    return false;
   }
 
-  void attempt(const std::string& asked) {
+  /// Tries an effect, a formula or a shape. Returns whether it is accepted.
+  /// @param least_fall of the RMSE on the select flights
+  bool attempt(const std::string& asked, double least_fall) {
     std::string name = asked;
     if (is_proposal(asked)) {
-      const Passes passes = {working_, kind_, ladder_.split.fit, 0, jobs_, progress_};
-      name = propose(working_, passes, ladder_.fitted, asked);
+      name = propose(working_, passes(), ladder_.fitted, asked);
       if (name.empty())
         return refuse(asked,
                       fmt::format("the remainder of the {} flights to fit does not vary significantly with "
@@ -267,7 +335,7 @@ class Climb {
     if (fresh == fitted.rend())
       return refuse(name, "no flight of the fit has slow flight with the duty of each of four motors");
     Trial next = trial(name, with_effects(working_.models[0], specs_of(fitted)));
-    const bool helps = is_rotors ? balances(next) : lowers_error(next);
+    const bool helps = is_rotors ? balances(next) : lowers_error(next, least_fall);
     next.row.accepted = helps || keeps_anyway_;
     if (next.row.accepted) {
       note_errors(*fresh, helps, next);
@@ -278,12 +346,14 @@ class Climb {
       next.row.values = best().row.values;
       if (name != asked) withdraw(working_, name);
     }
+    const bool is_accepted = next.row.accepted;
     trials_.push_back(std::move(next));
+    return is_accepted;
   }
 
-  bool lowers_error(Trial& next) {
+  bool lowers_error(Trial& next, double least_fall) {
     const double before_N = best().row.select_rmse_N, after_N = next.row.select_rmse_N;
-    const bool helps = after_N <= (1 - kLeastFall) * before_N;
+    const bool helps = after_N <= (1 - least_fall) * before_N;
     if (!helps)
       next.row.note =
           fmt::format("the error of the select flights goes from {:.5f} to {:.5f} N", before_N, after_N);
@@ -321,12 +391,13 @@ class Climb {
     for (stability::EffectSpec& effect : ladder_.model.effects) {
       if (effect.fit.is_empty()) continue;
       effect.fit.test_looks = ladder_.test_looks;
-      if (!ladder_.split.by_flight && effect.fit.note.empty())
-        effect.fit.note = "fewer than three flights: selected and tested on the flights to fit";
+      if (ladder_.split.by == Split::By::kNothing && effect.fit.note.empty())
+        effect.fit.note = "one or two short flights: selected on the flights to fit, and not tested";
     }
     const double floor_N = noise_floor_N(inputs_, ladder_.model, ladder_.split.test, jobs_);
     for (Trial& t : trials_) {
-      t.row.test_rmse_N = rmse(inputs_, t.model, ladder_.split.test, jobs_);
+      if (ladder_.split.by != Split::By::kNothing)
+        t.row.test_rmse_N = rmse(inputs_, t.model, ladder_.split.test, jobs_);
       t.row.noise_floor_N = floor_N;
       t.row.test_looks = ladder_.test_looks;
       ladder_.rows.push_back(std::move(t.row));
@@ -337,7 +408,7 @@ class Climb {
 
   const residuals::Inputs& inputs_;
   const std::string kind_;
-  const bool keeps_anyway_;
+  const bool is_automatic_, keeps_anyway_;
   const int jobs_;
   const residuals::Progress& progress_;
   Ladder& ladder_;
@@ -349,10 +420,11 @@ class Climb {
 
 }  // namespace
 
-Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int jobs,
+Ladder climb(residuals::Inputs inputs, const LadderOptions& options, int jobs,
              const residuals::Progress& progress) {
   Ladder ladder;
   ladder.split = options.split ? *options.split : split_flights(inputs);
+  for (const residuals::FlightFiles& flight : inputs.found.flights) ladder.flights.push_back(flight.name);
   const stability::Model& nominal = inputs.models[0];
   ladder.too_poor = too_poor(inputs, nominal.kind, ladder.split, jobs, ladder.problems, ladder.is_tested);
   if (!ladder.too_poor.empty()) return ladder;

@@ -9,18 +9,23 @@
 
 namespace swarmcert::identification {
 
-/// The use of each flight. Split by flight, never by time within a flight, because neighbouring records are similar.
+/// The use of each flight. Split by flight if there are at least three; never record by record, because neighbouring
+/// records are similar.
 struct Split {
+  /// kTime: parts of flights with a guard between them. kNothing: too little even for that; all is used for everything.
+  enum class By { kFlights, kTime, kNothing };
+  By by = By::kFlights;
   std::vector<int> fit, select, test;
-  bool by_flight = true;  ///< false: too few flights, so all are used for everything
 };
 
 /// Of each five flights, ordered by scenario and run, uses three to fit, one to select and one to test; of three or
-/// four flights, the last one to test and the one before it to select.
-Split split_flights(const residuals::Inputs& inputs);
+/// four flights, the last one to test and the one before it to select. Fewer flights are replaced in `inputs` by their
+/// parts, five or ten of at least 8 s each, and the parts are split in the same way.
+Split split_flights(residuals::Inputs& inputs);
 
 struct Ladder {
   Split split;
+  std::vector<std::string> flights;  ///< names of the flights, or of their parts, that `split` refers to
   std::vector<stability::LadderRow> earlier;  ///< of the given model
   std::vector<stability::LadderRow> rows;     ///< "nominal" is the given model; then the trials
   stability::Model model;                     ///< with the accepted effects, and with all rows
@@ -29,10 +34,12 @@ struct Ladder {
   std::string too_poor;   ///< why nothing was fitted; empty if something was. If set, the rest is empty.
   bool is_tested = true;  ///< false: the test flights have no usable record, and test_rmse_N is 0
   int test_looks = 0;     ///< including this ladder
+  std::string stopped;    ///< why an automatic ladder tried nothing further
   std::vector<std::string> problems;  ///< Coverage::problems
 };
 
 struct LadderOptions {
+  /// Tries what diagnose() finds, then formulas and shapes for what is left, see climb().
   bool automatic = true;
   /// Effects to try, in this order unless automatic; may include formulas and shapes, see is_proposal().
   std::vector<std::string> effects;
@@ -41,9 +48,11 @@ struct LadderOptions {
 };
 
 /// Fits and accepts effects for the only model of `inputs`, if the flights are sufficient. An effect is accepted if the
-/// RMSE on the select flights falls by at least half a percent. In each step the coefficients of all effects accepted
+/// RMSE on the select flights falls by at least half a percent. An automatic ladder goes on while what is left on the
+/// flights to fit stands out of the noise, with the best formula for it, or else the best shape; these have no name and
+/// must lower the RMSE by 2 %. In each step the coefficients of all effects accepted
 /// so far are fitted again. The test flights are scored once, after the last step, so their errors decide nothing.
-Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int jobs,
+Ladder climb(residuals::Inputs inputs, const LadderOptions& options, int jobs,
              const residuals::Progress& progress);
 
 /// Returns `model` with the last accepted row undone: the effect of that row is removed, the others get back their

@@ -3,9 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <iterator>
 
 namespace swarmcert::identification {
 namespace {
+
+constexpr const char* kNames[] = {"missing_effect", "unexplained", "nothing_missing", "inconclusive"};
 
 /// Returns why one kind cannot be judged; empty if it can.
 std::string not_judged(const Diagnosis& diagnosis) {
@@ -16,9 +19,10 @@ std::string not_judged(const Diagnosis& diagnosis) {
 
 }  // namespace
 
-const char* name(Verdict verdict) {
-  static const char* const kNames[] = {"missing_effect", "unexplained", "nothing_missing", "inconclusive"};
-  return kNames[static_cast<int>(verdict)];
+const char* name(Verdict verdict) { return kNames[static_cast<int>(verdict)]; }
+
+void describe(files::Record& record, Verdict verdict) {
+  record.choice(verdict, {std::begin(kNames), std::end(kNames)});
 }
 
 bool leaves_something(const Diagnosis& diagnosis) {

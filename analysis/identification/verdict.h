@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "analysis/identification/diagnose.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::identification {
 
@@ -17,6 +18,7 @@ enum class Verdict {
 
 /// Returns "missing_effect", "unexplained", "nothing_missing" or "inconclusive".
 const char* name(Verdict verdict);
+void describe(files::Record& record, Verdict verdict);
 
 /// A scan result is significant if it explains more than this fraction of the mean square of the force error.
 inline constexpr double kMuchOfForce = 0.1;

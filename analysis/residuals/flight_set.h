@@ -2,10 +2,13 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "nn/base/interval.h"
 
 namespace swarmcert::residuals {
 
@@ -20,6 +23,8 @@ struct FlightFiles {
   /// By path of a log: how far its clock is ahead of the first log's clock, if found from the flight itself.
   std::map<std::string, double> clock_offsets_s;
   std::set<std::string> position_only;  ///< paths of logs that flights.toml marks as position only
+  std::optional<Interval>
+      part_s;  ///< only this part of the flight, on the clock of its first log; empty: all of it
 };
 
 /// A `[log."GLOB"]` table of flights.toml with properties of single logs. Empty texts and zeros mean "not given".

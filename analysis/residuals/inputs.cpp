@@ -207,7 +207,10 @@ std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& pro
   }
   const FlightFiles& flight = found.flights[index];
   const auto load_all = [&](std::vector<std::string>& told) {
-    return load_flight(flight, uses, fallback_kind, kinds, map, rules, *cache, told);
+    std::vector<Track> all = load_flight(flight, uses, fallback_kind, kinds, map, rules, *cache, told);
+    for (Track& track : all)
+      if (flight.part_s) track = part_of(track, *flight.part_s);
+    return all;
   };
   std::vector<Track> loaded =
       tracks == nullptr ? load_all(problems) : tracks->tracks(flight, load_all, problems);

@@ -68,7 +68,7 @@ bool takes_part(const Track& track, double share) {
          number_of(track.flight + "/" + track.vehicle + " takes part") * stretch_s < share * all_s;
 }
 
-/// Returns the stretches of an excerpt as ranges [first, second) of positions in `used`, the records without a cut.
+/// Returns the stretches of an excerpt as ranges of positions in `used`, the records without a cut.
 std::vector<std::pair<std::size_t, std::size_t>> stretches(const Track& track,
                                                            const std::vector<std::size_t>& used,
                                                            double share) {
@@ -91,20 +91,14 @@ std::vector<std::pair<std::size_t, std::size_t>> stretches(const Track& track,
   return result;
 }
 
-}  // namespace
+/// A range [first, second) of records.
+using Range = std::pair<std::size_t, std::size_t>;
 
-Track excerpt_of(const Track& track, double share) {
+/// Keeps the records of `ranges`, which are in order, and ahead of each what filters need to settle.
+Track with_ranges(const Track& track, const std::vector<Range>& ranges) {
   Track result = track;
-  own_neighbours(result);
-  std::vector<std::size_t> used;
-  for (std::size_t i = 0; i < track.cut.size(); ++i) {
-    if (track.cut[i] == Cut::kNone) used.push_back(i);
-  }
-  if (used.empty() || share >= 1 || !(track.duration_s() > 0)) return result;
   std::vector<std::size_t> kept;
-  for (const auto& [first, last] : stretches(track, used, share)) {
-    if (first == last) continue;
-    const std::size_t from = used[first], to = used[last - 1] + 1;
+  for (const auto& [from, to] : ranges) {
     const std::size_t before = kept.empty() ? 0 : kept.back() + 1;
     std::size_t lead = from;
     while (lead > before && track.instants[from].time_s - track.instants[lead - 1].time_s <= kLead_s) --lead;
@@ -131,6 +125,36 @@ Track excerpt_of(const Track& track, double share) {
   return result;
 }
 
+}  // namespace
+
+Track excerpt_of(const Track& track, double share) {
+  std::vector<std::size_t> used;
+  for (std::size_t i = 0; i < track.cut.size(); ++i) {
+    if (track.cut[i] == Cut::kNone) used.push_back(i);
+  }
+  if (used.empty() || share >= 1 || !(track.duration_s() > 0)) {
+    Track whole = track;
+    own_neighbours(whole);
+    return whole;
+  }
+  std::vector<Range> ranges;
+  for (const auto& [first, last] : stretches(track, used, share))
+    if (first < last) ranges.emplace_back(used[first], used[last - 1] + 1);
+  return with_ranges(track, ranges);
+}
+
+Track part_of(const Track& track, Interval part_s) {
+  const auto before = [](const stability::Instant& instant, double time_s) {
+    return instant.time_s < time_s;
+  };
+  const auto place_of = [&](double time_s) {
+    const auto at = std::lower_bound(track.instants.begin(), track.instants.end(), time_s, before);
+    return static_cast<std::size_t>(at - track.instants.begin());
+  };
+  if (track.instants.empty()) return track;
+  return with_ranges(track, {{place_of(part_s.lower), place_of(part_s.upper)}});
+}
+
 TrackStore::Kept TrackStore::loaded(const Load& load) const {
   Kept all;
   all.tracks = load(all.problems);
@@ -148,7 +172,7 @@ TrackStore::Kept TrackStore::loaded(const Load& load) const {
 
 std::vector<Track> TrackStore::tracks(const FlightFiles& flight, const Load& load,
                                       std::vector<std::string>& problems) {
-  const std::string& key = flight.logs.at(0).second;
+  const std::string key = flight.name + '\n' + flight.logs.at(0).second;
   const auto tell = [&](const Kept& known) {
     problems.insert(problems.end(), known.problems.begin(), known.problems.end());
   };

@@ -17,6 +17,9 @@ namespace swarmcert::residuals {
 /// 1 s ahead of it is kept as well, cut as Cut::kSettling.
 Track excerpt_of(const Track& track, double share);
 
+/// Returns the records of `track` within `part_s` on the flight's clock, and up to 1 s ahead of them, as excerpt_of().
+Track part_of(const Track& track, Interval part_s);
+
 /// Tracks as loaded by load_flight(), independent of the model, so that passes with other models can reuse them.
 /// Thread-safe. Tracks that do not fit into memory are loaded again each time.
 class TrackStore {
@@ -43,7 +46,7 @@ class TrackStore {
   const double share_;
   const std::size_t most_bytes_;
   std::mutex mutex_;
-  std::map<std::string, Kept> kept_;  ///< by the path of the flight's first log
+  std::map<std::string, Kept> kept_;  ///< by the name of the flight and the path of its first log
   std::size_t held_bytes_ = 0;
 };
 

@@ -21,13 +21,22 @@ class Study : public testing::Test {
     for (int run = 1; run <= count; ++run) fly(run, run);
   }
   void fly(int run, int seed) {
+    fly(source_path("stability/models/crazyflie-small-effects.toml"), 2, 25, run, seed);
+  }
+  void fly(const std::string& truth, int vehicles, int duration_s, int run, int seed) {
     const Outcome outcome = run_shell(
-        fmt::format("swarmcert simulate random-walk -q --vehicles 2 --duration 25 --seed {} --model {} "
+        fmt::format("swarmcert simulate random-walk -q --vehicles {} --duration {} --seed {} --model {} "
                     "--gains {} -o flights/{}",
-                    seed, source_path("stability/models/crazyflie-small-effects.toml"),
-                    source_path("controller/gains/crazyflie-small.toml"), run),
+                    vehicles, duration_s, seed, truth, source_path("controller/gains/crazyflie-small.toml"),
+                    run),
         folder_.path());
     ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  }
+  /// Returns the small Crazyflie with one more effect.
+  std::string truth_with(const std::string& effect) {
+    write_text(folder_ / "truth.toml",
+               read_text(source_path("stability/models/crazyflie-small.toml")) + "\n[[effect]]\n" + effect);
+    return folder_ / "truth.toml";
   }
 
   Outcome study(const std::string& words) {
@@ -75,7 +84,9 @@ TEST_F(Study, AddsWhatIsMissingAndLowersTheErrorOfTestFlights) {
             0.5 * json["before"]["test"]["rmse"]["z"].get<double>());
   for (const char* const key : {"ladder", "remainder", "next"}) EXPECT_TRUE(json[key].is_array()) << key;
   EXPECT_EQ(read_text(folder_ / "copy.json"), read_text(folder_ / "out/study.json"));
-  EXPECT_NE(outcome.output.find("Vertical error (RMS) on test flights"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("Error of the force (RMS) on flights that nothing was fitted to: "),
+            std::string::npos)
+      << outcome.output;
   // The fitted model reproduces the error stated on the page.
   EXPECT_EQ(
       run_shell("swarmcert compare out/fitted.toml flights -q --json after.json", folder_.path()).exit_code,
@@ -84,6 +95,80 @@ TEST_F(Study, AddsWhatIsMissingAndLowersTheErrorOfTestFlights) {
             json["after"]["all"]["rmse"]["z"]);
   EXPECT_NE(read_text(folder_ / "out/study.html").find("Where the model failed"), std::string::npos);
   EXPECT_EQ(study("flights -o out -q").exit_code, 3) << "a folder that is not empty is kept";
+}
+
+TEST_F(Study, EndsWithCausesTheirSizeAndACommandThatRuns) {
+  fly(3);
+  const Outcome outcome = study("flights -o out -q");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const files::Json json = result("out");
+  EXPECT_EQ(json["held_out"]["how"], "flights");
+  EXPECT_EQ(json["held_out"]["records"], json["after"]["test"]["records"]);
+  ASSERT_FALSE(json["causes"].empty());
+  double rmse_N = json["before"]["test"]["rmse"]["total"];
+  for (const files::Json& cause : json["causes"]) {
+    EXPECT_FALSE(cause["equation"].get<std::string>().empty()) << cause;
+    EXPECT_FALSE(cause["parameters"].empty()) << cause;
+    rmse_N *= 1 - cause["fall_percent"].get<double>() / 100;
+  }
+  // The falls multiply to the whole fall of the error of the vector.
+  EXPECT_NEAR(rmse_N, json["after"]["test"]["rmse"]["total"].get<double>(), 1e-6);
+  const std::string next = json["next_command"];
+  EXPECT_NE(outcome.output.find("Next: " + next), std::string::npos) << outcome.output;
+  const Outcome ran = run_shell(next, folder_.path());
+  EXPECT_EQ(ran.exit_code, 0) << next << "\n" << ran.output;
+}
+
+TEST_F(Study, GoesOnWithAFormulaWhereNoNamedEffectExplainsTheForce) {
+  const std::string truth = truth_with(
+      "name = \"updraft\"\nparameters = { a = 0.04, r = 0.3 }\n[effect.expression]\n"
+      "force_z_N = \"a * exp(-((x - 0.4)^2 + (y + 0.3)^2) / (2 * r^2))\"\nlinear = [\"a\"]\n");
+  for (int run = 1; run <= 5; ++run) fly(truth, 1, 30, run, run);
+  const Outcome outcome = study("flights -o out -q");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const files::Json json = result("out");
+  ASSERT_FALSE(json["causes"].empty()) << outcome.output;
+  EXPECT_LT(json["after"]["test"]["rmse"]["total"].get<double>(),
+            0.7 * json["before"]["test"]["rmse"]["total"].get<double>())
+      << outcome.output;
+  EXPECT_LT(json["ladder"].back()["over_noise_floor"].get<double>(), 1.2) << outcome.output;
+  EXPECT_FALSE(json["stopped"].get<std::string>().empty());
+}
+
+TEST_F(Study, ASidewaysForceIsNamedWithItsAxisAndIsTheSameEverywhere) {
+  const std::string truth = truth_with("name = \"constant_force\"\nparameters = { force_y_N = -0.02 }\n");
+  for (int run = 1; run <= 3; ++run) fly(truth, 1, 25, run, run);
+  const Outcome outcome = study("flights -o out -q");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const files::Json json = result("out");
+  EXPECT_EQ(json["fails"]["where"], "everywhere") << json["fails"];
+  EXPECT_NE(json["fails"]["words"].get<std::string>().find("towards -y"), std::string::npos) << json["fails"];
+  EXPECT_NE(outcome.output.find("most along y"), std::string::npos) << outcome.output;
+  ASSERT_EQ(json["causes"].size(), 1U) << outcome.output;
+  EXPECT_EQ(json["causes"][0]["name"], "constant_force");
+  EXPECT_GT(json["causes"][0]["fall_percent"].get<double>(), 50);
+}
+
+TEST_F(Study, OneLogIsHeldOutByPartsAndAShortOneNotAtAll) {
+  fly(source_path("stability/models/crazyflie-small-effects.toml"), 2, 60, 1, 1);
+  ASSERT_EQ(study("flights -o long -q").exit_code, 0);
+  const files::Json json = result("long");
+  EXPECT_EQ(json["held_out"]["how"], "parts of flights");
+  EXPECT_GT(json["held_out"]["records"].get<int>(), 0);
+  EXPECT_LT(json["held_out"]["records"].get<int>(), json["before"]["all"]["records"].get<int>() / 3);
+  std::set<std::string> parts;
+  for (const char* const use : {"fit", "select", "test"})
+    for (const files::Json& name : json["split"][use]) parts.insert(name.get<std::string>());
+  EXPECT_EQ(parts.size(), 5U) << json["split"];
+  EXPECT_LT(json["after"]["test"]["rmse"]["total"].get<double>(),
+            json["before"]["test"]["rmse"]["total"].get<double>());
+  std::filesystem::remove_all(folder_ / "flights");
+  fly(1);
+  ASSERT_EQ(study("flights -o short -q").exit_code, 0);
+  const files::Json alone = result("short");
+  EXPECT_EQ(alone["held_out"]["how"], "nothing");
+  EXPECT_EQ(alone["held_out"]["records"], 0);
+  for (const files::Json& row : alone["ladder"]) EXPECT_TRUE(row["test_rmse"].is_null()) << row;
 }
 
 TEST_F(Study, FlightsThatAreNamedForTheTestDecideNothing) {

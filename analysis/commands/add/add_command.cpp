@@ -36,7 +36,7 @@ struct AddOptions {
   bool keep_anyway = false, lists_effects = false;
 };
 
-std::vector<std::string> split_names(const std::string& text) {
+std::vector<std::string> names_between_commas(const std::string& text) {
   std::vector<std::string> names = files::split_at_commas(text);
   names.erase(std::remove(names.begin(), names.end(), std::string()), names.end());
   return names;
@@ -69,11 +69,12 @@ void check(const std::vector<std::string>& names, const stability::Model& model)
   }
 }
 
-void report_ladders(const AddOptions& options, const CommonOptions& common, const files::Json& result,
+void report_ladders(const AddOptions& options, const CommonOptions& common, const files::Node& result,
                     const std::vector<LadderOfModel>& ladders, const residuals::ForceUnit& unit,
                     const BeforeAfter* change = nullptr) {
   if (options.report.empty()) return;
-  const std::string path = write_ladder_report(ladders, change, unit, result, options.report, common.force);
+  const std::string path =
+      write_ladder_report(ladders, change, unit, to_json(result), options.report, common.force);
   if (common.prints_text()) fmt::print("report: {}\n", path);
 }
 
@@ -103,36 +104,32 @@ int undo(const AddOptions& options, const CommonOptions& common) {
   const std::string& path = options.flights.models[0];
   const stability::Model model = identification::undone(stability::read_model(path));
   files::write_file(options.output, stability::to_toml(model, heading_of(model)), common.force);
-  files::Json result = result_head("add", {path});
-  result["ladder"] = ladder_json(model.ladder);
-  result["effects"] = effects_json(model.effects);
+  const LadderOfModel kept = {model.path, model.ladder, model.effects};
+  const files::Node result = result_of("add", {path}, std::nullopt, AddResult{kept, {}, {}});
   write_result(common, result);
   if (common.prints_text()) {
     print_ladder(model.ladder);
     fmt::print("Written: {}\n", options.output);
   }
-  report_ladders(options, common, result, {{model.path, model.ladder, model.effects}},
-                 residuals::chosen_force_unit(options.flights.unit, model));
+  report_ladders(options, common, result, {kept}, residuals::chosen_force_unit(options.flights.unit, model));
   return kDone;
 }
 
 /// `add show`: prints the ladders stored in model files, one below the other.
 int show(const AddOptions& options, const CommonOptions& common) {
-  files::Json result = result_head("add", options.flights.models);
-  result["ladders"] = files::Json::array();
   std::vector<LadderOfModel> ladders;
   residuals::ForceUnit unit;
   for (const std::string& path : options.flights.models) {
     const stability::Model model = stability::read_model(path);
     // One page uses one unit, that of the first model.
     if (ladders.empty()) unit = residuals::chosen_force_unit(options.flights.unit, model);
-    result["ladders"].push_back(
-        {{"model", path}, {"ladder", ladder_json(model.ladder)}, {"effects", effects_json(model.effects)}});
     ladders.push_back({path, model.ladder, model.effects});
     if (!common.prints_text()) continue;
     fmt::print("{}{}\n", path, model.ladder.empty() ? ": no ladder" : "");
     if (!model.ladder.empty()) print_ladder(model.ladder);
   }
+  const files::Node result =
+      result_of("add", options.flights.models, std::nullopt, AddResult{{}, {}, ladders});
   write_result(common, result);
   report_ladders(options, common, result, ladders, unit);
   return kDone;
@@ -152,7 +149,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   identification::LadderOptions what;
   what.automatic = options.effects == "auto";
   if (!what.automatic) {
-    what.effects = split_names(options.effects);
+    what.effects = names_between_commas(options.effects);
     check(what.effects, inputs.models[0]);
   }
   what.keep_anyway = options.keep_anyway;
@@ -167,13 +164,15 @@ int climb(const AddOptions& options, const CommonOptions& common) {
     files::write_file(options.output, stability::to_toml(ladder.model, heading_of(ladder.model)),
                       common.force);
   }
-  files::Json result = result_head("add", inputs.files());
-  add_ladder(ladder, inputs, result);
-  add_clocks(clocks, common.prints_text(), result);
-  add_labels(labels, common.prints_text(), result);
-  result["written"] = ladder.any_accepted;
-  result["problems"] = ladder.problems;
-  if (!ladder.too_poor.empty()) result["reason"] = ladder.too_poor;
+  const files::Node result =
+      result_of("add", inputs.files(), std::nullopt,
+                AddResult{LadderOfModel{"On these flights", ladder.rows, ladder.model.effects},
+                          Climbed{ladder, clocks, labels},
+                          {}});
+  if (common.prints_text()) {
+    print_clock_offsets(clocks);
+    print_mislabelled(labels);
+  }
   for (const std::string& problem : few_of_each(ladder.problems)) note("warning: " + problem);
   write_result(common, result);
   if (!ladder.too_poor.empty()) {
@@ -183,7 +182,8 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   if (common.prints_text()) {
     print_ladder(ladder);
     if (ladder.any_accepted)
-      fmt::print("Written: {}\n", options.output);
+      fmt::print("Written: {}\nNext: {}\n", options.output,
+                 next_command({"compare", options.output}, options.flights, inputs, {"--horizon", "0.5"}));
     else
       fmt::print("No effect helped: {} is not written. --keep-anyway writes it nevertheless.\n",
                  options.output);
@@ -253,7 +253,8 @@ Command add_command() {
             "before and after");
         declare_unit(app, options->flights);
         return [options](const CommonOptions& common) { return run_add(*options, common); };
-      }};
+      },
+      fields_of<AddResult>()};
 }
 
 }  // namespace swarmcert::analysis

@@ -2,7 +2,9 @@
 
 #include <fmt/core.h>
 
+#include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/effect_output.h"
+#include "analysis/commands/shared/label_output.h"
 #include "analysis/identification/balance/balance_ladder.h"
 
 namespace swarmcert::analysis {
@@ -11,42 +13,78 @@ namespace {
 using identification::Ladder;
 using stability::LadderRow;
 
-files::Json names_of(const residuals::Inputs& inputs, const std::vector<int>& which) {
-  files::Json names = files::Json::array();
-  for (const int i : which) names.push_back(inputs.found.flights[static_cast<std::size_t>(i)].name);
+std::vector<std::string> names_of(const std::vector<std::string>& flights, const std::vector<int>& which) {
+  std::vector<std::string> names;
+  for (const int i : which) names.push_back(flights[static_cast<std::size_t>(i)]);
   return names;
 }
 
-files::Json json_of(const LadderRow& row) {
-  return {{"effect", row.effect},
-          {"fit_rmse", row.fit_rmse_N},
-          {"select_rmse", row.select_rmse_N},
-          {"test_rmse", row.test_rmse_N > 0 ? files::Json(row.test_rmse_N) : nullptr},
-          {"over_noise_floor", row.noise_floor_N > 0 && row.test_rmse_N > 0
-                                   ? files::Json(row.test_rmse_N / row.noise_floor_N)
-                                   : nullptr},
-          {"test_looks", row.test_looks},
-          {"accepted", row.accepted},
-          {"reason", row.note}};
+std::optional<double> if_known(bool is_known, double value) {
+  return is_known ? std::optional(value) : std::nullopt;
 }
 
 }  // namespace
 
-files::Json ladder_json(const std::vector<LadderRow>& rows) {
-  files::Json json = files::Json::array();
-  for (const LadderRow& row : rows) json.push_back(json_of(row));
-  return json;
+void describe_ladder_row(files::Record& record, const LadderRow& row) {
+  const bool is_tested = row.test_rmse_N > 0;
+  record.field("effect", row.effect, "What was added; nominal: the given model.");
+  record.field("fit_rmse", row.fit_rmse_N, "RMS of the residual vector on the flights to fit.", "N",
+               "estimate");
+  record.field("select_rmse", row.select_rmse_N, "On the flights that decide what is accepted.", "N",
+               "estimate");
+  record.field("test_rmse", if_known(is_tested, row.test_rmse_N),
+               "On flights that decide nothing; null: none.", "N", "estimate");
+  record.field("over_noise_floor",
+               if_known(is_tested && row.noise_floor_N > 0, row.test_rmse_N / row.noise_floor_N),
+               "test_rmse over what no model can explain.", "", "estimate");
+  record.field("test_looks", row.test_looks, "How often the test flights had been looked at.");
+  record.field("accepted", row.accepted, "");
+  record.field("reason", row.note, "Why it was refused, or kept nevertheless.");
 }
 
-void add_ladder(const Ladder& ladder, const residuals::Inputs& inputs, files::Json& result) {
-  result["ladder"] = ladder_json(ladder.rows);
-  result["earlier"] = ladder_json(ladder.earlier);
-  result["test_looks"] = ladder.test_looks;
-  result["split"] = {{"by_flight", ladder.split.by_flight},
-                     {"fit", names_of(inputs, ladder.split.fit)},
-                     {"select", names_of(inputs, ladder.split.select)},
-                     {"test", names_of(inputs, ladder.split.test)}};
-  result["effects"] = effects_json(ladder.model.effects);
+void describe_climb(files::Record& record, const Ladder& ladder) {
+  record.list("earlier", ladder.earlier, "Steps that the given model already has, on the flights of then.",
+              describe_ladder_row);
+  record.field("test_looks", ladder.test_looks,
+               "How often the test flights were looked at, this time included.");
+  const identification::Split& split = ladder.split;
+  record.object("split", "The use of each flight.", [&](files::Record& r) {
+    r.field("by_flight", split.by == identification::Split::By::kFlights,
+            "false: fewer than three flights; parts of them, with names that state their time, or all for "
+            "everything.");
+    r.field("fit", names_of(ladder.flights, split.fit), "");
+    r.field("select", names_of(ladder.flights, split.select), "");
+    r.field("test", names_of(ladder.flights, split.test), "");
+  });
+  record.field("stopped", ladder.stopped, "Why `auto` tried nothing further.");
+}
+
+void describe(files::Record& record, const AddResult& result) {
+  const auto describe_own = [](files::Record& r, const LadderOfModel& own) {
+    r.list("ladder", own.rows, "One row per step; errors in newton.", describe_ladder_row);
+    r.list("effects", own.effects, "Effects of the written model.", describe_effect);
+  };
+  record.may_fields(result.own.has_value(),
+                    [&](files::Record& r) { describe_own(r, result.own.value_or(LadderOfModel{})); });
+  record.may_fields(result.climbed.has_value(), [&](files::Record& r) {
+    const Climbed climbed = result.climbed.value_or(Climbed{});
+    describe_climb(r, climbed.ladder);
+    r.list("clock_offsets", climbed.clocks, "Clocks that differ, from how vehicles disturb each other.",
+           describe_clock);
+    r.list("mislabelled", climbed.labels, "Set points, paths, sensors, names or kinds of other vehicles.",
+           describe_label);
+    r.field("written", climbed.ladder.any_accepted, "Whether a model was written.");
+    r.field("problems", climbed.ladder.problems, "Logs and records that could not be used.");
+    const std::string& reason = climbed.ladder.too_poor;
+    r.may("reason", reason.empty() ? std::nullopt : std::optional(reason), "Why there is no answer.");
+  });
+  record.may_fields(result.shown.has_value(), [&](files::Record& r) {
+    r.list("ladders", result.shown.value_or(std::vector<LadderOfModel>{}), "add show: of each model file.",
+           [&](files::Record& one, const LadderOfModel& shown) {
+             one.field("model", shown.title, "Its file.");
+             describe_own(one, shown);
+           });
+  });
 }
 
 void print_ladder(const std::vector<LadderRow>& rows) {
@@ -72,12 +110,14 @@ void print_ladder(const Ladder& ladder) {
     fmt::print("The model's ladder so far, on the flights of then:\n");
     print_ladder(ladder.earlier);
   }
+  static constexpr const char* kSplitWords[] = {"", ", which are parts of flights",
+                                                " (too little to split: all for everything)"};
   fmt::print("RMSE of the {}, in newton; flights for fit / select / test: {} / {} / {}{}\n",
              what_rows_measure(ladder.rows), ladder.split.fit.size(), ladder.split.select.size(),
-             ladder.split.test.size(),
-             ladder.split.by_flight ? "" : " (too few to split: all for everything)");
+             ladder.split.test.size(), kSplitWords[static_cast<std::size_t>(ladder.split.by)]);
   print_ladder(ladder.rows);
   fmt::print("Test flights looked at: {} time{}\n", ladder.test_looks, ladder.test_looks == 1 ? "" : "s");
+  if (!ladder.stopped.empty()) fmt::print("It stopped there: {}\n", ladder.stopped);
   for (const stability::EffectSpec& effect : ladder.model.effects) {
     print_values(effect.name, effect.name + (effect.vehicle.empty() ? "" : " of " + effect.vehicle) + " ",
                  effect.parameters, effect.fit.interval);

@@ -1,19 +1,43 @@
-/// @file An error ladder as JSON and as text.
+/// @file An error ladder as result and as text.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "analysis/identification/clocks/clock_offset.h"
+#include "analysis/identification/labels/mislabelled.h"
 #include "analysis/identification/ladder.h"
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::analysis {
 
-/// Returns one entry per row: `effect`, `fit_rmse`, `select_rmse`, `test_rmse` in newton, `accepted`, `reason`.
-files::Json ladder_json(const std::vector<stability::LadderRow>& rows);
+/// Describes the rows of a ladder.
+void describe_ladder_row(files::Record& record, const stability::LadderRow& row);
+/// Describes `earlier`, `test_looks` and `split`.
+void describe_climb(files::Record& record, const identification::Ladder& ladder);
 
-/// Adds `ladder`, `earlier`, `test_looks`, `split` and `effects` to the result.
-void add_ladder(const identification::Ladder& ladder, const residuals::Inputs& inputs, files::Json& result);
+/// A ladder with the fitted values, and where it comes from.
+struct LadderOfModel {
+  std::string title;
+  std::vector<stability::LadderRow> rows;
+  std::vector<stability::EffectSpec> effects;
+};
+
+/// What `add EFFECT` did.
+struct Climbed {
+  identification::Ladder ladder;
+  std::vector<identification::ClockOffset> clocks;
+  std::vector<identification::Mislabelled> labels;
+};
+
+/// Of add EFFECT and add undo, `own` and, of the former, `climbed`; of add show, `shown`, titled by files.
+struct AddResult {
+  std::optional<LadderOfModel> own;
+  std::optional<Climbed> climbed;
+  std::optional<std::vector<LadderOfModel>> shown;
+};
+void describe(files::Record& record, const AddResult& result);
 
 /// Prints the ladder as text.
 void print_ladder(const std::vector<stability::LadderRow>& rows);

@@ -4,19 +4,13 @@
 #include <string>
 #include <vector>
 
+#include "analysis/commands/add/add_output.h"
 #include "analysis/commands/shared/before_after.h"
 #include "analysis/report/report.h"
 #include "nn/base/json.h"
 #include "stability/model.h"
 
 namespace swarmcert::analysis {
-
-/// A ladder and the model that it led to.
-struct LadderOfModel {
-  std::string title;
-  std::vector<stability::LadderRow> rows;
-  std::vector<stability::EffectSpec> effects;
-};
 
 /// The flights under the given model and under the fitted model.
 struct BeforeAfter {

@@ -12,7 +12,7 @@
 #include "analysis/commands/compare/compare_result.h"
 #include "analysis/commands/compare/log_output.h"
 #include "analysis/commands/shared/flight_options.h"
-#include "analysis/residuals/force_unit.h"
+#include "analysis/residuals/failing_place.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -98,8 +98,10 @@ void print_errors(const Comparison& comparison, const Comparison* own, const res
   fmt::print("\nRMSE of all: {:.4f} {}, 90 % interval {:.4f} .. {:.4f}; {:.1f} % of the weight.\n",
              comparison.overall.statistics.rmse.total, per_mass ? unit.name : "N", interval[3].lower,
              interval[3].upper, 100 * comparison.overall.nrmse.total);
-  fmt::print("\nWhere it fails most:\n");
-  for (std::size_t i = 0; i < comparison.regions.size() && i < 8; ++i) {
+  const residuals::FailingPlace fails = residuals::failing_place(comparison, unit);
+  fmt::print("\nWhere it fails most: {}\n", per_mass ? "by regime" : fails.words);
+  const bool is_regional = per_mass || fails.where == residuals::FailingPlace::Where::kRegion;
+  for (std::size_t i = 0; i < comparison.regions.size() && i < 8 && is_regional; ++i) {
     const residuals::RegionErrors& region = comparison.regions[i];
     fmt::print("  {} ({} records)\n", region.words, region.statistics.samples);
   }

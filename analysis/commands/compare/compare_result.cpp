@@ -6,6 +6,7 @@
 #include "analysis/commands/compare/budget_output.h"
 #include "analysis/commands/compare/log_output.h"
 #include "analysis/commands/shared/plausibility_output.h"
+#include "analysis/residuals/failing_place.h"
 #include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::analysis {
@@ -368,6 +369,10 @@ void describe_comparison(Record& record, const CompareResult& result) {
              "By the kinds of the neighbours and of the vehicle.", judged);
   record.field("mean_square_z_gf2", per_mass ? std::nullopt : std::optional(mean_squares_gf2(comparison)),
                "Mean square of the vertical residual by composition.", "gf^2");
+  record.may("fails",
+             per_mass ? std::nullopt
+                      : std::optional(residuals::failing_place(comparison, residuals::force_unit(inputs))),
+             "Where the model fails, in one line.");
   record.list("regions", comparison.regions, "Where the model fails, worst first.",
               [&judged](Record& r, const residuals::RegionErrors& region) {
                 r.field("variable", residuals::variable_name(region.variable), "");

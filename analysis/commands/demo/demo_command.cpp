@@ -128,14 +128,14 @@ std::string study_flights(const fs::path& folder, const CommonOptions& common, c
   const identification::Study study = identification::study(
       inputs, std::nullopt, common.jobs,
       [&](int done, int total, const std::string& what) { progress.show(done, total, what); });
-  files::Json answer = result_head("study", inputs.files());
-  add_study(study, inputs, answer);
   const residuals::ForceUnit unit = residuals::chosen_force_unit("N", inputs.models[0]);
-  const std::string sentence = headline(study, unit);
+  const StudyResult answer = study_result(study, unit, next_of_study(study, {}, inputs, output));
+  const std::string sentence = headline(answer, unit);
   say("   " + sentence);
   result.headline = sentence;
-  result.verdict = answer["verdict"].get<std::string>();
-  return write_study_folder(study, {}, nullptr, unit, answer, output);
+  result.verdict = name(answer.found.judgement.verdict);
+  const files::Json document = to_json(result_of("study", inputs.files(), std::nullopt, answer));
+  return write_study_folder(answer, {}, unit, document, output);
 }
 
 int run_demo(const DemoOptions& options, const CommonOptions& common) {

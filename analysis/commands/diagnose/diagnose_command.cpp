@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/host.h"
@@ -10,6 +11,7 @@
 #include "analysis/commands/diagnose/balance_output.h"
 #include "analysis/commands/diagnose/diagnose_output.h"
 #include "analysis/commands/diagnose/diagnose_report.h"
+#include "analysis/commands/diagnose/diagnose_result.h"
 #include "analysis/commands/diagnose/each_output.h"
 #include "analysis/commands/diagnose/rotor_output.h"
 #include "analysis/commands/shared/clock_output.h"
@@ -18,7 +20,6 @@
 #include "analysis/commands/shared/plausibility_output.h"
 #include "analysis/identification/diagnose.h"
 #include "analysis/identification/rotors/lone_rotor.h"
-#include "analysis/identification/verdict.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -39,17 +40,11 @@ struct Answers {
   std::vector<identification::Each> each;
 };
 
-void print_next(const std::vector<Diagnosis>& diagnoses) {
-  for (const Diagnosis& diagnosis : diagnoses) {
-    for (const std::string& flight : next_flights(diagnosis)) fmt::print("  fly {}\n", flight);
-  }
-}
-
-void add_next(const std::vector<Diagnosis>& diagnoses, files::Json& result) {
-  result["next"] = files::Json::array();
-  for (const Diagnosis& diagnosis : diagnoses) {
-    for (const std::string& flight : next_flights(diagnosis)) result["next"].push_back(flight);
-  }
+std::vector<std::string> all_next_flights(const std::vector<Diagnosis>& diagnoses) {
+  std::vector<std::string> next;
+  for (const Diagnosis& diagnosis : diagnoses)
+    for (std::string& flight : next_flights(diagnosis)) next.push_back(std::move(flight));
+  return next;
 }
 
 Answers answer(const DiagnoseOptions& options, const CommonOptions& common, const residuals::Inputs& inputs,
@@ -111,45 +106,51 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
     identification::find_and_correct_clocks(*others, common.jobs);
     other_files = add_files_of(*others, files);
   }
-  files::Json result = result_head("diagnose", files);
-  const Answers answers = answer(options, common, inputs, others ? &*others : nullptr);
-  if (common.prints_text()) print(answers);
-  add_diagnoses(answers.diagnoses, result);
-  if (others) add_differences(answers.differences, other_files, result);
-  const bool names_rotor = others && judge_rotors(inputs, *others, common.jobs, common.prints_text(), result);
-  // With --against the rotors are compared one by one with those of the healthy flights.
-  const bool names_torque = !others && judge_torques(inputs, common.jobs, common.prints_text(), result);
-  const bool names_sensor =
-      !others && judge_accelerometers(inputs, common.jobs, common.prints_text(), result);
-  const bool names_clock = judge_clocks(clocks, common.prints_text(), result);
-  const bool names_label = judge_labels(labels, common.prints_text(), result);
-  const bool is_unexplained = judge_motions(inputs, common.jobs, result);
-  if (options.each) add_each(answers.each, result);
-  if (options.next) add_next(answers.diagnoses, result);
-  if (options.next && common.prints_text()) print_next(answers.diagnoses);
-  for (const std::string& problem : few_of_each(result["problems"].get<std::vector<std::string>>()))
-    note("warning: " + problem);
-  std::string reason;
-  identification::Verdict verdict = identification::verdict_of(answers.diagnoses, reason);
-  if (names_rotor || ((names_torque || names_sensor || names_clock || names_label) &&
-                      verdict != identification::Verdict::kInconclusive))
-    verdict = identification::Verdict::kMissingEffect;
-  if (is_unexplained && verdict == identification::Verdict::kNothingMissing) {
-    verdict = identification::Verdict::kUnexplained;
-    result["verdict"] = name(verdict);
+  Answers answers = answer(options, common, inputs, others ? &*others : nullptr);
+  const bool prints = common.prints_text();
+  if (prints) print(answers);
+  DiagnoseResult result;
+  result.found = diagnosed(answers.diagnoses);
+  Judgement& judgement = result.found.judgement;
+  if (others) {
+    result.against = Against{other_files, answers.differences};
+    result.rotors = judge_rotors(inputs, *others, common.jobs, prints, judgement);
+  } else {
+    // With --against the rotors are compared one by one with those of the healthy flights.
+    result.torques = judge_torques(inputs, common.jobs, prints, judgement);
+    result.sensors = judge_accelerometers(inputs, common.jobs, prints, judgement);
   }
-  write_result(common, result);
-  if (common.prints_text()) fmt::print("verdict: {}\n", name(verdict));
+  judgement.append(ranked(clocks));
+  judgement.append(ranked(labels));
+  judge_motions(inputs, common.jobs, judgement, result.found.problems);
+  if (options.each) result.each = answers.each;
+  if (options.next) result.next = all_next_flights(answers.diagnoses);
+  if (prints) {
+    print_clock_offsets(clocks);
+    print_mislabelled(labels);
+    for (const std::string& flight : result.next.value_or(std::vector<std::string>{}))
+      fmt::print("  fly {}\n", flight);
+  }
+  for (const std::string& problem : few_of_each(result.found.problems)) note("warning: " + problem);
+  const files::Node document = result_of("diagnose", files, std::nullopt, result);
+  write_result(common, document);
+  if (prints) fmt::print("verdict: {}\n", name(judgement.verdict));
+  const bool has_more = judgement.verdict == identification::Verdict::kMissingEffect ||
+                        judgement.verdict == identification::Verdict::kUnexplained;
+  if (prints && !others && has_more && inputs.models.size() == 1)
+    fmt::print("Next: {}\n", next_command({"add", "auto", "--model", inputs.models[0].path}, options.flights,
+                                          inputs, {"-o", "fitted.toml"}));
   if (!options.report.empty()) {
     std::vector<std::string> notes;
     for (const identification::Mislabelled& label : labels) notes.push_back(sentence(label));
     for (const identification::ClockOffset& clock : clocks) notes.push_back(sentence(clock));
-    const std::string path = write_diagnose_report(answers.diagnoses, answers.differences, answers.each,
-                                                   notes, unit, result, options.report, common.force);
-    if (common.prints_text()) fmt::print("Report: {}\n", path);
+    const std::string path =
+        write_diagnose_report(answers.diagnoses, answers.differences, answers.each, notes, unit,
+                              to_json(document), options.report, common.force);
+    if (prints) fmt::print("Report: {}\n", path);
   }
-  if (verdict != identification::Verdict::kInconclusive) return kDone;
-  note("inconclusive: " + reason);
+  if (judgement.verdict != identification::Verdict::kInconclusive) return kDone;
+  note("inconclusive: " + judgement.reason);
   return kInconclusive;
 }
 
@@ -182,7 +183,8 @@ Command diagnose_command() {
         add_output(app, "--report", options->report, "Write an HTML report into this folder");
         declare_unit(app, options->flights);
         return [options](const CommonOptions& common) { return run_diagnose(*options, common); };
-      }};
+      },
+      fields_of<DiagnoseResult>()};
 }
 
 }  // namespace swarmcert::analysis

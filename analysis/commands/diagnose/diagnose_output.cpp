@@ -8,72 +8,12 @@
 #include "analysis/commands/diagnose/remainder_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/identification/verdict.h"
-#include "nn/base/json_number.h"
 
 namespace swarmcert::analysis {
 namespace {
 
 using identification::Diagnosis;
 using identification::Missing;
-
-constexpr const char* kDetectableMeaning =
-    "the smallest size that these flights show in 90 % of injections (open loop: column times size is added "
-    "to the residual of resampled blocks; the flight does not react); null: not at any size within the "
-    "physical bounds; nothing_missing means none above these sizes, and nothing left above three times the "
-    "noise floor";
-
-files::Json json_of(const identification::InstrumentedValue& value, double beyond) {
-  return {{"least_squares", beyond + value.least_squares},
-          {"instrument", beyond + value.instrument},
-          {"interval_90", {beyond + value.interval.lower, beyond + value.interval.upper}},
-          {"difference_z", value.difference_z},
-          {"verdict", !value.is_strong()    ? "too_weak"
-                      : value.contradicts() ? "contradicts"
-                                            : "agrees"}};
-}
-
-/// Effects that no flight can tell apart, followed by those that these flights cannot tell apart.
-std::string class_of(const Missing& missing) {
-  std::string all = missing.equivalence_class;
-  for (const identification::Rival& rival : missing.finding.rivals) all += " / " + rival.effect;
-  return all;
-}
-
-files::Json json_of(const Missing& missing) {
-  const identification::Finding& finding = missing.finding;
-  files::Json model_form = files::Json::object(), instrument = files::Json::object();
-  for (std::size_t c = 0; c < missing.coefficients.size(); ++c) {
-    const std::string& name = missing.coefficients[c];
-    const double beyond = shown_beyond_file(missing.effect, name);
-    if (c < finding.model_form.size())
-      model_form[name] = {beyond + finding.model_form[c].lower, beyond + finding.model_form[c].upper};
-    if (c < missing.instrument.size()) instrument[name] = json_of(missing.instrument[c], beyond);
-  }
-  files::Json rivals = files::Json::array();
-  for (const identification::Rival& rival : finding.rivals)
-    rivals.push_back({{"effect", rival.effect}, {"fly", rival.excitation}});
-  files::Json json = {{"effect", missing.effect},
-                      {"kind", missing.kind},
-                      {"rmse_before", finding.rmse_before_N},
-                      {"rmse_after", finding.rmse_after_N},
-                      {"drop", 1 - finding.rmse_after_N / finding.rmse_before_N},
-                      {"drop_ci", finding.drop_interval},
-                      {"parameters", values_json(missing.effect, missing.parameters, missing.intervals)},
-                      {"per_vehicle", !missing.specs.empty() && !missing.specs[0].vehicle.empty()},
-                      {"model_form", std::move(model_form)},
-                      {"instrument", std::move(instrument)},
-                      {"class", class_of(missing)},
-                      {"confounded_with", finding.confounded_with()},
-                      {"rivals", std::move(rivals)},
-                      {"separated_by", missing.excitation},
-                      {"paired_z", finding.paired_z},
-                      {"wald_z", finding.wald_z},
-                      {"records_in_support", finding.support.records},
-                      {"blocks_in_support", finding.support.blocks},
-                      {"flights_in_support", finding.support.flights}};
-  if (is_sensor_error(missing.effect)) json["sensor"] = true;
-  return json;
-}
 
 void print(const Missing& missing, int flights) {
   const identification::Finding& finding = missing.finding;
@@ -96,34 +36,6 @@ void print(const Missing& missing, int flights) {
   for (const identification::Rival& rival : finding.rivals)
     fmt::print("    these flights cannot distinguish it from {}; flights that would: {}; {}\n", rival.effect,
                missing.excitation, rival.excitation);
-}
-
-files::Json json_of(const Diagnosis& diagnosis) {
-  files::Json kind = {{"kind", diagnosis.kind},
-                      {"records", diagnosis.records},
-                      {"blocks", diagnosis.blocks},
-                      {"searched_blocks", diagnosis.searched_blocks},
-                      {"flights", diagnosis.flights},
-                      {"rmse_before", diagnosis.rmse_before_N},
-                      {"rmse_after", diagnosis.rmse_after_N},
-                      {"too_poor", diagnosis.too_poor},
-                      {"closed_loop_artefacts", diagnosis.contradicted},
-                      {"suspected", diagnosis.suspected},
-                      {"at_bound", diagnosis.at_bound}};
-  if (diagnosis.thrust_scale.is_known) {
-    const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
-    kind["thrust_scale"] = {{"least_squares", 1 + scale.least_squares},
-                            {"instrument", 1 + scale.instrument},
-                            {"interval_90", {1 + scale.interval.lower, 1 + scale.interval.upper}},
-                            {"difference_z", scale.difference_z}};
-  }
-  return kind;
-}
-
-files::Json json_of(const identification::Detectable& entry, const std::string& kind) {
-  return {{"effect", entry.effect},       {"kind", kind},
-          {"parameter", entry.parameter}, {"size", files::finite(entry.size)},
-          {"shape", entry.shape},         {"excitation", entry.excitation}};
 }
 
 }  // namespace
@@ -186,59 +98,6 @@ void print_diagnosis(const Diagnosis& diagnosis) {
   }
 }
 
-void add_diagnoses(const std::vector<Diagnosis>& diagnoses, files::Json& result) {
-  files::Json ranking = files::Json::array(), detectable = files::Json::array(), kinds = files::Json::array();
-  files::Json depends_on = files::Json::array(), left = files::Json::array();
-  bool flag = false;
-  double ratio = 0;
-  std::vector<std::string> problems;
-  for (const Diagnosis& diagnosis : diagnoses) {
-    for (const std::string& problem : diagnosis.problems)
-      if (std::find(problems.begin(), problems.end(), problem) == problems.end()) problems.push_back(problem);
-    for (const Missing& missing : diagnosis.ranking) {
-      ranking.push_back(json_of(missing));
-      if (!diagnosis.vehicle.empty()) ranking.back()["vehicle"] = diagnosis.vehicle;
-    }
-    for (const identification::Detectable& entry : diagnosis.detectable)
-      detectable.push_back(json_of(entry, diagnosis.kind));
-    const identification::Remainder& rest = diagnosis.remainder;
-    flag = flag || rest.stands_out();
-    ratio = std::max(ratio, rest.ratio);
-    for (const std::string& variable : rest.depends_on) depends_on.push_back(variable);
-    for (files::Json& entry : remainder_json(diagnosis)) left.push_back(std::move(entry));
-    kinds.push_back(json_of(diagnosis));
-  }
-  std::string reason;
-  result["verdict"] = name(identification::verdict_of(diagnoses, reason));
-  result["ranking"] = std::move(ranking);
-  result["unexplained"] = {{"flag", flag}, {"ratio", ratio}, {"depends_on", std::move(depends_on)}};
-  result["remainder"] = std::move(left);
-  result["detectable"] = std::move(detectable);
-  result["detectable_meaning"] = kDetectableMeaning;
-  result["kinds"] = std::move(kinds);
-  result["problems"] = problems;
-  if (!reason.empty()) result["reason"] = reason;
-}
-
-void add_differences(const std::vector<identification::Difference>& differences,
-                     const std::vector<std::string>& other_flights, files::Json& result) {
-  files::Json vehicles = files::Json::array();
-  for (const identification::Difference& difference : differences) {
-    files::Json within = files::Json::array();
-    for (const Missing& missing : difference.within_scatter) within.push_back(json_of(missing));
-    vehicles.push_back({{"vehicle", difference.vehicle},
-                        {"kind", difference.diagnosis.kind},
-                        {"same_vehicle", difference.against_itself},
-                        {"held", effects_json(difference.held)},
-                        {"grouped_by", difference.grouped_by},
-                        {"groups", difference.own_groups},
-                        {"other_groups", difference.other_groups},
-                        {"scatter_known", difference.no_scatter.empty()},
-                        {"within_scatter", std::move(within)}});
-  }
-  result["against"] = {{"flights", other_flights}, {"vehicles", std::move(vehicles)}};
-}
-
 std::string in_words(const identification::Difference& difference) {
   std::string held;
   for (const stability::EffectSpec& spec : difference.held) held += (held.empty() ? "" : ", ") + spec.name;
@@ -258,6 +117,9 @@ std::vector<std::string> next_flights(const Diagnosis& diagnosis) {
   const auto add = [&next](const std::string& flight) {
     if (!flight.empty() && std::find(next.begin(), next.end(), flight) == next.end()) next.push_back(flight);
   };
+  const bool is_open = !diagnosis.ranking.empty() || identification::leaves_something(diagnosis);
+  if (!diagnosis.has_set_points && is_open && diagnosis.too_poor.empty())
+    add("with the set points in the log: they tell what the controller answered from what it caused");
   for (const Missing& missing : diagnosis.ranking) {
     for (const identification::Rival& rival : missing.finding.rivals)
       add(fmt::format("to separate {} from {}: {}; {}", missing.effect, rival.effect, missing.excitation,

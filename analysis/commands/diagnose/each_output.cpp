@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 
+#include "analysis/commands/shared/effect_output.h"
 #include "analysis/report/report_text.h"
 
 namespace swarmcert::analysis {
@@ -17,15 +19,13 @@ using identification::EachFlight;
 using identification::FlightNumber;
 using identification::FlightNumbers;
 
-files::Json json_of(const FlightNumber& number) {
-  if (!number.is_observable) return nullptr;
-  return {{"value", number.value}, {"interval_90", number.interval}};
-}
-
-void put(const FlightNumbers& numbers, files::Json& json) {
+void describe_numbers(files::Record& record, const FlightNumbers& numbers) {
   for (const std::string& name : identification::each_numbers()) {
     const auto number = numbers.find(name);
-    json[name] = number == numbers.end() ? files::Json(nullptr) : json_of(number->second);
+    std::optional<FittedValue> shown;
+    if (number != numbers.end() && number->second.is_observable)
+      shown = FittedValue{number->second.value, number->second.interval};
+    record.field(name.c_str(), shown, "A factor where 1 is nominal; null: not shown.");
   }
 }
 
@@ -101,35 +101,41 @@ bool add_plot(Report& report, const Each& each, const std::string& number, const
 
 }  // namespace
 
-void add_each(const std::vector<Each>& kinds, files::Json& result) {
-  files::Json flights = files::Json::array(), days = files::Json::array(), drifts = files::Json::array();
+void describe_each(files::Record& record, const std::vector<Each>& kinds) {
+  Each all;
   for (const Each& each : kinds) {
-    for (const EachFlight& flight : each.flights) {
-      files::Json row = {{"flight", flight.flight}, {"day", flight.day},       {"vehicle", flight.vehicle},
-                         {"kind", flight.kind},     {"blocks", flight.blocks}, {"too_poor", flight.too_poor}};
-      put(flight.numbers, row);
-      row["outlier"] = outliers_of(flight);
-      flights.push_back(std::move(row));
-    }
-    for (const EachDay& day : each.days) {
-      files::Json row = {
-          {"day", day.day}, {"vehicle", day.vehicle}, {"kind", day.kind}, {"flights", day.flights}};
-      put(day.numbers, row);
-      days.push_back(std::move(row));
-    }
-    for (const Drift& drift : each.drifts) {
-      drifts.push_back({{"number", drift.number},
-                        {"vehicle", drift.vehicle},
-                        {"kind", drift.kind},
-                        {"per_flight", drift.per_flight},
-                        {"interval_90", drift.interval},
-                        {"flights", drift.flights},
-                        {"drifts", drift.is_there}});
-    }
+    all.flights.insert(all.flights.end(), each.flights.begin(), each.flights.end());
+    all.days.insert(all.days.end(), each.days.begin(), each.days.end());
+    all.drifts.insert(all.drifts.end(), each.drifts.begin(), each.drifts.end());
   }
-  result["each"] = std::move(flights);
-  result["each_days"] = std::move(days);
-  result["each_drifts"] = std::move(drifts);
+  record.list(
+      "each", all.flights, "One row per vehicle and flight.", [](files::Record& r, const EachFlight& flight) {
+        r.field("flight", flight.flight, "");
+        r.field("day", flight.day, "");
+        r.field("vehicle", flight.vehicle, "");
+        r.field("kind", flight.kind, "");
+        r.field("blocks", flight.blocks, "Of 2 s.");
+        r.field("too_poor", flight.too_poor, "Why there are no numbers; empty if there are.");
+        describe_numbers(r, flight.numbers);
+        r.field("outlier", outliers_of(flight), "Numbers that stand out among the vehicle's flights.");
+      });
+  record.list("each_days", all.days, "Means of days.", [](files::Record& r, const EachDay& day) {
+    r.field("day", day.day, "");
+    r.field("vehicle", day.vehicle, "");
+    r.field("kind", day.kind, "");
+    r.field("flights", day.flights, "");
+    describe_numbers(r, day.numbers);
+  });
+  record.list("each_drifts", all.drifts, "Changes from one flight to the next.",
+              [](files::Record& r, const Drift& drift) {
+                r.field("number", drift.number, "");
+                r.field("vehicle", drift.vehicle, "");
+                r.field("kind", drift.kind, "");
+                r.field("per_flight", drift.per_flight, "", "", "estimate");
+                r.field("interval_90", drift.interval, "");
+                r.field("flights", drift.flights, "");
+                r.field("drifts", drift.is_there, "The 99 % interval excludes zero.");
+              });
 }
 
 void print_each(const Each& each) {

@@ -1,16 +1,16 @@
-/// @file The table over flights and days of `diagnose --each` as JSON, text and plots.
+/// @file The table over flights and days of `diagnose --each` as result, text and plots.
 #pragma once
 
 #include <vector>
 
 #include "analysis/identification/fleet/each.h"
 #include "analysis/report/report.h"
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::analysis {
 
-/// Adds `each[]`, `each_days[]`, `each_drifts[]`. A parameter that a flight does not reveal is null.
-void add_each(const std::vector<identification::Each>& kinds, files::Json& result);
+/// Describes `each`, `each_days`, `each_drifts`. A parameter that a flight does not reveal is null.
+void describe_each(files::Record& record, const std::vector<identification::Each>& kinds);
 
 /// Prints text lines: flights, then days with more than one flight, then drifts.
 void print_each(const identification::Each& each);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -51,16 +52,6 @@ std::string verdict_of(const ScanEntry& entry) {
   return entry.slope.interval.upper < 1 ? "contradicts" : "agrees";
 }
 
-files::Json curve_json(const ScanEntry& entry) {
-  files::Json points = files::Json::array();
-  for (const CurvePoint& point : entry.curve) {
-    points.push_back({{"at", point.at},
-                      {is_torque(entry) ? "torque_Nm" : "force_N", point.value},
-                      {"interval_90", point.interval}});
-  }
-  return points;
-}
-
 /// An entry from the scan of the force, or of the torques and rotors.
 struct Listed {
   const ScanEntry* entry = nullptr;
@@ -100,24 +91,50 @@ std::vector<Listed> all_listed(const Diagnosis& diagnosis) {
   return all;
 }
 
-files::Json json_of(const ScanEntry& entry, const std::string& kind) {
-  files::Json json = {{"variable", entry.variable},
-                      {"quantity", entry.quantity},
-                      {"frame", entry.frame},
-                      {"axis", entry.axis},
-                      {"kind", kind},
-                      {"share", entry.share},
-                      {"share_ci", entry.share_interval},
-                      {"uncorrected_share", entry.uncorrected_share},
-                      {"curve", curve_json(entry)},
-                      {"expression", nullptr},
-                      {"rmse_before", entry.rmse_before},
-                      {"rmse_after", entry.rmse_after},
-                      {"set_points", verdict_of(entry)}};
-  if (entry.lag_s > 0) json["lag_s"] = entry.lag_s;
-  if (entry.over_ground) json["over_ground"] = true;
-  if (entry.period_s > 0) json["period_s"] = entry.period_s;
-  return json;
+/// A row of `remainder`.
+struct RemainderRow {
+  ScanEntry entry;
+  std::optional<identification::Formula> formula;
+  std::string kind;
+};
+
+template <class T>
+std::optional<T> if_positive(T value) {
+  return value > 0 ? std::optional(value) : std::nullopt;
+}
+
+void describe_remainder_row(files::Record& record, const RemainderRow& row) {
+  const ScanEntry& entry = row.entry;
+  record.field("variable", entry.variable, "It varies with this; body_constant: with nothing.");
+  record.field("quantity", entry.quantity, "force, torque or rotor_force.");
+  record.field("frame", entry.frame, "world, body, neighbour or velocity.");
+  record.field("axis", entry.axis, "");
+  record.field("kind", row.kind, "Kind of vehicle.");
+  record.field("share", entry.share, "Of the mean square, corrected for the controller's reaction.", "",
+               "estimate");
+  record.field("share_ci", entry.share_interval, "90 % interval of share.");
+  record.field("uncorrected_share", entry.uncorrected_share, "Before the correction.", "", "estimate");
+  record.list("curve", entry.curve, "Its mean over the variable.",
+              [&](files::Record& r, const CurvePoint& point) {
+                r.field("at", point.at, "One number, or two for a map.");
+                const bool torque = is_torque(entry);
+                r.may(torque ? "torque_Nm" : "force_N", std::optional(point.value), "", torque ? "N m" : "N",
+                      "estimate");
+                if (r.is_shape()) r.may("torque_Nm", std::optional(0.0), "Of torques.", "N m", "estimate");
+                r.field("interval_90", point.interval, "From fits without one part of the data.");
+              });
+  record.field("expression", row.formula ? std::optional(to_toml(*row.formula)) : std::nullopt,
+               "The formula as a part of a model file; null: none fits.");
+  record.field("rmse_before", entry.rmse_before, "Without the curve.", "N, N m");
+  record.field("rmse_after", entry.rmse_after, "With it.", "N, N m");
+  record.field("set_points", verdict_of(entry), "not_applicable, too_weak, contradicts or agrees.");
+  record.may("lag_s", if_positive(entry.lag_s), "Age of the neighbour's state.", "s");
+  record.may("over_ground", entry.over_ground ? std::optional(true) : std::nullopt,
+             "The neighbour's velocity, not minus the vehicle's.");
+  record.may("period_s", if_positive(entry.period_s), "Of a periodic force.", "s");
+  record.may("form", row.formula ? std::optional(row.formula->form) : std::nullopt, "Form of the formula.");
+  record.may("saved_bits", row.formula ? std::optional(row.formula->saved_bits) : std::nullopt,
+             "By which the formula shortens the description of the data.", "bit", "estimate");
 }
 
 std::string place_of(const ScanEntry& entry) {
@@ -182,18 +199,14 @@ void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
 
 }  // namespace
 
-files::Json remainder_json(const Diagnosis& diagnosis) {
-  files::Json entries = files::Json::array();
-  for (const auto& [entry, formula] : all_listed(diagnosis)) {
-    files::Json json = json_of(*entry, diagnosis.kind);
-    if (formula != nullptr) {
-      json["expression"] = to_toml(*formula);
-      json["form"] = formula->form;
-      json["saved_bits"] = formula->saved_bits;
-    }
-    entries.push_back(std::move(json));
+void describe_remainder(files::Record& record, const std::vector<Diagnosis>& diagnoses) {
+  std::vector<RemainderRow> rows;
+  for (const Diagnosis& diagnosis : diagnoses) {
+    for (const auto& [entry, formula] : all_listed(diagnosis))
+      rows.push_back({*entry, formula == nullptr ? std::nullopt : std::optional(*formula), diagnosis.kind});
   }
-  return entries;
+  record.list("remainder", rows, "What is left of forces, torques and rotors, variable by variable.",
+              describe_remainder_row);
 }
 
 void print_remainder(const Diagnosis& diagnosis) {

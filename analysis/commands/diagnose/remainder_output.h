@@ -2,16 +2,17 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "analysis/identification/diagnose.h"
 #include "analysis/report/report.h"
 #include "analysis/residuals/force_unit.h"
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::analysis {
 
-/// Returns `remainder[]` for one kind of vehicle, best first.
-files::Json remainder_json(const identification::Diagnosis& diagnosis);
+/// Describes `remainder`, for each kind of vehicle best first.
+void describe_remainder(files::Record& record, const std::vector<identification::Diagnosis>& diagnoses);
 
 /// Prints the first few entries, one line each.
 void print_remainder(const identification::Diagnosis& diagnosis);

@@ -2,9 +2,10 @@
 
 #include <fmt/core.h>
 
-#include <cmath>
+#include <array>
+#include <optional>
+#include <string>
 
-#include "analysis/identification/verdict.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::analysis {
@@ -12,62 +13,37 @@ namespace {
 
 using identification::RotorBalance;
 
-std::vector<double> numbers(const Eigen::Vector4d& four) { return {four.data(), four.data() + four.size()}; }
+std::array<double, 4> numbers(const Eigen::Vector4d& four) { return {four[0], four[1], four[2], four[3]}; }
 
-files::Json factors_json(const RotorBalance& balance) {
-  files::Json json = files::Json::object();
-  for (std::size_t k = 0; k < balance.factors.size(); ++k) {
-    const identification::RotorFactor& factor = balance.factors[k];
-    json["rotor_" + std::to_string(k + 1)] = {{"value", factor.value}, {"interval_90", factor.interval}};
-  }
-  return json;
-}
-
-files::Json json_of(const RotorBalance& balance) {
-  return {{"vehicle", balance.vehicle},
-          {"flight", balance.flight.empty() ? files::Json(nullptr) : files::Json(balance.flight)},
-          {"flights", balance.flights},
-          {"healthy_flights", balance.healthy_flights},
-          {"load_N", numbers(balance.load_N)},
-          {"healthy_load_N", numbers(balance.healthy_N)},
-          {"rise_N", numbers(balance.rise_N)},
-          {"least_rise_N", balance.least_rise_N},
-          {"parameters", factors_json(balance)},
-          {"rotor", balance.rotor == 0 ? files::Json(nullptr) : files::Json(balance.rotor)},
-          {"statement", identification::in_words(balance)}};
+FittedValues factors_of(const RotorBalance& balance) {
+  FittedValues factors;
+  for (std::size_t k = 0; k < balance.factors.size(); ++k)
+    factors["rotor_" + std::to_string(k + 1)] = {balance.factors[k].value, balance.factors[k].interval};
+  return factors;
 }
 
 /// Returns the ranking entry: its errors are those of the four rotor loads, relative to healthy flights.
-files::Json ranking_entry(const RotorBalance& balance, const std::string& kind) {
+Ranked ranked_rotor(const RotorBalance& balance, const std::string& kind) {
   Eigen::Vector4d left_N = balance.rise_N;
   left_N[balance.rotor - 1] = 0;
-  const double before_N = balance.rise_N.norm() / 2, after_N = left_N.norm() / 2;
   const stability::EffectInfo& info = stability::effect_info(identification::rotor_effect());
-  return {{"effect", info.name},
-          {"kind", kind},
-          {"vehicle", balance.vehicle},
-          {"rmse_before", before_N},
-          {"rmse_after", after_N},
-          {"drop", 1 - after_N / before_N},
-          {"drop_ci", {nullptr, nullptr}},
-          {"parameters", factors_json(balance)},
-          {"per_vehicle", true},
-          {"model_form", files::Json::object()},
-          {"instrument", files::Json::object()},
-          {"class", info.equivalence_class},
-          {"confounded_with", {"payload"}},
-          {"rivals", {{{"effect", "payload"}, {"fly", info.excitation}}}},
-          {"separated_by", info.excitation},
-          {"paired_z", nullptr},
-          {"wald_z", nullptr},
-          {"records_in_support", balance.records},
-          {"blocks_in_support", balance.flights},
-          {"flights_in_support", balance.flights},
-          {"rotor", balance.rotor},
-          {"statement", identification::in_words(balance)}};
+  Ranked entry;
+  entry.effect = info.name;
+  entry.kind = kind;
+  entry.vehicle = balance.vehicle;
+  entry.rmse_before_N = balance.rise_N.norm() / 2;
+  entry.rmse_after_N = left_N.norm() / 2;
+  entry.drop = 1 - entry.rmse_after_N / entry.rmse_before_N;
+  entry.parameters = factors_of(balance);
+  entry.equivalence_class = info.equivalence_class;
+  entry.rivals.push_back({{"payload"}, kUnknown, info.excitation});
+  entry.separated_by = info.excitation;
+  entry.records = balance.records;
+  entry.blocks = entry.flights = static_cast<std::size_t>(balance.flights);
+  entry.rotor = balance.rotor;
+  entry.statement = identification::in_words(balance);
+  return entry;
 }
-
-}  // namespace
 
 void print_rotors(const std::vector<RotorBalance>& balances) {
   int of_vehicle = 0;
@@ -82,35 +58,40 @@ void print_rotors(const std::vector<RotorBalance>& balances) {
   }
 }
 
-bool add_rotors(const std::vector<RotorBalance>& balances, const std::string& kind, files::Json& result) {
-  files::Json ranking = files::Json::array();
-  files::Json& rotors = result["rotors"];
-  if (rotors.is_null()) rotors = files::Json::array();
-  for (const RotorBalance& balance : balances) {
-    rotors.push_back(json_of(balance));
-    if (balance.flight.empty() && balance.rotor != 0) ranking.push_back(ranking_entry(balance, kind));
-  }
-  const bool is_named = !ranking.empty();
-  for (files::Json& entry : result["ranking"]) ranking.push_back(std::move(entry));
-  result["ranking"] = std::move(ranking);
-  if (is_named) {
-    result["verdict"] = identification::name(identification::Verdict::kMissingEffect);
-    result.erase("reason");
-  }
-  return is_named;
-}
+}  // namespace
 
-bool judge_rotors(const residuals::Inputs& inputs, const residuals::Inputs& healthy, int jobs, bool prints,
-                  files::Json& result) {
-  bool is_named = false;
+std::vector<RotorBalance> judge_rotors(const residuals::Inputs& inputs, const residuals::Inputs& healthy,
+                                       int jobs, bool prints, Judgement& judgement) {
+  std::vector<RotorBalance> all;
   for (const stability::Model& model : inputs.models) {
     const std::vector<RotorBalance> balances =
         identification::rotor_balances(identification::rotor_loads(inputs, model.kind, jobs),
                                        identification::rotor_loads(healthy, model.kind, jobs), model);
     if (prints) print_rotors(balances);
-    is_named = add_rotors(balances, model.kind, result) || is_named;
+    std::vector<Ranked> named;
+    for (const RotorBalance& balance : balances)
+      if (balance.flight.empty() && balance.rotor != 0) named.push_back(ranked_rotor(balance, model.kind));
+    if (!named.empty()) judgement.verdict = identification::Verdict::kMissingEffect;
+    judgement.ranking.insert(judgement.ranking.begin(), named.begin(), named.end());
+    all.insert(all.end(), balances.begin(), balances.end());
   }
-  return is_named;
+  return all;
+}
+
+void describe_rotors(files::Record& record, const RotorBalance& balance) {
+  record.field("vehicle", balance.vehicle, "");
+  record.field("flight", balance.flight.empty() ? std::nullopt : std::optional(balance.flight),
+               "null: all flights of the vehicle.");
+  record.field("flights", balance.flights, "");
+  record.field("healthy_flights", balance.healthy_flights, "");
+  record.field("load_N", numbers(balance.load_N), "Front right, back right, back left, front left.", "N");
+  record.field("healthy_load_N", numbers(balance.healthy_N), "The same of healthy flights.", "N");
+  record.field("rise_N", numbers(balance.rise_N), "Over the mean of the two rotors that rose least.", "N");
+  record.field("least_rise_N", balance.least_rise_N, "That names a rotor.", "N");
+  record.field("parameters", factors_of(balance), "Fractions of the previous thrust; 1: unchanged.");
+  record.field("rotor", balance.rotor == 0 ? std::nullopt : std::optional(balance.rotor),
+               "Weak, or with a load near it; null: none is named.");
+  record.field("statement", record.is_shape() ? "" : identification::in_words(balance), "It in words.");
 }
 
 }  // namespace swarmcert::analysis

@@ -10,21 +10,11 @@
 #include "analysis/commands/commands.h"
 #include "analysis/commands/schema/file_kinds.h"
 #include "nn/base/suggest.h"
+#include "nn/base/text.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::analysis {
 namespace {
-
-/// "mass / payload / thrust scale" as its three names.
-std::vector<std::string> names_of_class(const std::string& text) {
-  std::vector<std::string> names;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find(" / ", begin), text.size());
-    names.push_back(text.substr(begin, end - begin));
-    begin = end + 3;
-  }
-  return names;
-}
 
 std::string parameter_text(const stability::Parameter& parameter) {
   return fmt::format("{}: {}, between {:g} and {:g}", parameter.name, parameter.meaning, parameter.lower,
@@ -140,7 +130,7 @@ std::vector<GlossaryEntry> effect_entries() {
 std::vector<GlossaryEntry> explain(const std::string& word) {
   std::vector<GlossaryEntry> entries;
   for (const GlossaryEntry& effect : effect_entries()) {
-    const std::vector<std::string> others = names_of_class(effect.same_as);
+    const std::vector<std::string> others = files::split_at(effect.same_as, " / ");
     if (effect.name == word || std::find(others.begin(), others.end(), word) != others.end())
       entries.push_back(effect);
   }
@@ -153,7 +143,7 @@ std::vector<std::string> glossary_words() {
   std::vector<std::string> words;
   for (const GlossaryEntry& effect : effect_entries()) {
     words.push_back(effect.name);
-    for (const std::string& name : names_of_class(effect.same_as)) words.push_back(name);
+    for (const std::string& name : files::split_at(effect.same_as, " / ")) words.push_back(name);
   }
   for_each_described_field([&words](const files::Node& field, const std::string&) {
     words.push_back(field.name);
@@ -168,7 +158,7 @@ std::string effect_suggestion(const std::string& name, const std::vector<std::st
   std::vector<std::string> words = known;
   std::map<std::string, std::string> effect_of;
   for (const GlossaryEntry& effect : effect_entries()) {
-    for (const std::string& other : names_of_class(effect.same_as)) {
+    for (const std::string& other : files::split_at(effect.same_as, " / ")) {
       words.push_back(other);
       effect_of[other] = effect.name;
     }

@@ -23,7 +23,7 @@ struct MapSize {
 /// gnuplot commands for two maps of NAME.dat with a common colour scale, columns 3 (before) and 4 (after). On narrow
 /// screens the maps are stacked, in a drawing of twice the height.
 std::string two_maps(const std::string& name, const std::string& x, const std::string& y, const MapSize& size,
-                     const residuals::ForceUnit& unit) {
+                     char along, const residuals::ForceUnit& unit) {
   const std::string file = "'" + name + ".dat'";
   return "stats " + file + " using 3 nooutput\nlow = STATS_min; high = STATS_max\nstats " + file +
          " using 4 nooutput\nlow = STATS_min < low ? STATS_min : low\n"
@@ -31,8 +31,8 @@ std::string two_maps(const std::string& name, const std::string& x, const std::s
          "set cbrange [-(m > 0 ? m : 1):(m > 0 ? m : 1)]\nset palette @signed_colours\nset key off\n"
          "set xlabel '" +
          x + "'\nset ylabel '" + y +
-         fmt::format("'\nset xtics {:g}\nset ytics {:g}\nset cblabel 'mean vertical residual [{}]'\n",
-                     tick_step(size.x), tick_step(size.y), unit.name) +
+         fmt::format("'\nset xtics {:g}\nset ytics {:g}\nset cblabel 'mean residual along {} [{}]'\n",
+                     tick_step(size.x), tick_step(size.y), along, unit.name) +
          "if (exists('narrow')) { set terminal svg size 400,680 dynamic noenhanced font 'sans-serif,13'; "
          "set multiplot layout 2,1 } else { set multiplot layout 1,2 }\n"
          "set title 'before'\nplot " +
@@ -61,9 +61,11 @@ void add_room(Report& report, const RoomMap& map, const residuals::ForceUnit& un
   report.figure(
       "room", data,
       two_maps("room", "x [m]", "y [m]", {RoomMap::kCells * map.step_m[0], RoomMap::kCells * map.step_m[1]},
-               unit),
-      "Mean vertical residual over the position in the room, before and after, with a common colour scale; "
-      "cells of fewer than 20 records are empty.");
+               "xyz"[map.axis], unit),
+      fmt::format(
+          "Mean residual along {} over the position in the room, before and after, with a common colour "
+          "scale; cells of fewer than 20 records are empty.",
+          "xyz"[map.axis]));
 }
 
 void add_neighbours(Report& report, const residuals::NeighbourMap& before,
@@ -87,21 +89,26 @@ void add_neighbours(Report& report, const residuals::NeighbourMap& before,
     data += "\n";
   }
   if (!any) return;
-  report.figure("neighbours", data,
-                two_maps("neighbours", "lateral distance [m]", "height of the neighbour above [m]",
-                         {Map::kLateral * Map::kLateralStep_m, Map::kHeights * Map::kHeightStep_m}, unit),
-                "Mean vertical residual over the position of the laterally nearest neighbour, before and "
-                "after, with a common colour scale.");
+  report.figure(
+      "neighbours", data,
+      two_maps("neighbours", "lateral distance [m]", "height of the neighbour above [m]",
+               {Map::kLateral * Map::kLateralStep_m, Map::kHeights * Map::kHeightStep_m}, 'z', unit),
+      "Mean vertical residual over the position of the laterally nearest neighbour, before and "
+      "after, with a common colour scale.");
 }
 
 /// Plots the mean of the residual over the ranges of one variable, before and after.
 void add_variable(Report& report, const residuals::Comparison& before, const residuals::Comparison& after,
-                  int variable, const residuals::ForceUnit& unit) {
+                  int variable, int axis, const residuals::ForceUnit& unit) {
   const auto mean_of = [&](const residuals::Comparison& comparison,
                            int region) -> const residuals::RegionErrors* {
     for (const residuals::RegionErrors& candidate : comparison.regions)
       if (candidate.variable == variable && candidate.region == region) return &candidate;
     return nullptr;
+  };
+  const auto mean_N = [axis](const residuals::RegionErrors& region) {
+    const residuals::Axes& bias = region.statistics.bias;
+    return axis == 0 ? bias.x : axis == 1 ? bias.y : bias.z;
   };
   std::string data = "# value before after\n";
   int points = 0;
@@ -110,19 +117,18 @@ void add_variable(Report& report, const residuals::Comparison& before, const res
     const residuals::RegionErrors* is = mean_of(after, region);
     if (was == nullptr || is == nullptr) continue;
     ++points;
-    data +=
-        fmt::format("{:.6g} {:.6g} {:.6g}\n", residuals::region_middle(variable, region),
-                    was->statistics.bias.z * unit.per_newton(), is->statistics.bias.z * unit.per_newton());
+    data += fmt::format("{:.6g} {:.6g} {:.6g}\n", residuals::region_middle(variable, region),
+                        mean_N(*was) * unit.per_newton(), mean_N(*is) * unit.per_newton());
   }
   if (points < 2) return;
   const std::string label = residuals::variable_name(variable), name = fmt::format("over_{}", variable);
-  const std::string axis = label + " " + kVariableUnits[variable];
+  const std::string over = label + " " + kVariableUnits[variable], along(1, "xyz"[axis]);
   report.figure(name, data,
-                "set xlabel '" + axis + "'\nset ylabel 'mean vertical residual [" + unit.name + "]'\nplot '" +
-                    name +
+                "set xlabel '" + over + "'\nset ylabel 'mean residual along " + along + " [" + unit.name +
+                    "]'\nplot '" + name +
                     ".dat' using 1:2 with linespoints title 'before', '' using 1:3 with linespoints title "
                     "'after', 0 linecolor 'gray' notitle\n",
-                "Mean vertical residual over " + label + ", before and after.");
+                "Mean residual along " + along + " over " + label + ", before and after.");
 }
 
 }  // namespace
@@ -133,7 +139,7 @@ void add_before_and_after(Report& report, const residuals::Comparison& before,
   add_neighbours(report, before.neighbours, after.neighbours, unit);
   add_room(report, room, unit);
   for (int variable = 0; variable < kPlottedVariables; ++variable)
-    add_variable(report, before, after, variable, unit);
+    add_variable(report, before, after, variable, room.axis, unit);
 }
 
 void add_effect_curves(Report& report, const std::vector<EffectCurve>& effects,

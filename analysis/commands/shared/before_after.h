@@ -11,8 +11,8 @@
 
 namespace swarmcert::analysis {
 
-/// Adds the vertical residuals over neighbour positions and over the room, each pair of maps with a common colour
-/// scale, and over single variables. At most once per report.
+/// Adds the vertical residuals over neighbour positions, and those along the axis of `room` over the room and over
+/// single variables; each pair of maps has a common colour scale. At most once per report.
 void add_before_and_after(Report& report, const residuals::Comparison& before,
                           const residuals::Comparison& after, const identification::RoomMap& room,
                           const residuals::ForceUnit& unit);

@@ -2,36 +2,31 @@
 
 #include <fmt/core.h>
 
-#include "analysis/commands/shared/log_faults.h"
+#include <utility>
 
 namespace swarmcert::analysis {
 namespace {
 
 using identification::ClockOffset;
 
-files::Json ranking_entry_of(const ClockOffset& offset) {
-  return fault_entry(
-      {{"effect", "clock_offset"},
-       {"kind", offset.kind},
-       {"vehicle", offset.vehicle},
-       {"against", offset.against_vehicle},
-       {"rmse_before", offset.rmse_before_N},
-       {"rmse_after", offset.rmse_after_N},
-       {"drop", 1 - offset.rmse_after_N / offset.rmse_before_N},
-       {"parameters", {{"offset_s", {{"value", offset.offset_s}, {"interval_90", offset.interval}}}}},
-       {"class", "clock offset"},
-       {"confounded_with", files::Json::array()},
-       {"rivals", files::Json::array()},
-       {"separated_by", "passes in which each vehicle disturbs the other"},
-       {"paired_z", offset.z},
-       {"records_in_support", offset.records},
-       {"blocks_in_support", offset.records},
-       {"flights_in_support", 1},
-       {"statement", identification::in_words(offset)}});
-}
-
-void print_all(const std::vector<ClockOffset>& offsets) {
-  for (const ClockOffset& offset : offsets) fmt::print("  {}\n", sentence(offset));
+Ranked ranked_offset(const ClockOffset& offset) {
+  Ranked entry;
+  entry.effect = "clock_offset";
+  entry.kind = offset.kind;
+  entry.vehicle = offset.vehicle;
+  entry.against = offset.against_vehicle;
+  entry.rmse_before_N = offset.rmse_before_N;
+  entry.rmse_after_N = offset.rmse_after_N;
+  entry.drop = 1 - offset.rmse_after_N / offset.rmse_before_N;
+  entry.parameters["offset_s"] = {offset.offset_s, offset.interval};
+  entry.equivalence_class = "clock offset";
+  entry.separated_by = "passes in which each vehicle disturbs the other";
+  entry.paired_z = offset.z;
+  entry.records = entry.blocks = offset.records;
+  entry.flights = 1;
+  entry.statement = identification::in_words(offset);
+  entry.is_sensor = true;
+  return entry;
 }
 
 }  // namespace
@@ -42,25 +37,24 @@ std::string sentence(const ClockOffset& offset) {
   return words + ".";
 }
 
-void add_clocks(const std::vector<ClockOffset>& offsets, bool prints, files::Json& result) {
-  result["clock_offsets"] = files::Json::array();
-  for (const ClockOffset& offset : offsets) {
-    result["clock_offsets"].push_back({{"flight", offset.flight},
-                                       {"log", offset.path},
-                                       {"vehicle", offset.vehicle},
-                                       {"against", offset.against_vehicle},
-                                       {"offset_s", offset.offset_s},
-                                       {"interval_90", offset.interval},
-                                       {"statement", identification::in_words(offset)}});
-  }
-  if (prints) print_all(offsets);
+std::vector<Ranked> ranked(const std::vector<ClockOffset>& offsets) {
+  std::vector<Ranked> entries;
+  for (const ClockOffset& offset : offsets) entries.push_back(ranked_offset(offset));
+  return entries;
 }
 
-bool judge_clocks(const std::vector<ClockOffset>& offsets, bool prints, files::Json& result) {
-  std::vector<files::Json> entries;
-  for (const ClockOffset& offset : offsets) entries.push_back(ranking_entry_of(offset));
-  if (prints) print_all(offsets);
-  return rank_faults(entries, result);
+void describe_clock(files::Record& record, const ClockOffset& offset) {
+  record.field("flight", offset.flight, "");
+  record.field("log", offset.path, "");
+  record.field("vehicle", offset.vehicle, "");
+  record.field("against", offset.against_vehicle, "The vehicle whose clock it is compared with.");
+  record.field("offset_s", offset.offset_s, "How far its clock is ahead.", "s", "estimate");
+  record.field("interval_90", offset.interval, "", "s");
+  record.field("statement", record.is_shape() ? "" : identification::in_words(offset), "It in words.");
+}
+
+void print_clock_offsets(const std::vector<ClockOffset>& offsets) {
+  for (const ClockOffset& offset : offsets) fmt::print("  {}\n", sentence(offset));
 }
 
 }  // namespace swarmcert::analysis

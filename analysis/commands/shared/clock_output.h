@@ -1,21 +1,21 @@
-/// @file Clock offsets as JSON and as text.
+/// @file Clock offsets as results and as text.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "analysis/commands/shared/ranking.h"
 #include "analysis/identification/clocks/clock_offset.h"
-#include "nn/base/json.h"
 
 namespace swarmcert::analysis {
 
-/// Appends the offsets to `ranking` as clock_offset, which makes the verdict missing_effect; all earlier entries were
-/// judged with the clocks corrected. Prints the offsets if `prints`.
-/// @return whether there are any.
-bool judge_clocks(const std::vector<identification::ClockOffset>& offsets, bool prints, files::Json& result);
+/// Returns the offsets as entries clock_offset; all other entries were judged with the clocks corrected.
+std::vector<Ranked> ranked(const std::vector<identification::ClockOffset>& offsets);
 
-/// Adds "clock_offsets" of add: the same for results without a ranking. Prints the offsets if `prints`.
-void add_clocks(const std::vector<identification::ClockOffset>& offsets, bool prints, files::Json& result);
+/// Describes an entry of `clock_offsets` of add, whose result has no ranking.
+void describe_clock(files::Record& record, const identification::ClockOffset& offset);
+
+void print_clock_offsets(const std::vector<identification::ClockOffset>& offsets);
 
 /// Returns "The clock of cf2_00 is ...; all else was judged with it corrected."
 std::string sentence(const identification::ClockOffset& offset);

@@ -19,17 +19,22 @@ std::string interval_words(const std::string& effect, const std::string& paramet
   return fmt::format("{:.4g} .. {:.4g}", beyond + interval->second.lower, beyond + interval->second.upper);
 }
 
-files::Json values_json(const std::string& effect, const std::map<std::string, double>& values,
-                        const std::map<std::string, Interval>& intervals) {
-  files::Json json = files::Json::object();
+void describe(files::Record& record, const FittedValue& fitted) {
+  record.field("value", fitted.value, "", "", "estimate");
+  record.may("interval_90", fitted.interval_90, "90 % interval.");
+}
+
+FittedValues fitted_values(const std::string& effect, const std::map<std::string, double>& values,
+                           const std::map<std::string, Interval>& intervals) {
+  FittedValues fitted;
   for (const auto& [name, value] : values) {
     const double beyond = shown_beyond_file(effect, name);
-    files::Json& entry = json[name] = {{"value", beyond + value}};
+    fitted[name].value = beyond + value;
     const auto interval = intervals.find(name);
     if (interval != intervals.end())
-      entry["interval_90"] = {beyond + interval->second.lower, beyond + interval->second.upper};
+      fitted[name].interval_90 = {beyond + interval->second.lower, beyond + interval->second.upper};
   }
-  return json;
+  return fitted;
 }
 
 bool is_sensor_error(const std::string& effect) {
@@ -40,16 +45,15 @@ std::string sensor_words(const std::string& effect) {
   return effect + " is an error of a sensor, not a force on the vehicle.";
 }
 
-files::Json effects_json(const std::vector<stability::EffectSpec>& effects) {
-  files::Json json = files::Json::array();
-  for (const stability::EffectSpec& effect : effects) {
-    files::Json entry = {{"effect", effect.name},
-                         {"parameters", values_json(effect.name, effect.parameters, effect.fit.interval)}};
-    if (is_sensor_error(effect.name)) entry["sensor"] = true;
-    if (!effect.vehicle.empty()) entry["vehicle"] = effect.vehicle;
-    json.push_back(std::move(entry));
-  }
-  return json;
+void describe_effect(files::Record& record, const stability::EffectSpec& effect) {
+  record.field("effect", effect.name, "Name in model files.");
+  record.field("parameters", fitted_values(effect.name, effect.parameters, effect.fit.interval),
+               "Fitted values; units stand in the names.");
+  record.may("sensor",
+             !effect.name.empty() && is_sensor_error(effect.name) ? std::optional(true) : std::nullopt,
+             "An error of a sensor, not a force on the vehicle.");
+  record.may("vehicle", effect.vehicle.empty() ? std::nullopt : std::optional(effect.vehicle),
+             "The one vehicle that has it; absent: all.");
 }
 
 void print_values(const std::string& effect, const std::string& prefix,

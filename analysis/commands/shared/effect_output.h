@@ -2,10 +2,10 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
-#include <vector>
 
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 #include "stability/model.h"
 
 namespace swarmcert::analysis {
@@ -18,17 +18,25 @@ double shown_beyond_file(const std::string& effect, const std::string& parameter
 std::string interval_words(const std::string& effect, const std::string& parameter,
                            const std::map<std::string, Interval>& intervals);
 
-/// Returns {"tau_s": {"value": 0.06, "interval_90": [0.05, 0.07]}}; without the interval if there is none.
-files::Json values_json(const std::string& effect, const std::map<std::string, double>& values,
-                        const std::map<std::string, Interval>& intervals);
+/// A fitted parameter as results show it.
+struct FittedValue {
+  double value = 0;
+  std::optional<Interval> interval_90;
+};
+void describe(files::Record& record, const FittedValue& fitted);
+
+/// Fitted parameters by name.
+using FittedValues = std::map<std::string, FittedValue>;
+FittedValues fitted_values(const std::string& effect, const std::map<std::string, double>& values,
+                           const std::map<std::string, Interval>& intervals);
 
 /// Whether `effect` is an error of a logged signal rather than a force on the vehicle.
 bool is_sensor_error(const std::string& effect);
 /// Returns "accelerometer_scale is an error of a sensor, not a force". Precondition: is_sensor_error(effect).
 std::string sensor_words(const std::string& effect);
 
-/// Returns one entry per effect with its parameters and their intervals.
-files::Json effects_json(const std::vector<stability::EffectSpec>& effects);
+/// Describes an effect of a model file with its fitted parameters.
+void describe_effect(files::Record& record, const stability::EffectSpec& effect);
 
 /// Prints one line per parameter, each after `prefix`: "tau_s = 0.06, 90 % 0.05 .. 0.07".
 void print_values(const std::string& effect, const std::string& prefix,

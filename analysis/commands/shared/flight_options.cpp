@@ -5,6 +5,7 @@
 
 #include "analysis/cli/bundled.h"
 #include "analysis/cli/host.h"
+#include "analysis/report/report_text.h"
 #include "analysis/residuals/log_copies.h"
 #include "nn/base/input_error.h"
 
@@ -121,8 +122,15 @@ std::vector<std::string> add_files_of(const residuals::Inputs& others, std::vect
   return added;
 }
 
-files::Json json_of(const residuals::Axes& axes) {
-  return {{"x", axes.x}, {"y", axes.y}, {"z", axes.z}, {"total", axes.total}};
+std::string next_command(std::vector<std::string> words, const FlightOptions& options,
+                         const residuals::Inputs& inputs, const std::vector<std::string>& more) {
+  words.insert(words.begin(), "swarmcert");
+  words.insert(words.end(), inputs.words.begin(), inputs.words.end());
+  if (!options.fleet.empty()) words.insert(words.end(), {"--flights", options.fleet});
+  if (!options.columns.empty()) words.insert(words.end(), {"--columns", options.columns});
+  if (options.keep) words.emplace_back("--keep");
+  words.insert(words.end(), more.begin(), more.end());
+  return shell_line(words);
 }
 
 }  // namespace swarmcert::analysis

@@ -7,7 +7,6 @@
 #include "analysis/cli/command.h"
 #include "analysis/residuals/force_unit.h"
 #include "analysis/residuals/inputs.h"
-#include "analysis/residuals/statistics.h"
 
 namespace swarmcert::analysis {
 
@@ -47,6 +46,9 @@ residuals::Inputs read_others(const FlightOptions& options, const std::vector<st
 /// Appends to `files` the additional files read by `others`, and returns them.
 std::vector<std::string> add_files_of(const residuals::Inputs& others, std::vector<std::string>& files);
 
-files::Json json_of(const residuals::Axes& axes);
+/// Returns the command to type next, for a shell: "swarmcert", `words`, the flights and the options with which they were
+/// read, `more`.
+std::string next_command(std::vector<std::string> words, const FlightOptions& options,
+                         const residuals::Inputs& inputs, const std::vector<std::string>& more);
 
 }  // namespace swarmcert::analysis

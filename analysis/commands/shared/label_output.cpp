@@ -2,58 +2,48 @@
 
 #include <fmt/core.h>
 
-#include "analysis/commands/shared/log_faults.h"
-
 namespace swarmcert::analysis {
 namespace {
 
 using identification::Mislabelled;
 
-files::Json parameters_of(const Mislabelled& label) {
-  const char* const unit = label.what == Mislabelled::What::kSetPoints ? "m" : "m_s2";
-  return {{fmt::format("misfit_{}", unit), {{"value", label.after}}},
-          {fmt::format("misfit_as_labelled_{}", unit), {{"value", label.before}}}};
+FittedValues misfits_of(const Mislabelled& label) {
+  const std::string unit = label.what == Mislabelled::What::kSetPoints ? "m" : "m_s2";
+  return {{"misfit_" + unit, {label.after, {}}}, {"misfit_as_labelled_" + unit, {label.before, {}}}};
 }
 
-/// Force error in newton; null if no force is compared.
-files::Json force_of(const Mislabelled& label, double misfit) {
-  if (label.what == Mislabelled::What::kSetPoints || !(label.mass_kg > 0)) return nullptr;
+/// Force error in newton; unknown if no force is compared.
+double force_of(const Mislabelled& label, double misfit) {
+  if (label.what == Mislabelled::What::kSetPoints || !(label.mass_kg > 0)) return kUnknown;
   return label.mass_kg * misfit;
 }
 
-files::Json ranking_entry_of(const Mislabelled& label) {
-  const std::vector<std::string> rivals =
-      label.is_sure ? std::vector<std::string>{}
-                    : std::vector<std::string>{"thrust_ratio", "payload", "constant_force"};
-  files::Json entry =
-      fault_entry({{"effect", "mislabelled"},
-                   {"kind", label.kind},
-                   {"vehicle", label.vehicle},
-                   {"against", label.belongs_to},
-                   {"rmse_before", force_of(label, label.before)},
-                   {"rmse_after", force_of(label, label.after)},
-                   {"drop", 1 - label.after / label.before},
-                   {"parameters", parameters_of(label)},
-                   {"class", label.is_sure ? "mislabelled" : "mislabelled, thrust ratio or mass"},
-                   {"confounded_with", rivals},
-                   {"rivals", files::Json::array()},
-                   {"separated_by", label.is_sure ? "" : "the vehicle on a scale"},
-                   {"paired_z", nullptr},
-                   {"records_in_support", 0},
-                   {"blocks_in_support", label.blocks},
-                   {"flights_in_support", label.flights},
-                   {"statement", identification::in_words(label)}});
-  for (const std::string& rival : rivals)
-    entry["rivals"].push_back({{"effect", rival}, {"fly", "the vehicle on a scale"}});
+Ranked ranked_label(const Mislabelled& label) {
+  constexpr const char* kScale = "the vehicle on a scale";
+  Ranked entry;
+  entry.effect = "mislabelled";
+  entry.kind = label.kind;
+  entry.vehicle = label.vehicle;
+  entry.against = label.belongs_to;
+  entry.rmse_before_N = force_of(label, label.before);
+  entry.rmse_after_N = force_of(label, label.after);
+  entry.drop = 1 - label.after / label.before;
+  entry.parameters = misfits_of(label);
+  entry.equivalence_class = label.is_sure ? "mislabelled" : "mislabelled, thrust ratio or mass";
+  if (!label.is_sure) {
+    for (const char* const rival : {"thrust_ratio", "payload", "constant_force"})
+      entry.rivals.push_back({{rival}, kUnknown, kScale});
+    entry.separated_by = kScale;
+  }
+  entry.blocks = static_cast<std::size_t>(label.blocks);
+  entry.flights = static_cast<std::size_t>(label.flights);
+  entry.statement = identification::in_words(label);
+  entry.is_sensor = true;
   return entry;
 }
 
 bool is_corrected(const Mislabelled& label) {
   return label.is_sure && (label.what == Mislabelled::What::kName || label.what == Mislabelled::What::kKind);
-}
-
-void print_all(const std::vector<Mislabelled>& labels) {
-  for (const Mislabelled& label : labels) fmt::print("  Mislabelled: {}\n", sentence(label));
 }
 
 }  // namespace
@@ -66,23 +56,22 @@ std::string sentence(const Mislabelled& label) {
                                : "; all else was judged with it corrected.");
 }
 
-void add_labels(const std::vector<Mislabelled>& labels, bool prints, files::Json& result) {
-  result["mislabelled"] = files::Json::array();
-  for (const Mislabelled& label : labels) {
-    result["mislabelled"].push_back({{"vehicle", label.vehicle},
-                                     {"belongs_to", label.belongs_to},
-                                     {"flight", label.flight},
-                                     {"is_sure", label.is_sure},
-                                     {"statement", identification::in_words(label)}});
-  }
-  if (prints) print_all(labels);
+std::vector<Ranked> ranked(const std::vector<Mislabelled>& labels) {
+  std::vector<Ranked> entries;
+  for (const Mislabelled& label : labels) entries.push_back(ranked_label(label));
+  return entries;
 }
 
-bool judge_labels(const std::vector<Mislabelled>& labels, bool prints, files::Json& result) {
-  std::vector<files::Json> entries;
-  for (const Mislabelled& label : labels) entries.push_back(ranking_entry_of(label));
-  if (prints) print_all(labels);
-  return rank_faults(entries, result);
+void describe_label(files::Record& record, const Mislabelled& label) {
+  record.field("vehicle", label.vehicle, "");
+  record.field("belongs_to", label.belongs_to, "The vehicle whose log it is.");
+  record.field("flight", label.flight, "");
+  record.field("is_sure", label.is_sure, "");
+  record.field("statement", record.is_shape() ? "" : identification::in_words(label), "It in words.");
+}
+
+void print_mislabelled(const std::vector<Mislabelled>& labels) {
+  for (const Mislabelled& label : labels) fmt::print("  Mislabelled: {}\n", sentence(label));
 }
 
 }  // namespace swarmcert::analysis

@@ -1,20 +1,21 @@
-/// @file Mislabelled logs as JSON and as text.
+/// @file Mislabelled logs as results and as text.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "analysis/commands/shared/ranking.h"
 #include "analysis/identification/labels/mislabelled.h"
-#include "nn/base/json.h"
 
 namespace swarmcert::analysis {
 
-/// Appends the labels to `ranking` as mislabelled, which makes the verdict missing_effect. Prints them if `prints`.
-/// @return whether there are any.
-bool judge_labels(const std::vector<identification::Mislabelled>& labels, bool prints, files::Json& result);
+/// Returns the labels as entries `mislabelled`.
+std::vector<Ranked> ranked(const std::vector<identification::Mislabelled>& labels);
 
-/// Adds "mislabelled" of add, whose result has no ranking. Prints the labels if `prints`.
-void add_labels(const std::vector<identification::Mislabelled>& labels, bool prints, files::Json& result);
+/// Describes an entry of `mislabelled` of add, whose result has no ranking.
+void describe_label(files::Record& record, const identification::Mislabelled& label);
+
+void print_mislabelled(const std::vector<identification::Mislabelled>& labels);
 
 /// Returns "Cf51 of swap/00 flew ..., all else was judged with the logs as they are: correct them first."
 std::string sentence(const identification::Mislabelled& label);

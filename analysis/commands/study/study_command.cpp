@@ -59,22 +59,19 @@ std::optional<identification::Split> split_of(const StudyOptions& options, const
 }
 
 /// Changes relative to the flights of --against, from the flights that are not used for testing only.
-Changes changes_against(const residuals::Inputs& others, const identification::Study& study,
-                        const residuals::Inputs& inputs, int jobs) {
+Changes changes_against(const residuals::Inputs& others, const std::vector<std::string>& other_files,
+                        const identification::Study& study, const residuals::Inputs& inputs, int jobs) {
   residuals::Inputs own = inputs;
   const identification::Split& split = study.ladder.split;
-  if (split.by_flight && !split.fit.empty()) {
+  if (split.by == identification::Split::By::kFlights && !split.fit.empty()) {
     own.found.flights.clear();
     for (std::size_t i = 0; i < inputs.found.flights.size(); ++i) {
       if (std::find(split.test.begin(), split.test.end(), static_cast<int>(i)) == split.test.end())
         own.found.flights.push_back(inputs.found.flights[i]);
     }
   }
-  Changes changes;
-  changes.differences =
-      identification::differences(own, others, inputs.models[0].kind, jobs, [](int, int) {});
-  changes.judged = changed_json(changes.differences, own, others, jobs);
-  return changes;
+  return changes_of(identification::differences(own, others, inputs.models[0].kind, jobs, [](int, int) {}),
+                    own, others, other_files, jobs);
 }
 
 int run_study(const StudyOptions& options, const CommonOptions& common) {
@@ -106,23 +103,19 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
   const identification::Study study = identification::study(
       inputs, split_of(options, inputs), common.jobs,
       [&](int done, int total, const std::string& what) { progress.show(done, total, what); });
-  files::Json result = result_head("study", files);
-  add_study(study, inputs, result);
-  judge_clocks(clocks, false, result);
-  judge_labels(labels, false, result);
-  std::optional<Changes> changes;
-  if (others) {
-    changes = changes_against(*others, study, inputs, common.jobs);
-    add_changes(*changes, other_files, result);
-  }
-  const std::string page =
-      write_study_folder(study, notes, changes ? &*changes : nullptr, unit, result, options.output);
-  write_result(common, result);
+  StudyResult result =
+      study_result(study, unit, next_of_study(study, options.flights, inputs, options.output));
+  result.found.judgement.append(ranked(clocks));
+  result.found.judgement.append(ranked(labels));
+  if (others) result.changes = changes_against(*others, other_files, study, inputs, common.jobs);
+  const files::Node document = result_of("study", files, std::nullopt, result);
+  const std::string page = write_study_folder(result, notes, unit, to_json(document), options.output);
+  write_result(common, document);
   if (common.prints_text()) {
-    print_study(study, unit);
+    print_study(result, unit);
     for (const std::string& note : notes) fmt::print("{}\n", note);
-    if (changes) print_changes(*changes);
-    fmt::print("Page: {}\n", page);
+    if (result.changes) print_changes(*result.changes);
+    fmt::print("Page: {}\nNext: {}\n", page, result.next_command);
   }
   if (study.ladder.too_poor.empty()) return kDone;
   note("inconclusive: " + study.ladder.too_poor + "; 'swarmcert compare' shows what was cut");
@@ -153,7 +146,8 @@ Command study_command() {
             add_output(app, "-o,--output", options->output, "Folder for page, result and fitted model")
                 ->required();
             return [options](const CommonOptions& common) { return run_study(*options, common); };
-          }};
+          },
+          fields_of<StudyResult>()};
 }
 
 }  // namespace swarmcert::analysis

@@ -2,40 +2,17 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
-#include <cmath>
+#include <utility>
 
-#include "analysis/commands/add/add_output.h"
-#include "analysis/commands/diagnose/diagnose_output.h"
 #include "analysis/commands/diagnose/rotor_output.h"
-#include "analysis/commands/shared/flight_options.h"
 #include "analysis/identification/verdict.h"
+#include "analysis/report/report_text.h"
 
 namespace swarmcert::analysis {
 namespace {
 
 using identification::Study;
 using identification::StudyErrors;
-
-files::Json group_json(const residuals::GroupErrors& errors) {
-  const residuals::ErrorStatistics& s = errors.statistics;
-  return {{"records", s.samples},
-          {"rmse", json_of(s.rmse)},
-          {"bias", json_of(s.bias)},
-          {"p95", json_of(s.p95)},
-          {"max", json_of(s.max)}};
-}
-
-files::Json json_of(const StudyErrors& errors) {
-  return {{"all", group_json(errors.all.overall)}, {"test", group_json(errors.test.overall)}};
-}
-
-std::vector<std::string> accepted_effects(const Study& study) {
-  std::vector<std::string> names;
-  for (const stability::LadderRow& row : study.ladder.rows)
-    if (row.accepted && row.effect != "nominal") names.push_back(row.effect);
-  return names;
-}
 
 /// Joins words as "a", "a and b", "a, b and c".
 std::string listed(const std::vector<std::string>& words) {
@@ -55,74 +32,93 @@ std::string why_nothing_is_judged(const Study& study) {
   return "every record was cut, see 'swarmcert compare' and 'swarmcert inspect'";
 }
 
-double vertical_N(const residuals::Comparison& comparison) { return comparison.overall.statistics.rmse.z; }
+/// "26.5 mN, most along y": the root mean square of the residual vector.
+std::string error_words(const residuals::Comparison& comparison, const residuals::ForceUnit& unit) {
+  const residuals::ErrorStatistics& s = comparison.overall.statistics;
+  const int axis = residuals::failing_axis(s);
+  const double along = axis == 0 ? s.rmse.x : axis == 1 ? s.rmse.y : s.rmse.z;
+  constexpr double kMost = 0.5;  // of the mean square
+  return fmt::format(
+      "{:.3g} {}{}", s.rmse.total * unit.per_newton(), unit.name,
+      along * along > kMost * s.rmse.total * s.rmse.total ? fmt::format(", most along {}", "xyz"[axis]) : "");
+}
+
+/// The comparison from which the headline is read: of what is held out, if anything is.
+const residuals::Comparison& judged(const StudyErrors& errors) {
+  return errors.test.overall.statistics.samples > 0 ? errors.test : errors.all;
+}
+
+std::string first_log(const residuals::Inputs& inputs) {
+  const std::vector<std::string> logs = residuals::log_files(inputs.found);
+  return logs.empty() ? "" : logs[0];
+}
 
 }  // namespace
 
-std::string headline(const Study& study, const residuals::ForceUnit& unit) {
-  const auto shown = [&unit](double newton) { return fmt::format("{:.3g}", newton * unit.per_newton()); };
-  const std::vector<std::string> added = accepted_effects(study);
-  const std::string left =
-      leaves_something(study.diagnosis) ? "part of the error remains unexplained" : "nothing else stands out";
-  const std::string where = study.ladder.split.by_flight
-                                ? "on test flights"
-                                : "on the flights of the fit (too few to hold any back)";
+std::string headline(const StudyResult& result, const residuals::ForceUnit& unit) {
+  const Study& study = result.study;
   if (study.before.all.overall.statistics.samples == 0)
     return "No record of these flights can be judged: " + why_nothing_is_judged(study) + ".";
+  const std::string before = error_words(judged(study.before), unit);
   if (!study.ladder.too_poor.empty())
-    return fmt::format("Vertical error (RMS) {} {}; no effect can be fitted: {}.",
-                       shown(vertical_N(study.before.all)), unit.name, study.ladder.too_poor);
+    return fmt::format("Error of the force (RMS) {}; no effect can be fitted: {}.", before,
+                       study.ladder.too_poor);
+  std::vector<std::string> added;
+  for (const Cause& cause : result.causes) added.push_back(cause.name);
+  const std::string left =
+      leaves_something(study.diagnosis) ? "part of the error has no name" : "nothing else stands out";
+  const std::string where = where_held_out(study.ladder);
   if (added.empty())
-    return fmt::format("Vertical error (RMS) {} {} {}; no effect lowers it, and {}.", where,
-                       shown(vertical_N(study.before.test)), unit.name, left);
-  return fmt::format("Vertical error (RMS) {} {} {}, after adding {} {} {}; {}.", where,
-                     shown(vertical_N(study.before.test)), unit.name, listed(added),
-                     shown(vertical_N(study.after.test)), unit.name, left);
+    return fmt::format("Error of the force (RMS) on {}: {}; no effect lowers it, and {}.", where, before,
+                       left);
+  const double floor_N = study.ladder.rows.back().noise_floor_N;
+  return fmt::format("Error of the force (RMS) on {}: {}; after adding {} {}{}; {}.", where, before,
+                     listed(added), error_words(judged(study.after), unit),
+                     floor_N > 0 ? fmt::format(" (noise {:.3g})", floor_N * unit.per_newton()) : "", left);
 }
 
-void add_study(const Study& study, const residuals::Inputs& inputs, files::Json& result) {
-  result["before"] = json_of(study.before);
-  result["after"] = json_of(study.after);
-  add_ladder(study.ladder, inputs, result);
-  add_diagnoses({study.diagnosis}, result);
-  files::Json next = files::Json::array();
-  for (const std::string& flight : next_flights(study.diagnosis)) next.push_back(flight);
-  result["next"] = std::move(next);
+std::vector<std::string> conclusions(const StudyResult& result, const residuals::ForceUnit& unit) {
+  std::vector<std::string> sentences = {"It fails " + result.fails.words + "."};
+  for (const Cause& cause : result.causes) sentences.push_back(sentence(cause, unit) + ".");
+  const std::string& stopped = result.study.ladder.stopped;
+  if (!stopped.empty()) sentences.push_back("The search ended: " + stopped + ".");
+  return sentences;
 }
 
-void print_study(const Study& study, const residuals::ForceUnit& unit) {
-  fmt::print("{}\n", headline(study, unit));
-  constexpr std::size_t kMostRows = 6, kMostNext = 2;
-  std::size_t rows = 0;
-  if (!study.ladder.rows.empty()) fmt::print("RMSE of the force residual (estimates; all axes):\n");
-  for (const stability::LadderRow& row : study.ladder.rows) {
-    if (!row.accepted || ++rows > kMostRows) continue;
-    fmt::print("  {:<24} fit {:>8.3g}  select {:>8.3g}  test {:>8.3g} {}\n",
-               (row.effect == "nominal" ? "" : "+ ") + row.effect, row.fit_rmse_N * unit.per_newton(),
-               row.select_rmse_N * unit.per_newton(), row.test_rmse_N * unit.per_newton(), unit.name);
-  }
-  const std::vector<std::string> next = next_flights(study.diagnosis);
-  for (std::size_t i = 0; i < next.size() && i < kMostNext; ++i) fmt::print("  fly {}\n", next[i]);
+std::string next_of_study(const Study& study, const FlightOptions& options, const residuals::Inputs& inputs,
+                          const std::string& output) {
+  const std::string& given = inputs.models[0].path;
+  if (study.before.all.overall.statistics.samples == 0)
+    return shell_line({"swarmcert", "inspect", first_log(inputs)});
+  if (study.ladder.any_accepted)
+    return next_command({"compare", output + "/fitted.toml"}, options, inputs, {"--horizon", "0.5"});
+  if (leaves_something(study.diagnosis))
+    return next_command({"diagnose", given}, options, inputs, {"--next"});
+  return next_command({"compare", given}, options, inputs, {"--json", "errors.json"});
 }
 
-files::Json changed_json(const std::vector<identification::Difference>& differences,
-                         const residuals::Inputs& inputs, const residuals::Inputs& others, int jobs) {
+void print_study(const StudyResult& result, const residuals::ForceUnit& unit) {
+  fmt::print("{}\n", headline(result, unit));
+  for (const std::string& line : conclusions(result, unit)) fmt::print("  {}\n", line);
+  constexpr std::size_t kMostNext = 2;
+  for (std::size_t i = 0; i < result.next.size() && i < kMostNext; ++i)
+    fmt::print("  fly {}\n", result.next[i]);
+}
+
+Changes changes_of(std::vector<identification::Difference> differences, const residuals::Inputs& inputs,
+                   const residuals::Inputs& others, const std::vector<std::string>& other_files, int jobs) {
   std::vector<identification::Diagnosis> diagnoses;
   for (const identification::Difference& difference : differences) diagnoses.push_back(difference.diagnosis);
-  files::Json all = files::Json::object();
-  add_diagnoses(diagnoses, all);
-  judge_rotors(inputs, others, jobs, false, all);
-  return {{"verdict", all["verdict"]}, {"ranking", all["ranking"]}, {"rotors", all["rotors"]}};
-}
-
-void add_changes(const Changes& changes, const std::vector<std::string>& other_files, files::Json& result) {
-  add_differences(changes.differences, other_files, result);
-  result["changed"] = changes.judged;
+  Changes changes;
+  changes.against = {other_files, std::move(differences)};
+  changes.judgement = judgement_of(diagnoses);
+  changes.rotors = judge_rotors(inputs, others, jobs, false, changes.judgement);
+  return changes;
 }
 
 std::vector<std::string> in_words(const Changes& changes) {
   std::vector<std::string> sentences;
-  for (const identification::Difference& difference : changes.differences) {
+  for (const identification::Difference& difference : changes.against.differences) {
     const identification::Diagnosis& diagnosis = difference.diagnosis;
     std::vector<std::string> effects;
     for (const identification::Missing& missing : diagnosis.ranking) effects.push_back(missing.effect);
@@ -131,10 +127,9 @@ std::vector<std::string> in_words(const Changes& changes) {
                          : effects.empty() ? "no effect changed beyond the scatter of the other flights"
                                            : listed(effects) + " changed"));
   }
-  for (const files::Json& rotor : changes.judged["rotors"]) {
-    if (rotor["flight"].is_null() && !rotor["rotor"].is_null())
-      sentences.push_back(rotor["vehicle"].get<std::string>() + ": " + rotor["statement"].get<std::string>());
-  }
+  for (const identification::RotorBalance& rotor : changes.rotors)
+    if (rotor.flight.empty() && rotor.rotor != 0)
+      sentences.push_back(rotor.vehicle + ": " + identification::in_words(rotor));
   if (sentences.empty()) sentences.emplace_back("no vehicle has usable records on both sides");
   return sentences;
 }

@@ -1,38 +1,32 @@
-/// @file The result of `study` as JSON and as text.
+/// @file The result of `study` as text.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "analysis/commands/shared/before_after.h"
-#include "analysis/identification/fleet/difference.h"
-#include "analysis/identification/study/study.h"
-#include "analysis/residuals/force_unit.h"
-#include "nn/base/json.h"
+#include "analysis/commands/shared/flight_options.h"
+#include "analysis/commands/study/study_result.h"
 
 namespace swarmcert::analysis {
 
 /// Returns the whole answer in one sentence, with its numbers.
-std::string headline(const identification::Study& study, const residuals::ForceUnit& unit);
+std::string headline(const StudyResult& result, const residuals::ForceUnit& unit);
 
-/// Adds `before`, `after`, `ladder`, `ranking`, `remainder`, `verdict`, `next` and `split`; forces in newton.
-void add_study(const identification::Study& study, const residuals::Inputs& inputs, files::Json& result);
+/// Returns one sentence per cause, the reason for which nothing further was added, and what to do next.
+std::vector<std::string> conclusions(const StudyResult& result, const residuals::ForceUnit& unit);
+
+/// Returns the command to type next: a check of the fitted model, else a search for what is left, else the errors from
+/// which `bound` computes.
+/// @param output folder of the study
+std::string next_of_study(const identification::Study& study, const FlightOptions& options,
+                          const residuals::Inputs& inputs, const std::string& output);
 
 /// Prints about ten lines for the terminal.
-void print_study(const identification::Study& study, const residuals::ForceUnit& unit);
+void print_study(const StudyResult& result, const residuals::ForceUnit& unit);
 
-/// Differences from the flights of --against.
-struct Changes {
-  std::vector<identification::Difference> differences;  ///< one per vehicle
-  files::Json judged;                                   ///< from changed_json()
-};
-
-/// Returns `verdict`, `ranking` and `rotors`, as written by diagnose --against.
-files::Json changed_json(const std::vector<identification::Difference>& differences,
-                         const residuals::Inputs& inputs, const residuals::Inputs& others, int jobs);
-
-/// Adds `against` and `changed`.
-void add_changes(const Changes& changes, const std::vector<std::string>& other_files, files::Json& result);
+/// Compares with the flights of --against.
+Changes changes_of(std::vector<identification::Difference> differences, const residuals::Inputs& inputs,
+                   const residuals::Inputs& others, const std::vector<std::string>& other_files, int jobs);
 
 /// Returns one sentence per vehicle, and one per rotor that is named.
 std::vector<std::string> in_words(const Changes& changes);

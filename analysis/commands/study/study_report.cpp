@@ -14,6 +14,7 @@
 #include "analysis/commands/diagnose/remainder_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/time_plots.h"
+#include "analysis/commands/study/study_output.h"
 #include "analysis/report/report.h"
 #include "analysis/report/report_text.h"
 #include "nn/base/file_io.h"
@@ -92,7 +93,7 @@ void add_changes(Report& report, const Changes& changes, const residuals::ForceU
   report.heading("What changed against the other flights");
   for (const std::string& sentence : in_words(changes)) report.paragraph(sentence + ".");
   std::size_t number = 0;
-  for (const identification::Difference& difference : changes.differences) {
+  for (const identification::Difference& difference : changes.against.differences) {
     report.paragraph(difference.vehicle + ". " + in_words(difference));
     ++number;
     if (!difference.diagnosis.ranking.empty())
@@ -102,14 +103,16 @@ void add_changes(Report& report, const Changes& changes, const residuals::ForceU
 
 using Notes = std::vector<std::string>;
 
-std::string write_page(const Study& study, const Notes& notes, const Changes* changes,
-                       const residuals::ForceUnit& unit, const files::Json& result,
-                       const std::string& folder) {
+std::string write_page(const StudyResult& result, const Notes& notes, const residuals::ForceUnit& unit,
+                       const files::Json& document, const std::string& folder) {
+  const Study& study = result.study;
   Report report("What does the model lack?");
   report.made_by(command_to_copy());
-  report.result(result);
-  report.paragraph(headline(study, unit));
+  report.result(document);
+  report.paragraph(headline(result, unit));
+  for (const std::string& line : conclusions(result, unit)) report.paragraph(line);
   for (const std::string& note : notes) report.paragraph(note);
+  report.paragraph("Next: " + result.next_command);
   report.heading("Where the model failed");
   add_before_and_after(report, study.before.all, study.after.all, study.pictures.room, unit);
   add_moments(report, study, unit);
@@ -122,11 +125,10 @@ std::string write_page(const Study& study, const Notes& notes, const Changes* ch
   report.heading("The remainder, and what to fly next");
   add_left(report, study.diagnosis, unit);
   add_remainder(report, study.diagnosis, 1, unit);
-  const std::vector<std::string> next = next_flights(study.diagnosis);
-  if (next.empty())
+  if (result.next.empty())
     report.paragraph("Another flight would not answer any of the questions that are still open.");
-  for (const std::string& flight : next) report.paragraph("Fly " + flight + ".");
-  if (changes != nullptr) add_changes(report, *changes, unit);
+  for (const std::string& flight : result.next) report.paragraph("Fly " + flight + ".");
+  if (result.changes) add_changes(report, *result.changes, unit);
   add_time_series(report, study.after.all, &study.before.all, unit.name, unit.per_newton());
   add_replay(report, study, unit);
   return report.write(folder, true, "study.html");
@@ -134,18 +136,19 @@ std::string write_page(const Study& study, const Notes& notes, const Changes* ch
 
 }  // namespace
 
-std::string write_study_folder(const Study& study, const Notes& notes, const Changes* changes,
-                               const residuals::ForceUnit& unit, const files::Json& result,
+std::string write_study_folder(const StudyResult& result, const Notes& notes,
+                               const residuals::ForceUnit& unit, const files::Json& document,
                                const std::string& folder) {
   const std::filesystem::path path(folder);
   std::filesystem::create_directories(path);
-  if (study.ladder.any_accepted) {
-    files::write_file(
-        (path / "fitted.toml").string(),
-        stability::to_toml(study.ladder.model, {"Effects fitted to flights by swarmcert study."}), true);
+  const identification::Ladder& ladder = result.study.ladder;
+  if (ladder.any_accepted) {
+    files::write_file((path / "fitted.toml").string(),
+                      stability::to_toml(ladder.model, {"Effects fitted to flights by swarmcert study."}),
+                      true);
   }
-  files::write_file((path / "study.json").string(), files::to_text(result), true);
-  return write_page(study, notes, changes, unit, result, folder);
+  files::write_file((path / "study.json").string(), files::to_text(document), true);
+  return write_page(result, notes, unit, document, folder);
 }
 
 }  // namespace swarmcert::analysis

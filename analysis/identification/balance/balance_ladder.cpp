@@ -75,11 +75,11 @@ bool is_balanced(const std::string& effect) {
   return is_of_torques(effect) || stability::traits_of(effect).shown_by == stability::ShownBy::kAccelerometer;
 }
 
-Ladder balance_ladder(const residuals::Inputs& inputs, const std::string& effect, bool keep_anyway,
-                      int jobs) {
+Ladder balance_ladder(residuals::Inputs inputs, const std::string& effect, bool keep_anyway, int jobs) {
   Ladder ladder;
   const stability::Model& nominal = inputs.models[0];
   ladder.split = split_flights(inputs);
+  for (const residuals::FlightFiles& flight : inputs.found.flights) ladder.flights.push_back(flight.name);
   ladder.earlier = nominal.ladder;
   std::vector<stability::EffectSpec> specs =
       fitted_to_means(with_model(inputs, {}, ladder.split.fit), effect, jobs);
@@ -106,7 +106,7 @@ Ladder balance_ladder(const residuals::Inputs& inputs, const std::string& effect
     row.effect = has_effect ? effect : "nominal";
     row.fit_rmse_N = error_N(ladder.split.fit);
     row.select_rmse_N = error_N(ladder.split.select);
-    row.test_rmse_N = error_N(ladder.split.test);
+    if (ladder.split.by != Split::By::kNothing) row.test_rmse_N = error_N(ladder.split.test);
     row.test_looks = ladder.test_looks;
     row.values = values_of_effects(with_effects(nominal, added));
     ladder.rows.push_back(std::move(row));

@@ -15,6 +15,6 @@ bool is_balanced(const std::string& effect);
 /// Like climb() for this single effect. The errors of the rows are, for torques, the forces by which the rotors are out
 /// of balance, rms over blocks of 1 s and rotors; for accelerometer_scale, the errors of the force. If several vehicles
 /// flew, each gets an effect of its own. Precondition: is_balanced(effect).
-Ladder balance_ladder(const residuals::Inputs& inputs, const std::string& effect, bool keep_anyway, int jobs);
+Ladder balance_ladder(residuals::Inputs inputs, const std::string& effect, bool keep_anyway, int jobs);
 
 }  // namespace swarmcert::identification

@@ -51,9 +51,19 @@ Records collect(const residuals::Inputs& inputs, const std::vector<stability::Mo
   return all;
 }
 
+/// Returns the axis with the largest mean square.
+int largest_axis(const std::vector<Eigen::Vector3f>& residual_N) {
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3f& r : residual_N) squares += r.cast<double>().cwiseAbs2();
+  int axis = 2;
+  squares.maxCoeff(&axis);
+  return axis;
+}
+
 RoomMap room_map(const Records& records, std::size_t before, std::size_t after) {
   RoomMap map;
   if (records.place_m.empty()) return map;
+  map.axis = largest_axis(records.residual_N[before]);
   Eigen::Vector2f lower = records.place_m[0], upper = lower;
   for (const Eigen::Vector2f& place : records.place_m) {
     lower = lower.cwiseMin(place);
@@ -71,8 +81,8 @@ RoomMap room_map(const Records& records, std::size_t before, std::size_t after) 
     };
     RoomMap::Cell& cell = map.cells[static_cast<std::size_t>(index(1) * RoomMap::kCells + index(0))];
     ++cell.records;
-    cell.before_N += static_cast<double>(records.residual_N[before][i].z());
-    cell.after_N += static_cast<double>(records.residual_N[after][i].z());
+    cell.before_N += static_cast<double>(records.residual_N[before][i][map.axis]);
+    cell.after_N += static_cast<double>(records.residual_N[after][i][map.axis]);
   }
   for (RoomMap::Cell& cell : map.cells) {
     if (cell.records == 0) continue;

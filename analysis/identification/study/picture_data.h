@@ -9,8 +9,9 @@
 
 namespace swarmcert::identification {
 
-/// Mean vertical residual over the horizontal position of the vehicle, on a grid.
+/// Mean residual along one axis over the horizontal position of the vehicle, on a grid.
 struct RoomMap {
+  int axis = 2;                      ///< along which the residual of the given model is largest; 2: z
   static constexpr int kCells = 16;  ///< along x and along y
   double lower_m[2] = {0, 0}, step_m[2] = {0, 0};
   struct Cell {

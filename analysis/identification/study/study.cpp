@@ -21,17 +21,22 @@ residuals::Inputs with_model(const residuals::Inputs& inputs, const stability::M
   return changed;
 }
 
-StudyErrors errors_of(const residuals::Inputs& inputs, const Split& split, int jobs) {
+/// @param divided the same inputs, with the flights or parts that `split` refers to
+StudyErrors errors_of(const residuals::Inputs& inputs, const residuals::Inputs& divided, const Split& split,
+                      const stability::Model& model, int jobs) {
   const auto silent = [](int, int) {};
-  return {residuals::compare(inputs, jobs, silent),
-          residuals::compare(with_flights(inputs, split.test), jobs, silent)};
+  StudyErrors errors;
+  errors.all = residuals::compare(with_model(inputs, model), jobs, silent);
+  if (split.by != Split::By::kNothing)
+    errors.test = residuals::compare(with_flights(with_model(divided, model), split.test), jobs, silent);
+  return errors;
 }
 
 std::vector<int> not_for_test(const residuals::Inputs& inputs, const Split& split) {
   std::vector<int> which;
   for (const int i : every_flight(inputs)) {
     const bool is_test = std::find(split.test.begin(), split.test.end(), i) != split.test.end();
-    if (!is_test || !split.by_flight) which.push_back(i);
+    if (!is_test || split.by == Split::By::kNothing) which.push_back(i);
   }
   return which;
 }
@@ -43,25 +48,26 @@ Study study(const residuals::Inputs& inputs, const std::optional<Split>& split, 
   if (inputs.models.size() != 1) throw std::invalid_argument("study: exactly one model is studied");
   constexpr int kSteps = 5;
   const auto silent = [](int, int) {};
-  const Split chosen = split ? *split : split_flights(inputs);
-  const std::string& kind = inputs.models[0].kind;
+  residuals::Inputs divided = inputs;
+  const Split chosen = split ? *split : split_flights(divided);
+  const stability::Model& given = inputs.models[0];
   Study result;
   progress(0, kSteps, "errors of the given model");
-  result.before = errors_of(inputs, chosen, jobs);
+  result.before = errors_of(inputs, divided, chosen, given, jobs);
   progress(1, kSteps, "missing effects");
-  const std::vector<int> seen = not_for_test(inputs, chosen);
-  result.diagnosis = diagnose(inputs, kind, seen, jobs, silent);
-  name_lone_rotor(inputs, kind, seen, jobs, result.diagnosis.ranking);
-  progress(2, kSteps, "adding effects");
+  const std::vector<int> seen = not_for_test(divided, chosen);
+  result.diagnosis = diagnose(divided, given.kind, seen, jobs, silent);
+  name_lone_rotor(divided, given.kind, seen, jobs, result.diagnosis.ranking);
+  progress(2, kSteps, "adding effects, formulas and shapes");
   LadderOptions options;
   options.split = chosen;
-  result.ladder = climb(inputs, options, jobs, silent);
-  const stability::Model& fitted = result.ladder.any_accepted ? result.ladder.model : inputs.models[0];
+  result.ladder = climb(divided, options, jobs, silent);
+  const stability::Model& fitted = result.ladder.any_accepted ? result.ladder.model : given;
   progress(3, kSteps, "errors of the fitted model");
-  result.after = errors_of(with_model(inputs, fitted), chosen, jobs);
+  result.after = errors_of(inputs, divided, chosen, fitted, jobs);
   progress(4, kSteps, "pictures");
-  result.pictures = picture_data(inputs, inputs.models[0], fitted);
-  result.replay = replay_data(inputs, inputs.models[0], fitted, result.before.all.moments);
+  result.pictures = picture_data(inputs, given, fitted);
+  result.replay = replay_data(inputs, given, fitted, result.before.all.moments);
   progress(kSteps, kSteps, "done");
   return result;
 }

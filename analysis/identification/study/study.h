@@ -13,7 +13,7 @@
 
 namespace swarmcert::identification {
 
-/// Errors of a model on all flights, and on those not used for any fit.
+/// Errors of a model on all flights, and on those not used for any fit; `test` is empty if nothing is held out.
 struct StudyErrors {
   residuals::Comparison all, test;
 };
