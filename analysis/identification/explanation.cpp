@@ -462,7 +462,7 @@ void set_numbers(const Passes& passes, std::vector<Refined>& refined, const Gram
   widen_by_bias(checks, instrument_with_shapes(passes, refined), refined);
   for (std::size_t i = 0; i < refined.size(); ++i) {
     ranking[i] = with_numbers(passes, refined[i], ranking[i], grams);
-    if (!checks.empty()) ranking[i].instrument = checks[i];
+    if (!checks.empty()) set_instrument(refined[i], checks[i], ranking[i]);
   }
 }
 

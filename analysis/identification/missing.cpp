@@ -49,6 +49,13 @@ Missing with_numbers(const Passes& passes, const Refined& refined, const Missing
   return result;
 }
 
+void set_instrument(const Refined& refined, const std::vector<InstrumentedValue>& checks, Missing& missing) {
+  const bool has_free_shape =
+      std::any_of(refined.shape_intervals.begin(), refined.shape_intervals.end(),
+                  [](const Interval& interval) { return interval.lower < interval.upper; });
+  if (!has_free_shape) missing.instrument = checks;
+}
+
 std::vector<Missing> ranking_of(const Passes& passes, const Selected& selected) {
   std::vector<Finding> known = findings(Selection(selected.grams), selected.members);
   std::vector<Missing> ranking;
@@ -60,7 +67,7 @@ std::vector<Missing> ranking_of(const Passes& passes, const Selected& selected) 
         std::find(rivals.begin(), rivals.end(), selected.instead) == rivals.end())
       known[i].rivals.push_back({selected.instead, stability::effect_info(selected.instead).excitation});
     ranking.push_back(missing_of(passes, selected.refined[i], std::move(known[i]), selected.grams));
-    if (!selected.checks.empty()) ranking.back().instrument = selected.checks[i];
+    if (!selected.checks.empty()) set_instrument(selected.refined[i], selected.checks[i], ranking.back());
   }
   return ranking;
 }

@@ -18,9 +18,14 @@ struct Missing {
   std::map<std::string, double> parameters;
   std::map<std::string, Interval> intervals;  ///< 90 %, statistical
   std::vector<std::string> coefficients;      ///< names, in the order of finding.model_form and `instrument`
-  std::vector<InstrumentedValue> instrument;  ///< of each coefficient; empty if no check is possible
+  /// Of each coefficient; empty if no check is possible, or if a shape is fitted too: these values hold it fixed, and
+  /// their intervals would leave out how far it is known.
+  std::vector<InstrumentedValue> instrument;
   std::vector<stability::EffectSpec> specs;   ///< for the model file
 };
+
+/// Sets `instrument` of `missing`, which `refined` fitted.
+void set_instrument(const Refined& refined, const std::vector<InstrumentedValue>& checks, Missing& missing);
 
 /// Returns the selected effects as missing effects, in their order.
 std::vector<Missing> ranking_of(const Passes& passes, const Selected& selected);

@@ -1,4 +1,4 @@
-/// The README as its reader uses it: a clone, every block pasted in order, and the numbers shown.
+/// The README and the guide of commands as their readers use them: a clone, every block pasted in order, and the numbers shown.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -181,9 +181,17 @@ TEST(Readme, BlocksKeepTheirCommandsInOrderWithContinuationsAndOutput) {
   EXPECT_EQ(blocks[1][0].command, "four");
 }
 
-/// Uses a clone of HEAD: uncommitted files are missing, and files committed by accident are present. README.md is
-/// read from the clone as well.
-TEST(Readme, EveryBlockWorksInAFreshCloneAndPrintsWhatIsShown) {
+/// A page with commands, and the least number of commands and of compared lines that it must keep.
+struct Page {
+  const char* path;
+  int commands, compared;
+};
+
+class PageOfCommands : public testing::TestWithParam<Page> {};
+
+/// Uses a clone of HEAD: uncommitted files are missing, and files committed by accident are present. The page is read
+/// from the clone as well.
+TEST_P(PageOfCommands, WorksInAFreshCloneAndPrintsWhatIsShown) {
   const ScratchFolder folder;
   write_text(folder / "gitconfig", "[safe]\n\tdirectory = *\n");  // the checkout may belong to another user
   const Outcome cloned = run_shell(
@@ -193,7 +201,7 @@ TEST(Readme, EveryBlockWorksInAFreshCloneAndPrintsWhatIsShown) {
   ASSERT_EQ(cloned.exit_code, 0) << cloned.output;
   const std::filesystem::path clone = folder.path() / "clone";
   int number = 0, commands = 0, compared = 0;
-  for (const Block& block : blocks_of(read_text((clone / "README.md").string()))) {
+  for (const Block& block : blocks_of(read_text((clone / GetParam().path).string()))) {
     const std::vector<Printed> printed =
         run_block(block, folder / ("block_" + std::to_string(++number) + ".sh"), clone);
     ASSERT_EQ(printed.size(), block.size()) << "the shell ended within block " << number;
@@ -205,9 +213,16 @@ TEST(Readme, EveryBlockWorksInAFreshCloneAndPrintsWhatIsShown) {
         check_bootstrap(block[i].command, clone);
     }
   }
-  EXPECT_GE(commands, 15) << "the README lost its examples";
-  EXPECT_GE(compared, 10) << "the README shows no output";
+  EXPECT_GE(commands, GetParam().commands) << "the page lost its examples";
+  EXPECT_GE(compared, GetParam().compared) << "the page shows no output";
 }
+
+INSTANTIATE_TEST_SUITE_P(Readme, PageOfCommands,
+                         testing::Values(Page{"README.md", 15, 10},
+                                         Page{"notebooks_cpp/from_your_log.md", 15, 10}),
+                         [](const testing::TestParamInfo<Page>& page) {
+                           return page.index == 0 ? "Front" : "FromYourLog";
+                         });
 
 }  // namespace
 }  // namespace swarmcert::tests

@@ -144,7 +144,7 @@ TEST_F(Study, ASidewaysForceIsNamedWithItsAxisAndIsTheSameEverywhere) {
   EXPECT_EQ(json["fails"]["where"], "everywhere") << json["fails"];
   EXPECT_NE(json["fails"]["words"].get<std::string>().find("towards -y"), std::string::npos) << json["fails"];
   EXPECT_NE(outcome.output.find("most along y"), std::string::npos) << outcome.output;
-  ASSERT_EQ(json["causes"].size(), 1U) << outcome.output;
+  ASSERT_FALSE(json["causes"].empty()) << outcome.output;
   EXPECT_EQ(json["causes"][0]["name"], "constant_force");
   EXPECT_GT(json["causes"][0]["fall_percent"].get<double>(), 50);
 }
