@@ -72,9 +72,9 @@ FailingPlace failing_place(const Comparison& comparison, const ForceUnit& unit) 
   if (worst != comparison.regions.end() && share_of(*worst) >= kLeastOfRegion) {
     place.where = Where::kRegion;
     place.share = share_of(*worst);
-    place.words = fmt::format("most at {}: {}, {:.0f} % of the mean square",
-                              region_name(worst->variable, worst->region),
-                              direction_words(worst->statistics, unit), 100 * place.share);
+    place.words =
+        fmt::format("at {}: {}, {:.0f} % of the mean square", region_name(worst->variable, worst->region),
+                    direction_words(worst->statistics, unit), 100 * place.share);
     return place;
   }
   place.where = Where::kScattered;

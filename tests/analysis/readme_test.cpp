@@ -182,12 +182,12 @@ TEST(Readme, BlocksKeepTheirCommandsInOrderWithContinuationsAndOutput) {
 }
 
 /// A page with commands, and the least number of commands and of compared lines that it must keep.
-struct Page {
+struct CommandPage {
   const char* path;
   int commands, compared;
 };
 
-class PageOfCommands : public testing::TestWithParam<Page> {};
+class PageOfCommands : public testing::TestWithParam<CommandPage> {};
 
 /// Uses a clone of HEAD: uncommitted files are missing, and files committed by accident are present. The page is read
 /// from the clone as well.
@@ -218,9 +218,9 @@ TEST_P(PageOfCommands, WorksInAFreshCloneAndPrintsWhatIsShown) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Readme, PageOfCommands,
-                         testing::Values(Page{"README.md", 15, 10},
-                                         Page{"notebooks_cpp/from_your_log.md", 15, 10}),
-                         [](const testing::TestParamInfo<Page>& page) {
+                         testing::Values(CommandPage{"README.md", 15, 10},
+                                         CommandPage{"notebooks_cpp/from_your_log.md", 15, 10}),
+                         [](const testing::TestParamInfo<CommandPage>& page) {
                            return page.index == 0 ? "Front" : "FromYourLog";
                          });
 

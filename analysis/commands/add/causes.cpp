@@ -77,12 +77,13 @@ std::vector<Cause> causes_of(const Ladder& ladder) {
 std::string sentence(const Cause& cause, const residuals::ForceUnit& unit) {
   std::string values;
   for (const auto& [name, value] : cause.parameters) {
-    if (!value.interval_90) continue;  // it keeps its standard value
+    const bool is_fitted = value.interval_90 && value.interval_90->lower < value.interval_90->upper;
+    if (!is_fitted) continue;
     values += fmt::format("{}{} = {:.4g} ({:.4g} .. {:.4g})", values.empty() ? "" : ", ", name, value.value,
                           value.interval_90->lower, value.interval_90->upper);
   }
-  return fmt::format("{}: {}; {}; lowers the error by {:.0f} %, {:.3g} to {:.3g} {}", cause.name,
-                     cause.equation, values, cause.fall_percent(), cause.before_N * unit.per_newton(),
+  return fmt::format("{}: {}; lowers the error by {:.0f} %, {:.3g} to {:.3g} {}", cause.name, values,
+                     cause.fall_percent(), cause.before_N * unit.per_newton(),
                      cause.after_N * unit.per_newton(), unit.name);
 }
 

@@ -48,6 +48,13 @@ const residuals::Comparison& judged(const StudyErrors& errors) {
   return errors.test.overall.statistics.samples > 0 ? errors.test : errors.all;
 }
 
+/// The mean over all steps of a prediction.
+std::string mean_position_error(const Prediction& prediction) {
+  const double mean_m =
+      prediction.errors[residuals::kPositionError].sum() / static_cast<double>(prediction.steps());
+  return fmt::format("{:.3g} mm", 1000 * mean_m);
+}
+
 std::string first_log(const residuals::Inputs& inputs) {
   const std::vector<std::string> logs = residuals::log_files(inputs.found);
   return logs.empty() ? "" : logs[0];
@@ -72,14 +79,22 @@ std::string headline(const StudyResult& result, const residuals::ForceUnit& unit
     return fmt::format("Error of the force (RMS) on {}: {}; no effect lowers it, and {}.", where, before,
                        left);
   const double floor_N = study.ladder.rows.back().noise_floor_N;
-  return fmt::format("Error of the force (RMS) on {}: {}; after adding {} {}{}; {}.", where, before,
+  return fmt::format("Error of the force (RMS) on {}: {}. After adding {}: {}{}; {}.", where, before,
                      listed(added), error_words(judged(study.after), unit),
                      floor_N > 0 ? fmt::format(" (noise {:.3g})", floor_N * unit.per_newton()) : "", left);
 }
 
 std::vector<std::string> conclusions(const StudyResult& result, const residuals::ForceUnit& unit) {
   std::vector<std::string> sentences = {"It fails " + result.fails.words + "."};
-  for (const Cause& cause : result.causes) sentences.push_back(sentence(cause, unit) + ".");
+  for (const Cause& cause : result.causes) {
+    sentences.push_back(sentence(cause, unit) + ".");
+    sentences.push_back("  " + cause.equation);
+  }
+  if (result.predicted_before && result.predicted_after && !result.causes.empty()) {
+    sentences.push_back(fmt::format(
+        "Up to half a second ahead it predicts the position to {} on average; before, to {}.",
+        mean_position_error(*result.predicted_after), mean_position_error(*result.predicted_before)));
+  }
   const std::string& stopped = result.study.ladder.stopped;
   if (!stopped.empty()) sentences.push_back("The search ended: " + stopped + ".");
   return sentences;
@@ -98,7 +113,10 @@ std::string next_of_study(const Study& study, const FlightOptions& options, cons
 }
 
 void print_study(const StudyResult& result, const residuals::ForceUnit& unit) {
-  fmt::print("{}\n", headline(result, unit));
+  std::string answer = headline(result, unit);
+  const std::size_t second = answer.find(". After");
+  if (second != std::string::npos) answer[second + 1] = '\n';
+  fmt::print("{}\n", answer);
   for (const std::string& line : conclusions(result, unit)) fmt::print("  {}\n", line);
   constexpr std::size_t kMostNext = 2;
   for (std::size_t i = 0; i < result.next.size() && i < kMostNext; ++i)

@@ -9,10 +9,10 @@
 
 namespace swarmcert::analysis {
 
-/// Returns the whole answer in one sentence, with its numbers.
+/// Returns the whole answer in two sentences, with its numbers.
 std::string headline(const StudyResult& result, const residuals::ForceUnit& unit);
 
-/// Returns one sentence per cause, the reason for which nothing further was added, and what to do next.
+/// Returns two lines per cause, the reason for which nothing further was added, and what to do next.
 std::vector<std::string> conclusions(const StudyResult& result, const residuals::ForceUnit& unit);
 
 /// Returns the command to type next: a check of the fitted model, else a search for what is left, else the errors from

@@ -23,9 +23,10 @@ void describe_group(Record& record, const residuals::GroupErrors& errors) {
   add("max", s.max, "Its largest magnitude.");
 }
 
-void describe_errors(Record& record, const StudyErrors& errors) {
+void describe_errors(Record& record, const StudyErrors& errors, const std::optional<Prediction>& prediction) {
   record.object("all", "On all flights.", [&](Record& r) { describe_group(r, errors.all.overall); });
   record.object("test", "On what is held out.", [&](Record& r) { describe_group(r, errors.test.overall); });
+  record.may("prediction", prediction, "Of half a second from each measured state of what is held out.");
 }
 
 const char* how_held_out(Split::By by) {
@@ -47,8 +48,10 @@ void describe_changes(Record& record, const Changes& changes) {
 
 void describe(Record& record, const StudyResult& result) {
   const identification::Study& study = result.study;
-  record.object("before", "Errors of the given model.", [&](Record& r) { describe_errors(r, study.before); });
-  record.object("after", "Errors of the fitted model.", [&](Record& r) { describe_errors(r, study.after); });
+  record.object("before", "Errors of the given model.",
+                [&](Record& r) { describe_errors(r, study.before, result.predicted_before); });
+  record.object("after", "Errors of the fitted model.",
+                [&](Record& r) { describe_errors(r, study.after, result.predicted_after); });
   record.field("fails", result.fails, "Where the given model fails.");
   record.field("causes", result.causes, "What was added, in order, and what each is worth.");
   record.object("held_out", "What no fit has seen; errors of causes are of these.", [&](Record& r) {
@@ -71,6 +74,8 @@ StudyResult study_result(const identification::Study& study, const residuals::Fo
   return {study,
           diagnosed({study.diagnosis}),
           residuals::failing_place(study.before.all, unit),
+          prediction_of(study.before.predictions),
+          prediction_of(study.after.predictions),
           causes_of(study.ladder),
           next_flights(study.diagnosis),
           next_command,

@@ -7,6 +7,7 @@
 
 #include "analysis/commands/add/causes.h"
 #include "analysis/commands/diagnose/diagnose_result.h"
+#include "analysis/commands/shared/prediction_output.h"
 #include "analysis/identification/study/study.h"
 #include "analysis/residuals/failing_place.h"
 
@@ -23,6 +24,8 @@ struct StudyResult {
   identification::Study study;
   Diagnosed found;
   residuals::FailingPlace fails;  ///< the given model, on all flights
+  /// Over half a second, by the given and by the fitted model, where nothing was fitted; absent without rates.
+  std::optional<Prediction> predicted_before, predicted_after;
   std::vector<Cause> causes;
   std::vector<std::string> next;
   std::string next_command;

@@ -27,8 +27,10 @@ StudyErrors errors_of(const residuals::Inputs& inputs, const residuals::Inputs& 
   const auto silent = [](int, int) {};
   StudyErrors errors;
   errors.all = residuals::compare(with_model(inputs, model), jobs, silent);
-  if (split.by != Split::By::kNothing)
-    errors.test = residuals::compare(with_flights(with_model(divided, model), split.test), jobs, silent);
+  const bool is_held_out = split.by != Split::By::kNothing;
+  const residuals::Inputs judged = with_flights(with_model(divided, model), split.test);
+  if (is_held_out) errors.test = residuals::compare(judged, jobs, silent);
+  errors.predictions = residuals::predict(judged, kHorizon_s, false, jobs);
   return errors;
 }
 

@@ -4,19 +4,25 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "analysis/identification/diagnose.h"
 #include "analysis/identification/ladder.h"
 #include "analysis/identification/study/picture_data.h"
 #include "analysis/identification/study/replay_data.h"
 #include "analysis/residuals/comparison.h"
+#include "analysis/residuals/prediction.h"
 
 namespace swarmcert::identification {
 
 /// Errors of a model on all flights, and on those not used for any fit; `test` is empty if nothing is held out.
 struct StudyErrors {
   residuals::Comparison all, test;
+  std::vector<residuals::FlightPrediction>
+      predictions;  ///< over kHorizon_s, on `test`, or else on all flights
 };
+
+inline constexpr double kHorizon_s = 0.5;
 
 struct Study {
   Diagnosis diagnosis;  ///< of the given model, on all flights except the test flights
