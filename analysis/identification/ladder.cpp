@@ -3,8 +3,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 
 #include "analysis/identification/remainder.h"
 #include "analysis/identification/rotors/rotor_fit.h"
@@ -28,11 +30,16 @@ constexpr int kMostForms = 6;
 /// Parts of a flight are at least this long. Errors are correlated over blocks of 2 s, so as much lies between parts.
 constexpr double kShortestPart_s = 8, kGuard_s = 2;
 
-/// Returns the root mean square of the residual vector of `model` on the flights `which`, in newton.
-double rmse(residuals::Inputs inputs, const stability::Model& model, const std::vector<int>& which,
-            int jobs) {
+/// Squared residual vectors of a flight, in N^2, and their number.
+struct FlightSquares {
+  double sum = 0, count = 0;
+};
+
+/// Returns the squares of the residual of `model` in the flights `which`, in their order.
+std::vector<FlightSquares> squares_of(residuals::Inputs inputs, const stability::Model& model,
+                                      const std::vector<int>& which, int jobs) {
   inputs.models = {model};
-  std::vector<double> squares(which.size(), 0), counts(which.size(), 0);
+  std::vector<FlightSquares> all(which.size());
   files::parallel_for(static_cast<int>(which.size()), jobs, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     std::vector<std::string> problems;
@@ -41,17 +48,38 @@ double rmse(residuals::Inputs inputs, const stability::Model& model, const std::
       const auto r = residuals::force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
       for (std::size_t s = 0; s < r.size(); ++s) {
         if (track.cut[s] != residuals::Cut::kNone) continue;
-        squares[k] += r[s].squaredNorm();
-        counts[k] += 1;
+        all[k].sum += r[s].squaredNorm();
+        all[k].count += 1;
       }
     }
   });
-  double sum = 0, count = 0;
-  for (std::size_t k = 0; k < squares.size(); ++k) {
-    sum += squares[k];
-    count += counts[k];
+  return all;
+}
+
+/// Returns the root mean square, in newton.
+double rmse_N(const std::vector<FlightSquares>& flights) {
+  FlightSquares all;
+  for (const FlightSquares& flight : flights) {
+    all.sum += flight.sum;
+    all.count += flight.count;
   }
-  return count > 0 ? std::sqrt(sum / count) : 0;
+  return all.count > 0 ? std::sqrt(all.sum / all.count) : 0;
+}
+
+/// Whether the squared error falls in most flights alike: the mean of the relative falls exceeds zero in a t test at
+/// 95 %. A form that only tells one flight from the others lowers the error of some and not of the others. With fewer
+/// than three flights there is no test.
+bool are_alike_falls(const std::vector<FlightSquares>& before, const std::vector<FlightSquares>& after) {
+  std::vector<double> falls;
+  for (std::size_t k = 0; k < before.size(); ++k)
+    if (before[k].sum > 0) falls.push_back(1 - after[k].sum / before[k].sum);
+  if (falls.size() < 3) return true;
+  const auto n = static_cast<double>(falls.size());
+  const double mean = std::accumulate(falls.begin(), falls.end(), 0.0) / n;
+  double squares = 0;
+  for (const double fall : falls) squares += (fall - mean) * (fall - mean);
+  const double error = std::sqrt(squares / (n - 1) / n);
+  return mean > boost::math::quantile(boost::math::students_t(n - 1), 0.95) * error;
 }
 
 residuals::Inputs only_flights(residuals::Inputs inputs, const std::vector<int>& which) {
@@ -222,6 +250,7 @@ bool split_in_time(residuals::Inputs& inputs) {
 struct Trial {
   LadderRow row;
   stability::Model model;
+  std::vector<FlightSquares> fit, select;  ///< by flight
 };
 
 }  // namespace
@@ -295,10 +324,12 @@ class Climb {
   }
 
   Trial trial(const std::string& effect, stability::Model model) const {
-    Trial next{{}, std::move(model)};
+    Trial next{{}, std::move(model), {}, {}};
     next.row.effect = effect;
-    next.row.fit_rmse_N = rmse(inputs_, next.model, ladder_.split.fit, jobs_);
-    next.row.select_rmse_N = rmse(inputs_, next.model, ladder_.split.select, jobs_);
+    next.fit = squares_of(inputs_, next.model, ladder_.split.fit, jobs_);
+    next.select = squares_of(inputs_, next.model, ladder_.split.select, jobs_);
+    next.row.fit_rmse_N = rmse_N(next.fit);
+    next.row.select_rmse_N = rmse_N(next.select);
     next.row.values = values_of(next.model);
     return next;
   }
@@ -335,7 +366,9 @@ class Climb {
     if (fresh == fitted.rend())
       return refuse(name, "no flight of the fit has slow flight with the duty of each of four motors");
     Trial next = trial(name, with_effects(working_.models[0], specs_of(fitted)));
-    const bool helps = is_rotors ? balances(next) : lowers_error(next, least_fall);
+    const bool is_form = name != asked && is_automatic_;
+    const bool helps =
+        is_rotors ? balances(next) : lowers_error(next, least_fall) && (!is_form || falls_alike(next));
     next.row.accepted = helps || keeps_anyway_;
     if (next.row.accepted) {
       note_errors(*fresh, helps, next);
@@ -358,6 +391,17 @@ class Climb {
       next.row.note =
           fmt::format("the error of the select flights goes from {:.5f} to {:.5f} N", before_N, after_N);
     return helps;
+  }
+
+  bool falls_alike(Trial& next) {
+    const auto all = [](const Trial& trial) {
+      std::vector<FlightSquares> flights = trial.fit;
+      flights.insert(flights.end(), trial.select.begin(), trial.select.end());
+      return flights;
+    };
+    const bool alike = are_alike_falls(all(best()), all(next));
+    if (!alike) next.row.note = "it lowers the error of some flights and not of the others";
+    return alike;
   }
 
   bool balances(Trial& next) {
@@ -397,7 +441,7 @@ class Climb {
     const double floor_N = noise_floor_N(inputs_, ladder_.model, ladder_.split.test, jobs_);
     for (Trial& t : trials_) {
       if (ladder_.split.by != Split::By::kNothing)
-        t.row.test_rmse_N = rmse(inputs_, t.model, ladder_.split.test, jobs_);
+        t.row.test_rmse_N = rmse_N(squares_of(inputs_, t.model, ladder_.split.test, jobs_));
       t.row.noise_floor_N = floor_N;
       t.row.test_looks = ladder_.test_looks;
       ladder_.rows.push_back(std::move(t.row));

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "analysis/identification/draft_geometry.h"
+#include "analysis/identification/rotor_response.h"
 #include "analysis/logs/flight_story.h"
 #include "analysis/logs/plausibility.h"
 #include "analysis/logs/read_log.h"
@@ -49,6 +51,7 @@ struct LogFit {
   int motor_power = 1;
   double least_V = INFINITY, most_V = 0;  ///< of the battery in flight
   std::map<std::string, double> parameters;
+  std::optional<RotorResponse> response;  ///< if the log has motor commands and rates
 };
 
 /// Fits thrust over specific force along the thrust axis, in means over blocks: the mass, if the thrust is right.
@@ -64,6 +67,8 @@ LogFit fit(const logs::Log& log, const stability::Model& base) {
     if (delay.signal == "specific_force" && delay.against == "thrust") result.delay_s = delay.delay_s;
   }
   const std::vector<char> air = logs::airborne(log);
+  if (result.motors > 0 && log.signals.rates && log.hover_command > 0)
+    result.response = rotor_response(log, air);
   double thrust_N = 0, load = 0, start_s = -INFINITY;
   const auto close = [&] {
     if (load > 0) result.mass_kg.push_back(thrust_N / load);
@@ -137,10 +142,33 @@ void use_stated_arm(ModelDraft& draft) {
   }
 }
 
+/// Returns the places that the flights show; none if no flight shows them, or if two disagree.
+std::vector<stability::RotorPlace> places_seen(const std::vector<LogFit>& fits, double arm_m) {
+  std::vector<stability::RotorPlace> seen;
+  for (const LogFit& log : fits) {
+    const std::vector<stability::RotorPlace> places =
+        log.response ? places_of(*log.response, arm_m) : std::vector<stability::RotorPlace>{};
+    const auto is_same = [](const stability::RotorPlace& a, const stability::RotorPlace& b) {
+      return a.x_m == b.x_m && a.y_m == b.y_m && a.counterclockwise == b.counterclockwise;
+    };
+    if (places.empty()) continue;
+    if (!seen.empty() && !std::equal(seen.begin(), seen.end(), places.begin(), places.end(), is_same))
+      return {};
+    seen = places;
+  }
+  return seen;
+}
+
 /// Sets the rotors and their thrust from logs with motor commands: the weight at the hover command.
-void set_motors(const LogFit& log, double hover_command, ModelDraft& draft) {
+void set_motors(const LogFit& log, double hover_command, const std::vector<LogFit>& fits, ModelDraft& draft) {
   stability::Model& model = draft.model;
-  const DraftedGeometry geometry = geometry_of(log.parameters, log.motors, model.arm_m);
+  DraftedGeometry geometry = geometry_of(log.parameters, log.motors, model.arm_m);
+  const bool is_stated = geometry.torque_per_thrust_m > 0;
+  const std::vector<stability::RotorPlace> seen = places_seen(fits, model.arm_m);
+  if (!is_stated && seen.size() == log.motors) {
+    geometry.rotors = seen;
+    geometry.source = "fit: which motor turns the vehicle which way; the distance is that of arm_m";
+  }
   model.rotors = geometry.rotors;
   const auto add = [&draft](const std::string& name, double value, const std::string& source) {
     draft.parameters.push_back({name, value, false, 0, 0, source});
@@ -152,7 +180,7 @@ void set_motors(const LogFit& log, double hover_command, ModelDraft& draft) {
     add(name + "y_m", rotor.y_m, geometry.source);
     add(name + "spin", rotor.counterclockwise ? 1 : -1, geometry.source + "; 1: ccw, -1: cw");
   }
-  if (geometry.torque_per_thrust_m > 0) {
+  if (is_stated) {
     use_stated_arm(draft);
     model.torque_per_thrust_m = geometry.torque_per_thrust_m;
     for (DraftedParameter& p : draft.parameters) {
@@ -293,7 +321,7 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
     draft.parameters.push_back({"hover_command", command.value, hover.size() > 1, command.lower,
                                 command.upper, "fit: mean motor command that carries the weight"});
     if (motors->motors > 0) {
-      set_motors(*motors, command.value, draft);
+      set_motors(*motors, command.value, fits, draft);
     } else {
       // The log has rotor speeds or a collective command in any unit, but no commands of 0 .. 1 for each motor.
       const double each_N = draft.model.weight_N() / 4;
