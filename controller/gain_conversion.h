@@ -1,4 +1,5 @@
-/// @file Conversion between the paper's gains (Lambda, K) and PID gains, where both forms describe the same law.
+/// @file Conversion between the paper's gains (Lambda, K) and PID gains, where both forms describe the same law, and of
+/// gains that give forces into PID gains.
 ///
 /// Per axis, with a = k / m: Kd = a + 2 l, Kp = 2 a l + l^2, Ki = a l^2, that is s^3 + Kd s^2 + Kp s + Ki = (s + a)(s +
 /// l)^2. A PID law has this form only if its characteristic polynomial has a real double root -l with 0 < l < Kd / 2:
@@ -61,6 +62,20 @@ inline AxisPid<Scalar> to_pid(const Scalar& lambda_1_s, const Scalar& k_kg_s, co
   const Scalar square = product(lambda_1_s, lambda_1_s);
   return {product(Scalar(2), product(a, lambda_1_s)) + square, a + product(Scalar(2), lambda_1_s),
           product(a, square)};
+}
+
+/// Gains of one axis of a law F = m_told (a_d + g) + kp e_p + kd e_v + ki int e_p, as of Mellinger's controller in the
+/// Crazyflie firmware (parameters ctrlMel.*).
+template <typename Scalar>
+struct AxisForceGains {
+  Scalar kp_N_m, kd_N_s_m, ki_N_ms;
+};
+
+/// Divides by the mass that the controller is told, not the one that a scale shows: the law is m_told times ours. If
+/// both differ, so do feedforward and weight, by a constant force in steady flight that the integrator takes.
+template <typename Scalar>
+inline AxisPid<Scalar> to_pid(const AxisForceGains<Scalar>& force, const Scalar& mass_told_kg) {
+  return {force.kp_N_m / mass_told_kg, force.kd_N_s_m / mass_told_kg, force.ki_N_ms / mass_told_kg};
 }
 
 /// @param relative_tolerance maximum deviation of Ki from (Kd - 2 l) l^2, relative to the latter; needed because gains

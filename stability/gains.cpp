@@ -3,6 +3,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "controller/gain_conversion.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
@@ -142,16 +143,60 @@ Matrix3 matrix(const TomlTable& table, const std::string& key, double largest, c
 
 controller::Vector3<double> vector(const PerAxis& v) { return {v[0], v[1], v[2]}; }
 
+/// Reads gains in newton, by the names of the Crazyflie firmware's parameters ctrlMel.*.
+void read_mellinger(const TomlTable& position, Gains& gains) {
+  for (const char* const key : {"Kp", "Kd", "Ki", "Lambda", "K", "integrator_limit"}) {
+    if (position.has(key))
+      position.refuse(key, "", "cannot be combined with kp_xy, kp_z, ... of the Mellinger controller",
+                      "give one form");
+  }
+  if (!position.has("mass"))
+    position.refuse("mass", "", "is missing: kp_xy, ... are in N/m and are divided by the mass",
+                    "give the mass that the firmware is told, ctrlMel.mass, in kg");
+  const double mass_told_kg = positive(position, "mass");
+  if (position.has("massThrust"))
+    positive(position, "massThrust");  // PWM per newton: no part of the position law
+  const auto of_axis = [&](const std::string& axis) {
+    const auto in_newton = [&](const char* gain, bool may_be_left_out, double largest, const char* unit) {
+      const std::string key = gain + axis;
+      if (may_be_left_out && !position.has(key)) return 0.0;
+      const double value = may_be_left_out ? non_negative(position, key) : positive(position, key);
+      if (value / mass_told_kg > largest)
+        position.refuse(key, text_of(value), "exceeds " + text_of(largest * mass_told_kg) + " " + unit,
+                        "the value is in " + std::string(unit));
+      return value;
+    };
+    return controller::to_pid(
+        controller::AxisForceGains<double>{in_newton("kp_", false, kLargestKp_1_s2, "N/m"),
+                                           in_newton("kd_", false, kLargestKd_1_s, "N s/m"),
+                                           in_newton("ki_", true, kLargestKi_1_s3, "N/(m s)")},
+        mass_told_kg);
+  };
+  const controller::AxisPid<double> xy = of_axis("xy"), z = of_axis("z");
+  gains.pid = PidGains{{xy.Kp_1_s2, xy.Kp_1_s2, z.Kp_1_s2},
+                       {xy.Kd_1_s, xy.Kd_1_s, z.Kd_1_s},
+                       {xy.Ki_1_s3, xy.Ki_1_s3, z.Ki_1_s3}};
+  if (position.has("i_range_xy"))
+    gains.integrator_limit_m_s[0] = gains.integrator_limit_m_s[1] = non_negative(position, "i_range_xy");
+  if (position.has("i_range_z")) gains.integrator_limit_m_s[2] = non_negative(position, "i_range_z");
+}
+
 void read_position(const TomlTable& position, Gains& gains) {
-  position.allow_only({"Kp", "Kd", "Ki", "Lambda", "K", "integrator_limit", "rate_hz", "integrator_step_s"});
+  position.allow_only({"Kp", "Kd", "Ki", "Lambda", "K", "integrator_limit", "rate_hz", "integrator_step_s",
+                       "kp_xy", "kd_xy", "ki_xy", "i_range_xy", "kp_z", "kd_z", "ki_z", "i_range_z", "mass",
+                       "massThrust"});
+  const bool is_mellinger = position.has("kp_xy") || position.has("kp_z");
   const bool is_pid = position.has("Kp") || position.has("Kd") || position.has("Ki");
   const bool is_composite = position.has("Lambda") || position.has("K");
   if (is_pid && is_composite) {
     position.refuse(position.has("Lambda") ? "Lambda" : "K", "", "cannot be combined with Kp, Kd or Ki",
                     "give Kp, Kd, Ki or Lambda, K");
   }
-  if (!is_pid && !is_composite) position.refuse("", "", "has no gains", "give Kp, Kd, Ki or Lambda, K");
-  if (is_pid) {
+  if (!is_pid && !is_composite && !is_mellinger)
+    position.refuse("", "", "has no gains", "give Kp, Kd, Ki or Lambda, K");
+  if (is_mellinger) {
+    read_mellinger(position, gains);
+  } else if (is_pid) {
     gains.pid = PidGains{vector(per_axis(position, "Kp", false, kLargestKp_1_s2, "1/s^2")),
                          vector(per_axis(position, "Kd", false, kLargestKd_1_s, "1/s")),
                          vector(per_axis(position, "Ki", true, kLargestKi_1_s3, "1/s^3"))};

@@ -354,11 +354,15 @@ class Assigner {
     groups_.erase(std::remove_if(groups_.begin(), groups_.end(), is_mixed), groups_.end());
   }
 
-  void report(const ColumnGroup& group, const char* why) const {
+  static Carried carried_of(const ColumnGroup& group) {
     Carried carried;
     carried.topic = group.topic;
     carried.columns = group.columns;
-    found_.rejected.push_back(names_of(log_, carried) + ": " + why);
+    return carried;
+  }
+
+  void report(const ColumnGroup& group, const char* why) const {
+    found_.rejected.push_back(names_of(log_, carried_of(group)) + ": " + why);
   }
 
   bool is_free(const ColumnGroup& group) const {
@@ -554,7 +558,9 @@ class Assigner {
       if (group.is_foreign)
         report(group, "not the vehicle's motion, as its name says");
       else if (*named > kLikelyName && known(signals_of_slots()[slot]) == nullptr)
-        report(group, "the rest of the log contradicts its name");
+        report(group, is_dead(log_.topics[group.topic], carried_of(group))
+                          ? "only zeros"
+                          : "the rest of the log contradicts its name");
     }
   }
 

@@ -29,14 +29,6 @@ Attitude unpacked(double packed) {
   return {q[0], q[1], q[2], q[3]};
 }
 
-/// Rz(yaw) Ry(pitch) Rx(roll)
-Attitude quaternion_of(double roll, double pitch, double yaw) {
-  const double cr = std::cos(roll / 2), sr = std::sin(roll / 2), cp = std::cos(pitch / 2),
-               sp = std::sin(pitch / 2), cy = std::cos(yaw / 2), sy = std::sin(yaw / 2);
-  return {sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy,
-          cr * cp * cy + sr * sp * sy};
-}
-
 void set_attitude(SignalTable& table, std::size_t record, const Attitude& attitude) {
   const std::array<double, 4> xyzw = attitude.xyzw();
   for (int k = 0; k < 4; ++k) table[kAttitude + k][record] = xyzw[static_cast<std::size_t>(k)];
@@ -65,11 +57,18 @@ void derive_from_acceleration(Draft& draft) {
     const double forward = std::cos(yaw) * ax + std::sin(yaw) * ay,
                  left = -std::sin(yaw) * ax + std::cos(yaw) * ay;
     const double pitch = std::atan2(forward, up), roll = std::atan2(-left, std::hypot(forward, up));
-    set_attitude(t, i, quaternion_of(roll, pitch, yaw));
+    set_attitude(t, i, attitude_of_angles(roll, pitch, yaw));
   }
 }
 
 }  // namespace
+
+Attitude attitude_of_angles(double roll, double pitch, double yaw) {
+  const double cr = std::cos(roll / 2), sr = std::sin(roll / 2), cp = std::cos(pitch / 2),
+               sp = std::sin(pitch / 2), cy = std::cos(yaw / 2), sy = std::sin(yaw / 2);
+  return {sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy,
+          cr * cp * cy + sr * sp * sy};
+}
 
 std::array<Vector, 3> Attitude::rotation() const {
   return {{{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
@@ -91,8 +90,8 @@ void settle_attitude(Draft& draft) {
   } else if (t.has_group(kEuler, 2)) {
     make_room(t);
     for (std::size_t i = 0; i < t.size(); ++i)
-      set_attitude(t, i,
-                   quaternion_of(t[kEuler][i], t[kEuler + 1][i], t.has(kEuler + 2) ? t[kEuler + 2][i] : 0));
+      set_attitude(
+          t, i, attitude_of_angles(t[kEuler][i], t[kEuler + 1][i], t.has(kEuler + 2) ? t[kEuler + 2][i] : 0));
     draft.log.signals.attitude = t.has(kEuler + 2);
     const Carried& angles = *draft.recognition.find(kEuler);
     draft.add("attitude", SignalInfo::Source::kDerived, "Euler angles " + names_of(draft.raw, angles), "1");

@@ -9,7 +9,10 @@
 
 namespace swarmcert::logs {
 
-double seconds_per_unit(const std::vector<double>& clock) {
+double seconds_per_unit(std::vector<double> clock) {
+  clock.erase(std::remove_if(clock.begin(), clock.end(), [](double t) { return !std::isfinite(t); }),
+              clock.end());
+  std::sort(clock.begin(), clock.end());  // rows may be in any order
   std::vector<double> steps;
   for (std::size_t i = 1; i < clock.size(); ++i) {
     if (clock[i] > clock[i - 1]) steps.push_back(clock[i] - clock[i - 1]);
@@ -55,6 +58,33 @@ int clock_by_steps(const RawTopic& topic) {
   return best;
 }
 
+namespace {
+
+/// Drops the records of which only other blocks have numbers.
+void drop_records_of_others(RawTopic& topic, const std::map<std::vector<bool>, RawTopic>& blocks) {
+  if (blocks.empty()) return;
+  const std::size_t n = topic.time_s.size();
+  std::vector<char> numbers(n, 0), others(n, 0);
+  for (const RawColumn& column : topic.columns) {
+    if (column.name == topic.clock) continue;
+    for (std::size_t i = 0; i < n; ++i)
+      if (std::isfinite(column.values[i])) numbers[i] = 1;
+  }
+  for (const auto& [has_number, block] : blocks)
+    for (std::size_t i = 0; i < n; ++i)
+      if (has_number[i]) others[i] = 1;
+  const auto keep = [&](std::vector<double>& values) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < n; ++i)
+      if (numbers[i] != 0 || others[i] == 0) values[kept++] = values[i];
+    values.resize(kept);
+  };
+  for (RawColumn& column : topic.columns) keep(column.values);
+  keep(topic.time_s);
+}
+
+}  // namespace
+
 void separate_blocks(RawLog& log) {
   constexpr double kWhole = 0.9;
   constexpr std::size_t kFew = 20;  // too few to tell blocks from damage
@@ -84,6 +114,8 @@ void separate_blocks(RawLog& log) {
     }
   }
   joined.columns = std::move(whole);
+  drop_records_of_others(joined, blocks);
+  log.health.mended.merged_blocks += blocks.size();
   const std::string name = joined.name + (joined.name.empty() ? "block " : " block ");
   for (auto& [has_number, block] : blocks) {
     block.name = name + std::to_string(log.topics.size());
@@ -95,12 +127,20 @@ void Collector::begin(const std::vector<std::string>& names) {
   log_.topics.emplace_back();
   RawTopic& topic = log_.topics.back();
   for (const std::string& name : names) topic.columns.push_back({name, "", {}});
-  const Carried stated = time_column(topic, map_);
-  int clock = stated.columns[0];
-  if (clock >= 0)
-    scale_s_ = 1e-6 * stated.multiply / stated.divide;
-  else if (map_.empty())
-    clock = clock_by_name(topic);
+  int clock = -1;
+  const auto find_clock = [&](const std::string& name, double unit_s) {
+    const RawColumn* const column = topic.find(name);
+    if (column == nullptr || clock >= 0) return;
+    clock = static_cast<int>(column - topic.columns.data());
+    scale_s_ = unit_s;
+  };
+  for (const SignalSource& source : map_)
+    if (source.signal == kTime) find_clock(source.column, 1e-6 * source.multiply / source.divide);
+  if (map_.empty()) {
+    // "time[ms]" of the published CSV files is in microseconds.
+    for (const char* const name : {"time_us", "time[ms]"}) find_clock(name, 1e-6);
+    if (clock < 0) clock = clock_by_name(topic);
+  }
   if (log_.format == "usd") scale_s_ = 1e-6;  // the ticks of the deck
   if (clock < 0 && !map_.empty()) refuse_without_clock();
   needs_.assign(names.size(), 0);
@@ -135,11 +175,21 @@ void Collector::end() {
   const double scale_s = scale_s_ > 0 ? scale_s_ : seconds_per_unit(clock);
   topic.time_s.reserve(clock.size());
   for (const double time : clock) topic.time_s.push_back(time * scale_s);
-  const std::string name = topic.columns[time_].name;
+  topic.clock = topic.columns[time_].name;
+  topic.clock_unit_s = scale_s;
   separate_blocks(log_);
-  const std::vector<RawColumn>& left = log_.topics.front().columns;  // that of the time among them
-  const auto same = [&name](const RawColumn& column) { return column.name == name; };
-  time_ = static_cast<std::size_t>(std::find_if(left.begin(), left.end(), same) - left.begin());
+}
+
+RawLog read_table(std::istream& in, const std::string& path, const SignalMap& map) {
+  RawLog log;
+  log.path = path;
+  log.format = "csv";
+  Collector collector(log, map);
+  const std::optional<files::InputFault> damage = read_csv(in, path, collector, log.health);
+  collector.end();
+  log.health.records = log.topics.front().time_s.size();
+  if (damage && log.health.records == 0) throw files::InputError(*damage);
+  return log;
 }
 
 }  // namespace swarmcert::logs

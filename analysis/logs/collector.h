@@ -15,11 +15,15 @@ int clock_by_steps(const RawTopic& topic);
 
 /// Returns the seconds per unit of a clock, judged by its median step: the largest common unit that gives a plausible
 /// logging rate.
-double seconds_per_unit(const std::vector<double>& clock);
+double seconds_per_unit(std::vector<double> clock);
 
 /// Log blocks of several rates, joined over time, leave blanks: columns of the last topic that have numbers in the same
 /// records, in less than nine tenths of those that have a time, become a topic of these records only.
 void separate_blocks(RawLog& log);
+
+/// Reads a CSV file: one topic, or one for each block of columns.
+/// @throws files::InputError as read_csv() does, and if no line can be read or no column can be the time
+RawLog read_table(std::istream& in, const std::string& path, const SignalMap& map);
 
 /// Collects records. The unit of the time column is decided at the end, from its steps.
 class Collector : public RecordSink {
@@ -34,8 +38,6 @@ class Collector : public RecordSink {
   /// Call once after the last record: fills RawTopic::time_s.
   /// @throws files::InputError if no column can be the time.
   void end();
-  /// After end(): the column that holds the time.
-  std::size_t time_index() const { return time_; }
 
  private:
   [[noreturn]] void refuse_without_clock() const;

@@ -126,13 +126,6 @@ class Grouping {
 
 }  // namespace
 
-bool ColumnGroup::overlaps(const ColumnGroup& other) const {
-  if (topic != other.topic) return false;
-  return std::any_of(columns.begin(), columns.end(), [&](int c) {
-    return c >= 0 && std::find(other.columns.begin(), other.columns.end(), c) != other.columns.end();
-  });
-}
-
 bool is_plain_table(const RawLog& log, const RawTopic& topic) {
   return topic.type.empty() && log.format != "ulog" && log.format != "ardupilot";
 }

@@ -21,8 +21,6 @@ struct ColumnGroup {
       IndexKind::kNone;  ///< kNone: neighbours in the file whose names do not say that they belong together
   bool is_foreign = false, is_wish = false, says_down = false, says_up = false;  ///< as NameReading
   bool is_east_north_up = false;  ///< of compass columns: x east, y north, z up, and not north, east, down
-
-  bool overlaps(const ColumnGroup& other) const;
 };
 
 /// Returns the groups of three, four, six or eight columns that names tell (x y z, roll pitch yaw, n e d, 0 .. 3,

@@ -14,7 +14,7 @@ namespace {
 
 struct Unit {
   const char* name;
-  double multiply, divide;
+  double multiply, divide, offset = 0;
 };
 
 /// A signal that columns.toml may name.
@@ -60,18 +60,22 @@ std::map<std::string, NamedSignal> named_signals() {
   add("roll", {""}, kEuler, angle);
   add("pitch", {""}, kEuler + 1, angle);
   add("yaw", {""}, kEuler + 2, angle);
-  add("requested", motors, kRequested, {{"1", 1, 1}, {"%", 1, 100}, {"PWM", 1, 65536}});
+  add("attitude_packed", {""}, kPackedAttitude, {{"packed", 1, 1}});
+  const std::vector<Unit> share = {
+      {"1", 1, 1}, {"%", 1, 100}, {"permille", 1, 1000}, {"1/255", 1, 255}, {"PWM", 1, 65536}};
+  add("requested", motors, kRequested, share);
   add("rate", axes, kRates, of_both_signs({{"rad/s", 1, 1}, {"mrad/s", 1, 1000}, {"deg/s", kDegree_rad, 1}}));
-  add("duty", motors, kDuty, {{"1", 1, 1}, {"%", 1, 100}, {"PWM", 1, 65536}});
+  add("duty", motors, kDuty, share);
   add("rotor_speed", motors, kRotorSpeed, {{"rad/s", 1, 1}, {"rpm", 2 * kPi, 60}, {"erpm", 2 * kPi, 60 * 6}});
   add("motor_command", {"_1", "_2", "_3", "_4", "_5", "_6", "_7", "_8"}, kMotorCommand,
-      {{"1", 1, 1}, {"%", 1, 100}, {"permille", 1, 1000}, {"PWM", 1, 65536}});
+      {{"1", 1, 1}, {"%", 1, 100}, {"permille", 1, 1000}, {"PWM", 1, 65536}, {"us", 1, 1000, 1000}});
   add("battery", {""}, kBattery, {{"V", 1, 1}, {"mV", 1, 1000}});
   add("target_position", axes, kTargetPosition, length);
   add("target_velocity", axes, kTargetVelocity, speed);
   add("motor_force", motors, kMotorForce, force);
   add("thrust_command", {""}, kThrust, force);
-  add("torque_command", axes, kTorque, {{"Nm", 1, 1}});
+  add("thrust_command_normalised", {""}, kThrustCommand, {{"1", 1, 1}});
+  add("torque_command", axes, kTorque, {{"N m", 1, 1}, {"Nm", 1, 1}});
   return named;
 }
 
@@ -96,7 +100,7 @@ std::optional<UnitFactor> unit_factor(int signal, const std::string& unit) {
   const auto* const named = named_signal(signal);
   if (named == nullptr) return std::nullopt;
   for (const Unit& candidate : named->second.units)
-    if (unit == candidate.name) return UnitFactor{candidate.multiply, candidate.divide};
+    if (unit == candidate.name) return UnitFactor{candidate.multiply, candidate.divide, candidate.offset};
   return std::nullopt;
 }
 
@@ -105,12 +109,22 @@ std::string columns_name(int signal) {
   return named == nullptr ? "" : named->first;
 }
 
-std::string unit_of_factor(int signal, double factor) {
+std::string unit_of_factor(int signal, double factor, double offset) {
   const auto* const named = named_signal(signal);
   if (named == nullptr) return "";
   for (const Unit& unit : named->second.units)
-    if (std::abs(unit.multiply / unit.divide / factor - 1) < 1e-9) return unit.name;
+    if (std::abs(unit.multiply / unit.divide / factor - 1) < 1e-9 && unit.offset == offset) return unit.name;
   return "";
+}
+
+bool is_same_meaning(const SignalMap& a, const SignalMap& b) {
+  const auto is_in_b = [&](const SignalSource& one) {
+    return std::any_of(b.begin(), b.end(), [&](const SignalSource& other) {
+      return one.signal == other.signal && one.column == other.column && one.offset == other.offset &&
+             std::abs(one.multiply * other.divide / (other.multiply * one.divide) - 1) < 1e-9;
+    });
+  };
+  return a.size() == b.size() && std::all_of(a.begin(), a.end(), is_in_b);
 }
 
 const SignalMap& known_columns() {
@@ -149,7 +163,7 @@ SignalMap parse_columns(const std::string& text, const std::string& path) {
         table.refuse("frame", "", "differs from the frame of another axis", "all three axes need one frame");
     }
     map.push_back({in_body ? signal.signal - kForceWorld + kForceBody : signal.signal, table.text("column"),
-                   unit.multiply, unit.divide, unit.name});
+                   unit.multiply, unit.divide, unit.name, unit.offset});
   }
   return map;
 }

@@ -130,6 +130,40 @@ std::optional<LineFault> parse_line(std::string_view line, char separator, const
   return std::nullopt;
 }
 
+/// Returns `line` with the numbers of lists, "[0.1, 0.2]" with or without quotes, as cells of their own.
+/// @param counts receives how many cells each cell of `line` has become
+std::string without_lists(std::string_view line, char separator, std::vector<std::size_t>& counts) {
+  constexpr std::string_view kOpen = "[(", kClose = "])", kBetween = "[]() ,;\t";
+  counts.clear();
+  std::string flat;
+  for (std::size_t at = 0; at <= line.size();) {
+    const std::size_t first = line.find_first_not_of(" \"", at);
+    const bool is_list = first < line.size() && kOpen.find(line[first]) != std::string_view::npos;
+    std::size_t last = is_list ? first : at;
+    for (int depth = 0; is_list && last < line.size(); ++last) {
+      depth += kOpen.find(line[last]) != std::string_view::npos ? 1 : 0;
+      depth -= kClose.find(line[last]) != std::string_view::npos ? 1 : 0;
+      if (depth == 0) break;
+    }
+    const std::size_t end = std::min(line.find(separator, last), line.size());
+    std::size_t count = 0;
+    const auto add = [&](std::string_view cell) {
+      if (!counts.empty() || count > 0) flat += separator;
+      flat += cell;
+      ++count;
+    };
+    for (std::size_t i = first; is_list && i < last;) {
+      const std::size_t next = std::min(line.find_first_of(kBetween, i), last);
+      if (next > i) add(line.substr(i, next - i));
+      i = next + 1;
+    }
+    if (count == 0) add(line.substr(at, end - at));
+    counts.push_back(count);
+    at = end + 1;
+  }
+  return flat;
+}
+
 /// The line with the column names. Comment lines may precede it, and it may itself start with "#".
 class Header {
  public:
@@ -166,10 +200,28 @@ std::optional<files::InputFault> read_csv(std::istream& in, const std::string& p
     throw files::InputError(
         {path, "line 1", "", "", "the file is empty", "the recording failed; exclude this file"});
   }
+  const std::string where = "line " + std::to_string(header.lines - (header.first_record ? 1 : 0));
   const char separator = files::csv_separator(header.line, ' ');
   const std::vector<std::string_view> cells = files::csv_cells(header.line, separator);
-  const std::vector<std::string> names(cells.begin(), cells.end());
-  const std::string where = "line " + std::to_string(header.lines - (header.first_record ? 1 : 0));
+  std::vector<std::string> names(cells.begin(), cells.end());
+  std::string line;
+  bool complete = true, is_read = header.first_record.has_value();
+  if (is_read)
+    line = *header.first_record;
+  else if ((is_read = next_line(in, line, complete)))
+    ++header.lines;
+  std::vector<std::size_t> counts;
+  const bool has_lists = separator != ' ' && line.find_first_of("[(") != std::string::npos;
+  if (has_lists) {
+    line = without_lists(line, separator, counts);
+    std::vector<std::string> flat;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const std::size_t count = i < counts.size() ? counts[i] : 1;
+      for (std::size_t k = 0; k < count; ++k)
+        flat.push_back(count == 1 ? names[i] : names[i] + '[' + std::to_string(k) + ']');
+    }
+    names = std::move(flat);
+  }
   if (names.size() < 2 || header.line.size() > kLongestLine_bytes) {
     throw files::InputError({path, where, "header", files::in_quotes(header.line), "does not name columns",
                              "the first line names them, separated by commas, semicolons, tabs or blanks"});
@@ -180,8 +232,6 @@ std::optional<files::InputFault> read_csv(std::istream& in, const std::string& p
   std::vector<double> values(names.size());
   std::optional<files::InputFault> damage;
   std::size_t number = header.lines;
-  bool complete = true;
-  std::string line;
   const auto take_line = [&] {
     if (line.empty()) return;
     const std::optional<LineFault> fault = parse_line(line, separator, sink, values);
@@ -203,12 +253,10 @@ std::optional<files::InputFault> read_csv(std::istream& in, const std::string& p
                             "decimal point, or a decimal comma if commas do not separate cells"};
     }
   };
-  if (header.first_record) {
-    line = *header.first_record;
-    take_line();
-  }
+  if (is_read) take_line();
   while (next_line(in, line, complete)) {
     ++number;
+    if (has_lists) line = without_lists(line, separator, counts);
     take_line();
   }
   return damage;

@@ -5,36 +5,30 @@
 #include "analysis/logs/statistics_of_series.h"
 
 namespace swarmcert::logs {
-namespace {
-
-struct Candidate {
-  std::vector<double> thrust;
-  double hover = 0, scatter = INFINITY;
-};
-
-Candidate scaled(const Log& log, std::vector<double> thrust) {
-  Candidate candidate;
+HoverScale hover_scale(const std::vector<double>& thrust, const std::vector<double>& load) {
+  constexpr std::size_t kFew = 10;
+  // The rotors carry the vehicle where their thrust is above a third of its upper quantile.
   const double high = quantile_of(thrust, 0.9);
   std::vector<double> ratios;
-  for (std::size_t i = 0; i < thrust.size(); ++i) {
-    const auto R = log.samples[i].attitude.rotation();
-    const double load = log.samples[i].specific_force_m_s2[2] / kGravity_m_s2 / std::max(R[2][2], 0.1);
-    if (thrust[i] > high / 3 && load > 0.5 && load < 2) ratios.push_back(thrust[i] / load);
-  }
-  candidate.thrust = std::move(thrust);
-  if (ratios.empty()) return candidate;
-  candidate.hover = median(ratios);
-  for (double& ratio : ratios) ratio = std::abs(ratio / candidate.hover - 1);
-  candidate.scatter = median(ratios);
-  return candidate;
+  for (std::size_t i = 0; i < thrust.size(); ++i)
+    if (thrust[i] > high / 3 && load[i] > 0.5 && load[i] < 2) ratios.push_back(thrust[i] / load[i]);
+  if (ratios.size() < kFew) return {quantile_of(thrust, 0.5), 0};
+  HoverScale scale;
+  scale.hover = median(ratios);
+  for (double& ratio : ratios) ratio = std::abs(ratio / scale.hover - 1);
+  scale.scatter = median(ratios) / 0.6745;  // median absolute value of a standard normal variable
+  return scale;
 }
-
-}  // namespace
 
 void use_hover_multiples(Log& log) {
   Signals& signals = log.signals;
   if (signals.thrust != ThrustSource::kDuty && signals.thrust != ThrustSource::kForce) return;
-  Candidate best;
+  std::vector<double> load;
+  for (const Sample& sample : log.samples)
+    load.push_back(sample.specific_force_m_s2[2] / kGravity_m_s2 /
+                   std::max(sample.attitude.rotation()[2][2], 0.1));
+  std::vector<double> best;
+  HoverScale of_best{0, INFINITY};
   for (const double power : {1.0, 1.5, 2.0}) {
     std::vector<double> thrust;
     for (const Sample& sample : log.samples) {
@@ -45,13 +39,15 @@ void use_hover_multiples(Log& log) {
       }
       thrust.push_back(sum);
     }
-    Candidate candidate = scaled(log, std::move(thrust));
-    if (candidate.scatter < best.scatter) best = std::move(candidate);
+    const HoverScale scale = hover_scale(thrust, load);
+    if (scale.scatter < of_best.scatter) {
+      of_best = scale;
+      best = std::move(thrust);
+    }
     if (signals.thrust == ThrustSource::kForce) break;
   }
-  if (!(best.hover > 0)) return;
-  for (std::size_t i = 0; i < log.samples.size(); ++i)
-    log.samples[i].given_thrust = best.thrust[i] / best.hover;
+  if (!(of_best.hover > 0)) return;
+  for (std::size_t i = 0; i < log.samples.size(); ++i) log.samples[i].given_thrust = best[i] / of_best.hover;
   signals.thrust = ThrustSource::kHoverMultiple;
 }
 

@@ -10,6 +10,7 @@
 #include "analysis/logs/absolute_time.h"
 #include "analysis/logs/angles.h"
 #include "analysis/logs/message_frames.h"
+#include "analysis/logs/record_order.h"
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
 
@@ -97,10 +98,13 @@ void refuse_without_motion(const Draft& draft) {
   for (const Carried& carried : draft.recognition.groups) {
     if (carried.signal < kAttitude) return;  // position, velocity or acceleration
   }
+  if (has_torque_signals(draft.recognition)) return;
   std::string hint = "log it, or name its column in a columns.toml (--columns)";
   for (const std::string& rejected : draft.recognition.rejected) hint += "; not used: " + rejected;
-  throw files::InputError(
-      {draft.raw.path, "", "position", "", "no column carries it, nor a velocity or an acceleration", hint});
+  throw files::InputError({draft.raw.path, "", "position", "",
+                           "no column carries it, nor a velocity or an acceleration, nor "
+                           "rates beside the commands of motors",
+                           hint});
 }
 
 /// Makes clocks that count from 1970 start at zero and stores the offset in Log::epoch_s. Other clocks keep their
@@ -137,29 +141,16 @@ void add_rest(Draft& draft) {
   }
 }
 
-void drop_bad_quaternions(Draft& draft) {
-  SignalTable& t = draft.table;
-  if (t.has(kPackedAttitude) || !t.has_group(kAttitude, 4)) return;
-  std::vector<std::size_t> kept;
-  for (std::size_t i = 0; i < t.size(); ++i) {
-    double norm = 0;
-    for (int k = 0; k < 4; ++k) norm += t[kAttitude + k][i] * t[kAttitude + k][i];
-    if (std::abs(norm - 1) < 0.05) kept.push_back(i);
+/// Adds up what was mended in the topics that carry signals.
+void count_mended(const std::vector<Mended>& of_topics, const Recognition& recognition, Mended& sum) {
+  std::set<std::size_t> used = {recognition.clock};
+  for (const Carried& carried : recognition.groups) used.insert(carried.topic);
+  for (const std::size_t topic : used) {
+    if (topic >= of_topics.size()) continue;
+    sum.unsorted_rows += of_topics[topic].unsorted_rows;
+    sum.repeated_rows += of_topics[topic].repeated_rows;
+    sum.unwrapped_clocks += of_topics[topic].unwrapped_clocks;
   }
-  if (kept.size() == t.size()) return;
-  draft.log.health.not_finite += t.size() - kept.size();
-  draft.log.health.records = kept.size();
-  for (auto& column : t.values) {
-    if (column.empty()) continue;
-    for (std::size_t k = 0; k < kept.size(); ++k) column[k] = column[kept[k]];
-    column.resize(kept.size());
-  }
-  for (std::size_t k = 0; k < kept.size(); ++k) t.time_us[k] = t.time_us[kept[k]];
-  t.time_us.resize(kept.size());
-  t.restarts.assign(kept.size(), 0);
-  const double gap_us = 1e6 * longest_gap_s(t.step_s());
-  for (std::size_t k = 0; k < kept.size(); ++k)
-    t.restarts[k] = k == 0 || t.time_us[k] - t.time_us[k - 1] > gap_us ? 1 : 0;
 }
 
 double rate_hz_of(const RawTopic& topic) {
@@ -235,7 +226,7 @@ void settle_judgement(Draft& draft) {
                                                                                : TorqueUse::kMean;
 }
 
-Log interpret(RawLog raw, const SignalMap& map) {
+Log interpret(RawLog raw, const SignalMap& map, SignalMap* meaning) {
   Log log;
   log.path = raw.path;
   log.format = raw.format;
@@ -244,16 +235,20 @@ Log interpret(RawLog raw, const SignalMap& map) {
   log.signals.not_multirotor = vehicle_without_rotors(raw);
   log.parameters = raw.parameters;
   keep_one_vehicle(raw, log);
+  std::vector<Mended> mended;
+  for (RawTopic& topic : raw.topics) mended.push_back(put_in_order(topic));
+  for (const RawDropout& dropout : raw.dropouts) log.health.dropouts_s += dropout.duration_s;
   for (const RawTopic& topic : raw.topics) {
     for (const RawColumn& column : topic.columns) log.channels.push_back(column.name);
   }
   add_own_names(raw, log.interpretation);
   Draft draft{raw, recognise(raw, map), {}, log, {}, map.empty()};
-  draft.table = signal_table(raw, draft.recognition, map, log.health, log.events);
+  if (meaning != nullptr) *meaning = meaning_of(raw, draft.recognition);
+  draft.table = signal_table(raw, draft.recognition, log.health, log.events);
+  count_mended(mended, draft.recognition, log.health.mended);
   for (const std::string& corrected : draft.recognition.corrected) draft.note(corrected);
   for (const std::string& rejected : draft.recognition.rejected) draft.note("not used: " + rejected);
   refuse_without_motion(draft);
-  drop_bad_quaternions(draft);
   add_landed(raw, log);
   take_epoch_off(raw, draft.table, log);
   for (RawTopic& topic : raw.topics) {
@@ -263,6 +258,7 @@ Log interpret(RawLog raw, const SignalMap& map) {
   settle_attitude(draft);
   settle_specific_force(draft);
   settle_thrust(draft);
+  if (meaning != nullptr) *meaning = meaning_of(raw, draft.recognition);
   add_rest(draft);
   settle_judgement(draft);
   estimate_delays(draft);

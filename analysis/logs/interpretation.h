@@ -52,7 +52,8 @@ void settle_judgement(Draft& draft);
 void estimate_delays(Draft& draft);
 
 /// Interprets `raw` as a log.
+/// @param meaning receives what was taken for what; also if nothing shows a motion
 /// @throws files::InputError if it has no time or nothing that shows motion, or if `map` names a missing column.
-Log interpret(RawLog raw, const SignalMap& map);
+Log interpret(RawLog raw, const SignalMap& map, SignalMap* meaning = nullptr);
 
 }  // namespace swarmcert::logs

@@ -93,6 +93,16 @@ struct Signals {
   bool rates = false;
 };
 
+/// What was repaired without loss.
+struct Mended {
+  std::size_t unsorted_rows = 0;     ///< sorted by time
+  std::size_t repeated_rows = 0;     ///< same time and values as another one, which is kept
+  std::size_t unwrapped_clocks = 0;  ///< wraps of a counter or a time of day
+  std::size_t merged_blocks = 0;     ///< log blocks of other rates than that of the records
+
+  bool any() const { return unsorted_rows + repeated_rows + unwrapped_clocks + merged_blocks > 0; }
+};
+
 /// Damage found in a file and how it was handled; nothing is repaired silently.
 struct LogHealth {
   std::size_t blocks = 0;          ///< valid checksummed blocks (old binary format only)
@@ -106,6 +116,9 @@ struct LogHealth {
   std::size_t clock_jumps = 0;     ///< records dropped because their time does not follow the previous one
   std::size_t gaps = 0;            ///< pauses longer than kLongestGap_s
   double longest_gap_s = 0;
+  double dropouts_s = 0;  ///< pauses during which the vehicle reports that it could not write
+  std::size_t bytes = 0;  ///< of the file; 0: unknown
+  Mended mended;
 };
 
 /// How a log provides one signal.

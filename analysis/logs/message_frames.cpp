@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <string>
 #include <vector>
@@ -300,24 +301,36 @@ Armed was_armed(const RawLog& log) {
 
 std::string vehicle_without_rotors(const RawLog& log) {
   // VehicleStatus.msg of PX4; a vehicle that is at times a rotary wing counts as one.
-  constexpr double kRotaryWing = 1, kFixedWing = 2, kRover = 3;
-  double type = 0;
+  constexpr double kRotaryWing = 1;
+  static const char* const types[] = {"", "", "fixed wing", "rover", "airship"};
+  std::string vehicle;
   for (const RawTopic& topic : log.topics) {
     const RawColumn* const found =
         message_of(topic) == "vehicle_status" ? topic.find("vehicle_type") : nullptr;
     if (found == nullptr) continue;
     for (const double value : found->values) {
       if (value == kRotaryWing) return "";
-      if (value == kFixedWing || value == kRover) type = value;
+      if (value > kRotaryWing && value < std::size(types)) vehicle = types[static_cast<std::size_t>(value)];
     }
   }
-  if (type != 0) return type == kFixedWing ? "fixed wing" : "rover";
+  // The airframe says more than the type of some firmware: ranges of PX4's airframes reference.
+  struct Airframes {
+    double first, last;
+    const char* vehicle;
+  };
+  const auto airframe = log.parameters.find("SYS_AUTOSTART");
+  for (const Airframes& range : {Airframes{2100, 3999, "fixed wing"}, Airframes{50000, 50999, "rover"},
+                                 Airframes{60000, 60999, "submarine"}}) {
+    if (airframe != log.parameters.end() && airframe->second >= range.first && airframe->second <= range.last)
+      return range.vehicle;
+  }
+  if (!vehicle.empty()) return vehicle;
   // ArduPilot writes the name and version of its firmware.
   static const std::pair<const char*, const char*> firmwares[] = {
       {"ArduPlane", "fixed wing"}, {"ArduRover", "rover"}, {"ArduSub", "submarine"}};
   for (const RawMessage& message : log.messages) {
-    for (const auto& [firmware, vehicle] : firmwares)
-      if (message.text.rfind(firmware, 0) == 0) return vehicle;
+    for (const auto& [firmware, kind] : firmwares)
+      if (message.text.rfind(firmware, 0) == 0) return kind;
   }
   return "";
 }

@@ -24,6 +24,8 @@ struct RawTopic {
   std::string type;  ///< message type where the format has one, e.g. "geometry_msgs/msg/PoseStamped"
   int instance = 0;
   std::vector<double> time_s;  ///< on the file's clock, as stored: neither sorted nor repaired
+  std::string clock{};         ///< the column that holds the times; empty: none does
+  double clock_unit_s = 1;     ///< its unit
   std::vector<RawColumn> columns;
   std::map<std::string, std::string> texts;  ///< text fields: the first non-empty text
 

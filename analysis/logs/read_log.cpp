@@ -2,8 +2,10 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <regex>
 #include <sstream>
 
@@ -45,58 +47,40 @@ Format kind_of(std::istream& in) {
   return start.find_first_of(",;\t") == std::string::npos ? Format::kUnknown : Format::kCsv;
 }
 
-std::string other_formats() {
-  std::string names;
-  for (const LogFormat& format : log_formats()) names += std::string(", ") + format.name;
-  return names;
-}
-
-[[noreturn]] void refuse_unknown(const std::string& head, const std::string& path) {
-  std::string what = "is not a flight log", hint = "supported are micro-SD logs, CSV" + other_formats();
-  if (head.empty()) {
-    what = "the file is empty";
-    hint = "the recording failed; exclude this file";
-  } else if (head.compare(0, 2, "\x1F\x8B") == 0) {
-    what = "is compressed";
-    hint = "unpack it with gunzip";
-  } else if (head.compare(0, 2, "\xFF\xFE") == 0 || head.compare(0, 2, "\xFE\xFF") == 0) {
-    what = "is text in UTF-16";
-    hint = "save it as UTF-8";
-  }
-  throw files::InputError({path, "offset 0", "", "", what, hint});
+std::size_t bytes_in(std::istream& in) {
+  in.seekg(0, std::ios::end);
+  const std::streamoff size = in.tellg();
+  in.clear();
+  in.seekg(0);
+  return size > 0 ? static_cast<std::size_t>(size) : 0;
 }
 
 /// Micro-SD logs and CSV files are streams of records; formats/formats.h handles the other formats.
 RawLog raw_of(std::istream& in, const std::string& path, const SignalMap& map) {
+  const std::size_t bytes = bytes_in(in);
   const std::string head = format_head(in);
-  // The header of an old micro-SD log names variables like a CSV header. A columns.toml always takes precedence.
-  const Format kind = kind_of(in);
-  const bool is_usd = kind == Format::kUsd || kind == Format::kUsdEvents;
-  if (!is_usd && format_of(head) != nullptr && (map.empty() || kind != Format::kCsv))
-    return parse_raw(in, path);
+  if (is_foreign_log(head)) refuse_unknown(head, path);
   RawLog log;
-  log.path = path;
-  Collector collector(log, map);
+  // The header of an old micro-SD log names variables like a CSV header.
+  const Format kind = kind_of(in);
   switch (kind) {
-    case Format::kUsd:
+    case Format::kUsd: {
+      log.path = path;
       log.format = "usd";
+      Collector collector(log, map);
       read_usd(in, path, collector, log.health);
       collector.end();
       break;
+    }
     case Format::kUsdEvents:
+      log.path = path;
       log.format = fmt::format("usd version {}", read_usd_events(in, path, log));
       break;
-    case Format::kCsv: {
-      log.format = "csv";
-      const std::optional<files::InputFault> damage = read_csv(in, path, collector, log.health);
-      collector.end();
-      if (damage && log.topics.front().time_s.empty())
-        throw files::InputError(*damage);  // no line can be read
-      break;
-    }
+    case Format::kCsv:
     case Format::kUnknown:
-      refuse_unknown(head, path);
+      log = kind == Format::kCsv ? read_table(in, path, map) : parse_raw(in, path);
   }
+  log.health.bytes = bytes;
   return log;
 }
 
@@ -106,23 +90,15 @@ Log parse_log(std::istream& in, const std::string& path, const SignalMap& map) {
   return interpret(raw_of(in, path, map), map);
 }
 
-Log read_log(const std::string& path, const SignalMap& map) {
-  RawLog raw;
-  const LogAddress address = address_of(path);
-  if (!address.vehicle.empty()) {
-    std::istringstream in(table_of(address));
-    raw = raw_of(in, path, map);
-  } else if (std::filesystem::is_directory(path)) {
-    raw = read_raw(path);
-  } else {
-    refuse_several_vehicles(path, map.empty());
-    std::ifstream in = open_log(path);
-    raw = raw_of(in, path, map);
-  }
+namespace {
+
+/// @param meaning as for interpret()
+Log read_as(const std::string& path, const SignalMap& map, SignalMap* meaning) {
+  RawLog raw = read_uninterpreted(path, map);
   // With a columns.toml, columns keep the names given in the log, because the file refers to those.
   const std::vector<std::string> named = map.empty() ? name_variables(raw) : std::vector<std::string>{};
   try {
-    Log log = interpret(std::move(raw), map);
+    Log log = interpret(std::move(raw), map, meaning);
     log.interpretation.insert(log.interpretation.begin(), named.begin(), named.end());
     return log;
   } catch (const files::InputError& error) {
@@ -130,6 +106,44 @@ Log read_log(const std::string& path, const SignalMap& map) {
     for (const std::string& note : named) fault.hint = note + "; " + fault.hint;
     throw files::InputError(fault);
   }
+}
+
+}  // namespace
+
+RawLog read_uninterpreted(const std::string& path, const SignalMap& map) {
+  const LogAddress address = address_of(path);
+  if (!address.vehicle.empty()) {
+    std::istringstream in(table_of(address));
+    return raw_of(in, path, map);
+  }
+  if (std::filesystem::is_directory(path)) return read_raw(path);
+  refuse_several_vehicles(path, map.empty());
+  std::ifstream in = open_log(path);
+  return raw_of(in, path, map);
+}
+
+Log read_log(const std::string& path, const SignalMap& map) {
+  if (map.empty()) return read_as(path, map, nullptr);
+  // Who states what the evidence says anyway gets the same log, with the evidence.
+  SignalMap meaning;
+  try {
+    Log log = read_as(path, known_columns(), &meaning);
+    if (is_same_meaning(meaning, map)) return log;
+  } catch (const files::InputError&) {
+    // The columns.toml may say what the evidence does not.
+  }
+  return read_as(path, map, nullptr);
+}
+
+SignalMap meaning_of_columns(const std::string& path, std::vector<std::string>& notes) {
+  SignalMap meaning;
+  try {
+    notes = read_as(path, known_columns(), &meaning).interpretation;
+  } catch (const files::InputError& error) {
+    if (meaning.empty()) throw;
+    notes = {error.what()};
+  }
+  return meaning;
 }
 
 bool looks_like_log(const std::string& path) {
@@ -141,6 +155,7 @@ bool looks_like_log(const std::string& path) {
   if (is_pipe(path)) return false;
   std::ifstream in(path, std::ios::binary);
   if (!in) return false;
+  if (is_foreign_log(format_head(in))) return true;
   const Format format = kind_of(in);
   if (format == Format::kCsv) return is_flight_table(path);
   return format == Format::kUsd || format == Format::kUsdEvents;
@@ -176,13 +191,10 @@ bool is_flight_table(const std::string& path) {
   try {
     std::istringstream in(ends_of(path, kHead_bytes).first);
     if (kind_of(in) != Format::kCsv) return false;
-    RawLog log;
-    Collector collector(log, known_columns());
-    read_csv(in, path, collector, log.health);
-    collector.end();
+    const RawLog log = read_table(in, path, known_columns());
     const Recognition found = recognise(log, known_columns());
     return found.find(kPosition) != nullptr || found.find(kVelocity) != nullptr ||
-           found.find(kForceBody) != nullptr;
+           found.find(kForceBody) != nullptr || has_torque_signals(found);
   } catch (const files::InputError&) {
     return false;
   }
@@ -195,13 +207,10 @@ Interval time_span_s(const std::string& path) {
     const Format kind = kind_of(whole);
     if (kind == Format::kUsd || kind == Format::kUsdEvents)
       return {0, 0};  // their clocks start with the vehicle
-    if (kind != Format::kCsv || format_of_file(path) != nullptr) return absolute_span_s(read_raw(path));
+    if (kind != Format::kCsv) return absolute_span_s(read_raw(path));
     const auto [head, tail] = ends_of(path, kEnd_bytes);
     std::istringstream in(head.substr(0, head.rfind('\n') + 1) + tail);
-    RawLog log;
-    Collector collector(log, known_columns());
-    read_csv(in, path, collector, log.health);
-    collector.end();
+    const RawLog log = read_table(in, path, known_columns());
     const std::vector<double>& times = log.topics.front().time_s;
     return times.empty() ? Interval() : Interval(times.front(), times.back());
   } catch (const files::InputError&) {
@@ -240,11 +249,31 @@ void write_csv(const Log& log, double t0_s, double t1_s, std::ostream& out) {
   }
 }
 
+Completeness completeness_of(const LogHealth& health) {
+  // A file that ends early has no checksum of the whole, and its last bytes are skipped.
+  const bool is_damaged =
+      health.damaged_blocks + health.damaged_lines + health.not_finite + health.clock_jumps > 0;
+  const bool has_lost_bytes = health.skipped_bytes > 0 || health.checksum_failed;
+  if (is_damaged || (has_lost_bytes && !health.truncated)) return Completeness::kDamaged;
+  return health.truncated || health.dropouts_s > 0 ? Completeness::kCut : Completeness::kComplete;
+}
+
+double lost_share(const Log& log) {
+  const LogHealth& health = log.health;
+  if (completeness_of(health) == Completeness::kComplete) return 0;
+  const auto share = [](double lost, double whole) { return lost > 0 && whole > 0 ? lost / whole : 0; };
+  const auto dropped = static_cast<double>(health.not_finite + health.clock_jumps + health.damaged_lines);
+  const double span_s =
+      log.samples.empty() ? 0 : 1e-6 * (log.samples.back().time_us - log.samples.front().time_us);
+  const double most =
+      std::max({share(dropped, dropped + static_cast<double>(health.records)),
+                share(static_cast<double>(health.skipped_bytes), static_cast<double>(health.bytes)),
+                share(health.dropouts_s, span_s)});
+  return health.truncated || most == 0 ? std::numeric_limits<double>::quiet_NaN() : std::min(most, 1.0);
+}
+
 bool is_sound(const LogHealth& health) {
-  return health.damaged_blocks + health.skipped_bytes + health.damaged_lines + health.not_finite +
-                 health.clock_jumps ==
-             0 &&
-         !health.truncated && !health.checksum_failed;
+  return completeness_of(health) != Completeness::kDamaged && !health.truncated;
 }
 
 std::vector<std::string> findings(const LogHealth& health) {
@@ -257,6 +286,8 @@ std::vector<std::string> findings(const LogHealth& health) {
   add(health.damaged_lines, "lines whose number of values differs from the header");
   add(health.not_finite, "records with values that are not finite");
   add(health.clock_jumps, "records whose time does not follow the previous one");
+  if (health.dropouts_s > 0)
+    found.push_back(fmt::format("{:.3f} s in which the vehicle could not write", health.dropouts_s));
   if (health.gaps > 0) {
     found.push_back(
         fmt::format("{} gaps over 30 ms, the longest {:.3f} s", health.gaps, health.longest_gap_s));

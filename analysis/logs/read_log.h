@@ -20,6 +20,14 @@ namespace swarmcert::logs {
 ///   neither `path` nor `map` selects one of them.
 Log read_log(const std::string& path, const SignalMap& map = known_columns());
 
+/// Returns what read_log() takes the columns of a file for, also if they show no motion.
+/// @param notes receives what was decided from the data
+/// @throws files::InputError as read_log() does
+SignalMap meaning_of_columns(const std::string& path, std::vector<std::string>& notes);
+
+/// Returns the topics of a file as read_log() interprets them.
+RawLog read_uninterpreted(const std::string& path, const SignalMap& map = known_columns());
+
 /// Like read_log() for a stream; `path` is used only in messages.
 Log parse_log(std::istream& in, const std::string& path, const SignalMap& map = known_columns());
 
@@ -39,6 +47,18 @@ bool is_log_name(const std::string& name);
 /// Writes the authors' 30 columns with their names, digits and units, for samples with t0 <= time < t1 in seconds of
 /// the log's own clock. For a log with all these signals the result equals the authors' file byte for byte.
 void write_csv(const Log& log, double t0_s, double t1_s, std::ostream& out);
+
+/// Whether everything that the vehicle logged is there.
+enum class Completeness {
+  kComplete,
+  kCut,  ///< the recording ends inside a record, or has pauses in which the vehicle could not write; the rest is sound
+  kDamaged  ///< records were lost or cannot be trusted
+};
+Completeness completeness_of(const LogHealth& health);
+
+/// Returns the share of the records that was lost, counted in records, bytes or seconds, whichever says most; NaN if it
+/// cannot be counted, as where a file ends early.
+double lost_share(const Log& log);
 
 /// Returns false if anything in the file was damaged. A pause in the recording (LogHealth::gaps) is not damage.
 bool is_sound(const LogHealth& health);

@@ -353,11 +353,8 @@ class Reader {
     std::array<std::vector<double>, 4> q;
     for (auto& part : q) part.resize(knots_.time_s.size());
     for (std::size_t i = 0; i < knots_.time_s.size(); ++i) {
-      const double cr = std::cos(angle[0][i] / 2), sr = std::sin(angle[0][i] / 2),
-                   cp = std::cos(angle[1][i] / 2), sp = std::sin(angle[1][i] / 2),
-                   cy = std::cos(angle[2][i] / 2), sy = std::sin(angle[2][i] / 2);
-      q[0][i] = sr * cp * cy - cr * sp * sy, q[1][i] = cr * sp * cy + sr * cp * sy;
-      q[2][i] = cr * cp * sy - sr * sp * cy, q[3][i] = cr * cp * cy + sr * sp * sy;
+      const std::array<double, 4> xyzw = attitude_of_angles(angle[0][i], angle[1][i], angle[2][i]).xyzw();
+      for (std::size_t k = 0; k < 4; ++k) q[k][i] = xyzw[k];
     }
     fill_rotation(knots_, q, reading);
     reading.is_down = is_down;

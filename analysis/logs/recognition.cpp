@@ -1,7 +1,10 @@
 #include "analysis/logs/recognition.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <set>
 #include <unordered_map>
@@ -72,17 +75,6 @@ void drop_empty_columns(const RawTopic& topic, Carried& carried) {
     const std::vector<double>& values = topic.columns[static_cast<std::size_t>(c)].values;
     if (std::none_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); })) c = -1;
   }
-}
-
-bool is_dead(const RawTopic& topic, const Carried& carried) {
-  bool any = false;
-  for (const int c : carried.columns) {
-    if (c < 0) continue;
-    for (const double value : topic.columns[static_cast<std::size_t>(c)].values) {
-      if (std::isfinite(value) && value != 0) any = true;
-    }
-  }
-  return !any;
 }
 
 /// Motors are at rest in a log on the ground, so their zeros are valid. So are setpoints at the origin.
@@ -174,6 +166,36 @@ void recognise_by_names(const RawLog& log, Recognition& found) {
   }
 }
 
+/// Returns the first signal of the group that a signal belongs to.
+int first_of_group(int signal) {
+  static const std::set<int> firsts = {
+      kPosition, kVelocity, kForceWorld, kForceBody,      kAccelerationWorld, kAttitude,     kPackedAttitude,
+      kRates,    kDuty,     kBattery,    kTargetPosition, kTargetVelocity,    kMotorForce,   kThrust,
+      kTorque,   kEuler,    kRequested,  kRotorSpeed,     kMotorCommand,      kThrustCommand};
+  return *std::prev(firsts.upper_bound(signal));
+}
+
+/// Adds the column of one signal to the group of its topic that has its unit, up to the sign.
+void join(Carried one, Recognition& found) {
+  const int first = first_of_group(one.signal);
+  const auto place = static_cast<std::size_t>(one.signal - first);
+  Carried* group = found.find(first);
+  const bool is_alike = group != nullptr && group->topic == one.topic && group->divide == one.divide &&
+                        group->multiply == std::abs(one.multiply) && group->offset == one.offset;
+  if (group != nullptr && !is_alike) return found.groups.push_back(std::move(one));
+  if (group == nullptr) {
+    found.groups.push_back(one);
+    group = &found.groups.back();
+    group->signal = first;
+    group->columns.clear();
+    group->multiply = std::abs(one.multiply);
+    if (one.multiply < 0) group->unit.erase(0, 1);
+  }
+  if (group->columns.size() <= place) group->columns.resize(place + 1, -1);
+  group->columns[place] = one.columns[0];
+  if (one.multiply < 0) group->sign[place] = -1;
+}
+
 void recognise_by_map(const RawLog& log, const SignalMap& map, Recognition& found) {
   std::vector<std::string> names;
   for (const RawTopic& topic : log.topics) {
@@ -182,9 +204,11 @@ void recognise_by_map(const RawLog& log, const SignalMap& map, Recognition& foun
   for (const SignalSource& source : map) {
     if (source.signal == kTime) continue;
     Carried carried{source.signal, 0, {-1}, source.unit, source.multiply, source.divide, Ask::kNothing};
+    carried.offset = source.offset;
     for (std::size_t t = 0; t < log.topics.size() && carried.columns[0] < 0; ++t) {
       for (std::size_t c = 0; c < log.topics[t].columns.size(); ++c) {
-        if (log.topics[t].columns[c].name != source.column) continue;
+        const std::string& name = log.topics[t].columns[c].name;
+        if (name != source.column && log.topics[t].name + ": " + name != source.column) continue;
         carried.topic = t;
         carried.columns[0] = static_cast<int>(c);
         break;
@@ -195,7 +219,7 @@ void recognise_by_map(const RawLog& log, const SignalMap& map, Recognition& foun
                                "is not a column of this log, but columns.toml names it",
                                files::did_you_mean(source.column, names)});
     }
-    if (found.find(source.signal) == nullptr) found.groups.push_back(std::move(carried));
+    join(std::move(carried), found);
   }
 }
 
@@ -206,6 +230,24 @@ const Carried* Recognition::find(int signal) const {
     if (carried.signal == signal) return &carried;
   }
   return nullptr;
+}
+
+Carried* Recognition::find(int signal) {
+  const Recognition& constant = *this;
+  return const_cast<Carried*>(constant.find(signal));
+}
+
+bool has_torque_signals(const Recognition& recognition) {
+  const auto has = [&](int signal) { return recognition.find(signal) != nullptr; };
+  return has(kRates) && (has(kDuty) || has(kRequested) || has(kMotorCommand) || has(kRotorSpeed));
+}
+
+bool is_dead(const RawTopic& topic, const Carried& carried) {
+  return std::all_of(carried.columns.begin(), carried.columns.end(), [&](int c) {
+    if (c < 0) return true;
+    const std::vector<double>& values = topic.columns[static_cast<std::size_t>(c)].values;
+    return std::all_of(values.begin(), values.end(), [](double x) { return !std::isfinite(x) || x == 0; });
+  });
 }
 
 Recognition recognise(const RawLog& log, const SignalMap& map) {
@@ -222,33 +264,40 @@ Recognition recognise(const RawLog& log, const SignalMap& map) {
                                       [](const Carried& carried) { return carried.signal == kEuler; }),
                        found.groups.end());
   }
-  for (const int signal : {kForceBody, kForceWorld, kAccelerationWorld, kVelocity, kPosition}) {
+  for (const int signal : {kRates, kForceBody, kForceWorld, kAccelerationWorld, kVelocity, kPosition}) {
     if (const Carried* const carried = found.find(signal)) found.clock = carried->topic;
   }
   return found;
 }
 
-Carried time_column(const RawTopic& topic, const SignalMap& map) {
-  Carried time{kTime, 0, {-1}, "us", 1, 1, Ask::kNothing};
-  for (const SignalSource& source : map) {
-    for (std::size_t c = 0; c < topic.columns.size() && source.signal == kTime; ++c) {
-      if (topic.columns[c].name != source.column) continue;
-      time.columns[0] = static_cast<int>(c);
-      time.unit = source.unit;
-      time.multiply = source.multiply;
-      time.divide = source.divide;
-      return time;
+SignalMap meaning_of(const RawLog& log, const Recognition& recognition) {
+  SignalMap meaning;
+  for (const RawTopic& topic : log.topics) {
+    if (topic.clock.empty()) continue;
+    const double per_us = 1e6 * topic.clock_unit_s;
+    meaning.push_back({kTime, topic.clock, per_us, 1, unit_of_factor(kTime, per_us)});
+    break;
+  }
+  for (const Carried& carried : recognition.groups) {
+    if (carried.signal == kAccelerationWorld) continue;
+    const RawTopic& topic = log.topics[carried.topic];
+    for (std::size_t k = 0; k < carried.size(); ++k) {
+      if (carried.columns[k] < 0) continue;
+      const std::string& name = topic.columns[static_cast<std::size_t>(carried.columns[k])].name;
+      const bool is_ambiguous = std::any_of(log.topics.begin(), log.topics.end(), [&](const RawTopic& other) {
+        return &other < &topic && other.find(name) != nullptr;
+      });
+      const int signal = carried.signal + static_cast<int>(k);
+      const double factor =
+          (k < carried.sign.size() ? carried.sign[k] : 1) * carried.multiply / carried.divide;
+      meaning.push_back({signal, is_ambiguous ? topic.name + ": " + name : name, factor, 1,
+                         unit_of_factor(signal, factor, carried.offset), carried.offset,
+                         std::isfinite(carried.odds_bits) ? fmt::format("odds {:.0f} bits against {}",
+                                                                        carried.odds_bits, carried.runner_up)
+                                                          : "by its name"});
     }
   }
-  // "time[ms]" of the published CSV files is in microseconds.
-  for (const char* const name : {"time_us", "time[ms]"}) {
-    for (std::size_t c = 0; c < topic.columns.size(); ++c) {
-      if (topic.columns[c].name != name) continue;
-      time.columns[0] = static_cast<int>(c);
-      return time;
-    }
-  }
-  return time;
+  return meaning;
 }
 
 std::string names_of(const RawLog& log, const Carried& carried) {

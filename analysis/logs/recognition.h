@@ -21,6 +21,7 @@ struct Carried {
   double multiply = 1, divide = 1;
   Ask ask = Ask::kNothing;
   std::array<double, 4> sign{1, 1, 1, 1};  ///< of the columns of vectors and quaternions
+  double offset = 0;                       ///< subtracted from the stored numbers
   /// Evidence for this reading over `runner_up` if it was found by assignment.h; NaN: the names are known.
   double odds_bits = std::numeric_limits<double>::quiet_NaN();
   std::string runner_up{};
@@ -35,6 +36,7 @@ struct Recognition {
   std::vector<std::string> corrected;  ///< units of known names that the motion contradicts, in words
 
   const Carried* find(int signal) const;
+  Carried* find(int signal);
 };
 
 /// Recognises columns by the names of known programs and then by evidence (assignment.h), or by `map` if it is not
@@ -42,9 +44,15 @@ struct Recognition {
 /// @throws files::InputError if `map` names a column that no topic has.
 Recognition recognise(const RawLog& log, const SignalMap& map);
 
-/// Returns the column with the times of a topic and its scale to microseconds; columns = {-1} if there is none, in
-/// which case RawTopic::time_s is used.
-Carried time_column(const RawTopic& topic, const SignalMap& map);
+/// Returns whether rates and the command of each motor were found, from which torques can be judged.
+bool has_torque_signals(const Recognition& recognition);
+
+/// Returns whether no column holds a number other than zero.
+bool is_dead(const RawTopic& topic, const Carried& carried);
+
+/// Returns what `recognition` says of each column, as a columns.toml would. Accelerations without gravity, which
+/// nothing uses, have no name there.
+SignalMap meaning_of(const RawLog& log, const Recognition& recognition);
 
 /// Returns the names of the columns, e.g. "ctrlLee.rpyx, ctrlLee.rpyy, ctrlLee.rpyz".
 std::string names_of(const RawLog& log, const Carried& carried);

@@ -41,8 +41,9 @@ int read_usd_events(std::istream& in, const std::string& path, RawLog& log);
 
 /// Reads text: a header line, which may start with "#" and follow comment lines starting with "#", and lines with the
 /// same number of cells. The separator is the first of comma, semicolon, tab and blank that occurs in the header.
-/// Cells are numbers or empty; columns that the sink does not need may hold anything. If the separator is not a comma,
-/// commas are decimal points. Dates become seconds since 1970, times of day seconds since midnight.
+/// Cells are numbers or empty; cells that hold a list become columns name[0], name[1], ...; columns that the sink does
+/// not need may hold anything. If the separator is not a comma, commas are decimal points. Dates become seconds since
+/// 1970, times of day seconds since midnight.
 /// @return what is wrong with the first damaged line
 /// @throws files::InputError if the header is empty or contains a name twice.
 std::optional<files::InputFault> read_csv(std::istream& in, const std::string& path, RecordSink& sink,

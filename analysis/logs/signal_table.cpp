@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -80,15 +79,10 @@ struct Series {
   std::vector<double> time_s, values;
 };
 
-/// Sorts by time and drops repeated times and non-finite values.
-Series in_order(const std::vector<double>& time_s, const std::vector<double>& values) {
-  std::vector<std::size_t> order(std::min(time_s.size(), values.size()));
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return std::isfinite(time_s[a]) && (!std::isfinite(time_s[b]) || time_s[a] < time_s[b]);
-  });
+/// Drops what is not finite and times that do not rise.
+Series rising(const std::vector<double>& time_s, const std::vector<double>& values) {
   Series series;
-  for (const std::size_t i : order) {
+  for (std::size_t i = 0; i < std::min(time_s.size(), values.size()); ++i) {
     if (!std::isfinite(time_s[i]) || !std::isfinite(values[i])) continue;
     if (!series.time_s.empty() && time_s[i] <= series.time_s.back()) continue;
     series.time_s.push_back(time_s[i]);
@@ -97,40 +91,15 @@ Series in_order(const std::vector<double>& time_s, const std::vector<double>& va
   return series;
 }
 
-/// Undoes wraps of a clock that counts milliseconds in 24 or 32 bits or microseconds in 32 bits: where it falls by one
-/// of these ranges, up to a pause, it has wrapped.
-void undo_wraps(std::vector<double>& times_us) {
-  constexpr double kRanges_us[] = {4294967296.0, 16777216.0 * 1e3, 4294967296.0 * 1e3};
-  double added_us = 0, last_us = kNaN;
-  for (double& time_us : times_us) {
-    const double step_us = time_us - last_us;
-    for (const double range_us : kRanges_us) {
-      if (step_us < 0 && std::abs(step_us + range_us) < kLongestPause_us) added_us += range_us;
-      // A record from before the wrap, out of order.
-      if (added_us > 0 && step_us > 0 && std::abs(step_us - range_us) < kLongestPause_us)
-        added_us -= range_us;
-    }
-    if (std::isfinite(time_us)) last_us = time_us;
-    time_us += added_us;
-  }
-}
-
-/// Returns the times of a topic in microseconds, without wraps.
-std::vector<double> times_us(const RawTopic& topic, const SignalMap& map) {
-  const Carried time = time_column(topic, map);
+/// Returns the times of a topic in microseconds. Files store whole micro- or nanoseconds: the rounding of their
+/// conversion to seconds is undone.
+std::vector<double> times_us(const RawTopic& topic) {
   std::vector<double> times;
   times.reserve(topic.time_s.size());
-  if (time.columns[0] >= 0) {
-    for (const double value : topic.columns[static_cast<std::size_t>(time.columns[0])].values)
-      times.push_back(value * time.multiply / time.divide);
-  } else {
-    for (const double time_s : topic.time_s) {
-      // Formats store whole microseconds or nanoseconds: undo the rounding of the conversion to seconds.
-      const double time_us = 1e6 * time_s, whole_us = std::nearbyint(time_us);
-      times.push_back(std::abs(time_us - whole_us) < 1e-3 ? whole_us : time_us);
-    }
+  for (const double time_s : topic.time_s) {
+    const double time_us = 1e6 * time_s, whole_us = std::nearbyint(time_us);
+    times.push_back(std::abs(time_us - whole_us) < 1e-3 ? whole_us : time_us);
   }
-  undo_wraps(times);
   return times;
 }
 
@@ -201,21 +170,23 @@ class RecordFilter {
   std::optional<Pending> pending_;
 };
 
-/// Returns true for signals without which a record is useless, if the log has them.
-bool is_needed(int signal) {
-  return signal < kRates || (signal >= kDuty && signal < kTargetPosition) ||
-         (signal >= kEuler && signal < kRequested);
+/// Quaternions without unit norm are no rotations.
+void drop_bad_quaternions(std::array<std::vector<double>, kNumSignals>& all) {
+  if (all[kAttitude].empty() || !all[kPackedAttitude].empty()) return;
+  for (std::size_t i = 0; i < all[kAttitude].size(); ++i) {
+    double norm = 0;
+    for (std::size_t k = kAttitude; k < kAttitude + 4; ++k)
+      norm += all[k].empty() ? 0 : all[k][i] * all[k][i];
+    if (!(std::abs(norm - 1) < 0.05)) all[kAttitude][i] = kNaN;
+  }
 }
 
-}  // namespace
-
-double longest_gap_s(double step_s) { return std::max(kLongestGap_s, step_s > 0.02 ? 2.5 * step_s : 0); }
-
-double SignalTable::step_s() const { return 1e-6 * median_step(time_us); }
-
+/// Resamples `series` at `times_s`: means over a target step where the series is faster, linear interpolation
+/// elsewhere, NaN across gaps. Both clocks must ascend.
+/// @param hold  keep values across gaps and beyond the ends, e.g. for a battery voltage
 std::vector<double> resampled(const std::vector<double>& from_s, const std::vector<double>& series,
                               const std::vector<double>& times_s, bool hold) {
-  const Series source = in_order(from_s, series);
+  const Series source = rising(from_s, series);
   std::vector<double> values(times_s.size(), kNaN);
   if (source.time_s.empty()) return values;
   const double step_s = median_step(source.time_s), own_step_s = median_step(times_s);
@@ -254,13 +225,25 @@ std::vector<double> resampled(const std::vector<double>& from_s, const std::vect
   return values;
 }
 
-SignalTable signal_table(const RawLog& log, const Recognition& recognition, const SignalMap& map,
-                         LogHealth& health, std::vector<LogEvent>& events) {
+/// Returns true for signals without which a record is useless, if the log has them.
+bool is_needed(int signal) {
+  return signal < kRates || (signal >= kDuty && signal < kTargetPosition) ||
+         (signal >= kEuler && signal < kRequested);
+}
+
+}  // namespace
+
+double longest_gap_s(double step_s) { return std::max(kLongestGap_s, step_s > 0.02 ? 2.5 * step_s : 0); }
+
+double SignalTable::step_s() const { return 1e-6 * median_step(time_us); }
+
+SignalTable signal_table(const RawLog& log, const Recognition& recognition, LogHealth& health,
+                         std::vector<LogEvent>& events) {
   SignalTable table;
   if (log.topics.empty()) return table;
   const RawTopic& clock = log.topics[recognition.clock];
   RecordFilter filter(table, health);
-  const std::vector<double> clock_us = times_us(clock, map);
+  const std::vector<double> clock_us = times_us(clock);
   std::vector<double> clock_s;
   for (const double time_us : clock_us) clock_s.push_back(1e-6 * time_us);
   std::array<std::vector<double>, kNumSignals> all;
@@ -269,7 +252,7 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, cons
     const RawTopic& topic = log.topics[carried.topic];
     std::vector<double> topic_s;
     if (carried.topic != recognition.clock) {
-      for (const double time_us : times_us(topic, map)) topic_s.push_back(1e-6 * time_us);
+      for (const double time_us : times_us(topic)) topic_s.push_back(1e-6 * time_us);
     }
     std::vector<double> signs;
     if (carried.topic != recognition.clock && carried.signal == kAttitude && carried.size() == 4)
@@ -283,7 +266,11 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, cons
                               carried.signal == kPosition || carried.signal == kTargetPosition, events)
               : column.values;
       const double sign = k < carried.sign.size() ? carried.sign[k] : 1;
-      for (double& value : values) value = sign * value * carried.multiply / carried.divide;
+      for (double& value : values)
+        value = sign * (value - carried.offset) * carried.multiply / carried.divide;
+      // Pulses of a servo signal go beyond the ends of its range.
+      for (double& value : values)
+        value = carried.offset != 0 && std::isfinite(value) ? std::clamp(value, 0.0, 1.0) : value;
       for (std::size_t i = 0; i < signs.size(); ++i) values[i] *= signs[i];
       const int signal = carried.signal + static_cast<int>(k);
       if (carried.topic != recognition.clock) {
@@ -294,6 +281,7 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, cons
       is_own[static_cast<std::size_t>(signal)] = carried.topic == recognition.clock ? 1 : 0;
     }
   }
+  drop_bad_quaternions(all);
   filter.longest_gap_s = longest_gap_s(median_step(clock_s));
   for (std::size_t i = 0; i < clock_us.size(); ++i) {
     bool is_finite = true, others_know = true;

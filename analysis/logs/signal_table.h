@@ -41,17 +41,11 @@ struct SignalTable {
 /// with invalid times are dropped and counted in `health`: a time must be later than the previous one, and a step of
 /// more than ten seconds is accepted only if the next record confirms it. The 32-bit tick may wrap.
 /// @param events  receives the wraps and saturations of 16-bit integers
-SignalTable signal_table(const RawLog& log, const Recognition& recognition, const SignalMap& map,
-                         LogHealth& health, std::vector<LogEvent>& events);
+SignalTable signal_table(const RawLog& log, const Recognition& recognition, LogHealth& health,
+                         std::vector<LogEvent>& events);
 
 /// Returns the longest step between neighbouring records in a log with this median step: kLongestGap_s, or two and a
 /// half steps in slow logs.
 double longest_gap_s(double step_s);
-
-/// Resamples `series` at `times_s`: means over a target step where the series is faster, linear interpolation
-/// elsewhere, NaN across gaps. Both clocks must ascend.
-/// @param hold  keep values across gaps and beyond the ends, e.g. for a battery voltage
-std::vector<double> resampled(const std::vector<double>& from_s, const std::vector<double>& series,
-                              const std::vector<double>& times_s, bool hold);
 
 }  // namespace swarmcert::logs

@@ -35,20 +35,22 @@ enum Signal : int {
   kNumSignals = 63
 };
 
-/// `signal` = value of `column` * multiply / divide.
+/// `signal` = (value of `column` - offset) * multiply / divide.
 struct SignalSource {
   int signal;
-  std::string column;
+  std::string column;  ///< or "TOPIC: COLUMN"
   double multiply = 1, divide = 1;
   std::string unit;  ///< of the column
+  double offset = 0;
+  std::string why{};  ///< evidence, in words
 };
 
 /// The user's meaning of the columns. If empty, columns are recognised by name (column_names.h).
 using SignalMap = std::vector<SignalSource>;
 
-/// A stored number times multiply / divide is the signal in its own unit.
+/// A stored number less `offset`, times multiply / divide, is the signal in its own unit.
 struct UnitFactor {
-  double multiply, divide;
+  double multiply, divide, offset = 0;
 };
 
 /// Returns the factor of `unit`, spelled as in columns.toml; nothing if `signal` has no such unit.
@@ -57,8 +59,12 @@ std::optional<UnitFactor> unit_factor(int signal, const std::string& unit);
 /// Returns the name of one signal in columns.toml, "position_x"; empty if it has none.
 std::string columns_name(int signal);
 
-/// Returns the unit of columns.toml in which a stored number times `factor` is the signal; empty if there is none.
-std::string unit_of_factor(int signal, double factor);
+/// Returns the unit of columns.toml in which a stored number less `offset`, times `factor`, is the signal; empty if
+/// there is none.
+std::string unit_of_factor(int signal, double factor, double offset = 0);
+
+/// Returns whether both give the same columns the same signals and units.
+bool is_same_meaning(const SignalMap& a, const SignalMap& b);
 
 /// Returns the empty map.
 const SignalMap& known_columns();

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "analysis/logs/battery_compensation.h"
+#include "analysis/logs/hover_scale.h"
 #include "analysis/logs/interpretation.h"
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/rotor_speed.h"
@@ -43,38 +44,6 @@ std::vector<double> sum_of_powers(const SignalTable& t, const Rotors& rotors, do
   return sum;
 }
 
-/// Returns the records in which the rotors carry the vehicle: thrust above a third of its upper quantile.
-std::vector<char> carrying(const std::vector<double>& thrust) {
-  const double high = quantile_of(thrust, 0.9);
-  std::vector<char> flies;
-  for (const double value : thrust) flies.push_back(value > high / 3 ? 1 : 0);
-  return flies;
-}
-
-struct Scale {
-  double hover = 0;    ///< median of thrust (in its own unit) over load factor
-  double scatter = 0;  ///< robust relative deviation of that ratio
-};
-
-Scale scale_of(const std::vector<double>& thrust, const std::vector<double>& load) {
-  const std::vector<char> flies = carrying(thrust);
-  std::vector<double> ratios;
-  for (std::size_t i = 0; i < thrust.size(); ++i) {
-    if (flies[i] == 0) continue;
-    const double ratio = std::isfinite(load[i]) ? thrust[i] / load[i] : std::nan("");
-    if (load[i] > 0.5 && load[i] < 2) ratios.push_back(ratio);
-  }
-  Scale scale;
-  if (ratios.size() < 10) {
-    scale.hover = quantile_of(thrust, 0.5);
-    return scale;
-  }
-  scale.hover = median(ratios);
-  for (double& ratio : ratios) ratio = std::abs(ratio / scale.hover - 1);
-  scale.scatter = median(ratios) / 0.6745;
-  return scale;
-}
-
 /// Writes the rotor speeds as commands of the motors; see nn/base/rotor_speed.h.
 void speeds_become_commands(Draft& draft) {
   SignalTable& t = draft.table;
@@ -91,9 +60,9 @@ void set_hover_multiple(Draft& draft, const Rotors& rotors, bool squares_only, c
   SignalTable& t = draft.table;
   const std::vector<double> load = load_factor(draft);
   const std::vector<double> linear = sum_of_powers(t, rotors, 1), square = sum_of_powers(t, rotors, 2);
-  const Scale of_linear = scale_of(linear, load), of_square = scale_of(square, load);
+  const HoverScale of_linear = hover_scale(linear, load), of_square = hover_scale(square, load);
   const bool is_square = squares_only || of_square.scatter < of_linear.scatter;
-  const Scale& scale = is_square ? of_square : of_linear;
+  const HoverScale& scale = is_square ? of_square : of_linear;
   if (!(scale.hover > 0)) {
     draft.add("thrust", Source::kMissing, "", "N");
     return;
@@ -121,7 +90,7 @@ void set_hover_multiple(Draft& draft, const Rotors& rotors, bool squares_only, c
 
 /// Determines the scale of duty columns; returns false for microseconds of a servo signal, which do not give a duty.
 bool settle_duty_scale(Draft& draft) {
-  const Carried* const carried = draft.recognition.find(kDuty);
+  Carried* const carried = draft.recognition.find(kDuty);
   SignalTable& t = draft.table;
   if (carried == nullptr || carried->ask != Ask::kMotors || !draft.asks_physics) return carried != nullptr;
   double largest = 0;
@@ -133,6 +102,9 @@ bool settle_duty_scale(Draft& draft) {
       t[kDuty + k].clear();
     }
     draft.note(names_of(draft.raw, *carried) + ": read as microseconds, 1000 to 2000");
+    carried->signal = kMotorCommand;
+    carried->divide = carried->offset = 1000;
+    carried->unit = "us";
     return false;
   }
   double scale = 1;
@@ -142,6 +114,8 @@ bool settle_duty_scale(Draft& draft) {
   for (int k = 0; k < kFour; ++k) {
     for (double& u : t[kDuty + k]) u /= scale;
   }
+  carried->divide *= scale;
+  carried->unit = unit_of_factor(kDuty, carried->multiply / carried->divide);
   draft.note(fmt::format("{}: read as duty over {:g}", names_of(draft.raw, *carried), scale));
   return true;
 }
@@ -152,6 +126,8 @@ void settle_battery(Draft& draft) {
     const double middle = median(t[kBattery]);
     if (middle > 500 && draft.asks_physics) {
       for (double& v : t[kBattery]) v /= 1000;
+      draft.recognition.find(kBattery)->divide *= 1000;
+      draft.recognition.find(kBattery)->unit = "mV";
       draft.note(fmt::format("battery: median {:.0f}, read as millivolt", middle));
     }
     draft.add_measured("battery", kBattery);
@@ -175,11 +151,15 @@ bool is_requested(Draft& draft) {
     for (std::size_t i = 0; i < t.size(); ++i)
       applied[i] += std::pow(std::max(t[kRequested + k][i], 0.0) * t[kBattery][i], 1.5);
   }
-  const double of_request = scale_of(requested, load).scatter, of_duty = scale_of(applied, load).scatter;
-  const bool request = of_request < of_duty;
-  draft.note(fmt::format(
-      "{}: {}; relative scatter against the load {:.3f} as requested thrust, {:.3f} as applied duty",
-      names_of(draft.raw, carried), request ? "requested thrust" : "applied duty", of_request, of_duty));
+  const double of_request = hover_scale(requested, load).scatter,
+               of_duty = hover_scale(applied, load).scatter;
+  const bool request = of_request<of_duty, is_shown = of_request + of_duty> 0;
+  draft.note(
+      fmt::format("{}: {}; ", names_of(draft.raw, carried), request ? "requested thrust" : "applied duty") +
+      (is_shown ? fmt::format("relative scatter against the load {:.3f} as requested thrust, {:.3f} as "
+                              "applied duty",
+                              of_request, of_duty)
+                : "assumed: no load shows which"));
   return request;
 }
 
@@ -291,7 +271,8 @@ void settle_thrust(Draft& draft) {
         t[kDuty + k] = std::exchange(t[kRequested + k], {});
         for (double& duty : t[kDuty + k]) duty = std::min(duty, 1.0);
       }
-      draft.add_measured("duty", kRequested);
+      draft.recognition.find(kRequested)->signal = kDuty;
+      draft.add_measured("duty", kDuty);
       has_request = false;
     } else {
       draft.add_measured("requested_thrust", kRequested);

@@ -83,6 +83,12 @@ class Blocks {
     return little_endian<std::uint32_t>(block + body) == ~checksum(block, body) ? body + kChecksum_bytes : 0;
   }
 
+  /// Returns whether the block that is announced here ends within the file.
+  bool fits() {
+    const std::size_t size = 1 + *window_.peek(1) * header_.record_bytes + kChecksum_bytes;
+    return window_.left(size) == size;
+  }
+
   /// Returns true if a block may start here after damage: it is not empty and its first time is soon after `last`. This
   /// avoids computing a checksum at almost every byte; an empty block is only five bytes, which occur by chance.
   bool may_start(std::uint32_t last) {
@@ -124,13 +130,14 @@ void read_usd(std::istream& in, const std::string& path, RecordSink& sink, LogHe
   Blocks blocks(window, header);
   std::vector<double> values(num_variables);
   std::uint32_t last_time = 0;
-  bool searching = false;
+  bool searching = false, is_cut = false;
   // Limits the work on malicious files, which could request a checksum over thousands of bytes at each byte.
   constexpr std::size_t kMostSearch_bytes = std::size_t{4} << 30;
   while (window.left(1) == 1) {
     const bool tries = !searching || (blocks.work_bytes() < kMostSearch_bytes && blocks.may_start(last_time));
     const std::size_t size = tries ? blocks.sound_block() : 0;
     if (size == 0) {
+      if (!searching) is_cut = !blocks.fits();
       health.damaged_blocks += searching ? 0 : 1;
       ++health.skipped_bytes;
       searching = true;
@@ -148,6 +155,7 @@ void read_usd(std::istream& in, const std::string& path, RecordSink& sink, LogHe
     window.skip(size);
   }
   health.truncated = searching;
+  health.damaged_blocks -= searching && is_cut ? 1 : 0;
 }
 
 namespace {
@@ -182,12 +190,16 @@ class EventReader {
       for (const std::string& name : event.header.names) topic.columns.push_back({name, "", {}});
       log.topics.push_back(std::move(topic));
     }
+    std::size_t largest = 0;  // record
+    for (const auto& [id, event] : events_)
+      largest = std::max(largest, head_bytes() + event.header.record_bytes + kChecksum_bytes);
     std::vector<double> values;
-    bool searching = false;
+    bool searching = false, is_cut = false;
     double last_time = -1;
     while (window_.left(kChecksum_bytes + 1) > kChecksum_bytes) {
       const std::size_t size = searching ? after_damage(last_time) : record_size(0, last_time);
       if (size == 0) {
+        if (!searching) is_cut = window_.left(largest) < largest;
         health.damaged_blocks += searching ? 0 : 1;
         ++health.skipped_bytes;
         searching = true;
@@ -207,6 +219,7 @@ class EventReader {
       sum(window_.peek(size), size);
     }
     health.truncated = searching;
+    health.damaged_blocks -= searching && is_cut ? 1 : 0;
     const unsigned char* const stored = window_.peek(kChecksum_bytes);
     health.checksum_failed = stored == nullptr || little_endian<std::uint32_t>(stored) != checksum_;
     if (stored == nullptr) health.truncated = true;

@@ -15,7 +15,6 @@
 
 #include "analysis/logs/collector.h"
 #include "analysis/logs/formats/bytes.h"
-#include "analysis/logs/formats/crazyflie_csv.h"
 #include "analysis/logs/formats/formats.h"
 #include "nn/base/csv.h"
 #include "nn/base/file_io.h"
@@ -216,8 +215,7 @@ bool may_hold_several(const std::string& path) {
   if ((extension != ".csv" && extension != ".CSV") || !std::filesystem::is_regular_file(path)) return false;
   std::ifstream in(path, std::ios::binary);
   const std::string head = format_head(in);
-  // "cf1.x" has the form of a Crazyflie's log variable.
-  return format_of(head) == nullptr || looks_like_crazyflie_csv(head);
+  return format_of(head) == nullptr;
 }
 
 /// Returns the beginning of a file, enough for its header unless that is absurdly long.

@@ -4,6 +4,7 @@
 #include <array>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,8 @@ namespace swarmcert::residuals {
 /// Errors of a group of records.
 struct GroupErrors {
   ErrorStatistics statistics;
-  std::array<Interval, 4> rmse_interval;  ///< 90 %, of x, y, z, total, from blocks of 2 s
+  /// 90 %, of x, y, z, total, from blocks of 2 s; nothing if they are too few.
+  std::optional<std::array<Interval, 4>> rmse_interval;
   Axes nrmse;                             ///< rmse divided by the mean weight of the vehicles
   Eigen::Vector3d low_band_to_floor = Eigen::Vector3d::Zero();  ///< Spectrum::low_band_to_floor()
   Eigen::Vector3d noise_floor_N = Eigen::Vector3d::Zero();

@@ -69,11 +69,14 @@ ErrorStatistics statistics(const std::vector<Eigen::Vector3f>& r, const std::vec
   return result;
 }
 
-std::array<Interval, 4> bootstrap_rmse(const std::vector<BlockSum>& blocks, std::uint64_t seed) {
+std::optional<std::array<Interval, 4>> bootstrap_rmse(const std::vector<BlockSum>& blocks,
+                                                      std::uint64_t seed) {
   constexpr int kResamples = 200;
+  constexpr std::size_t kFewest = 5;
+  if (blocks.size() < kFewest) return std::nullopt;
   std::mt19937_64 generator(seed);
   std::array<std::vector<double>, 4> values;
-  for (int i = 0; i < kResamples && !blocks.empty(); ++i) {
+  for (int i = 0; i < kResamples; ++i) {
     BlockSum sum;
     for (std::size_t k = 0; k < blocks.size(); ++k) {
       const BlockSum& block = blocks[generator() % blocks.size()];

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "nn/base/interval.h"
@@ -33,9 +34,9 @@ struct BlockSum {
   Eigen::Vector3d squares = Eigen::Vector3d::Zero();
   double count = 0;
 };
-/// Returns 90 % bootstrap intervals of the root mean square for x, y, z and total, by resampling blocks; both ends are
-/// equal if there are fewer than two blocks.
-std::array<Interval, 4> bootstrap_rmse(const std::vector<BlockSum>& blocks, std::uint64_t seed);
+/// Returns 90 % bootstrap intervals of the root mean square for x, y, z and total, by resampling blocks; nothing for
+/// fewer than five blocks, which say too little about others.
+std::optional<std::array<Interval, 4>> bootstrap_rmse(const std::vector<BlockSum>& blocks, std::uint64_t seed);
 
 /// Returns the `p` quantile of `values`; 0 if empty. Reorders `values`.
 double quantile(std::vector<double>& values, double p);

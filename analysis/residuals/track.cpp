@@ -110,7 +110,7 @@ void fill_instants(Track& track, const logs::Log& log) {
     for (int row = 0; row < 3; ++row)
       now.R_WB.row(row) = vector(R[static_cast<std::size_t>(row)]).transpose();
     if (log.signals.rates) now.omega_B_rad_s = vector(s.rates_rad_s);
-    now.battery_V = log.signals.force && s.battery_V > 0 ? s.battery_V : stability::kFullBattery_V;
+    now.battery_V = s.battery_V > 0 ? s.battery_V : stability::kFullBattery_V;
     track.duty[i] = s.duty;
     track.specific_force_m_s2[i] = vector(s.specific_force_m_s2);
     track.restarts[i] = s.restarts ? 1 : 0;
@@ -124,7 +124,7 @@ void fill_instants(Track& track, const logs::Log& log) {
 
 /// Derives the specific force of logs without an accelerometer, over the window also applied to the model's force.
 void derive_specific_force(Track& track) {
-  if (track.force_source == logs::ForceSource::kAccelerometer) return;
+  if (track.force_source == logs::ForceSource::kAccelerometer || track.judged.isZero()) return;
   SmoothingWindow window(track.force_source, track.window_s, 1);
   const bool is_velocity = track.force_source == logs::ForceSource::kVelocity;
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
@@ -320,9 +320,14 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
     track.kind = known == fleet.end() ? fallback_kind : known->second.kind;
     const bool only_neighbour =
         (known != fleet.end() && known->second.position_only) || flight.position_only.count(path) != 0;
-    track.position_only = !log.signals.force || only_neighbour;
+    const bool has_torque_only =
+        !log.signals.force && log.signals.torque != logs::TorqueUse::kNone && !rules.fits;
+    track.position_only = (!log.signals.force && !has_torque_only) || only_neighbour;
     if (log.armed == logs::Armed::kNever)
       problems.push_back(path + ": no flight: never armed");
+    else if (has_torque_only && !only_neighbour)
+      problems.push_back(path + ": only torques, at any speed: for a force the log lacks " +
+                         log.signals.force_lacks);
     else if (!log.signals.force && !only_neighbour)
       problems.push_back(path + ": used only as a neighbour: the log lacks " + log.signals.force_lacks);
     track.doubts = read->doubts;

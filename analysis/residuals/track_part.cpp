@@ -92,6 +92,7 @@ void add_records(const Track& track, const std::vector<Eigen::Vector3d>& r,
     const stability::Instant& now = track.instants[i];
     if (i > 0 && track.cut[i - 1] == Cut::kNone && track.restarts[i] == 0)
       errors.used_s += now.time_s - track.instants[i - 1].time_s;
+    if (track.judged.isZero()) continue;
     ResidualPoint point{r[i].cast<float>(), r0[i].cast<float>(), {}};
     regions_of(now, now.time_s - track.instants.front().time_s, point.regions);
     part.points.push_back(point);
@@ -199,10 +200,12 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
 
   result.part.weight_N = model.weight_N();
   add_records(track, r, r0, result);
-  add_spectra(track, r, result.part.spectrum);
-  result.windows = error_windows(track, r);
-  result.moments = moments_of(track, r);
-  sort_and_shorten(result.moments);
+  if (!track.judged.isZero()) {
+    add_spectra(track, r, result.part.spectrum);
+    result.windows = error_windows(track, r);
+    result.moments = moments_of(track, r);
+    sort_and_shorten(result.moments);
+  }
   errors.errors = errors_of({&result.part});
   if (inputs.rules.per_mass)
     errors.torque.refused =

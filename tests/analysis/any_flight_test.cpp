@@ -261,6 +261,35 @@ TEST(AnyFlight, TheWholeOfEveryCollectionHasAnAnswer_slow) {
   }
 }
 
+/// Rates and duties at 500 Hz for `duration_s`, and nothing else.
+std::string rates_and_duties_csv(double duration_s) {
+  std::string text = "time,gyro.x,gyro.y,gyro.z,motor.m1,motor.m2,motor.m3,motor.m4,pm.vbat\n";
+  for (int k = 0; k < 500 * duration_s; ++k) {
+    const double t = 0.002 * k;
+    text += fmt::format("{:.3f},{:.4f},{:.4f},0.0,39000,39000,39000,39000,3.9\n", t, 20 * std::sin(9 * t),
+                        15 * std::cos(7 * t));
+  }
+  return text;
+}
+
+TEST(AnyFlight, RatesAndCommandsAloneLetTorquesBeJudgedAndNoForce) {
+  const ScratchFolder folder;
+  write_text(folder / "rates.csv", rates_and_duties_csv(12));
+  write_text(folder / "hover.csv", hover_csv(0, 4));
+  const files::Json json = result_of(folder, "compare " + small_model() + " rates.csv hover.csv", "compare");
+  for (const files::Json& flight : json["flights"]) {
+    const bool is_rates = flight["file"].get<std::string>().find("rates") != std::string::npos;
+    EXPECT_EQ(flight["judged"]["torque"], files::Json({"x", "y", "z"})) << flight["file"];
+    EXPECT_EQ(flight["judged"]["force"], is_rates ? files::Json::array() : files::Json({"x", "y", "z"}));
+    if (!is_rates) continue;
+    // J omega' with equal duties: amplitude J 9 20 deg/s about x.
+    EXPECT_NEAR(flight["torque"]["rmse"]["x"].get<double>(),
+                16.571710e-6 * 9 * 20 * 0.0174533 / std::sqrt(2.0), 2e-6);
+  }
+  EXPECT_FALSE(json["overall"]["rmse"]["x"].is_null()) << "the other flight's force is judged";
+  EXPECT_TRUE(json["overall"]["rmse_interval_90"]["total"].is_null()) << "four seconds are two blocks";
+}
+
 TEST(AnyFlight, InspectSaysWhereSignalsComeFromAndWhatToLogNext) {
   SWARMCERT_NEEDS_DATA();
   const ScratchFolder folder;

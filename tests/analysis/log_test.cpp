@@ -147,17 +147,33 @@ TEST(UsdLog, RefusesAHeaderThatItCannotTrust) {
   EXPECT_NE(refusal(header).find("checksum"), std::string::npos);
 }
 
-TEST(UsdLog, TimesThatDoNotFollowAreDroppedAndCounted) {
+TEST(UsdLog, RecordsOutOfOrderAreSortedAndImpossibleTimesDropped) {
   const auto at = [](std::uint32_t tick, int x) { return small_record(tick, static_cast<std::int16_t>(x)); };
   const logs::Log log =
       parse(usd_header() + usd_block({at(10000, 0), at(20000, 1), at(15000, 2), at(4000000000u, 3),
                                       at(30000, 4), at(40000, 5), at(40000, 6), at(90000, 7)}));
-  EXPECT_EQ(survivors(log), (std::vector<int>{0, 1, 4, 5, 7}));
-  EXPECT_EQ(log.health.clock_jumps, 3u);
+  EXPECT_EQ(survivors(log), (std::vector<int>{0, 2, 1, 4, 5, 7}));
+  EXPECT_EQ(log.health.clock_jumps, 2u) << "4000 s, and another record at 40 ms";
+  EXPECT_GE(log.health.mended.unsorted_rows, 1u);
   EXPECT_EQ(log.health.gaps, 1u);
   EXPECT_DOUBLE_EQ(log.health.longest_gap_s, 0.05);
   EXPECT_TRUE(log.samples.back().restarts);
   EXPECT_FALSE(log.samples[2].restarts);
+}
+
+TEST(UsdLog, ItsCompletenessSaysCutWhereTheFileEndsAndDamagedWhereABlockIsWrong) {
+  const std::string bytes = small_usd();
+  EXPECT_EQ(logs::completeness_of(parse(bytes).health), logs::Completeness::kComplete);
+  EXPECT_EQ(logs::lost_share(parse(bytes)), 0);
+  const logs::Log cut = parse(bytes.substr(0, bytes.size() - 3));
+  EXPECT_EQ(logs::completeness_of(cut.health), logs::Completeness::kCut);
+  EXPECT_TRUE(std::isnan(logs::lost_share(cut))) << "nobody knows how much followed";
+  std::string wrong = bytes;
+  wrong[usd_header().size() + 2] ^= 1;
+  const logs::Log damaged = parse(wrong);
+  EXPECT_EQ(logs::completeness_of(damaged.health), logs::Completeness::kDamaged);
+  EXPECT_DOUBLE_EQ(logs::lost_share(damaged),
+                   static_cast<double>(kBlock_bytes) / static_cast<double>(bytes.size()));
 }
 
 TEST(UsdLog, TheTickMayWrap) {

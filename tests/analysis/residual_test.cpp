@@ -125,7 +125,7 @@ TEST(Compare, GivesTheSameNumbersForAnyNumberOfJobs) {
   const residuals::Comparison one = residuals::compare(inputs, 1, quiet);
   const residuals::Comparison two = residuals::compare(inputs, 2, quiet);
   EXPECT_EQ(one.overall.statistics.rmse.total, two.overall.statistics.rmse.total);
-  EXPECT_EQ(one.overall.rmse_interval[3].lower, two.overall.rmse_interval[3].lower);
+  EXPECT_EQ(one.overall.rmse_interval.value()[3].lower, two.overall.rmse_interval.value()[3].lower);
   ASSERT_EQ(one.regions.size(), two.regions.size());
   for (std::size_t i = 0; i < one.regions.size(); ++i) EXPECT_EQ(one.regions[i].words, two.regions[i].words);
 }

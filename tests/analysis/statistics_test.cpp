@@ -73,7 +73,7 @@ TEST(ResidualStatistics, ResampledBlocksCoverTheRootMeanSquareAsOftenAsStated) {
       const double power = 1 + 0.5 * random.symmetric();  // mean 1, and so is that of the squares
       block = {Eigen::Vector3d::Constant(100 * power), 100};
     }
-    const Interval x = bootstrap_rmse(blocks, static_cast<std::uint64_t>(run))[0];
+    const Interval x = bootstrap_rmse(blocks, static_cast<std::uint64_t>(run)).value()[0];
     EXPECT_LT(x.lower, x.upper);
     held += x.lower <= 1 && 1 <= x.upper ? 1 : 0;
   }
@@ -109,11 +109,13 @@ TEST(ResidualStatistics, AVibrationIsALineOfTheSpectrumAndADriftIsNone) {
   EXPECT_FALSE(spectrum_with(2, 1.5).line().is_found()) << "within the low band";
 }
 
-TEST(ResidualStatistics, OneBlockHasNoScatter) {
-  const auto intervals = bootstrap_rmse({{Eigen::Vector3d(4, 9, 36), 1}}, 1);
-  EXPECT_EQ(intervals[0].lower, 2);
-  EXPECT_EQ(intervals[0].upper, 2);
-  EXPECT_EQ(intervals[3].upper, 7);
+TEST(ResidualStatistics, FewerThanFiveBlocksHaveNoInterval) {
+  std::vector<BlockSum> blocks(4, {Eigen::Vector3d(4, 9, 36), 1});
+  EXPECT_FALSE(bootstrap_rmse(blocks, 1).has_value());
+  blocks.push_back(blocks.back());
+  const auto intervals = bootstrap_rmse(blocks, 1);
+  ASSERT_TRUE(intervals.has_value());
+  EXPECT_EQ((*intervals)[3], Interval(7)) << "all blocks are equal";
 }
 
 }  // namespace

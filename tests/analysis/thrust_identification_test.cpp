@@ -74,6 +74,44 @@ TEST(ThrustIdentification, FindsTheInverseMapOfExactData) {
   for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(result.pwm.coefficients[i].value, d[i], 1e-10);
 }
 
+/// Thrust in N of one rotor, cubic in the motor's voltage, of the size of a Crazyflie's.
+ThrustData cubic_in_motor_voltage(double noise_gf, int repeats) {
+  std::mt19937 generator(3);
+  ThrustData data;
+  for (int i = 0; i < 60; ++i) {
+    ThrustSample s;
+    s.p = uniform(generator, 0.2, 1), s.v = uniform(generator, 3.2, 4.2) / 4.2;
+    const double u = s.p * s.v * 4.2;
+    for (int k = 0; k < repeats; ++k) {
+      s.thrust_gf =
+          (-0.02 + 0.03 * u - 0.001 * u * u + 0.0012 * u * u * u) / 0.00981 + noise_gf * noise(generator);
+      data.samples.push_back(s);
+    }
+  }
+  return data;
+}
+
+TEST(ThrustIdentification, FindsTheCubicInTheVoltageOfTheMotor) {
+  const PolynomialFit fit = identify_thrust(cubic_in_motor_voltage(0, 1), 0.95).motor_voltage;
+  ASSERT_TRUE(fit.determined) << fit.why_not;
+  const double truth[] = {-0.02, 0.03, -0.001, 0.0012};
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(fit.coefficients[i].value, truth[i], 1e-9);
+}
+
+TEST(ThrustIdentification, LackOfFitIsFoundWhereTheFormIsWrongAndNotWhereItIsRight) {
+  for (const int repeats : {1, 4}) {
+    const ThrustIdentification found = identify_thrust(cubic_in_motor_voltage(0.02, repeats), 0.95);
+    EXPECT_EQ(found.thrust.lack.against, repeats > 1 ? "repeated rows" : "terms of the next order");
+    EXPECT_TRUE(found.thrust.lack.is_found()) << found.thrust.lack.chance;
+    EXPECT_FALSE(found.motor_voltage.lack.is_found()) << found.motor_voltage.lack.chance;
+  }
+  int found = 0;
+  constexpr int kExperiments = 200;
+  for (unsigned seed = 0; seed < kExperiments; ++seed)
+    found += identify_thrust(measured({}, seed), 0.95).thrust.lack.is_found() ? 1 : 0;
+  EXPECT_LE(found, 9) << "1 % of false alarms, and five standard deviations";
+}
+
 // A 90 % interval must contain the truth in 90 % of repeated experiments. For 400 experiments the binomial standard
 // deviation is 1.5 %, so 84 % to 96 % covers four of them.
 TEST(ThrustIdentification, IntervalsHoldTheTruthAsOftenAsTheySay) {

@@ -60,6 +60,16 @@ TEST(GainConversion, TripleRootConverts) {
   EXPECT_NEAR(back.lambda_1_s, 4.0, 1e-4);
 }
 
+// The force of the law with gains in newton is the mass it is told times that of the PID gains.
+TEST(GainConversion, GainsInNewtonGiveTheSameForce) {
+  const AxisForceGains<double> gains = {0.4, 0.2, 0.05};
+  constexpr double kTold_kg = 0.027, kError_m = 0.3, kError_m_s = -0.7, kIntegral_m_s = 0.11;
+  const AxisPid<double> pid = to_pid(gains, kTold_kg);
+  EXPECT_DOUBLE_EQ(
+      kTold_kg * (pid.Kp_1_s2 * kError_m + pid.Kd_1_s * kError_m_s + pid.Ki_1_s3 * kIntegral_m_s),
+      gains.kp_N_m * kError_m + gains.kd_N_s_m * kError_m_s + gains.ki_N_ms * kIntegral_m_s);
+}
+
 // Expected values: real roots of 3 l^2 - 2 Kd l + Kp = 0, and Ki = (Kd - 2 l) l^2, for the gains published with the
 // paper and the defaults of the firmware.
 TEST(GainConversion, PublishedGainsAreNotOfTheTheoremsForm) {

@@ -29,4 +29,5 @@ template Heading<float> heading_of_yaw(float);
 template float pwm_of_force(const ThrustMap<float>&, const float&, const float&);
 template AxisComposite<float> to_composite(const AxisPid<float>&, const float&, const float&);
 template AxisPid<float> to_pid(const float&, const float&, const float&);
+template AxisPid<float> to_pid(const AxisForceGains<float>&, const float&);
 }  // namespace swarmcert::controller

@@ -199,9 +199,9 @@ TEST(ColumnMeaning, AQuaternionThatLaysTheVehicleOnItsSideHasTheOtherOrder) {
 }
 
 /// Returns a ULog of the flight as PX4 writes it, with the duties of an output driver beside the motor commands.
-std::string px4_flight(bool xy_valid, std::uint8_t vehicle_type) {
+std::string px4_flight(bool xy_valid, std::uint8_t vehicle_type, const std::string& parameters = "") {
   std::string text =
-      ulog_head() + ulog_flags(0, 0) +
+      ulog_head() + ulog_flags(0, 0) + parameters +
       ulog_format(
           "vehicle_local_position:uint64_t timestamp;float x;float y;float z;float vx;float vy;"
           "float vz;uint8_t xy_valid;uint8_t v_xy_valid;") +
@@ -247,6 +247,18 @@ TEST(ColumnMeaning, AFixedWingHasNoRotorsToJudge) {
   const logs::Log log = read(px4_flight(true, 2), "flight.ulg");
   EXPECT_FALSE(log.signals.force);
   EXPECT_NE(log.signals.force_lacks.find("fixed wing"), std::string::npos) << log.signals.force_lacks;
+}
+
+TEST(ColumnMeaning, TheAirframeNamesTheKindOfAVehicleWithoutRotors) {
+  const auto kind = [](std::uint8_t type, std::int32_t airframe) {
+    return read(px4_flight(true, type, ulog_keyed('P', "int32_t SYS_AUTOSTART", bytes_of(airframe))),
+                "flight.ulg")
+        .signals.not_multirotor;
+  };
+  EXPECT_EQ(kind(3, 3000), "fixed wing") << "a flying wing";
+  EXPECT_EQ(kind(0, 50000), "rover");
+  EXPECT_EQ(kind(3, 4001), "rover") << "the airframe of a quadrotor says nothing against the type";
+  EXPECT_EQ(kind(1, 3000), "") << "it flies on its rotors";
 }
 
 TEST(ColumnMeaning, InstancesOfDataflashWithoutUnitsAreKnownByTheirFields) {

@@ -7,9 +7,12 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include "analysis/logs/read_log.h"
+#include "data.h"
 #include "nn/base/input_error.h"
+#include "synthetic_header.h"
 
 namespace swarmcert::tests {
 namespace {
@@ -96,6 +99,93 @@ TEST_F(ColumnsDraftOfValues, AnglesFollowFromTheLateralAccelerationAndWhatIsMiss
 TEST_F(ColumnsDraftOfValues, ATableWithoutAClockIsRefused) {
   std::ofstream(path_) << "gain,error\n1,2\n1,3\n0.5,7\n2,1\n";
   EXPECT_THROW(logs::columns_draft(path_), files::InputError);
+}
+
+/// All numbers of a sample.
+std::vector<double> numbers(const logs::Sample& s) {
+  std::vector<double> all = {s.time_us, s.battery_V, s.thrust_command_N, s.given_thrust,
+                             s.restarts ? 1.0 : 0.0};
+  const auto add = [&all](const auto& values) { all.insert(all.end(), values.begin(), values.end()); };
+  for (const logs::Vector* const v : {&s.position_m, &s.velocity_m_s, &s.specific_force_m_s2, &s.rates_rad_s,
+                                      &s.target_position_m, &s.target_velocity_m_s, &s.torque_command_Nm})
+    add(*v);
+  add(s.attitude.xyzw());
+  add(s.duty);
+  add(s.motor_force_N);
+  add(s.motor_command);
+  return all;
+}
+
+void expect_same_samples(const logs::Log& a, const logs::Log& b) {
+  ASSERT_EQ(a.samples.size(), b.samples.size());
+  for (std::size_t i = 0; i < a.samples.size(); ++i) {
+    const std::vector<double> x = numbers(a.samples[i]), y = numbers(b.samples[i]);
+    for (std::size_t k = 0; k < x.size(); ++k)
+      ASSERT_TRUE(x[k] == y[k] || (std::isnan(x[k]) && std::isnan(y[k])))
+          << "number " << k << " of sample " << i << ": " << x[k] << ", by the draft " << y[k];
+  }
+}
+
+/// Reads a table, and again by its draft. Returns false where there is no draft.
+bool expect_that_the_draft_says_all(const std::string& path) {
+  SCOPED_TRACE(path);
+  std::string draft;
+  logs::Log log;
+  try {
+    draft = logs::columns_draft(path);
+    log = logs::read_log(path);
+  } catch (const files::InputError&) {
+    return false;
+  }
+  const logs::SignalMap map = logs::parse_columns(draft, "draft");
+  const logs::Log again = logs::read_log(path, map);
+  expect_same_samples(log, again);
+  EXPECT_EQ(log.interpretation, again.interpretation);
+  EXPECT_EQ(log.sources.size(), again.sources.size());
+  for (std::size_t i = 0; i < std::min(log.sources.size(), again.sources.size()); ++i) {
+    EXPECT_EQ(log.sources[i].from, again.sources[i].from);
+    EXPECT_EQ(log.sources[i].unit, again.sources[i].unit);
+    EXPECT_EQ(log.sources[i].runner_up, again.sources[i].runner_up);
+  }
+  return true;
+}
+
+TEST_F(ColumnsDraftOfValues, ByItselfSaysAllThatWasReadUnderRandomNames) {
+  int read = 0;
+  for (std::uint32_t seed = 1; seed <= 25; ++seed) {
+    const SyntheticTable table = synthetic_table(seed);
+    SCOPED_TRACE(table.habits);
+    std::ofstream(path_) << table.text;
+    if (!expect_that_the_draft_says_all(path_)) continue;
+    ++read;
+    // A stream is read by the columns.toml alone.
+    std::istringstream guessed(table.text), stated(table.text);
+    expect_same_samples(
+        logs::parse_log(guessed, path_),
+        logs::parse_log(stated, path_, logs::parse_columns(logs::columns_draft(path_), "draft")));
+  }
+  EXPECT_GE(read, 23);
+}
+
+void expect_drafts_of_recorded_tables(std::size_t every) {
+  std::size_t count = 0, read = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(data_path("."))) {
+    if (!entry.is_regular_file() || count++ % every != 0 || !logs::looks_like_log(entry.path().string()))
+      continue;
+    read += expect_that_the_draft_says_all(entry.path().string()) ? 1 : 0;
+    if (testing::Test::HasFatalFailure()) return;
+  }
+  EXPECT_GT(read, 5U);
+}
+
+TEST(ColumnsDraft, OfRecordedTablesSaysAllThatWasRead) {
+  SWARMCERT_NEEDS_DATA();
+  expect_drafts_of_recorded_tables(20);
+}
+
+TEST(ColumnsDraft, OfAllRecordedTablesSaysAllThatWasRead_slow) {
+  SWARMCERT_NEEDS_DATA();
+  expect_drafts_of_recorded_tables(1);
 }
 
 }  // namespace

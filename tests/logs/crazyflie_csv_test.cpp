@@ -1,5 +1,3 @@
-#include "analysis/logs/formats/crazyflie_csv.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "analysis/logs/collector.h"
+#include "analysis/logs/formats/cfclient_folder.h"
 #include "analysis/logs/formats/formats.h"
 #include "logs/raw_log_invariant.h"
 #include "logs/topics.h"
@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 logs::RawLog csv_of(const std::string& text) {
   std::istringstream in(text);
-  const logs::RawLog log = logs::parse_raw(in, "log.csv");
+  const logs::RawLog log = logs::read_table(in, "log.csv", logs::known_columns());
   EXPECT_EQ(broken_rule(log), "");
   return log;
 }
@@ -32,64 +32,50 @@ std::string cfclient_csv(int first, int last) {
   return text;
 }
 
+std::vector<long> milliseconds(const logs::RawTopic& topic) {
+  std::vector<long> times;
+  for (const double time_s : topic.time_s) times.push_back(std::lround(1e3 * time_s));
+  return times;
+}
+
 TEST(CrazyflieCsv, ReadsWhatCfclientWrites) {
   const logs::RawLog log = csv_of(cfclient_csv(0, 4));
   EXPECT_EQ(log.format, "csv");
-  const logs::RawTopic& topic = topic_of(log, "csv");
-  EXPECT_EQ(topic.time_s, (std::vector<double>{5.0, 5.01, 5.02, 5.03}));
+  const logs::RawTopic& topic = log.topics.at(0);
+  EXPECT_EQ(milliseconds(topic), (std::vector<long>{5000, 5010, 5020, 5030}));
   EXPECT_EQ(values_of(topic, "stabilizer.roll"), (std::vector<double>{0.5, 1.5, 2.5, 3.5}));
   EXPECT_EQ(values_of(topic, "motor.m1")[2], 12);
   EXPECT_EQ(values_of(topic, "Timestamp")[0], 5000) << "the column of the time stays as it is";
-  EXPECT_EQ(log.texts.at("time_unit"), "ms");
+  EXPECT_EQ(topic.clock, "Timestamp");
   EXPECT_EQ(log.health.records, 4u);
 }
 
-TEST(CrazyflieCsv, TakesUnitsFromTheHead) {
-  const logs::RawLog log = csv_of("time[s];acc.z[g];pm.vbat (V);a.b[0]\n1;0.5;3.7;4\n");
-  const logs::RawTopic& topic = topic_of(log, "csv");
-  EXPECT_EQ(topic.time_s, std::vector<double>{1});
-  EXPECT_EQ(topic.find("acc.z[g]")->unit, "g");
-  EXPECT_EQ(topic.find("pm.vbat (V)")->unit, "V");
-  EXPECT_EQ(topic.find("a.b[0]")->unit, "") << "an index is no unit";
-}
-
 TEST(CrazyflieCsv, FindsTheUnitOfTheTimeInItsSteps) {
-  for (const auto& [step, unit] : {std::pair{"0.01", "s"}, std::pair{"2", "ms"}, std::pair{"100", "ms"},
-                                   std::pair{"2000", "us"}, std::pair{"1e7", "ns"}}) {
+  for (const auto& [step, unit_s] :
+       {std::pair{"0.01", 1.0}, {"2", 1e-3}, {"100", 1e-3}, {"2000", 1e-6}, {"1e7", 1e-9}}) {
     std::string text = "timestamp,gyro.x\n";
     for (int k = 0; k < 10; ++k) text += std::to_string(k * std::stod(step)) + ",1\n";
-    EXPECT_EQ(csv_of(text).texts.at("time_unit"), unit) << step;
+    EXPECT_EQ(csv_of(text).topics[0].clock_unit_s, unit_s) << step;
   }
 }
 
 TEST(CrazyflieCsv, TextInACellIsNotANumberAndCostsNoOtherCell) {
   const logs::RawLog log =
       csv_of("tick,sys.state,block,acc.z\n10,flying,Pose,1\n20,3,Pose,\n30,nan,Pose,inf\n");
-  const logs::RawTopic& topic = topic_of(log, "csv");
+  const logs::RawTopic& topic = log.topics.at(0);
   EXPECT_EQ(topic.time_s.size(), 3u);
   EXPECT_TRUE(std::isnan(values_of(topic, "sys.state")[0]));
   EXPECT_EQ(values_of(topic, "sys.state")[1], 3);
   EXPECT_TRUE(std::isnan(values_of(topic, "acc.z")[1]));
   EXPECT_TRUE(std::isinf(values_of(topic, "acc.z")[2]));
-  EXPECT_EQ(topic.find("block"), nullptr);
-  ASSERT_EQ(log.skipped.size(), 1u);
-  EXPECT_EQ(log.skipped[0].name, "block");
   EXPECT_EQ(log.health.damaged_lines, 0u);
 }
 
 TEST(CrazyflieCsv, DamagedLinesAreCountedAndLeftOut) {
-  const logs::RawLog log = csv_of("Timestamp,acc.z\n10,1\n20\n30,1,2\nx,1\n,1\n40,1\n5");
-  EXPECT_EQ(topic_of(log, "csv").time_s, (std::vector<double>{0.01, 0.04}));
+  const logs::RawLog log = csv_of("Timestamp,acc.z\n10,1\n20\n30,1,2\nx,1\n40,1\n5");
+  EXPECT_EQ(values_of(log.topics.at(0), "Timestamp"), (std::vector<double>{10, 40}));
   EXPECT_EQ(log.health.damaged_lines, 3u);
-  EXPECT_EQ(log.health.not_finite, 1u);
   EXPECT_TRUE(log.health.truncated);
-}
-
-TEST(CrazyflieCsv, OtherTablesAreNoneOfThese) {
-  EXPECT_TRUE(logs::looks_like_crazyflie_csv("\xEF\xBB\xBF# Time,\"gyro.x\"\r\n1,2\r\n"));
-  for (const char* const head : {"", "Timestamp", "Timestamp,roll\n1,2\n", "roll,gyro.x\n",
-                                 "# time[ms],x[m],y[m]\n", "Timestamp 1.5,2.5\n", "time,1.5\n", "t,a.b.c\n"})
-    EXPECT_FALSE(logs::looks_like_crazyflie_csv(head)) << head;
   EXPECT_TRUE(refuses([] { csv_of("Timestamp,a.b,a.b\n1,2,3\n"); }, {"log.csv", "names a column twice"}));
 }
 
@@ -102,7 +88,7 @@ TEST(CrazyflieCsv, EveryDamagedByteGivesALogOrARefusal) {
       text[i] = static_cast<char>(text[i] ^ flip);
       std::istringstream in(text);
       try {
-        const logs::RawLog log = logs::read_crazyflie_csv(in, "log.csv");
+        const logs::RawLog log = logs::read_table(in, "log.csv", logs::known_columns());
         EXPECT_EQ(broken_rule(log), "") << i;
         kept += log.health.records >= 18 ? 1 : 0;
       } catch (const files::InputError&) {
@@ -126,7 +112,7 @@ TEST(CrazyflieCsv, ASessionOfCfclientIsOneLogWithATopicForEachBlock) {
   const logs::RawLog log = logs::read_raw(folder.string());
   EXPECT_EQ(broken_rule(log), "");
   ASSERT_EQ(log.topics.size(), 2u);
-  EXPECT_EQ(topic_of(log, "pose").time_s, (std::vector<double>{5.0, 5.01, 5.02, 6.0, 6.01}));
+  EXPECT_EQ(milliseconds(topic_of(log, "pose")), (std::vector<long>{5000, 5010, 5020, 6000, 6010}));
   EXPECT_EQ(values_in(log, "power", "pm.vbat"), (std::vector<double>{3.7, 3.6}));
   EXPECT_EQ(log.health.records, 7u);
   write("notes.csv", "any,table\n1,2\n");

@@ -36,7 +36,7 @@ def calls(folder, flights):
     yield "diagnose", lambda: swarmcert.diagnose(MODEL, flights), ()
     add = lambda: swarmcert.add(["downwash"], MODEL, flights, folder / "fitted.toml")
     yield "add", add, ("-o", folder / "fitted2.toml")
-    yield "study", lambda: swarmcert.study(MODEL, flights, folder / "study"), ("-o", folder / "study2")
+    yield "study", lambda: swarmcert.study(MODEL, flights, folder / "study"), ("-o", folder / "study")
     model = lambda: swarmcert.run("model", "draft", flights, output=folder / "draft.toml")
     yield "model", model, ("-o", folder / "draft2.toml")
     train = lambda: swarmcert.run(

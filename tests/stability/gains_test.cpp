@@ -54,6 +54,22 @@ latency_s = 0.01
   EXPECT_EQ(gains.network_latency_s, 0.01);
 }
 
+// The firmware's own numbers for a vehicle of 27 g.
+TEST(Gains, GainsOfTheMellingerControllerAreDividedByTheMassThatItIsTold) {
+  const std::string body =
+      "[position]\nkp_xy = 0.4\nkd_xy = 0.2\nki_xy = 0.05\ni_range_xy = 2\nkp_z = 1.25\nkd_z = 0.4\nki_z = "
+      "0.05\n"
+      "i_range_z = 0.4\n";
+  const Gains gains = parse_gains(kHead + body + "mass = 0.027\nmassThrust = 132000\n", "g");
+  ASSERT_TRUE(gains.pid.has_value());
+  EXPECT_EQ(to_eigen(gains.pid->Kp_1_s2), Eigen::Vector3d(0.4 / 0.027, 0.4 / 0.027, 1.25 / 0.027));
+  EXPECT_EQ(to_eigen(gains.pid->Kd_1_s), Eigen::Vector3d(0.2 / 0.027, 0.2 / 0.027, 0.4 / 0.027));
+  EXPECT_EQ(to_eigen(gains.pid->Ki_1_s3), Eigen::Vector3d(0.05 / 0.027, 0.05 / 0.027, 0.05 / 0.027));
+  EXPECT_EQ(gains.integrator_limit_m_s, (PerAxis{2, 2, 0.4}));
+  EXPECT_TRUE(refused(body, {"mass", "ctrlMel.mass"}));
+  EXPECT_TRUE(refused(body + "mass = 0.027\nKp = 3\n", {"Kp", "cannot be combined"}));
+}
+
 TEST(Gains, ReadsCompositeGainsAsMatrixDiagonalOrNumber) {
   const Gains gains = parse_gains(
       std::string(kHead) + "[position]\nLambda = [[4, 1, 0], [1, 4, 0], [0, 0, 2]]\nK = [0.1, 0.2, 0.3]\n",

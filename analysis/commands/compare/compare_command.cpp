@@ -209,7 +209,11 @@ void add_extras(const CompareOptions& options, const CommonOptions& common, cons
 
 /// If no log could be read, the input is bad; if the flights contain too little data, the result is inconclusive.
 int exit_code_of(const residuals::Comparison& comparison) {
-  if (comparison.overall.statistics.samples > 0) return kDone;
+  const bool has_torque = std::any_of(comparison.tracks.begin(), comparison.tracks.end(),
+                                      [](const residuals::TrackErrors& track) {
+                                        return track.torque.records + track.torque.slow_records > 0;
+                                      });
+  if (comparison.overall.statistics.samples > 0 || has_torque) return kDone;
   note("no usable record: nothing was compared" + (comparison.problems.empty()
                                                        ? "; 'swarmcert inspect LOG' shows what is in a log"
                                                        : ": " + comparison.problems[0]));

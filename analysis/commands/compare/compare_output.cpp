@@ -25,7 +25,11 @@ void print_torque(const Comparison& comparison) {
     fmt::print("Torque residual refused: {}.\n", summary.refused);
     const auto slow = std::count_if(comparison.tracks.begin(), comparison.tracks.end(),
                                     [](const auto& track) { return track.torque.slow_records > 0; });
-    if (slow > 0) fmt::print("Mean torque in slow flight: {} logs, flights[].torque in the JSON.\n", slow);
+    if (slow > 0)
+      fmt::print(
+          "Mean torque in slow flight (in all flight where no speed is known): {} logs, flights[].torque in "
+          "the JSON.\n",
+          slow);
     return;
   }
   for (const residuals::TrackErrors& track : comparison.tracks) {
@@ -95,9 +99,12 @@ void print_errors(const Comparison& comparison, const Comparison* own, const res
   line("all", comparison.overall);
   if (!per_mass || comparison.compositions.size() > 1) print_compositions(comparison, own, unit);
   const auto& interval = comparison.overall.rmse_interval;
-  fmt::print("\nRMSE of all: {:.4f} {}, 90 % interval {:.4f} .. {:.4f}; {:.1f} % of the weight.\n",
-             comparison.overall.statistics.rmse.total, per_mass ? unit.name : "N", interval[3].lower,
-             interval[3].upper, 100 * comparison.overall.nrmse.total);
+  fmt::print("\nRMSE of all: {:.4f} {}, {}; {:.1f} % of the weight.\n",
+             comparison.overall.statistics.rmse.total, per_mass ? unit.name : "N",
+             interval
+                 ? fmt::format("90 % interval {:.4f} .. {:.4f}", (*interval)[3].lower, (*interval)[3].upper)
+                 : "no interval: too short a flight",
+             100 * comparison.overall.nrmse.total);
   const residuals::FailingPlace fails = residuals::failing_place(comparison, unit);
   fmt::print("\nWhere it fails most: {}\n", per_mass ? "by regime" : fails.words);
   const bool is_regional = per_mass || fails.where == residuals::FailingPlace::Where::kRegion;
@@ -145,6 +152,9 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
   print_cuts(comparison);
   if (comparison.overall.statistics.samples > 0)
     print_errors(comparison, own, residuals::force_unit(inputs), inputs.rules.per_mass);
+  else if (std::any_of(comparison.tracks.begin(), comparison.tracks.end(),
+                       [](const residuals::TrackErrors& track) { return !track.position_only; }))
+    print_torque(comparison);
   for (const std::string& left_out : inputs.found.left_out) fmt::print("left out: {}\n", left_out);
   print_doubts(comparison);
   for (const std::string& problem : comparison.problems) fmt::print("not judged: {}\n", problem);

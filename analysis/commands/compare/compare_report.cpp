@@ -37,7 +37,9 @@ std::vector<std::string> row(const std::string& name, const residuals::GroupErro
           gf(s.rmse.x),
           gf(s.rmse.y),
           gf(s.rmse.z),
-          gf(group.rmse_interval[2].lower) + " .. " + gf(group.rmse_interval[2].upper),
+          group.rmse_interval
+              ? gf((*group.rmse_interval)[2].lower) + " .. " + gf((*group.rmse_interval)[2].upper)
+              : "-",
           gf(s.bias.z),
           gf(s.p95.z),
           gf(s.p999.z),

@@ -48,13 +48,13 @@ void describe_statistics(Record& record, const residuals::ErrorStatistics& s, co
 
 void describe_group(Record& record, const residuals::GroupErrors& g, const Eigen::Vector3d& judged) {
   describe_statistics(record, g.statistics, judged);
-  record.object("rmse_interval_90", "Of the RMSE, from blocks of 2 s.", [&](Record& r) {
-    const char* const kAxes[] = {"x", "y", "z"};
-    for (int k = 0; k < 3; ++k)
-      r.field(kAxes[k],
-              judged[k] != 0 ? std::optional(g.rmse_interval[static_cast<std::size_t>(k)]) : std::nullopt,
+  record.object("rmse_interval_90", "Of the RMSE, from blocks of 2 s; null: too few.", [&](Record& r) {
+    const char* const kAxes[] = {"x", "y", "z", "total"};
+    for (int k = 0; k < 4; ++k) {
+      const bool has = g.rmse_interval && (k == 3 || judged[k] != 0);
+      r.field(kAxes[k], has ? std::optional((*g.rmse_interval)[static_cast<std::size_t>(k)]) : std::nullopt,
               "");
-    r.field("total", g.rmse_interval[3], "");
+    }
   });
   add(record, "nrmse", g.nrmse, judged, "RMSE over the mean weight.");
   add(record, "low_band_to_floor", g.low_band_to_floor, judged,
@@ -119,7 +119,8 @@ void describe_trajectories(Record& record, const residuals::Trajectories& all) {
   });
 }
 
-void describe_torque(Record& record, const residuals::TorqueErrors& torque) {
+/// @param has_speed the log shows how fast the vehicle is
+void describe_torque(Record& record, const residuals::TorqueErrors& torque, bool has_speed) {
   const bool is_refused = !torque.refused.empty();
   const auto axes = [](Record& r, const char* name, const residuals::Axes& a) {
     add(r, name, a, kAllJudged, "About the body axes.", "N m");
@@ -131,13 +132,15 @@ void describe_torque(Record& record, const residuals::TorqueErrors& torque) {
     r.field("records", torque.records, "");
     r.field("rate_hz", torque.rate_hz, "Of the log.", "Hz");
   });
-  record.object_or_null(torque.slow_records > 0, "slow_flight", "What balances the rotors in slow flight.",
-                        [&](Record& r) {
-                          r.constant("unit", "N m", "");
-                          r.field("slower_than_m_s", residuals::TorqueErrors::kSlow_m_s, "", "m/s");
-                          r.field("records", torque.slow_records, "");
-                          axes(r, "mean", torque.slow_mean_Nm);
-                        });
+  record.object_or_null(
+      torque.slow_records > 0, "slow_flight", "What balances the rotors in slow flight.", [&](Record& r) {
+        r.constant("unit", "N m", "");
+        r.field("slower_than_m_s",
+                has_speed ? std::optional(residuals::TorqueErrors::kSlow_m_s) : std::nullopt,
+                "Null: the log shows no speed, and the mean is that of the whole flight.", "m/s");
+        r.field("records", torque.slow_records, "");
+        axes(r, "mean", torque.slow_mean_Nm);
+      });
   record.may_fields(!is_refused, [&](Record& r) {
     axes(r, "rmse", torque.rmse_Nm);
     axes(r, "bias", torque.bias_Nm);
@@ -227,7 +230,9 @@ void describe_flight(Record& record, const FlightRow& row) {
   describe_group(record, track.errors, track.position_only ? kAllJudged : track.judged);
   record.object("trajectory", "The closed loop, simulated from the set points.",
                 [&](Record& r) { describe_trajectory(r, track.trajectory); });
-  record.object("torque", "Torque residual.", [&](Record& r) { describe_torque(r, track.torque); });
+  record.object("torque", "Torque residual.", [&](Record& r) {
+    describe_torque(r, track.torque, track.force_source != logs::ForceSource::kNone);
+  });
   const std::optional<ErrorsOfFlights> none;
   const std::optional<ErrorsOfFlights>& errors = row.errors != nullptr ? *row.errors : none;
   record.may_fields(errors.has_value(), [&](Record& r) {
@@ -451,7 +456,7 @@ std::vector<LogOutcome> outcomes_of(const Comparison& comparison, const residual
       outcome.path = path;
       const auto found = tracks.find(path);
       outcome.opened = found != tracks.end();
-      const bool is_used = outcome.opened && found->second->errors.statistics.samples > 0;
+      const bool is_used = outcome.opened && found->second->used_s > 0;
       if (!outcome.opened)
         outcome.left_out_why = "unreadable";
       else if (found->second->position_only)

@@ -38,6 +38,16 @@ void describe_fit(files::Record& record, const PolynomialFit& fit) {
   record.field("largest_residual", fit.largest_residual, "In `unit`.");
   record.field("largest_uncertainty", fit.largest_uncertainty,
                "Of the polynomial within the data, in `unit`.");
+  record.object_or_null(!fit.lack.against.empty(), "lack_of_fit",
+                        "What the fit cannot follow; null: not tested.", [&](files::Record& r) {
+                          r.field("against", fit.lack.against, "repeated rows or terms of the next order.");
+                          r.field("found", fit.lack.is_found(), "Whether the chance is below 1 %.");
+                          r.field("F", fit.lack.F, "Of the F test.");
+                          r.field("degrees_of_freedom", std::array<int, 2>{fit.lack.terms, fit.lack.left},
+                                  "Of what is lacking and of the noise.");
+                          r.field("chance", fit.lack.chance, "Of such an F where nothing is lacking.");
+                          r.field("rms", fit.lack.rms, "Of what is lacking, in `unit`.");
+                        });
   record.may("why_not", fit.determined ? std::nullopt : std::optional<std::string>(fit.why_not),
              "What the data lack.");
 }
@@ -73,12 +83,17 @@ void describe(files::Record& record, const ThrustResult& result) {
                                       found.largest_v * controller::kReferenceVoltage_V},
                 "Of the battery.", "V");
   });
-  const std::vector<std::pair<std::string, PolynomialFit>> fits = {
-      {"thrust", found.thrust}, {"pwm", found.pwm}, {"max_thrust", found.max_thrust}};
+  const std::vector<std::pair<std::string, PolynomialFit>> fits = {{"thrust", found.thrust},
+                                                                   {"pwm", found.pwm},
+                                                                   {"max_thrust", found.max_thrust},
+                                                                   {"motor_voltage", found.motor_voltage}};
   std::vector<std::pair<std::string, Coefficient>> coefficients;
   for (const auto& [name, fit] : fits)
     for (const Coefficient& c : fit.coefficients) coefficients.emplace_back(c.name, c);
-  record.entries("coefficients", coefficients, "Of the three polynomials, by name.", describe_coefficient);
+  record.entries(
+      "coefficients", coefficients,
+      "Of the polynomials, by name; VMOTOR2THRUST0 .. 3: N of one rotor over the voltage of its motor.",
+      describe_coefficient);
   record.entries("fits", fits, "How well they fit.", describe_fit);
 }
 
@@ -89,11 +104,13 @@ void print(const ThrustData& data, const ThrustIdentification& result) {
              result.largest_v * controller::kReferenceVoltage_V);
   fmt::print("pwm: '{}' in {}; voltage: '{}' in {}; thrust: '{}' in {}\n", data.pwm.column, data.pwm.unit,
              data.voltage.column, data.voltage.unit, data.thrust.column, data.thrust.unit);
-  constexpr const char* kFormulas[] = {"gf of one rotor = c00 + c10 p + c01 v + c20 p^2 + c11 p v",
-                                       "p = d00 + d10 g + d01 v + d20 g^2 + d11 g v",
-                                       "largest gf of one rotor = e00 + e10 p + e01 v"};
-  const PolynomialFit* const fits[] = {&result.thrust, &result.pwm, &result.max_thrust};
-  for (int i = 0; i < 3; ++i) {
+  constexpr const char* kFormulas[] = {
+      "gf of one rotor = c00 + c10 p + c01 v + c20 p^2 + c11 p v",
+      "p = d00 + d10 g + d01 v + d20 g^2 + d11 g v", "largest gf of one rotor = e00 + e10 p + e01 v",
+      "N of one rotor = VMOTOR2THRUST0 + .. 1 u + .. 2 u^2 + .. 3 u^3, u = p V"};
+  const PolynomialFit* const fits[] = {&result.thrust, &result.pwm, &result.max_thrust,
+                                       &result.motor_voltage};
+  for (int i = 0; i < 4; ++i) {
     const PolynomialFit& fit = *fits[i];
     fmt::print("\n{}   (p = PWM / 65536, v = V / 4.2)\n", kFormulas[i]);
     if (!fit.determined) {
@@ -102,6 +119,11 @@ void print(const ThrustData& data, const ThrustIdentification& result) {
     }
     fmt::print("  {}; residual rms {:.4g} {}, largest {:.4g}\n", fit.method, fit.residual_rms, fit.unit,
                fit.largest_residual);
+    if (!fit.lack.against.empty())
+      fmt::print("  {}: F({}, {}) = {:.3g} against {}, chance {:.2g}{}\n",
+                 fit.lack.is_found() ? "lack of fit" : "no lack of fit", fit.lack.terms, fit.lack.left,
+                 fit.lack.F, fit.lack.against, fit.lack.chance,
+                 fit.lack.is_found() ? fmt::format("; rms {:.3g} {}", fit.lack.rms, fit.unit) : "");
     for (const Coefficient& c : fit.coefficients) {
       fmt::print("  {} = {:<24.17g}# {:g} % interval {:.6g} to {:.6g}\n", c.name, c.value,
                  100 * result.confidence, c.lower, c.upper);

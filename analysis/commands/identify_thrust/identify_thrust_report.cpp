@@ -33,6 +33,9 @@ void add_polynomial(Report& report, const std::string& title, const PolynomialFi
   }
   report.paragraph(fmt::format("{}; {} samples, residual RMS {:.4g} {}, largest {:.4g}.", fit.method,
                                fit.samples, fit.residual_rms, fit.unit, fit.largest_residual));
+  if (fit.lack.is_found())
+    report.paragraph(fmt::format("Lack of fit: {:.3g} {} RMS, which {} show (F test, chance {:.2g}).",
+                                 fit.lack.rms, fit.unit, fit.lack.against, fit.lack.chance));
   std::vector<std::vector<std::string>> rows;
   for (const Coefficient& c : fit.coefficients) {
     rows.push_back({c.name, fmt::format("{:.10g}", c.value), fmt::format("{:.6g}", c.lower),
@@ -75,6 +78,7 @@ std::string write_thrust_report(const ThrustData& data, const ThrustIdentificati
   add_polynomial(report, "Thrust from PWM and voltage", found.thrust);
   add_polynomial(report, "PWM from thrust and voltage", found.pwm);
   add_polynomial(report, "Largest thrust", found.max_thrust);
+  add_polynomial(report, "Thrust in N from the voltage of the motor, a cubic", found.motor_voltage);
   return report.write(folder, overwrite);
 }
 

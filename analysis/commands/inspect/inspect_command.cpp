@@ -307,7 +307,7 @@ void print_grouping(const files::Json& flights, const files::Json& skipped) {
 
 /// Where column names alone are not enough, the log is inspected as described by the draft.
 void write_draft(InspectOptions& options, const CommonOptions& common) {
-  if (options.files.size() != 1) throw UsageError("--columns-draft takes one CSV");
+  if (options.files.size() != 1) throw UsageError("--columns-draft takes one table");
   refuse_to_replace(common, options.columns_draft);
   files::write_file(options.columns_draft, logs::columns_draft(options.files[0]), common.force);
   if (common.prints_text()) fmt::print("Written: {}\n", options.columns_draft);
@@ -398,7 +398,8 @@ Command inspect_command() {
             "Write an HTML page on the flight logs into this folder: phases, events, gaps, signals, what "
             "can be judged, and what to log next time");
         add_output(app, "--columns-draft", options->columns_draft,
-                   "Write a columns.toml for the one CSV: meaning, unit and frame of its columns, with the "
+                   "Write a columns.toml for the one table (CSV or micro-SD log): meaning, unit and frame of "
+                   "its columns, with the "
                    "evidence. Properties not evident from names are guessed from the values and marked; the "
                    "rest is listed to be filled in");
         app.add_option("--key", options->network.key,

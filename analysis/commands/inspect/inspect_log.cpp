@@ -52,6 +52,26 @@ files::Json health_of(const logs::LogHealth& health) {
           {"checksum_failed", health.checksum_failed}};
 }
 
+const char* name(logs::Completeness completeness) {
+  const char* const kWords[] = {"complete", "cut", "damaged"};
+  return kWords[static_cast<int>(completeness)];
+}
+
+/// "damaged, 3.1 % lost; mended: 12 unsorted rows"
+std::string completeness_in_words(const logs::Log& log) {
+  std::string words = name(logs::completeness_of(log.health));
+  const double lost = logs::lost_share(log);
+  if (lost > 0) words += fmt::format(", {:.2g} % lost", 100 * lost);
+  const logs::Mended& mended = log.health.mended;
+  std::string list;
+  for (const auto& [count, what] :
+       {std::pair(mended.unsorted_rows, "unsorted rows"), std::pair(mended.repeated_rows, "repeated rows"),
+        std::pair(mended.unwrapped_clocks, "wraps of the clock"),
+        std::pair(mended.merged_blocks, "log blocks of other rates")})
+    if (count > 0) list += fmt::format("{}{} {}", list.empty() ? "; mended: " : ", ", count, what);
+  return words + list;
+}
+
 double start_s(const logs::Log& log) { return log.samples.empty() ? 0 : log.samples.front().time_us * 1e-6; }
 double end_s(const logs::Log& log) { return log.samples.empty() ? 0 : log.samples.back().time_us * 1e-6; }
 
@@ -108,6 +128,13 @@ files::Json describe_log(const logs::Log& log) {
                        {"last_V", story.battery_last_V},
                        {"least_V", story.battery_least_V}};
   json["interpretation"] = log.interpretation;
+  json["completeness"] = name(logs::completeness_of(log.health));
+  json["lost_share"] = finite(logs::lost_share(log));
+  const logs::Mended& mended = log.health.mended;
+  json["mended"] = {{"unsorted_rows", mended.unsorted_rows},
+                    {"repeated_rows", mended.repeated_rows},
+                    {"unwrapped_clocks", mended.unwrapped_clocks},
+                    {"merged_blocks", mended.merged_blocks}};
   json["health"] = health_of(log.health);
   json["plausibility"] = files::to_json(files::record_of(logs::doubts_of(log)));
   return json;
@@ -124,7 +151,7 @@ LogOutcome outcome_of(const std::string& path, const logs::Log& log, const files
     if (outcome.left_out_why.empty() && doubt["refused"].get<bool>())
       outcome.left_out_why = "implausible: " + doubt["signal"].get<std::string>();
   }
-  if (outcome.left_out_why.empty() && !log.signals.force)
+  if (outcome.left_out_why.empty() && !log.signals.force && log.signals.torque == logs::TorqueUse::kNone)
     outcome.left_out_why = "lacks " + log.signals.force_lacks;
   if (!outcome.left_out_why.empty()) return outcome;
   for (std::size_t k = 0; k < 3; ++k) outcome.force[k] = log.signals.force_axes[k];
@@ -137,6 +164,7 @@ void print_log(const logs::Log& log) {
   fmt::print("{}: flight log ({}), {} records from {:.3f} to {:.3f} s, {:.1f} s in the air\n", log.path,
              log.format, log.health.records, start_s(log), end_s(log), story.air_s);
   if (!story.no_flight.empty()) fmt::print("  no flight: {}\n", story.no_flight);
+  fmt::print("  {}\n", completeness_in_words(log));
   for (const std::string& finding : logs::findings(log.health)) fmt::print("  {}\n", finding);
   for (const logs::Doubt& doubt : logs::doubts_of(log)) fmt::print("  implausible: {}\n", doubt.words);
   for (const logs::SignalInfo& signal : log.sources) {

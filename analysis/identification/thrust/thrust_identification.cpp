@@ -4,8 +4,10 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <map>
 
 #include "controller/battery.h"
 
@@ -41,8 +43,75 @@ struct Problem {
   std::vector<double> targets;
   std::vector<Row> used_at;
   std::string method, unit;
-  double scale = 0;  ///< largest measured value of the fitted quantity
+  double scale = 0;           ///< largest measured value of the fitted quantity
+  std::vector<Row> higher{};  ///< terms of the next order, one row per row; empty: lack of fit is not tested
 };
+
+/// The terms that quadratic_row() lacks.
+Row cubic_terms(double x, double y) {
+  Row row(5);
+  row << x * x * x, x * x * y, x * y * y, y * y, y * y * y;
+  return row;
+}
+
+/// Sum of squares and their number within repeated rows, about the mean of each group.
+struct PureError {
+  double squares = 0;
+  int freedom = 0, groups = 0;
+};
+PureError pure_error(const Problem& problem) {
+  std::map<std::vector<double>, std::vector<double>> targets;
+  for (std::size_t i = 0; i < problem.rows.size(); ++i) {
+    const Row& row = problem.rows[i];
+    targets[{row.begin(), row.end()}].push_back(problem.targets[i]);
+  }
+  PureError error;
+  error.groups = static_cast<int>(targets.size());
+  for (const auto& [row, repeated] : targets) {
+    double sum = 0;
+    for (const double target : repeated) sum += target;
+    const double mean = sum / static_cast<double>(repeated.size());
+    for (const double target : repeated) error.squares += (target - mean) * (target - mean);
+    error.freedom += static_cast<int>(repeated.size()) - 1;
+  }
+  return error;
+}
+
+LackOfFit lack_of(const Problem& problem, const Eigen::MatrixXd& a, const Eigen::VectorXd& residual) {
+  constexpr int kFewestRepeats = 10;
+  constexpr double kRounding = 1e-9;  // of the largest measured value
+  LackOfFit lack;
+  const auto n = static_cast<int>(a.rows()), k = static_cast<int>(a.cols());
+  if (problem.higher.empty()) return lack;
+  const double squares = residual.squaredNorm();
+  double noise = 0;
+  const PureError repeated = pure_error(problem);
+  if (repeated.freedom >= kFewestRepeats && repeated.groups > k) {
+    lack.against = "repeated rows";
+    lack.terms = repeated.groups - k;
+    lack.left = repeated.freedom;
+    noise = repeated.squares;
+  } else {
+    const auto more = static_cast<int>(problem.higher[0].size());
+    if (n <= k + more) return lack;
+    Eigen::MatrixXd all(n, k + more);
+    all.leftCols(k) = a;
+    for (int i = 0; i < n; ++i)
+      all.row(i).tail(more) = problem.higher[static_cast<std::size_t>(i)].transpose();
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(all);
+    lack.against = "terms of the next order";
+    lack.terms = static_cast<int>(qr.rank()) - k;
+    lack.left = n - static_cast<int>(qr.rank());
+    if (lack.terms < 1) return {};
+    noise = (residual - all * qr.solve(residual)).squaredNorm();
+  }
+  const double lacking = std::max(0.0, squares - noise);
+  lack.rms = std::sqrt(lacking / n);
+  if (std::sqrt(squares / n) < kRounding * problem.scale) return lack;
+  lack.F = lacking / lack.terms / std::max(noise / lack.left, 1e-300);
+  lack.chance = boost::math::cdf(complement(boost::math::fisher_f(lack.terms, lack.left), lack.F));
+  return lack;
+}
 
 /// Fits without checking the excitation.
 struct Solution {
@@ -91,6 +160,7 @@ Solution solve(const Problem& problem, double confidence) {
       boost::math::quantile(boost::math::students_t(static_cast<double>(n - k)), 0.5 + 0.5 * confidence);
   fit.residual_rms = std::sqrt(residual.squaredNorm() / static_cast<double>(n));
   fit.largest_residual = residual.cwiseAbs().maxCoeff();
+  fit.lack = lack_of(problem, a, residual);
   for (const Row& row : problem.used_at) {
     const double half = s.quantile * std::sqrt(std::max(0.0, row.dot(s.covariance * row)));
     fit.largest_uncertainty = std::max(fit.largest_uncertainty, half);
@@ -181,6 +251,40 @@ PolynomialFit at_full_pwm(const Solution& thrust, double largest_p) {
 
 }  // namespace
 
+namespace {
+
+/// The cubic in the motors' voltage. Its next order are the fourth power and what depends on the battery alone.
+PolynomialFit of_motor_voltage(const ThrustData& data, double confidence) {
+  Problem cubic{{"VMOTOR2THRUST0", "VMOTOR2THRUST1", "VMOTOR2THRUST2", "VMOTOR2THRUST3"},
+                {},
+                {},
+                {},
+                "thrust to the voltage of the motor",
+                "N",
+                0};
+  const auto row_of = [](double u) {
+    Row row(4);
+    row << 1, u, u * u, u * u * u;
+    return row;
+  };
+  double least_V = 1e300, most_V = 0;
+  for (const ThrustSample& s : data.samples) {
+    const double battery_V = s.v * controller::kReferenceVoltage_V, u = s.p * battery_V;
+    cubic.rows.push_back(row_of(u));
+    cubic.targets.push_back(s.thrust_gf * controller::kNewtonPerGramForce);
+    Row higher(3);
+    higher << u * u * u * u, battery_V, battery_V * u;
+    cubic.higher.push_back(higher);
+    cubic.scale = std::max(cubic.scale, std::abs(cubic.targets.back()));
+    least_V = std::min(least_V, u);
+    most_V = std::max(most_V, u);
+  }
+  cubic.used_at = {row_of(least_V), row_of(most_V)};
+  return solve(cubic, confidence).fit;
+}
+
+}  // namespace
+
 ThrustIdentification identify_thrust(const ThrustData& data, double confidence) {
   ThrustIdentification result;
   result.confidence = confidence;
@@ -197,8 +301,10 @@ ThrustIdentification identify_thrust(const ThrustData& data, double confidence) 
     largest_gf = std::max(largest_gf, s.thrust_gf);
     thrust.rows.push_back(quadratic_row(s.p, s.v));
     thrust.targets.push_back(s.thrust_gf);
+    thrust.higher.push_back(cubic_terms(s.p, s.v));
     pwm.rows.push_back(quadratic_row(s.thrust_gf, s.v));
     pwm.targets.push_back(s.p);
+    pwm.higher.push_back(cubic_terms(s.thrust_gf, s.v));
   }
   thrust.scale = std::max(std::abs(smallest_gf), std::abs(largest_gf));
   pwm.scale = result.largest_p;
@@ -220,6 +326,7 @@ ThrustIdentification identify_thrust(const ThrustData& data, double confidence) 
     }
   }
   result.thrust = thrust_solution.fit;
+  result.motor_voltage = of_motor_voltage(data, confidence);
 
   int ramps = 0;
   Problem largest = ramps_to_full_pwm(data, ramps);

@@ -37,6 +37,12 @@ const LogFormat* format_of(std::string_view head);
 /// Like format_of() for the first bytes of a file; also returns nullptr if the file cannot be read.
 const LogFormat* format_of_file(const std::string& path);
 
+/// Returns true for logs of programs that have to be converted first: ROS 1, MAVLink telemetry, Betaflight.
+bool is_foreign_log(std::string_view head);
+
+/// @throws files::InputError that says what the file is, if known, and what to do.
+[[noreturn]] void refuse_unknown(std::string_view head, const std::string& path);
+
 /// Returns true for a folder that holds one log: a rosbag2 folder with its metadata.yaml, or a cfclient session.
 bool is_log_folder(const std::string& path);
 

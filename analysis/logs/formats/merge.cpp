@@ -29,6 +29,7 @@ void append(LogHealth& health, const LogHealth& more) {
   health.records += more.records;
   health.damaged_blocks += more.damaged_blocks;
   health.skipped_bytes += more.skipped_bytes;
+  health.bytes += more.bytes;
   health.truncated |= more.truncated;
   health.checksum_failed |= more.checksum_failed;
 }
