@@ -71,7 +71,7 @@ def case(options, name, effect, seed):
     right = bool(set(first) & effect.get("variables", set())) or right_name or said
     answer = {"name": name, "seed": seed, "named": named, "wrong": wrong, "right": right,
               "first": [f"{e['variable']}/{e['frame']}.{e['axis']} {e['share']:.2f}" for e in remainder[:4]]}
-    if options.add and effect.get("variables"):
+    if options.add and (effect.get("variables") or options.nothing):
         answer.update(held_out(options, folder, flights, model, effect))
     if not options.keep:
         shutil.rmtree(folder)
@@ -79,15 +79,13 @@ def case(options, name, effect, seed):
 
 
 def held_out(options, folder, flights, model, effect):
-    """Returns the errors on the test flight of the formula found, and of the true formula with its true values."""
-    new = os.path.join(folder, "new.toml")
-    added = asked(options.tool, ["add", "formula", "--model", model, flights, "-o", new],
-                  os.path.join(folder, "add.json"))
-    if added is None:
+    """Returns the errors on the test flight of what `study` adds, and of the true formula with its true values."""
+    studied = asked(options.tool, ["study", model, flights, "-o", os.path.join(folder, "study")],
+                    os.path.join(folder, "study.json"))
+    if studied is None:
         return {}
-    ladder = added["ladder"]
-    answer = {"formula": [effect["effect"] for effect in added["effects"]][1:], "before": ladder[0]["test_rmse"],
-              "after": min(row["test_rmse"] for row in ladder if row["accepted"])}
+    errors = [row["test_rmse"] for row in studied["ladder"] if row["accepted"]]
+    answer = {"causes": [cause["name"] for cause in studied["causes"]], "before": errors[0], "after": errors[-1]}
     if "formula" in effect:
         truth = model_with_lag(options.model, folder, effect["formula"], "truth.toml")
         test = [f for f in sorted(os.listdir(flights)) if f.endswith(f"_{FLIGHTS - 1:02d}")]
@@ -101,28 +99,29 @@ def main():
     parser = argument_parser()
     parser.add_argument("--seeds", default="1:4")
     parser.add_argument("--nothing", type=int, default=0, help="cases without any effect, instead of the effects")
-    parser.add_argument("--add", action="store_true", help="also ask `add formula`, and judge its held-out error")
+    parser.add_argument("--add", action="store_true", help="also run `study`, and judge its held-out error")
     options = parser.parse_args()
     first, last = (int(x) for x in options.seeds.split(":"))
     chosen = [n for n in options.effects.split(",") if n] or list(EFFECTS)
     cases = [(n, EFFECTS[n], s) for n in chosen for s in range(first, last)]
     if options.nothing:
         cases = [("nothing", {}, first + k) for k in range(options.nothing)]
-    right = wrong = close = judged = claims = 0
+    right = wrong = close = judged = claims = rises = 0
     for name, effect, seed in cases:
         answer = case(options, name, effect, seed)
         right += answer["right"]
         wrong += bool(answer["wrong"])
-        claims += bool(answer["named"] or answer["first"])
+        claims += bool(answer["named"] or answer["first"] or answer.get("causes"))
+        rises += answer.get("after", 0) > 1.01 * answer.get("before", 0)
         if "of_truth" in answer:
             judged += 1
             close += answer["after"] <= 1.2 * answer["of_truth"]
         print(("  " if answer["right"] and not answer["wrong"] else "! ") + json.dumps(answer), flush=True)
     print(f"cases {len(cases)}: right variable or name {right}, wrong names {wrong}, claims {claims}, "
-          f"held-out error within 1.2 of the truth's {close} of {judged}")
+          f"held-out error within 1.2 of the truth's {close} of {judged}, raised in {rises}")
     if options.nothing:
         return 0 if claims <= 0.02 * len(cases) else 1
-    return 0 if right >= 0.9 * len(cases) and wrong == 0 and close >= 0.8 * judged else 1
+    return 0 if right >= 0.9 * len(cases) and wrong == 0 and close >= 0.8 * judged and rises == 0 else 1
 
 
 if __name__ == "__main__":

@@ -183,7 +183,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
     print_ladder(ladder);
     if (ladder.any_accepted)
       fmt::print("Written: {}\nNext: {}\n", options.output,
-                 next_command({"compare", options.output}, options.flights, inputs, {"--horizon", "0.5"}));
+                 next_command("compare", {options.output}, options.flights, inputs, {"--horizon", "0.5"}));
     else
       fmt::print("No effect helped: {} is not written. --keep-anyway writes it nevertheless.\n",
                  options.output);

@@ -264,7 +264,7 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
       fmt::print("Run time: {:.1f} s for {}.\n", run.count(), counted(inputs.found.flights.size(), "flight"));
     if (inputs.models.size() == 1 && !inputs.rules.per_mass)
       fmt::print("Next: {}\n",
-                 next_command({"diagnose", inputs.models[0].path}, options.flights, inputs, {}));
+                 next_command("diagnose", {inputs.models[0].path}, options.flights, inputs, {}));
   }
   if (!options.report.empty()) {
     const std::string path = write_compare_report(result, unit, described, options.report, common.force);

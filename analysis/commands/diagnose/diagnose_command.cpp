@@ -138,7 +138,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   const bool has_more = judgement.verdict == identification::Verdict::kMissingEffect ||
                         judgement.verdict == identification::Verdict::kUnexplained;
   if (prints && !others && has_more && inputs.models.size() == 1)
-    fmt::print("Next: {}\n", next_command({"add", "auto", "--model", inputs.models[0].path}, options.flights,
+    fmt::print("Next: {}\n", next_command("add", {"auto", "--model", inputs.models[0].path}, options.flights,
                                           inputs, {"-o", "fitted.toml"}));
   if (!options.report.empty()) {
     std::vector<std::string> notes;

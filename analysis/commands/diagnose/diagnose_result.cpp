@@ -181,7 +181,7 @@ void describe(Record& record, const Diagnosed& found) {
       detectable.push_back({entry, diagnosis.kind});
   record.list("detectable", detectable, "The smallest size of each effect that these flights would show.",
               describe_detectable);
-  record.field("detectable_meaning", kDetectableMeaning, "");
+  record.field("detectable_meaning", kDetectableMeaning, "What a size in `detectable` means.");
   record.list("kinds", found.diagnoses, "Per kind of vehicle.", describe_kind);
   record.field("problems", found.problems, "What could not be used, and why.");
   const std::string& reason = found.judgement.reason;

@@ -122,9 +122,10 @@ std::vector<std::string> add_files_of(const residuals::Inputs& others, std::vect
   return added;
 }
 
-std::string next_command(std::vector<std::string> words, const FlightOptions& options,
-                         const residuals::Inputs& inputs, const std::vector<std::string>& more) {
-  words.insert(words.begin(), "swarmcert");
+std::string next_command(const std::string& command, std::vector<std::string> words,
+                         const FlightOptions& options, const residuals::Inputs& inputs,
+                         const std::vector<std::string>& more) {
+  words.insert(words.begin(), {"swarmcert", command});
   words.insert(words.end(), inputs.words.begin(), inputs.words.end());
   if (!options.fleet.empty()) words.insert(words.end(), {"--flights", options.fleet});
   if (!options.columns.empty()) words.insert(words.end(), {"--columns", options.columns});

@@ -46,9 +46,10 @@ residuals::Inputs read_others(const FlightOptions& options, const std::vector<st
 /// Appends to `files` the additional files read by `others`, and returns them.
 std::vector<std::string> add_files_of(const residuals::Inputs& others, std::vector<std::string>& files);
 
-/// Returns the command to type next, for a shell: "swarmcert", `words`, the flights and the options with which they were
-/// read, `more`.
-std::string next_command(std::vector<std::string> words, const FlightOptions& options,
-                         const residuals::Inputs& inputs, const std::vector<std::string>& more);
+/// Returns the command to type next, for a shell: "swarmcert COMMAND", `words`, the flights and the options with which
+/// they were read, `more`.
+std::string next_command(const std::string& command, std::vector<std::string> words,
+                         const FlightOptions& options, const residuals::Inputs& inputs,
+                         const std::vector<std::string>& more);
 
 }  // namespace swarmcert::analysis

@@ -106,10 +106,10 @@ std::string next_of_study(const Study& study, const FlightOptions& options, cons
   if (study.before.all.overall.statistics.samples == 0)
     return shell_line({"swarmcert", "inspect", first_log(inputs)});
   if (study.ladder.any_accepted)
-    return next_command({"compare", output + "/fitted.toml"}, options, inputs, {"--horizon", "0.5"});
+    return next_command("compare", {output + "/fitted.toml"}, options, inputs, {"--horizon", "0.5"});
   if (leaves_something(study.diagnosis))
-    return next_command({"diagnose", given}, options, inputs, {"--next"});
-  return next_command({"compare", given}, options, inputs, {"--json", "errors.json"});
+    return next_command("diagnose", {given}, options, inputs, {"--next"});
+  return next_command("compare", {given}, options, inputs, {"--json", "errors.json"});
 }
 
 void print_study(const StudyResult& result, const residuals::ForceUnit& unit) {
