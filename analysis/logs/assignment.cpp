@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kLikelyName = 6;    ///< bits of a name that nothing else confirms
 constexpr std::size_t kTried = 150;  ///< readings of a file that are compared in full
+constexpr double kDown = 8;          ///< bits against z down
 constexpr int kNone = -1;
 
 /// Choices for position, velocity, attitude, specific force and rates.
@@ -142,7 +143,7 @@ class MotionSearch {
 
   /// Most people log z up, and rarely mix frames or units.
   double frame_bits(const Choice& c) const {
-    constexpr double kDown = 8, kMixed = 8;
+    constexpr double kMixed = 8;
     const Reading *const position = chosen(c, kPositionSlot), *const velocity = chosen(c, kVelocitySlot),
                          *const attitude = chosen(c, kAttitudeSlot);
     const Reading* const world = velocity != nullptr ? velocity : position;
@@ -206,7 +207,7 @@ class MotionSearch {
         : c[from] != kNone
             ? tilt_rate_bits(knots_, accelerations_[from][static_cast<std::size_t>(c[from])], rates)
             : 0;
-    return bits - (rates.is_down != is_down ? 6 : 0);
+    return bits - (rates.is_down == is_down ? 0 : like != nullptr ? 6 : kDown);
   }
 
   void complete(Scored& scored) const {

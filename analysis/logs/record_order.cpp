@@ -14,17 +14,23 @@ using Order = std::vector<std::size_t>;
 std::size_t unwrap_clock(std::vector<double>& time_s) {
   constexpr double kLongestPause_s = 10;
   // Microseconds in 32 bits, milliseconds in 24 and 32 bits, the end of daylight saving time, midnight.
-  constexpr double kRanges_s[] = {4294.967296, 16777.216, 4294967.296, 3600, 86400};
+  struct Range {
+    double size_s;
+    int times = 0;
+  };
+  Range ranges[] = {{4294.967296}, {16777.216}, {4294967.296}, {3600}, {86400}};
   std::size_t wraps = 0;
   double added_s = 0, last_s = NAN;
   for (double& now_s : time_s) {
     const double step_s = now_s - last_s;
-    for (const double range_s : kRanges_s) {
-      if (step_s < 0 && std::abs(step_s + range_s) < kLongestPause_s) {
-        added_s += range_s;
+    for (Range& range : ranges) {
+      if (step_s < 0 && std::abs(step_s + range.size_s) < kLongestPause_s) {
+        added_s += range.size_s;
+        ++range.times;
         ++wraps;
-      } else if (added_s > 0 && step_s > 0 && std::abs(step_s - range_s) < kLongestPause_s) {
-        added_s -= range_s;  // a record from before the wrap, out of order
+      } else if (range.times > 0 && step_s > 0 && std::abs(step_s - range.size_s) < kLongestPause_s) {
+        added_s -= range.size_s;  // a record from before the wrap, out of order
+        --range.times;
       }
     }
     if (std::isfinite(now_s)) last_s = now_s;

@@ -180,6 +180,22 @@ TEST(NothingLost, RatesAndMotorsAloneLetTorquesBeJudged) {
   EXPECT_EQ(log.samples.size(), static_cast<std::size_t>(kRecords));
 }
 
+TEST(NothingLost, WithoutAnyOtherSignalRatesAreUsedOnlyInAStatedUnit) {
+  const auto text = [](const char* header) {
+    std::string rows = std::string(header) + ",motor_1,motor_2,motor_3,motor_4\n";
+    for (int k = 0; k < kRecords; ++k)
+      rows += fmt::format("{:.3f},{:.5f},{:.5f},0.1,40000,40100,40200,40300\n", 0.002 * k,
+                          20 * std::sin(0.02 * k), 15 * std::cos(0.03 * k));
+    return rows;
+  };
+  std::istringstream stated(text("time,gyro_x_dps,gyro_y_dps,gyro_z_dps"));
+  const logs::Log log = logs::parse_log(stated, "flight.csv");
+  EXPECT_EQ(log.signals.torque, logs::TorqueUse::kDynamic);
+  EXPECT_NEAR(log.samples[0].rates_rad_s[1], 15 * 3.14159265 / 180, 1e-6);
+  EXPECT_NE(refusal(text("time,gyro_x,gyro_y,gyro_z")).find("body rates in rad/s"), std::string::npos)
+      << "it is said what the columns could be";
+}
+
 TEST(NothingLost, AnAttitudeOfZerosIsSaidToBeInvalid) {
   std::vector<std::string> lines = rows();
   for (std::string& line : lines) line += ",0,0,0,0";
