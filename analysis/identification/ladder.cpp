@@ -369,7 +369,7 @@ class Climb {
     const bool is_form = name != asked && is_automatic_;
     const bool helps =
         is_rotors ? balances(next) : lowers_error(next, least_fall) && (!is_form || falls_alike(next));
-    next.row.accepted = helps || keeps_anyway_;
+    next.row.accepted = helps || (keeps_anyway_ && !is_form);
     if (next.row.accepted) {
       note_errors(*fresh, helps, next);
       accepted_.push_back(name);
