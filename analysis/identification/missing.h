@@ -21,7 +21,7 @@ struct Missing {
   /// Of each coefficient; empty if no check is possible, or if a shape is fitted too: these values hold it fixed, and
   /// their intervals would leave out how far it is known.
   std::vector<InstrumentedValue> instrument;
-  std::vector<stability::EffectSpec> specs;   ///< for the model file
+  std::vector<stability::EffectSpec> specs;  ///< for the model file
 };
 
 /// Sets `instrument` of `missing`, which `refined` fitted.

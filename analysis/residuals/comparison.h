@@ -23,7 +23,7 @@ struct GroupErrors {
   ErrorStatistics statistics;
   /// 90 %, of x, y, z, total, from blocks of 2 s; nothing if they are too few.
   std::optional<std::array<Interval, 4>> rmse_interval;
-  Axes nrmse;                             ///< rmse divided by the mean weight of the vehicles
+  Axes nrmse;  ///< rmse divided by the mean weight of the vehicles
   Eigen::Vector3d low_band_to_floor = Eigen::Vector3d::Zero();  ///< Spectrum::low_band_to_floor()
   Eigen::Vector3d noise_floor_N = Eigen::Vector3d::Zero();
 };

@@ -36,7 +36,8 @@ struct BlockSum {
 };
 /// Returns 90 % bootstrap intervals of the root mean square for x, y, z and total, by resampling blocks; nothing for
 /// fewer than five blocks, which say too little about others.
-std::optional<std::array<Interval, 4>> bootstrap_rmse(const std::vector<BlockSum>& blocks, std::uint64_t seed);
+std::optional<std::array<Interval, 4>> bootstrap_rmse(const std::vector<BlockSum>& blocks,
+                                                      std::uint64_t seed);
 
 /// Returns the `p` quantile of `values`; 0 if empty. Reorders `values`.
 double quantile(std::vector<double>& values, double p);
