@@ -314,13 +314,23 @@ class Climb {
 
   /// Adds formulas, or else shapes, for what is left. Returns why it stops.
   std::string add_forms() {
+    hold_named();
     for (int k = 0; k < kMostForms; ++k) {
-      if (!remainder(passes(), specs_of(ladder_.fitted)).stands_out())
+      if (!remainder(passes(), specs_of(fitted_)).stands_out())
         return "nothing stands out above the noise of the flights to fit";
       if (!attempt("formula", kLeastFallOfForm) && !attempt("shape", kLeastFallOfForm))
         return "no formula or shape lowers the error of the select flights further";
     }
     return fmt::format("{} formulas and shapes were added, which is enough for one ladder", kMostForms);
+  }
+
+  /// Makes the named effects part of the model: a form may resemble one of them, and would take a part of it.
+  void hold_named() {
+    change_models(working_, [specs = specs_of(fitted_)](stability::Model& model) {
+      model = with_effects(model, specs);
+    });
+    fitted_.clear();
+    accepted_.clear();
   }
 
   Trial trial(const std::string& effect, stability::Model model) const {
@@ -348,7 +358,7 @@ class Climb {
   bool attempt(const std::string& asked, double least_fall) {
     std::string name = asked;
     if (is_proposal(asked)) {
-      name = propose(working_, passes(), ladder_.fitted, asked);
+      name = propose(working_, passes(), fitted_, asked);
       if (name.empty())
         return refuse(asked,
                       fmt::format("the remainder of the {} flights to fit does not vary significantly with "
@@ -373,7 +383,7 @@ class Climb {
     if (next.row.accepted) {
       note_errors(*fresh, helps, next);
       accepted_.push_back(name);
-      ladder_.fitted = std::move(fitted);
+      fitted_ = std::move(fitted);
       best_ = trials_.size();
     } else {
       next.row.values = best().row.values;
@@ -457,7 +467,8 @@ class Climb {
   const residuals::Progress& progress_;
   Ladder& ladder_;
   std::vector<std::string> wanted_, accepted_;
-  residuals::Inputs working_;  ///< with the proposed effects
+  residuals::Inputs working_;    ///< with the proposed effects
+  std::vector<Missing> fitted_;  ///< as of the last accepted row, except for what is part of working_
   std::vector<Trial> trials_;
   std::size_t best_ = 0;  ///< the last accepted trial
 };

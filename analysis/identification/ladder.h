@@ -29,7 +29,6 @@ struct Ladder {
   std::vector<stability::LadderRow> earlier;  ///< of the given model
   std::vector<stability::LadderRow> rows;     ///< "nominal" is the given model; then the trials
   stability::Model model;                     ///< with the accepted effects, and with all rows
-  std::vector<Missing> fitted;                ///< the fitted and accepted effects, as of the last row
   bool any_accepted = false;
   std::string too_poor;   ///< why nothing was fitted; empty if something was. If set, the rest is empty.
   bool is_tested = true;  ///< false: the test flights have no usable record, and test_rmse_N is 0
@@ -50,8 +49,9 @@ struct LadderOptions {
 /// Fits and accepts effects for the only model of `inputs`, if the flights are sufficient. An effect is accepted if the
 /// RMSE on the select flights falls by at least half a percent. An automatic ladder goes on while what is left on the
 /// flights to fit stands out of the noise, with the best formula for it, or else the best shape; these have no name and
-/// must lower the RMSE by 2 %, and the errors of the flights to fit and to select alike (t test over flights). In each step the coefficients of all effects accepted
-/// so far are fitted again. The test flights are scored once, after the last step, so their errors decide nothing.
+/// must lower the RMSE by 2 %, and the errors of the flights to fit and to select alike (t test over flights). Named
+/// effects keep their values beside them; otherwise the coefficients of all effects accepted so far are fitted again in
+/// each step. The test flights are scored once, after the last step, so their errors decide nothing.
 Ladder climb(residuals::Inputs inputs, const LadderOptions& options, int jobs,
              const residuals::Progress& progress);
 
