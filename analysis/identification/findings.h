@@ -27,9 +27,9 @@ struct Finding {
   double rmse_before_N = 0, rmse_after_N = 0;  ///< cross-validated, of the vector
   Interval drop_interval;  ///< 90 % interval of the relative fall of the RMSE, by resampling blocks
   double paired_z = 0, wald_z = 0;
-  /// Logarithm of the odds over a model without the effect: n/2 ln(1 + W/n) nats, with the squared Wald statistic W, which
-  /// is robust to errors correlated within blocks, and n blocks from which their variance is estimated, less
-  /// k/2 ln(n) for k coefficients (Schwarz 1978). For a rival, W is reduced to the share of the fall of the squared error
+  /// Logarithm of the odds over a model without the effect: n/2 ln(1 + W/n) nats, with the squared Wald statistic W,
+  /// which is robust to errors correlated within blocks, and n blocks from which their variance is estimated, less k/2
+  /// ln(n) for k coefficients (Schwarz 1978). For a rival, W is reduced to the share of the fall of the squared error
   /// of held-out blocks that it keeps.
   double evidence_bits = 0;
   Support support;

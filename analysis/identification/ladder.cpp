@@ -9,6 +9,7 @@
 #include "analysis/identification/remainder.h"
 #include "analysis/identification/rotors/rotor_fit.h"
 #include "analysis/identification/scan/proposal.h"
+#include "analysis/identification/verdict.h"
 #include "analysis/residuals/comparison.h"
 #include "analysis/residuals/force_residual.h"
 #include "nn/base/doubles.h"
@@ -64,8 +65,8 @@ double rmse_N(const std::vector<FlightSquares>& flights) {
   return all.count > 0 ? std::sqrt(all.sum / all.count) : 0;
 }
 
-/// Whether the error rises in any flight by more than the fall that an effect needs. A form that only tells flights from
-/// each other, such as a step over the battery, lowers the error of some and raises that of others.
+/// Whether the error rises in any flight by more than the fall that an effect needs. A form that only tells flights
+/// from each other, such as a step over the battery, lowers the error of some and raises that of others.
 bool rises_anywhere(const std::vector<FlightSquares>& before, const std::vector<FlightSquares>& after) {
   for (std::size_t k = 0; k < before.size(); ++k)
     if (rmse_N({after[k]}) > (1 + kLeastFall) * rmse_N({before[k]})) return true;
@@ -306,12 +307,19 @@ class Climb {
   std::string add_forms() {
     hold_named();
     for (int k = 0; k < kMostForms; ++k) {
-      if (!remainder(passes(), specs_of(fitted_)).stands_out())
-        return "nothing stands out above the noise of the flights to fit";
+      if (!leaves_something()) return "nothing stands out above the noise of the flights to fit";
       if (!attempt("formula", kLeastFallOfForm) && !attempt("shape", kLeastFallOfForm))
         return "no formula or shape lowers the error of the select flights further";
     }
     return fmt::format("{} formulas and shapes were added, which is enough for one ladder", kMostForms);
+  }
+
+  /// Whether the accepted effects leave slow disturbances, a vibration, or a force of which a variable explains much.
+  bool leaves_something() const {
+    const std::vector<stability::EffectSpec> specs = specs_of(fitted_);
+    if (remainder(passes(), specs).stands_out()) return true;
+    const Scan found = scan(scan_samples(passes(), specs), jobs_);
+    return !found.entries.empty() && found.entries[0].share >= kMuchOfForce;
   }
 
   /// Makes the named effects part of the model: a form may resemble one of them, and would take a part of it.

@@ -1,4 +1,5 @@
-/// The README and the guide of commands as their readers use them: a clone, every block pasted in order, and the numbers shown.
+/// The README and the guide of commands as their readers use them: a clone, every block pasted in order, and the
+/// numbers shown.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

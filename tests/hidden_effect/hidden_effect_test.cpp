@@ -183,8 +183,9 @@ TEST(HiddenEffect, OfTheLibrarysSimulationIsFoundAddedAndTheErrorFalls) {
     ASSERT_GE(ladder.size(), 2u);
     const double after = total_rmse(loop.run("compare better.toml flights", "compare"));
     EXPECT_LT(after, 0.95 * before);
-    EXPECT_NEAR(after, ladder.back()["test_rmse"].get<double>(), 1e-6 * after);
-    EXPECT_GT(ladder.back()["over_noise_floor"].get<double>(), 0.5);
+    // A flight of 40 s is too short to hold a part of it back.
+    EXPECT_NEAR(after, ladder.back()["fit_rmse"].get<double>(), 1e-6 * after);
+    EXPECT_TRUE(ladder.back()["test_rmse"].is_null());
   }
 }
 

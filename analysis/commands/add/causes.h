@@ -14,8 +14,8 @@ struct Cause {
   std::string name;
   std::string equation;     ///< of the force, or of what it changes; parameters by name
   FittedValues parameters;  ///< units stand in the names
-  /// RMSE of the residual vector before and after, on flights that decided nothing; if nothing was held out, on those of
-  /// the fit.
+  /// RMSE of the residual vector before and after, on flights that decided nothing; if nothing was held out, on those
+  /// of the fit.
   double before_N = 0, after_N = 0;
 
   double fall_percent() const { return before_N > 0 ? 100 * (1 - after_N / before_N) : 0; }
