@@ -22,8 +22,8 @@ namespace {
 using stability::LadderRow;
 
 constexpr double kLeastFall = 0.005;
-/// Of formulas and shapes, which are chosen among many: the gain at which an effect counts as found.
-constexpr double kLeastFallOfForm = Thresholds{}.gain;
+/// Of formulas and shapes, which are chosen among many: as of the mean square of an effect that counts as found.
+constexpr double kLeastFallOfForm = Thresholds{}.gain / 2;
 /// Formulas and shapes that an automatic ladder adds at most.
 constexpr int kMostForms = 6;
 /// Parts of a flight are at least this long. Errors are correlated over blocks of 2 s, so as much lies between parts.
