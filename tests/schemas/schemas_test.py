@@ -277,8 +277,8 @@ def test_the_writers_write_no_field_that_the_schemas_do_not_know():
     expect(len(fields) > 150, f"only {len(fields)} fields found in the source")
     # Values, and names in maps such as the parameters of effects.
     no_fields = {"auto", "free", "aol", "orthogonal", "sandwich", "Kpos_P", "Kpos_D", "Kpos_I", "force_z", "gf", "mN",
-                 "pwm", "voltage", "motor_voltage", "max_thrust", "offset_x_m", "offset_y_m", "torque_x_Nm", "torque_y_Nm",
-                 "offset_s"}
+                 "pwm", "voltage", "motor_voltage", "max_thrust", "offset_x_m", "offset_y_m", "torque_x_Nm",
+                 "torque_y_Nm", "offset_s"}
     unknown = {field: file for field, file in fields.items() if field not in known | no_fields}
     expect(not unknown, f"no schema knows {unknown}")
 
