@@ -24,8 +24,6 @@ using stability::LadderRow;
 constexpr double kLeastFall = 0.005;
 /// Of formulas and shapes, which are chosen among many: as of the mean square of an effect that counts as found.
 constexpr double kLeastFallOfForm = Thresholds{}.gain / 2;
-/// Formulas and shapes that an automatic ladder adds at most.
-constexpr int kMostForms = 6;
 /// Parts of a flight are at least this long. Errors are correlated over blocks of 2 s, so as much lies between parts.
 constexpr double kShortestPart_s = 8, kGuard_s = 2;
 
@@ -94,18 +92,6 @@ int looks_so_far(const stability::Model& model) {
   for (const stability::EffectSpec& effect : model.effects) looks = std::max(looks, effect.fit.test_looks);
   for (const LadderRow& row : model.ladder) looks = std::max(looks, row.test_looks);
   return looks;
-}
-
-std::string prefix_of(const stability::EffectSpec& spec) {
-  return spec.name + (spec.vehicle.empty() ? "" : "@" + spec.vehicle) + ".";
-}
-
-std::map<std::string, double> values_of(const stability::Model& model) {
-  std::map<std::string, double> values;
-  for (const stability::EffectSpec& spec : model.effects) {
-    for (const auto& [name, value] : spec.parameters) values[prefix_of(spec) + name] = value;
-  }
-  return values;
 }
 
 /// Returns why the flights are too few to fit or to select; empty if they are sufficient. Test flights cannot be too
@@ -197,18 +183,16 @@ std::optional<double> imbalance_N(const residuals::Inputs& inputs, const stabili
   return rotor_imbalance_N(loads, rotor_factors_of(model));
 }
 
-/// Returns the parts of `flight`, five or, of a long one, ten; none if they would be too short.
+/// Returns five parts of `flight`, as five flights are split; none if they would be too short.
 std::vector<residuals::FlightFiles> parts_of(const residuals::FlightFiles& flight, Interval span_s) {
-  constexpr int kFew = 5, kMany = 10;
-  constexpr double kLong_s = 200;
+  constexpr int kParts = 5;
   const double whole_s = span_s.upper - span_s.lower;
-  const int count = whole_s < kLong_s ? kFew : kMany;
   std::vector<residuals::FlightFiles> parts;
-  if (!(whole_s / count >= kShortestPart_s + kGuard_s)) return parts;
-  for (int k = 0; k < count; ++k) {
+  if (!(whole_s / kParts >= kShortestPart_s + kGuard_s)) return parts;
+  for (int k = 0; k < kParts; ++k) {
     residuals::FlightFiles part = flight;
-    const double begin_s = span_s.lower + whole_s * k / count;
-    part.part_s = {begin_s, begin_s + whole_s / count - kGuard_s};
+    const double begin_s = span_s.lower + whole_s * k / kParts;
+    part.part_s = {begin_s, begin_s + whole_s / kParts - kGuard_s};
     part.name += fmt::format(" {:.0f}..{:.0f} s", part.part_s->lower, part.part_s->upper);
     parts.push_back(std::move(part));
   }
@@ -306,12 +290,12 @@ class Climb {
   /// Adds formulas, or else shapes, for what is left. Returns why it stops.
   std::string add_forms() {
     hold_named();
-    for (int k = 0; k < kMostForms; ++k) {
+    for (int k = 0; k < static_cast<int>(kMostFormulas); ++k) {
       if (!leaves_something()) return "nothing stands out above the noise of the flights to fit";
       if (!attempt("formula", kLeastFallOfForm) && !attempt("shape", kLeastFallOfForm))
         return "no formula or shape lowers the error of the select flights further";
     }
-    return fmt::format("{} formulas and shapes were added, which is enough for one ladder", kMostForms);
+    return fmt::format("{} formulas and shapes were added, which is enough for one ladder", kMostFormulas);
   }
 
   /// Whether the accepted effects leave slow disturbances, a vibration, or a force of which a variable explains much.
@@ -338,7 +322,7 @@ class Climb {
     next.select = squares_of(inputs_, next.model, ladder_.split.select, jobs_);
     next.row.fit_rmse_N = rmse_N(next.fit);
     next.row.select_rmse_N = rmse_N(next.select);
-    next.row.values = values_of(next.model);
+    next.row.values = ladder_values(next.model);
     return next;
   }
 
@@ -482,6 +466,17 @@ Ladder climb(residuals::Inputs inputs, const LadderOptions& options, int jobs,
   return ladder;
 }
 
+std::string ladder_key(const stability::EffectSpec& effect, const std::string& parameter) {
+  return effect.name + (effect.vehicle.empty() ? "" : "@" + effect.vehicle) + "." + parameter;
+}
+
+std::map<std::string, double> ladder_values(const stability::Model& model) {
+  std::map<std::string, double> values;
+  for (const stability::EffectSpec& spec : model.effects)
+    for (const auto& [name, value] : spec.parameters) values[ladder_key(spec, name)] = value;
+  return values;
+}
+
 stability::Model undone(const stability::Model& model) {
   const std::vector<LadderRow>& rows = model.ladder;
   std::size_t last = rows.size();
@@ -502,7 +497,7 @@ stability::Model undone(const stability::Model& model) {
   for (stability::EffectSpec spec : model.effects) {
     bool present = spec.parameters.empty();
     for (auto& [name, value] : spec.parameters) {
-      const auto before = values.find(prefix_of(spec) + name);
+      const auto before = values.find(ladder_key(spec, name));
       if (before == values.end()) continue;
       present = true;
       if (value != before->second) spec.fit.interval.clear();  // it belongs to another fit

@@ -1,6 +1,7 @@
 /// @file Adds effects to a model step by step, with errors on flights that were not used for the fit.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,7 +21,7 @@ struct Split {
 
 /// Of each five flights, ordered by scenario and run, uses three to fit, one to select and one to test; of three or
 /// four flights, the last one to test and the one before it to select. Fewer flights are replaced in `inputs` by their
-/// parts, five or ten of at least 8 s each, and the parts are split in the same way.
+/// parts, five of at least 8 s each, and the parts are split in the same way.
 Split split_flights(residuals::Inputs& inputs);
 
 struct Ladder {
@@ -54,6 +55,12 @@ struct LadderOptions {
 /// each step. The test flights are scored once, after the last step, so their errors decide nothing.
 Ladder climb(residuals::Inputs inputs, const LadderOptions& options, int jobs,
              const residuals::Progress& progress);
+
+/// Returns the key of `parameter` in LadderRow::values.
+std::string ladder_key(const stability::EffectSpec& effect, const std::string& parameter);
+
+/// Returns LadderRow::values of `model`.
+std::map<std::string, double> ladder_values(const stability::Model& model);
 
 /// Returns `model` with the last accepted row undone: the effect of that row is removed, the others get back their
 /// previous values.

@@ -9,6 +9,7 @@
 namespace swarmcert::identification {
 namespace {
 
+/// Long enough for the rates to exceed their noise, and shorter than an attitude loop takes to react.
 constexpr double kResponseWindow_s = 0.03;
 constexpr double kFewestWindows = 200;
 

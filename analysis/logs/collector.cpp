@@ -115,7 +115,7 @@ void separate_blocks(RawLog& log) {
   }
   joined.columns = std::move(whole);
   drop_records_of_others(joined, blocks);
-  log.health.mended.merged_blocks += blocks.size();
+  log.health.repaired.merged_blocks += blocks.size();
   const std::string name = joined.name + (joined.name.empty() ? "block " : " block ");
   for (auto& [has_number, block] : blocks) {
     block.name = name + std::to_string(log.topics.size());

@@ -141,8 +141,8 @@ void add_rest(Draft& draft) {
   }
 }
 
-/// Adds up what was mended in the topics that carry signals.
-void count_mended(const std::vector<Mended>& of_topics, const Recognition& recognition, Mended& sum) {
+/// Adds up what was repaired in the topics that carry signals.
+void count_repaired(const std::vector<Repaired>& of_topics, const Recognition& recognition, Repaired& sum) {
   std::set<std::size_t> used = {recognition.clock};
   for (const Carried& carried : recognition.groups) used.insert(carried.topic);
   for (const std::size_t topic : used) {
@@ -235,8 +235,8 @@ Log interpret(RawLog raw, const SignalMap& map, SignalMap* meaning) {
   log.signals.not_multirotor = vehicle_without_rotors(raw);
   log.parameters = raw.parameters;
   keep_one_vehicle(raw, log);
-  std::vector<Mended> mended;
-  for (RawTopic& topic : raw.topics) mended.push_back(put_in_order(topic));
+  std::vector<Repaired> repaired;
+  for (RawTopic& topic : raw.topics) repaired.push_back(put_in_order(topic));
   for (const RawDropout& dropout : raw.dropouts) log.health.dropouts_s += dropout.duration_s;
   for (const RawTopic& topic : raw.topics) {
     for (const RawColumn& column : topic.columns) log.channels.push_back(column.name);
@@ -245,7 +245,7 @@ Log interpret(RawLog raw, const SignalMap& map, SignalMap* meaning) {
   Draft draft{raw, recognise(raw, map), {}, log, {}, map.empty()};
   if (meaning != nullptr) *meaning = meaning_of(raw, draft.recognition);
   draft.table = signal_table(raw, draft.recognition, log.health, log.events);
-  count_mended(mended, draft.recognition, log.health.mended);
+  count_repaired(repaired, draft.recognition, log.health.repaired);
   for (const std::string& corrected : draft.recognition.corrected) draft.note(corrected);
   for (const std::string& rejected : draft.recognition.rejected) draft.note("not used: " + rejected);
   refuse_without_motion(draft);

@@ -94,7 +94,7 @@ struct Signals {
 };
 
 /// What was repaired without loss.
-struct Mended {
+struct Repaired {
   std::size_t unsorted_rows = 0;     ///< sorted by time
   std::size_t repeated_rows = 0;     ///< same time and values as another one, which is kept
   std::size_t unwrapped_clocks = 0;  ///< wraps of a counter or a time of day
@@ -118,7 +118,7 @@ struct LogHealth {
   double longest_gap_s = 0;
   double dropouts_s = 0;  ///< pauses during which the vehicle reports that it could not write
   std::size_t bytes = 0;  ///< of the file; 0: unknown
-  Mended mended;
+  Repaired repaired;
 };
 
 /// How a log provides one signal.

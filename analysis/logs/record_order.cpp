@@ -75,13 +75,13 @@ void rearrange(std::vector<double>& values, const Order& order) {
 
 }  // namespace
 
-Mended put_in_order(RawTopic& topic) {
-  Mended mended;
+Repaired put_in_order(RawTopic& topic) {
+  Repaired repaired;
   std::vector<double>& time_s = topic.time_s;
-  mended.unwrapped_clocks = unwrap_clock(time_s);
+  repaired.unwrapped_clocks = unwrap_clock(time_s);
   const bool is_rising = std::adjacent_find(time_s.begin(), time_s.end(),
                                             [](double a, double b) { return !(a < b); }) == time_s.end();
-  if (is_rising) return mended;
+  if (is_rising) return repaired;
   Order order(time_s.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
@@ -91,7 +91,7 @@ Mended put_in_order(RawTopic& topic) {
   for (const std::size_t i : order) {
     if (kept.empty() || !are_same(topic, kept.back(), i)) kept.push_back(i);
   }
-  mended.repeated_rows = order.size() - kept.size();
+  repaired.repeated_rows = order.size() - kept.size();
   Order in_file = kept;
   std::sort(in_file.begin(), in_file.end());
   if (starts_again(time_s, in_file)) {
@@ -99,13 +99,13 @@ Mended put_in_order(RawTopic& topic) {
   } else {
     double latest_s = -INFINITY;
     for (const std::size_t i : in_file) {
-      mended.unsorted_rows += time_s[i] < latest_s ? 1 : 0;
+      repaired.unsorted_rows += time_s[i] < latest_s ? 1 : 0;
       if (std::isfinite(time_s[i])) latest_s = std::max(latest_s, time_s[i]);
     }
   }
   for (RawColumn& column : topic.columns) rearrange(column.values, kept);
   rearrange(time_s, kept);
-  return mended;
+  return repaired;
 }
 
 }  // namespace swarmcert::logs

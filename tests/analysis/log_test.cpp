@@ -154,7 +154,7 @@ TEST(UsdLog, RecordsOutOfOrderAreSortedAndImpossibleTimesDropped) {
                                       at(30000, 4), at(40000, 5), at(40000, 6), at(90000, 7)}));
   EXPECT_EQ(survivors(log), (std::vector<int>{0, 2, 1, 4, 5, 7}));
   EXPECT_EQ(log.health.clock_jumps, 2u) << "4000 s, and another record at 40 ms";
-  EXPECT_GE(log.health.mended.unsorted_rows, 1u);
+  EXPECT_GE(log.health.repaired.unsorted_rows, 1u);
   EXPECT_EQ(log.health.gaps, 1u);
   EXPECT_DOUBLE_EQ(log.health.longest_gap_s, 0.05);
   EXPECT_TRUE(log.samples.back().restarts);

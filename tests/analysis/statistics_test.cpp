@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "analysis/residuals/failing_place.h"
 #include "nn/base/random.h"
 
 namespace swarmcert::residuals {
@@ -116,6 +117,44 @@ TEST(ResidualStatistics, FewerThanFiveBlocksHaveNoInterval) {
   const auto intervals = bootstrap_rmse(blocks, 1);
   ASSERT_TRUE(intervals.has_value());
   EXPECT_EQ((*intervals)[3], Interval(7)) << "all blocks are equal";
+}
+
+/// 1000 records with noise of 1 N along each axis and, in the first `in_region`, this force.
+Comparison with_force(const Eigen::Vector3f& force_N, std::size_t in_region) {
+  files::Random random(5);
+  std::vector<Eigen::Vector3f> all;
+  for (std::size_t i = 0; i < 1000; ++i) {
+    const Eigen::Vector3d noise_N(random.bell(), random.bell(), random.bell());
+    all.push_back(noise_N.cast<float>() + (i < in_region ? force_N : Eigen::Vector3f::Zero()));
+  }
+  const std::vector<Eigen::Vector3f> first(all.begin(), all.begin() + 250),
+      rest(all.begin() + 250, all.end());
+  Comparison comparison;
+  comparison.overall.statistics = statistics(all, all);
+  comparison.overall.noise_floor_N = Eigen::Vector3d::Ones();
+  comparison.regions = {{0, 0, "", 0, statistics(first, first)}, {0, 1, "", 0, statistics(rest, rest)}};
+  return comparison;
+}
+
+TEST(FailingPlace, IsNowhereForNoiseEverywhereForAConstantForceAndTheRegionOfALocalOne) {
+  using Where = FailingPlace::Where;
+  const ForceUnit unit;
+  EXPECT_EQ(failing_place(with_force({0, 0, 0}, 0), unit).where, Where::kNowhere);
+  const FailingPlace everywhere = failing_place(with_force({0, -10, 0}, 1000), unit);
+  EXPECT_EQ(everywhere.where, Where::kEverywhere);
+  EXPECT_NE(everywhere.words.find("towards -y"), std::string::npos) << everywhere.words;
+  EXPECT_NEAR(everywhere.share, 100.0 / 103, 0.02);
+  const FailingPlace region = failing_place(with_force({0, 0, 10}, 250), unit);
+  EXPECT_EQ(region.where, Where::kRegion);
+  EXPECT_NE(region.words.find(region_name(0, 0)), std::string::npos) << region.words;
+  // The mean of all is 2.5 N, of the region 10 N: 0.25 * 7.5^2 of 28 N^2.
+  EXPECT_NEAR(region.share, 0.25 * 7.5 * 7.5 / 28, 0.03);
+}
+
+TEST(FailingPlace, IsScatteredWhereTheForceIsNotThatOfARegime) {
+  Comparison comparison = with_force({0, 0, 0}, 0);
+  comparison.overall.noise_floor_N /= 10;
+  EXPECT_EQ(failing_place(comparison, ForceUnit()).where, FailingPlace::Where::kScattered);
 }
 
 }  // namespace

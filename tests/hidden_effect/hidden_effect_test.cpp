@@ -181,8 +181,13 @@ TEST(HiddenEffect, OfTheLibrarysSimulationIsFoundAddedAndTheErrorFalls) {
     const files::Json ladder =
         loop.run("add auto --model known.toml flights -o better.toml", "add")["ladder"];
     ASSERT_GE(ladder.size(), 2u);
-    const double after = total_rmse(loop.run("compare better.toml flights", "compare"));
+    const files::Json compared = loop.run("compare better.toml flights", "compare");
+    const double after = total_rmse(compared);
     EXPECT_LT(after, 0.95 * before);
+    double floor_N2 = 0;
+    for (const char* const axis : {"x", "y", "z"})
+      floor_N2 += std::pow(compared["overall"]["noise_floor"][axis].get<double>(), 2);
+    EXPECT_GT(after, 0.5 * std::sqrt(floor_N2));
     // A flight of 40 s is too short to hold a part of it back.
     EXPECT_NEAR(after, ladder.back()["fit_rmse"].get<double>(), 1e-6 * after);
     EXPECT_TRUE(ladder.back()["test_rmse"].is_null());

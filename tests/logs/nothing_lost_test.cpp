@@ -59,11 +59,11 @@ TEST(NothingLost, RowsInAnyOrderAreSortedAndCounted) {
   std::swap(lines[100], lines[101]);
   const logs::Log exchanged = read(lines);
   expect_whole(exchanged);
-  EXPECT_EQ(exchanged.health.mended.unsorted_rows, 1u);
+  EXPECT_EQ(exchanged.health.repaired.unsorted_rows, 1u);
   std::shuffle(lines.begin(), lines.end(), std::mt19937(1));
   const logs::Log shuffled = read(lines);
   expect_whole(shuffled);
-  EXPECT_GT(shuffled.health.mended.unsorted_rows, kRecords / 2u);
+  EXPECT_GT(shuffled.health.repaired.unsorted_rows, kRecords / 2u);
   lines = rows();
   std::rotate(lines.begin(), lines.begin() + kRecords / 2, lines.end());  // the second file before the first
   expect_whole(read(lines));
@@ -74,7 +74,7 @@ TEST(NothingLost, RepeatedRowsCountOnce) {
   lines.insert(lines.begin() + 200, lines.begin() + 50, lines.begin() + 100);
   const logs::Log log = read(lines);
   expect_whole(log);
-  EXPECT_EQ(log.health.mended.repeated_rows, 50u);
+  EXPECT_EQ(log.health.repaired.repeated_rows, 50u);
 }
 
 TEST(NothingLost, WrapsOfClocksAreCounted) {
@@ -83,7 +83,7 @@ TEST(NothingLost, WrapsOfClocksAreCounted) {
     lines.push_back(row(fmt::format("{}", (16777216 - 1000 + 10 * k) % 16777216), 0.01 * k));
   const logs::Log log = read(lines);
   expect_whole(log);
-  EXPECT_EQ(log.health.mended.unwrapped_clocks, 1u);
+  EXPECT_EQ(log.health.repaired.unwrapped_clocks, 1u);
 }
 
 TEST(NothingLost, TheEndOfDaylightSavingAndMidnightDoNotEndAFlight) {
@@ -106,7 +106,7 @@ TEST(NothingLost, BlocksOfOtherRatesAreCounted) {
   }
   const logs::Log log = read(lines, "time,x,y,z,vx,vy,vz,vbat");
   expect_whole(log);
-  EXPECT_GE(log.health.mended.merged_blocks, 1u);
+  EXPECT_GE(log.health.repaired.merged_blocks, 1u);
 }
 
 TEST(NothingLost, TwoFlightsOnOneClockAreNotMixed) {
@@ -114,7 +114,7 @@ TEST(NothingLost, TwoFlightsOnOneClockAreNotMixed) {
   for (int k = 0; k < kRecords; ++k)
     lines.push_back(row(fmt::format("{:.3f}", 0.01 * k + 0.004), 30 + 0.01 * k));
   const logs::Log log = read(lines);
-  EXPECT_EQ(log.health.mended.unsorted_rows, 0u);
+  EXPECT_EQ(log.health.repaired.unsorted_rows, 0u);
   EXPECT_EQ(logs::completeness_of(log.health), logs::Completeness::kDamaged);
   EXPECT_NEAR(logs::lost_share(log), 0.5, 0.01);
 }

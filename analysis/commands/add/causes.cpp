@@ -2,7 +2,7 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
+#include <cmath>
 
 #include "stability/effects/registry.h"
 
@@ -14,17 +14,18 @@ using identification::Split;
 using stability::EffectSpec;
 using stability::LadderRow;
 
-/// The effects that a row added: those that have values after it and had none before.
+/// The effects that a row added: those that have values after it and had none before; if the model had the effect, and
+/// the row changed it, that one.
 std::vector<const EffectSpec*> added_by(const LadderRow& row, const LadderRow& before,
                                         const std::vector<EffectSpec>& effects) {
-  std::vector<const EffectSpec*> added;
+  std::vector<const EffectSpec*> added, changed;
   for (const EffectSpec& spec : effects) {
     if (spec.parameters.empty()) continue;
-    const std::string key =
-        spec.name + (spec.vehicle.empty() ? "" : "@" + spec.vehicle) + "." + spec.parameters.begin()->first;
+    const std::string key = identification::ladder_key(spec, spec.parameters.begin()->first);
     if (row.values.count(key) != 0 && before.values.count(key) == 0) added.push_back(&spec);
+    if (spec.name == row.effect) changed.push_back(&spec);
   }
-  return added;
+  return added.empty() ? changed : added;
 }
 
 std::string equation_of(const EffectSpec& spec) {
@@ -82,8 +83,9 @@ std::string sentence(const Cause& cause, const residuals::ForceUnit& unit) {
     values += fmt::format("{}{} = {:.4g} ({:.4g} .. {:.4g})", values.empty() ? "" : ", ", name, value.value,
                           value.interval_90->lower, value.interval_90->upper);
   }
-  return fmt::format("{}: {}; lowers the error by {:.0f} %, {:.3g} to {:.3g} {}", cause.name, values,
-                     cause.fall_percent(), cause.before_N * unit.per_newton(),
+  const double fall = cause.fall_percent();
+  return fmt::format("{}: {}; {} the error by {:.0f} %, {:.3g} to {:.3g} {}", cause.name, values,
+                     fall < 0 ? "raises" : "lowers", std::abs(fall), cause.before_N * unit.per_newton(),
                      cause.after_N * unit.per_newton(), unit.name);
 }
 

@@ -71,7 +71,10 @@ std::vector<RotorBalance> judge_rotors(const residuals::Inputs& inputs, const re
     std::vector<Ranked> named;
     for (const RotorBalance& balance : balances)
       if (balance.flight.empty() && balance.rotor != 0) named.push_back(ranked_rotor(balance, model.kind));
-    if (!named.empty()) judgement.verdict = identification::Verdict::kMissingEffect;
+    if (!named.empty()) {
+      judgement.verdict = identification::Verdict::kMissingEffect;
+      judgement.reason.clear();
+    }
     judgement.ranking.insert(judgement.ranking.begin(), named.begin(), named.end());
     all.insert(all.end(), balances.begin(), balances.end());
   }

@@ -57,18 +57,18 @@ const char* name(logs::Completeness completeness) {
   return kWords[static_cast<int>(completeness)];
 }
 
-/// "damaged, 3.1 % lost; mended: 12 unsorted rows"
+/// "damaged, 3.1 % lost; repaired: 12 unsorted rows"
 std::string completeness_in_words(const logs::Log& log) {
   std::string words = name(logs::completeness_of(log.health));
   const double lost = logs::lost_share(log);
   if (lost > 0) words += fmt::format(", {:.2g} % lost", 100 * lost);
-  const logs::Mended& mended = log.health.mended;
+  const logs::Repaired& repaired = log.health.repaired;
   std::string list;
-  for (const auto& [count, what] :
-       {std::pair(mended.unsorted_rows, "unsorted rows"), std::pair(mended.repeated_rows, "repeated rows"),
-        std::pair(mended.unwrapped_clocks, "wraps of the clock"),
-        std::pair(mended.merged_blocks, "log blocks of other rates")})
-    if (count > 0) list += fmt::format("{}{} {}", list.empty() ? "; mended: " : ", ", count, what);
+  for (const auto& [count, what] : {std::pair(repaired.unsorted_rows, "unsorted rows"),
+                                    std::pair(repaired.repeated_rows, "repeated rows"),
+                                    std::pair(repaired.unwrapped_clocks, "wraps of the clock"),
+                                    std::pair(repaired.merged_blocks, "log blocks of other rates")})
+    if (count > 0) list += fmt::format("{}{} {}", list.empty() ? "; repaired: " : ", ", count, what);
   return words + list;
 }
 
@@ -130,11 +130,11 @@ files::Json describe_log(const logs::Log& log) {
   json["interpretation"] = log.interpretation;
   json["completeness"] = name(logs::completeness_of(log.health));
   json["lost_share"] = finite(logs::lost_share(log));
-  const logs::Mended& mended = log.health.mended;
-  json["mended"] = {{"unsorted_rows", mended.unsorted_rows},
-                    {"repeated_rows", mended.repeated_rows},
-                    {"unwrapped_clocks", mended.unwrapped_clocks},
-                    {"merged_blocks", mended.merged_blocks}};
+  const logs::Repaired& repaired = log.health.repaired;
+  json["repaired"] = {{"unsorted_rows", repaired.unsorted_rows},
+                      {"repeated_rows", repaired.repeated_rows},
+                      {"unwrapped_clocks", repaired.unwrapped_clocks},
+                      {"merged_blocks", repaired.merged_blocks}};
   json["health"] = health_of(log.health);
   json["plausibility"] = files::to_json(files::record_of(logs::doubts_of(log)));
   return json;

@@ -56,15 +56,6 @@ std::vector<stability::EffectSpec> fitted_to_means(const residuals::Inputs& inpu
   return specs;
 }
 
-std::map<std::string, double> values_of_effects(const stability::Model& model) {
-  std::map<std::string, double> values;
-  for (const stability::EffectSpec& spec : model.effects) {
-    const std::string prefix = spec.name + (spec.vehicle.empty() ? "" : "@" + spec.vehicle) + ".";
-    for (const auto& [name, value] : spec.parameters) values[prefix + name] = value;
-  }
-  return values;
-}
-
 }  // namespace
 
 bool is_of_torques(const std::string& effect) {
@@ -108,7 +99,7 @@ Ladder balance_ladder(residuals::Inputs inputs, const std::string& effect, bool 
     row.select_rmse_N = error_N(ladder.split.select);
     if (ladder.split.by != Split::By::kNothing) row.test_rmse_N = error_N(ladder.split.test);
     row.test_looks = ladder.test_looks;
-    row.values = values_of_effects(with_effects(nominal, added));
+    row.values = ladder_values(with_effects(nominal, added));
     ladder.rows.push_back(std::move(row));
   }
   stability::LadderRow& last = ladder.rows.back();
