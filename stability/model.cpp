@@ -268,7 +268,7 @@ EffectSpec read_effect(const TomlTable& effect, const Model& model) {
 
 LadderRow read_row(const TomlTable& table) {
   table.allow_only({"effect", "accepted", "fit_rmse_N", "select_rmse_N", "test_rmse_N", "noise_floor_N",
-                    "test_looks", "note", "values"});
+                    "select_rates_rad_s", "test_rates_rad_s", "test_looks", "note", "values"});
   LadderRow row;
   row.effect = table.text("effect");
   if (table.has("accepted")) row.accepted = table.flag("accepted");
@@ -276,6 +276,8 @@ LadderRow read_row(const TomlTable& table) {
   row.select_rmse_N = not_negative(table, "select_rmse_N", 0);
   row.test_rmse_N = not_negative(table, "test_rmse_N", 0);
   row.noise_floor_N = not_negative(table, "noise_floor_N", 0);
+  row.select_rates_rad_s = not_negative(table, "select_rates_rad_s", 0);
+  row.test_rates_rad_s = not_negative(table, "test_rates_rad_s", 0);
   row.test_looks = static_cast<int>(std::min(not_negative(table, "test_looks", 0), 1e6));
   if (table.has("note")) row.note = table.text("note");
   if (table.has("values")) {

@@ -99,6 +99,8 @@ struct LadderRow {
   std::string effect;  ///< "nominal" for the first
   bool accepted = true;
   double fit_rmse_N = 0, select_rmse_N = 0, test_rmse_N = 0, noise_floor_N = 0;
+  /// Mean error of the body rates over predictions of half a second; 0: not predicted.
+  double select_rates_rad_s = 0, test_rates_rad_s = 0;
   int test_looks = 0;  ///< number of times the test flights had been scored
   std::string note;    ///< why it was rejected, or kept nevertheless
   /// Parameter values of every effect after this row, so that the row can be restored: "motor_lag.tau_s",

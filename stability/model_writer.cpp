@@ -106,6 +106,9 @@ std::string row_text(const LadderRow& row) {
   text += "fit_rmse_N = " + number(row.fit_rmse_N) + "\nselect_rmse_N = " + number(row.select_rmse_N) +
           "\ntest_rmse_N = " + number(row.test_rmse_N) + "\nnoise_floor_N = " + number(row.noise_floor_N) +
           fmt::format("\ntest_looks = {}\n", row.test_looks);
+  if (row.select_rates_rad_s > 0)
+    text += "select_rates_rad_s = " + number(row.select_rates_rad_s) +
+            "\ntest_rates_rad_s = " + number(row.test_rates_rad_s) + "\n";
   if (!row.note.empty()) text += "note = " + quoted(row.note) + "\n";
   text += "values = { " +
           joined(row.values, [](const auto& item) { return key(item.first) + " = " + number(item.second); }) +

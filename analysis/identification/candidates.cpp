@@ -235,12 +235,14 @@ bool is_written_by_hand(const std::string& name) {
          shown_by == ShownBy::kNothing;
 }
 
+bool is_turning(const std::string& name) { return stability::traits_of(name).shown_by == ShownBy::kTurning; }
+
 std::string rotor_effect() { return stability::effect_shown_by(ShownBy::kRotors); }
 
 std::vector<std::string> candidate_names(const stability::Model& model) {
   std::vector<std::string> names;
   for (const std::string& name : stability::effect_names()) {
-    if (!is_written_by_hand(name) && name != rotor_effect()) names.push_back(name);
+    if (!is_written_by_hand(name) && name != rotor_effect() && !is_turning(name)) names.push_back(name);
   }
   for (const EffectSpec& spec : model.effects) {
     if (spec.is_expression()) names.push_back(spec.name);

@@ -64,6 +64,9 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
 /// Returns true if an effect of this name cannot be fitted to the force in flight: it acts as a torque or is a network.
 bool is_written_by_hand(const std::string& name);
 
+/// Returns true for effects that are fitted to predictions of the attitude (turning.h).
+bool is_turning(const std::string& name);
+
 /// Returns the effect of single rotors. It is fitted to their loads in slow flight (rotors/rotor_fit.h), as the
 /// force in flight shows only their sum.
 std::string rotor_effect();

@@ -9,6 +9,7 @@
 #include "analysis/identification/remainder.h"
 #include "analysis/identification/rotors/rotor_fit.h"
 #include "analysis/identification/scan/proposal.h"
+#include "analysis/identification/turning_search.h"
 #include "analysis/identification/verdict.h"
 #include "analysis/residuals/comparison.h"
 #include "analysis/residuals/force_residual.h"
@@ -19,6 +20,7 @@
 namespace swarmcert::identification {
 namespace {
 
+using stability::EffectSpec;
 using stability::LadderRow;
 
 constexpr double kLeastFall = 0.005;
@@ -226,6 +228,7 @@ struct Trial {
   LadderRow row;
   stability::Model model;
   std::vector<FlightSquares> fit, select;  ///< by flight
+  std::vector<EffectSpec> turning = {};    ///< of the model, fitted to predictions
 };
 
 }  // namespace
@@ -271,7 +274,10 @@ class Climb {
 
   void run() {
     for (const std::string& asked : wanted_) attempt(asked, kLeastFall);
-    if (is_automatic_) ladder_.stopped = add_forms();
+    if (is_automatic_) {
+      ladder_.stopped = add_forms();
+      add_turning();
+    }
     finish();
   }
 
@@ -297,6 +303,58 @@ class Climb {
     }
     return fmt::format("{} formulas and shapes were added, which is enough for one ladder", kMostFormulas);
   }
+
+  /// Adds effects that turn the vehicle, the best one first, as long as one predicts its rates much better.
+  void add_turning() {
+    std::vector<std::string> left = turning_effects();
+    while (can_turn()) {
+      const std::optional<Turned> next = turning_->best_of(left);
+      if (!next) return;
+      accept(*next);
+      left.erase(std::find(left.begin(), left.end(), next->name));
+    }
+  }
+
+  /// Loads the flights once, with the forces found so far.
+  bool can_turn() {
+    if (!turning_) {
+      residuals::Inputs inputs = inputs_;
+      inputs.models = {best().model};
+      turning_.emplace(inputs, kind_, ladder_.split.fit, ladder_.split.select, jobs_);
+    }
+    return turning_->is_possible();
+  }
+
+  void accept(const Turned& next) {
+    best().row.select_rates_rad_s = turning_->rates_rad_s();
+    turning_->accept(next);
+    Trial now = best();
+    now.row.effect = next.name;
+    now.row.note.clear();
+    now.row.select_rates_rad_s = turning_->rates_rad_s();
+    now.turning = next.specs;
+    now.model = with_effects(without_turning(), next.specs);
+    now.row.values = ladder_values(now.model);
+    trials_.push_back(std::move(now));
+    best_ = trials_.size() - 1;
+  }
+
+  /// Tries an effect that turns the vehicle because the user asks for it. Returns whether it is accepted.
+  bool attempt_turning(const std::string& name) {
+    if (!can_turn())
+      return refuse(name,
+                    "no flight shows how the vehicle turns: body rates are needed, and measured rotor "
+                    "speeds, or the force of each rotor at 400 Hz");
+    const Turned next = turning_->with(name);
+    if (turning_->error_ratio(next) > 1 - kLeastFall && !keeps_anyway_)
+      return refuse(name, fmt::format("the error of predicted body rates goes from {:.4f} to {:.4f} rad/s",
+                                      turning_->rates_rad_s(), TurningSearch::rates_rad_s(next)));
+    accept(next);
+    return true;
+  }
+
+  /// The best model without what was fitted to predictions.
+  stability::Model without_turning() { return with_effects(working_.models[0], specs_of(fitted_)); }
 
   /// Whether the accepted effects leave slow disturbances, a vibration, or a force of which a variable explains much.
   bool leaves_something() const {
@@ -338,6 +396,7 @@ class Climb {
   /// Tries an effect, a formula or a shape. Returns whether it is accepted.
   /// @param least_fall of the RMSE on the select flights
   bool attempt(const std::string& asked, double least_fall) {
+    if (is_turning(asked)) return attempt_turning(asked);
     std::string name = asked;
     if (is_proposal(asked)) {
       name = propose(working_, passes(), fitted_, asked);
@@ -357,7 +416,9 @@ class Climb {
     });
     if (fresh == fitted.rend())
       return refuse(name, "no flight of the fit has slow flight with the duty of each of four motors");
-    Trial next = trial(name, with_effects(working_.models[0], specs_of(fitted)));
+    Trial next =
+        trial(name, with_effects(with_effects(working_.models[0], specs_of(fitted)), best().turning));
+    next.turning = best().turning;
     const bool is_form = name != asked && is_automatic_;
     const bool helps =
         is_rotors ? balances(next) : lowers_error(next, least_fall) && (!is_form || raises_none(next));
@@ -426,6 +487,7 @@ class Climb {
         effect.fit.note = "one or two short flights: selected on the flights to fit, and not tested";
     }
     const double floor_N = noise_floor_N(inputs_, ladder_.model, ladder_.split.test, jobs_);
+    test_turning();
     for (Trial& t : trials_) {
       if (ladder_.split.by != Split::By::kNothing)
         t.row.test_rmse_N = rmse_N(squares_of(inputs_, t.model, ladder_.split.test, jobs_));
@@ -435,6 +497,17 @@ class Climb {
     }
     ladder_.model.ladder = ladder_.earlier;
     ladder_.model.ladder.insert(ladder_.model.ladder.end(), ladder_.rows.begin(), ladder_.rows.end());
+  }
+
+  void test_turning() {
+    if (best().turning.empty() || ladder_.split.by == Split::By::kNothing) return;
+    residuals::Inputs inputs = inputs_;
+    inputs.models = {without_turning()};
+    const TurningFlights test(inputs, kind_, ladder_.split.test, jobs_);
+    for (Trial& t : trials_) {
+      if (test.empty() || !(t.row.select_rates_rad_s > 0)) continue;
+      t.row.test_rates_rad_s = TurningSearch::rates_rad_s({"", {}, test.rate_errors_rad_s(t.turning)});
+    }
   }
 
   const residuals::Inputs& inputs_;
@@ -447,7 +520,8 @@ class Climb {
   residuals::Inputs working_;    ///< with the proposed effects
   std::vector<Missing> fitted_;  ///< as of the last accepted row, except for what is part of working_
   std::vector<Trial> trials_;
-  std::size_t best_ = 0;  ///< the last accepted trial
+  std::size_t best_ = 0;                  ///< the last accepted trial
+  std::optional<TurningSearch> turning_;  ///< see can_turn()
 };
 
 }  // namespace

@@ -8,7 +8,8 @@
 namespace swarmcert::identification {
 namespace {
 
-Missing missing_of(const Passes& passes, const Refined& refined, Finding finding, const Grams& grams) {
+Missing missing_of(const Passes& passes, const Refined& known, Finding finding, const Grams& grams) {
+  const Refined refined = widened_by_step(passes, known);
   const Candidate& candidate = refined.candidate;
   Missing missing;
   missing.effect = candidate.name;

@@ -385,6 +385,18 @@ void widen_by_answers(const std::vector<Refined>& by_squares, std::vector<Refine
   }
 }
 
+/// Returns half the step between the records of the first flight that has any.
+double half_step_s(const Passes& passes) {
+  for (const int flight : passes.flights) {
+    std::vector<std::string> problems;
+    for (const residuals::Track& track : passes.inputs.load(static_cast<std::size_t>(flight), problems)) {
+      if (track.position_only || track.kind != passes.kind || track.instants.size() < 2) continue;
+      return track.duration_s() / static_cast<double>(track.instants.size() - 1) / 2;
+    }
+  }
+  return 0;
+}
+
 /// Fits lags and delays to whitened columns, then everything else beside them to the plain ones.
 std::vector<Refined> with_whitened_memories(const Passes& passes, const Noise& noise,
                                             const std::vector<Refined>& refined,
@@ -469,6 +481,19 @@ std::vector<Refined> with_innovations(const Passes& passes, std::vector<Refined>
   }
   widen_by_answers(by_squares, refined);
   return refined;
+}
+
+Refined widened_by_step(const Passes& passes, Refined effect) {
+  const stability::EffectInfo& info = effect.candidate.info;
+  if (!info.remembers || info.traits.place != stability::Place::kThrust) return effect;
+  const double by_s = half_step_s(passes);
+  for (std::size_t k = 0; k < effect.theta.size(); ++k) {
+    Interval& interval = effect.shape_intervals[k];
+    if (!(interval.lower < interval.upper)) continue;
+    interval = {std::max(interval.lower - by_s, info.shape[k].lower),
+                std::min(interval.upper + by_s, info.shape[k].upper)};
+  }
+  return effect;
 }
 
 std::vector<Refined> refit(const Passes& all, const Passes& seen, const std::vector<Refined>& found) {

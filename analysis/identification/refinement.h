@@ -26,6 +26,11 @@ std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Memb
 /// white.
 std::vector<Refined> with_innovations(const Passes& passes, std::vector<Refined> refined);
 
+/// Returns a lag or delay of the thrust with intervals wider by half the step of the log, and other effects unchanged.
+/// A record does not tell when, since the last one, the command has become what it says: at once, or only now. Commands
+/// that change whenever a record is written shift the time by half a step, one way or the other.
+Refined widened_by_step(const Passes& passes, Refined effect);
+
 /// Fits `found`, which was found on the excerpt `seen` of the flights of `all`, to all flights, starting from there.
 /// Lags and delays are again fitted to the innovations; their intervals include the same allowance for the effect of
 /// whitening as in with_innovations().

@@ -218,6 +218,7 @@ void settle_judgement(Draft& draft) {
   signals.targets = t.has_group(kTargetPosition, 3) && t.has_group(kTargetVelocity, 3);
   signals.commands = t.has_group(kMotorForce, 4) && t.has(kThrust) && t.has_group(kTorque, 3);
   signals.rates = t.has_group(kRates, 3);
+  signals.rotor_speeds = t.has_group(kRotorSpeed, 4);
   // Torques need the thrust of each rotor, and their dynamics are aliased below the rate of the attitude loop.
   const bool each_rotor = t.has_group(kDuty, 4) || t.has_group(kRotorSpeed, 4) ||
                           t.has_group(kRequested, 4) || signals.motor_commands > 0;

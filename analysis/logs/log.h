@@ -86,10 +86,11 @@ struct Signals {
   int motor_commands = 0;  ///< motors whose normalised commands gave `thrust`; 0: it has another source
   ForceSource specific_force = ForceSource::kNone;
   TorqueUse torque = TorqueUse::kNone;
-  bool position = false;  ///< all three axes
-  bool attitude = false;  ///< measured; otherwise the thrust axis follows from the acceleration
-  bool targets = false;   ///< target position and velocity
-  bool commands = false;  ///< motor forces, thrust and torque commands
+  bool rotor_speeds = false;  ///< of each of four rotors
+  bool position = false;      ///< all three axes
+  bool attitude = false;      ///< measured; otherwise the thrust axis follows from the acceleration
+  bool targets = false;       ///< target position and velocity
+  bool commands = false;      ///< motor forces, thrust and torque commands
   bool rates = false;
 };
 

@@ -342,6 +342,7 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
                                      fmt::join(logs::findings(log.health), "; ")));
     }
     track.has_rates = log.signals.rates;
+    track.has_rotor_speeds = log.signals.rotor_speeds;
     track.has_height = log.signals.position;
     track.thrust_source = log.signals.thrust;
     track.motor_commands = log.signals.motor_commands;

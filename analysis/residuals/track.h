@@ -70,6 +70,8 @@ struct TrackHead {
 
 struct Track : TrackHead {
   bool has_rates = false;
+  bool has_rotor_speeds =
+      false;               ///< measured: they do not alias the attitude loop as commands of a slow log do
   bool has_height = true;  ///< the log has a position, so ground contact can be detected
   double window_s = 0;     ///< of the derivative, if force_source is not the accelerometer
   logs::TorqueUse torque_use = logs::TorqueUse::kDynamic;

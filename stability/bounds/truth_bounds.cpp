@@ -286,7 +286,8 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
   const Values value(effect, info);
   if (name == "motor_lag" || name == "delay" || name == "thrust_ratio") {
     result.note = "acts through the loop";
-  } else if (name == "torque_bias" || name == "downwash_torque" || name == "com_offset") {
+  } else if (info.traits.shown_by == ShownBy::kTurning || name == "torque_bias" ||
+             name == "downwash_torque" || name == "com_offset") {
     result.note = "a torque: no force";
   } else if (name == "sensor_delay" || name == "accelerometer_scale") {
     result.note = "affects only the accelerometer: no force";

@@ -28,6 +28,7 @@ enum class ShownBy {
   kSwing,          ///< likewise, where the horizontal force has a resonance
   kTorques,        ///< mean torques of the rotors
   kRotors,         ///< loads of the rotors in slow flight
+  kTurning,        ///< predictions of the attitude
   kAccelerometer,  ///< accelerometer against velocity
   kNothing         ///< written into the model file by hand
 };

@@ -125,6 +125,45 @@ TEST(ComOffset, LeversTheThrustAboutTheCentreOfMass) {
   EXPECT_EQ(wrench.force_W_N.norm(), 0);
 }
 
+Eigen::Vector3d torque_of(const std::string& name, const std::map<std::string, double>& parameters,
+                          const Instant& now) {
+  EffectSpec spec;
+  spec.name = name;
+  spec.parameters = parameters;
+  const Wrench wrench = AppliedEffect(spec, {"small", {"small"}, ""}).wrench(now);
+  EXPECT_EQ(wrench.force_W_N.norm(), 0);
+  return wrench.torque_B_Nm;
+}
+
+TEST(FlowTorque, TiltsTheThrustAxisAwayFromTheDirectionOfFlight) {
+  Instant now = hovering();
+  EXPECT_EQ(torque_of("flow_torque", {{"moment_N_s", 5e-4}}, now).norm(), 0);
+  now.R_WB = Eigen::AngleAxisd(0.4, Eigen::Vector3d(0.6, 0, 0.8)).toRotationMatrix();
+  now.v_W_m_s = now.R_WB * Eigen::Vector3d(2, 0, 1);
+  const Eigen::Vector3d torque = torque_of("flow_torque", {{"moment_N_s", 5e-4}}, now);
+  EXPECT_LT((torque - Eigen::Vector3d(0, -1e-3, 0)).norm(), 1e-15);  // nose up
+  // The thrust axis turns with omega x e3.
+  EXPECT_LT(torque.cross(Eigen::Vector3d::UnitZ()).x(), 0);
+}
+
+TEST(RateDamping, TakesEnergyFromEveryRotation) {
+  Instant now = hovering();
+  now.omega_B_rad_s = {1, -2, 3};
+  const Eigen::Vector3d torque =
+      torque_of("rate_damping", {{"damping_xy_N_m_s", 1e-4}, {"damping_z_N_m_s", 2e-4}}, now);
+  EXPECT_LT((torque - Eigen::Vector3d(-1e-4, 2e-4, -6e-4)).norm(), 1e-15);
+  EXPECT_LT(torque.dot(now.omega_B_rad_s), 0);
+}
+
+TEST(TorqueRatio, IsAChangeOfTheRotorsTorqueAboutEachAxis) {
+  Instant now = hovering();
+  now.torque_B_Nm = {1e-3, 2e-3, 3e-3};
+  EXPECT_LT((torque_of("torque_ratio", {{"change_x", -0.5}, {"change_y", 0.1}}, now) -
+             Eigen::Vector3d(-5e-4, 2e-4, 0))
+                .norm(),
+            1e-15);
+}
+
 TEST(ImuTilt, TiltsTheThrustInTheBody) {
   Instant now = hovering();
   now.R_WB = Eigen::AngleAxisd(std::acos(0.0), Eigen::Vector3d::UnitZ()).toRotationMatrix();

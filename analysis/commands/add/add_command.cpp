@@ -20,6 +20,7 @@
 #include "analysis/identification/balance/balance_ladder.h"
 #include "analysis/identification/ladder.h"
 #include "analysis/identification/scan/proposal.h"
+#include "analysis/identification/turning.h"
 #include "nn/base/file_io.h"
 #include "nn/base/suggest.h"
 #include "nn/base/text.h"
@@ -46,6 +47,7 @@ void check(const std::vector<std::string>& names, const stability::Model& model)
   if (names.empty()) throw UsageError("no effect is named: add EFFECT[,EFFECT], auto, undo or show");
   std::vector<std::string> known = identification::candidate_names(model);
   known.emplace_back(identification::rotor_effect());
+  for (const std::string& name : identification::turning_effects()) known.push_back(name);
   std::vector<std::string> all = known;
   all.insert(all.end(), {"auto", "formula", "shape", "show", "undo"});
   for (const std::string& name : stability::effect_names()) {

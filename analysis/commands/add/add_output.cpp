@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/label_output.h"
@@ -37,6 +39,13 @@ void describe_ladder_row(files::Record& record, const LadderRow& row) {
   record.field("over_noise_floor",
                if_known(is_tested && row.noise_floor_N > 0, row.test_rmse_N / row.noise_floor_N),
                "test_rmse over what no model can explain.", "", "estimate");
+  record.may(
+      "select_rates", if_known(row.select_rates_rad_s > 0, row.select_rates_rad_s),
+      "Where effects that turn the vehicle were tried: mean error of the body rates over predictions of half "
+      "a second, on the flights that decide.",
+      "rad/s", "estimate");
+  record.may("test_rates", if_known(row.test_rates_rad_s > 0, row.test_rates_rad_s),
+             "On flights that decide nothing.", "rad/s", "estimate");
   record.field("test_looks", row.test_looks, "How often the test flights had been looked at.");
   record.field("accepted", row.accepted, "");
   record.field("reason", row.note, "Why it was refused, or kept nevertheless.");
@@ -87,6 +96,20 @@ void describe(files::Record& record, const AddResult& result) {
   });
 }
 
+/// The rows in which effects that turn the vehicle were tried.
+void print_rates(const std::vector<LadderRow>& rows) {
+  const auto any = [](const LadderRow& row) { return row.select_rates_rad_s > 0; };
+  if (std::none_of(rows.begin(), rows.end(), any)) return;
+  fmt::print("Error of the body rates over predictions of half a second, in rad/s\n");
+  fmt::print("  {:<18}{:>10}{:>10}{:>10}\n", "", "", "select", "test");
+  for (const LadderRow& row : rows) {
+    if (!any(row)) continue;
+    fmt::print("  {:<18}{:>10}{:>10.5f}{:>10}\n", (row.effect == "nominal" ? "" : "+ ") + row.effect, "",
+               row.select_rates_rad_s,
+               row.test_rates_rad_s > 0 ? fmt::format("{:.5f}", row.test_rates_rad_s) : "-");
+  }
+}
+
 void print_ladder(const std::vector<LadderRow>& rows) {
   fmt::print("  {:<18}{:>10}{:>10}{:>10}{:>14}\n", "", "fit", "select", "test", "test / floor");
   for (const LadderRow& row : rows) {
@@ -98,6 +121,7 @@ void print_ladder(const std::vector<LadderRow>& rows) {
                    : "-",
                row.note.empty() ? "" : (row.accepted ? "  kept although " : "  refused: ") + row.note);
   }
+  print_rates(rows);
 }
 
 std::string what_rows_measure(const std::vector<stability::LadderRow>& rows) {

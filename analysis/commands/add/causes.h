@@ -1,6 +1,7 @@
 /// @file What a ladder added to a model, cause by cause: equation, size, and by how much the error fell.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,8 +18,13 @@ struct Cause {
   /// RMSE of the residual vector before and after, on flights that decided nothing; if nothing was held out, on those
   /// of the fit.
   double before_N = 0, after_N = 0;
+  /// Of an effect that turns the vehicle instead: mean errors of the body rates over predictions of half a second.
+  std::optional<double> rates_before_rad_s, rates_after_rad_s;
 
-  double fall_percent() const { return before_N > 0 ? 100 * (1 - after_N / before_N) : 0; }
+  double fall_percent() const {
+    const double before = rates_before_rad_s.value_or(before_N), after = rates_after_rad_s.value_or(after_N);
+    return before > 0 ? 100 * (1 - after / before) : 0;
+  }
 };
 void describe(files::Record& record, const Cause& cause);
 

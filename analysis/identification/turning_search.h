@@ -1,0 +1,49 @@
+/// @file Which effects turn a vehicle: forward selection by predictions of its body rates.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/identification/turning.h"
+
+namespace swarmcert::identification {
+
+/// An effect that turns the vehicle, fitted jointly with those accepted before it.
+struct Turned {
+  std::string name;
+  std::vector<stability::EffectSpec> specs;  ///< of all of them
+  std::vector<double> rates_rad_s;           ///< TurningFlights::rate_errors_rad_s() of the select flights
+};
+
+class TurningSearch {
+ public:
+  /// @param inputs with the model whose forces move the vehicles
+  TurningSearch(const residuals::Inputs& inputs, const std::string& kind, const std::vector<int>& fit,
+                const std::vector<int>& select, int jobs);
+
+  /// Whether flights to fit and to select show how the vehicle turns. Precondition of what follows.
+  bool is_possible() const { return !fit_.empty() && !select_.empty(); }
+
+  const Turned& accepted() const { return accepted_; }
+  /// Returns the mean error of the body rates with what is accepted, or with `next`.
+  double rates_rad_s() const;
+  static double rates_rad_s(const Turned& next);
+
+  Turned with(const std::string& name) const;
+  /// Returns the mean over flights of the errors with `next`, relative to those with what is accepted.
+  double error_ratio(const Turned& next) const;
+  /// Returns the best of `names`; nothing unless it lowers the error by 5 %, and by as much of what the rates do in
+  /// flight as an effect of the force needs to be found. Torques that are held from record to record are late: without
+  /// the second, what makes up for that would be an effect.
+  std::optional<Turned> best_of(const std::vector<std::string>& names) const;
+  void accept(const Turned& next) { accepted_ = next; }
+
+ private:
+  bool explains_motion(const Turned& next) const;
+
+  TurningFlights fit_, select_;
+  Turned accepted_;
+};
+
+}  // namespace swarmcert::identification
