@@ -51,6 +51,7 @@ void prepare(const fs::path& folder, const fs::path& project) {
   fs::create_directories(folder);
   for (const char* name : {"analysis", "controller", "nn", "stability"})
     fs::create_directory_symlink(project / name, folder / name);
+  fs::create_directory_symlink(project.parent_path() / "shared" / "data", folder / "data");  // may be missing
 }
 
 /// SVG and PNG of NAME.gp; stay empty where gnuplot is missing or fails.

@@ -19,8 +19,6 @@ enum Slope { kTotal, kAcross, kAlong };
 /// Returns 1/x of an interval of positive numbers, which may be unbounded.
 Interval inverse(Interval x) { return {std::isinf(x.upper) ? 0 : down(1 / x.upper), up(1 / x.lower)}; }
 
-Interval square(Interval x) { return abs(x) * abs(x); }
-
 /// q = r / spread(h), and z, on one side of kWakeNearest_m.
 struct Box {
   Interval q, z;

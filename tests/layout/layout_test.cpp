@@ -57,6 +57,7 @@ const std::vector<Layer>& layers() {
       {"stability", {"controller", "nn", "nn/base", "nn/weights"}},  // with bodies and effects
       {"stability/bounds/loops", {"nn/base", "stability"}},
       {"stability/bounds/enclosures", {"nn/base", "stability/bounds/loops"}},
+      {"stability/reach", {"nn/base", "nn/weights", "stability/bounds/enclosures"}},
       {"stability/bounds/uncertain", {"nn/base", "stability/bounds/loops"}},
       {"stability/bounds",
        {"controller", "nn/base", "stability", "stability/bounds/loops", "stability/bounds/enclosures",

@@ -14,13 +14,13 @@ namespace {
 
 using stability::exp;
 using stability::pow;
+using stability::square;
 
 /// exp(-7^2/2), rounded up: the strength at which the simulator cuts off wakes.
 constexpr double kCutOff = 2.3e-11;
 /// Smaller numbers are treated as any number between zero and this, to keep logarithms finite.
 constexpr double kTiny = 1e-280;
 
-Interval square(Interval x) { return abs(x) * abs(x); }
 Interval cut(Interval x, double from, double to) {
   return {std::clamp(x.lower, from, to), std::clamp(x.upper, from, to)};
 }

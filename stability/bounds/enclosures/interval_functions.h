@@ -1,4 +1,4 @@
-/// @file Enclosures of exp, log and pow by interval arithmetic, independent of the accuracy of libm.
+/// @file Enclosures of squares, exp, log, pow, sin and cos by interval arithmetic, independent of the accuracy of libm.
 #pragma once
 
 #include <stdexcept>
@@ -7,6 +7,9 @@
 #include "nn/base/interval.h"
 
 namespace swarmcert::stability {
+
+/// Encloses x^2.
+inline Interval square(Interval x) { return abs(x) * abs(x); }
 
 /// Encloses e^x of one double. With y = x/2^k, |y| <= 1/4: the Taylor polynomial of degree 13, whose remainder is below
 /// 1.3 |y|^14/14!, squared k times. Beyond +-700, near the limits of doubles, [0, 1e-300] or [1e300, oo].
@@ -42,5 +45,19 @@ inline Interval pow(Interval x, double n) {
   if (n == 0) return Interval(1);
   return exp(Interval(n) * Interval(log_of(x.lower).lower, log_of(x.upper).upper));
 }
+
+/// Encloses x^first/first! - x^(first + 2)/(first + 2)! + ...: cos x for `first` 0, sin x for 1. The terms alternate
+/// and decrease from degree 4 on, so the first one left out bounds the remainder. [-1, 1] for |x| > 4.
+inline Interval alternating_series(double x, int first) {
+  if (!(std::abs(x) <= 4)) return {-1, 1};
+  Interval total(0), term = first == 0 ? Interval(1) : Interval(x);
+  for (int n = first; n < 40; n += 2) {
+    total += term;
+    term = -term * Interval(x) * Interval(x) / Interval((n + 1) * (n + 2));
+  }
+  return total + Interval(-term.mag(), term.mag());
+}
+inline Interval cos_of(double x) { return alternating_series(x, 0); }
+inline Interval sin_of(double x) { return alternating_series(x, 1); }
 
 }  // namespace swarmcert::stability

@@ -68,12 +68,7 @@ class SampledAdjoint {
   /// ..., and finish(kernel, ratio) as above.
   template <class Visit, class Finish>
   void command_kernel(const Eigen::RowVectorXd& after, const Visit& visit, const Finish& finish) const {
-    input_kernel(after, Eigen::VectorXd::Unit(model_.size() + 1, model_.command_index()), visit, finish);
-  }
-  /// The same for an input that adds `input` [size + 1] to the state after the control of every period.
-  template <class Visit, class Finish>
-  void input_kernel(const Eigen::RowVectorXd& after, const Eigen::VectorXd& input, const Visit& visit,
-                    const Finish& finish) const {
+    const Eigen::VectorXd input = Eigen::VectorXd::Unit(model_.size() + 1, model_.command_index());
     const Eigen::VectorXd held = model_.hold() * input;
     const auto kernel_of = [&](const std::vector<double>& row) {
       double kernel = 0;
