@@ -266,9 +266,19 @@ EffectSpec read_effect(const TomlTable& effect, const Model& model) {
   return spec;
 }
 
+LadderMeasure read_measure(const TomlTable& table) {
+  table.allow_only({"quantity", "unit", "select", "test"});
+  const auto pair = [&table](const char* key) {
+    const std::vector<double> numbers = table.numbers(key);
+    if (numbers.size() != 2) table.refuse(key, std::to_string(numbers.size()) + " numbers", "must be two");
+    return std::array<double, 2>{numbers[0], numbers[1]};
+  };
+  return {table.text("quantity"), table.text("unit"), pair("select"), pair("test")};
+}
+
 LadderRow read_row(const TomlTable& table) {
   table.allow_only({"effect", "accepted", "fit_rmse_N", "select_rmse_N", "test_rmse_N", "noise_floor_N",
-                    "select_rates_rad_s", "test_rates_rad_s", "test_looks", "note", "values"});
+                    "measure", "test_looks", "note", "values"});
   LadderRow row;
   row.effect = table.text("effect");
   if (table.has("accepted")) row.accepted = table.flag("accepted");
@@ -276,8 +286,7 @@ LadderRow read_row(const TomlTable& table) {
   row.select_rmse_N = not_negative(table, "select_rmse_N", 0);
   row.test_rmse_N = not_negative(table, "test_rmse_N", 0);
   row.noise_floor_N = not_negative(table, "noise_floor_N", 0);
-  row.select_rates_rad_s = not_negative(table, "select_rates_rad_s", 0);
-  row.test_rates_rad_s = not_negative(table, "test_rates_rad_s", 0);
+  if (table.has("measure")) row.measure = read_measure(table.table("measure"));
   row.test_looks = static_cast<int>(std::min(not_negative(table, "test_looks", 0), 1e6));
   if (table.has("note")) row.note = table.text("note");
   if (table.has("values")) {

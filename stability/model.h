@@ -95,14 +95,20 @@ struct EffectSpec {
 };
 
 /// One row of the ladder of errors that led to a model: an effect tried on top of the rows before it.
+/// What decides about a step that leaves the force residual as it is.
+struct LadderMeasure {
+  std::string quantity, unit;  ///< "imbalance of the rotors", "N"
+  /// Before the step and after it; `test` is zero if nothing is tested.
+  std::array<double, 2> select = {0, 0}, test = {0, 0};
+};
+
 struct LadderRow {
   std::string effect;  ///< "nominal" for the first
   bool accepted = true;
   double fit_rmse_N = 0, select_rmse_N = 0, test_rmse_N = 0, noise_floor_N = 0;
-  /// Mean error of the body rates over predictions of half a second; 0: not predicted.
-  double select_rates_rad_s = 0, test_rates_rad_s = 0;
-  int test_looks = 0;  ///< number of times the test flights had been scored
-  std::string note;    ///< why it was rejected, or kept nevertheless
+  std::optional<LadderMeasure> measure;  ///< absent: the force residual decides
+  int test_looks = 0;                    ///< number of times the test flights had been scored
+  std::string note;                      ///< why it was rejected, or kept nevertheless
   /// Parameter values of every effect after this row, so that the row can be restored: "motor_lag.tau_s",
   /// "constant_force@cf50.force_x_N".
   std::map<std::string, double> values;

@@ -106,9 +106,14 @@ std::string row_text(const LadderRow& row) {
   text += "fit_rmse_N = " + number(row.fit_rmse_N) + "\nselect_rmse_N = " + number(row.select_rmse_N) +
           "\ntest_rmse_N = " + number(row.test_rmse_N) + "\nnoise_floor_N = " + number(row.noise_floor_N) +
           fmt::format("\ntest_looks = {}\n", row.test_looks);
-  if (row.select_rates_rad_s > 0)
-    text += "select_rates_rad_s = " + number(row.select_rates_rad_s) +
-            "\ntest_rates_rad_s = " + number(row.test_rates_rad_s) + "\n";
+  if (row.measure) {
+    const auto pair = [](const std::array<double, 2>& of) {
+      return "[" + number(of[0]) + ", " + number(of[1]) + "]";
+    };
+    text += "measure = { quantity = " + quoted(row.measure->quantity) +
+            ", unit = " + quoted(row.measure->unit) + ", select = " + pair(row.measure->select) +
+            ", test = " + pair(row.measure->test) + " }\n";
+  }
   if (!row.note.empty()) text += "note = " + quoted(row.note) + "\n";
   text += "values = { " +
           joined(row.values, [](const auto& item) { return key(item.first) + " = " + number(item.second); }) +

@@ -3,91 +3,28 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
-#include <iterator>
 
+#include "analysis/identification/balance/torque_balance.h"
+#include "analysis/identification/ladder_errors.h"
 #include "analysis/identification/remainder.h"
 #include "analysis/identification/rotors/rotor_fit.h"
 #include "analysis/identification/scan/proposal.h"
 #include "analysis/identification/turning_search.h"
 #include "analysis/identification/verdict.h"
-#include "analysis/residuals/comparison.h"
-#include "analysis/residuals/force_residual.h"
-#include "nn/base/doubles.h"
 #include "nn/base/input_error.h"
-#include "nn/base/parallel.h"
 
 namespace swarmcert::identification {
 namespace {
 
 using stability::EffectSpec;
+using stability::LadderMeasure;
 using stability::LadderRow;
 
 constexpr double kLeastFall = 0.005;
+constexpr char kImbalance[] = "imbalance of the rotors";
+constexpr char kRatesAhead[] = "error of body rates up to half a second ahead";
 /// Of formulas and shapes, which are chosen among many: as of the mean square of an effect that counts as found.
 constexpr double kLeastFallOfForm = Thresholds{}.gain / 2;
-/// Parts of a flight are at least this long. Errors are correlated over blocks of 2 s, so as much lies between parts.
-constexpr double kShortestPart_s = 8, kGuard_s = 2;
-
-/// Squared residual vectors of a flight, in N^2, and their number.
-struct FlightSquares {
-  double sum = 0, count = 0;
-};
-
-/// Returns the squares of the residual of `model` in the flights `which`, in their order.
-std::vector<FlightSquares> squares_of(residuals::Inputs inputs, const stability::Model& model,
-                                      const std::vector<int>& which, int jobs) {
-  inputs.models = {model};
-  std::vector<FlightSquares> all(which.size());
-  files::parallel_for(static_cast<int>(which.size()), jobs, [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    std::vector<std::string> problems;
-    for (const residuals::Track& track : inputs.load(static_cast<std::size_t>(which[k]), problems)) {
-      if (track.position_only) continue;
-      const auto r = residuals::force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
-      for (std::size_t s = 0; s < r.size(); ++s) {
-        if (track.cut[s] != residuals::Cut::kNone) continue;
-        all[k].sum += r[s].squaredNorm();
-        all[k].count += 1;
-      }
-    }
-  });
-  return all;
-}
-
-/// Returns the root mean square, in newton.
-double rmse_N(const std::vector<FlightSquares>& flights) {
-  FlightSquares all;
-  for (const FlightSquares& flight : flights) {
-    all.sum += flight.sum;
-    all.count += flight.count;
-  }
-  return all.count > 0 ? std::sqrt(all.sum / all.count) : 0;
-}
-
-/// Whether the error rises in any flight by more than the fall that an effect needs. A form that only tells flights
-/// from each other, such as a step over the battery, lowers the error of some and raises that of others.
-bool rises_anywhere(const std::vector<FlightSquares>& before, const std::vector<FlightSquares>& after) {
-  for (std::size_t k = 0; k < before.size(); ++k)
-    if (rmse_N({after[k]}) > (1 + kLeastFall) * rmse_N({before[k]})) return true;
-  return false;
-}
-
-residuals::Inputs only_flights(residuals::Inputs inputs, const std::vector<int>& which) {
-  std::vector<residuals::FlightFiles> flights;
-  for (const int i : which) flights.push_back(inputs.found.flights[static_cast<std::size_t>(i)]);
-  inputs.found.flights = std::move(flights);
-  return inputs;
-}
-
-/// Returns what no model can explain in the flights `which`: the white part of the spectrum.
-double noise_floor_N(residuals::Inputs inputs, const stability::Model& model, const std::vector<int>& which,
-                     int jobs) {
-  inputs = only_flights(std::move(inputs), which);
-  inputs.models = {model};
-  const double floor_N = residuals::compare(inputs, jobs, [](int, int) {}).overall.noise_floor_N.norm();
-  return std::isfinite(floor_N) ? floor_N : 0;
-}
 
 int looks_so_far(const stability::Model& model) {
   int looks = 0;
@@ -177,82 +114,14 @@ std::vector<Missing> fit_with_rotors(const residuals::Inputs& inputs, const std:
   return fitted;
 }
 
-/// Returns how far the rotors are out of balance in the flights `which` with `model`; empty if no flight shows it.
-std::optional<double> imbalance_N(const residuals::Inputs& inputs, const stability::Model& model,
-                                  const std::vector<int>& which, int jobs) {
-  const std::vector<RotorLoads> loads = rotor_loads(only_flights(inputs, which), model.kind, jobs);
-  if (loads.empty()) return std::nullopt;
-  return rotor_imbalance_N(loads, rotor_factors_of(model));
-}
-
-/// Returns five parts of `flight`, as five flights are split; none if they would be too short.
-std::vector<residuals::FlightFiles> parts_of(const residuals::FlightFiles& flight, Interval span_s) {
-  constexpr int kParts = 5;
-  const double whole_s = span_s.upper - span_s.lower;
-  std::vector<residuals::FlightFiles> parts;
-  if (!(whole_s / kParts >= kShortestPart_s + kGuard_s)) return parts;
-  for (int k = 0; k < kParts; ++k) {
-    residuals::FlightFiles part = flight;
-    const double begin_s = span_s.lower + whole_s * k / kParts;
-    part.part_s = {begin_s, begin_s + whole_s / kParts - kGuard_s};
-    part.name += fmt::format(" {:.0f}..{:.0f} s", part.part_s->lower, part.part_s->upper);
-    parts.push_back(std::move(part));
-  }
-  return parts;
-}
-
-/// Replaces the flights of `inputs` by their parts. Returns false, and changes nothing, if a flight is too short.
-bool split_in_time(residuals::Inputs& inputs) {
-  std::vector<residuals::FlightFiles> parts;
-  for (std::size_t i = 0; i < inputs.found.flights.size(); ++i) {
-    Interval span_s = {kInfinity, -kInfinity};
-    std::vector<std::string> problems;
-    for (const residuals::Track& track : inputs.load(i, problems)) {
-      if (track.position_only) continue;
-      for (std::size_t k = 0; k < track.cut.size(); ++k) {
-        if (track.cut[k] != residuals::Cut::kNone) continue;
-        span_s.lower = std::min(span_s.lower, track.instants[k].time_s);
-        span_s.upper = std::max(span_s.upper, track.instants[k].time_s);
-      }
-    }
-    std::vector<residuals::FlightFiles> own = parts_of(inputs.found.flights[i], span_s);
-    if (own.empty()) return false;
-    std::move(own.begin(), own.end(), std::back_inserter(parts));
-  }
-  inputs.found.flights = std::move(parts);
-  return true;
-}
-
 /// A candidate added to the model of the last accepted row.
 struct Trial {
   LadderRow row;
   stability::Model model;
   std::vector<FlightSquares> fit, select;  ///< by flight
   std::vector<EffectSpec> turning = {};    ///< of the model, fitted to predictions
+  std::size_t follows = 0;                 ///< the trial to which the effect is added
 };
-
-}  // namespace
-
-Split split_flights(residuals::Inputs& inputs) {
-  Split split;
-  if (inputs.found.flights.size() < 3) {
-    split.by = split_in_time(inputs) ? Split::By::kTime : Split::By::kNothing;
-    if (split.by == Split::By::kNothing) {
-      split.fit = split.select = split.test = every_flight(inputs);
-      return split;
-    }
-  }
-  const auto count = static_cast<int>(inputs.found.flights.size());
-  for (int i = 0; i < count; ++i) {
-    const bool few = count < 5;
-    const bool test = few ? i == count - 1 : i % 5 == 4;
-    const bool select = few ? i == count - 2 : i % 5 == 2;
-    (test ? split.test : select ? split.select : split.fit).push_back(i);
-  }
-  return split;
-}
-
-namespace {
 
 /// Tries effects one after the other and keeps those that reduce the error on the select flights.
 class Climb {
@@ -276,6 +145,7 @@ class Climb {
     for (const std::string& asked : wanted_) attempt(asked, kLeastFall);
     if (is_automatic_) {
       ladder_.stopped = add_forms();
+      add_torques();
       add_turning();
     }
     finish();
@@ -326,17 +196,16 @@ class Climb {
   }
 
   void accept(const Turned& next) {
-    best().row.select_rates_rad_s = turning_->rates_rad_s();
+    Trial now = unmoved(next.name);
+    now.row.measure = measure(next);
     turning_->accept(next);
-    Trial now = best();
-    now.row.effect = next.name;
-    now.row.note.clear();
-    now.row.select_rates_rad_s = turning_->rates_rad_s();
     now.turning = next.specs;
     now.model = with_effects(without_turning(), next.specs);
-    now.row.values = ladder_values(now.model);
-    trials_.push_back(std::move(now));
-    best_ = trials_.size() - 1;
+    keep(std::move(now));
+  }
+
+  LadderMeasure measure(const Turned& next) const {
+    return {kRatesAhead, "rad/s", {turning_->accepted().mean_rad_s(), next.mean_rad_s()}, {}};
   }
 
   /// Tries an effect that turns the vehicle because the user asks for it. Returns whether it is accepted.
@@ -347,14 +216,67 @@ class Climb {
                     "speeds, or the force of each rotor at 400 Hz");
     const Turned next = turning_->with(name);
     if (turning_->error_ratio(next) > 1 - kLeastFall && !keeps_anyway_)
-      return refuse(name, fmt::format("the error of predicted body rates goes from {:.4f} to {:.4f} rad/s",
-                                      turning_->rates_rad_s(), TurningSearch::rates_rad_s(next)));
+      return refuse(name, in_words(measure(next)));
     accept(next);
     return true;
   }
 
+  /// Adds what the mean torques of the rotors show, as diagnose() does.
+  void add_torques() {
+    residuals::Inputs inputs = only_flights(inputs_, ladder_.split.fit);
+    inputs.models = {best().model};
+    std::map<std::string, std::vector<EffectSpec>> found;
+    for (const TorqueBalance& balance : torque_balances(inputs, kind_, jobs_))
+      if (balance.is_named()) found[balance.effect].push_back(spec_of(balance, balance.effect));
+    for (auto& [effect, specs] : found) {
+      if (specs.size() == 1) specs[0].vehicle.clear();
+      attempt_torques(effect, specs);
+    }
+  }
+
+  bool attempt_torques(const std::string& effect, const std::vector<EffectSpec>& specs) {
+    const auto imbalance_on_select_N = [this](const stability::Model& model) {
+      residuals::Inputs inputs = only_flights(inputs_, ladder_.split.select);
+      inputs.models = {model};
+      return torque_imbalance_N(inputs, kind_, jobs_);
+    };
+    Trial now = unmoved(effect);
+    now.model = with_effects(best().model, specs);
+    now.row.measure = LadderMeasure{
+        kImbalance, "N", {imbalance_on_select_N(best().model), imbalance_on_select_N(now.model)}, {}};
+    if (!falls(*now.row.measure)) return refuse(effect, in_words(*now.row.measure));
+    change_models(working_, [&](stability::Model& model) { model = with_effects(model, specs); });
+    keep(std::move(now));
+    return true;
+  }
+
+  static bool falls(const LadderMeasure& measure) {
+    return measure.select[0] > 0 && measure.select[1] <= (1 - kLeastFall) * measure.select[0];
+  }
+
+  static std::string in_words(const LadderMeasure& measure) {
+    return fmt::format("the {} of the select flights goes from {:.5f} to {:.5f} {}", measure.quantity,
+                       measure.select[0], measure.select[1], measure.unit);
+  }
+
+  /// The best trial under another name: an effect that does not change the force residual.
+  Trial unmoved(const std::string& effect) {
+    Trial now = best();
+    now.row.effect = effect;
+    now.row.note.clear();
+    now.row.measure.reset();
+    return now;
+  }
+
+  void keep(Trial now) {
+    now.row.values = ladder_values(now.model);
+    now.follows = best_;
+    best_ = trials_.size();
+    trials_.push_back(std::move(now));
+  }
+
   /// The best model without what was fitted to predictions.
-  stability::Model without_turning() { return with_effects(working_.models[0], specs_of(fitted_)); }
+  stability::Model without_turning() const { return with_effects(working_.models[0], specs_of(fitted_)); }
 
   /// Whether the accepted effects leave slow disturbances, a vibration, or a force of which a variable explains much.
   bool leaves_something() const {
@@ -419,6 +341,7 @@ class Climb {
     Trial next =
         trial(name, with_effects(with_effects(working_.models[0], specs_of(fitted)), best().turning));
     next.turning = best().turning;
+    next.follows = best_;
     const bool is_form = name != asked && is_automatic_;
     const bool helps =
         is_rotors ? balances(next) : lowers_error(next, least_fall) && (!is_form || raises_none(next));
@@ -454,14 +377,14 @@ class Climb {
 
   bool balances(Trial& next) {
     const auto before_N = imbalance_N(inputs_, best().model, ladder_.split.select, jobs_);
-    const auto after_N = imbalance_N(inputs_, next.model, ladder_.split.select, jobs_);
-    const bool helps = before_N && *after_N <= (1 - kLeastFall) * *before_N;
-    if (!before_N)
+    if (!before_N) {
       next.row.note = "the select flights have no slow flight with the duty of each motor";
-    else if (!helps)
-      next.row.note = fmt::format("the rotor imbalance of the select flights goes from {:.5f} to {:.5f} N",
-                                  *before_N, *after_N);
-    return helps;
+      return false;
+    }
+    const double after_N = *imbalance_N(inputs_, next.model, ladder_.split.select, jobs_);
+    next.row.measure = LadderMeasure{kImbalance, "N", {*before_N, after_N}, {}};
+    if (!falls(*next.row.measure)) next.row.note = in_words(*next.row.measure);
+    return next.row.note.empty();
   }
 
   /// Stores the errors in the model file, with the effect fitted last.
@@ -487,8 +410,8 @@ class Climb {
         effect.fit.note = "one or two short flights: selected on the flights to fit, and not tested";
     }
     const double floor_N = noise_floor_N(inputs_, ladder_.model, ladder_.split.test, jobs_);
-    test_turning();
     for (Trial& t : trials_) {
+      if (t.row.measure && ladder_.split.by != Split::By::kNothing) t.row.measure->test = on_test(t);
       if (ladder_.split.by != Split::By::kNothing)
         t.row.test_rmse_N = rmse_N(squares_of(inputs_, t.model, ladder_.split.test, jobs_));
       t.row.noise_floor_N = floor_N;
@@ -499,15 +422,28 @@ class Climb {
     ladder_.model.ladder.insert(ladder_.model.ladder.end(), ladder_.rows.begin(), ladder_.rows.end());
   }
 
-  void test_turning() {
-    if (best().turning.empty() || ladder_.split.by == Split::By::kNothing) return;
-    residuals::Inputs inputs = inputs_;
-    inputs.models = {without_turning()};
-    const TurningFlights test(inputs, kind_, ladder_.split.test, jobs_);
-    for (Trial& t : trials_) {
-      if (test.empty() || !(t.row.select_rates_rad_s > 0)) continue;
-      t.row.test_rates_rad_s = TurningSearch::rates_rad_s({"", {}, test.rate_errors_rad_s(t.turning)});
+  /// Measures on the test flights what decided about `t`, before it and with it.
+  std::array<double, 2> on_test(const Trial& t) const {
+    const Trial& before = trials_[t.follows];
+    residuals::Inputs inputs = only_flights(inputs_, ladder_.split.test);
+    const auto with = [&](const stability::Model& model) {
+      inputs.models = {model};
+      return inputs;
+    };
+    if (is_turning(t.row.effect)) {
+      const TurningFlights flights(with(without_turning()), kind_, every_flight(inputs), jobs_);
+      if (flights.empty()) return {};
+      const auto error_rad_s = [&](const Trial& trial) {
+        return Turned{"", {}, flights.rate_errors_rad_s(trial.turning)}.mean_rad_s();
+      };
+      return {error_rad_s(before), error_rad_s(t)};
     }
+    if (t.row.effect != rotor_effect())
+      return {torque_imbalance_N(with(before.model), kind_, jobs_),
+              torque_imbalance_N(with(t.model), kind_, jobs_)};
+    const auto before_N = imbalance_N(inputs_, before.model, ladder_.split.test, jobs_);
+    if (!before_N) return {};
+    return {*before_N, *imbalance_N(inputs_, t.model, ladder_.split.test, jobs_)};
   }
 
   const residuals::Inputs& inputs_;

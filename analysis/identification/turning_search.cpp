@@ -21,9 +21,7 @@ TurningSearch::TurningSearch(const residuals::Inputs& inputs, const std::string&
   if (is_possible()) accepted_.rates_rad_s = select_.rate_errors_rad_s({});
 }
 
-double TurningSearch::rates_rad_s() const { return rates_rad_s(accepted_); }
-
-double TurningSearch::rates_rad_s(const Turned& next) { return mean_of(next.rates_rad_s); }
+double Turned::mean_rad_s() const { return mean_of(rates_rad_s); }
 
 Turned TurningSearch::with(const std::string& name) const {
   std::vector<stability::EffectSpec> specs = accepted_.specs;
@@ -54,7 +52,7 @@ std::optional<Turned> TurningSearch::best_of(const std::vector<std::string>& nam
   std::optional<Turned> best;
   for (const std::string& name : names) {
     Turned next = with(name);
-    if (!best || rates_rad_s(next) < rates_rad_s(*best)) best = std::move(next);
+    if (!best || next.mean_rad_s() < best->mean_rad_s()) best = std::move(next);
   }
   if (best && !explains_motion(*best)) best.reset();
   return best;

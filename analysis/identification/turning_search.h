@@ -14,6 +14,8 @@ struct Turned {
   std::string name;
   std::vector<stability::EffectSpec> specs;  ///< of all of them
   std::vector<double> rates_rad_s;           ///< TurningFlights::rate_errors_rad_s() of the select flights
+
+  double mean_rad_s() const;
 };
 
 class TurningSearch {
@@ -26,10 +28,6 @@ class TurningSearch {
   bool is_possible() const { return !fit_.empty() && !select_.empty(); }
 
   const Turned& accepted() const { return accepted_; }
-  /// Returns the mean error of the body rates with what is accepted, or with `next`.
-  double rates_rad_s() const;
-  static double rates_rad_s(const Turned& next);
-
   Turned with(const std::string& name) const;
   /// Returns the mean over flights of the errors with `next`, relative to those with what is accepted.
   double error_ratio(const Turned& next) const;

@@ -2,8 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
-
 #include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/label_output.h"
@@ -27,6 +25,16 @@ std::optional<double> if_known(bool is_known, double value) {
 
 }  // namespace
 
+void describe_measure(files::Record& record, const stability::LadderMeasure& measure) {
+  const auto pair = [&](const char* name, const std::array<double, 2>& of, const char* meaning) {
+    record.field(name, std::vector<double>(of.begin(), of.end()), meaning, "", "estimate");
+  };
+  record.field("quantity", measure.quantity, "");
+  record.field("unit", measure.unit, "");
+  pair("select", measure.select, "Before the step and after it, on the flights that decide.");
+  pair("test", measure.test, "On flights that decide nothing; zeros: nothing is tested.");
+}
+
 void describe_ladder_row(files::Record& record, const LadderRow& row) {
   const bool is_tested = row.test_rmse_N > 0;
   record.field("effect", row.effect, "What was added; nominal: the given model.");
@@ -39,13 +47,10 @@ void describe_ladder_row(files::Record& record, const LadderRow& row) {
   record.field("over_noise_floor",
                if_known(is_tested && row.noise_floor_N > 0, row.test_rmse_N / row.noise_floor_N),
                "test_rmse over what no model can explain.", "", "estimate");
-  record.may(
-      "select_rates", if_known(row.select_rates_rad_s > 0, row.select_rates_rad_s),
-      "Where effects that turn the vehicle were tried: mean error of the body rates over predictions of half "
-      "a second, on the flights that decide.",
-      "rad/s", "estimate");
-  record.may("test_rates", if_known(row.test_rates_rad_s > 0, row.test_rates_rad_s),
-             "On flights that decide nothing.", "rad/s", "estimate");
+  const stability::LadderMeasure measure = row.measure.value_or(stability::LadderMeasure{});
+  record.may_object(row.measure.has_value(), "measure",
+                    "What decided, if it is not the residual of the force.",
+                    [&](files::Record& r) { describe_measure(r, measure); });
   record.field("test_looks", row.test_looks, "How often the test flights had been looked at.");
   record.field("accepted", row.accepted, "");
   record.field("reason", row.note, "Why it was refused, or kept nevertheless.");
@@ -96,17 +101,15 @@ void describe(files::Record& record, const AddResult& result) {
   });
 }
 
-/// The rows in which effects that turn the vehicle were tried.
-void print_rates(const std::vector<LadderRow>& rows) {
-  const auto any = [](const LadderRow& row) { return row.select_rates_rad_s > 0; };
-  if (std::none_of(rows.begin(), rows.end(), any)) return;
-  fmt::print("Error of the body rates over predictions of half a second, in rad/s\n");
-  fmt::print("  {:<18}{:>10}{:>10}{:>10}\n", "", "", "select", "test");
+/// The rows that something else than the force decided.
+void print_measures(const std::vector<LadderRow>& rows) {
   for (const LadderRow& row : rows) {
-    if (!any(row)) continue;
-    fmt::print("  {:<18}{:>10}{:>10.5f}{:>10}\n", (row.effect == "nominal" ? "" : "+ ") + row.effect, "",
-               row.select_rates_rad_s,
-               row.test_rates_rad_s > 0 ? fmt::format("{:.5f}", row.test_rates_rad_s) : "-");
+    if (!row.measure || !row.accepted) continue;
+    const stability::LadderMeasure& m = *row.measure;
+    fmt::print("  {}: {} {:.4g} -> {:.4g} {} on the select flights", row.effect, m.quantity, m.select[0],
+               m.select[1], m.unit);
+    if (m.test[0] > 0) fmt::print(", {:.4g} -> {:.4g} on the test flights", m.test[0], m.test[1]);
+    fmt::print("\n");
   }
 }
 
@@ -121,7 +124,7 @@ void print_ladder(const std::vector<LadderRow>& rows) {
                    : "-",
                row.note.empty() ? "" : (row.accepted ? "  kept although " : "  refused: ") + row.note);
   }
-  print_rates(rows);
+  print_measures(rows);
 }
 
 std::string what_rows_measure(const std::vector<stability::LadderRow>& rows) {

@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "analysis/identification/candidates.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::analysis {
@@ -43,9 +42,9 @@ Cause cause_of(const LadderRow& row, const LadderRow& before, const Ladder& ladd
   const bool is_tested = row.test_rmse_N > 0 && before.test_rmse_N > 0;
   cause.before_N = is_tested ? before.test_rmse_N : before.fit_rmse_N;
   cause.after_N = is_tested ? row.test_rmse_N : row.fit_rmse_N;
-  if (identification::is_turning(row.effect)) {
-    cause.rates_before_rad_s = is_tested ? before.test_rates_rad_s : before.select_rates_rad_s;
-    cause.rates_after_rad_s = is_tested ? row.test_rates_rad_s : row.select_rates_rad_s;
+  if (row.measure) {
+    const auto& [before_it, with_it] = row.measure->test[0] > 0 ? row.measure->test : row.measure->select;
+    cause.measure = CauseMeasure{row.measure->quantity, row.measure->unit, before_it, with_it};
   }
   for (const EffectSpec* const spec : added_by(row, before, ladder.model.effects)) {
     cause.equation = equation_of(*spec);
@@ -58,6 +57,13 @@ Cause cause_of(const LadderRow& row, const LadderRow& before, const Ladder& ladd
 
 }  // namespace
 
+void describe(files::Record& record, const CauseMeasure& measure) {
+  record.field("quantity", measure.quantity, "");
+  record.field("unit", measure.unit, "");
+  record.field("before", measure.before, "Without the cause and those after it.", "", "estimate");
+  record.field("after", measure.after, "With it.", "", "estimate");
+}
+
 void describe(files::Record& record, const Cause& cause) {
   record.field("name", cause.name, "Effect, formula or shape, as in the fitted model.");
   record.field("equation", cause.equation, "Of the force, or of what it changes.");
@@ -65,11 +71,7 @@ void describe(files::Record& record, const Cause& cause) {
   record.field("rmse_before", cause.before_N, "Of the residual vector, without it and those after it.", "N",
                "estimate");
   record.field("rmse_after", cause.after_N, "With it.", "N", "estimate");
-  record.may(
-      "rates_before", cause.rates_before_rad_s,
-      "Of an effect that turns the vehicle: mean error of the body rates over predictions of half a second.",
-      "rad/s", "estimate");
-  record.may("rates_after", cause.rates_after_rad_s, "With it.", "rad/s", "estimate");
+  record.may("measure", cause.measure, "What decided, if it is not the residual of the force.");
   record.field("fall_percent", cause.fall_percent(), "By which it lowers the error where `held_out` says.",
                "%", "estimate");
 }
@@ -89,7 +91,7 @@ std::string sentence(const Cause& cause, const residuals::ForceUnit& unit) {
   std::string values;
   for (const auto& [name, value] : cause.parameters) {
     const bool is_fitted = value.interval_90 && value.interval_90->lower < value.interval_90->upper;
-    if (!is_fitted && !cause.rates_before_rad_s) continue;
+    if (!is_fitted && !cause.measure) continue;
     const std::string of = values.empty() ? "" : ", ";
     if (!is_fitted) {
       values += fmt::format("{}{} = {:.4g}", of, name, value.value);
@@ -101,10 +103,10 @@ std::string sentence(const Cause& cause, const residuals::ForceUnit& unit) {
   const double fall = cause.fall_percent();
   const std::string by = fmt::format("by {:.0f} %", std::abs(fall));
   const char* const moves = fall < 0 ? "raises" : "lowers";
-  if (cause.rates_before_rad_s)
-    return fmt::format(
-        "{}: {}; {} the error of body rates up to half a second ahead {}, {:.3g} to {:.3g} rad/s", cause.name,
-        values, moves, by, *cause.rates_before_rad_s, *cause.rates_after_rad_s);
+  if (cause.measure)
+    return fmt::format("{}: {}; {} the {} {}, {:.3g} to {:.3g} {}", cause.name, values, moves,
+                       cause.measure->quantity, by, cause.measure->before, cause.measure->after,
+                       cause.measure->unit);
   return fmt::format("{}: {}; {} the error {}, {:.3g} to {:.3g} {}", cause.name, values, moves, by,
                      cause.before_N * unit.per_newton(), cause.after_N * unit.per_newton(), unit.name);
 }

@@ -11,6 +11,12 @@
 
 namespace swarmcert::analysis {
 
+struct CauseMeasure {
+  std::string quantity, unit;
+  double before = 0, after = 0;
+};
+void describe(files::Record& record, const CauseMeasure& measure);
+
 struct Cause {
   std::string name;
   std::string equation;     ///< of the force, or of what it changes; parameters by name
@@ -18,11 +24,11 @@ struct Cause {
   /// RMSE of the residual vector before and after, on flights that decided nothing; if nothing was held out, on those
   /// of the fit.
   double before_N = 0, after_N = 0;
-  /// Of an effect that turns the vehicle instead: mean errors of the body rates over predictions of half a second.
-  std::optional<double> rates_before_rad_s, rates_after_rad_s;
+  /// What decided instead, on the same flights; absent: the residual did.
+  std::optional<CauseMeasure> measure;
 
   double fall_percent() const {
-    const double before = rates_before_rad_s.value_or(before_N), after = rates_after_rad_s.value_or(after_N);
+    const double before = measure ? measure->before : before_N, after = measure ? measure->after : after_N;
     return before > 0 ? 100 * (1 - after / before) : 0;
   }
 };

@@ -25,18 +25,8 @@ residuals::Inputs with_model(residuals::Inputs inputs, const std::vector<stabili
   return inputs;
 }
 
-/// Returns the imbalance of the rotors over all vehicles; 0 if none has ten blocks.
-double imbalance_of(const residuals::Inputs& inputs, int jobs) {
-  double squares = 0, blocks = 0;
-  for (const TorqueBalance& balance : torque_balances(inputs, inputs.models[0].kind, jobs)) {
-    squares += static_cast<double>(balance.blocks) * balance.rmse_before_N * balance.rmse_before_N;
-    blocks += static_cast<double>(balance.blocks);
-  }
-  return blocks > 0 ? std::sqrt(squares / blocks) : 0;
-}
-
 double error_of(const residuals::Inputs& inputs, const std::string& effect, int jobs) {
-  if (is_of_torques(effect)) return imbalance_of(inputs, jobs);
+  if (is_of_torques(effect)) return torque_imbalance_N(inputs, inputs.models[0].kind, jobs);
   return residuals::compare(inputs, jobs, [](int, int) {}).overall.statistics.rmse.total;
 }
 

@@ -102,6 +102,15 @@ std::vector<TorqueBalance> torque_balances(const residuals::Inputs& inputs, cons
       });
 }
 
+double torque_imbalance_N(const residuals::Inputs& inputs, const std::string& kind, int jobs) {
+  double squares = 0, blocks = 0;
+  for (const TorqueBalance& balance : torque_balances(inputs, kind, jobs)) {
+    squares += static_cast<double>(balance.blocks) * balance.rmse_before_N * balance.rmse_before_N;
+    blocks += static_cast<double>(balance.blocks);
+  }
+  return blocks > 0 ? std::sqrt(squares / blocks) : 0;
+}
+
 stability::EffectSpec spec_of(const TorqueBalance& balance, const std::string& effect) {
   stability::EffectSpec spec;
   spec.name = effect;

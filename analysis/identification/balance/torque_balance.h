@@ -58,6 +58,9 @@ void fit_torques(const std::vector<residuals::TorqueBlock>& blocks, const stabil
 std::vector<TorqueBalance> torque_balances(const residuals::Inputs& inputs, const std::string& kind,
                                            int jobs);
 
+/// Returns TorqueBalance::rmse_before_N over the blocks of all vehicles; 0 if none has 10 blocks.
+double torque_imbalance_N(const residuals::Inputs& inputs, const std::string& kind, int jobs);
+
 /// Returns `effect`, com_offset or torque_bias, with the values and intervals of `balance`, for its vehicle.
 stability::EffectSpec spec_of(const TorqueBalance& balance, const std::string& effect);
 
