@@ -36,22 +36,23 @@ std::string unit_at(const Node& row, const std::string& path) {
 }
 
 /// Factor and name of the unit in which a column shows the field at its path.
-std::pair<double, std::string> scale_of(const Column& column, const Node& row, const ForceScale& forces) {
+std::pair<double, std::string> scale_of(const Column& column, const std::string& path, const Node& row,
+                                        const ForceScale& forces) {
   if (*column.unit != '\0' || column.factor != 1) return {column.factor, column.unit};
-  return shown_unit(unit_at(row, column.path), forces);
+  return shown_unit(unit_at(row, path), forces);
 }
 
-std::string head_of(const Column& column, const Node& row, const std::string& unit) {
+std::string head_of(const Column& column, const std::string& path, const Node& row, const std::string& unit) {
   std::string words = column.head;
-  if (words.empty() && *column.path != '\0') words = words_of(*row.find(column.path));
+  if (words.empty() && !path.empty()) words = words_of(*row.find(path));
   return unit.empty() ? words : words + " [" + unit + "]";
 }
 
-/// The first row that has the field of a column.
-const Node& row_with(const Node& list, const Column& column) {
+/// The first row that has a field; nullptr: none.
+const Node* row_with(const Node& list, const std::string& path) {
   for (const Node& row : list.members)
-    if (*column.path == '\0' || row.find(column.path) != nullptr) return row;
-  throw std::logic_error(std::string("no row has a field ") + column.path);
+    if (path.empty() || row.find(path) != nullptr) return &row;
+  return nullptr;
 }
 
 bool is_numeric(const std::string& text) {
@@ -83,27 +84,38 @@ std::string cell(const Node& value, const char* format, double factor) {
   if (const std::string* text = std::get_if<std::string>(&value.value)) return *text;
   std::string words;
   for (const Node& member : value.members)
-    words += (words.empty() ? "" : ", ") + cell(member, format, factor);
+    words += (words.empty() ? "" : ", ") + (value.kind == Node::Kind::map ? member.name + " " : "") +
+             cell(member, format, factor);
   return words.empty() ? "-" : words;
 }
 
 Table table(const Node& list, const std::vector<Column>& columns, const ForceScale& forces) {
   Table result;
   if (list.members.empty()) return result;
-  std::vector<double> factors;
+  struct Shown {
+    std::string path;
+    const char* format;
+    double factor;
+  };
+  std::vector<Shown> shown;
   for (const Column& column : columns) {
-    const Node& row = row_with(list, column);
-    const auto [factor, unit] = scale_of(column, row, forces);
-    factors.push_back(factor);
-    result.header.push_back(head_of(column, row, unit));
+    std::string path = column.path;
+    const bool may_lack = !path.empty() && path.back() == '?';
+    if (may_lack) path.pop_back();
+    const Node* const row = row_with(list, path);
+    if (row == nullptr && may_lack) continue;
+    if (row == nullptr) throw std::logic_error("no row has a field " + path);
+    const auto [factor, unit] = scale_of(column, path, *row, forces);
+    shown.push_back({path, column.format, factor});
+    result.header.push_back(head_of(column, path, *row, unit));
   }
   for (const Node& row : list.members) {
     std::vector<std::string> cells;
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-      const Node* const field = *columns[i].path == '\0' ? nullptr : row.find(columns[i].path);
-      cells.push_back(*columns[i].path == '\0' ? row.name
-                      : field == nullptr       ? "-"
-                                               : cell(*field, columns[i].format, factors[i]));
+    for (const Shown& column : shown) {
+      const Node* const field = column.path.empty() ? nullptr : row.find(column.path);
+      cells.push_back(column.path.empty() ? row.name
+                      : field == nullptr  ? "-"
+                                          : cell(*field, column.format, column.factor));
     }
     result.rows.push_back(std::move(cells));
   }
@@ -115,7 +127,7 @@ Table fields_table(const Node& record, const std::vector<Column>& rows, const Fo
   for (const Column& row : rows) {
     const Node* const field = record.find(row.path);
     if (field == nullptr) continue;
-    const auto [factor, unit] = scale_of(row, record, forces);
+    const auto [factor, unit] = scale_of(row, row.path, record, forces);
     const std::string value = cell(*field, row.format, factor);
     result.rows.push_back(
         {*row.head != '\0' ? row.head : words_of(*field), unit.empty() ? value : value + " " + unit});

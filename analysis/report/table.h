@@ -16,7 +16,7 @@ struct ForceScale {
 };
 
 struct Column {
-  const char* path;         ///< of a field of a row, as in "max.x"
+  const char* path;         ///< of a field of a row, as in "max.x"; "max.x?": left out if no row has it
   const char* head = "";    ///< empty: the name of the field
   const char* format = "";  ///< of numbers, as in "{:.4f}"; empty: four significant digits
   double factor = 1;        ///< "%" as unit and 100 here: a share
@@ -38,7 +38,8 @@ Table fields_table(const files::Node& record, const std::vector<Column>& rows, c
 /// Returns a table as lines with aligned columns, numbers to the right, each line indented by two spaces.
 std::string to_text(const Table& table);
 
-/// Returns a described value as people read it: "-" for null, "yes", "no", texts of a list after one another.
+/// Returns a described value as people read it: "-" for null, "yes", "no", members of a list after one another, those
+/// of a map with their names.
 std::string cell(const files::Node& value, const char* format = "", double factor = 1);
 
 /// Returns the factor from the described unit, such as "N/s", to the one that is shown, and that unit's name.

@@ -47,22 +47,51 @@ std::string paths(const Flown& flown) {
 
 float height_error_m(const Moment& now) { return now.p_m.z() - now.p_d_m.z(); }
 
-}  // namespace
+/// The network trained with this many vehicles; nothing for 0, the baseline.
+std::optional<files::Network> network_of(Stages& stages, int trained_with) {
+  if (trained_with == 0) return std::nullopt;
+  return stages.learned(stage_of(trained_with)).network;
+}
 
-Finding figure_intro(const Setting& setting) {
+void describe_truth_name(files::Record& record, const std::string& truth) {
+  record.field("truth", truth, "Name of the simulated truth.");
+}
+
+/// Largest height errors of a controller: of the swarm, or vehicle by vehicle.
+template <class Error>
+struct ControllerError {
+  int trained_with = 0;
+  Error max_z_m{};
+};
+
+template <class Error>
+struct SwapResult {
+  std::string truth;
+  std::vector<ControllerError<Error>> controllers;
+};
+using IntroResult = SwapResult<double>;
+using SwapsResult = SwapResult<std::vector<double>>;
+
+template <class Error>
+void describe(files::Record& record, const SwapResult<Error>& result) {
+  describe_truth_name(record, result.truth);
+  record.list("controllers", result.controllers, "Largest height error of each controller.",
+              [](files::Record& r, const ControllerError<Error>& row) {
+                r.field("trained_with", row.trained_with,
+                        "Number of vehicles that the network was trained with; 0: no network.");
+                r.field("max_z_m", row.max_z_m, "Largest |z - z_d|; a list: of each vehicle.", "m");
+              });
+}
+
+Finding run_intro(const Setting& setting) {
   Finding finding;
   Stages stages = stages_of(setting);
-  finding.json["truth"] = stages.truth().name;
-  finding.json["controllers"] = files::Json::array();
-  Table table = {"Two vehicles swap sides, six times", {"controller", "largest |z - z_d| [m]"}, {}};
+  IntroResult result{stages.truth().name, {}};
   for (const int trained_with : {0, 2}) {
-    std::optional<files::Network> network;
-    if (trained_with > 0) network = stages.learned(stage_of(trained_with)).network;
+    const std::optional<files::Network> network = network_of(stages, trained_with);
     const Flown flown = fly(setting, stages.truth(), {"swap", 2, 0, flight_seed(setting)},
                             network ? &*network : nullptr, false);
-    const double largest_m = largest_error_m(flown, 2);
-    table.rows.push_back({curve_name(trained_with), fmt::format("{:.3f}", largest_m)});
-    finding.json["controllers"].push_back({{"trained_with", trained_with}, {"max_z_m", largest_m}});
+    result.controllers.push_back({trained_with, largest_error_m(flown, 2)});
     const std::string name = trained_with == 0 ? "intro_baseline" : "intro_network";
     finding.figures.push_back(
         {name, paths(flown),
@@ -73,33 +102,26 @@ Finding figure_intro(const Setting& setting) {
              name + ".dat' index i using 2:4 with lines dt 2 lc 'gray' notitle\n",
          fmt::format("Paths of two vehicles, {}; dashed: as commanded.", curve_name(trained_with))});
   }
-  finding.tables.push_back(std::move(table));
+  finding.fields = files::record_of(result);
+  finding.show("Two vehicles swap sides, six times (trained with 0: baseline)", "controllers",
+               {{"trained_with"}, {"max_z_m", "largest |z - z_d|", "{:.3f}"}});
   return finding;
 }
 
-Finding figure_swaps(const Setting& setting) {
+Finding run_swaps(const Setting& setting) {
   Finding finding;
   Stages stages = stages_of(setting);
-  finding.json["truth"] = stages.truth().name;
-  finding.json["controllers"] = files::Json::array();
-  Table table = {"Three vehicles, two swaps: largest |z - z_d| [m]",
-                 {"controller", "vehicle 1 (lowest)", "vehicle 2", "vehicle 3"},
-                 {}};
+  SwapsResult result{stages.truth().name, {}};
   for (const int trained_with : {0, 2, 3, 4}) {
-    std::optional<files::Network> network;
-    if (trained_with > 0) network = stages.learned(stage_of(trained_with)).network;
+    const std::optional<files::Network> network = network_of(stages, trained_with);
     const Flown flown = fly(setting, stages.truth(), {"swap", 3, 9, flight_seed(setting)},
                             network ? &*network : nullptr, false);
-    std::vector<std::string> row = {curve_name(trained_with)};
-    files::Json errors = files::Json::array();
+    result.controllers.push_back({trained_with, {}});
     for (const auto& moments : flown.vehicles) {
       float largest = 0;
       for (const Moment& now : moments) largest = std::max(largest, std::abs(height_error_m(now)));
-      row.push_back(fmt::format("{:.3f}", largest));
-      errors.push_back(static_cast<double>(largest));
+      result.controllers.back().max_z_m.push_back(static_cast<double>(largest));
     }
-    table.rows.push_back(std::move(row));
-    finding.json["controllers"].push_back({{"trained_with", trained_with}, {"max_z_m", std::move(errors)}});
     const std::string name = fmt::format("swaps_{}", trained_with);
     finding.figures.push_back(
         {name,
@@ -113,16 +135,16 @@ Finding figure_swaps(const Setting& setting) {
          fmt::format("Height errors of three vehicles, {}; aligned at 3.0 s and 7.5 s.",
                      curve_name(trained_with))});
   }
-  finding.tables.push_back(std::move(table));
+  finding.fields = files::record_of(result);
+  finding.show("Three vehicles, two swaps (trained with 0: baseline)", "controllers",
+               {{"trained_with"}, {"max_z_m", "largest |z - z_d|, lowest vehicle first", "{:.3f}"}});
   return finding;
 }
 
-namespace {
-
 struct Placement {
-  const char* name;
-  const char* words;
-  bool from_text;               ///< whether the positions come from the paper's text; otherwise they are ours
+  const char* name = "";
+  const char* words = "";
+  bool from_text = false;       ///< whether the positions come from the paper's text; otherwise they are ours
   std::vector<Relative> stars;  ///< positions and velocities of the neighbours
 };
 
@@ -159,6 +181,7 @@ double force_gf(Interaction& function, const Placement& placement, double y, dou
 
 /// Forces on a grid of positions in gnuplot's format, and their distance from the truth.
 struct HeatMap {
+  Placement placement;
   std::string data;
   double least_gf = INFINITY, most_gf = -INFINITY, rms_gf = 0;
 };
@@ -166,6 +189,7 @@ struct HeatMap {
 HeatMap heat_map(Interaction& learned, Interaction& truth, const Placement& placement) {
   constexpr int kSteps = 61;
   HeatMap map;
+  map.placement = placement;
   double squares = 0;
   for (int i = 0; i < kSteps; ++i) {
     for (int j = 0; j < kSteps; ++j) {
@@ -198,59 +222,100 @@ std::string heat_map_script(const std::string& name) {
          plot("network", 3) + plot("truth", 4) + "unset multiplot\n";
 }
 
-}  // namespace
+void describe_heat_map(files::Record& record, const HeatMap& map) {
+  record.field("map", map.placement.name, "");
+  record.field("words", map.placement.words, "Where the neighbours are.");
+  record.field("places_from_the_text", map.placement.from_text, "false: the places are our choice.");
+  record.field("least_gf", map.least_gf, "", "gf");
+  record.field("most_gf", map.most_gf, "", "gf");
+  record.field("rms_from_truth_gf", map.rms_gf, "", "gf");
+}
 
-Finding figure_heatmap(const Setting& setting) {
+void describe_trained_with(files::Record& record, const std::string& truth) {
+  describe_truth_name(record, truth);
+  record.field("trained_with", 3, "Number of vehicles that the network was trained with.");
+}
+
+struct HeatMapResult {
+  std::string truth;
+  std::vector<HeatMap> maps;
+  double probe_gf = 0, actual_gf = 0;
+};
+
+constexpr double kProbeY_m = -0.3, kProbeZ_m = -0.5;
+
+void describe(files::Record& record, const HeatMapResult& result) {
+  describe_trained_with(record, result.truth);
+  record.list("maps", result.maps, "Force over places, map by map.", describe_heat_map);
+  record.object("probe", "The force at the place that the paper states.", [&](files::Record& probe) {
+    probe.field("map", "c", "");
+    probe.field("y_m", kProbeY_m, "", "m");
+    probe.field("z_m", kProbeZ_m, "", "m");
+    probe.field("network_gf", result.probe_gf, "", "gf");
+    probe.field("truth_gf", result.actual_gf, "", "gf");
+    probe.field("paper_gf", 4, "", "gf");
+  });
+}
+
+Finding run_heatmap(const Setting& setting) {
   Finding finding;
   Stages stages = stages_of(setting);
-  finding.json["truth"] = stages.truth().name;
-  finding.json["trained_with"] = 3;
-  finding.json["maps"] = files::Json::array();
+  HeatMapResult result;
+  result.truth = stages.truth().name;
   Interaction learned(stages.learned(stage_of(3)).network), truth(stages.truth());
-  Table table = {"Force along z over places (0, y, z), network trained with 3",
-                 {"map", "places", "least [gf]", "largest [gf]", "RMS from the truth [gf]"},
-                 {}};
   for (const Placement& placement : placements()) {
-    HeatMap map = heat_map(learned, truth, placement);
-    table.rows.push_back({placement.name,
-                          std::string(placement.words) + (placement.from_text ? "" : " (ours)"),
-                          fmt::format("{:.1f}", map.least_gf), fmt::format("{:.1f}", map.most_gf),
-                          fmt::format("{:.2f}", map.rms_gf)});
-    finding.json["maps"].push_back({{"map", placement.name},
-                                    {"words", placement.words},
-                                    {"places_from_the_text", placement.from_text},
-                                    {"least_gf", map.least_gf},
-                                    {"most_gf", map.most_gf},
-                                    {"rms_from_truth_gf", map.rms_gf}});
+    result.maps.push_back(heat_map(learned, truth, placement));
     const std::string name = fmt::format("heatmap_{}", placement.name);
     finding.figures.push_back(
-        {name, std::move(map.data), heat_map_script(name),
+        {name, result.maps.back().data, heat_map_script(name),
          fmt::format("({}) {}; {}.", placement.name, placement.words,
                      placement.from_text ? "places from the paper's text" : "places chosen by us")});
   }
-  finding.tables.push_back(std::move(table));
-  const double probe = force_gf(learned, placements()[2], -0.3, -0.5),
-               actual = force_gf(truth, placements()[2], -0.3, -0.5);
-  finding.json["probe"] = {{"map", "c"},          {"y_m", -0.3},        {"z_m", -0.5},
-                           {"network_gf", probe}, {"truth_gf", actual}, {"paper_gf", 4}};
+  result.probe_gf = force_gf(learned, placements()[2], kProbeY_m, kProbeZ_m);
+  result.actual_gf = force_gf(truth, placements()[2], kProbeY_m, kProbeZ_m);
+  finding.fields = files::record_of(result);
+  finding.show("Force along z over places (0, y, z), network trained with 3", "maps",
+               {{"map"},
+                {"words", "places"},
+                {"places_from_the_text", "from the text"},
+                {"least_gf", "least", "{:.1f}"},
+                {"most_gf", "largest", "{:.1f}"},
+                {"rms_from_truth_gf", "RMS from the truth", "{:.2f}"}});
   finding.notes.push_back(
       fmt::format("At (0, -0.3, -0.5) in map c the network predicts {:.2f} gf and the truth is {:.2f} gf; "
                   "the paper's network predicted 4 gf.{}",
-                  probe, actual, setting.updraft ? "" : " This truth has no updraft; --updraft adds one."));
+                  result.probe_gf, result.actual_gf,
+                  setting.updraft ? "" : " This truth has no updraft; --updraft adds one."));
   return finding;
 }
 
-Finding figure_validation(const Setting& setting) {
-  Finding finding;
+struct PredictedVehicle {
+  std::size_t vehicle = 0;
+  double rms_force_gf = 0, rms_error_gf = 0;
+  std::optional<double> correlation;
+};
+
+struct ValidationResult {
+  std::string truth;
+  std::vector<PredictedVehicle> vehicles;
+};
+
+void describe(files::Record& record, const ValidationResult& result) {
+  describe_trained_with(record, result.truth);
+  record.list("vehicles", result.vehicles, "Force and error of the prediction, vehicle by vehicle.",
+              [](files::Record& r, const PredictedVehicle& row) {
+                r.field("vehicle", row.vehicle, "From 1, the lowest.");
+                r.field("rms_force_gf", row.rms_force_gf, "", "gf");
+                r.field("rms_error_gf", row.rms_error_gf, "", "gf");
+                r.field("correlation", row.correlation, "null: the vehicle feels no force.");
+              });
+}
+
+Finding run_validation(const Setting& setting) {
   Stages stages = stages_of(setting);
-  finding.json["truth"] = stages.truth().name;
-  finding.json["trained_with"] = 3;
-  finding.json["vehicles"] = files::Json::array();
+  ValidationResult result{stages.truth().name, {}};
   const files::Network network = stages.learned(stage_of(3)).network;
   const Flown flown = fly(setting, stages.truth(), {"swap", 4, 9, flight_seed(setting)}, &network, false);
-  Table table = {"Swap of four vehicles, network trained with three",
-                 {"vehicle", "RMS force [gf]", "RMS error [gf]", "correlation"},
-                 {}};
   for (std::size_t i = 0; i < flown.vehicles.size(); ++i) {
     double f2 = 0, e2 = 0, f = 0, g = 0, g2 = 0, fg = 0;
     const auto n = static_cast<double>(flown.vehicles[i].size());
@@ -266,16 +331,16 @@ Finding figure_validation(const Setting& setting) {
     const double spread = std::sqrt((f2 - f * f) * (g2 - g * g));
     // The topmost vehicle feels no force, so there is no correlation.
     const bool varies = f2 - f * f > 1e-6;
-    table.rows.push_back({std::to_string(i + 1), fmt::format("{:.2f}", std::sqrt(f2)),
-                          fmt::format("{:.2f}", std::sqrt(e2)),
-                          varies ? fmt::format("{:.3f}", (fg - f * g) / spread) : "-"});
-    finding.json["vehicles"].push_back(
-        {{"vehicle", i + 1},
-         {"rms_force_gf", std::sqrt(f2)},
-         {"rms_error_gf", std::sqrt(e2)},
-         {"correlation", varies ? files::Json((fg - f * g) / spread) : files::Json()}});
+    result.vehicles.push_back(
+        {i + 1, std::sqrt(f2), std::sqrt(e2), varies ? std::optional((fg - f * g) / spread) : std::nullopt});
   }
-  finding.tables.push_back(std::move(table));
+  Finding finding;
+  finding.fields = files::record_of(result);
+  finding.show("Swap of four vehicles, network trained with three", "vehicles",
+               {{"vehicle"},
+                {"rms_force_gf", "RMS force", "{:.2f}"},
+                {"rms_error_gf", "RMS error", "{:.2f}"},
+                {"correlation", "", "{:.3f}"}});
   finding.figures.push_back(
       {"validation",
        series(flown,
@@ -290,6 +355,27 @@ Finding figure_validation(const Setting& setting) {
        "}\nunset multiplot\n",
        "Force and prediction as flown in a swap of four; the network saw three at most."});
   return finding;
+}
+
+}  // namespace
+
+Experiment figure_intro() {
+  return experiment<IntroResult>("intro", "fig:intro: two vehicles swap, without and with a network",
+                                 run_intro);
+}
+
+Experiment figure_swaps() {
+  return experiment<SwapsResult>("swaps", "fig:swaps: height errors of three vehicles under four controllers",
+                                 run_swaps);
+}
+
+Experiment figure_heatmap() {
+  return experiment<HeatMapResult>("heatmap", "fig:heatmap: predicted force over places", run_heatmap);
+}
+
+Experiment figure_validation() {
+  return experiment<ValidationResult>("validation", "fig:validation: force and prediction in a swap of four",
+                                      run_validation);
 }
 
 }  // namespace swarmcert::reproduction

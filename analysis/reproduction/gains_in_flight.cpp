@@ -205,104 +205,187 @@ Summary summary(const std::vector<Judged>& judged) {
   return result;
 }
 
-files::Json summary_json(const Summary& s) {
-  return {{"flights", s.flights},
-          {"gain_sets", s.gain_sets},
-          {"coverage", s.coverage},
-          {"coverage_of_gain_sets", s.coverage_of_gain_sets},
-          {"median_ratio", s.median_ratio},
-          {"blind_ratio", s.blind_ratio},
-          {"blind_coverage", s.blind_coverage},
-          {"rank", s.rank},
-          {"rank_rms", s.rank_rms}};
+void describe(files::Record& record, const Summary& s) {
+  record.field("flights", s.flights, "");
+  record.field("gain_sets", s.gain_sets, "");
+  record.field("coverage", s.coverage, "Share of the flights whose peak stays below the bound.");
+  record.field("coverage_of_gain_sets", s.coverage_of_gain_sets, "Mean over gain sets.");
+  record.field("median_ratio", s.median_ratio, "Bound over peak.");
+  record.field("blind_ratio", s.blind_ratio, "Likewise, of a bound that is blind to the gains.");
+  record.field("blind_coverage", s.blind_coverage, "Of that bound.");
+  record.field("rank", s.rank, "Rank correlation of mean bound and mean peak, over gain sets.");
+  record.field("rank_rms", s.rank_rms, "Likewise, with the mean RMS of the error.");
 }
 
-std::vector<std::string> summary_row(const std::string& name, const Summary& s) {
-  const auto rank = [](double value) {
-    return std::isfinite(value) ? fmt::format("{:.2f}", value) : std::string("-");
+/// Summary of the flights with the same motors and set point.
+struct ClassRow {
+  std::string name;
+  Summary summary;
+};
+
+void describe(files::Record& record, const ClassRow& row) {
+  record.field("name", row.name, "Motors, and range and speed of the set point.");
+  describe(record, row.summary);
+}
+
+struct AxisRow {
+  Track track = Track::kAlong;
+  Summary summary;
+  PeakModel model;
+  double level = 0;
+  std::vector<ClassRow> classes;
+};
+
+void describe(files::Record& record, const AxisRow& row) {
+  const ConformalThreshold& promise = row.model.promise;
+  record.field("axis", track_name(row.track), "Along the set point's motion, across it, or vertically.");
+  describe(record, row.summary);
+  record.object("calibrated", "By which flights.", [&](files::Record& r) {
+    r.field("flights", promise.flights, "");
+    r.field("gain_sets", promise.groups, "");
+    r.field("level", row.level, "Probability that is asked for.");
+    r.field("interval", promise.coverage_90, "90 %, of the coverage of the calibration at hand.");
+    r.field("multiplier", promise.threshold, "Of the prediction.");
+  });
+  struct Part {
+    std::string name;
+    double size = 0;
+    std::string unit;
   };
-  return {name,
-          std::to_string(s.flights),
-          std::to_string(s.gain_sets),
-          fmt::format("{:.3f}", s.coverage),
-          fmt::format("{:.2f}", s.median_ratio),
-          fmt::format("{:.2f} at {:.3f}", s.blind_ratio, s.blind_coverage),
-          rank(s.rank),
-          rank(s.rank_rms)};
+  std::vector<Part> parts;
+  for (std::size_t k = 0; k < row.model.weights.size(); ++k)
+    if (row.model.weights[k] > 0) parts.push_back({part_names()[k], row.model.weights[k], part_units()[k]});
+  record.list("disturbances", parts, "Fitted sizes.", [](files::Record& r, const Part& part) {
+    r.field("name", part.name, "");
+    r.field("size", part.size, "");
+    r.field("unit", part.unit, "");
+  });
+  record.field("set_points", row.classes, "The same by motors and set point.");
 }
 
-const std::vector<std::string>& summary_header() {
-  static const std::vector<std::string> header = {"",           "flights",    "gain sets", "coverage",
-                                                  "bound/peak", "gain-blind", "rank",      "rank of RMS"};
-  return header;
+struct FlightRow {
+  std::string log, gain_set;
+  Track track = Track::kAlong;
+  std::size_t axis = 0;
+  double bound_m = 0, peak_m = 0, rms_m = 0, blind_m = 0;
+  bool left_gain_set_out = false, extrapolates = false;
+  stability::CascadeMargins margins;
+  stability::Nearness nearness = stability::Nearness::kClear;
+};
+
+void describe(files::Record& record, const FlightRow& row) {
+  record.field("log", row.log, "");
+  record.field("axis", track_name(row.track), "Along the set point's motion, across it, or vertically.");
+  record.field("world_axis", std::string(1, "xyz"[row.axis]), "x, y or z.");
+  record.field("bound", row.bound_m, "On the peak.", "m", "upper bound with the stated coverage");
+  record.field("peak", row.peak_m, "Largest error that was flown.", "m");
+  record.field("rms", row.rms_m, "", "m");
+  record.field("blind", row.blind_m, "Bound that is blind to the gains.", "m");
+  record.field("gain_set", row.gain_set, "The gains that act on this axis.");
+  record.field("gain_set_left_out", row.left_gain_set_out, "Whether it was judged by the others.");
+  record.field("extrapolates", row.extrapolates, "Unlike the calibrating flights: nothing is promised.");
+  record.object("margins", "Of the linear loop.", [&](files::Record& r) {
+    r.field("gain", row.margins.gain, "Factor; null: any.");
+    r.field("delay_s", row.margins.delay_s, "", "s");
+    r.field("damping", row.margins.damping, "Of the least damped poles.");
+    r.field("frequency_rad_s", row.margins.frequency_rad_s, "Likewise.", "rad/s");
+    r.field("verdict", name(row.nearness), "clear, close to a limit cycle, or unstable.");
+  });
 }
 
-void add_axis(Track track, const std::vector<Judged>& judged, Calibrations& calibrations, double level,
-              Finding& finding) {
-  const Summary all = summary(judged);
-  files::Json row = {{"axis", track_name(track)}};
-  row.update(summary_json(all));
-  const PeakModel& model = calibrations.without("").model;
-  row["calibrated"] = {{"flights", model.promise.flights},
-                       {"gain_sets", model.promise.groups},
-                       {"level", level},
-                       {"interval", model.promise.coverage_90},
-                       {"multiplier", model.promise.threshold}};
-  row["disturbances"] = files::Json::array();
-  for (std::size_t k = 0; k < model.weights.size(); ++k) {
-    if (model.weights[k] > 0)
-      row["disturbances"].push_back(
-          {{"name", part_names()[k]}, {"size", model.weights[k]}, {"unit", part_units()[k]}});
-  }
-  finding.tables[0].rows.push_back(summary_row(track_name(track), all));
+struct GainsResult {
+  double coverage = 0;
+  std::vector<AxisRow> axes;
+  std::vector<FlightRow> flights;
+  std::vector<std::string> calibrated_on;
+  std::vector<std::pair<std::string, std::string>> left_out;
+  bool leaves_out = false;
+};
+
+void describe(files::Record& record, const GainsResult& result) {
+  record.field("coverage", result.coverage, "Probability with which a flight stays below its bound.");
+  record.field("axes", result.axes, "Coverage and sharpness of the bounds, axis by axis.");
+  record.field("flights", result.flights, "Bound and peak, flight by flight and axis by axis.");
+  record.field("calibrated_on", result.calibrated_on, "Logs of the calibration.");
+  record.list("left_out", result.left_out, "Logs that were left out.", [](files::Record& r, const auto& one) {
+    r.field("log", one.first, "");
+    r.field("why", one.second, "");
+  });
+  record.field("leave_gain_set_out", result.leaves_out, "Whether a gain set is judged by the others.");
+}
+
+AxisRow axis_row(Track track, const std::vector<Judged>& judged, Calibrations& calibrations, double level) {
+  AxisRow row = {track, summary(judged), calibrations.without("").model, level, {}};
   std::map<std::string, std::vector<Judged>> classes;
   for (const Judged& one : judged) classes[set_point_class(*one.one.flight, one.one.axis)].push_back(one);
-  row["set_points"] = files::Json::array();
-  for (const auto& [name, members] : classes) {
-    const Summary of_class = summary(members);
-    row["set_points"].push_back({{"name", name}});
-    row["set_points"].back().update(summary_json(of_class));
-    finding.tables[1].rows.push_back(summary_row(std::string(track_name(track)) + ", " + name, of_class));
-  }
-  finding.notes.push_back(
-      fmt::format("{}: calibrated on {} flights with {} gain sets. A flight of a further gain set, drawn "
-                  "like these, stays below its bound with probability {:g}; for the calibration at hand "
-                  "between {:.3f} and {:.3f} (90 %).",
-                  track_name(track), model.promise.flights, model.promise.groups, level,
-                  model.promise.coverage_90.lower, model.promise.coverage_90.upper));
-  finding.json["axes"].push_back(std::move(row));
+  for (const auto& [name, members] : classes) row.classes.push_back({name, summary(members)});
+  return row;
 }
 
-void add_flight(Track track, const Judged& judged, Finding& finding) {
+FlightRow flight_row(Track track, const Judged& judged) {
   const AxisFlight& one = judged.one;
-  const stability::Nearness nearness = nearness_to_limit_cycle(judged.margins);
-  finding.json["flights"].push_back({{"log", one.flight->log},
-                                     {"axis", track_name(track)},
-                                     {"world_axis", std::string(1, "xyz"[one.axis])},
-                                     {"bound", judged.bound_m},
-                                     {"peak", one.flown().peak_m},
-                                     {"rms", one.flown().rms_m},
-                                     {"blind", judged.blind_m},
-                                     {"gain_set", one.group()},
-                                     {"gain_set_left_out", judged.left_gain_set_out},
-                                     {"extrapolates", judged.extrapolates},
-                                     {"margins",
-                                      {{"gain", judged.margins.gain},
-                                       {"delay_s", judged.margins.delay_s},
-                                       {"damping", judged.margins.damping},
-                                       {"frequency_rad_s", judged.margins.frequency_rad_s},
-                                       {"verdict", name(nearness)}}}});
-  if (nearness != stability::Nearness::kClear) {
-    finding.tables[3].rows.push_back(
-        {one.flight->log, fmt::format("{} ({})", track_name(track), "xyz"[one.axis]),
-         fmt::format("{:.2f}", judged.margins.gain), fmt::format("{:.3f}", judged.margins.damping),
-         fmt::format("{:.1f}", judged.margins.frequency_rad_s), name(nearness), one.group()});
+  return {one.flight->log,
+          one.group(),
+          track,
+          one.axis,
+          judged.bound_m,
+          one.flown().peak_m,
+          one.flown().rms_m,
+          judged.blind_m,
+          judged.left_gain_set_out,
+          judged.extrapolates,
+          judged.margins,
+          nearness_to_limit_cycle(judged.margins)};
+}
+
+analysis::Table summary_table(const files::Node& list, const char* first, const char* head) {
+  return analysis::table(list, {{first, head},
+                                {"flights"},
+                                {"gain_sets"},
+                                {"coverage", "", "{:.3f}"},
+                                {"median_ratio", "bound/peak", "{:.2f}"},
+                                {"blind_ratio", "gain-blind", "{:.2f}"},
+                                {"blind_coverage", "coverage", "{:.3f}"},
+                                {"rank", "", "{:.2f}"},
+                                {"rank_rms", "rank of RMS", "{:.2f}"}});
+}
+
+void show_gains(const GainsResult& result, Finding& finding) {
+  finding.add(fmt::format("Predicted {:g} % bound over flown peak error", 100 * result.coverage),
+              summary_table(*finding.fields.find("axes"), "axis", ""));
+  for (const AxisRow& axis : result.axes)
+    finding.add(fmt::format("The same by motors and set point, {}", track_name(axis.track)),
+                summary_table(files::record_of(axis.classes), "name", "set point"));
+  std::vector<FlightRow> above, near;
+  for (const FlightRow& row : result.flights) {
+    if (row.bound_m < row.peak_m) above.push_back(row);
+    if (row.nearness != stability::Nearness::kClear) near.push_back(row);
   }
-  if (judged.holds()) return;
-  finding.tables[2].rows.push_back({one.flight->log,
-                                    fmt::format("{} ({})", track_name(track), "xyz"[one.axis]),
-                                    fmt::format("{:.1f}", 1000 * judged.bound_m),
-                                    fmt::format("{:.1f}", 1000 * one.flown().peak_m), one.group()});
+  finding.add("Flights above their bound",
+              analysis::table(files::record_of(above), {{"log", "flight"},
+                                                        {"axis"},
+                                                        {"world_axis", ""},
+                                                        {"bound", "", "{:.1f}", 1000, "mm"},
+                                                        {"peak", "", "{:.1f}", 1000, "mm"},
+                                                        {"gain_set", "gains"}}));
+  finding.add("Gains that are close to a limit cycle, or unstable in the linear model",
+              analysis::table(files::record_of(near), {{"log", "flight"},
+                                                       {"axis"},
+                                                       {"world_axis", ""},
+                                                       {"margins.gain", "gain margin", "{:.2f}"},
+                                                       {"margins.damping", "", "{:.3f}"},
+                                                       {"margins.frequency_rad_s", "", "{:.1f}"},
+                                                       {"margins.verdict"},
+                                                       {"gain_set", "gains"}}));
+  for (const AxisRow& axis : result.axes) {
+    const ConformalThreshold& promise = axis.model.promise;
+    finding.notes.push_back(
+        fmt::format("{}: calibrated on {} flights with {} gain sets. A flight of a further gain set, drawn "
+                    "like these, stays below its bound with probability {:g}; for the calibration at hand "
+                    "between {:.3f} and {:.3f} (90 %).",
+                    track_name(axis.track), promise.flights, promise.groups, axis.level,
+                    promise.coverage_90.lower, promise.coverage_90.upper));
+  }
 }
 
 /// One point per flight and axis; the line is bound = peak.
@@ -344,38 +427,13 @@ void refuse_too_few(const GainFolder& folder, Track track, int groups, bool leav
        "calibrate on more flights, or ask for less with --coverage"});
 }
 
-void begin(const GainFolder& calibrating, const GainFolder& reported, const Setting& setting,
-           Finding& finding) {
-  finding.json["coverage"] = setting.coverage;
-  finding.json["axes"] = finding.json["flights"] = files::Json::array();
-  finding.json["calibrated_on"] = files::Json::array();
-  for (const GainFlight& flight : calibrating.flights) finding.json["calibrated_on"].push_back(flight.log);
-  finding.json["left_out"] = files::Json::array();
-  for (const GainFolder* folder : {&calibrating, &reported}) {
-    for (const auto& [log, why] : folder->left_out) {
-      finding.json["left_out"].push_back({{"log", log}, {"why", why}});
-    }
-    if (calibrating.path == reported.path) break;
-  }
-  finding.tables.push_back(
-      {fmt::format("Predicted {:g} % bound over flown peak error", 100 * setting.coverage),
-       summary_header(),
-       {}});
-  finding.tables.push_back({"The same by motors and set point", summary_header(), {}});
-  finding.tables.push_back(
-      {"Flights above their bound [mm]", {"flight", "axis", "bound", "peak", "gains"}, {}});
-  finding.tables.push_back({"Gains that are close to a limit cycle, or unstable in the linear model",
-                            {"flight", "axis", "gain margin", "damping", "rad/s", "", "gains"},
-                            {}});
-  finding.inputs = calibrating.inputs;
-  finding.inputs.insert(finding.inputs.end(), reported.inputs.begin(), reported.inputs.end());
-  std::sort(finding.inputs.begin(), finding.inputs.end());
-  finding.inputs.erase(std::unique(finding.inputs.begin(), finding.inputs.end()), finding.inputs.end());
+std::vector<std::string> inputs_of(const GainFolder& calibrating, const GainFolder& reported) {
+  std::set<std::string> inputs(calibrating.inputs.begin(), calibrating.inputs.end());
+  inputs.insert(reported.inputs.begin(), reported.inputs.end());
+  return {inputs.begin(), inputs.end()};
 }
 
-}  // namespace
-
-Finding gains_in_flight(const Setting& setting) {
+Finding run_gains_in_flight(const Setting& setting) {
   if (setting.calibrate.empty() || setting.flights.empty()) {
     throw files::InputError(
         {"reproduce gains-in-flight", "", "--calibrate, --flights", "", "are both needed",
@@ -383,15 +441,19 @@ Finding gains_in_flight(const Setting& setting) {
          "judged by the others"});
   }
   const GainFolder calibrating = read_gain_folder(setting.calibrate, setting);
-  const GainFolder reported =
-      setting.flights == setting.calibrate ? calibrating : read_gain_folder(setting.flights, setting);
+  const bool is_same = setting.flights == setting.calibrate;
+  const GainFolder reported = is_same ? calibrating : read_gain_folder(setting.flights, setting);
   const stability::Model model = stability::read_model(setting.models + "/crazyflie-small.toml");
   const CascadePlant plant = {model.inertia_kg_m2, stability::load_gains(setting.gains).motor_lag_s};
-  Finding finding;
-  begin(calibrating, reported, setting, finding);
+  GainsResult result;
+  result.coverage = setting.coverage;
+  for (const GainFlight& flight : calibrating.flights) result.calibrated_on.push_back(flight.log);
+  result.left_out = calibrating.left_out;
+  if (!is_same)
+    result.left_out.insert(result.left_out.end(), reported.left_out.begin(), reported.left_out.end());
   std::map<Track, std::vector<Judged>> judged;
   int done = 0;
-  bool leaves_out = false, extrapolates = false;
+  bool extrapolates = false;
   for (const Track track : {Track::kAlong, Track::kAcross, Track::kVertical}) {
     const std::vector<AxisFlight> flights = on_track(reported, track);
     if (flights.empty()) continue;
@@ -403,17 +465,20 @@ Finding gains_in_flight(const Setting& setting) {
                    needs_another, setting.coverage);
     for (const AxisFlight& one : flights) {
       judged[track].push_back(judge(one, calibrations));
-      leaves_out |= judged[track].back().left_gain_set_out;
-      extrapolates |= judged[track].back().extrapolates;
-      add_flight(track, judged[track].back(), finding);
+      result.flights.push_back(flight_row(track, judged[track].back()));
+      result.leaves_out |= result.flights.back().left_gain_set_out;
+      extrapolates |= result.flights.back().extrapolates;
       if (setting.progress)
         setting.progress(++done, 3 * static_cast<int>(reported.flights.size()), "bounds, one per axis");
     }
-    add_axis(track, judged[track], calibrations, setting.coverage, finding);
+    result.axes.push_back(axis_row(track, judged[track], calibrations, setting.coverage));
   }
+  Finding finding;
+  finding.inputs = inputs_of(calibrating, reported);
+  finding.fields = files::record_of(result);
+  show_gains(result, finding);
   add_figure(judged, finding);
-  finding.json["leave_gain_set_out"] = leaves_out;
-  if (leaves_out) {
+  if (result.leaves_out) {
     finding.notes.push_back(
         "Flights that are also among the calibrating ones were judged without their gain set: fit, thrust "
         "ratio and multiplier come from the others.");
@@ -426,10 +491,17 @@ Finding gains_in_flight(const Setting& setting) {
   finding.notes.push_back(
       "The set of parts was chosen on the flights of the collection that are numbered 8 to 148 and not "
       "divisible by five; sizes and multiplier are fitted to the calibrating flights alone.");
-  for (const auto& row : finding.json["left_out"])
-    finding.notes.push_back(
-        fmt::format("Left out: {}, {}.", row["log"].get<std::string>(), row["why"].get<std::string>()));
+  for (const auto& [log, why] : result.left_out)
+    finding.notes.push_back(fmt::format("Left out: {}, {}.", log, why));
   return finding;
+}
+
+}  // namespace
+
+Experiment gains_in_flight() {
+  return experiment<GainsResult>(
+      "gains-in-flight", "errors of gains that flew, predicted from the gains: --calibrate, --flights",
+      run_gains_in_flight);
 }
 
 }  // namespace swarmcert::reproduction

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "analysis/reproduction/experiments.h"
 #include "analysis/reproduction/sources.h"
@@ -13,9 +14,9 @@ namespace {
 
 /// How a network is made to keep a bound.
 struct Method {
-  const char* name;
-  training::Layers layers;
-  bool joint;  ///< the joint bound is limited; otherwise the norm of each layer
+  const char* name = "";
+  training::Layers layers = training::Layers::kFree;
+  bool joint = false;  ///< the joint bound is limited; otherwise the norm of each layer
 };
 constexpr Method kMethods[] = {{"spectral normalisation", training::Layers::kFree, false},
                                {"projection", training::Layers::kFree, true},
@@ -40,7 +41,8 @@ constexpr double kRate = 6e-3;
 constexpr int kEpochs = 12;
 
 struct Point {
-  double limit;
+  Method method;
+  double limit = 0;
   Group group;
 };
 
@@ -52,14 +54,15 @@ Point point_of(const Setting& setting, const Source& source, const Method& metho
   options.begins_within = true;
   if (!method.joint) options.gamma.value = limit;
   if (options.epochs > 0 && setting.full) options.epochs = kEpochs;
-  return {limit, train_group(setting, source, source.all, options,
-                             fmt::format("layers/{}-{}-{:g}", source.name, method.name, limit),
-                             sweep_of(setting).seeds)};
+  return {method, limit,
+          train_group(setting, source, source.all, options,
+                      fmt::format("layers/{}-{}-{:g}", source.name, method.name, limit),
+                      sweep_of(setting).seeds)};
 }
 
 /// Errors at a given bound.
 struct Errors {
-  double select_gf, test_gf;
+  double select_gf = 0, test_gf = 0;
 };
 
 /// Errors of networks limited to this bound; otherwise interpolated between the two networks with adjacent bounds,
@@ -82,65 +85,88 @@ std::optional<Errors> errors_at(double bound, const std::vector<Point>& curve, b
 
 using Curves = std::map<std::string, std::vector<Point>>;  ///< by method
 
-Curves curves_of(const Setting& setting, const Source& source, Finding& finding) {
+struct EqualBoundRow {
+  double bound = 0;
+  std::vector<std::pair<std::string, Errors>> errors;  ///< by method
+  std::string preferred;
+};
+
+struct LayersResult {
+  std::string flights;
+  std::vector<Point> points;  ///< in order of methods
+  std::vector<EqualBoundRow> at_equal_bounds;
+};
+
+void describe(files::Record& record, const LayersResult& result) {
+  record.list("curves", result.points,
+              "Networks over what is limited, the norm of each layer or the joint bound, by the method that "
+              "keeps it; numbers by seed.",
+              [&result](files::Record& r, const Point& point) {
+                describe_group(r, point.group);
+                r.field("flights", result.flights, "simulated or recorded.");
+                r.field("method", point.method.name, "");
+                r.field("limited", point.method.joint ? "joint bound" : "norm of each layer", "");
+                r.field("limit", point.limit, "Of what is limited.");
+              });
+  record.list(
+      "at_equal_bounds", result.at_equal_bounds,
+      "Mean errors of each method at equal proved joint bounds, of spectral normalisation between two "
+      "of its networks; methods without a network at this bound are left out.",
+      [&result](files::Record& r, const EqualBoundRow& row) {
+        r.field("flights", result.flights, "simulated or recorded.");
+        r.field("bound_gf_per_unit", row.bound, "Joint Lipschitz bound.", "gf/unit", "proved upper bound");
+        r.list("errors", row.errors, "", [](files::Record& one, const auto& errors) {
+          one.field("method", errors.first, "");
+          one.field("select_rmse_gf", errors.second.select_gf, "On the selecting flights.", "gf");
+          one.field("test_rmse_gf", errors.second.test_gf, "On flights not seen.", "gf");
+        });
+        r.field("preferred_by_selecting_flights", row.preferred,
+                "Method with the least error on the flights that select.");
+      });
+}
+
+Curves curves_of(const Setting& setting, const Source& source) {
   Curves curves;
   const Sweep sweep = sweep_of(setting);
-  Table table = {
-      fmt::format("{} flights: error over the proved joint bound, mean of {} seeds (standard error)",
-                  source.name, sweep.seeds),
-      {"method", "limit", "joint bound [gf/unit]", "selecting RMSE [gf]", "test RMSE [gf]"},
-      {}};
-  for (const Method& method : kMethods) {
-    for (const double limit : method.joint ? sweep.limits : sweep.gammas) {
-      const Point point = point_of(setting, source, method, limit);
-      const Group& group = point.group;
-      table.rows.push_back(
-          {method.name, fmt::format("{:g}", limit), fmt::format("{:.1f}", group.mean_bound()),
-           fmt::format("{:.3f}", group.mean_select_gf()),
-           sweep.seeds > 1 ? fmt::format("{:.3f} ({:.3f})", group.mean_test_gf(), group.standard_error_gf())
-                           : fmt::format("{:.3f}", group.mean_test_gf())});
-      files::Json json = json_of(group);
-      json.update({{"flights", source.name},
-                   {"method", method.name},
-                   {"limited", method.joint ? "joint bound" : "norm of each layer"},
-                   {"limit", limit}});
-      finding.json["curves"].push_back(std::move(json));
-      curves[method.name].push_back(point);
-    }
-  }
-  finding.tables.push_back(std::move(table));
+  for (const Method& method : kMethods)
+    for (const double limit : method.joint ? sweep.limits : sweep.gammas)
+      curves[method.name].push_back(point_of(setting, source, method, limit));
   return curves;
 }
 
-/// Adds one row per bound, one column per method, and the method preferred by the selecting flights.
-void add_equal_bounds(const Setting& setting, const Source& source, const Curves& curves, Finding& finding) {
-  Table table = {
-      source.name + " flights: test RMSE [gf] at equal proved joint bounds", {"joint bound [gf/unit]"}, {}};
-  for (const Method& method : kMethods) table.header.push_back(method.name);
-  table.header.push_back("least on the selecting flights");
-  for (const double bound : sweep_of(setting).limits) {
-    std::vector<std::string> row = {fmt::format("{:g}", bound)};
-    std::string preferred;
-    double least_gf = 0;
-    files::Json errors = files::Json::array();
-    for (const Method& method : kMethods) {
-      const std::optional<Errors> found = errors_at(bound, curves.at(method.name), method.joint);
-      row.push_back(found ? fmt::format("{:.3f}", found->test_gf) : "");
-      if (!found) continue;
-      errors.push_back(
-          {{"method", method.name}, {"select_rmse_gf", found->select_gf}, {"test_rmse_gf", found->test_gf}});
-      if (!preferred.empty() && found->select_gf >= least_gf) continue;
-      preferred = method.name;
-      least_gf = found->select_gf;
-    }
-    row.push_back(preferred);
-    finding.json["at_equal_bounds"].push_back({{"flights", source.name},
-                                               {"bound_gf_per_unit", bound},
-                                               {"errors", std::move(errors)},
-                                               {"preferred_by_selecting_flights", preferred}});
-    table.rows.push_back(std::move(row));
+/// The errors of each method at one bound, and the method preferred by the selecting flights.
+EqualBoundRow at_bound(double bound, const Curves& curves) {
+  EqualBoundRow row;
+  row.bound = bound;
+  double least_gf = 0;
+  for (const Method& method : kMethods) {
+    const std::optional<Errors> found = errors_at(bound, curves.at(method.name), method.joint);
+    if (!found) continue;
+    row.errors.emplace_back(method.name, *found);
+    if (!row.preferred.empty() && found->select_gf >= least_gf) continue;
+    row.preferred = method.name;
+    least_gf = found->select_gf;
   }
-  finding.tables.push_back(std::move(table));
+  return row;
+}
+
+/// One line per bound, one column per method.
+Table equal_bounds_table(const LayersResult& result) {
+  Table table = {result.flights + " flights: test RMSE [gf] at equal proved joint bounds",
+                 {{"joint bound [gf/unit]"}, {}}};
+  for (const Method& method : kMethods) table.cells.header.emplace_back(method.name);
+  table.cells.header.emplace_back("least on the selecting flights");
+  for (const EqualBoundRow& row : result.at_equal_bounds) {
+    std::vector<std::string> cells = {fmt::format("{:g}", row.bound)};
+    for (const Method& method : kMethods) {
+      const auto found = std::find_if(row.errors.begin(), row.errors.end(),
+                                      [&](const auto& errors) { return errors.first == method.name; });
+      cells.push_back(found == row.errors.end() ? "" : fmt::format("{:.3f}", found->second.test_gf));
+    }
+    cells.push_back(row.preferred);
+    table.cells.rows.push_back(std::move(cells));
+  }
+  return table;
 }
 
 void add_figure(const Source& source, const Curves& curves, Finding& finding) {
@@ -162,19 +188,32 @@ void add_figure(const Source& source, const Curves& curves, Finding& finding) {
        "Test error over the proved joint bound, " + source.name + " flights."});
 }
 
-}  // namespace
-
-Finding bounded_layers(const Setting& setting) {
+Finding run_layers(const Setting& setting) {
   Finding finding;
-  finding.json["curves"] = finding.json["at_equal_bounds"] = files::Json::array();
   const bool is_recorded = !setting.recorded.empty();
   Source source = is_recorded ? recorded_source(setting) : simulated_source(setting);
   if (is_recorded) {
     source.all = of_small_vehicles(source.all);
     add_inputs(source.all, finding);
   }
-  const Curves curves = curves_of(setting, source, finding);
-  add_equal_bounds(setting, source, curves, finding);
+  const Curves curves = curves_of(setting, source);
+  LayersResult result;
+  result.flights = source.name;
+  for (const Method& method : kMethods)
+    for (const Point& point : curves.at(method.name)) result.points.push_back(point);
+  for (const double bound : sweep_of(setting).limits)
+    result.at_equal_bounds.push_back(at_bound(bound, curves));
+  finding.fields = files::record_of(result);
+  finding.show(fmt::format("{} flights: error over the proved joint bound, mean of {} seeds", source.name,
+                           sweep_of(setting).seeds),
+               "curves",
+               {{"method"},
+                {"limit", "", "{:g}"},
+                {"mean_bound_gf_per_unit", "joint bound", "{:.1f}"},
+                {"mean_test_rmse_gf", "test RMSE", "{:.3f}"},
+                {"test_rmse_gf", "by seed", "{:.3f}"},
+                {"select_rmse_gf", "selecting RMSE by seed", "{:.3f}"}});
+  finding.tables.push_back(equal_bounds_table(result));
   add_figure(source, curves, finding);
   finding.notes.push_back(
       "All with rotated samples and the same epochs. The rate and the epoch of each network are chosen on "
@@ -183,6 +222,14 @@ Finding bounded_layers(const Setting& setting) {
       "of norms; at equal "
       "bounds, spectral normalisation is interpolated between two gammas.");
   return finding;
+}
+
+}  // namespace
+
+Experiment bounded_layers() {
+  return experiment<LayersResult>(
+      "layers", "spectral normalisation, projection and bounded layers: test error at equal certified bounds",
+      run_layers);
 }
 
 }  // namespace swarmcert::reproduction

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <utility>
 
 #include "analysis/reproduction/experiments.h"
 #include "analysis/reproduction/table_flights.h"
-#include "nn/base/json_number.h"
 
 namespace swarmcert::reproduction {
 namespace {
@@ -20,132 +20,173 @@ std::string controller_name(int controller) {
 
 std::string metres(double value) { return std::isfinite(value) ? fmt::format("{:.3f}", value) : "lost"; }
 
-/// Compares the largest height errors with the paper's: a table, and column["max_z"].
-Spreads add_heights(const Truth& truth, const files::Json& flights, files::Json& column, Finding& finding) {
-  const Spreads spreads = height_spreads(flights);
-  Table table = {
-      fmt::format("Maximum z-error [m], truth \"{}\": worst of all seeds (median) | paper", truth.name),
-      {"controller", "2 CF swap", "3 CF swap", "4 CF swap", "5 CF swap"},
-      {}};
-  column["max_z"] = files::Json::array();
-  for (std::size_t c = 0; c < 4; ++c) {
-    std::vector<std::string> row = {controller_name(kControllers[c])};
-    for (std::size_t v = 0; v < 4; ++v) {
-      const Spread& spread = spreads[c][v];
-      const double paper = kPaper_m[c][v];
-      row.push_back(fmt::format("{} ({}) | {}", metres(spread.most_m), metres(spread.median_m),
-                                std::isnan(paper) ? "N.A." : fmt::format("{:.3f}", paper)));
-      column["max_z"].push_back({{"trained_with", kControllers[c]},
-                                 {"vehicles", kLeastVehicles + static_cast<int>(v)},
-                                 {"worst_m", files::finite(spread.most_m)},
-                                 {"median_m", files::finite(spread.median_m)},
-                                 {"least_m", files::finite(spread.least_m)},
-                                 {"paper_m", files::finite(paper)}});
-    }
-    table.rows.push_back(std::move(row));
-  }
-  finding.tables.push_back(std::move(table));
-  return spreads;
+/// Height errors of one controller and number of vehicles.
+struct HeightRow {
+  int controller = 0, vehicles = 0;
+  Spread spread;
+  double paper_m = 0;  ///< NaN: not flown
+};
+
+struct SidewaysRow {
+  int controller = 0, vehicles = 0;
+  char axis = 'x';
+  double p50_m = 0, p95_m = 0, max_m = 0;
+};
+
+/// One column of the paper's table.
+struct TruthColumn {
+  Truth truth;
+  std::vector<HeightRow> heights;
+  std::vector<SidewaysRow> sideways;
+  std::vector<double> factors;  ///< least improvement by training seed
+  double farthest = 0, least_factor = INFINITY, two_at_four = 0, three_at_five = 0;
+  TableFlights flights;
+};
+
+void describe_swarm(files::Record& record, int controller, int vehicles) {
+  record.field("trained_with", controller, "Vehicles in training; 0: no network.");
+  record.field("vehicles", vehicles, "");
 }
 
-/// Errors along x and y: a table, and column["xy"].
-void add_sideways(const Truth& truth, const files::Json& flights, files::Json& column, Finding& finding) {
-  Table sideways = {fmt::format("Errors along x and y [m], truth \"{}\": median, 95 %, largest", truth.name),
-                    {"controller", "2 CF swap", "3 CF swap", "4 CF swap", "5 CF swap"},
-                    {}};
-  column["xy"] = files::Json::array();
-  for (const char axis : {'x', 'y'}) {
+void describe_height(files::Record& record, const HeightRow& row) {
+  describe_swarm(record, row.controller, row.vehicles);
+  record.field("worst_m", row.spread.most_m, "Of all seeds; null: a vehicle was lost.", "m");
+  record.field("median_m", row.spread.median_m, "", "m");
+  record.field("least_m", row.spread.least_m, "", "m");
+  record.field("paper_m", row.paper_m, "null: not flown.", "m");
+}
+
+void describe_sideways(files::Record& record, const SidewaysRow& row) {
+  describe_swarm(record, row.controller, row.vehicles);
+  record.field("axis", std::string(1, row.axis), "x or y.");
+  record.field("p50_m", row.p50_m, "Median.", "m");
+  record.field("p95_m", row.p95_m, "95 % quantile.", "m");
+  record.field("max_m", row.max_m, "Largest of all seeds.", "m");
+}
+
+void describe_column(files::Record& record, const TruthColumn& column) {
+  record.field("truth", column.truth.name, "Name of the simulated truth.");
+  record.field("knobs", column.truth.knobs, "Its parameters that were chosen to reproduce the table.");
+  record.list("max_z", column.heights, "Largest height errors.", describe_height);
+  record.list("xy", column.sideways, "Errors along x and y.", describe_sideways);
+  record.field("least_improvement_by_training_seed", column.factors,
+               "Factor by which networks trained with 3 or 4 vehicles divide the worst error, least over "
+               "swarms.");
+  record.field("baseline_farthest_from_paper", column.farthest, "Relative.");
+  record.field("least_improvement_trained_with_3_or_4", column.least_factor, "Over swarms and seeds.");
+  record.field("improvement_trained_with_2_at_4", column.two_at_four, "Of the worst error.");
+  record.field("improvement_trained_with_3_at_5", column.three_at_five, "Likewise.");
+  record.field("flights", column.flights, "All flights, by training seed.");
+}
+
+struct PerformanceResult {
+  std::vector<TruthColumn> columns;
+};
+
+void describe(files::Record& record, const PerformanceResult& result) {
+  record.list("columns", result.columns, "One entry per column of the paper's table, with its flights.",
+              describe_column);
+  record.field("swaps_per_flight", 6, "Number of swaps in each flight.");
+}
+
+/// A line per controller, or per axis and controller; a column per number of vehicles, as in the paper.
+template <class Row, class Name, class Text>
+Table as_in_the_paper(const std::string& title, const std::vector<Row>& rows, Name name, Text text) {
+  Table table = {title, {{"controller", "2 CF swap", "3 CF swap", "4 CF swap", "5 CF swap"}, {}}};
+  for (const Row& row : rows) {
+    if (row.vehicles == kLeastVehicles) table.cells.rows.push_back({name(row)});
+    table.cells.rows.back().push_back(text(row));
+  }
+  return table;
+}
+
+std::vector<HeightRow> heights_of(const Spreads& spreads) {
+  std::vector<HeightRow> rows;
+  for (std::size_t c = 0; c < 4; ++c)
+    for (std::size_t v = 0; v < 4; ++v)
+      rows.push_back({kControllers[c], kLeastVehicles + static_cast<int>(v), spreads[c][v], kPaper_m[c][v]});
+  return rows;
+}
+
+std::vector<SidewaysRow> sideways_of(const TableFlights& flights) {
+  std::vector<SidewaysRow> rows;
+  for (const int axis : {0, 1}) {
     for (const int controller : kControllers) {
-      std::vector<std::string> row = {fmt::format("{} {}", controller_name(controller), axis)};
       for (int vehicles = kLeastVehicles; vehicles <= kMostVehicles; ++vehicles) {
-        const auto of = [&](const char* what) {
-          return spread_of(flights, controller, vehicles, fmt::format("{}_{}_m", what, axis).c_str());
-        };
-        const double p50 = of("p50").median_m, p95 = of("p95").median_m, most = of("max").most_m;
-        row.push_back(fmt::format("{}, {}, {}", metres(p50), metres(p95), metres(most)));
-        column["xy"].push_back({{"trained_with", controller},
-                                {"vehicles", vehicles},
-                                {"axis", std::string(1, axis)},
-                                {"p50_m", p50},
-                                {"p95_m", p95},
-                                {"max_m", files::finite(most)}});
+        const auto of = [&](const auto& value) { return spread_of(flights, controller, vehicles, value); };
+        rows.push_back({controller, vehicles, "xy"[axis],
+                        of([axis](const TableFlight& f) { return f.p50_m[axis]; }).median_m,
+                        of([axis](const TableFlight& f) { return f.p95_m[axis]; }).median_m,
+                        of([axis](const TableFlight& f) { return f.max_m[axis]; }).most_m});
       }
-      sideways.rows.push_back(std::move(row));
     }
   }
-  finding.tables.push_back(std::move(sideways));
+  return rows;
 }
 
 /// Factors by which networks reduce the worst error, for each training seed: the minimum over the swarms for networks
 /// trained with three or four vehicles. The networks of all seeds are compared with the same baseline; the minimum
 /// over all seeds therefore involves a worst case over more flights than the baseline has.
-std::map<int, double> improvement_by_seed(const files::Json& flights, const Spreads& spreads) {
+std::map<int, double> improvement_by_seed(const TableFlights& flights, const Spreads& spreads) {
   std::map<int, double> factor_of_seed;
-  for (const files::Json& flight : flights) {
-    const int controller = flight.at("trained_with").get<int>();
-    if (controller < 3) continue;
-    const Spread& baseline = spreads[0][flight.at("vehicles").get<int>() - kLeastVehicles];
-    const double most_m = flight.at("max_z_m").is_number() ? flight.at("max_z_m").get<double>() : INFINITY;
-    double& least = factor_of_seed.try_emplace(flight.at("training_seed").get<int>(), INFINITY).first->second;
-    least = std::min(least, baseline.most_m / most_m);
+  for (const TableFlight& flight : flights) {
+    if (flight.controller < 3) continue;
+    const Spread& baseline = spreads[0][flight.vehicles - kLeastVehicles];
+    double& least = factor_of_seed.try_emplace(flight.training_seed, INFINITY).first->second;
+    least = std::min(least, baseline.most_m / flight.max_m[2]);
   }
   return factor_of_seed;
 }
 
-/// Summarises the tables in a sentence, with its numbers in `column`.
-void add_improvement(const Truth& truth, const files::Json& flights, const Spreads& spreads,
-                     files::Json& column, Finding& finding) {
-  double farthest = 0;
-  for (std::size_t v = 0; v < 4; ++v)
-    farthest = std::max(farthest, std::abs(spreads[0][v].most_m / kPaper_m[0][v] - 1));
-  double least_factor = INFINITY;  // networks trained with three or four vehicles, over all swarms
-  for (std::size_t c = 2; c < 4; ++c) {
-    for (std::size_t v = 0; v < 4; ++v)
-      least_factor = std::min(least_factor, spreads[0][v].most_m / spreads[c][v].most_m);
+TruthColumn column_of(const Truth& truth, TableFlights flights) {
+  const Spreads spreads = height_spreads(flights);
+  TruthColumn column;
+  column.truth = truth;
+  column.heights = heights_of(spreads);
+  column.sideways = sideways_of(flights);
+  for (const auto& [seed, factor] : improvement_by_seed(flights, spreads)) column.factors.push_back(factor);
+  for (std::size_t v = 0; v < 4; ++v) {
+    column.farthest = std::max(column.farthest, std::abs(spreads[0][v].most_m / kPaper_m[0][v] - 1));
+    for (std::size_t c = 2; c < 4; ++c)  // networks trained with three or four vehicles
+      column.least_factor = std::min(column.least_factor, spreads[0][v].most_m / spreads[c][v].most_m);
   }
-  std::vector<std::string> factors;
-  column["least_improvement_by_training_seed"] = files::Json::array();
-  for (const auto& [seed, factor] : improvement_by_seed(flights, spreads)) {
-    column["least_improvement_by_training_seed"].push_back(files::finite(factor));
-    factors.push_back(fmt::format("{:.2f}", factor));
-  }
-  const double two_at_four = spreads[0][2].most_m / spreads[1][2].most_m;
-  const double three_at_five = spreads[0][3].most_m / spreads[2][3].most_m;
-  column["baseline_farthest_from_paper"] = farthest;
-  column["least_improvement_trained_with_3_or_4"] = files::finite(least_factor);
-  column["improvement_trained_with_2_at_4"] = files::finite(two_at_four);
-  column["improvement_trained_with_3_at_5"] = files::finite(three_at_five);
+  column.two_at_four = spreads[0][2].most_m / spreads[1][2].most_m;
+  column.three_at_five = spreads[0][3].most_m / spreads[2][3].most_m;
+  column.flights = std::move(flights);
+  return column;
+}
+
+void show_column(const TruthColumn& column, Finding& finding) {
+  const std::string& truth = column.truth.name;
+  finding.tables.push_back(as_in_the_paper(
+      fmt::format("Maximum z-error [m], truth \"{}\": worst of all seeds (median) | paper", truth),
+      column.heights, [](const HeightRow& row) { return controller_name(row.controller); },
+      [](const HeightRow& row) {
+        return fmt::format("{} ({}) | {}", metres(row.spread.most_m), metres(row.spread.median_m),
+                           std::isnan(row.paper_m) ? "N.A." : fmt::format("{:.3f}", row.paper_m));
+      }));
+  finding.tables.push_back(as_in_the_paper(
+      fmt::format("Errors along x and y [m], truth \"{}\": median, 95 %, largest", truth), column.sideways,
+      [](const SidewaysRow& row) { return fmt::format("{} {}", controller_name(row.controller), row.axis); },
+      [](const SidewaysRow& row) {
+        return fmt::format("{}, {}, {}", metres(row.p50_m), metres(row.p95_m), metres(row.max_m));
+      }));
   finding.notes.push_back(fmt::format(
       "Truth \"{}\": baseline within {:.0f} % of the paper; networks trained with three or four divide the "
-      "worst error by at least {:.2f} (training seeds: {}; paper: 1.5 to 3.9); trained with two, at four "
+      "worst error by at least {:.2f} (training seeds: {:.2f}; paper: 1.5 to 3.9); trained with two, at four "
       "vehicles: by {:.2f} (paper: 0.71); trained with three, at five: by {:.2f} (paper: 1.97).",
-      truth.name, 100 * farthest, least_factor, fmt::join(factors, ", "), two_at_four, three_at_five));
+      truth, 100 * column.farthest, column.least_factor, fmt::join(column.factors, ", "), column.two_at_four,
+      column.three_at_five));
+  for (const std::string& knob : column.truth.knobs)
+    finding.notes.push_back(fmt::format("Chosen for truth \"{}\": {}.", truth, knob));
 }
 
-void add_truth(const Truth& truth, const files::Json& flights, Finding& finding) {
-  files::Json column = {{"truth", truth.name}, {"knobs", truth.knobs}};
-  const Spreads spreads = add_heights(truth, flights, column, finding);
-  add_sideways(truth, flights, column, finding);
-  add_improvement(truth, flights, spreads, column, finding);
-  finding.json["columns"].push_back(std::move(column));
-  for (const std::string& knob : truth.knobs)
-    finding.notes.push_back(fmt::format("Chosen for truth \"{}\": {}.", truth.name, knob));
-}
-
-}  // namespace
-
-Finding performance(const Setting& setting) {
-  Finding finding;
-  finding.notes.push_back(
-      fmt::format("Flown {:.1f} m higher than in the published scripts: there the lowest of five flies at "
-                  "0.3 m, and an error of the paper's size would end on the floor. The height is our choice.",
-                  kHigher_m));
-  finding.json["columns"] = files::Json::array();
-  finding.json["swaps_per_flight"] = 6;
+Finding run_performance(const Setting& setting) {
+  PerformanceResult result;
   const Scale scale = scale_of(setting);
   int unit = 0;
   for (const Truth& truth : truths(setting)) {
-    files::Json flights = files::Json::array();
+    TableFlights flights;
     for (int k = 0; k < scale.training_seeds; ++k, ++unit) {
       const std::string file =
           (fs::path(setting.work) / fmt::format("{}{}-{}/table-{}.json", truth.name,
@@ -153,14 +194,26 @@ Finding performance(const Setting& setting) {
               .string();
       if (!setting.shard.has(unit)) continue;
       Stages stages(setting, truth, k);
-      for (const files::Json& flight : table_flights(setting, stages, truth, k, kHigher_m, file))
-        flights.push_back(flight);
+      const TableFlights of_seed = table_flights(setting, stages, truth, k, kHigher_m, file);
+      flights.insert(flights.end(), of_seed.begin(), of_seed.end());
     }
-    if (!setting.shard.is_whole()) continue;
-    add_truth(truth, flights, finding);
-    finding.json["columns"].back()["flights"] = std::move(flights);
+    if (setting.shard.is_whole()) result.columns.push_back(column_of(truth, std::move(flights)));
   }
+  Finding finding;
+  finding.fields = files::record_of(result);
+  finding.notes.push_back(
+      fmt::format("Flown {:.1f} m higher than in the published scripts: there the lowest of five flies at "
+                  "0.3 m, and an error of the paper's size would end on the floor. The height is our choice.",
+                  kHigher_m));
+  for (const TruthColumn& column : result.columns) show_column(column, finding);
   return finding;
+}
+
+}  // namespace
+
+Experiment performance() {
+  return experiment<PerformanceResult>(
+      "table", "tab:nnperf: largest z-error of networks and swarms; x- and y-errors", run_performance);
 }
 
 }  // namespace swarmcert::reproduction

@@ -1,10 +1,10 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <cmath>
+#include <utility>
 
 #include "analysis/identification/budget.h"
 #include "analysis/reproduction/recorded.h"
-#include "nn/base/json_number.h"
 
 namespace swarmcert::reproduction {
 
@@ -13,30 +13,14 @@ namespace {
 /// Name of a model and its residuals on the test flights.
 using Row = std::pair<std::string, std::vector<ResidualBlock>>;
 
-/// The ladder as a table and in JSON, each row with the error reduction relative to the previous row.
-void add_rows(const std::vector<Row>& rows, Finding& finding) {
-  Table table = {"Physics first: vertical residual on test flights",
-                 {"model", "RMS [gf]", "90 %", "falls by [gf]", "90 %"},
-                 {}};
-  finding.json["physics_first"] = files::Json::array();
+std::vector<PhysicsRow> ladder_of(const std::vector<Row>& rows) {
+  std::vector<PhysicsRow> ladder;
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    const Interval of_row = interval_of(rows[k].second);
-    const double rms = rms_gf(rows[k].second);
-    files::Json row = {{"model", rows[k].first}, {"rms_gf", rms}, {"interval_gf", of_row}};
-    std::vector<std::string> cells = {rows[k].first, gf(rms), gf(of_row), "", ""};
-    if (k > 0) {
-      const Estimate fall = change(rows[k - 1].second, rows[k].second);
-      row["falls_by_gf"] = fall.value_gf;
-      row["falls_by_interval_gf"] = fall.interval;
-      cells[3] = gf(fall.value_gf);
-      cells[4] = gf(fall.interval);
-    }
-    row["compositions"] = files::Json::object();
-    for (const auto& [name, value] : by_composition(rows[k].second)) row["compositions"][name] = value;
-    finding.json["physics_first"].push_back(std::move(row));
-    table.rows.push_back(std::move(cells));
+    const auto& [name, blocks] = rows[k];
+    ladder.push_back({name, rms_gf(blocks), interval_of(blocks), std::nullopt, by_composition(blocks)});
+    if (k > 0) ladder.back().fall = change(rows[k - 1].second, blocks);
   }
-  finding.tables.push_back(std::move(table));
+  return ladder;
 }
 
 /// All flights except the test flights; every network of the folds leaves out some of them.
@@ -59,59 +43,101 @@ void make_nominal(const identification::Budget& budget, residuals::Inputs& input
 }
 
 /// Compares physics, physics with the network, and the published networks on the test flights.
-void add_beside_published(const Row& physics, const Row& ours, const identification::BudgetRow& published,
-                          Finding& finding) {
-  Table table = {
-      "Physics, then network: vertical residual on test flights, RMS [gf], by neighbours 2 vehicle",
-      {"", "physics", "and network", "published network", "ratio"},
-      {}};
-  files::Json& rows = finding.json["physics_then_network"]["compositions"] = files::Json::array();
+std::vector<PhysicsComposition> compositions_of(const Row& physics, const Row& ours,
+                                                const identification::BudgetRow& published) {
+  std::vector<PhysicsComposition> rows;
   const std::map<std::string, double> with = by_composition(ours.second);
   for (const auto& [name, alone] : by_composition(physics.second)) {
-    const double rms = with.at(name);
     const auto found = published.of.find(name);
-    const double other = found == published.of.end() ? NAN : found->second.rmse.z / stability::kGramForce_N;
-    rows.push_back({{"name", name},
-                    {"physics_rms_gf", alone},
-                    {"rms_gf", rms},
-                    {"published_rms_gf", files::finite(other)}});
-    table.rows.push_back({name, gf(alone), gf(rms), gf(other), fmt::format("{:.3f}", rms / other)});
+    rows.push_back({name, alone, with.at(name),
+                    found == published.of.end() ? NAN : found->second.rmse.z / stability::kGramForce_N});
   }
-  finding.tables.push_back(std::move(table));
+  return rows;
 }
 
-/// Adds the decisions made by flights unseen by the networks of the folds, the bounds, and the flights that were left
-/// out.
-void add_decisions(const Learned& learned, double published_bound, const residuals::Inputs& test,
-                   Finding& finding) {
-  files::Json& json = finding.json["physics_then_network"];
-  json["output_scales"] = learned.support.scales;
-  json["silent"] = json["left_out"] = files::Json::array();
-  json["bound"] = learned.bound;
-  json["published_bound"] = published_bound;
-  std::string silent, left_out;
-  for (const auto& [composition, errors] : learned.support.silent) {
-    json["silent"].push_back(
-        {{"vehicles", composition}, {"rms_gf", errors.network}, {"physics_rms_gf", errors.nothing}});
-    silent += fmt::format("{}{} ({:.2f} gf with it, {:.2f} without)", silent.empty() ? "" : ", ", composition,
-                          errors.network, errors.nothing);
-  }
-  for (const residuals::FlightFiles& flight : test.found.flights) {
-    json["left_out"].push_back(flight.name);
-    left_out += (left_out.empty() ? "" : ", ") + flight.name;
-  }
-  finding.notes.push_back("Compositions that the development flights leave without a network: " +
-                          (silent.empty() ? "none" : silent) + ".");
-  finding.notes.push_back(fmt::format(
-      "Largest joint Lipschitz bound, proved: {:.1f} gf per unit of input, of the published networks {:.1f}.",
-      learned.bound, published_bound));
-  finding.notes.push_back("Left out of physics, networks and decisions, and judged here: " + left_out +
-                          ". The published networks had seen these flights when they were trained.");
+void describe_physics_row(files::Record& record, const PhysicsRow& row) {
+  record.field("model", row.model, "");
+  record.field("rms_gf", row.rms_gf, "", "gf", "estimate");
+  record.field("interval_gf", row.interval_gf, "90 %.", "gf", "estimate");
+  record.may("falls_by_gf", row.fall ? std::optional(row.fall->value_gf) : std::nullopt,
+             "From the row before.", "gf", "estimate");
+  record.may("falls_by_interval_gf", row.fall ? std::optional(row.fall->interval) : std::nullopt, "90 %.",
+             "gf", "estimate");
+  record.field("compositions", row.compositions, "RMS by composition.", "gf");
+}
+
+void describe_physics_composition(files::Record& record, const PhysicsComposition& row) {
+  record.field("name", row.name, "Kinds of neighbours and vehicle.");
+  record.field("physics_rms_gf", row.physics_gf, "Of the fitted effects.", "gf");
+  record.field("rms_gf", row.with_network_gf, "With the networks behind them.", "gf");
+  record.field("published_rms_gf", row.published_gf, "Of the published networks; null: none.", "gf");
 }
 
 }  // namespace
 
-void physics_first(const Setting& setting, Finding& finding) {
+void describe(files::Record& record, const PhysicsFirst& physics) {
+  record.list("physics_first", physics.ladder, "Errors where effects are fitted before the network.",
+              describe_physics_row);
+  record.object(
+      "physics_then_network",
+      "Fitted effects, then networks of the folds behind them, beside the published networks.",
+      [&](files::Record& then) {
+        then.list("compositions", physics.compositions,
+                  "On the test flights, by kinds of neighbours and vehicle.", describe_physics_composition);
+        then.field("output_scales", physics.support.scales,
+                   "Factor of each kind's output, chosen on flights that the network had not seen.");
+        const std::vector<std::pair<std::string, learning::SupportedErrors>> silent(
+            physics.support.silent.begin(), physics.support.silent.end());
+        then.list("silent", silent,
+                  "Compositions without a network, with the errors on flights that it had not seen.",
+                  [](files::Record& r, const auto& one) {
+                    r.field("vehicles", one.first, "");
+                    r.field("rms_gf", one.second.network, "With the network.", "gf");
+                    r.field("physics_rms_gf", one.second.nothing, "Without it.", "gf");
+                  });
+        then.field("left_out", physics.left_out,
+                   "Flights that neither fit nor decide anything: those of compositions.");
+        then.field("bound", physics.bound, "Largest joint Lipschitz bound.", "gf/unit", "proved upper bound");
+        then.field("published_bound", physics.published_bound, "That of the published networks.", "gf/unit",
+                   "proved upper bound");
+      });
+  record.field("remainder_bound", physics.bound, "Of the network behind the fitted effects.", "gf/unit",
+               "proved upper bound");
+}
+
+void show_physics(const PhysicsFirst& physics, Finding& finding) {
+  finding.show("Physics first: vertical residual on test flights", "physics_first",
+               {{"model"},
+                {"rms_gf", "RMS", "{:.2f}"},
+                {"interval_gf", "90 %", "{:.2f}"},
+                {"falls_by_gf?", "falls by", "{:.2f}"},
+                {"falls_by_interval_gf?", "90 %", "{:.2f}"}});
+  finding.add("Physics, then network: vertical residual on test flights, RMS, by neighbours 2 vehicle",
+              analysis::table(*finding.fields.find("physics_then_network.compositions"),
+                              {{"name", "vehicles"},
+                               {"physics_rms_gf", "physics", "{:.2f}"},
+                               {"rms_gf", "and network", "{:.2f}"},
+                               {"published_rms_gf", "published network", "{:.2f}"}}));
+  std::vector<std::string> silent;
+  for (const auto& [composition, errors] : physics.support.silent)
+    silent.push_back(
+        fmt::format("{} ({:.2f} gf with it, {:.2f} without)", composition, errors.network, errors.nothing));
+  finding.notes.push_back(
+      fmt::format("Compositions that the development flights leave without a network: {}.",
+                  silent.empty() ? "none" : fmt::format("{}", fmt::join(silent, ", "))));
+  finding.notes.push_back(fmt::format(
+      "Largest joint Lipschitz bound, proved: {:.1f} gf per unit of input, of the published networks {:.1f}.",
+      physics.bound, physics.published_bound));
+  finding.notes.push_back(
+      fmt::format("Left out of physics, networks and decisions, and judged here: {}. The published networks "
+                  "had seen these flights when they were trained.",
+                  fmt::join(physics.left_out, ", ")));
+  finding.notes.push_back(
+      "Physics first is judged with its own labels (accelerometer filter in the model), the deep set alone "
+      "with the authors': compare rows within a table.");
+}
+
+PhysicsFirst physics_first(const Setting& setting) {
   Recorded recorded = development_flights(setting);
   const identification::Budget budget = identification::error_budget(
       recorded.fit, recorded.test, published_network(setting), setting.jobs,
@@ -130,20 +156,21 @@ void physics_first(const Setting& setting, Finding& finding) {
   }
   for (residuals::Inputs* inputs : {&recorded.fit, &recorded.select, &recorded.test})
     inputs->vehicle_models = budget.fitted;
-  std::string physics;
-  for (const auto& [vehicle, model] : budget.fitted) physics += vehicle + "\n" + stability::to_toml(model);
+  std::string fitted;
+  for (const auto& [vehicle, model] : budget.fitted) fitted += vehicle + "\n" + stability::to_toml(model);
   const Learned learned =
-      train_recorded(setting, recorded, folds_options(setting), "remainder", "remainder of " + physics);
+      train_recorded(setting, recorded, folds_options(setting), "remainder", "remainder of " + fitted);
   judge("+ deep set on the remainder", with_network(recorded.test, learned.folder + "/network.toml"));
 
-  add_rows(rows, finding);
-  add_beside_published(rows[rows.size() - 2], rows.back(), budget.rows.back(), finding);
-  add_decisions(learned, certified_published(setting).largest(), recorded.test, finding);
-  finding.json["remainder_bound"] = learned.bound;
-  finding.notes.push_back(
-      "Physics first is judged with its own labels (accelerometer filter in the model), the deep set alone "
-      "with the "
-      "authors': compare rows within a table.");
+  PhysicsFirst physics;
+  physics.ladder = ladder_of(rows);
+  physics.compositions = compositions_of(rows[rows.size() - 2], rows.back(), budget.rows.back());
+  physics.support = learned.support;
+  for (const residuals::FlightFiles& flight : recorded.test.found.flights)
+    physics.left_out.push_back(flight.name);
+  physics.bound = learned.bound;
+  physics.published_bound = certified_published(setting).largest();
+  return physics;
 }
 
 }  // namespace swarmcert::reproduction

@@ -157,9 +157,4 @@ Learned train_recorded(const Setting& setting, const Recorded& recorded, const L
                [&] { return load_recorded(setting, recorded, options); });
 }
 
-std::string gf(double value) { return fmt::format("{:.2f}", value); }
-std::string gf(const Interval& interval) {
-  return fmt::format("{:.2f} .. {:.2f}", interval.lower, interval.upper);
-}
-
 }  // namespace swarmcert::reproduction

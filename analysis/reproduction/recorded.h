@@ -1,7 +1,10 @@
 /// @file The published flights as used by the experiments: which flights are fitted, and how networks learn from them.
 #pragma once
 
+#include <map>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "analysis/learning/trained_network.h"
 #include "analysis/reproduction/finding.h"
@@ -48,12 +51,34 @@ Learned train_recorded(const Setting& setting, const Recorded& recorded, const L
 /// Returns text that changes with every flight.
 std::string recorded_key(const Setting& setting, const Recorded& recorded);
 
-/// Physics first: fits lag, offsets, ground, jet and the other effects to all development flights; the networks of
-/// the folds learn the remainder, where that helps. Adds a table with the contribution of each step, and a table that
-/// compares it with the published networks on the test flights, which are named.
-void physics_first(const Setting& setting, Finding& finding);
+/// One row of the ladder of physics, and how much its error falls from the row before.
+struct PhysicsRow {
+  std::string model;
+  double rms_gf = 0;
+  Interval interval_gf;
+  std::optional<Estimate> fall;
+  std::map<std::string, double> compositions;
+};
 
-std::string gf(double value);
-std::string gf(const Interval& interval);
+/// Errors on the test flights, by kinds of neighbours and vehicle.
+struct PhysicsComposition {
+  std::string name;
+  double physics_gf = 0, with_network_gf = 0, published_gf = 0;
+};
+
+/// Fits lag, offsets, ground, jet and the other effects to all development flights; the networks of the folds learn
+/// the remainder, where that helps. Compared with the published networks on the test flights.
+struct PhysicsFirst {
+  std::vector<PhysicsRow> ladder;
+  std::vector<PhysicsComposition> compositions;
+  learning::OutputSupport support;    ///< decided on flights that no network of the folds has seen
+  std::vector<std::string> left_out;  ///< flights that neither fit nor decide anything
+  double bound = 0, published_bound = 0;
+};
+
+PhysicsFirst physics_first(const Setting& setting);
+void describe(files::Record& record, const PhysicsFirst& physics);
+/// Adds tables and notes; `finding` has the fields.
+void show_physics(const PhysicsFirst& physics, Finding& finding);
 
 }  // namespace swarmcert::reproduction

@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <map>
 
@@ -65,13 +64,6 @@ double Group::mean_select_gf() const { return mean(select_gf); }
 double Group::mean_test_gf() const { return mean(test_gf); }
 double Group::mean_bound() const { return mean(bounds); }
 
-double Group::standard_error_gf() const {
-  double squares = 0;
-  for (const double x : test_gf) squares += (x - mean_test_gf()) * (x - mean_test_gf());
-  const auto n = static_cast<double>(test_gf.size());
-  return std::sqrt(squares / (n - 1) / n);
-}
-
 Group train_group(const Setting& setting, const Source& source, const Recorded& flights, LearnOptions options,
                   const std::string& name, int seeds) {
   if (!setting.full) options.sizes = {{12, 12}, {12}, 8, options.sizes.ground};
@@ -88,12 +80,13 @@ Group train_group(const Setting& setting, const Source& source, const Recorded& 
   return group;
 }
 
-files::Json json_of(const Group& group) {
-  return {{"select_rmse_gf", group.select_gf},
-          {"test_rmse_gf", group.test_gf},
-          {"mean_test_rmse_gf", group.mean_test_gf()},
-          {"bound_gf_per_unit", group.bounds},
-          {"mean_bound_gf_per_unit", group.mean_bound()}};
+void describe_group(files::Record& record, const Group& group) {
+  record.field("select_rmse_gf", group.select_gf, "On the selecting flights, by seed.", "gf");
+  record.field("test_rmse_gf", group.test_gf, "On flights not seen, by seed.", "gf");
+  record.field("mean_test_rmse_gf", group.mean_test_gf(), "Over seeds.", "gf");
+  record.field("bound_gf_per_unit", group.bounds, "Joint Lipschitz bound, by seed.", "gf/unit",
+               "proved upper bound");
+  record.field("mean_bound_gf_per_unit", group.mean_bound(), "Over seeds.", "gf/unit");
 }
 
 }  // namespace swarmcert::reproduction

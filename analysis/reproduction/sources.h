@@ -26,14 +26,13 @@ struct Group {
   double mean_select_gf() const;
   double mean_test_gf() const;
   double mean_bound() const;
-  /// Standard error of the mean over seeds; NaN for a single seed.
-  double standard_error_gf() const;
 };
 
 /// Trains `seeds` networks with tight bounds, small ones at the small size, into folders whose names begin with `name`.
 Group train_group(const Setting& setting, const Source& source, const Recorded& flights, LearnOptions options,
                   const std::string& name, int seeds);
 
-files::Json json_of(const Group& group);
+/// Describes the numbers of a group, by seed and their means.
+void describe_group(files::Record& record, const Group& group);
 
 }  // namespace swarmcert::reproduction

@@ -18,9 +18,9 @@ namespace swarmcert::reproduction {
 /// A network allows closer flight (section III-C), so the random walks of every stage with a network are contracted.
 /// Otherwise the task's repulsion would keep more vehicles as far apart as fewer ones. The factor is our choice.
 struct Stage {
-  int vehicles;
-  double drawn_in;         ///< contraction of the setpoints of the random walks, see Plan
-  const char* flown_with;  ///< as text
+  int vehicles = 0;
+  double drawn_in = 1;          ///< contraction of the setpoints of the random walks, see Plan
+  const char* flown_with = "";  ///< as text
 };
 inline constexpr Stage kStages[] = {{2, 1.0, "no network"},
                                     {2, 0.95, "network of 2, uncompensated"},

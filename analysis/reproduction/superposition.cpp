@@ -48,23 +48,36 @@ struct Defect {
   }
 };
 
-void add_row(const std::string& who, const Blocks& blocks, const std::string& name, std::size_t records,
-             Table& table, Finding& finding) {
-  const Estimate together = estimate(blocks, name + " together"), apart = estimate(blocks, name + " apart"),
-                 defect = estimate(blocks, name + " defect");
-  table.rows.push_back({who, std::to_string(records), fmt::format("{:.2f}", together.value_gf),
-                        fmt::format("{:.2f}", apart.value_gf), fmt::format("{:+.2f}", defect.value_gf),
-                        fmt::format("{:+.2f} .. {:+.2f}", defect.interval.lower, defect.interval.upper)});
-  finding.json["rows"].push_back({{"function", who},
-                                  {"records", records},
-                                  {"f_ab_gf", together.value_gf},
-                                  {"f_a_plus_f_b_gf", apart.value_gf},
-                                  {"defect_gf", defect.value_gf},
-                                  {"interval_gf", defect.interval}});
+struct FunctionRow {
+  std::string function;
+  std::size_t records = 0;
+  Estimate together, apart, defect;
+};
+
+struct SuperpositionResult {
+  std::vector<FunctionRow> rows;
+};
+
+void describe(files::Record& record, const SuperpositionResult& result) {
+  record.list("rows", result.rows, "One row per function and placement; forces relative to no neighbour.",
+              [](files::Record& r, const FunctionRow& row) {
+                r.field("function", row.function, "");
+                r.field("records", row.records, "");
+                r.field("f_ab_gf", row.together.value_gf, "f(a,b).", "gf", "estimate");
+                r.field("f_a_plus_f_b_gf", row.apart.value_gf, "f(a) + f(b).", "gf", "estimate");
+                r.field("defect_gf", row.defect.value_gf, "f(a,b) - f(a) - f(b).", "gf", "estimate");
+                r.field("interval_gf", row.defect.interval, "90 %, of the defect.", "gf", "estimate");
+              });
+}
+
+FunctionRow row_of(const std::string& function, const Blocks& blocks, const std::string& name,
+                   std::size_t records) {
+  return {function, records, estimate(blocks, name + " together"), estimate(blocks, name + " apart"),
+          estimate(blocks, name + " defect")};
 }
 
 /// Simulated flights of three vehicles: the truth and the network at the states reached in flight.
-void add_simulated(const Setting& setting, const Truth& truth, Table& table, Finding& finding) {
+void add_simulated(const Setting& setting, const Truth& truth, SuperpositionResult& result) {
   Stages stages(setting, truth, 0);
   const Learned learned = stages.learned(stage_of(3));
   Interaction actual(truth), predicted(learned.network);
@@ -100,13 +113,13 @@ void add_simulated(const Setting& setting, const Truth& truth, Table& table, Fin
     }
   }
   if (records == 0) return;
-  add_row(fmt::format("truth \"{}\"", truth.name), blocks, "truth", records, table, finding);
-  add_row(fmt::format("network trained with 3 on it"), blocks, "network", records, table, finding);
+  result.rows.push_back(row_of(fmt::format("truth \"{}\"", truth.name), blocks, "truth", records));
+  result.rows.push_back(row_of("network trained with 3 on it", blocks, "network", records));
 }
 
 /// Recorded flights of three small vehicles: the measured force minus the force of each neighbour according to
 /// two-vehicle flights.
-void add_recorded(const Setting& setting, const Truth& truth, Table& table, Finding& finding) {
+void add_recorded(const Setting& setting, const Truth& truth, SuperpositionResult& result, Finding& finding) {
   if (setting.recorded.empty() || !fs::exists(fs::path(setting.recorded) / "flights")) {
     finding.notes.push_back("Recorded flights are left out: --recorded names no folder that contains them.");
     return;
@@ -163,28 +176,36 @@ void add_recorded(const Setting& setting, const Truth& truth, Table& table, Find
       }
     }
   }
-  if (records > 0) add_row("recorded flights of three", blocks, "recorded", records, table, finding);
+  if (records > 0) result.rows.push_back(row_of("recorded flights of three", blocks, "recorded", records));
 }
 
-}  // namespace
-
-Finding superposition(const Setting& setting) {
+Finding run_superposition(const Setting& setting) {
   Finding finding;
-  finding.json["rows"] = files::Json::array();
-  Table table = {fmt::format("Two vehicles above that push by more than {:g} gf each", kActing_gf),
-                 {"function", "records", "f(a,b) [gf]", "f(a) + f(b) [gf]", "defect [gf]", "90 %"},
-                 {}};
-  const std::vector<Truth> all = truths(setting);
-  for (const Truth& truth : all) add_simulated(setting, truth, table, finding);
+  SuperpositionResult result;
+  for (const Truth& truth : truths(setting)) add_simulated(setting, truth, result);
   Setting recorded = setting;
   recorded.updraft = false;  // the updraft is our assumption: recorded flights of two show none
-  add_recorded(recorded, truths(recorded).front(), table, finding);
-  finding.tables.push_back(std::move(table));
+  add_recorded(recorded, truths(recorded).front(), result, finding);
+  finding.fields = files::record_of(result);
+  finding.show(fmt::format("Two vehicles above that push by more than {:g} gf each", kActing_gf), "rows",
+               {{"function"},
+                {"records"},
+                {"f_ab_gf", "f(a,b)", "{:.2f}"},
+                {"f_a_plus_f_b_gf", "f(a) + f(b)", "{:.2f}"},
+                {"defect_gf", "", "{:+.2f}"},
+                {"interval_gf", "90 %", "{:+.2f}"}});
   finding.notes.push_back(
       "The defect is f(a,b) - f(a) - f(b), all relative to f of no neighbour. For recorded flights f(a) and "
       "f(b) are the downwash fitted to flights of two vehicles, and f(a,b) is the measured force minus the "
       "vehicle's mean when no vehicle is above. Intervals: 90 %, blocks of 2 s.");
   return finding;
+}
+
+}  // namespace
+
+Experiment superposition() {
+  return experiment<SuperpositionResult>(
+      "superposition", "f(a,b) - f(a) - f(b): truth, network, recorded flights", run_superposition);
 }
 
 }  // namespace swarmcert::reproduction

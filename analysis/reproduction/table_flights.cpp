@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "analysis/residuals/statistics.h"
-#include "nn/base/json_number.h"
+#include "nn/base/json.h"
 #include "nn/base/parallel.h"
 #include "nn/base/shard.h"
 
@@ -16,16 +16,7 @@ namespace {
 
 constexpr const char* kUnitSchema = "swarmcert/table-unit/1";
 
-/// One flight of the table: six swaps.
-struct Cell {
-  int controller = 0, vehicles = 0, training_seed = 0;
-  std::uint64_t flight_seed = 0;
-  double max_m[3] = {0, 0, 0};                  ///< |x|, |y|, |z|; infinite: vehicle lost
-  double p50_m[2] = {0, 0}, p95_m[2] = {0, 0};  ///< of |x|, |y|
-  double saturated_share = 0;
-};
-
-void fill(const Flown& flown, Cell& cell) {
+void fill(const Flown& flown, TableFlight& cell) {
   for (int axis = 0; axis < 3; ++axis) cell.max_m[axis] = largest_error_m(flown, axis);
   cell.saturated_share = flown.saturated_share;
   for (int axis = 0; axis < 2; ++axis) {
@@ -42,13 +33,13 @@ void fill(const Flown& flown, Cell& cell) {
 using Networks = std::array<std::optional<files::Network>, 4>;
 
 /// The planned flights of the table.
-std::vector<Cell> planned(const Setting& setting, int training_seed) {
-  std::vector<Cell> cells;
+TableFlights planned(const Setting& setting, int training_seed) {
+  TableFlights cells;
   for (const int controller : kControllers) {
     if (controller == 0 && training_seed > 0) continue;  // the baseline does not depend on training
     for (int vehicles = kLeastVehicles; vehicles <= kMostVehicles; ++vehicles) {
       for (int k = 0; k < scale_of(setting).flight_seeds; ++k) {
-        Cell cell;
+        TableFlight cell;
         cell.controller = controller;
         cell.vehicles = vehicles;
         cell.training_seed = training_seed;
@@ -60,42 +51,53 @@ std::vector<Cell> planned(const Setting& setting, int training_seed) {
   return cells;
 }
 
-files::Json to_json(const std::vector<Cell>& cells) {
-  files::Json flights = files::Json::array();
-  for (const Cell& cell : cells) {
-    flights.push_back({{"trained_with", cell.controller},
-                       {"vehicles", cell.vehicles},
-                       {"training_seed", cell.training_seed},
-                       {"flight_seed", cell.flight_seed},
-                       {"max_x_m", files::finite(cell.max_m[0])},
-                       {"max_y_m", files::finite(cell.max_m[1])},
-                       {"max_z_m", files::finite(cell.max_m[2])},
-                       {"p50_x_m", cell.p50_m[0]},
-                       {"p50_y_m", cell.p50_m[1]},
-                       {"p95_x_m", cell.p95_m[0]},
-                       {"p95_y_m", cell.p95_m[1]},
-                       {"saturated_share", cell.saturated_share}});
-  }
-  return flights;
+/// The inverse of describe().
+TableFlight flight_of(const files::Json& json) {
+  const auto number = [&json](const char* key) {
+    return json.at(key).is_number() ? json.at(key).get<double>() : INFINITY;
+  };
+  return {json.at("trained_with"),
+          json.at("vehicles"),
+          json.at("training_seed"),
+          json.at("flight_seed"),
+          {number("max_x_m"), number("max_y_m"), number("max_z_m")},
+          {number("p50_x_m"), number("p50_y_m")},
+          {number("p95_x_m"), number("p95_y_m")},
+          number("saturated_share")};
 }
 
-files::Json flown_cells(const Setting& setting, const Truth& flown, const Networks& networks,
-                        int training_seed, double higher_m) {
-  std::vector<Cell> cells = planned(setting, training_seed);
+TableFlights flown_cells(const Setting& setting, const Truth& flown, const Networks& networks,
+                         int training_seed, double higher_m) {
+  TableFlights cells = planned(setting, training_seed);
   files::parallel_for(static_cast<int>(cells.size()), setting.jobs, [&](int i) {
-    Cell& cell = cells[static_cast<std::size_t>(i)];
+    TableFlight& cell = cells[static_cast<std::size_t>(i)];
     const std::size_t c = cell.controller == 0 ? 0 : static_cast<std::size_t>(cell.controller - 1);
     fill(fly(setting, flown, {"swap", cell.vehicles, 0, cell.flight_seed, higher_m},
              networks[c] ? &*networks[c] : nullptr, false),
          cell);
   });
-  return to_json(cells);
+  return cells;
 }
 
 }  // namespace
 
-files::Json table_flights(const Setting& setting, Stages& stages, const Truth& flown, int training_seed,
-                          double higher_m, const std::string& file) {
+void describe(files::Record& record, const TableFlight& flight) {
+  record.field("trained_with", flight.controller, "Vehicles in training; 0: no network.");
+  record.field("vehicles", flight.vehicles, "");
+  record.field("training_seed", flight.training_seed, "");
+  record.field("flight_seed", flight.flight_seed, "");
+  record.field("max_x_m", flight.max_m[0], "Largest error; null: a vehicle was lost.", "m");
+  record.field("max_y_m", flight.max_m[1], "Likewise.", "m");
+  record.field("max_z_m", flight.max_m[2], "Likewise.", "m");
+  record.field("p50_x_m", flight.p50_m[0], "Median of the errors.", "m");
+  record.field("p50_y_m", flight.p50_m[1], "Likewise.", "m");
+  record.field("p95_x_m", flight.p95_m[0], "95 % quantile of the errors.", "m");
+  record.field("p95_y_m", flight.p95_m[1], "Likewise.", "m");
+  record.field("saturated_share", flight.saturated_share, "Of the control periods of the worst vehicle.");
+}
+
+TableFlights table_flights(const Setting& setting, Stages& stages, const Truth& flown, int training_seed,
+                           double higher_m, const std::string& file) {
   Networks networks;
   std::string key =
       fmt::format("{} {} {} {} ", higher_m, flown.battery_V, setting.seed, scale_of(setting).flight_seeds) +
@@ -106,32 +108,36 @@ files::Json table_flights(const Setting& setting, Stages& stages, const Truth& f
   }
   const auto fly_all = [&] {
     files::Json unit;
-    unit["flights"] = flown_cells(setting, flown, networks, training_seed, higher_m);
+    unit["flights"] =
+        files::to_json(files::record_of(flown_cells(setting, flown, networks, training_seed, higher_m)));
     return unit;
   };
-  return files::kept_unit(file, kUnitSchema, key, fly_all).at("flights");
+  const files::Json unit = files::kept_unit(file, kUnitSchema, key, fly_all);
+  TableFlights flights;
+  for (const files::Json& flight : unit.at("flights")) flights.push_back(flight_of(flight));
+  return flights;
 }
 
-Spread spread_of(const files::Json& flights, int controller, int vehicles, const char* field) {
+Spread spread_of(const TableFlights& flights, int controller, int vehicles,
+                 const std::function<double(const TableFlight&)>& value) {
   std::vector<double> values;
-  for (const files::Json& flight : flights) {
-    if (flight.at("trained_with") != controller || flight.at("vehicles") != vehicles) continue;
-    values.push_back(flight.at(field).is_number() ? flight.at(field).get<double>() : INFINITY);
-  }
+  for (const TableFlight& flight : flights)
+    if (flight.controller == controller && flight.vehicles == vehicles) values.push_back(value(flight));
   Spread spread{0, INFINITY, 0};
-  for (const double value : values) {
-    spread.least_m = std::min(spread.least_m, value);
-    spread.most_m = std::max(spread.most_m, value);
+  for (const double one : values) {
+    spread.least_m = std::min(spread.least_m, one);
+    spread.most_m = std::max(spread.most_m, one);
   }
   spread.median_m = residuals::quantile(values, 0.5);
   return spread;
 }
 
-Spreads height_spreads(const files::Json& flights) {
+Spreads height_spreads(const TableFlights& flights) {
   Spreads spreads;
   for (std::size_t c = 0; c < 4; ++c) {
     for (std::size_t v = 0; v < 4; ++v)
-      spreads[c][v] = spread_of(flights, kControllers[c], kLeastVehicles + static_cast<int>(v), "max_z_m");
+      spreads[c][v] = spread_of(flights, kControllers[c], kLeastVehicles + static_cast<int>(v),
+                                [](const TableFlight& flight) { return flight.max_m[2]; });
   }
   return spreads;
 }

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "analysis/reproduction/stages.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::reproduction {
 
@@ -22,20 +25,33 @@ inline constexpr double kPaper_m[4][4] = {{0.094, 0.139, 0.209, 0.314},
                                           {0.026, 0.082, 0.140, 0.159},
                                           {0.024, 0.061, 0.102, 0.150}};
 
-/// Returns all flights of one training seed as objects of result.json; read from `file` if it contains them.
+/// One flight of the table: six swaps.
+struct TableFlight {
+  int controller = 0, vehicles = 0, training_seed = 0;
+  std::uint64_t flight_seed = 0;
+  double max_m[3] = {0, 0, 0};                  ///< |x|, |y|, |z|; infinite: vehicle lost
+  double p50_m[2] = {0, 0}, p95_m[2] = {0, 0};  ///< of |x|, |y|
+  double saturated_share = 0;
+};
+using TableFlights = std::vector<TableFlight>;
+
+void describe(files::Record& record, const TableFlight& flight);
+
+/// Returns all flights of one training seed; read from `file` if it contains them.
 /// @param stages trained the networks, on flights of their own truth.
 /// @param flown the truth used in flight; its battery may differ.
-files::Json table_flights(const Setting& setting, Stages& stages, const Truth& flown, int training_seed,
-                          double higher_m, const std::string& file);
+TableFlights table_flights(const Setting& setting, Stages& stages, const Truth& flown, int training_seed,
+                           double higher_m, const std::string& file);
 
-/// Statistics of one field over the flights of one controller and number of vehicles; a lost flight counts as infinite.
+/// Statistics of one value over the flights of one controller and number of vehicles; a lost flight counts as infinite.
 struct Spread {
   double median_m = 0, least_m = 0, most_m = 0;
 };
-Spread spread_of(const files::Json& flights, int controller, int vehicles, const char* field);
+Spread spread_of(const TableFlights& flights, int controller, int vehicles,
+                 const std::function<double(const TableFlight&)>& value);
 
-/// Indexed by controller, then by the number of vehicles starting at kLeastVehicles.
+/// Of the height errors, indexed by controller, then by the number of vehicles starting at kLeastVehicles.
 using Spreads = std::array<std::array<Spread, 4>, 4>;
-Spreads height_spreads(const files::Json& flights);
+Spreads height_spreads(const TableFlights& flights);
 
 }  // namespace swarmcert::reproduction

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "analysis/reproduction/experiments.h"
 #include "analysis/reproduction/stages.h"
@@ -75,9 +76,34 @@ ErrorsInSwaps errors_in_swaps(const Setting& setting, const Truth& truth, const 
   return errors;
 }
 
-}  // namespace
+struct GammaRow {
+  double gamma = 0;
+  Learned learned;
+  ErrorsInSwaps errors;
+};
 
-Finding lipschitz_tradeoff(const Setting& setting) {
+struct TradeoffResult {
+  std::string truth;
+  std::vector<GammaRow> curve;
+};
+
+void describe(files::Record& record, const TradeoffResult& result) {
+  record.field("truth", result.truth, "Name of the simulated truth.");
+  record.field("trained_with", kVehicles, "Number of vehicles that the networks were trained with.");
+  record.list("curve", result.curve, "Error over gamma.", [](files::Record& r, const GammaRow& row) {
+    r.field("gamma", row.gamma, "Limit of the norm of every layer.");
+    r.field("gamma_proved", row.learned.keeps_gamma, "Whether every layer keeps it.", "", "proved");
+    r.field("bound_gf_per_unit", row.learned.bound, "Largest Lipschitz bound.", "gf/unit",
+            "proved upper bound");
+    r.field("test_rmse_gf", row.learned.test_gf, "On flights not seen.", "gf");
+    r.field("predicted_z_error_m", row.errors.predicted_m, "Of the linear loop in these flights.", "m",
+            "upper bound");
+    r.field("predicted_by", row.errors.by, "Name of the bound that is least.");
+    r.field("flown_z_error_m", row.errors.flown_m, "", "m");
+  });
+}
+
+Finding run_tradeoff(const Setting& setting) {
   Finding finding;
   const Truth truth = truths(setting).front();
   Stages stages(setting, truth, 0);
@@ -85,13 +111,7 @@ Finding lipschitz_tradeoff(const Setting& setting) {
   const stability::Gains gains = stability::load_gains(setting.gains);
   const std::optional<stability::AxisLoop> loop =
       stability::FlownLoop{gains, {truth.model.mass_kg}}.continuous(2);
-  finding.json["truth"] = truth.name;
-  finding.json["trained_with"] = kVehicles;
-  finding.json["curve"] = files::Json::array();
-  Table table = {
-      "Networks trained with three, gamma in every layer",
-      {"gamma", "proved bound [gf/unit]", "test RMSE [gf]", "predicted z-error [m]", "by", "flown [m]"},
-      {}};
+  TradeoffResult result{truth.name, {}};
   std::string data;
   const std::vector<double> gammas =
       setting.full ? std::vector<double>{1, 1.5, 2, 2.5, 3, 4, 6} : std::vector<double>{1.5, 3};
@@ -101,23 +121,21 @@ Finding lipschitz_tradeoff(const Setting& setting) {
     options.steps = setting.full ? 6000 : 600;
     const std::string folder =
         (std::filesystem::path(stages.flights(stage).folder) / fmt::format("gamma-{:g}", gamma)).string();
-    const Learned learned = learn(setting, options, folder, stages.data_key(stage),
-                                  [&] { return stages.data(stage, options.sizes); });
-    const auto [predicted_m, flown_m, by] =
-        errors_in_swaps(setting, truth, *loop, gains.motor_lag_s, learned.network);
-    table.rows.push_back({fmt::format("{:g}", gamma), fmt::format("{:.1f}", learned.bound),
-                          fmt::format("{:.2f}", learned.test_gf), fmt::format("{:.3f}", predicted_m), by,
-                          fmt::format("{:.3f}", flown_m)});
-    finding.json["curve"].push_back({{"gamma", gamma},
-                                     {"gamma_proved", learned.keeps_gamma},
-                                     {"bound_gf_per_unit", learned.bound},
-                                     {"test_rmse_gf", learned.test_gf},
-                                     {"predicted_z_error_m", predicted_m},
-                                     {"predicted_by", by},
-                                     {"flown_z_error_m", flown_m}});
-    data += fmt::format("{} {} {} {}\n", learned.bound, learned.test_gf, 100 * predicted_m, 100 * flown_m);
+    Learned learned = learn(setting, options, folder, stages.data_key(stage),
+                            [&] { return stages.data(stage, options.sizes); });
+    const ErrorsInSwaps errors = errors_in_swaps(setting, truth, *loop, gains.motor_lag_s, learned.network);
+    data += fmt::format("{} {} {} {}\n", learned.bound, learned.test_gf, 100 * errors.predicted_m,
+                        100 * errors.flown_m);
+    result.curve.push_back({gamma, std::move(learned), errors});
   }
-  finding.tables.push_back(std::move(table));
+  finding.fields = files::record_of(result);
+  finding.show("Networks trained with three, gamma in every layer", "curve",
+               {{"gamma", "", "{:g}"},
+                {"bound_gf_per_unit", "proved bound", "{:.1f}"},
+                {"test_rmse_gf", "test RMSE", "{:.2f}"},
+                {"predicted_z_error_m", "predicted z-error", "{:.3f}"},
+                {"predicted_by", "by"},
+                {"flown_z_error_m", "flown", "{:.3f}"}});
   finding.notes.push_back(
       "Predicted: the loop's exact gains times the measured remainder of the force after the prediction, "
       "with the motors' lag, in swaps of three. It bounds the linear loop, for these flights: noise and "
@@ -131,6 +149,13 @@ Finding lipschitz_tradeoff(const Setting& setting) {
        "using 1:4 axes x1y2 with linespoints title 'flown z-error'\n",
        "Test error and tracking error over the proved Lipschitz bound."});
   return finding;
+}
+
+}  // namespace
+
+Experiment lipschitz_tradeoff() {
+  return experiment<TradeoffResult>("lipschitz", "test error, certified bound and tracking error over gamma",
+                                    run_tradeoff);
 }
 
 }  // namespace swarmcert::reproduction

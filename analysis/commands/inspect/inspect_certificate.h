@@ -1,15 +1,14 @@
-/// @file Statements of a certificate as shown by `inspect`; nothing is checked.
+/// @file Reads what a certificate states; nothing is checked.
 #pragma once
 
 #include <string>
 
-#include "nn/base/json.h"
+#include "analysis/commands/inspect/inspect_result.h"
 
 namespace swarmcert::analysis {
 
-/// Describes a certificate of network bounds (kind "certificate") or of the gains of position loops (kind
-/// "tracking_certificate").
+/// Reads a certificate of network bounds, or of the gains of position loops.
 /// @throws files::InputError for any other JSON.
-files::Json inspect_certificate(const std::string& path, bool print);
+InspectedFile stated_by_certificate(const std::string& path);
 
 }  // namespace swarmcert::analysis

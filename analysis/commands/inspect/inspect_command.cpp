@@ -4,30 +4,28 @@
 #include <chrono>
 #include <exception>
 #include <filesystem>
+#include <iterator>
 #include <limits>
-#include <map>
 #include <memory>
 #include <sstream>
+#include <utility>
 
 #include "analysis/cli/command_line.h"
-#include "analysis/cli/counted.h"
 #include "analysis/cli/host.h"
+#include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/inspect/inspect_certificate.h"
-#include "analysis/commands/inspect/inspect_log.h"
+#include "analysis/commands/inspect/inspect_output.h"
 #include "analysis/commands/inspect/inspect_report.h"
 #include "analysis/commands/shared/collection_table.h"
 #include "analysis/logs/columns_draft.h"
 #include "analysis/logs/read_log.h"
 #include "analysis/logs/vehicles_in_file.h"
-#include "analysis/residuals/flight_set.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
 #include "nn/base/text.h"
 #include "nn/base/toml.h"
-#include "nn/weights/compositions.h"
-#include "nn/weights/functions.h"
 #include "stability/model.h"
 
 namespace swarmcert::analysis {
@@ -42,96 +40,10 @@ struct InspectOptions {
   double t1_s = std::numeric_limits<double>::infinity();
 };
 
-/// The operation after layer `k`: the activation; nothing after the last layer.
-std::string activation_after(const files::Weights& weights, std::size_t k) {
-  return k + 1 < weights.layers.size() ? files::op_after(weights.layers[k]) : "";
-}
-
-files::Json describe(const files::Weights& weights) {
-  files::Json layers = files::Json::array();
-  for (std::size_t k = 0; k < weights.layers.size(); ++k) {
-    const files::Layer& layer = weights.layers[k];
-    const std::string activation = activation_after(weights, k);
-    layers.push_back({{"name", layer.name},
-                      {"inputs", layer.inputs},
-                      {"outputs", layer.outputs},
-                      {"activation", activation.empty() ? files::Json() : files::Json(activation)}});
-  }
-  return {{"file", weights.path},
-          {"sha256", weights.sha256},
-          {"precision", files::name(weights.precision)},
-          {"activation", weights.layers.size() > 1 ? weights.activation_names() : "relu"},
-          {"layers", std::move(layers)},
-          {"notes", weights.notes},
-          {"rounding_of_slope", files::rounding_of_slope(weights)}};
-}
-
 bool is_json(const std::string& path) {
   const std::string text = files::read_file(path);
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   return first != std::string::npos && text[first] == '{';
-}
-
-/// The statements of network.toml other than its weights; null where it states nothing.
-files::Json description(const files::Network& network) {
-  using Gamma = files::GammaStatement;
-  files::Json gamma, clamp;
-  if (network.gamma) {
-    gamma = {{"value", network.gamma->value},
-             {"scope", network.gamma->scope == Gamma::Scope::kLayer ? "layer" : "network"},
-             {"mode", network.gamma->mode == Gamma::Mode::kClip ? "clip" : "equal"}};
-  }
-  if (network.clamp) clamp = {{"lower", network.clamp->lower}, {"upper", network.clamp->upper}};
-  return {{"output", {{"quantity", network.output_quantity}, {"unit", network.output_unit}}},
-          {"gamma", std::move(gamma)},
-          {"silent", files::silent_compositions(network)},
-          {"input", {{"order", network.input_order}, {"clamp", std::move(clamp)}}}};
-}
-
-void print_description(const files::Network& network) {
-  if (network.path.empty()) return;
-  fmt::print("{}: output {} in {}", network.path,
-             network.output_quantity.empty() ? "not stated" : network.output_quantity,
-             network.output_unit.empty() ? "no stated unit" : network.output_unit);
-  if (network.gamma) {
-    const bool is_layer = network.gamma->scope == files::GammaStatement::Scope::kLayer;
-    const bool is_clip = network.gamma->mode == files::GammaStatement::Mode::kClip;
-    fmt::print("; gamma {} {} per {}", is_clip ? "at most" : "equal to", network.gamma->value,
-               is_layer ? "layer" : "network");
-  }
-  fmt::print("\n");
-  const std::vector<std::string>& order = network.input_order;
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    fmt::print("  input {}: {}", k, order[k]);
-    if (network.clamp) fmt::print(", clamped to {} .. {}", network.clamp->lower[k], network.clamp->upper[k]);
-    fmt::print("\n");
-  }
-  for (const std::string& composition : files::silent_compositions(network))
-    fmt::print("  silent: {}\n", composition);
-}
-
-files::Json inspect_network(const std::string& path, files::NetworkArguments arguments, bool print) {
-  arguments.file = path;
-  const files::Network network = files::load_any_network(arguments);
-  if (print) print_description(network);
-  files::Json parts = files::Json::object();
-  for (const auto& [part, weights] : files::parts(network)) {
-    parts[part.name()] = describe(*weights);
-    if (!print) continue;
-    fmt::print("{}: {} {}, sha256 {}\n", weights->path, part.name(), files::name(weights->precision),
-               weights->sha256);
-    for (std::size_t k = 0; k < weights->layers.size(); ++k) {
-      const files::Layer& layer = weights->layers[k];
-      const std::string activation = activation_after(*weights, k);
-      fmt::print("  {:<10} {} -> {}{}{}\n", layer.name, layer.inputs, layer.outputs,
-                 activation.empty() ? "" : ", ", activation);
-    }
-    for (const std::string& note : weights->notes) fmt::print("  {}\n", note);
-  }
-  files::Json json = {{"file", path}, {"kind", "network"}};
-  json.update(description(network));
-  json["networks"] = std::move(parts);
-  return json;
 }
 
 bool is_model(const std::string& path) {
@@ -140,45 +52,12 @@ bool is_model(const std::string& path) {
   return document["schema"].value_or(std::string()).rfind("swarmcert/model/", 0) == 0;
 }
 
-files::Json inspect_model(const std::string& path, bool print) {
-  const stability::Model model = stability::read_model(path);
-  files::Json effects = files::Json::array();
-  for (const stability::EffectSpec& effect : model.effects) {
-    effects.push_back({{"effect", effect.name}, {"parameters", effect.parameters}});
-    if (!effect.vehicle.empty()) effects.back()["vehicle"] = effect.vehicle;
-  }
-  const stability::ThrustMap& map = model.thrust;
-  if (print) {
-    fmt::print("{}: model of kind {}: {} kg, arm {} m, at most {:.3f} N per rotor\n", path, model.kind,
-               model.mass_kg, model.arm_m, map.largest_N(stability::kFullBattery_V));
-    for (const files::Json& effect : effects) fmt::print("  {}\n", effect.dump());
-    if (effects.empty()) fmt::print("  no effects\n");
-  }
-  return {{"file", path},
-          {"kind", "model"},
-          {"vehicle",
-           {{"kind", model.kind},
-            {"mass_kg", model.mass_kg},
-            {"inertia_kg_m2", model.inertia_kg_m2},
-            {"arm_m", model.arm_m},
-            {"torque_per_thrust_m", model.torque_per_thrust_m},
-            {"thrust",
-             {{"c00", map.c00}, {"c10", map.c10}, {"c01", map.c01}, {"c20", map.c20}, {"c11", map.c11}}}}},
-          {"effects", std::move(effects)}};
-}
-
-/// Data for the table of folders and the page, one element per log.
-struct Seen {
-  std::vector<LogOutcome> outcomes;
-  std::vector<InspectedLog> logs;  ///< empty without --report
-};
-
 /// A file that may be a log: its contents, or the reason why it cannot be read.
 struct LogRead {
   bool is_log = false;  ///< if false, only `error` is set
-  logs::Log log;
-  files::Json json;  ///< its description in the result
-  LogOutcome outcome;
+  LogFile file;
+  std::string csv, curve;  ///< if they were asked for
+  double run_s = 0;
   std::exception_ptr error;
 };
 
@@ -188,12 +67,16 @@ LogRead log_read(const std::string& path, const InspectOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     read.is_log = logs::looks_like_log(path);
     if (!read.is_log) return read;
-    read.log = options.columns.empty() ? logs::read_log(path)
-                                       : logs::read_log(path, logs::read_columns(options.columns));
-    read.json = {{"file", path}};
-    read.json.update(describe_log(read.log));
-    read.outcome = outcome_of(path, read.log, read.json);
-    read.outcome.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    logs::Log log = options.columns.empty() ? logs::read_log(path)
+                                            : logs::read_log(path, logs::read_columns(options.columns));
+    if (!options.csv.empty()) {
+      std::ostringstream text;
+      logs::write_csv(log, options.t0_s, options.t1_s, text);
+      read.csv = text.str();
+    }
+    if (!options.report.empty()) read.curve = curve_of(log);
+    read.file = log_file(path, std::move(log));
+    read.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   } catch (const files::InputError&) {
     read.error = std::current_exception();
   }
@@ -228,32 +111,33 @@ class LogsInOrder {
   std::vector<LogRead> ahead_;
 };
 
-files::Json show_log(LogRead read, const InspectOptions& options, const CommonOptions& common, bool in_table,
-                     Seen& seen) {
-  const std::string path = read.outcome.path;
-  if (!options.csv.empty()) {
-    std::ostringstream text;
-    logs::write_csv(read.log, options.t0_s, options.t1_s, text);
-    files::write_file(options.csv, text.str(), common.force);
-  }
-  seen.outcomes.push_back(std::move(read.outcome));
-  if (!options.report.empty())
-    seen.logs.push_back({path, read.json, logs::findings(read.log.health), curve_of(read.log)});
-  if (common.prints_text()) {
-    if (in_table)
-      print_log_row(path, read.json);
-    else
-      print_log(read.log);
-  }
-  return std::move(read.json);
+LogOutcome outcome_of(const LogFile& file, double run_s) {
+  const logs::Signals& signals = file.log.signals;
+  LogOutcome outcome;
+  outcome.path = file.file;
+  outcome.opened = true;
+  outcome.seconds = file.story.air_s;
+  outcome.run_s = run_s;
+  if (!file.story.no_flight.empty()) outcome.left_out_why = "no flight: " + file.story.no_flight;
+  for (const logs::Doubt& doubt : file.doubts)
+    if (outcome.left_out_why.empty() && doubt.refuses_force)
+      outcome.left_out_why = "implausible: " + doubt.signal;
+  outcome.torque = signals.torque != logs::TorqueUse::kNone;
+  if (outcome.left_out_why.empty() && !signals.force && !outcome.torque)
+    outcome.left_out_why = "lacks " + signals.force_lacks;
+  for (std::size_t k = 0; k < 3; ++k) outcome.force[k] = signals.force_axes[k];
+  if (outcome.left_out_why.empty()) return outcome;
+  outcome.torque = false;
+  std::fill(std::begin(outcome.force), std::end(outcome.force), false);
+  return outcome;
 }
 
-files::Json inspect_other(const std::string& path, const InspectOptions& options,
-                          const CommonOptions& common) {
-  if (is_model(path)) return inspect_model(path, common.prints_text());
-  if (is_json(path)) return inspect_certificate(path, common.prints_text());
+InspectedFile other_file(const std::string& path, files::NetworkArguments network) {
+  if (is_model(path)) return ModelFile{path, stability::read_model(path)};
+  if (is_json(path)) return stated_by_certificate(path);
   try {
-    return inspect_network(path, options.network, common.prints_text());
+    network.file = path;
+    return NetworkFile{path, files::load_any_network(network)};
   } catch (const files::InputError& error) {
     files::InputFault fault = error.fault();
     if (fault.file != path || fault.what.rfind("is neither", 0) != 0) throw;
@@ -266,43 +150,20 @@ files::Json inspect_other(const std::string& path, const InspectOptions& options
 /// Returns files of one log unchanged, folders as the logs below them, and files of several vehicles as their logs, and
 /// reports which logs were taken as one flight and why.
 std::vector<std::string> expanded(const std::vector<std::string>& words, bool by_columns,
-                                  files::Json& flights, files::Json& skipped) {
+                                  residuals::FoundFlights& found) {
   std::vector<std::string> paths;
   for (const std::string& word : words) {
     if (!std::filesystem::is_directory(word) && logs::vehicles_in(word, by_columns).empty()) {
       paths.push_back(word);
       continue;
     }
-    const residuals::FoundFlights found = residuals::find_flights({word}, {}, by_columns);
-    for (const residuals::FlightFiles& flight : found.flights) {
-      files::Json members = files::Json::array();
-      for (const auto& [vehicle, path] : flight.logs) {
-        paths.push_back(path);
-        members.push_back({{"vehicle", vehicle}, {"file", path}});
-      }
-      flights.push_back({{"name", flight.name}, {"why", flight.why}, {"logs", std::move(members)}});
-    }
-    for (const std::string& file : found.skipped) skipped.push_back(file);
+    const residuals::FoundFlights here = residuals::find_flights({word}, {}, by_columns);
+    for (const residuals::FlightFiles& flight : here.flights)
+      for (const auto& [vehicle, path] : flight.logs) paths.push_back(path);
+    found.flights.insert(found.flights.end(), here.flights.begin(), here.flights.end());
+    found.skipped.insert(found.skipped.end(), here.skipped.begin(), here.skipped.end());
   }
   return paths;
-}
-
-void print_grouping(const files::Json& flights, const files::Json& skipped) {
-  if (flights.empty()) return;
-  std::map<std::string, std::size_t> reasons;
-  for (const files::Json& flight : flights) {
-    ++reasons[flight["why"].get<std::string>()];
-    if (flight["logs"].size() < 2) continue;
-    fmt::print("one flight, {}: {} of {} vehicles\n", flight["why"].get<std::string>(),
-               flight["name"].get<std::string>(), flight["logs"].size());
-  }
-  for (const auto& [why, count] : reasons) fmt::print("{}: {}\n", counted(count, "flight"), why);
-  if (reasons["one file"] > 1) {
-    fmt::print(
-        "(If some of these vehicles flew together, effects of neighbours need their logs as one flight: name "
-        "them [<prefix>_]cf<id>_<run>, or group them in a flights.toml.)\n");
-  }
-  if (!skipped.empty()) fmt::print("Skipped, no flight logs: {}\n", counted(skipped.size(), "file"));
 }
 
 /// Where column names alone are not enough, the log is inspected as described by the draft.
@@ -328,48 +189,52 @@ int run_inspect(InspectOptions options, const CommonOptions& common) {
   }
   refuse_folder(common, options.report);
   if (!options.columns_draft.empty()) write_draft(options, common);
-  files::Json found = files::Json::array(), flights = files::Json::array(), skipped = files::Json::array();
-  const std::vector<std::string> paths = expanded(options.files, options.columns.empty(), flights, skipped);
+  InspectResult result;
+  const std::vector<std::string> paths = expanded(options.files, options.columns.empty(), result.found);
   const bool in_table = paths.size() > options.files.size();
   std::vector<std::string> readable;  ///< files
   std::size_t num_readable = 0;       ///< logs and other files
-  Seen seen;
+  std::vector<LogOutcome> outcomes;
+  std::vector<std::string> curves;  ///< of logs
   LogsInOrder in_order(paths, options, common.jobs);
+  Progress progress(common.quiet);
   for (std::size_t i = 0; i < paths.size(); ++i) {
     const std::string& path = paths[i];
     try {
       LogRead log = in_order.next(i);
       if (log.error) std::rethrow_exception(log.error);
-      found.push_back(log.is_log ? show_log(std::move(log), options, common, in_table, seen)
-                                 : inspect_other(path, options, common));
+      if (log.is_log) {
+        if (!options.csv.empty()) files::write_file(options.csv, log.csv, common.force);
+        outcomes.push_back(outcome_of(log.file, log.run_s));
+        curves.push_back(std::move(log.curve));
+      }
+      result.files.push_back(log.is_log ? std::move(log.file) : other_file(path, options.network));
     } catch (const files::InputError& error) {
-      seen.outcomes.push_back({path, false, {}, false, 0, 0, "unreadable: " + error.fault().what});
+      outcomes.push_back({path, false, {}, false, 0, 0, "unreadable: " + error.fault().what});
       note(std::string("swarmcert: ") + error.what());
-      found.push_back({{"file", path}, {"kind", "unreadable"}, {"reason", error.what()}});
+      result.files.push_back(UnreadableFile{path, error.what()});
       continue;
     }
+    const bool is_row = in_table && std::holds_alternative<LogFile>(result.files.back());
+    if (common.prints_text() && !is_row) print_file(result.files.back());
+    progress.show(static_cast<int>(i + 1), static_cast<int>(paths.size()), "files read");
     const std::string file = logs::address_of(path).file;
     if (path == file || readable.empty() || readable.back() != file) readable.push_back(file);
     ++num_readable;
   }
-  const std::vector<CollectionRow> rows = collection_rows(options.files, seen.outcomes);
+  result.collections = collection_rows(options.files, outcomes);
   if (common.prints_text()) {
-    print_grouping(flights, skipped);
-    print_collections(rows, "in the air");
+    if (in_table) fmt::print("{}", to_text(log_list(logs_of(result))));
+    print_grouping(result.found);
+    print_collections(result.collections, "in the air");
   }
-  files::Json result = result_head("inspect", readable);
-  result["files"] = std::move(found);
-  if (!flights.empty()) {
-    result["flights"] = std::move(flights);
-    result["skipped"] = std::move(skipped);
-  }
-  if (!rows.empty()) result["collections"] = files::to_json(files::record_of(rows));
+  const files::Node described = result_of("inspect", readable, std::nullopt, result);
   if (!options.report.empty()) {
-    if (seen.logs.empty()) throw UsageError("--report is a page of flight logs, and none was read");
-    const std::string page = write_inspect_report(seen.logs, rows, result, options.report, common.force);
+    if (curves.empty()) throw UsageError("--report is a page of flight logs, and none was read");
+    const std::string page = write_inspect_report(result, curves, described, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", page);
   }
-  write_result(common, result);
+  write_result(common, described);
   return num_readable == paths.size() ? kDone : kBadInput;
 }
 
@@ -407,7 +272,8 @@ Command inspect_command() {
         declare_activation(app, options->network);
         declare_order(app, options->network);
         return [options](const CommonOptions& common) { return run_inspect(*options, common); };
-      }};
+      },
+      fields_of<InspectResult>()};
 }
 
 }  // namespace swarmcert::analysis

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <utility>
 
 #include "analysis/cli/bundled.h"
 #include "analysis/cli/command_line.h"
@@ -39,24 +41,8 @@ const Experiment& experiment(const std::string& name) {
 }
 
 void print(const Finding& finding) {
-  for (const reproduction::Table& table : finding.tables) {
-    fmt::print("{}\n", table.title);
-    std::vector<std::size_t> widths(table.header.size());
-    for (std::size_t c = 0; c < widths.size(); ++c) {
-      widths[c] = table.header[c].size();
-      for (const auto& row : table.rows) widths[c] = std::max(widths[c], row[c].size());
-    }
-    const auto line = [&](const std::vector<std::string>& row) {
-      std::string text = "  ";
-      for (std::size_t c = 0; c < row.size(); ++c)
-        text +=
-            c == 0 ? fmt::format("{:<{}}", row[c], widths[c]) : fmt::format("  {:>{}}", row[c], widths[c]);
-      fmt::print("{}\n", text);
-    };
-    line(table.header);
-    for (const auto& row : table.rows) line(row);
-    fmt::print("\n");
-  }
+  for (const reproduction::Table& table : finding.tables)
+    fmt::print("{}\n{}\n", table.title, to_text(table.cells));
   for (const std::string& note : finding.notes) fmt::print("{}\n", note);
 }
 
@@ -66,11 +52,59 @@ std::string write_report(const ReproduceOptions& options, const Finding& finding
   for (const std::string& note : finding.notes) report.paragraph(note);
   for (const reproduction::Table& table : finding.tables) {
     report.heading(table.title);
-    report.table(table.header, table.rows);
+    report.table(table.cells);
   }
   for (const reproduction::Figure& figure : finding.figures)
     report.figure(figure.name, figure.data, figure.script, figure.caption);
   return report.write((fs::path(options.output) / options.name).string(), true);
+}
+
+void describe_setting(files::Record& record, const std::string& experiment,
+                      const reproduction::Setting& setting) {
+  record.field("experiment", experiment, "Decides which further fields there are.");
+  record.field("size", setting.full ? "full" : "small", "small: seconds to minutes; full: that of --full.");
+  record.field("updraft", setting.updraft, "Whether the simulated truth has an updraft around downwash.");
+  record.field("complete", setting.shard.is_whole(), "false: one part of --shard.");
+}
+
+/// A field that results of some experiments have, with its shape in each.
+struct SharedField {
+  std::string experiments;
+  std::vector<files::Node> shapes;  ///< that differ
+};
+
+/// Fields of all experiments, each described by one of them; where their shapes differ, by each.
+void describe_any(files::Record& record) {
+  std::vector<std::pair<std::string, SharedField>> fields;
+  const auto schema = [](const files::Node& shape) { return files::schema_of(shape, "", "", "", true); };
+  for (const Experiment& one : reproduction::experiments()) {
+    files::Node shape;
+    files::Record of_one(shape, true);
+    one.describe_result(of_one);
+    for (const files::Node& field : shape.members) {
+      const auto known = std::find_if(fields.begin(), fields.end(),
+                                      [&](const auto& other) { return other.first == field.name; });
+      SharedField& shared =
+          known != fields.end() ? known->second : fields.emplace_back(field.name, SharedField{}).second;
+      shared.experiments += (shared.experiments.empty() ? "" : ", ") + one.name;
+      if (std::none_of(shared.shapes.begin(), shared.shapes.end(),
+                       [&](const files::Node& other) { return schema(other) == schema(field); }))
+        shared.shapes.push_back(field);
+    }
+  }
+  describe_setting(record, "", {});
+  for (const auto& [name, shared] : fields) {
+    files::Node any = shared.shapes[0];
+    if (shared.shapes.size() > 1) {
+      any = {};
+      any.kind = files::Node::Kind::one_of;
+      any.members = shared.shapes;
+    }
+    const files::About& about = any.about;
+    const std::string meaning = shared.experiments + (*about.meaning == '\0' ? "" : ": ") + about.meaning;
+    record.may(files::interned(name), std::optional(any), files::interned(meaning), about.unit,
+               about.guarantee);
+  }
 }
 
 int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
@@ -112,13 +146,11 @@ int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
 
   std::vector<std::string> inputs = {setting.gains, setting.models + "/crazyflie-small-effects.toml"};
   inputs.insert(inputs.end(), finding.inputs.begin(), finding.inputs.end());
-  files::Json result = result_head("reproduce", inputs);
-  result["seed"] = setting.seed;
-  result["experiment"] = options.name;
-  result["size"] = setting.full ? "full" : "small";
-  result["updraft"] = setting.updraft;
-  result["complete"] = !is_part;
-  result.update(finding.json);
+  const files::Node result = described_result("reproduce", inputs, setting.seed, [&](files::Record& record) {
+    describe_setting(record, options.name, setting);
+    for (const files::Node& field : finding.fields.members)
+      record.field(field.name.c_str(), field, field.about.meaning, field.about.unit, field.about.guarantee);
+  });
   write_result(common, result);
   if (common.prints_text()) print(finding);
   if (is_part) {
@@ -128,7 +160,7 @@ int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
     return kDone;
   }
   const std::string report = write_report(options, finding);
-  files::write_file(result_file.string(), files::to_text(result), true);
+  files::write_file(result_file.string(), files::to_text(files::to_json(result)), true);
   if (common.prints_text()) fmt::print("Report: {}\nNumbers: {}\n", report, result_file.string());
   return kDone;
 }
@@ -176,7 +208,8 @@ Command reproduce_command() {
             ->check(CLI::Range(0.5, 0.99))
             ->capture_default_str();
         return [options](const CommonOptions& common) { return run_reproduce(*options, common); };
-      }};
+      },
+      describe_any};
 }
 
 }  // namespace swarmcert::analysis

@@ -40,6 +40,10 @@ std::string reasons(const CollectionRow& row) {
   return text;
 }
 
+bool is_timed(const std::vector<CollectionRow>& rows) {
+  return std::any_of(rows.begin(), rows.end(), [](const CollectionRow& row) { return row.run_s > 0; });
+}
+
 }  // namespace
 
 std::vector<CollectionRow> collection_rows(const std::vector<std::string>& words,
@@ -91,22 +95,29 @@ void describe(files::Record& record, const CollectionRow& row) {
   });
 }
 
+Table collection_table(const std::vector<CollectionRow>& rows) {
+  Table all = table(files::record_of(rows), {{"name", "folder"},
+                                             {"logs"},
+                                             {"opened"},
+                                             {"force.x", "force x"},
+                                             {"force.y", "y"},
+                                             {"force.z", "z"},
+                                             {"torque"},
+                                             {"seconds", "flight", "{:.1f}"}});
+  if (is_timed(rows)) all.header.emplace_back("run [s]");
+  all.header.emplace_back("left out");
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (is_timed(rows)) all.rows[i].push_back(fmt::format("{:.2f}", rows[i].run_s));
+    all.rows[i].push_back(rows[i].left_out.empty() ? "-" : reasons(rows[i]));
+  }
+  return all;
+}
+
 void print_collections(const std::vector<CollectionRow>& rows, const std::string& seconds) {
   if (rows.empty()) return;
-  std::size_t width = 6;
-  for (const CollectionRow& row : rows) width = std::max(width, row.name.size());
-  const bool is_timed =
-      std::any_of(rows.begin(), rows.end(), [](const CollectionRow& row) { return row.run_s > 0; });
-  fmt::print("\n{:<{}}{:>6}{:>8}{:>9}{:>6}{:>6}{:>8}{:>11}{}  left out\n", "folder", width + 1, "logs",
-             "opened", "force x", "y", "z", "torque", "flight [s]", is_timed ? "   run [s]" : "");
-  for (const CollectionRow& row : rows) {
-    fmt::print("{:<{}}{:>6}{:>8}{:>9}{:>6}{:>6}{:>8}{:>11.1f}{}  {}\n", row.name, width + 1, row.logs,
-               row.opened, row.force[0], row.force[1], row.force[2], row.torque, row.seconds,
-               is_timed ? fmt::format("{:>10.2f}", row.run_s) : "",
-               row.left_out.empty() ? "-" : reasons(row));
-  }
+  fmt::print("\n{}", to_text(collection_table(rows)));
   fmt::print("(flight: seconds {}{}; torque: at least its mean in slow flight)\n", seconds,
-             is_timed ? "; run: seconds that reading and judging took" : "");
+             is_timed(rows) ? "; run: seconds that reading and judging took" : "");
 }
 
 }  // namespace swarmcert::analysis

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/report/table.h"
 #include "nn/base/record.h"
 
 namespace swarmcert::analysis {
@@ -37,7 +38,10 @@ std::vector<CollectionRow> collection_rows(const std::vector<std::string>& words
 /// Without run_s, because a result depends on its inputs only.
 void describe(files::Record& record, const CollectionRow& row);
 
-/// Prints the table to standard output: flight seconds, labelled by `seconds`, and the run time if it was measured.
+/// Returns one line per row, with the run time if it was measured.
+Table collection_table(const std::vector<CollectionRow>& rows);
+
+/// Prints it; `seconds` says which seconds of flight are counted.
 void print_collections(const std::vector<CollectionRow>& rows, const std::string& seconds);
 
 }  // namespace swarmcert::analysis
