@@ -59,7 +59,7 @@ def tether(k, anchor, slack):
 # observable parameters; rivals: effects that must or must not be one.
 NAMED = {
     "com_offset": dict(truth=dict(torque=com_offset(0.004, -0.002)), values={"offset_x_m": 0.004, "offset_y_m": -0.002},
-                       not_rivals=["torque_bias"], is_added=True),
+                       not_rivals=["torque_bias"], is_added=True, is_added_by_auto=True),
     "imu_tilt": dict(truth=dict(force=tilted(0.03, -0.04), yaw_reach=3.0),
                      values={"tilt_x_rad": 0.03, "tilt_y_rad": -0.04}, not_rivals=["constant_force"], is_added=True,
                      of_sensor=True),
@@ -130,6 +130,13 @@ def diagnosed(options, name, case):
         rest = asked(options.tool, ["diagnose", fitted, flights], os.path.join(folder, "rest.json"))
         if rest["ranking"]:
             raise RuntimeError(f"beside the {name} that add fitted: {rest['ranking']}")
+    if case.get("is_added_by_auto"):
+        added = asked(options.tool, ["add", "auto", "--model", model, flights, "-o",
+                                     os.path.join(folder, "auto.toml")], os.path.join(folder, "auto.json"))
+        ladder = added["ladder"]
+        row = next((row for row in ladder if row["effect"] == name and row["accepted"]), None)
+        if row is None or not row["measure"]["test"][1] < 0.9 * row["measure"]["test"][0]:
+            raise RuntimeError(f"add auto does not add {name}: {ladder}")
     result = asked(options.tool, ["diagnose", model, flights], os.path.join(folder, "diagnose.json"))
     if not options.keep:
         shutil.rmtree(folder)
