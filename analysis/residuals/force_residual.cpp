@@ -8,6 +8,7 @@
 #include "analysis/residuals/published_lag.h"
 #include "analysis/residuals/thrust_stage.h"
 #include "nn/base/pi.h"
+#include "nn/base/rotor_speed.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::residuals {
@@ -181,10 +182,26 @@ void MeasuredForce::apply(const stability::Instant& now, Eigen::Matrix3Xd& force
   }
 }
 
+namespace {
+
+/// Returns the sum of the measured rotor speeds, counterclockwise positive; 0 if the log has none.
+double rotor_spin_rad_s(const std::vector<stability::RotorPlace>& rotors, const Track& track,
+                        std::size_t record) {
+  double sum = 0;
+  if (!track.has_rotor_speeds || static_cast<std::size_t>(track.motor_commands) != rotors.size()) return sum;
+  for (std::size_t k = 0; k < rotors.size(); ++k)
+    sum += (rotors[k].counterclockwise ? 1 : -1) * kFullRotorSpeed_rad_s * track.motor_command[record][k];
+  return sum;
+}
+
+}  // namespace
+
 void apply_model(const stability::Model& model, const Kinds& kinds, const CutRules& rules, Track& track) {
+  const std::vector<stability::RotorPlace> rotors = rotor_places(model);
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
     stability::Instant& now = track.instants[i];
     now.mass_kg = model.mass_kg;
+    now.rotor_spin_rad_s = rotor_spin_rad_s(rotors, track, i);
     now.thrust_N = commanded_thrust_N(model, track, i);
   }
   if (rules.has_published_signals()) {

@@ -42,6 +42,7 @@ struct Instant {
   /// the model's own delay and motor_lag.
   double thrust_N = 0;
   Eigen::Vector3d torque_B_Nm = Eigen::Vector3d::Zero();
+  double rotor_spin_rad_s = 0;  ///< sum of the rotors' speeds, counterclockwise positive; 0: not measured
   double battery_V = kFullBattery_V;
   double mass_kg = 0;  ///< from the vehicle's model
   const Neighbour* neighbours = nullptr;

@@ -40,6 +40,7 @@ EffectEntry inflow();
 EffectEntry motor_lag();
 EffectEntry payload_step();
 EffectEntry rate_damping();
+EffectEntry rotor_momentum();
 EffectEntry rotor_thrust();
 EffectEntry sensor_delay();
 EffectEntry tether();

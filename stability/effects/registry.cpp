@@ -33,6 +33,7 @@ std::deque<EffectEntry>& entries() {
                                         effects::torque_bias(),
                                         effects::torque_ratio(),
                                         effects::rate_damping(),
+                                        effects::rotor_momentum(),
                                         effects::flow_torque(),
                                         effects::downwash_torque(),
                                         effect_entry<DeepSetEffect>(),

@@ -53,6 +53,7 @@ TEST(Effects, HaveTheNamesOfTheCommandLine) {
                                         "torque_bias",
                                         "torque_ratio",
                                         "rate_damping",
+                                        "rotor_momentum",
                                         "flow_torque",
                                         "deep_set",
                                         "downwash_torque",

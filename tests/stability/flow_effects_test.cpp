@@ -155,6 +155,32 @@ TEST(RateDamping, TakesEnergyFromEveryRotation) {
   EXPECT_LT(torque.dot(now.omega_B_rad_s), 0);
 }
 
+TEST(RotorMomentum, IsWhatTheBodyGivesToTheRotors) {
+  EffectSpec spec;
+  spec.name = "rotor_momentum";
+  spec.parameters = {{"inertia_kg_m2", 5e-8}};
+  const AppliedEffect effect(spec, {"small", {"small"}, ""});
+  const auto stream = effect.effect().stream(nullptr);
+  Instant now = hovering();
+  now.rotor_spin_rad_s = 40;
+  now.omega_B_rad_s = {2, 0, 0};
+  Wrench column;
+  stream->advance(now, &column);
+  // A steady rotor of a rolling body: tau = -omega x h.
+  EXPECT_LT((column.torque_B_Nm - Eigen::Vector3d(0, 80, 0)).norm(), 1e-12);
+  now.time_s = 0.01;
+  now.omega_B_rad_s.setZero();
+  now.rotor_spin_rad_s = 50;
+  stream->advance(now, &column);
+  // Counterclockwise rotors that speed up turn the body clockwise.
+  EXPECT_LT((column.torque_B_Nm - Eigen::Vector3d(0, 0, -1000)).norm(), 1e-9);
+  stream->restart();
+  now.time_s = 5;
+  now.rotor_spin_rad_s = 90;
+  stream->advance(now, &column);
+  EXPECT_EQ(column.torque_B_Nm.norm(), 0);
+}
+
 TEST(TorqueRatio, IsAChangeOfTheRotorsTorqueAboutEachAxis) {
   Instant now = hovering();
   now.torque_B_Nm = {1e-3, 2e-3, 3e-3};
