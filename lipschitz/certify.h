@@ -154,6 +154,8 @@ void describe(files::Record& record, const BoundSummary& summary);
 
 /// Returns the certificate of a certification: the network and everything that check::check() needs.
 files::Json certificate(const files::Network& network, const Certification& certification);
+/// Describes the file.
+void describe_certificate_file(files::Record& record);
 
 /// Returns whether the search for any of the bounds was interrupted.
 bool is_interrupted(const Certification& certification);

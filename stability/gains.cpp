@@ -5,6 +5,7 @@
 
 #include "controller/gain_conversion.h"
 #include "nn/base/file_io.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
 
@@ -22,6 +23,50 @@ constexpr double kLargestKp_1_s2 = 1e7, kLargestKd_1_s = 1e5, kLargestKi_1_s3 = 
 constexpr double kLargestLambda_1_s = 1e3, kLargestK_kg_s = 1e5;
 constexpr double kLeastRate_hz = 1, kLargestRate_hz = 1e5;
 constexpr double kLongestIntegral_m_s = 1e6;
+
+const std::vector<std::string> kAttitudeLaws = {"lee", "robust"};
+
+void describe_position(files::Keys& keys) {
+  using files::NumberOrThree;
+  using DiagonalOrRows = std::variant<double, std::array<double, 3>, std::array<std::array<double, 3>, 3>>;
+  keys.may<NumberOrThree>("Kp", "Of the position.", "1/s^2");
+  keys.may<NumberOrThree>("Kd", "Of the velocity.", "1/s");
+  keys.may<NumberOrThree>("Ki", "Of the integral.", "1/s^3");
+  keys.may<DiagonalOrRows>("Lambda", "In place of Kp, Kd, Ki: diagonal or rows.", "1/s");
+  keys.may<DiagonalOrRows>("K", "With Lambda: diagonal or rows.", "kg/s");
+  keys.may<NumberOrThree>("integrator_limit", "Of the integral.", "m s");
+  keys.may<double>("rate_hz", "Of the commands; absent: continuous.", "Hz");
+  keys.may<double>("integrator_step_s", "What the integral grows by per command, times the error.", "s");
+  for (const char* const axis : {"xy", "z"}) {
+    const std::string of = axis;
+    keys.may<double>("kp_" + of, "Of the Mellinger controller, divided by mass.", "N/m");
+    keys.may<double>("kd_" + of, "Likewise.", "N s/m");
+    keys.may<double>("ki_" + of, "Likewise.", "N/(m s)");
+    keys.may<double>("i_range_" + of, "Of its integral.", "m s");
+  }
+  keys.may<double>("mass", "That the Mellinger controller is told.", "kg");
+  keys.may<double>("massThrust", "PWM per newton; not used.");
+}
+
+void describe_attitude(files::Keys& keys) {
+  using files::NumberOrThree;
+  keys.may("law", "Which attitude law.", "", files::OneOf{kAttitudeLaws});
+  keys.may<NumberOrThree>("KR", "About the axes of the body.", "N m");
+  keys.may<NumberOrThree>("Kw", "Likewise.", "N m s");
+  keys.may<NumberOrThree>("KI", "Likewise.", "N m/s");
+}
+
+void describe_lag(files::Keys& keys) {
+  keys.may<double>("motor_s", "Time constant of the motors.", "s");
+  keys.may<double>("attitude_s", "Of the attitude loop.", "s");
+  keys.may<double>("body_rate_s", "Of the measured body rates.", "s");
+  keys.may<double>("delay_s", "Of the command.", "s");
+}
+
+void describe_feed(files::Keys& keys) {
+  keys.may<double>("rate_hz", "Of the predicted force; absent: continuous.", "Hz");
+  keys.may<double>("latency_s", "From the state to its force.", "s");
+}
 
 std::string text_of(double value) {
   if (std::abs(value) >= 1e6 || (value != 0 && std::abs(value) < 1e-4)) {
@@ -182,9 +227,7 @@ void read_mellinger(const TomlTable& position, Gains& gains) {
 }
 
 void read_position(const TomlTable& position, Gains& gains) {
-  position.allow_only({"Kp", "Kd", "Ki", "Lambda", "K", "integrator_limit", "rate_hz", "integrator_step_s",
-                       "kp_xy", "kd_xy", "ki_xy", "i_range_xy", "kp_z", "kd_z", "ki_z", "i_range_z", "mass",
-                       "massThrust"});
+  position.allow_only(files::key_names(describe_position));
   const bool is_mellinger = position.has("kp_xy") || position.has("kp_z");
   const bool is_pid = position.has("Kp") || position.has("Kd") || position.has("Ki");
   const bool is_composite = position.has("Lambda") || position.has("K");
@@ -223,8 +266,7 @@ void read_position(const TomlTable& position, Gains& gains) {
 void read_attitude(const TomlTable& table, Gains& gains) {
   const bool has_gains = table.has("KR") || table.has("Kw") || table.has("KI");
   if (table.has("law") || !has_gains) {
-    gains.attitude_law =
-        table.choice("law", {"lee", "robust"}) == 0 ? AttitudeLaw::kLee : AttitudeLaw::kRobust;
+    gains.attitude_law = table.choice("law", kAttitudeLaws) == 0 ? AttitudeLaw::kLee : AttitudeLaw::kRobust;
   }
   if (!has_gains) return;
   for (const char* const key : {"KR", "Kw"})
@@ -239,23 +281,31 @@ void read_attitude(const TomlTable& table, Gains& gains) {
 
 }  // namespace
 
+void describe_gains_file(files::Keys& keys) {
+  keys.schema(kSchema);
+  keys.must_table("position", "The position loop; three numbers are of x, y and z.", describe_position);
+  keys.may_table("attitude", "The attitude law and its gains.", describe_attitude);
+  keys.may_table("lag", "Lags and delay that the loop has.", describe_lag);
+  keys.may_table("network", "Rate and latency of the network's force.", describe_feed);
+}
+
 Gains parse_gains(const std::string& text, const std::string& path) {
   const toml::table document = files::parse_toml(text, path);
   const TomlTable top(document, path);
   top.require_schema(kSchema);
-  top.allow_only({"schema", "position", "attitude", "lag", "network"});
+  top.allow_only(files::key_names(describe_gains_file));
   Gains gains;
   gains.path = path;
   gains.sha256 = files::sha256(text);
   read_position(top.table("position"), gains);
   if (top.has("attitude")) {
     const TomlTable attitude = top.table("attitude");
-    attitude.allow_only({"law", "KR", "Kw", "KI"});
+    attitude.allow_only(files::key_names(describe_attitude));
     read_attitude(attitude, gains);
   }
   if (top.has("lag")) {
     const TomlTable lag = top.table("lag");
-    lag.allow_only({"motor_s", "attitude_s", "body_rate_s", "delay_s"});
+    lag.allow_only(files::key_names(describe_lag));
     const auto time = [&lag](const char* key) {
       return lag.has(key) ? seconds(lag, key, non_negative(lag, key)) : 0;
     };
@@ -266,7 +316,7 @@ Gains parse_gains(const std::string& text, const std::string& path) {
   }
   if (top.has("network")) {
     const TomlTable network = top.table("network");
-    network.allow_only({"rate_hz", "latency_s"});
+    network.allow_only(files::key_names(describe_feed));
     if (network.has("rate_hz")) gains.network_rate_hz = loop_rate_hz(network);
     if (network.has("latency_s"))
       gains.network_latency_s = seconds(network, "latency_s", non_negative(network, "latency_s"));

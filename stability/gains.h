@@ -8,6 +8,10 @@
 
 #include "controller/flight_controller.h"
 
+namespace swarmcert::files {
+class Keys;
+}
+
 namespace swarmcert::stability {
 
 /// One number per world axis x, y, z.
@@ -47,6 +51,9 @@ struct Gains {
   double network_rate_hz = 0;             ///< of the learned force, held between updates; 0: continuous
   double network_latency_s = 0;           ///< age of the network's inputs when its output is applied
 };
+
+/// Describes gains.toml.
+void describe_gains_file(files::Keys& keys);
 
 /// Reads gains.toml (schema swarmcert/gains/1).
 ///   [position] Kp, Kd, Ki: three numbers, or one for all axes; or Lambda, K: 3x3, three (diagonal), or one number.

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "nn/base/file_io.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/input_error.h"
 #include "nn/base/rotor_speed.h"
 #include "nn/base/suggest.h"
@@ -20,6 +21,90 @@ namespace {
 using files::TomlTable;
 
 constexpr char kSchema[] = "swarmcert/model/1";
+
+const std::vector<std::string> kSpins = {"ccw", "cw"};
+
+void describe_rotor(files::Keys& keys) {
+  keys.must<std::array<double, 3>>("position_m", "Forward, left and up from the centre.", "m");
+  keys.must("spin", "Seen from above.", "", files::OneOf{kSpins});
+}
+
+void describe_thrust(files::Keys& keys) {
+  for (const char* const name : {"c00", "c10", "c01", "c20", "c11"})
+    keys.must<double>(name, "Coefficient.", "gf");
+}
+
+void describe_thrust_curve(files::Keys& keys) {
+  keys.may<std::array<double, 3>>("force_N", "[a, b, c]: a + b u + c u^2 at command u in 0 .. 1.", "N");
+  keys.may<std::array<double, 3>>("force_of_speed", "[a, b, c]: a + b W + c W^2 at W rad/s.", "N");
+}
+
+void describe_vehicle(files::Keys& keys) {
+  keys.must<std::string>("kind", "Which networks and flights it has: small, large, ...");
+  keys.must<double>("mass_kg", "", "kg");
+  keys.must<std::array<double, 3>>("inertia_kg_m2", "Jxx, Jyy, Jzz of the body.", "kg m^2");
+  keys.may<double>("arm_m", "From the centre to each of four rotors in X.", "m");
+  keys.may_tables("rotors", "In place of arm_m: 3 to 8, in the order of the motors in logs.", describe_rotor);
+  keys.must<double>("torque_per_thrust_m", "Yaw torque of a rotor per newton of its thrust.", "m");
+  keys.may_table("thrust",
+                 "Gram-force of one rotor: c00 + c10 p + c01 v + c20 p^2 + c11 p v, p = PWM / 65536, v = V / "
+                 "4.2.",
+                 describe_thrust);
+  keys.may_table("thrust_curve", "In place of thrust: force of one rotor.", describe_thrust_curve);
+  keys.may<Interval>("battery_range_V", "Voltages that the battery may have; absent: one cell.", "V");
+}
+
+void describe_sensor(files::Keys& keys) {
+  keys.may<double>("accelerometer_cutoff_hz", "Of the filter.", "Hz");
+  keys.may<double>("accelerometer_noise_m_s2", "Standard deviation per sample.", "m/s^2");
+  keys.may<double>("position_noise_m", "Likewise.", "m");
+  keys.may<double>("velocity_noise_m_s", "Likewise.", "m/s");
+  keys.may<double>("attitude_noise_rad", "Likewise.", "rad");
+  keys.may<double>("log_rate_hz", "", "Hz");
+}
+
+void describe_fit(files::Keys& keys) {
+  keys.may<std::vector<std::string>>("flights", "That were used.");
+  keys.may<std::map<std::string, Interval>>("interval", "90 %, by parameter.");
+  keys.may<double>("select_rmse_before_N", "On flights that were not used.", "N");
+  keys.may<double>("select_rmse_after_N", "Likewise, with the effect.", "N");
+  keys.may<int>("test_looks", "How often the test flights had been scored.");
+  keys.may<std::string>("note", "");
+}
+
+void describe_effect_of_file(files::Keys& keys) {
+  using Entry =
+      std::variant<std::string, bool, std::vector<std::string>, std::map<std::string, std::vector<double>>>;
+  keys.must<std::string>("name", "Of the effect.");
+  keys.may<std::string>("vehicle", "Only of this vehicle.");
+  keys.may<std::map<std::string, double>>("parameters", "Units stand in the names.");
+  keys.may<std::string>("network", "network.toml of the effect deep_set.");
+  keys.may<std::map<std::string, Entry>>(
+      "expression",
+      "A user-defined effect: formulas by target, such as force_z_N; linear: parameters in which they are "
+      "linear; per_neighbour: whether they are summed over neighbours; bounds and grid: by parameter.");
+  keys.may_table("fit", "Where the values come from.", describe_fit);
+}
+
+void describe_measure_of_file(files::Keys& keys) {
+  keys.must<std::string>("quantity", "");
+  keys.must<std::string>("unit", "");
+  keys.must<std::array<double, 2>>("select", "Before the step and after it, on the selecting flights.");
+  keys.must<std::array<double, 2>>("test", "On the test flights; zeros: not tested.");
+}
+
+void describe_row_of_file(files::Keys& keys) {
+  keys.must<std::string>("effect", "That was tried; nominal for the first.");
+  keys.may<bool>("accepted", "");
+  keys.may<double>("fit_rmse_N", "On the flights of the fit.", "N");
+  keys.may<double>("select_rmse_N", "On the selecting flights.", "N");
+  keys.may<double>("test_rmse_N", "On the test flights.", "N");
+  keys.may<double>("noise_floor_N", "", "N");
+  keys.may_table("measure", "What decided, if not the force residual.", describe_measure_of_file);
+  keys.may<int>("test_looks", "How often the test flights had been scored.");
+  keys.may<std::string>("note", "Why it was rejected, or kept nevertheless.");
+  keys.may<std::map<std::string, double>>("values", "Of all parameters after this step.");
+}
 
 double positive(const TomlTable& table, const std::string& key) {
   const double value = table.number(key);
@@ -69,11 +154,11 @@ Interval battery_range(const TomlTable& vehicle) {
 }
 
 RotorPlace read_rotor(const TomlTable& table) {
-  table.allow_only({"position_m", "spin"});
+  table.allow_only(files::key_names(describe_rotor));
   const std::vector<double> position = table.numbers("position_m");
   if (position.size() != 3)
     table.refuse("position_m", "", "must be three numbers, [x, y, z]: forward, left and up from the centre");
-  return {position[0], position[1], position[2], table.choice("spin", {"ccw", "cw"}) == 0};
+  return {position[0], position[1], position[2], table.choice("spin", kSpins) == 0};
 }
 
 /// Reads rotors and computes arm_m from them; without rotors, reads arm_m of four in X.
@@ -107,7 +192,7 @@ void read_rotors(const TomlTable& vehicle, Model* model) {
 void read_thrust(const TomlTable& vehicle, Model* model) {
   if (!vehicle.has("thrust_curve")) {
     const TomlTable thrust = vehicle.table("thrust");
-    thrust.allow_only({"c00", "c10", "c01", "c20", "c11"});
+    thrust.allow_only(files::key_names(describe_thrust));
     model->thrust = {thrust.number("c00"), thrust.number("c10"), thrust.number("c01"), thrust.number("c20"),
                      thrust.number("c11")};
     return;
@@ -116,7 +201,7 @@ void read_thrust(const TomlTable& vehicle, Model* model) {
     vehicle.refuse("thrust", "", "cannot be combined with thrust_curve, which replaces it",
                    "omit one of the two");
   const TomlTable curve = vehicle.table("thrust_curve");
-  curve.allow_only({"force_N", "force_of_speed"});
+  curve.allow_only(files::key_names(describe_thrust_curve));
   const bool of_speed = curve.has("force_of_speed");
   if (of_speed && curve.has("force_N"))
     curve.refuse("force_of_speed", "", "cannot be combined with force_N", "omit one of the two");
@@ -138,8 +223,7 @@ void read_thrust(const TomlTable& vehicle, Model* model) {
 }
 
 void read_vehicle(const TomlTable& vehicle, Model* model) {
-  vehicle.allow_only({"kind", "mass_kg", "inertia_kg_m2", "arm_m", "rotors", "torque_per_thrust_m", "thrust",
-                      "thrust_curve", "battery_range_V"});
+  vehicle.allow_only(files::key_names(describe_vehicle));
   model->kind = vehicle.text("kind");
   if (model->kind.empty()) vehicle.refuse("kind", "", "is empty", "name it, e.g. \"small\"");
   model->mass_kg = positive(vehicle, "mass_kg");
@@ -156,8 +240,7 @@ void read_vehicle(const TomlTable& vehicle, Model* model) {
 }
 
 void read_sensor(const TomlTable& sensor, SensorModel* model) {
-  sensor.allow_only({"accelerometer_cutoff_hz", "accelerometer_noise_m_s2", "position_noise_m",
-                     "velocity_noise_m_s", "attitude_noise_rad", "log_rate_hz"});
+  sensor.allow_only(files::key_names(describe_sensor));
   if (sensor.has("accelerometer_cutoff_hz")) {
     model->accelerometer_cutoff_hz = rate_hz(sensor, "accelerometer_cutoff_hz");
   }
@@ -193,8 +276,7 @@ EffectExpression read_expression(const TomlTable& table) {
 }
 
 FitProvenance read_fit(const TomlTable& table) {
-  table.allow_only(
-      {"flights", "interval", "select_rmse_before_N", "select_rmse_after_N", "test_looks", "note"});
+  table.allow_only(files::key_names(describe_fit));
   FitProvenance fit;
   if (table.has("flights")) fit.flights = table.texts("flights");
   if (table.has("interval")) {
@@ -229,7 +311,7 @@ void check_parameters(const TomlTable& effect, const EffectSpec& spec, const Eff
 }
 
 EffectSpec read_effect(const TomlTable& effect, const Model& model) {
-  effect.allow_only({"name", "vehicle", "parameters", "network", "expression", "fit"});
+  effect.allow_only(files::key_names(describe_effect_of_file));
   EffectSpec spec;
   spec.name = effect.text("name");
   if (effect.has("vehicle")) spec.vehicle = effect.text("vehicle");
@@ -267,7 +349,7 @@ EffectSpec read_effect(const TomlTable& effect, const Model& model) {
 }
 
 LadderMeasure read_measure(const TomlTable& table) {
-  table.allow_only({"quantity", "unit", "select", "test"});
+  table.allow_only(files::key_names(describe_measure_of_file));
   const auto pair = [&table](const char* key) {
     const std::vector<double> numbers = table.numbers(key);
     if (numbers.size() != 2) table.refuse(key, std::to_string(numbers.size()) + " numbers", "must be two");
@@ -277,8 +359,7 @@ LadderMeasure read_measure(const TomlTable& table) {
 }
 
 LadderRow read_row(const TomlTable& table) {
-  table.allow_only({"effect", "accepted", "fit_rmse_N", "select_rmse_N", "test_rmse_N", "noise_floor_N",
-                    "measure", "test_looks", "note", "values"});
+  table.allow_only(files::key_names(describe_row_of_file));
   LadderRow row;
   row.effect = table.text("effect");
   if (table.has("accepted")) row.accepted = table.flag("accepted");
@@ -298,11 +379,19 @@ LadderRow read_row(const TomlTable& table) {
 
 }  // namespace
 
+void describe_model_file(files::Keys& keys) {
+  keys.schema(kSchema);
+  keys.must_table("vehicle", "Mass, inertia, rotors and thrust map.", describe_vehicle);
+  keys.may_table("sensor", "Noise and rate of the log that simulations write.", describe_sensor);
+  keys.may_tables("effect", "Physical effects, each with its parameters.", describe_effect_of_file);
+  keys.may_tables("ladder", "Steps by which effects were added.", describe_row_of_file);
+}
+
 Model parse_model(const std::string& text, const std::string& path) {
   const toml::table document = files::parse_toml(text, path);
   const TomlTable top(document, path);
   top.require_schema(kSchema);
-  top.allow_only({"schema", "vehicle", "sensor", "effect", "ladder"});
+  top.allow_only(files::key_names(describe_model_file));
   Model model;
   model.path = path;
   model.sha256 = files::sha256(text);

@@ -12,6 +12,10 @@
 #include "controller/position_law.h"
 #include "nn/base/interval.h"
 
+namespace swarmcert::files {
+class Keys;
+}
+
 namespace swarmcert::stability {
 
 using controller::kGravity_m_s2;
@@ -154,6 +158,9 @@ void set_thrust_curve(const std::array<double, 3>& curve_N, Model& model);
 
 /// @throws files::InputError unless the vehicle has four rotors in X, which `what` requires.
 void refuse_other_rotors(const Model& model, const std::string& what);
+
+/// Describes a model file.
+void describe_model_file(files::Keys& keys);
 
 /// Reads a model file.
 /// @throws files::InputError with line, key, value and hint; for unknown keys, effects and parameters the hint suggests

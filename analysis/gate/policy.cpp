@@ -2,8 +2,11 @@
 
 #include <cmath>
 #include <filesystem>
+#include <iterator>
+#include <map>
 
 #include "nn/base/file_io.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
 #include "stability/model.h"
@@ -14,6 +17,7 @@ namespace {
 using files::TomlTable;
 
 constexpr char kSchema[] = "swarmcert/policy/1";
+const std::vector<std::string> kPrecisions = {"float32", "float64"};
 
 /// Resolves `path` relative to the folder of the policy, unless it is absolute.
 std::string resolve(const std::string& policy, const std::string& path) {
@@ -48,12 +52,36 @@ void read_recordings(const TomlTable& table, const std::string& policy, Release&
   release.logs = static_cast<int>(logs);
 }
 
+void describe_release(files::Keys& keys) {
+  using Layers = std::vector<std::string>;
+  keys.may<std::string>("network", "network.toml or a weight file.");
+  keys.may<std::string>("phi", "Weight file, with rho in place of network.");
+  keys.may<std::string>("rho", "Likewise.");
+  keys.may<std::string>("key", "Of the state dict inside a nested checkpoint.");
+  keys.may<Layers>("order", "Of the layers of network.");
+  keys.may<Layers>("phi_order", "Of the layers of phi.");
+  keys.may<Layers>("rho_order", "Of the layers of rho.");
+  keys.may("precision", "In flight.", "", files::OneOf{kPrecisions});
+  keys.may<std::string>("certificate", "Of the network.");
+  keys.may<std::string>("box", "box.toml.");
+  keys.may<std::string>("gains", "gains.toml.");
+  keys.may<std::string>("model", "model.toml.");
+  keys.may<std::string>("source", "The exported source, a folder or file.");
+  keys.may<std::string>("elf", "The firmware.");
+  keys.may<std::string>("facts", "firmware-facts.json.");
+  keys.may<std::string>("swarm", "swarm.toml.");
+  keys.may<std::string>("promise", "Result of bound --coverage.");
+  keys.may<std::string>("vehicles", "flights.toml.");
+  keys.may<std::string>("columns", "columns.toml of the flights.");
+  keys.may<files::TextOrTexts>("flights", "Reference flights.");
+  keys.may<int>("logs", "How many logs the flights are, so that a missing one is noticed.");
+  keys.may<double>("battery_V", "Of the theorem and of the thrust.", "V");
+  keys.may<int>("most_neighbours", "Of the export in elf; absent: the default of export.");
+  keys.may<bool>("feed_forward", "Whether the network's force is part of the model.");
+}
+
 Release read_release(const TomlTable& table, const std::string& policy) {
-  table.allow_only({"network",     "phi",       "rho",       "key",          "precision",
-                    "certificate", "box",       "gains",     "model",        "source",
-                    "elf",         "facts",     "swarm",     "vehicles",     "columns",
-                    "flights",     "logs",      "battery_V", "feed_forward", "most_neighbours",
-                    "order",       "phi_order", "rho_order", "promise"});
+  table.allow_only(files::key_names(describe_release));
   Release release;
   const auto file = [&](const char* key) {
     if (!table.has(key)) return std::string();
@@ -71,7 +99,7 @@ Release read_release(const TomlTable& table, const std::string& policy) {
     table.refuse(release.network.phi.empty() ? "rho" : "phi", "", "needs both phi and rho");
   if (!release.network.phi.empty() && !release.network.file.empty())
     table.refuse("network", "", "conflicts with phi and rho", "name one or the other");
-  if (table.has("precision")) release.is_float32 = table.choice("precision", {"float32", "float64"}) == 0;
+  if (table.has("precision")) release.is_float32 = table.choice("precision", kPrecisions) == 0;
   release.certificate = file("certificate");
   release.box = file("box");
   release.gains = file("gains");
@@ -95,14 +123,23 @@ Release read_release(const TomlTable& table, const std::string& policy) {
 
 }  // namespace
 
+void describe_policy_file(files::Keys& keys) {
+  keys.schema(kSchema);
+  keys.must_table("release", "Files of the release.", describe_release);
+  for (const CheckKind& kind : check_kinds()) {
+    if (kind.describe_keys == nullptr)
+      keys.may<std::map<std::string, std::string>>(kind.name, kind.summary);
+    else
+      keys.may_table(kind.name, kind.summary, kind.describe_keys);
+  }
+}
+
 Policy read_policy(const std::string& path) {
   const std::string text = files::read_file(path);
   const auto document = files::parse_toml(text, path);
   const TomlTable top(document, path);
   top.require_schema(kSchema);
-  std::vector<std::string> known = {"schema", "release"};
-  for (const CheckKind& kind : check_kinds()) known.emplace_back(kind.name);
-  top.allow_only(known);
+  top.allow_only(files::key_names(describe_policy_file));
   Policy policy;
   policy.path = path;
   policy.release = read_release(top.table("release"), path);
@@ -113,6 +150,7 @@ Policy read_policy(const std::string& path) {
       continue;
     }
     const TomlTable table = top.table(kind.name);
+    if (kind.describe_keys != nullptr) table.allow_only(files::key_names(kind.describe_keys));
     policy.checks.push_back({kind.name, table.line(), kind.read(table, policy)});
   }
   if (policy.checks.empty()) top.refuse("", "", "asks for no check", "add a table, such as [certificate]");
@@ -131,17 +169,20 @@ std::optional<Limit> limit(const TomlTable& table, const std::string& key, const
   return result;
 }
 
-std::vector<std::string> force_keys(const std::string& stem, const std::string& suffix) {
-  return {stem + "_gf" + suffix, stem + "_N" + suffix, stem};
+void describe_force_limit(files::Keys& keys, const char* meaning, const std::string& stem,
+                          const std::string& suffix) {
+  keys.may<double>(stem + "_gf" + suffix, meaning, "gf");
+  keys.may<double>(stem + "_N" + suffix, meaning, "N");
+  keys.may<double>(stem, meaning);
 }
 
 std::optional<Limit> force_limit(const TomlTable& table, const std::string& stem, const std::string& suffix,
                                  bool is_most) {
   std::optional<Limit> found;
-  const std::vector<std::string> keys = force_keys(stem, suffix);
+  const std::string keys[] = {stem + "_gf" + suffix, stem + "_N" + suffix, stem};
   const std::string units[] = {"gf", "N", ""};
   const double unit_N[] = {stability::kGramForce_N, 1, 0};
-  for (std::size_t i = 0; i < keys.size(); ++i) {
+  for (std::size_t i = 0; i < std::size(keys); ++i) {
     if (!table.has(keys[i])) continue;
     if (found) table.refuse(keys[i], "", "states the limit twice", "give it in one unit");
     found = limit(table, keys[i], units[i], is_most);

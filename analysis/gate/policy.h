@@ -11,8 +11,9 @@
 #include "nn/weights/network.h"
 
 namespace swarmcert::files {
+class Keys;
 class TomlTable;
-}
+}  // namespace swarmcert::files
 
 namespace swarmcert::gate {
 
@@ -53,6 +54,9 @@ struct Policy {
   std::vector<std::string> blocks;  ///< input blocks with limits of their own
 };
 
+/// Describes policy.toml.
+void describe_policy_file(files::Keys& keys);
+
 /// Reads a policy (schema swarmcert/policy/1): [release] and one table per check.
 /// @throws files::InputError with line, key, value and hint for unknown tables and keys, limits that are not numbers,
 ///     a table without a limit, and a check whose file is not named in [release].
@@ -62,7 +66,9 @@ Policy read_policy(const std::string& path);
 struct CheckKind {
   const char* name;     ///< name of its table
   const char* summary;  ///< one-line description
-  /// Reads the table; may store information for other checks in the policy.
+  /// Describes the keys of the table; nullptr: they are names that the policy chooses.
+  void (*describe_keys)(files::Keys& keys);
+  /// Reads the table, which has no other keys; may store information for other checks in the policy.
   /// @throws files::InputError
   std::function<void(Evidence&, Checks&)> (*read)(const files::TomlTable& table, Policy& policy);
 };
@@ -78,8 +84,9 @@ std::optional<Limit> limit(const files::TomlTable& table, const std::string& key
 /// without a unit.
 std::optional<Limit> force_limit(const files::TomlTable& table, const std::string& stem,
                                  const std::string& suffix = "", bool is_most = true);
-/// Returns the keys that force_limit() reads.
-std::vector<std::string> force_keys(const std::string& stem, const std::string& suffix = "");
+/// Describes the keys that force_limit() reads.
+void describe_force_limit(files::Keys& keys, const char* meaning, const std::string& stem,
+                          const std::string& suffix = "");
 
 /// Reads an integer from 1 to 1000.
 int whole_number(const files::TomlTable& table, const std::string& key, int otherwise);

@@ -6,11 +6,14 @@
 #include "analysis/logs/angles.h"
 #include "analysis/logs/signals.h"
 #include "nn/base/file_io.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/suggest.h"
 #include "nn/base/toml.h"
 
 namespace swarmcert::logs {
 namespace {
+
+constexpr const char* kColumnsSchema = "swarmcert/columns/1";
 
 struct Unit {
   const char* name;
@@ -132,31 +135,52 @@ const SignalMap& known_columns() {
   return map;
 }
 
+namespace {
+
+/// The frames that a signal may state; several for the specific force.
+std::vector<std::string> frames_of(const NamedSignal& signal) {
+  const bool is_body_signal = signal.signal >= kRates && signal.signal < kDuty;
+  if (is_body_signal) return {"body"};
+  if (signal.may_be_body) return {"world", "body"};
+  return {"world"};
+}
+
+std::vector<std::string> units_of(const NamedSignal& signal) {
+  std::vector<std::string> units;
+  for (const Unit& unit : signal.units) units.emplace_back(unit.name);
+  return units;
+}
+
+void describe_column(files::Keys& keys, const NamedSignal& signal) {
+  keys.must<std::string>("column", "Its name in the header of the file.");
+  keys.must("unit", "Of its values; a minus: of opposite sign.", "", files::OneOf{units_of(signal)});
+  keys.may("frame", "Of its values.", "", files::OneOf{frames_of(signal)});
+}
+
+}  // namespace
+
+void describe_columns_file(files::Keys& keys) {
+  keys.schema(kColumnsSchema);
+  for (const auto& [name, signal] : named_signals())
+    keys.may_table(name, "The column that is this signal.",
+                   [&one = signal](files::Keys& column) { describe_column(column, one); });
+}
+
 SignalMap parse_columns(const std::string& text, const std::string& path) {
   const toml::table document = files::parse_toml(text, path);
   const files::TomlTable root(document, path);
-  root.choice("schema", {"swarmcert/columns/1"});
+  root.choice("schema", {kColumnsSchema});
+  root.allow_only(files::key_names(describe_columns_file));
   const std::map<std::string, NamedSignal> named = named_signals();
-  std::vector<std::string> known = {"schema"};
-  for (const auto& [name, unused] : named) known.push_back(name);
-  root.allow_only(known);
   SignalMap map;
   std::set<bool> frames;  // of the specific force: true for the body frame
   for (const std::string& name : root.keys()) {
     if (name == "schema") continue;
     const files::TomlTable table = root.table(name);
-    table.allow_only({"column", "unit", "frame"});
     const NamedSignal& signal = named.at(name);
-    std::vector<std::string> units;
-    for (const Unit& unit : signal.units) units.emplace_back(unit.name);
-    const Unit& unit = signal.units[table.choice("unit", units)];
-    bool in_body = false;
-    if (table.has("frame")) {
-      const bool is_body_signal = signal.signal >= kRates && signal.signal < kDuty;
-      std::vector<std::string> allowed = {is_body_signal ? "body" : "world"};
-      if (signal.may_be_body) allowed.emplace_back("body");
-      in_body = table.choice("frame", allowed) == 1;
-    }
+    table.allow_only(files::key_names([&](files::Keys& keys) { describe_column(keys, signal); }));
+    const Unit& unit = signal.units[table.choice("unit", units_of(signal))];
+    const bool in_body = table.has("frame") && table.choice("frame", frames_of(signal)) == 1;
     if (signal.may_be_body) {
       frames.insert(in_body);
       if (frames.size() == 2)

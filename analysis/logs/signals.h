@@ -7,6 +7,10 @@
 
 #include "analysis/logs/log.h"
 
+namespace swarmcert::files {
+class Keys;
+}
+
 namespace swarmcert::logs {
 
 /// The signals a column can carry. In a group, the enumerator is the first signal and the others follow it.
@@ -69,6 +73,8 @@ bool is_same_meaning(const SignalMap& a, const SignalMap& b);
 /// Returns the empty map.
 const SignalMap& known_columns();
 
+/// Describes columns.toml.
+void describe_columns_file(files::Keys& keys);
 /// Reads a columns.toml: one table per signal, `[position_x] column = "x_mm", unit = "mm", frame = "world"`.
 /// @throws files::InputError with line, key and hint; misspelt signals, units and frames get a suggestion.
 SignalMap read_columns(const std::string& path);

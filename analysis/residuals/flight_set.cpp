@@ -12,6 +12,7 @@
 #include "analysis/logs/vehicles_in_file.h"
 #include "analysis/residuals/log_copies.h"
 #include "nn/base/file_io.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
 #include "stability/model.h"
@@ -324,21 +325,48 @@ std::vector<std::string> log_files(const FoundFlights& found) {
   return files;
 }
 
+namespace {
+
+constexpr const char* kFlightsSchema = "swarmcert/flights/1";
+const std::vector<std::string> kUses = {"all", "position", "none"};
+
+void describe_vehicle_use(files::Keys& keys) {
+  keys.must<std::string>("model", "Its model.toml.");
+  keys.may("use", "position: only as a neighbour.", "", files::OneOf{{kUses[0], kUses[1]}});
+}
+
+void describe_log_rule(files::Keys& keys) {
+  keys.may<std::string>("vehicle", "That it is of.");
+  keys.may<std::string>("flight", "That it belongs to.");
+  keys.may<std::string>("model", "Its model.toml.");
+  keys.may<std::string>("gains", "Its gains.toml.");
+  keys.may<double>("mass_kg", "In place of the model's.", "kg");
+  keys.may("use", "position: only as a neighbour.", "", files::OneOf{kUses});
+}
+
+}  // namespace
+
+void describe_flights_file(files::Keys& keys) {
+  keys.schema(kFlightsSchema);
+  keys.may_named_tables("vehicle", "By name of a vehicle: its model and its use.", describe_vehicle_use);
+  keys.may_named_tables("log", "By the name of a log, wildcards allowed.", describe_log_rule);
+}
+
 Fleet read_fleet(const std::string& path) {
   const toml::table document = files::parse_toml(files::read_file(path), path);
   const files::TomlTable root(document, path);
-  root.choice("schema", {"swarmcert/flights/1"});
-  root.allow_only({"schema", "vehicle", "log"});
+  root.choice("schema", {kFlightsSchema});
+  root.allow_only(files::key_names(describe_flights_file));
   Fleet fleet;
   if (!root.has("vehicle")) return fleet;
   const files::TomlTable vehicles = root.table("vehicle");
   for (const std::string& name : vehicles.keys()) {
     const files::TomlTable table = vehicles.table(name);
-    table.allow_only({"model", "use"});
+    table.allow_only(files::key_names(describe_vehicle_use));
     VehicleUse use;
     use.model = (fs::path(path).parent_path() / table.text("model")).string();
     use.kind = stability::read_model(use.model).kind;
-    if (table.has("use")) use.position_only = table.choice("use", {"all", "position"}) == 1;
+    if (table.has("use")) use.position_only = table.choice("use", {kUses[0], kUses[1]}) == 1;
     fleet[name] = use;
   }
   return fleet;
@@ -347,13 +375,13 @@ Fleet read_fleet(const std::string& path) {
 LogRules read_log_rules(const std::string& path) {
   const toml::table document = files::parse_toml(files::read_file(path), path);
   const files::TomlTable root(document, path);
-  root.choice("schema", {"swarmcert/flights/1"});
+  root.choice("schema", {kFlightsSchema});
   LogRules rules;
   if (!root.has("log")) return rules;
   const files::TomlTable logs = root.table("log");
   for (const std::string& pattern : logs.keys()) {
     const files::TomlTable table = logs.table(pattern);
-    table.allow_only({"vehicle", "flight", "model", "gains", "mass_kg", "use"});
+    table.allow_only(files::key_names(describe_log_rule));
     LogRule rule;
     rule.pattern = pattern;
     const auto file = [&](const char* key) {
@@ -367,8 +395,7 @@ LogRules read_log_rules(const std::string& path) {
       rule.mass_kg = table.number("mass_kg");
       if (!(rule.mass_kg > 0)) table.refuse("mass_kg", std::to_string(rule.mass_kg), "must be positive");
     }
-    if (table.has("use"))
-      rule.use = static_cast<LogRule::Use>(1 + table.choice("use", {"all", "position", "none"}));
+    if (table.has("use")) rule.use = static_cast<LogRule::Use>(1 + table.choice("use", kUses));
     rules.push_back(std::move(rule));
   }
   return rules;

@@ -10,6 +10,10 @@
 
 #include "nn/base/interval.h"
 
+namespace swarmcert::files {
+class Keys;
+}
+
 namespace swarmcert::residuals {
 
 /// The logs of all vehicles of one flight.
@@ -82,6 +86,9 @@ struct VehicleUse {
 
 /// Vehicles by name.
 using Fleet = std::map<std::string, VehicleUse>;
+
+/// Describes flights.toml.
+void describe_flights_file(files::Keys& keys);
 
 /// Reads `[vehicle.cf50] model = "...", use = "all" | "position"`; model paths are relative to the file's folder.
 /// @throws files::InputError with line and key; also if a model cannot be read.

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "nn/base/file_io.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/json.h"
 #include "nn/base/toml.h"
 #include "nn/weights/functions.h"
@@ -129,12 +130,29 @@ std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptio
   return result;
 }
 
+namespace {
+
+constexpr const char* kBoxSchema = "swarmcert/box/1";
+
+void describe_sides(files::Keys& keys) {
+  keys.must<std::vector<double>>("lower", "Lower end of each input, in the order of the network's inputs.");
+  keys.must<std::vector<double>>("upper", "Upper end of each input.");
+}
+
+}  // namespace
+
+void describe_box_file(files::Keys& keys) {
+  keys.schema(kBoxSchema);
+  describe_sides(keys);
+  keys.may_table("ground", "The same for the ground's input, where the network has one.", describe_sides);
+}
+
 Domain read_domain(const std::string& path, const files::Network& network) {
   const std::string text = files::read_file(path);
   const toml::table document = files::parse_toml(text, path);
   const files::TomlTable top(document, path);
-  top.require_schema("swarmcert/box/1");
-  top.allow_only({"schema", "lower", "upper", "ground"});
+  top.require_schema(kBoxSchema);
+  top.allow_only(files::key_names(describe_box_file));
   Domain domain;
   if (network.plain) {
     if (top.has("ground")) top.refuse("ground", "", "the network has no ground term");
@@ -155,7 +173,7 @@ Domain read_domain(const std::string& path, const files::Network& network) {
   Box& ground = domain[files::FunctionId::ground_phi()];
   if (top.has("ground")) {
     const files::TomlTable table = top.table("ground");
-    table.allow_only({"lower", "upper"});
+    table.allow_only(files::key_names(describe_sides));
     ground = read_box(table, files::kGroundInputs);
   } else if (inputs < files::kGroundInputs) {
     top.refuse("ground", "", "is missing, and the box has too few intervals for the ground's inputs");

@@ -9,6 +9,10 @@
 #include "lipschitz/base/box.h"
 #include "nn/weights/network.h"
 
+namespace swarmcert::files {
+class Keys;
+}
+
 namespace swarmcert::lipschitz {
 
 /// Number of neighbours of each kind.
@@ -63,6 +67,9 @@ struct ClaimOptions {
 ///   a scale is not positive, or if `mixture` names a kind that NET does not have.
 std::vector<Claim> claims(const files::Network& network, const ClaimOptions& options);
 std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptions& options);
+
+/// Describes box.toml.
+void describe_box_file(files::Keys& keys);
 
 /// Reads a box.toml: `schema = "swarmcert/box/1"`, `lower` and `upper` with one number per input of the plain network
 /// or of the neighbours' phi. An optional table `ground` has the same keys for the ground's inputs (-z and -v); without

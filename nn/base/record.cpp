@@ -222,6 +222,12 @@ void Record::choose(std::size_t index, std::vector<std::string> names) {
   if (is_shape_) node_->choices = std::move(names);
 }
 
+std::vector<std::string> field_names(const Node& shape) {
+  std::vector<std::string> names;
+  for (const Node& field : shape.members) names.push_back(field.name);
+  return names;
+}
+
 Json to_json(const Node& value) {
   switch (value.kind) {
     case Node::Kind::fields:

@@ -232,6 +232,9 @@ Node shape_of() {
   return node;
 }
 
+/// Returns the names of the fields of a shape: the keys that a reader of such a file knows.
+std::vector<std::string> field_names(const Node& shape);
+
 /// The value as JSON, fields in the order of the description.
 nlohmann::ordered_json to_json(const Node& value);
 

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "nn/base/file_io.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
 #include "nn/base/text.h"
@@ -18,6 +19,44 @@ namespace {
 constexpr char kSchema[] = "swarmcert/network/1";
 constexpr char kGround[] = "ground";
 
+const std::vector<std::string> kQuantities = {"force_z", "force", "torque"};
+const std::vector<std::string> kForceUnits = {"gf", "N"}, kTorqueUnits = {"mN_m", "N_m"};
+const std::vector<std::string> kScopes = {"layer", "network"}, kModes = {"clip", "equal"};
+
+void describe_output(Keys& keys) {
+  std::vector<std::string> units = kForceUnits;
+  units.insert(units.end(), kTorqueUnits.begin(), kTorqueUnits.end());
+  keys.must("quantity", "What is predicted.", "", OneOf{kQuantities});
+  keys.must("unit", "Of a force, or of a torque.", "", OneOf{units});
+}
+
+void describe_gamma(Keys& keys) {
+  keys.must<double>("value", "Limit of the spectral norms.");
+  keys.must("scope", "What it limits.", "", OneOf{kScopes});
+  keys.must("mode", "clip: at most the limit.", "", OneOf{kModes});
+}
+
+void describe_clamp(Keys& keys) {
+  keys.must<std::vector<double>>("lower", "One number per input.");
+  keys.must<std::vector<double>>("upper", "One number per input.");
+}
+
+void describe_input(Keys& keys) {
+  keys.may<std::vector<std::string>>("order", "Inputs of phi, units in the names: dp_x_m, ..., dv_z_m_s.");
+  keys.may_table("clamp", "Values between which the inputs are clamped.", describe_clamp);
+}
+
+void describe_part(Keys& keys) {
+  keys.must<std::string>("weights", "Weight file.");
+  keys.may<std::vector<std::string>>("order", "Layers in the order of evaluation.");
+  keys.may<TextOrTexts>("select",
+                        "Prefix of the layers of one network in a file that holds several; a list names a "
+                        "chain in order of evaluation. Not beside order.");
+  keys.may<TextOrTexts>("activation",
+                        "Where the weight file does not state it: one name for what lies between all layers, "
+                        "or one for each layer but the last, and one more where it follows the last layer.");
+}
+
 class NetworkReader {
  public:
   NetworkReader(const TomlTable& top, const std::string& path, const WeightsLoader& load)
@@ -25,7 +64,7 @@ class NetworkReader {
 
   Network run() {
     top_.require_schema(kSchema);
-    top_.allow_only({"schema", "output", "gamma", "input", "silent", "phi", "rho"});
+    top_.allow_only(key_names(describe_network_file));
     network_.path = path_;
     if (top_.has("output")) read_output(top_.table("output"));
     if (top_.has("gamma")) read_gamma(top_.table("gamma"));
@@ -40,31 +79,27 @@ class NetworkReader {
 
  private:
   void read_output(const TomlTable& output) {
-    output.allow_only({"quantity", "unit"});
-    output.choice("quantity", {"force_z", "force", "torque"});
+    output.allow_only(key_names(describe_output));
+    output.choice("quantity", kQuantities);
     network_.output_quantity = output.text("quantity");
-    if (network_.output_quantity == "torque") {
-      output.choice("unit", {"mN_m", "N_m"});
-    } else {
-      output.choice("unit", {"gf", "N"});
-    }
+    output.choice("unit", network_.output_quantity == "torque" ? kTorqueUnits : kForceUnits);
     network_.output_unit = output.text("unit");
   }
 
   void read_gamma(const TomlTable& gamma) {
-    gamma.allow_only({"value", "scope", "mode"});
+    gamma.allow_only(key_names(describe_gamma));
     GammaStatement statement;
     statement.value = gamma.number("value");
     if (!(statement.value > 0)) gamma.refuse("value", std::to_string(statement.value), "must be positive");
-    statement.scope = gamma.choice("scope", {"layer", "network"}) == 0 ? GammaStatement::Scope::kLayer
-                                                                       : GammaStatement::Scope::kNetwork;
-    statement.mode = gamma.choice("mode", {"clip", "equal"}) == 0 ? GammaStatement::Mode::kClip
-                                                                  : GammaStatement::Mode::kEqual;
+    statement.scope =
+        gamma.choice("scope", kScopes) == 0 ? GammaStatement::Scope::kLayer : GammaStatement::Scope::kNetwork;
+    statement.mode =
+        gamma.choice("mode", kModes) == 0 ? GammaStatement::Mode::kClip : GammaStatement::Mode::kEqual;
     network_.gamma = statement;
   }
 
   void read_input(const TomlTable& input) {
-    input.allow_only({"order", "clamp"});
+    input.allow_only(key_names(describe_input));
     if (input.has("order")) {
       network_.input_order = input.texts("order");
       std::vector<std::string> sorted = network_.input_order;
@@ -75,7 +110,7 @@ class NetworkReader {
     }
     if (!input.has("clamp")) return;
     const TomlTable clamp = input.table("clamp");
-    clamp.allow_only({"lower", "upper"});
+    clamp.allow_only(key_names(describe_clamp));
     InputClamp box = {clamp.numbers("lower"), clamp.numbers("upper")};
     const std::size_t inputs = network_.input_order.empty() ? box.lower.size() : network_.input_order.size();
     check_length(clamp, "lower", box.lower, inputs, "inputs");
@@ -101,7 +136,7 @@ class NetworkReader {
     if (kinds.keys().empty()) kinds.refuse("", "", "names no kind of vehicle", "add [" + role + ".<kind>]");
     for (const std::string& kind : kinds.keys()) {
       const TomlTable entry = kinds.table(kind);
-      entry.allow_only({"weights", "order", "select", "activation"});
+      entry.allow_only(key_names(describe_part));
       // "set:<kind>:<kind>" is the name of a function.
       if (kind.find(':') != std::string::npos)
         kinds.refuse(in_quotes(kind), "", "a kind's name must not contain ':'", "rename the kind");
@@ -262,6 +297,20 @@ Network load_pair(const NetworkArguments& arguments) {
 }
 
 }  // namespace
+
+void describe_network_file(Keys& keys) {
+  keys.schema(kSchema);
+  keys.may_table("output", "Quantity and unit of the output.", describe_output);
+  keys.may_table("gamma", "Limit that the spectral norms were trained to.", describe_gamma);
+  keys.may_table("input", "Order of the inputs, and between which values they are clamped.", describe_input);
+  keys.may<std::vector<std::string>>(
+      "silent",
+      "Compositions without a network, kinds of the neighbours > kind of the vehicle: with as many "
+      "neighbours of each kind, and no others, its output is 0.");
+  keys.must_named_tables("phi", "By the kind of the neighbour; ground: the vehicle's own -z and -v.",
+                         describe_part);
+  keys.must_named_tables("rho", "By the kind of the vehicle.", describe_part);
+}
 
 int components(const std::string& quantity) { return quantity.empty() ? 0 : quantity == "force_z" ? 1 : 3; }
 

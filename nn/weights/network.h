@@ -14,6 +14,8 @@
 
 namespace swarmcert::files {
 
+class Keys;
+
 /// The stated limit on the networks' spectral norms: `gamma = { value, scope, mode }`.
 struct GammaStatement {
   enum class Scope { kLayer, kNetwork };
@@ -116,6 +118,9 @@ Network as_float32(Network network);
 
 /// Reads the weight file at a path; `choice` is as in load_weights().
 using WeightsLoader = std::function<Weights(const std::string& path, const LayerChoice& choice)>;
+
+/// Describes network.toml.
+void describe_network_file(Keys& keys);
 
 /// Parses a network.toml from memory, with any activation. `path` gives its folder and its name in messages; `load`
 /// reads the weight files.

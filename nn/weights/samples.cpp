@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "nn/base/file_keys.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/functions.h"
 
@@ -67,6 +68,17 @@ std::string Samples::place(std::size_t i) const {
   return i < lines.size() ? "line " + std::to_string(lines[i]) : "sample " + std::to_string(i);
 }
 
+void describe_samples_file(Keys& keys) {
+  const KeysOfTable recorded = [](Keys& table) {
+    using Row = std::vector<double>;
+    table.may<std::vector<Row>>("inputs", "One row per sample.");
+    table.may<std::vector<std::variant<double, Row>>>("outputs", "One number or row per sample.");
+  };
+  keys.schema(kSamplesSchema);
+  keys.may_named_tables("networks", "By name of a part: its recorded inputs and outputs.", recorded);
+  recorded(keys);
+}
+
 Json samples_json(const std::map<std::string, Samples>& samples) {
   Json networks = Json::object();
   for (const auto& [part, recorded] : samples) {
@@ -80,7 +92,7 @@ Json samples_json(const std::map<std::string, Samples>& samples) {
     networks[part] = {{"inputs", rows(recorded.x, recorded.inputs)},
                       {"outputs", rows(recorded.y, recorded.outputs)}};
   }
-  return {{"schema", "swarmcert/samples/1"}, {"networks", std::move(networks)}};
+  return {{"schema", kSamplesSchema}, {"networks", std::move(networks)}};
 }
 
 SampleAgreement hold_against(const Network& network, const FunctionId& part, const Samples& samples,

@@ -11,6 +11,8 @@
 
 namespace swarmcert::files {
 
+inline constexpr const char* kSamplesSchema = "swarmcert/samples/1";
+
 /// Samples of one stored network.
 struct Samples {
   std::string path;
@@ -37,6 +39,9 @@ std::map<std::string, Samples> read_samples(const std::string& argument, const N
 
 /// Same as read_samples(), for one network and from memory: CSV, .npz or JSON without `networks`.
 Samples parse_samples(const std::string& bytes, const std::string& path, int inputs, int outputs);
+
+/// Describes a JSON file of samples.
+void describe_samples_file(Keys& keys);
 
 /// Returns {"schema": "swarmcert/samples/1", "networks": {...}}, which read_samples() reads.
 Json samples_json(const std::map<std::string, Samples>& samples);

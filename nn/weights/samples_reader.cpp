@@ -17,7 +17,6 @@
 namespace swarmcert::files {
 namespace {
 
-constexpr char kSamplesSchema[] = "swarmcert/samples/1";
 constexpr char kHowToRecord[] = "per sample, record every input and every output of the network";
 
 [[noreturn]] void refuse_too_many(const std::string& path) {

@@ -5,6 +5,7 @@
 
 #include "nn/base/doubles.h"
 #include "nn/base/file_io.h"
+#include "nn/base/file_keys.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -32,25 +33,42 @@ template <class Of>
 struct Key {
   const char* name;
   double Of::*member;
+  const char *unit, *meaning;
 };
 
-constexpr Key<Disturbance> kClasses[] = {{"rate_N_s", &Disturbance::rate_N_s},
-                                         {"amplitude_N", &Disturbance::amplitude_N},
-                                         {"variation_N", &Disturbance::variation_N},
-                                         {"impulse_N_s", &Disturbance::impulse_N_s}};
-constexpr Key<EstimateError> kVelocity[] = {{"velocity_error_m_s", &EstimateError::amplitude},
-                                            {"velocity_error_rate_m_s2", &EstimateError::rate},
-                                            {"velocity_error_variation_m_s", &EstimateError::variation},
-                                            {"velocity_error_impulse_m", &EstimateError::impulse}};
-constexpr Key<EstimateError> kPosition[] = {{"position_error_m", &EstimateError::amplitude},
-                                            {"position_error_rate_m_s", &EstimateError::rate},
-                                            {"position_error_variation_m", &EstimateError::variation},
-                                            {"position_error_impulse_m_s", &EstimateError::impulse}};
+constexpr Key<Disturbance> kClasses[] = {
+    {"rate_N_s", &Disturbance::rate_N_s, "N/s", "sup |f'| of the force error f."},
+    {"amplitude_N", &Disturbance::amplitude_N, "N", "sup |f|."},
+    {"variation_N", &Disturbance::variation_N, "N", "Total variation of f."},
+    {"impulse_N_s", &Disturbance::impulse_N_s, "N s", "int |f| dt of one pass."}};
+constexpr Key<EstimateError> kVelocity[] = {
+    {"velocity_error_m_s", &EstimateError::amplitude, "m/s", "sup |estimated - true velocity|."},
+    {"velocity_error_rate_m_s2", &EstimateError::rate, "m/s^2",
+     "sup |d/dt (estimated - true velocity)|, from zero at the start."},
+    {"velocity_error_variation_m_s", &EstimateError::variation, "m/s",
+     "Total variation of (estimated - true velocity)."},
+    {"velocity_error_impulse_m", &EstimateError::impulse, "m", "int |estimated - true velocity| dt."}};
+constexpr Key<EstimateError> kPosition[] = {
+    {"position_error_m", &EstimateError::amplitude, "m", "sup |estimated - true position|."},
+    {"position_error_rate_m_s", &EstimateError::rate, "m/s",
+     "sup |d/dt (estimated - true position)|, from zero at the start."},
+    {"position_error_variation_m", &EstimateError::variation, "m",
+     "Total variation of (estimated - true position)."},
+    {"position_error_impulse_m_s", &EstimateError::impulse, "m s", "int |estimated - true position| dt."}};
 constexpr Key<ReferenceMotion> kReference[] = {
-    {"reference_step_m", &ReferenceMotion::steps_m},
-    {"reference_speed_step_m_s", &ReferenceMotion::speed_steps_m_s},
-    {"reference_accel_m_s2", &ReferenceMotion::acceleration_m_s2},
-    {"reference_jerk_m_s3", &ReferenceMotion::jerk_m_s3}};
+    {"reference_step_m", &ReferenceMotion::steps_m, "m", "Sum of all jumps of the set point."},
+    {"reference_speed_step_m_s", &ReferenceMotion::speed_steps_m_s, "m/s",
+     "Sum of all jumps of the set point's velocity."},
+    {"reference_accel_m_s2", &ReferenceMotion::acceleration_m_s2, "m/s^2",
+     "sup |p_d''|, for the thrust that the fed-forward acceleration takes."},
+    {"reference_jerk_m_s3", &ReferenceMotion::jerk_m_s3, "m/s^3",
+     "sup |p_d'''| of a set point whose acceleration is fed forward."}};
+constexpr const char* kDisturbanceSchema = "swarmcert/disturbance/1";
+
+template <class KeysOfGroup>
+void describe_group(files::Keys& keys, const KeysOfGroup& group) {
+  for (const auto& key : group) keys.may<files::NumberOrThree>(key.name, key.meaning, key.unit);
+}
 
 template <class Keys>
 bool states_any(const files::TomlTable& table, const Keys& keys) {
@@ -96,10 +114,23 @@ void read_passes(const files::TomlTable& table, DisturbanceSource& source) {
 
 }  // namespace
 
-std::vector<std::string> class_keys() {
-  std::vector<std::string> keys;
-  for (const Key<Disturbance>& key : kClasses) keys.emplace_back(key.name);
-  return keys;
+void describe_classes(files::Keys& keys) { describe_group(keys, kClasses); }
+
+void describe_force_error(files::Keys& keys) {
+  describe_classes(keys);
+  keys.may<files::NumberOrThree>("bias_N", "Constant part of the force error, on top of the rest.", "N");
+}
+
+void describe_disturbance_file(files::Keys& keys) {
+  keys.schema(kDisturbanceSchema);
+  describe_force_error(keys);
+  keys.may<double>("thrust_ratio_error", "Largest constant error of the thrust ratio, as a fraction.");
+  describe_group(keys, kVelocity);
+  describe_group(keys, kPosition);
+  describe_group(keys, kReference);
+  keys.may<int>("passes", "Number of passes; needs impulse_N_s and every_s.");
+  keys.may<double>("every_s", "Least time between the starts of two passes.", "s");
+  keys.may<double>("pass_length_s", "How long one pass lasts.", "s");
 }
 
 void read_force_error(const files::TomlTable& table, DisturbanceSource& source) {
@@ -122,16 +153,8 @@ void read_force_error(const files::TomlTable& table, DisturbanceSource& source) 
 void read_disturbance_file(const std::string& path, DisturbanceSource& source) {
   const toml::table document = files::parse_toml(files::read_file(path), path);
   const files::TomlTable table(document, path);
-  table.require_schema("swarmcert/disturbance/1");
-  std::vector<std::string> known = class_keys();
-  const auto add = [&known](const auto& keys) {
-    for (const auto& key : keys) known.emplace_back(key.name);
-  };
-  add(kVelocity), add(kPosition), add(kReference);
-  for (const char* const key :
-       {"schema", "bias_N", "thrust_ratio_error", "passes", "every_s", "pass_length_s"})
-    known.emplace_back(key);
-  table.allow_only(known);
+  table.require_schema(kDisturbanceSchema);
+  table.allow_only(files::key_names(describe_disturbance_file));
   read_force_error(table, source);
   if (source.kind == "declared") source.note = "as " + path + " declares";
   constexpr double kMostRatioError = 0.9;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "nn/base/file_io.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/input_error.h"
 #include "nn/base/suggest.h"
 #include "nn/base/text.h"
@@ -21,6 +22,7 @@ using files::TomlTable;
 
 constexpr char kSchema[] = "swarmcert/grid/1";
 constexpr double kMostCells = 1e7;
+const std::vector<std::string> kScales = {"linear", "log"}, kAxisNames = {"x", "y", "z"};
 
 std::vector<std::string> quantity_names() {
   std::vector<std::string> names;
@@ -28,16 +30,28 @@ std::vector<std::string> quantity_names() {
   return names;
 }
 
+void describe_values_of_axis(files::Keys& keys) {
+  keys.must<double>("from", "");
+  keys.must<double>("to", "");
+  keys.must<int>("steps", "Number of values.");
+  keys.may("scale", "linear if absent.", "", files::OneOf{kScales});
+}
+
+void describe_limits_of(files::Keys& keys) {
+  keys.may<double>("least", "");
+  keys.may<double>("most", "");
+}
+
 GridAxis read_axis(const TomlTable& axes, const std::string& name) {
   const TomlTable table = axes.table(name);
-  table.allow_only({"from", "to", "steps", "scale"});
+  table.allow_only(files::key_names(describe_values_of_axis));
   const double from = table.number("from");
   const double to = table.number("to");
   const double steps = table.number("steps");
   if (!(steps >= 1) || steps > kMostCells || steps != std::floor(steps)) {
     table.refuse("steps", fmt::format("{:g}", steps), "must be a whole number from 1");
   }
-  const bool is_log = table.has("scale") && table.choice("scale", {"linear", "log"}) == 1;
+  const bool is_log = table.has("scale") && table.choice("scale", kScales) == 1;
   for (const auto& [key, value] : {std::pair("from", from), std::pair("to", to)}) {
     if (value < 0) table.refuse(key, fmt::format("{:g}", value), "must not be negative");
     if (is_log && value == 0) table.refuse(key, "0", "must be positive on a log scale", "or omit scale");
@@ -81,7 +95,7 @@ std::string beside(const std::string& grid, const std::string& file) {
 }
 
 Disturbance read_disturbance(const TomlTable& table, int axis) {
-  table.allow_only(class_keys());
+  table.allow_only(files::key_names(describe_classes));
   DisturbanceSource source;
   read_force_error(table, source);
   return source.axis[axis];
@@ -190,7 +204,7 @@ void read_limits(const TomlTable& limits, Grid& grid) {
   limits.allow_only(quantity_names());
   for (const std::string& name : limits.keys()) {
     const TomlTable limit = limits.table(name);
-    limit.allow_only({"least", "most"});
+    limit.allow_only(files::key_names(describe_limits_of));
     const double least = limit.has("least") ? limit.number("least") : -INFINITY;
     const double most = limit.has("most") ? limit.number("most") : INFINITY;
     if (least > most) {
@@ -203,12 +217,30 @@ void read_limits(const TomlTable& limits, Grid& grid) {
 
 }  // namespace
 
+void describe_grid_file(files::Keys& keys) {
+  const std::vector<files::OneOf> quantities = {files::OneOf{quantity_names()}};
+  keys.schema(kSchema);
+  keys.must<std::string>("gains", "The gains.toml that is varied.");
+  keys.must<std::string>("model", "The model.toml.");
+  keys.may("axis", "Of the loop; z if absent.", "", files::OneOf{kAxisNames});
+  keys.must_table("axes", "The numbers that are varied.", [](files::Keys& axes) {
+    for (const std::string& name : grid_parameters())
+      axes.may_table(name, "Its values.", describe_values_of_axis);
+  });
+  keys.must("compute", "What is computed at every point.", "", quantities);
+  keys.may("pareto", "The numbers whose front is wanted.", "", quantities);
+  keys.may_table("limits", "Beyond which a point is not feasible.", [](files::Keys& limits) {
+    for (const std::string& name : quantity_names()) limits.may_table(name, "", describe_limits_of);
+  });
+  keys.may_table("disturbance", "The declared disturbance.", describe_classes);
+}
+
 Grid load_grid(const std::string& path) {
   const std::string text = files::read_file(path);
   const toml::table document = files::parse_toml(text, path);
   const TomlTable top(document, path);
   top.require_schema(kSchema);
-  top.allow_only({"schema", "gains", "model", "axis", "axes", "compute", "pareto", "limits", "disturbance"});
+  top.allow_only(files::key_names(describe_grid_file));
   Grid grid;
   grid.path = path;
   grid.sha256 = files::sha256(text);
@@ -217,7 +249,7 @@ Grid load_grid(const std::string& path) {
   grid.gains = load_gains(gains);
   grid.model = read_model(model);
   grid.inputs = {path, gains, model};
-  if (top.has("axis")) grid.axis = static_cast<int>(top.choice("axis", {"x", "y", "z"}));
+  if (top.has("axis")) grid.axis = static_cast<int>(top.choice("axis", kAxisNames));
   read_axes(top.table("axes"), grid);
   grid.compute = read_quantities(top, "compute");
   if (top.has("pareto")) read_pareto(top, grid);

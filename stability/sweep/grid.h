@@ -10,6 +10,10 @@
 #include "stability/gains.h"
 #include "stability/model.h"
 
+namespace swarmcert::files {
+class Keys;
+}
+
 namespace swarmcert::stability {
 
 /// One axis of the grid: `values` of the parameter `name`.
@@ -54,6 +58,9 @@ struct Quantity {
   std::string meaning;
 };
 const std::vector<Quantity>& grid_quantities();
+
+/// Describes grid.toml.
+void describe_grid_file(files::Keys& keys);
 
 /// Reads grid.toml (schema swarmcert/grid/1):
 ///   gains = "...", model = "...": files relative to the grid's folder; axis = "x" | "y" | "z"

@@ -88,8 +88,7 @@ endif()
 foreach(file bin/swarmcert share/bash-completion/completions/swarmcert
              share/doc/swarmcert/copyright share/doc/swarmcert/SECURITY.md share/swarmcert/networks/demo/network.toml
              share/swarmcert/gains/crazyflie-small.toml share/swarmcert/models/crazyflie-small.toml
-             share/swarmcert/analysis/flights/flights.toml share/swarmcert/sweep.sbatch
-             share/swarmcert/schemas/certificate.schema.json)
+             share/swarmcert/analysis/flights/flights.toml share/swarmcert/sweep.sbatch)
   if(NOT EXISTS ${root}/usr/${file})
     message(FATAL_ERROR "the package lacks ${file}")
   endif()

@@ -155,7 +155,7 @@ struct BoundResult {
   std::optional<std::vector<AxisTube>> tube;
   std::optional<TaskTube> local_tube;
   std::optional<SwarmBound> swarm;
-  std::optional<files::Json> certificate;
+  std::optional<TrackingCertificate> certificate;
 };
 
 void describe(files::Record& record, const BoundResult& result) {
@@ -170,9 +170,10 @@ void describe(files::Record& record, const BoundResult& result) {
   record.may("tube", result.tube, "Bound of every error over time, from rest.");
   record.may("local_tube", result.local_tube, "The tube around a task flown by several vehicles.");
   record.may("swarm", result.swarm, "Stability of vehicles that disturb one another.");
-  record.may_object(
-      result.certificate.has_value(), "certificate", "Certificate of the gains, with -o.",
-      [&result](files::Record& r) { describe_certificate(r, result.certificate.value_or(files::Json())); });
+  record.may_object(result.certificate.has_value(), "certificate", "Certificate of the gains, with -o.",
+                    [&result](files::Record& r) {
+                      describe_certificate(r, result.certificate.value_or(TrackingCertificate{}));
+                    });
 }
 
 /// Computes the results requested in addition to the bounds.
@@ -249,8 +250,9 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   add_extras(options, common, input, result);
   if (!options.certificate.empty()) {
     result.certificate = tracking_certificate(input, options.tracking, *result.verified);
-    if (!is_empty_certificate(*result.certificate))
-      files::write_file(options.certificate, files::to_text(*result.certificate), common.force);
+    if (!result.certificate->has_no_gain())
+      files::write_file(options.certificate,
+                        files::to_text(files::to_json(files::record_of(*result.certificate))), common.force);
   }
   const files::Node described = result_of("bound", inputs, std::nullopt, result);
   std::string report_path;

@@ -4,8 +4,9 @@
 
 #include <cmath>
 #include <map>
+#include <optional>
+#include <utility>
 
-#include "analysis/commands/bound/gain_witness.h"
 #include "nn/base/content_hash.h"
 #include "nn/base/file_io.h"
 #include "stability/checker/check_tracking.h"
@@ -13,217 +14,218 @@
 namespace swarmcert::analysis {
 namespace {
 
-using files::Json;
+using files::Record;
 
 /// The smallest double with a 30-bit significand that is not below `exact`, so that it prints with few digits.
 double short_double_above(const mpq_class& exact) {
   constexpr int kBits = 30;
   const double near = exact.get_d();
+  if (near == 0) return 0;
   const int exponent = std::ilogb(near) + 1 - kBits;
   double result = std::ldexp(std::floor(std::ldexp(near, -exponent)), exponent);
   while (mpq_class(result) < exact) result += std::ldexp(1.0, exponent);
   return result;
 }
 
-Json hex_array(const std::vector<double>& values) {
-  Json result = Json::array();
-  for (const double x : values) result.push_back(files::hex_float(x));
-  return result;
+std::vector<std::string> hex_floats(const std::vector<double>& values) {
+  std::vector<std::string> texts;
+  for (const double x : values) texts.push_back(files::hex_float(x));
+  return texts;
 }
 
-Json hex_rows(const std::vector<std::vector<double>>& matrix) {
-  Json result = Json::array();
-  for (const std::vector<double>& row : matrix) result.push_back(hex_array(row));
-  return result;
+void describe_hex(Record& record, const char* name, double value, const char* meaning,
+                  const char* unit = "") {
+  record.field(name, files::hex_float(value), meaning, unit);
 }
 
-Json gains_of(const check::GainBounds& bounds) {
-  Json gains;
-  const auto add = [&gains](const std::string& key, const std::optional<mpq_class>& exact) {
-    const double above = exact ? short_double_above(*exact) : 0;
-    gains[key] = exact ? Json(above) : Json();
-    gains[key + "_hex"] = exact ? Json(files::hex_float(above)) : Json();
-  };
-  add("rate", bounds.rate);
-  add("amplitude", bounds.amplitude);
-  add("edge", bounds.edge);
-  add("impulse", bounds.impulse);
-  return gains;
+void describe_gain_bounds(Record& record, const check::GainBounds& bounds) {
+  const auto above = [](const mpq_class& exact) { return short_double_above(exact); };
+  constexpr const char* kSame = "The same double as a hex float.";
+  const auto rate = bounds.rate ? std::optional(above(*bounds.rate)) : std::nullopt;
+  record.field("rate", rate, "Of |e| per sup |w'|; null where a constant input leaves an error.", "m",
+               "proved upper bound");
+  record.field("rate_hex", rate ? std::optional(files::hex_float(*rate)) : std::nullopt, kSame);
+  record.field("amplitude", above(bounds.amplitude), "Of |e| per sup |w|.", "m", "proved upper bound");
+  describe_hex(record, "amplitude_hex", above(bounds.amplitude), kSame);
+  record.field("edge", above(bounds.edge), "Of |e| per total variation of w.", "m", "proved upper bound");
+  describe_hex(record, "edge_hex", above(bounds.edge), kSame);
+  record.field("impulse", above(bounds.impulse), "Of |e| per int |w| dt.", "m", "proved upper bound");
+  describe_hex(record, "impulse_hex", above(bounds.impulse), kSame);
 }
 
-/// Members common to the entries of both kinds of loops; the axis is left empty.
-Json entry_of(const check::LoopNumbers& loop, const std::vector<std::vector<double>>& P, long steps) {
-  return {{"axis", ""},
-          {"mass_kg", files::hex_float(loop.mass_kg)},
-          {"Kp", files::hex_float(loop.Kp)},
-          {"Kd", files::hex_float(loop.Kd)},
-          {"Ki", files::hex_float(loop.Ki)},
-          {"lags_s", hex_array(loop.lags_s)},
-          {"delay_s", files::hex_float(loop.delay_s)},
-          {"steps", steps},
-          {"P", hex_rows(P)}};
+/// Members common to the entries of both kinds of loops.
+void describe_loop_numbers(Record& record, const std::string& axis, const check::LoopNumbers& loop) {
+  record.field("axis", axis, "x, y or z.");
+  describe_hex(record, "mass_kg", loop.mass_kg, "", "kg");
+  describe_hex(record, "Kp", loop.Kp, "", "1/s^2");
+  describe_hex(record, "Kd", loop.Kd, "", "1/s");
+  describe_hex(record, "Ki", loop.Ki, "As it acts; of a sampled loop, as the firmware states it.", "1/s^3");
+  record.field("lags_s", hex_floats(loop.lags_s), "Time constants of the first-order lags.", "s");
+  describe_hex(record, "delay_s", loop.delay_s, "Of the command, before the lags.", "s");
 }
 
-Json loop_entry(const ProvedGains& found) {
-  const check::LoopWitness& w = found.witness;
-  Json entry = entry_of(w, w.P, w.steps);
-  entry.update({{"input", w.input},
-                {"delay_order", w.delay_order},
-                {"time_exponent", w.time_exponent},
-                {"step_exponent", w.step_exponent},
-                {"decay", files::hex_float(w.decay)},
-                {"gains", gains_of(found.bounds)}});
-  return entry;
+void describe_form(Record& record, long steps, const std::vector<std::vector<double>>& P) {
+  std::vector<std::vector<std::string>> rows;
+  for (const std::vector<double>& row : P) rows.push_back(hex_floats(row));
+  record.field("steps", steps, "Cells or periods that are followed; the rest is bounded as the tail.");
+  record.field("P", rows, "The quadratic form, rows of hex floats.");
 }
 
-Json sampled_entry(const ProvedSampledGains& found) {
-  const check::SampledWitness& w = found.witness;
-  Json entry = entry_of(w, w.P, w.steps);
-  entry.update({{"period_s", files::hex_float(w.period_s)},
-                {"integrator_step_s", files::hex_float(w.integrator_step_s)},
-                {"contraction", files::hex_float(w.contraction)},
-                {"gains",
-                 {{"force", gains_of(found.bounds.force)},
-                  {"command", gains_of(found.bounds.command)},
-                  {"velocity", gains_of(found.bounds.velocity)},
-                  {"position", gains_of(found.bounds.position)}}}});
-  return entry;
+void describe_loop(Record& record, const TrackingCertificate::Loop& loop) {
+  const check::LoopWitness& w = loop.proved.witness;
+  describe_loop_numbers(record, loop.axis, w);
+  describe_form(record, w.steps, w.P);
+  record.field("input", w.input, "Where w enters: force, command, velocity or position.");
+  record.field("delay_order", w.delay_order, "Degree of the expansion of the delay; 0 without one.");
+  record.field("time_exponent", w.time_exponent, "The unit of time of the witness is 2^-time_exponent s.");
+  record.field("step_exponent", w.step_exponent, "A cell is 2^-step_exponent units of time long.");
+  describe_hex(record, "decay", w.decay, "sqrt(x'Px) falls at least like exp(-decay t), t in units of time.");
+  record.object("gains", "", [&](Record& gains) { describe_gain_bounds(gains, loop.proved.bounds); });
 }
 
-/// Returns the certificate entry of the loop with an empty axis, or a string with the reason why there is none.
-Json entry_or_reason(const stability::AxisLoop& loop, const VerifiedRow& row) {
-  if (!row.norms) return row.why;
+void describe_sampled_loop(Record& record, const TrackingCertificate::SampledLoop& loop) {
+  const check::SampledWitness& w = loop.proved.witness;
+  const check::SampledGainBounds& bounds = loop.proved.bounds;
+  describe_loop_numbers(record, loop.axis, w);
+  describe_form(record, w.steps, w.P);
+  describe_hex(record, "period_s", w.period_s, "From one command to the next.", "s");
+  describe_hex(record, "integrator_step_s", w.integrator_step_s,
+               "What the integral grows by per period, times e.", "s");
+  describe_hex(record, "contraction", w.contraction,
+               "sqrt(r P r') falls at least by this factor when a row goes to the period before.");
+  record.object("gains", "By input.", [&](Record& gains) {
+    for (const auto& [input, of_input] : {std::pair("force", &bounds.force),
+                                          {"command", &bounds.command},
+                                          {"velocity", &bounds.velocity},
+                                          {"position", &bounds.position}})
+      gains.object(input, "", [&one = *of_input](Record& r) { describe_gain_bounds(r, one); });
+  });
+}
+
+void describe_left_out(Record& record, const TrackingCertificate::LeftOut& row) {
+  record.field("axis", row.axis, "x, y or z.");
+  record.field("input", row.input, "Where the disturbance enters.");
+  record.field("loop", row.loop, "continuous or sampled.");
+  record.field("why", row.why, "Why it is not certified.");
+}
+
+/// A search, and the reason if it found nothing.
+template <class Proved>
+struct Found {
+  std::optional<Proved> proved;
   std::string why;
-  const auto found = gain_witness(loop, row.input, *row.norms, why);
-  return found ? loop_entry(*found) : Json(why);
+};
+
+Found<ProvedGains> found_gains(const stability::AxisLoop& loop, const VerifiedRow& row) {
+  if (!row.norms) return {std::nullopt, row.why};
+  Found<ProvedGains> found;
+  found.proved = gain_witness(loop, row.input, *row.norms, found.why);
+  return found;
 }
 
 /// Rows of the inputs of one sampled loop: force, command, velocity and position.
 using SampledRows = std::map<std::string, VerifiedRow>;
 
-/// The same for a sampled loop.
-Json sampled_entry_or_reason(const stability::SampledLoop& loop, const SampledRows& rows) {
+Found<ProvedSampledGains> found_gains(const stability::SampledLoop& loop, const SampledRows& rows) {
   for (const auto& [input, row] : rows)
-    if (!row.norms) return row.why;
+    if (!row.norms) return {std::nullopt, row.why};
   const auto known = [&rows](const char* input) { return *rows.at(input).between_samples; };
-  std::string why;
-  const auto found = sampled_gain_witness(
-      loop, {known("force"), known("command"), known("velocity"), known("position")}, why);
-  return found ? sampled_entry(*found) : Json(why);
+  Found<ProvedSampledGains> found;
+  found.proved = sampled_gain_witness(
+      loop, {known("force"), known("command"), known("velocity"), known("position")}, found.why);
+  return found;
 }
 
-/// Collects certificate entries, and the rows of --verified that have none.
-class Entries {
- public:
-  void add(const VerifiedRow& row, Json entry) {
-    if (entry.is_object()) {
-      entry["axis"] = stability::axis_name(row.axis);
-      (row.loop == stability::Loop::kSampled ? sampled : continuous).push_back(std::move(entry));
-    } else {
-      leave_out(row, entry);
-    }
-  }
-  void leave_out(const VerifiedRow& row, const Json& why) {
-    left_out.push_back({{"axis", stability::axis_name(row.axis)},
-                        {"input", row.input},
-                        {"loop", name(row.loop)},
-                        {"why", why}});
-  }
-  Json continuous = Json::array(), sampled = Json::array(), left_out = Json::array();
-};
+void leave_out(const VerifiedRow& row, const std::string& why, TrackingCertificate& certificate) {
+  certificate.left_out.push_back({stability::axis_name(row.axis), row.input, name(row.loop), why});
+}
 
 std::string numbers_of(const stability::AxisLoop& loop) {
-  return Json({loop.mass_kg, loop.Kp, loop.Kd, loop.Ki, loop.lags_s, loop.delay_s}).dump();
+  return files::Json({loop.mass_kg, loop.Kp, loop.Kd, loop.Ki, loop.lags_s, loop.delay_s}).dump();
 }
 
 /// Searches only once for axes with identical loops.
-void add_continuous(const Tracking& input, const VerifiedGains& verified, Entries& entries) {
-  std::map<std::string, Json> known;
+void add_continuous(const Tracking& input, const VerifiedGains& verified, TrackingCertificate& certificate) {
+  std::map<std::string, Found<ProvedGains>> known;
   for (const VerifiedRow& row : verified) {
     if (row.loop != stability::Loop::kContinuous) continue;
     const stability::AxisLoop loop = *input.continuous(row.axis);
     const auto [place, is_new] = known.try_emplace(numbers_of(loop) + row.input);
-    if (is_new) place->second = entry_or_reason(loop, row);
-    entries.add(row, place->second);
+    if (is_new) place->second = found_gains(loop, row);
+    const auto& [proved, why] = place->second;
+    if (proved)
+      certificate.loops.push_back({stability::axis_name(row.axis), *proved});
+    else
+      leave_out(row, why, certificate);
   }
 }
 
-void add_sampled(const Tracking& input, const VerifiedGains& verified, Entries& entries) {
+void add_sampled(const Tracking& input, const VerifiedGains& verified, TrackingCertificate& certificate) {
   std::map<int, SampledRows> rows;
   for (const VerifiedRow& row : verified)
     if (row.loop == stability::Loop::kSampled) rows[row.axis][row.input] = row;
-  std::map<std::string, Json> known;
+  std::map<std::string, Found<ProvedSampledGains>> known;
   for (const auto& [axis, inputs] : rows) {
     const stability::SampledLoop loop = *input.sampled(axis);
     const auto [place, is_new] = known.try_emplace(numbers_of(loop.plant));
-    if (is_new) place->second = sampled_entry_or_reason(loop, inputs);
-    if (place->second.is_object()) {
-      entries.add(inputs.begin()->second, place->second);
-    } else {
-      for (const auto& [name, row] : inputs) entries.leave_out(row, place->second);
-    }
+    if (is_new) place->second = found_gains(loop, inputs);
+    const auto& [proved, why] = place->second;
+    if (proved)
+      certificate.sampled_loops.push_back({stability::axis_name(axis), *proved});
+    else
+      for (const auto& [name, row] : inputs) leave_out(row, why, certificate);
   }
 }
 
 }  // namespace
 
-Json tracking_certificate(const Tracking& input, const TrackingArguments& arguments,
-                          const VerifiedGains& verified) {
-  Entries entries;
-  add_continuous(input, verified, entries);
-  add_sampled(input, verified, entries);
-  Json result = {{"schema", check::kTrackingSchema},
-                 {"tool", "swarmcert " SWARMCERT_VERSION},
-                 {"statement", check::kTrackingStatement},
-                 {"gains_sha256", files::sha256(files::read_file(arguments.gains))},
-                 {"model_sha256", files::sha256(files::read_file(arguments.model))},
-                 {"loops", std::move(entries.continuous)},
-                 {"sampled_loops", std::move(entries.sampled)},
-                 {"left_out", std::move(entries.left_out)}};
-  result["content_sha256"] = files::content_sha256(result);
-  return result;
+void describe(Record& record, const TrackingCertificate& certificate) {
+  record.constant("schema", check::kTrackingSchema, "Name and version of this format.");
+  record.field("tool", "swarmcert " SWARMCERT_VERSION, "Name and version of the tool that wrote this.");
+  record.field("statement", check::kTrackingStatement, "What the certificate claims, in words.");
+  record.field("gains_sha256", certificate.gains_sha256, "Of gains.toml.");
+  record.field("model_sha256", certificate.model_sha256, "Of model.toml.");
+  record.list("loops", certificate.loops, "Continuous loops, one entry per axis and input.", describe_loop);
+  record.list("sampled_loops", certificate.sampled_loops, "Sampled loops, one entry per axis.",
+              describe_sampled_loop);
+  record.list("left_out", certificate.left_out, "Rows of --verified that are not certified.",
+              describe_left_out);
+  record.field("content_sha256", certificate.content_sha256,
+               "Over everything else, independent of formatting.");
 }
 
-bool is_empty_certificate(const Json& certificate) {
-  return certificate["loops"].empty() && certificate["sampled_loops"].empty();
+TrackingCertificate tracking_certificate(const Tracking& input, const TrackingArguments& arguments,
+                                         const VerifiedGains& verified) {
+  TrackingCertificate certificate;
+  certificate.gains_sha256 = files::sha256(files::read_file(arguments.gains));
+  certificate.model_sha256 = files::sha256(files::read_file(arguments.model));
+  add_continuous(input, verified, certificate);
+  add_sampled(input, verified, certificate);
+  certificate.content_sha256 = files::content_sha256(files::to_json(files::record_of(certificate)));
+  return certificate;
 }
 
-void describe_certificate(files::Record& record, const Json& certificate) {
-  struct LeftOut {
-    std::string axis, input, loop, why;
-  };
-  const bool is_shape = certificate.is_null();
-  std::vector<LeftOut> left_out;
-  for (const Json& row : is_shape ? Json::array() : certificate["left_out"])
-    left_out.push_back({row["axis"], row["input"], row["loop"], row["why"]});
-  const auto size = [&](const char* of) { return is_shape ? std::size_t{0} : certificate[of].size(); };
-  record.field("content_sha256", is_shape ? "" : certificate["content_sha256"].get<std::string>(),
-               "Of the certificate.");
-  record.field("loops", size("loops"), "Continuous loops whose gains it holds, by axis and input.");
+void describe_certificate(Record& record, const TrackingCertificate& certificate) {
+  record.field("content_sha256", certificate.content_sha256, "Of the certificate.");
+  record.field("loops", certificate.loops.size(),
+               "Continuous loops whose gains it holds, by axis and input.");
   record.field(
-      "sampled_loops", size("sampled_loops"),
+      "sampled_loops", certificate.sampled_loops.size(),
       "Axes whose sampled loop it holds with all inputs; where there is no loop at all, no file is written.");
-  record.list("left_out", left_out, "Rows of verified that it does not hold.",
-              [](files::Record& r, const LeftOut& row) {
-                r.field("axis", row.axis, "");
-                r.field("input", row.input, "Where the disturbance enters.");
-                r.field("loop", row.loop, "continuous or sampled.");
-                r.field("why", row.why, "Why it is not certified.");
-              });
+  record.list("left_out", certificate.left_out, "Rows of verified that it does not hold.", describe_left_out);
 }
 
-void print_certificate_summary(const Json& certificate, const std::string& path) {
-  if (is_empty_certificate(certificate)) {
+void print_certificate_summary(const TrackingCertificate& certificate, const std::string& path) {
+  if (certificate.has_no_gain()) {
     fmt::print("\nno certificate: none of these gains could be certified\n");
   } else {
     fmt::print("\ncertificate of the gains of {} continuous loops and of {} sampled axes: {}\n",
-               certificate["loops"].size(), certificate["sampled_loops"].size(), path);
+               certificate.loops.size(), certificate.sampled_loops.size(), path);
   }
   std::map<std::string, std::string> reasons;
-  for (const Json& row : certificate["left_out"]) {
-    std::string& rows = reasons[row["why"].get<std::string>()];
-    rows += (rows.empty() ? "" : ", ") + row["axis"].get<std::string>() + " " +
-            row["input"].get<std::string>() + " " + row["loop"].get<std::string>();
+  for (const TrackingCertificate::LeftOut& row : certificate.left_out) {
+    std::string& rows = reasons[row.why];
+    rows += (rows.empty() ? "" : ", ") + row.axis + " " + row.input + " " + row.loop;
   }
   for (const auto& [why, rows] : reasons) fmt::print("  not in it: {} ({})\n", rows, why);
 }

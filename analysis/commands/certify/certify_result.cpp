@@ -31,7 +31,7 @@ std::vector<Place> points_of(const std::vector<files::FunctionId>& networks,
   return result;
 }
 
-void describe_point(Record& record, const Place& place) {
+void describe_place(Record& record, const Place& place) {
   record.field("network", place.network, "");
   record.field("x", place.x, "");
 }
@@ -39,7 +39,7 @@ void describe_point(Record& record, const Place& place) {
 void describe_attained(Record& record, const lipschitz::Attained& attained) {
   record.field("value", attained.value, "");
   record.list("points", points_of(attained.networks, attained.points), "Where; empty: no neighbours.",
-              describe_point);
+              describe_place);
 }
 
 /// A range with what the certificate states of it.
@@ -124,7 +124,7 @@ void describe_slope_witness(Record& record, const lipschitz::FoundSlope& found) 
   record.field("x", witness.x, "");
   record.field("y", witness.y, "");
   record.list("others", points_of(found.other_networks, witness.others), "Inputs of the other neighbours.",
-              describe_point);
+              describe_place);
 }
 
 void describe_bound(Record& record, const BoundRow& row) {

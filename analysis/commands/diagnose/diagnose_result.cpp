@@ -132,7 +132,7 @@ void describe_detectable(Record& record, const DetectableOfKind& one) {
   record.field("excitation", one.entry.excitation, "Flights that would show smaller ones.");
 }
 
-void describe_difference(Record& record, const identification::Difference& difference) {
+void describe_vehicle_difference(Record& record, const identification::Difference& difference) {
   record.field("vehicle", difference.vehicle, "");
   record.field("kind", difference.diagnosis.kind, "");
   record.field("same_vehicle", difference.against_itself, "The others are its own flights.");
@@ -190,7 +190,7 @@ void describe(Record& record, const Diagnosed& found) {
 
 void describe(Record& record, const Against& against) {
   record.field("flights", against.flights, "Files.");
-  record.list("vehicles", against.differences, "", describe_difference);
+  record.list("vehicles", against.differences, "", describe_vehicle_difference);
 }
 
 void describe(Record& record, const DiagnoseResult& result) {

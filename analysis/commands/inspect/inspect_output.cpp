@@ -34,8 +34,9 @@ void print_of(const NetworkFile& file) {
                network.output_quantity.empty() ? "not stated" : network.output_quantity,
                network.output_unit.empty() ? "no stated unit" : network.output_unit);
     if (network.gamma)
-      fmt::print("; gamma {} {} per {}", cell(*node.find("gamma.mode")) == "clip" ? "at most" : "equal to",
-                 network.gamma->value, cell(*node.find("gamma.scope")));
+      fmt::print("; gamma {} {} per {}",
+                 analysis::cell(*node.find("gamma.mode")) == "clip" ? "at most" : "equal to",
+                 network.gamma->value, analysis::cell(*node.find("gamma.scope")));
     fmt::print("\n");
     for (std::size_t k = 0; k < network.input_order.size(); ++k) {
       fmt::print("  input {}: {}", k, network.input_order[k]);
@@ -103,7 +104,7 @@ void print_of(const LogFile& file) {
 
 /// "damaged, 3.1 % lost; repaired: 12 unsorted rows"
 std::string completeness_in_words(const LogFile& file) {
-  std::string words = cell(files::record_of(logs::completeness_of(file.log.health)));
+  std::string words = analysis::cell(files::record_of(logs::completeness_of(file.log.health)));
   if (file.lost_share > 0) words += fmt::format(", {:.2g} % lost", 100 * file.lost_share);
   const logs::Repaired& repaired = file.log.health.repaired;
   std::string list;

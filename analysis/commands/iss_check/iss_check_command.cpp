@@ -126,7 +126,7 @@ void describe_run(files::Record& record, const IssRun& run) {
   });
 }
 
-void describe_kind(files::Record& record, const KindSummary& kind) {
+void describe_disturbance_kind(files::Record& record, const KindSummary& kind) {
   record.field("disturbance", kind.name, "Its kind.");
   record.field("runs", kind.runs, "Runs that were made.");
   record.field("violations", kind.violations, "Runs that left the ball or the transient bound.");
@@ -189,7 +189,7 @@ void describe(files::Record& record, const IssCheckResult& result) {
   record.field("worst_ratio", check.worst_ratio, "Largest error over the ball.");
   record.field("worst_transient_ratio", check.worst_transient_ratio,
                "Largest error over the transient bound.");
-  record.list("kinds", by_kind(check), "The same by kind of disturbance.", describe_kind);
+  record.list("kinds", by_kind(check), "The same by kind of disturbance.", describe_disturbance_kind);
   const IssRun* const shown = witness(check);
   record.object_or_null(shown != nullptr, "worst", "The most significant run; null: no runs.",
                         [&](files::Record& run) { describe_run(run, shown != nullptr ? *shown : IssRun{}); });

@@ -1,40 +1,32 @@
 #include <fmt/core.h>
 
-#include <algorithm>
-#include <filesystem>
 #include <map>
 #include <memory>
 
-#include "analysis/cli/bundled.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/schema/file_kinds.h"
-#include "nn/base/file_io.h"
 #include "nn/base/suggest.h"
 
 namespace swarmcert::analysis {
 namespace {
 
-namespace fs = std::filesystem;
 using files::Json;
 
-constexpr const char* kEnding = ".schema.json";
+/// The schema of a file: its $id ends in the version that the file states.
+Json schema_of_file(const FileKind& kind) {
+  files::Node shape;
+  files::Record record(shape, true);
+  kind.describes(record);
+  Json schema = files::schema_of(shape, kind.name, kind.title, kind.description, false);
+  const std::string stated = schema["properties"]["schema"]["const"];
+  schema["$id"] = "urn:swarmcert:schema:" + kind.name + ":" + stated.substr(stated.rfind('/') + 1);
+  return schema;
+}
 
-/// Schemas by name: of results that are described, and those kept as files.
+/// Schemas by name, of files and of results.
 std::map<std::string, Json> schemas() {
   std::map<std::string, Json> all;
-  for (const auto& entry : fs::directory_iterator(bundled_folder("schemas", "analysis/schemas"))) {
-    const std::string name = entry.path().filename().string();
-    const std::size_t at = name.rfind(kEnding);
-    if (at != std::string::npos && at > 0)
-      all[name.substr(0, at)] =
-          files::parse_json(files::read_file(entry.path().string()), entry.path().string());
-  }
-  for (const FileKind& kind : file_kinds()) {
-    files::Node shape;
-    files::Record record(shape, true);
-    kind.describes(record);
-    all[kind.name] = files::schema_of(shape, kind.name, kind.title, kind.description, false);
-  }
+  for (const FileKind& kind : file_kinds()) all[kind.name] = schema_of_file(kind);
   for (const Command& command : commands()) {
     if (!command.describe_result) continue;
     // The file model.toml has the kind `model` too.

@@ -36,7 +36,7 @@ std::vector<Errors> errors_of(const std::map<std::string, Scores>& scores, doubl
   return all;
 }
 
-void describe_errors(files::Record& record, const Errors& errors) {
+void describe_test_errors(files::Record& record, const Errors& errors) {
   record.field("vehicles", errors.composition, "Neighbours > vehicle, by kind.");
   record.field("rmse", errors.network, "With the network, SI.");
   record.field("rmse_of_nothing", errors.nothing, "Without, SI.");
@@ -72,7 +72,7 @@ void describe_selection(files::Record& record, const Outcome& outcome, double SI
       "silent", errors_of(outcome.support.silent, SI),
       "Compositions without a network, and the errors on the selecting flights with the output as trained "
       "and without.",
-      describe_errors);
+      describe_test_errors);
   const learning::SupportedErrors all = outcome.support.all();
   record.field("select_rmse", all.network * SI, "Error on the selecting flights, SI.");
   record.field("select_rmse_of_nothing", all.nothing * SI, "The same of predicting zero, SI.");
@@ -84,7 +84,7 @@ void describe_selection(files::Record& record, const Outcome& outcome, double SI
       "Errors on the selecting flights by composition, with what is kept of the output; with --folds, on "
       "all flights that do not test.",
       [](files::Record& one, const Errors& errors) {
-        describe_errors(one, errors);
+        describe_test_errors(one, errors);
         one.field("worse_than_none", errors.worse_than_none, "By more than rounding can explain.");
       });
 }
@@ -165,7 +165,7 @@ void describe_training(files::Record& record, const TrainOptions& options, const
   record.field("test_rmse_of_nothing", outcome.all.nothing * SI, "The same of predicting zero, SI.");
   describe_axes(record, outcome, SI);
   record.list("test", errors_of(outcome.compositions, SI), "Errors on test flights by composition.",
-              describe_errors);
+              describe_test_errors);
   describe_selection(record, outcome, SI);
   describe_bounds(record, outcome, target.unit);
   describe_runs(record, outcome, target.unit);

@@ -17,6 +17,8 @@ namespace {
 
 using residuals::LearningError;
 
+const std::vector<std::string> kQuantiles = {"p50", "p95", "p99", "max"};
+
 const residuals::Axes& quantile_of(const LearningError::Quantiles& all, const std::string& quantile) {
   return quantile == "p50" ? all.p50 : quantile == "p95" ? all.p95 : quantile == "p99" ? all.p99 : all.max;
 }
@@ -45,10 +47,10 @@ stability::DisturbanceSource measured(const LearningError& error, const std::str
 
 }  // namespace
 
-std::vector<std::string> disturbance_keys() {
-  std::vector<std::string> keys = stability::class_keys();
-  keys.insert(keys.end(), {"bias_N", "quantile"});
-  return keys;
+void describe_disturbance(files::Keys& keys) {
+  stability::describe_force_error(keys);
+  keys.may("quantile", "Of the force error measured on the flights, where none is declared.", "",
+           files::OneOf{kQuantiles});
 }
 
 DisturbanceTable read_disturbance(const files::TomlTable& table) {
@@ -61,8 +63,7 @@ DisturbanceTable read_disturbance(const files::TomlTable& table) {
   if (table.has("quantile")) {
     if (result.is_declared())
       table.refuse("quantile", "", "conflicts with a declared force error", "give one");
-    const std::vector<std::string> names = {"p50", "p95", "p99", "max"};
-    result.quantile = names[table.choice("quantile", names)];
+    result.quantile = kQuantiles[table.choice("quantile", kQuantiles)];
   }
   return result;
 }
@@ -77,7 +78,10 @@ stability::DisturbanceSource disturbance(const DisturbanceTable& table, Evidence
   return measured(comparison.learning_error, table.quantile);
 }
 
-std::vector<std::string> estimate_keys() { return {"velocity_error_m_s", "position_error_m"}; }
+void describe_estimates(files::Keys& keys) {
+  keys.may<double>("velocity_error_m_s", "sup |estimated - true velocity|; absent: as measured.", "m/s");
+  keys.may<double>("position_error_m", "sup |estimated - true position|.", "m");
+}
 
 EstimateTable read_estimates(const files::TomlTable& table) {
   EstimateTable result;

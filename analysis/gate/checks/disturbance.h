@@ -3,9 +3,9 @@
 
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "analysis/gate/evidence.h"
+#include "nn/base/file_keys.h"
 #include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::gate {
@@ -17,8 +17,8 @@ struct DisturbanceTable {
   bool is_declared() const { return declared.kind != "none"; }
 };
 
-/// Returns the keys of this part of a table.
-std::vector<std::string> disturbance_keys();
+/// Describes this part of a table.
+void describe_disturbance(files::Keys& keys);
 
 /// @throws files::InputError for negative numbers.
 DisturbanceTable read_disturbance(const files::TomlTable& table);
@@ -28,7 +28,7 @@ struct EstimateTable {
   std::optional<double> velocity_m_s;  ///< if empty, as measured on the reference flights, if there are any
   double position_m = 0;
 };
-std::vector<std::string> estimate_keys();
+void describe_estimates(files::Keys& keys);
 EstimateTable read_estimates(const files::TomlTable& table);
 
 /// Adds the estimation errors to a source of `force`. Without reference flights, the velocity error is as declared,

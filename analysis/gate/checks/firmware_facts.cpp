@@ -5,6 +5,7 @@
 #include "analysis/firmware/export_source.h"
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
 #include "nn/base/toml.h"
@@ -12,6 +13,9 @@
 
 namespace swarmcert::gate {
 namespace {
+
+constexpr const char* kFactsSchema = "swarmcert/firmware-facts/1";
+constexpr const char* kTasks[] = {"network_task", "controller", "self_test"};
 
 using files::Json;
 
@@ -62,9 +66,55 @@ std::string why_of_another(Evidence& evidence, const Json& facts, const std::str
 
 }  // namespace
 
+namespace {
+
+void describe_cost(files::Keys& keys) {
+  keys.may<int>("instructions", "Counted under QEMU.");
+  keys.must<Interval>("modelled_us", "Modelled, not measured: least and most.", "us");
+}
+
+void describe_stack(files::Keys& keys) {
+  keys.must<int>("bytes", "", "bytes");
+  keys.may<std::vector<std::string>>("path", "The worst chain of calls.");
+  keys.may<std::vector<std::string>>("outside", "Functions of the stock firmware on it.");
+}
+
+}  // namespace
+
+void describe_firmware_facts_file(files::Keys& keys) {
+  keys.schema(kFactsSchema);
+  keys.may<std::string>("tool", "Name and version of the tool that wrote this.");
+  keys.must_table("network", "Network whose weights are in the program, and their bytes.",
+                  [](files::Keys& network) {
+                    network.must<std::string>("sha256", "Of network.toml.");
+                    network.must_named_tables("weights", "By network.", [](files::Keys& weights) {
+                      weights.must<std::string>("sha256", "Of the weight file.");
+                    });
+                  });
+  keys.may<std::string>("target", "Processor.");
+  keys.may<std::string>("compiler", "Compiler and version.");
+  keys.may<std::string>("flags", "Options of the compiler.");
+  keys.may<std::string>("statement", "How the numbers come about.");
+  keys.must_named_tables("parts", "By network: phi:small, ...", describe_cost);
+  keys.must_named_tables("functions", "Cycles or time of each function.", describe_cost);
+  keys.must_table("stack", "Deepest stack of each task.", [](files::Keys& stack) {
+    for (const char* const task : kTasks) stack.must_table(task, "", describe_stack);
+    stack.may<int>("largest_frame_bytes", "", "bytes");
+  });
+  keys.must<int>("flash_bytes", "Size of program and constants.", "bytes");
+  keys.must<int>("ram_bytes", "Size of variables.", "bytes");
+}
+
+void describe_firmware_facts_keys(files::Keys& keys) {
+  keys.may<double>("max_flash_bytes", "", "bytes");
+  keys.may<double>("max_ram_bytes", "", "bytes");
+  keys.may<double>("max_stack_bytes", "Of every task.", "bytes");
+  keys.may<std::map<std::string, double>>("stack_bytes", "By task.", "bytes");
+  keys.may<std::map<std::string, double>>("parts_us", "By network: phi:small, ...", "us");
+  keys.may<std::map<std::string, double>>("functions_us", "By function.", "us");
+}
+
 Run read_firmware_facts(const files::TomlTable& table, Policy& policy) {
-  table.allow_only(
-      {"max_flash_bytes", "max_ram_bytes", "max_stack_bytes", "stack_bytes", "parts_us", "functions_us"});
   if (!policy.release.has_network()) require_file(table, "", "network");
   require_file(table, policy.release.facts, "facts");
   std::vector<Wanted> all;
@@ -74,7 +124,7 @@ Run read_firmware_facts(const files::TomlTable& table, Policy& policy) {
   };
   add("max_flash_bytes", "flash", {kFlash});
   add("max_ram_bytes", "ram", {"ram_bytes"});
-  for (const char* entry : {"network_task", "controller", "self_test"})
+  for (const char* entry : kTasks)
     add("max_stack_bytes", std::string("stack.") + entry, {"stack", entry, "bytes"});
   const auto add_table = [&](const char* key, const char* name, const char* member, const char* last,
                              const char* unit) {
@@ -90,7 +140,7 @@ Run read_firmware_facts(const files::TomlTable& table, Policy& policy) {
   if (all.empty()) refuse_without_limit(table, "max_flash_bytes = 65536");
   return [all, line = table.line()](Evidence& evidence, Checks& checks) {
     const std::string& file = evidence.release().facts;
-    const Json facts = files::read_json(file, "swarmcert/firmware-facts/1");
+    const Json facts = files::read_json(file, kFactsSchema);
     Check same = row("firmware_facts", line);
     const std::string why = why_of_another(evidence, facts, file);
     if (why.empty()) {

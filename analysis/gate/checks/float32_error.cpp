@@ -4,14 +4,18 @@
 
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/checks/force_unit.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/toml.h"
 
 namespace swarmcert::gate {
 
+void describe_float32_error_keys(files::Keys& keys) {
+  describe_force_limit(keys, "Of the error.", "max_error");
+  keys.may<int>("neighbours", "At most.");
+  keys.may<double>("input_step", "Of the inputs in flight.");
+}
+
 Run read_float32_error(const files::TomlTable& table, Policy& policy) {
-  std::vector<std::string> known = force_keys("max_error");
-  known.insert(known.end(), {"neighbours", "input_step"});
-  table.allow_only(known);
   if (!policy.release.has_network()) require_file(table, "", "network");
   const std::optional<Limit> limit = force_limit(table, "max_error");
   if (!limit) refuse_without_limit(table, "max_error_gf = 0.05");

@@ -7,6 +7,7 @@
 #include "analysis/gate/checks/force_unit.h"
 #include "analysis/gate/evidence.h"
 #include "lipschitz/base/box.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/json.h"
 #include "nn/base/toml.h"
 #include "nn/weights/function_id.h"
@@ -26,6 +27,8 @@ struct WantedBound {
   std::string block;
   Limit limit;
 };
+
+const std::vector<std::string> kDomains = {"global", "box"};
 
 /// The box of the release, and how the box of the certificate, on which its bounds of domain "box" hold, compares.
 struct ReleaseBox {
@@ -132,12 +135,15 @@ void judge_bounds(Evidence& evidence, const WantedBound& wanted, const std::opti
 
 }  // namespace
 
+void describe_lipschitz_keys(files::Keys& keys) {
+  describe_force_limit(keys, "Of the joint bound, per unit of input.", "max_joint");
+  describe_force_limit(keys, "Per relative position.", "max_position", "_m");
+  describe_force_limit(keys, "Per relative velocity.", "max_velocity", "_s_m");
+  keys.may("domain", "On which the bounds must hold; global if absent.", "", files::OneOf{kDomains});
+  keys.may<std::map<std::string, double>>("functions", "By function: network, phi:KIND, set:KIND:KIND.");
+}
+
 Run read_lipschitz(const files::TomlTable& table, Policy& policy) {
-  std::vector<std::string> known = {"domain", "functions"};
-  for (const auto& keys :
-       {force_keys("max_joint"), force_keys("max_position", "_m"), force_keys("max_velocity", "_s_m")})
-    known.insert(known.end(), keys.begin(), keys.end());
-  table.allow_only(known);
   if (!policy.release.has_network()) require_file(table, "", "network");
   std::vector<WantedBound> all;
   const auto add = [&all](const char* name, const char* block, const std::optional<Limit>& limit) {
@@ -160,7 +166,7 @@ Run read_lipschitz(const files::TomlTable& table, Policy& policy) {
     }
   }
   if (all.empty()) refuse_without_limit(table, "max_joint_gf = 500");
-  const bool on_box = table.has("domain") && table.choice("domain", {"global", "box"}) == 1;
+  const bool on_box = table.has("domain") && table.choice("domain", kDomains) == 1;
   return [all, on_box](Evidence& evidence, Checks& checks) {
     std::optional<ReleaseBox> box;
     if (on_box) box = release_box(evidence);

@@ -6,6 +6,7 @@
 #include "analysis/gate/evidence.h"
 #include "analysis/gate/expected_app.h"
 #include "nn/base/file_io.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/json.h"
 #include "nn/base/toml.h"
 
@@ -49,13 +50,25 @@ Check match_row(Evidence& evidence, const std::string& name, int line, const std
   return check;
 }
 
+namespace {
+
+const std::vector<std::string> kEntries = {"network", "controller"};
+
+}  // namespace
+
+void describe_match_keys(files::Keys& keys) {
+  keys.may("entry",
+           "What the ELF must hold: the Crazyflie app, whose controller is run, or at least the exported "
+           "functions.",
+           "", files::OneOf{kEntries});
+}
+
 Run read_match(const files::TomlTable& table, Policy& policy) {
-  table.allow_only({"entry"});
   if (!policy.release.has_network()) require_file(table, "", "network");
   if (policy.release.source.empty()) require_file(table, policy.release.elf, "source or elf");
   if (!policy.release.is_float32)
     table.refuse("", "", "compares float32 weights with a network that is used in float64");
-  const bool needs_app = table.has("entry") && table.choice("entry", {"network", "controller"}) == 1;
+  const bool needs_app = table.has("entry") && table.choice("entry", kEntries) == 1;
   if (needs_app) {
     require_file(table, policy.release.elf, "elf");
     require_file(table, policy.release.gains, "gains");

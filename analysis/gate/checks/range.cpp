@@ -6,6 +6,7 @@
 
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/checks/force_unit.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/toml.h"
 #include "nn/weights/function_id.h"
 
@@ -72,13 +73,15 @@ void judge_range(Evidence& evidence, const WantedRange& wanted, const std::vecto
 
 }  // namespace
 
+void describe_range_keys(files::Keys& keys) {
+  describe_force_limit(keys, "Of the magnitude.", "max_abs_force");
+  describe_force_limit(keys, "", "max_force");
+  describe_force_limit(keys, "", "min_force");
+  describe_force_limit(keys, "When a neighbour comes or goes.", "max_jump");
+  keys.may<int>("neighbours", "At most.");
+}
+
 Run read_range(const files::TomlTable& table, Policy& policy) {
-  std::vector<std::string> known = {"neighbours"};
-  for (const char* stem : {"max_abs_force", "max_force", "min_force", "max_jump"}) {
-    const std::vector<std::string> keys = force_keys(stem);
-    known.insert(known.end(), keys.begin(), keys.end());
-  }
-  table.allow_only(known);
   if (!policy.release.has_network()) require_file(table, "", "network");
   std::vector<WantedRange> all;
   const auto add = [&](const char* name, const char* stem, RangeQuantity quantity, bool is_most) {

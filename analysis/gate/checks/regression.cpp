@@ -7,6 +7,7 @@
 #include "analysis/gate/baseline.h"
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/input_error.h"
 #include "nn/base/suggest.h"
 #include "nn/base/toml.h"
@@ -37,8 +38,12 @@ void require_rows(const std::map<std::string, Limit>& own, const Checks& checks,
 
 }  // namespace
 
+void describe_regression_keys(files::Keys& keys) {
+  keys.must<double>("max_increase_percent", "By how much a value may rise above the last release.", "%");
+  keys.may<std::map<std::string, double>>("percent_of", "The same by check.", "%");
+}
+
 Run read_regression(const files::TomlTable& table, Policy&) {
-  table.allow_only({"max_increase_percent", "percent_of"});
   const std::optional<Limit> most = limit(table, "max_increase_percent", "%");
   if (!most) refuse_without_limit(table, "max_increase_percent = 5");
   if (most->value < 0)

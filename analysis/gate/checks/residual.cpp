@@ -6,6 +6,7 @@
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
 #include "analysis/residuals/comparison.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/toml.h"
 #include "stability/model.h"
 
@@ -51,11 +52,15 @@ std::string worst_track(const residuals::Comparison& comparison) {
 
 }  // namespace
 
+void describe_residual_keys(files::Keys& keys) {
+  for (const char* stem : {"max_rmse", "max_rmse_z", "max_bias", "max_p95"}) {
+    keys.may<double>(std::string(stem) + "_N", "Of the force that the model leaves.", "N");
+    keys.may<double>(std::string(stem) + "_gf", "Of the force that the model leaves.", "gf");
+  }
+  keys.may<int>("min_records", "On which it is judged.");
+}
+
 Run read_residual(const files::TomlTable& table, Policy& policy) {
-  std::vector<std::string> known = {"min_records"};
-  for (const char* stem : {"max_rmse", "max_rmse_z", "max_bias", "max_p95"})
-    known.insert(known.end(), {std::string(stem) + "_N", std::string(stem) + "_gf"});
-  table.allow_only(known);
   require_file(table, policy.release.model, "model");
   require_file(table, policy.release.flights.empty() ? "" : policy.release.flights.front(), "flights");
   std::vector<WantedResidual> all;

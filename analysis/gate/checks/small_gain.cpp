@@ -4,14 +4,18 @@
 
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/toml.h"
 #include "stability/bounds/swarms/coupled_swarm.h"
 #include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::gate {
 
+void describe_small_gain_keys(files::Keys& keys) {
+  keys.must<double>("min_margin", "Of the small-gain condition.");
+}
+
 Run read_small_gain(const files::TomlTable& table, Policy& policy) {
-  table.allow_only({"min_margin"});
   require_file(table, policy.release.gains, "gains");
   require_file(table, policy.release.model, "model");
   require_file(table, policy.release.swarm, "swarm");

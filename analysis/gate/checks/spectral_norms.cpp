@@ -4,6 +4,7 @@
 #include "analysis/gate/evidence.h"
 #include "lipschitz/certify.h"
 #include "lipschitz/upper/spectral_norm.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/toml.h"
 #include "nn/weights/functions.h"
 
@@ -56,8 +57,11 @@ void judge_norms(Evidence& evidence, const std::optional<Limit>& own, int line, 
 
 }  // namespace
 
+void describe_spectral_norms_keys(files::Keys& keys) {
+  keys.may<double>("max", "Of every layer; absent: the declared gamma.");
+}
+
 Run read_spectral_norms(const files::TomlTable& table, Policy& policy) {
-  table.allow_only({"max"});
   if (!policy.release.has_network()) require_file(table, "", "network");
   const std::optional<Limit> own = limit(table, "max", "");
   if (own && !(own->value > 0)) table.refuse("max", fmt::format("{}", own->value), "must be positive");

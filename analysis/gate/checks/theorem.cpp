@@ -4,22 +4,25 @@
 
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/checks/disturbance.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/toml.h"
 #include "stability/bounds/flown_loop.h"
 
 namespace swarmcert::gate {
 
+void describe_theorem_keys(files::Keys& keys) {
+  describe_disturbance(keys);
+  keys.may<double>("max_ball_m", "Of the theorem's ball; absent: only its hypotheses are checked.", "m");
+}
+
 Run read_theorem(const files::TomlTable& table, Policy& policy) {
-  std::vector<std::string> known = disturbance_keys();
-  known.emplace_back("max_ball_m");
-  table.allow_only(known);
   require_file(table, policy.release.gains, "gains");
   require_file(table, policy.release.model, "model");
   const DisturbanceTable declared = read_disturbance(table);
   const std::optional<Limit> ball = limit(table, "max_ball_m", "m");
   if (ball && !declared.is_declared() && policy.release.flights.empty())
     table.refuse("max_ball_m", "", "needs a force error", "state rate_N_s, or name flights in [release]");
-  for (const std::string& key : disturbance_keys())
+  for (const std::string& key : files::key_names(describe_disturbance))
     if (!ball && table.has(key))
       table.refuse(key, "", "has no effect without a limit on the ball", "add max_ball_m");
   return [declared, ball, line = table.line()](Evidence& evidence, Checks& checks) {

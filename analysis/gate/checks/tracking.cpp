@@ -11,10 +11,13 @@
 #include "analysis/residuals/flight_peaks.h"
 #include "analysis/tracking/kept_promise.h"
 #include "analysis/tracking/usual_uncertainty.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/toml.h"
 
 namespace swarmcert::gate {
 namespace {
+
+const std::vector<std::string> kGuardQuantiles = {"p50", "p95", "max"}, kOver = {"box", "corners"};
 
 /// Uncertain parameters: an interval if stated, otherwise the default about model and gains.
 struct Uncertainty {
@@ -39,10 +42,17 @@ std::optional<Interval> interval(const files::TomlTable& table, const char* key,
   return Interval{ends[0], ends[1]};
 }
 
+void describe_uncertainty(files::Keys& keys) {
+  keys.may<Interval>("mass_kg", "", "kg");
+  keys.may<Interval>("thrust_scale", "Actual over commanded thrust.");
+  keys.may<Interval>("lag_s", "Of the motors.", "s");
+  keys.may<Interval>("delay_s", "Of the command.", "s");
+}
+
 Uncertainty read_uncertainty(const files::TomlTable& table) {
   if (!table.has("uncertainty")) return {};
   const files::TomlTable inner = table.table("uncertainty");
-  inner.allow_only({"mass_kg", "thrust_scale", "lag_s", "delay_s"});
+  inner.allow_only(files::key_names(describe_uncertainty));
   return {interval(inner, "mass_kg", true), interval(inner, "thrust_scale", true),
           interval(inner, "lag_s", false), interval(inner, "delay_s", false)};
 }
@@ -144,13 +154,19 @@ void judge_promise(Evidence& evidence, const Limit& limit, Checks& checks) {
 
 }  // namespace
 
+void describe_tracking_keys(files::Keys& keys) {
+  describe_disturbance(keys);
+  describe_estimates(keys);
+  keys.must<double>("max_error_m", "", "m");
+  keys.may<double>("guard_factor", "By which peaks exceed the bound of the linear loop; absent: measured.");
+  keys.may("guard_quantile", "Of the measured factor.", "", files::OneOf{kGuardQuantiles});
+  keys.may("over", "Where the bound must hold; box if absent.", "", files::OneOf{kOver});
+  keys.may_table("uncertainty", "[from, to] of what is not known exactly; absent: the usual.",
+                 describe_uncertainty);
+  keys.may<double>("min_promise_kept", "Share of the flights that must keep the promise.");
+}
+
 Run read_tracking(const files::TomlTable& table, Policy& policy) {
-  std::vector<std::string> known = disturbance_keys();
-  const std::vector<std::string> of_estimates = estimate_keys();
-  known.insert(known.end(), of_estimates.begin(), of_estimates.end());
-  known.insert(known.end(),
-               {"max_error_m", "guard_factor", "guard_quantile", "over", "uncertainty", "min_promise_kept"});
-  table.allow_only(known);
   require_file(table, policy.release.gains, "gains");
   require_file(table, policy.release.model, "model");
   const std::optional<Limit> limit = gate::limit(table, "max_error_m", "m");
@@ -165,8 +181,7 @@ Run read_tracking(const files::TomlTable& table, Policy& policy) {
     if (!(*guard.declared >= 1))
       table.refuse("guard_factor", fmt::format("{}", *guard.declared), "must be at least 1");
   } else if (table.has("guard_quantile")) {
-    const std::vector<std::string> names = {"p50", "p95", "max"};
-    guard.quantile = names[table.choice("guard_quantile", names)];
+    guard.quantile = kGuardQuantiles[table.choice("guard_quantile", kGuardQuantiles)];
   }
   if (!declared.is_declared())
     require_file(table, policy.release.flights.empty() ? "" : policy.release.flights.front(),
@@ -181,8 +196,7 @@ Run read_tracking(const files::TomlTable& table, Policy& policy) {
     require_file(table, policy.release.promise, "promise");
     require_file(table, policy.release.flights.empty() ? "" : policy.release.flights.front(), "flights");
   }
-  const Over over =
-      table.has("over") && table.choice("over", {"box", "corners"}) == 1 ? Over::kCorners : Over::kBox;
+  const Over over = table.has("over") && table.choice("over", kOver) == 1 ? Over::kCorners : Over::kBox;
   return [declared, estimates, over, uncertainty = read_uncertainty(table), guard, limit = *limit, kept](
              Evidence& evidence, Checks& checks) {
     judge_tracking(evidence, declared, estimates, uncertainty, guard, over, limit, checks);

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "nn/base/file_io.h"
+#include "nn/base/file_keys.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
 #include "stability/bounds/swarms/estimate_motion.h"
@@ -18,14 +19,34 @@ std::string number_text(double value) {
   return text.str();
 }
 
+constexpr const char* kSwarmSchema = "swarmcert/swarm/1";
+const std::vector<std::string> kDirections = {"apart", "together"};
+
+void describe_coupling(files::Keys& keys) {
+  keys.must<int>("on", "The vehicle that is disturbed, from 0.");
+  keys.must<int>("by", "The other vehicle.");
+  keys.may<double>("position_N_m", "Force per relative position.", "N/m");
+  keys.may<double>("velocity_N_s_m", "Force per relative velocity.", "N s/m");
+  keys.may<double>("speed_m_s", "Largest relative speed.", "m/s");
+  keys.may<double>("acceleration_m_s2", "Largest relative acceleration.", "m/s^2");
+  keys.may<double>("cross_rate_N_s", "Largest rate of what else the force depends on.", "N/s");
+  keys.may("direction", "Of the force, where its sign is known.", "", files::OneOf{kDirections});
+}
+
 }  // namespace
+
+void describe_swarm_file(files::Keys& keys) {
+  keys.schema(kSwarmSchema);
+  keys.must<int>("vehicles", "Number of vehicles.");
+  keys.may_tables("coupling", "Who disturbs whom, and how much.", describe_coupling);
+}
 
 CoupledSwarm read_coupled_swarm(const std::string& path) {
   const std::string text = files::read_file(path);
   const auto document = files::parse_toml(text, path);
   const files::TomlTable top(document, path);
-  top.require_schema("swarmcert/swarm/1");
-  top.allow_only({"schema", "vehicles", "coupling"});
+  top.require_schema(kSwarmSchema);
+  top.allow_only(files::key_names(describe_swarm_file));
   const double vehicles = top.number("vehicles");
   if (!(vehicles >= 1 && vehicles <= 200) || vehicles != std::floor(vehicles)) {
     top.refuse("vehicles", number_text(vehicles), "must be a whole number from 1 to 200");
@@ -33,8 +54,7 @@ CoupledSwarm read_coupled_swarm(const std::string& path) {
   CoupledSwarm swarm;
   swarm.vehicles = static_cast<int>(vehicles);
   for (const files::TomlTable& table : top.tables("coupling")) {
-    table.allow_only({"on", "by", "position_N_m", "velocity_N_s_m", "speed_m_s", "acceleration_m_s2",
-                      "cross_rate_N_s", "direction"});
+    table.allow_only(files::key_names(describe_coupling));
     const auto vehicle = [&](const char* key) {
       const double value = table.number(key);
       if (!(value >= 0 && value < vehicles) || value != std::floor(value)) {
@@ -51,7 +71,7 @@ CoupledSwarm read_coupled_swarm(const std::string& path) {
                number("position_N_m"),  number("velocity_N_s_m"),
                number("speed_m_s"),     number("acceleration_m_s2"),
                number("cross_rate_N_s")};
-    if (table.has("direction")) c.direction = table.choice("direction", {"apart", "together"}) == 0 ? 1 : -1;
+    if (table.has("direction")) c.direction = table.choice("direction", kDirections) == 0 ? 1 : -1;
     if (c.on == c.by) table.refuse("by", std::to_string(c.by), "is the vehicle itself");
     swarm.couplings.push_back(c);
   }

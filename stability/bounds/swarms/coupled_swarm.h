@@ -9,12 +9,19 @@
 #include "stability/bounds/swarms/unstable_swarm.h"
 #include "stability/bounds/tracking_bounds.h"
 
+namespace swarmcert::files {
+class Keys;
+}
+
 namespace swarmcert::stability {
 
 struct CoupledSwarm {
   int vehicles = 0;
   std::vector<Coupling> couplings;
 };
+
+/// Describes swarm.toml.
+void describe_swarm_file(files::Keys& keys);
 
 /// Reads swarm.toml (schema swarmcert/swarm/1): vehicles = N, [[coupling]] on, by, position_N_m, velocity_N_s_m,
 /// speed_m_s, acceleration_m_s2, cross_rate_N_s, direction = "apart" | "together" if the force's sign is known.
