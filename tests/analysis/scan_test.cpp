@@ -514,6 +514,23 @@ TEST(Formulas, RecoverTheFormAndItsNumbers) {
 }
 
 /// A written formula can be read back and gives the force that was found.
+TEST(Formulas, DoNotGrowBeyondThePlacesThatWereFlown) {
+  Flights flights(41);
+  flights.push(2, [&](Eigen::Index i) { return 0.02 * flights.at(i, V::kZ); });
+  const std::vector<Formula> formulas = find_formulas(flights.samples, scan(flights.samples, 1), 1, 1);
+  ASSERT_EQ(formulas.size(), 1u);
+  ASSERT_EQ(formulas[0].variable, "z") << to_toml(formulas[0]);
+  const stability::AppliedEffect effect(formulas[0].effect, {"small", {"small"}, ""});
+  const auto force_N = [&](double z_m) {
+    stability::Instant now;
+    now.p_W_m.z() = z_m;
+    return effect.wrench(now).force_W_N.z();
+  };
+  EXPECT_NEAR(force_N(0.5) - force_N(-0.5), 0.02, 0.002);
+  EXPECT_EQ(force_N(50), force_N(5)) << to_toml(formulas[0]);
+  EXPECT_LT(std::abs(force_N(50)), 0.02 * 1.6);
+}
+
 TEST(Formulas, AreEffectsOfTheModelFile) {
   Flights flights(22);
   flights.push(0, [&](Eigen::Index i) { return 0.02 * std::max(0.0, flights.at(i, V::kSpeed) - 0.3); });

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "analysis/identification/scan/form_reach.h"
 #include "analysis/identification/scan/formula_trial.h"
 #include "analysis/identification/scan/pull.h"
 #include "nn/base/doubles.h"
@@ -188,14 +189,40 @@ int column_of(const ScanSamples& samples, const ScanEntry& entry, const EntryDat
   return body > world ? kThrust : kVertical;
 }
 
-stability::EffectSpec spec_of(const ScanEntry& entry, const char* target, const FormulaTrial& trial) {
+/// True for variables by which other flights may lie anywhere, so that no trend of these flights can go on: places,
+/// the battery, time.
+bool is_somewhere(ScanVariable v) {
+  using V = ScanVariable;
+  constexpr V kSuch[] = {V::kX, V::kY, V::kZ, V::kBattery, V::kTime};
+  return std::find(std::begin(kSuch), std::end(kSuch), v) != std::end(kSuch);
+}
+
+/// Returns the symbol of a variable, held at the ends of `range`.
+std::string held_within(ScanVariable v, const FormRange& range) {
+  return fmt::format("min(max({}, {:.4g}), {:.4g})", scan_variable(v).symbol, range.lower, range.upper);
+}
+
+/// Replaces {0} and {1} by the symbols of the entry's variables. Those in which the form grows are held at the ends of
+/// the range of these flights.
+void add_variables(const ScanEntry& entry, const EntryData& data, const FormulaTrial& trial,
+                   std::vector<std::string>& texts) {
+  std::vector<FormRange> ranges;
+  for (Eigen::Index k = 0; k < data.all.inputs.cols(); ++k)
+    ranges.push_back(range_of(data.all.inputs.col(k)));
+  for (std::size_t k = 0; k < ranges.size(); ++k) {
+    const ScanVariable v = entry.variables[k];
+    const bool is_held = is_somewhere(v) && grows_beyond(trial.form, trial.fit.theta, ranges, k);
+    const std::string symbol = is_held ? held_within(v, ranges[k]) : scan_variable(v).symbol;
+    for (std::string& text : texts) replace_all(text, k == 0 ? "{0}" : "{1}", symbol);
+  }
+}
+
+stability::EffectSpec spec_of(const ScanSamples& samples, const ScanEntry& entry, const EntryData& data,
+                              const char* target, const FormulaTrial& trial) {
   stability::EffectSpec spec;
   const std::string unit = scan_variable(entry.variables[0]).unit;
   std::vector<std::string> texts = trial.form.texts;
-  for (std::string& text : texts) {
-    replace_all(text, "{0}", scan_variable(entry.variables[0]).symbol);
-    if (entry.variables.size() > 1) replace_all(text, "{1}", scan_variable(entry.variables[1]).symbol);
-  }
+  add_variables(entry, data, trial, texts);
   add_shapes(trial, unit, spec, texts);
   std::string formula;
   const auto add = [&](const std::string& letter, const std::string& text, double value,
@@ -207,7 +234,10 @@ stability::EffectSpec spec_of(const ScanEntry& entry, const char* target, const 
   const char* const letters[] = {"a", "b"};
   for (std::size_t k = 0; k < texts.size(); ++k) {
     std::string text = "(" + texts[k] + ")";
-    if (trial.factor != ScanVariable::kCount) text += std::string(" * ") + scan_variable(trial.factor).symbol;
+    if (trial.factor != ScanVariable::kCount)
+      text += " * " + (is_somewhere(trial.factor)
+                           ? held_within(trial.factor, range_of(factor_of(samples, data.rows, trial.factor)))
+                           : scan_variable(trial.factor).symbol);
     std::string of = unit_of_coefficient(entry.unit, unit, trial.form.powers[k]);
     if (trial.factor != ScanVariable::kCount) of += std::string("_per_") + scan_variable(trial.factor).unit;
     add(letters[k], text, trial.fit.coefficients[static_cast<Eigen::Index>(k)], of);
@@ -299,7 +329,7 @@ std::vector<Formula> find_formulas(const ScanSamples& samples, const Scan& scan,
     formula.share = (data.mean_square - trial.fit.mean_square) / std::max(of, 1e-300);
     ScanEntry along = entry;
     along.column = column_of(samples, entry, data, trial);
-    formula.effect = spec_of(along, column_of_entry(samples, along.column).target, trial);
+    formula.effect = spec_of(samples, along, data, column_of_entry(samples, along.column).target, trial);
   });
   count_alike(trials, formulas);
   formulas.erase(
