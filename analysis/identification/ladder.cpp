@@ -434,7 +434,7 @@ class Climb {
       const TurningFlights flights(with(without_turning()), kind_, every_flight(inputs), jobs_);
       if (flights.empty()) return {};
       const auto error_rad_s = [&](const Trial& trial) {
-        return Turned{"", {}, flights.rate_errors_rad_s(trial.turning)}.mean_rad_s();
+        return Turned{"", {}, flights.rate_errors(trial.turning)}.mean_rad_s();
       };
       return {error_rad_s(before), error_rad_s(t)};
     }

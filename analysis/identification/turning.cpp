@@ -98,6 +98,12 @@ class Coefficients {
   std::vector<std::pair<std::size_t, stability::Parameter>> places_;
 };
 
+void add_error(const Eigen::Vector3d& error_rad_s, RateErrors& errors) {
+  for (int axis = 0; axis < 3; ++axis)
+    errors.rad_s[static_cast<std::size_t>(axis)] += std::abs(error_rad_s[axis]);
+  errors.rad_s[3] += error_rad_s.norm();
+}
+
 /// Huber's loss of a norm, and the weight of its square.
 struct Huber {
   static constexpr double kLinearFrom = 2;
@@ -114,7 +120,7 @@ struct TurningFlights::NormalEquations {
   Eigen::MatrixXd A;
   Eigen::VectorXd g;
   double loss = 0;
-  double rate_error_rad_s = 0;  ///< mean
+  RateErrors rates;
 
   void add(const NormalEquations& other) {
     A += other.A;
@@ -150,7 +156,7 @@ TurningFlights::TurningFlights(const residuals::Inputs& inputs, const std::strin
       records += track.instants.size();
       const stability::Model model = inputs.model_for(track);
       if (residuals::Predictor(model, kinds_, track).has_torque())
-        tracks_.push_back({std::move(track), model, {}, 0, 0, 0});
+        tracks_.push_back({std::move(track), model, {}, 0, 0, 0, {}});
     }
   }
   for (TurningTrack& t : tracks_) {
@@ -172,11 +178,13 @@ void TurningFlights::set_scales(TurningTrack& t) const {
     for (std::size_t k = 1; k <= kComparisons; ++k) {
       const PredictedState truth = measured.measured(start + k * t.steps / kComparisons);
       rates += (truth.omega_B_rad_s - begin.omega_B_rad_s).squaredNorm();
+      add_error(truth.omega_B_rad_s - begin.omega_B_rad_s, t.held);
       rotation += rotation_between(begin.q_WB, truth.q_WB).squaredNorm();
       ++count;
     }
   }
   constexpr double kSmallest = 1e-9;  // a log in which nothing turns
+  for (double& error : t.held.rad_s) error = std::max(error / count, kSmallest);
   t.rates_rad_s = std::max(std::sqrt(rates / count), kSmallest);
   t.rotation_rad = std::max(std::sqrt(rotation / count), kSmallest);
 }
@@ -218,11 +226,11 @@ TurningFlights::NormalEquations TurningFlights::normal_equations(const TurningTr
       add(t.rates_rad_s,
           [&](const PredictedState& s) -> Eigen::Vector3d { return s.omega_B_rad_s - truth.omega_B_rad_s; });
       add(t.rotation_rad, [&](const PredictedState& s) { return rotation_between(truth.q_WB, s.q_WB); });
-      sum.rate_error_rad_s += (states[0].omega_B_rad_s - truth.omega_B_rad_s).norm();
+      add_error(states[0].omega_B_rad_s - truth.omega_B_rad_s, sum.rates);
     }
   }
   const auto count = static_cast<double>(t.starts.size() * kComparisons);
-  sum.rate_error_rad_s /= count;
+  for (double& error : sum.rates.rad_s) error /= count;
   // Each flight counts alike, however much it turns.
   sum.A /= count;
   sum.g /= count;
@@ -240,15 +248,15 @@ std::vector<TurningFlights::NormalEquations> TurningFlights::of_all(const std::v
   return all;
 }
 
-std::vector<double> TurningFlights::rate_errors_rad_s(const std::vector<EffectSpec>& specs) const {
-  std::vector<double> errors;
-  for (const NormalEquations& track : of_all(specs, false)) errors.push_back(track.rate_error_rad_s);
+std::vector<RateErrors> TurningFlights::rate_errors(const std::vector<EffectSpec>& specs) const {
+  std::vector<RateErrors> errors;
+  for (const NormalEquations& track : of_all(specs, false)) errors.push_back(track.rates);
   return errors;
 }
 
-std::vector<double> TurningFlights::held_rad_s() const {
-  std::vector<double> held;
-  for (const TurningTrack& t : tracks_) held.push_back(t.rates_rad_s);
+std::vector<RateErrors> TurningFlights::held() const {
+  std::vector<RateErrors> held;
+  for (const TurningTrack& t : tracks_) held.push_back(t.held);
   return held;
 }
 

@@ -9,6 +9,7 @@
 /// have no interval, because noise of the signals reduces them: they are effective values.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,12 @@ std::vector<std::string> turning_effects();
 /// Returns one of them with all coefficients zero.
 stability::EffectSpec turning_effect(const std::string& name);
 
+/// Means over a track: of the absolute error about x, y, z, and of the norm of the error.
+struct RateErrors {
+  std::array<double, 4> rad_s = {0, 0, 0, 0};
+  double norm_rad_s() const { return rad_s[3]; }
+};
+
 /// Flights from which attitudes can be predicted: with rates, and with measured rotor speeds or the force of each rotor
 /// at the rate of an attitude loop.
 class TurningFlights {
@@ -33,11 +40,11 @@ class TurningFlights {
 
   bool empty() const { return tracks_.empty(); }
 
-  /// Returns the mean error of the body rates over half a second, for each track, of the models with `specs` added.
-  std::vector<double> rate_errors_rad_s(const std::vector<stability::EffectSpec>& specs) const;
+  /// Returns the mean errors of the body rates over half a second, for each track, of the models with `specs` added.
+  std::vector<RateErrors> rate_errors(const std::vector<stability::EffectSpec>& specs) const;
 
-  /// Returns the root mean square of the same, for each track, if the rates do not change.
-  std::vector<double> held_rad_s() const;
+  /// Returns the same if the rates do not change.
+  std::vector<RateErrors> held() const;
 
   /// Returns `specs`, effects of this kind, with all their coefficients fitted jointly, from their values on.
   std::vector<stability::EffectSpec> fitted(const std::vector<stability::EffectSpec>& specs) const;
@@ -49,6 +56,7 @@ class TurningFlights {
     std::vector<std::size_t> starts;   ///< of predictions
     std::size_t steps;                 ///< of each
     double rates_rad_s, rotation_rad;  ///< s_omega and s_theta
+    RateErrors held;
   };
   struct NormalEquations;
   void set_scales(TurningTrack& t) const;

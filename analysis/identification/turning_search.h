@@ -13,9 +13,9 @@ namespace swarmcert::identification {
 struct Turned {
   std::string name;
   std::vector<stability::EffectSpec> specs;  ///< of all of them
-  std::vector<double> rates_rad_s;           ///< TurningFlights::rate_errors_rad_s() of the select flights
+  std::vector<RateErrors> rates;             ///< of the flights to select
 
-  double mean_rad_s() const;
+  double mean_rad_s() const;  ///< of the norms
 };
 
 class TurningSearch {
@@ -30,14 +30,17 @@ class TurningSearch {
   const Turned& accepted() const { return accepted_; }
   Turned with(const std::string& name) const;
   /// Returns the mean over flights of the errors with `next`, relative to those with what is accepted.
-  double error_ratio(const Turned& next) const;
-  /// Returns the best of `names`; nothing unless it lowers the error by 5 %, and by as much of what the rates do in
-  /// flight as an effect of the force needs to be found. Torques that are held from record to record are late: without
-  /// the second, what makes up for that would be an effect.
+  double error_ratio(const Turned& next) const { return error_ratio(next, kNorm); }
+  /// Returns the best of `names` that explain a motion: the error about an axis falls by 5 %, and by as much of what the
+  /// rate about that axis does in flight as an effect of the force needs to be found; that of the vector does not rise.
+  /// Torques that are held from record to record are late: without the second, what makes up for that would be an
+  /// effect.
   std::optional<Turned> best_of(const std::vector<std::string>& names) const;
   void accept(const Turned& next) { accepted_ = next; }
 
  private:
+  static constexpr std::size_t kNorm = 3;
+  double error_ratio(const Turned& next, std::size_t axis) const;
   bool explains_motion(const Turned& next) const;
 
   TurningFlights fit_, select_;
