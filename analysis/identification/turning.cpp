@@ -201,7 +201,7 @@ TurningFlights::NormalEquations TurningFlights::normal_equations(const TurningTr
     if (k >= 0) changed[k] += coefficients.difference(k);
     predictors.emplace_back(with_effects(t.model, coefficients.specs(changed)), kinds_, t.track);
   }
-  NormalEquations sum = {Eigen::MatrixXd::Zero(unknowns, unknowns), Eigen::VectorXd::Zero(unknowns)};
+  NormalEquations sum = {Eigen::MatrixXd::Zero(unknowns, unknowns), Eigen::VectorXd::Zero(unknowns), 0, {}};
   std::vector<PredictedState> states(predictors.size());
   Eigen::Matrix3Xd slopes(3, unknowns);
   const auto add = [&](double scale, const auto& error_of) {
