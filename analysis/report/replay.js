@@ -1,11 +1,18 @@
-// Flights in space: vehicles with trails, and the residual force on each as arrows before and after effects were added.
+// Flights in space: all vehicles with their whole trajectories, coloured by the residual force, and the force on each at
+// one time as an arrow.
 (function () {
   'use strict';
   var box = document.getElementById('replay');
-  var data = JSON.parse(document.getElementById('replay-data').textContent);
-  // Columns of a row: time, position (3), force before (3), force after (3).
-  var PLACE = 1, BEFORE = 4, AFTER = 7;
-  var TRAIL_S = 4;
+  var data = window.flown(), flights = [];
+  data.logs.forEach(function (log) {
+    if (!log.columns[data.group('position').at].some(isFinite)) return;
+    if (flights.length === 0 || flights[flights.length - 1].name !== log.flight) flights.push({name: log.flight, logs: []});
+    flights[flights.length - 1].logs.push(log);
+  });
+  var PLACE = data.group('position').at, BEFORE = data.group('residual').at;
+  var AFTER = data.group('residual after') ? data.group('residual after').at : null;
+  /// From no error to the largest: readable on both papers.
+  var SCALE = ['#3b6fb6', '#35a79c', '#c9b037', '#e0702b', '#b5123b'];
   function page(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
   function element(kind, label, parent) {
     var made = document.createElement(kind);
@@ -24,11 +31,18 @@
   // --- controls ---
   var bar = element('div', '', box);
   var which = element('select', 'flight of the replay', bar);
-  data.flights.forEach(function (flight, i) {
-    var option = element('option', '', which);
-    option.value = i;
-    option.textContent = flight.name;
-  });
+  function options(choice, names, changed) {
+    names.forEach(function (name, i) {
+      var option = element('option', '', choice);
+      option.value = i;
+      option.textContent = name;
+    });
+    choice.addEventListener('change', changed);
+  }
+  options(which, flights.map(function (flight) { return flight.name; }), function () { stop(); build(); });
+  var coloured = element('select', 'colour of the trajectories', bar);
+  options(coloured, AFTER ? ['coloured by the residual before', 'coloured by the residual after'] : ['coloured by the residual'],
+          function () { var t = now; build(); at(t); });
   var play = element('button', '', bar);
   play.type = 'button';
   play.textContent = 'Play';
@@ -53,9 +67,13 @@
 
   // --- the scene; z points up ---
   THREE.Object3D.DefaultUp.set(0, 0, 1);
-  var scene, camera, orbit, vehicles, metres, low, high, now, perUnit;
-  function finite(row, first) { return row[first] !== null && row[first + 1] !== null && row[first + 2] !== null; }
-  function vector(row, first) { return new THREE.Vector3(row[first], row[first + 1], row[first + 2]); }
+  var scene, camera, orbit, vehicles, metres, square, large, low, high, now, perUnit;
+  function finite(log, row, first) {
+    return isFinite(log.columns[first][row]) && isFinite(log.columns[first + 1][row]) && isFinite(log.columns[first + 2][row]);
+  }
+  function vector(log, row, first) {
+    return new THREE.Vector3(log.columns[first][row], log.columns[first + 1][row], log.columns[first + 2][row]);
+  }
   function arrow(color) {
     var made = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 1, new THREE.Color(page(color)));
     scene.add(made);
@@ -65,48 +83,82 @@
     var around = new THREE.Box3();
     low = Infinity;
     high = -Infinity;
-    flight.vehicles.forEach(function (vehicle) {
-      vehicle.rows.forEach(function (row) {
-        around.expandByPoint(vector(row, PLACE));
-        low = Math.min(low, row[0]);
-        high = Math.max(high, row[0]);
-      });
+    flight.logs.forEach(function (log) {
+      for (var i = 0; i < log.rows; ++i) {
+        if (!finite(log, i, PLACE)) continue;
+        around.expandByPoint(vector(log, i, PLACE));
+        low = Math.min(low, log.columns[0][i]);
+        high = Math.max(high, log.columns[0][i]);
+      }
     });
     return around;
   }
-  /// 95 % of the forces before are drawn shorter than a quarter of the room.
-  function scale(flight) {
+  /// 95 % of the forces before are smaller.
+  function largeForce(flight) {
     var sizes = [];
-    flight.vehicles.forEach(function (vehicle) {
-      vehicle.rows.forEach(function (row) { if (finite(row, BEFORE)) sizes.push(vector(row, BEFORE).length()); });
+    flight.logs.forEach(function (log) {
+      for (var i = 0; i < log.rows; ++i) if (finite(log, i, BEFORE)) sizes.push(vector(log, i, BEFORE).length());
     });
     sizes.sort(function (a, b) { return a - b; });
-    var size = sizes[Math.floor(0.95 * sizes.length)];
-    return size > 0 ? 0.25 * metres / size : 0;
+    return sizes[Math.floor(0.95 * sizes.length)] || 0;
+  }
+  function colorAt(share) {
+    var place = Math.min(1, Math.max(0, share)) * (SCALE.length - 1), k = Math.min(SCALE.length - 2, Math.floor(place));
+    return new THREE.Color(SCALE[k]).lerp(new THREE.Color(SCALE[k + 1]), place - k);
+  }
+  function trajectory(log) {
+    var first = coloured.value === '1' ? AFTER : BEFORE, places = [], colors = [], cut = new THREE.Color(page('--line'));
+    for (var i = 0; i + 1 < log.rows; ++i) {
+      if (!finite(log, i, PLACE) || !finite(log, i + 1, PLACE)) continue;
+      var color = finite(log, i, first) && large > 0 ? colorAt(vector(log, i, first).length() / large) : cut;
+      [i, i + 1].forEach(function (k) {
+        places.push(log.columns[PLACE][k], log.columns[PLACE + 1][k], log.columns[PLACE + 2][k]);
+        colors.push(color.r, color.g, color.b);
+      });
+    }
+    var geometry = new THREE.BufferGeometry();
+    geometry.setAttribute('position', new THREE.Float32BufferAttribute(places, 3));
+    geometry.setAttribute('color', new THREE.Float32BufferAttribute(colors, 3));
+    return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({vertexColors: THREE.VertexColors}));
+  }
+  /// A length of 1, 2 or 5 times a power of ten, about a fifth of `size`.
+  function roundLength(size) {
+    var power = Math.pow(10, Math.floor(Math.log10(size / 5))), steps = size / 5 / power;
+    return power * (steps >= 5 ? 5 : steps >= 2 ? 2 : 1);
+  }
+  /// A grid at the lowest point of the flight, and a bar as long as a square beside it.
+  function ground(around) {
+    var middle = around.getCenter(new THREE.Vector3());
+    square = roundLength(metres);
+    var grid = new THREE.GridHelper(10 * square, 10, new THREE.Color(page('--line')), new THREE.Color(page('--line')));
+    grid.rotation.x = Math.PI / 2;
+    grid.position.set(Math.round(middle.x / square) * square, Math.round(middle.y / square) * square, around.min.z);
+    scene.add(grid);
+    var bar = new THREE.Mesh(new THREE.BoxGeometry(square, 0.01 * metres, 0.01 * metres),
+                             new THREE.MeshBasicMaterial({color: new THREE.Color(page('--ink'))}));
+    var corner = Math.max(1, Math.ceil((middle.y - around.min.y) / square)) * square;
+    bar.position.set(grid.position.x + square / 2, grid.position.y - corner, around.min.z);
+    scene.add(bar);
   }
   function build() {
-    var flight = data.flights[Number(which.value)];
+    var flight = flights[Number(which.value)];
     var around = bounds(flight), middle = around.getCenter(new THREE.Vector3());
-    metres = Math.max(0.5, around.getSize(new THREE.Vector3()).length());
-    perUnit = scale(flight);
+    metres = Math.max(0.1, around.getSize(new THREE.Vector3()).length());
+    large = largeForce(flight);
+    perUnit = large > 0 ? 0.2 * metres / large : 0;
     scene = new THREE.Scene();
     scene.background = new THREE.Color(page('--paper'));
-    var grid = new THREE.GridHelper(2 * metres, 20, new THREE.Color(page('--soft')), new THREE.Color(page('--line')));
-    grid.rotation.x = Math.PI / 2;
-    grid.position.set(middle.x, middle.y, Math.min(0, around.min.z));
-    scene.add(grid);
-    var colors = ['--curve-w', '--ink', '--soft'];
-    vehicles = flight.vehicles.map(function (vehicle, i) {
-      var color = new THREE.Color(page(colors[i % colors.length]));
-      var body = new THREE.Mesh(new THREE.SphereGeometry(0.012 * metres, 16, 12), new THREE.MeshBasicMaterial({color: color}));
-      var trail = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({color: color}));
-      trail.frustumCulled = false;
-      scene.add(body, trail);
-      return {name: vehicle.name, rows: vehicle.rows, body: body, trail: trail,
-              before: arrow('--curve-x'), after: arrow('--curve-z')};
+    ground(around);
+    var colors = ['--ink', '--curve-y', '--curve-w'];
+    vehicles = flight.logs.map(function (log, i) {
+      var color = colors[i % colors.length];
+      var body = new THREE.Mesh(new THREE.SphereGeometry(0.012 * metres, 16, 12),
+                                new THREE.MeshBasicMaterial({color: new THREE.Color(page(color))}));
+      scene.add(body, trajectory(log));
+      return {log: log, body: body, color: color, before: arrow('--curve-x'), after: arrow('--curve-z')};
     });
-    camera = new THREE.PerspectiveCamera(45, 1, 0.01 * metres, 20 * metres);
-    camera.position.set(middle.x + 0.55 * metres, middle.y - 0.7 * metres, middle.z + 0.4 * metres);
+    camera = new THREE.PerspectiveCamera(45, 1, 0.01 * metres, 40 * metres);
+    camera.position.set(middle.x + 0.62 * metres, middle.y - 0.85 * metres, middle.z + 0.5 * metres);
     if (orbit) orbit.dispose();
     orbit = new THREE.OrbitControls(camera, renderer.domElement);
     orbit.target.copy(middle);
@@ -119,53 +171,63 @@
     resize();
     at(low);
   }
-  /// The last row at or before `time`, or -1.
-  function rowAt(rows, time) {
-    var first = 0, last = rows.length;
+  /// The last row at or before `time` whose place is known, or the first.
+  function rowAt(log, time) {
+    var first = 0, last = log.rows, times = log.columns[0];
     while (first < last) {
       var middle = (first + last) >> 1;
-      if (rows[middle][0] <= time) first = middle + 1; else last = middle;
+      if (times[middle] <= time) first = middle + 1; else last = middle;
     }
-    return first - 1;
+    var row = Math.max(0, first - 1);
+    while (row > 0 && !finite(log, row, PLACE)) --row;
+    while (row + 1 < log.rows && !finite(log, row, PLACE)) ++row;
+    return row;
   }
-  function pointArrow(made, row, first) {
-    var force = finite(row, first) ? vector(row, first) : new THREE.Vector3();
+  function pointArrow(made, log, row, first) {
+    var force = first !== null && finite(log, row, first) ? vector(log, row, first) : new THREE.Vector3();
     var length = force.length() * perUnit;
     made.visible = length > 1e-4 * metres;
     if (!made.visible) return '';
-    made.position.copy(vector(row, PLACE));
+    made.position.copy(vector(log, row, PLACE));
     made.setDirection(force.clone().normalize());
     made.setLength(length, Math.min(0.3 * length, 0.04 * metres), Math.min(0.2 * length, 0.025 * metres));
-    return String(Number(force.length().toPrecision(2)));
+    return short(force.length());
+  }
+  function short(x) { return String(Number(x.toPrecision(2))); }
+  function say(text, color) {
+    var entry = element('span', '', legend);
+    if (color) entry.style.color = color;
+    entry.textContent = text + '   ';
   }
   function at(time) {
     now = time;
     slider.value = time;
     legend.textContent = '';
-    function say(text, color) {
+    say('|error| 0');
+    SCALE.forEach(function (color) {
       var entry = element('span', '', legend);
-      if (color) entry.style.color = page(color);
-      entry.textContent = text + '   ';
-    }
-    say(time.toFixed(2) + ' s');
-    say('\u25A0 residual before', '--curve-x');
-    say('\u25A0 after', '--curve-z');
+      entry.style.color = color;
+      entry.textContent = '\u25A0';
+    });
+    say(' ' + short(large) + ' ' + data.unit + ' and more');
+    say('bar and squares: ' + square + ' m');
+    say(time.toFixed(2) + ' s:');
+    if (AFTER) say('arrows: residual before', page('--curve-x')), say('and after', page('--curve-z'));
+    else say('arrows: residual', page('--curve-x'));
     var words = [];
     vehicles.forEach(function (vehicle) {
-      var index = rowAt(vehicle.rows, time), row = vehicle.rows[Math.max(0, index)];
-      vehicle.body.position.copy(vector(row, PLACE));
-      var before = pointArrow(vehicle.before, row, BEFORE), after = pointArrow(vehicle.after, row, AFTER);
-      if (before) words.push(vehicle.name + ' ' + before + ' \u2192 ' + (after || '0') + ' ' + data.unit);
-      var start = rowAt(vehicle.rows, time - TRAIL_S) + 1;
-      vehicle.trail.geometry.setFromPoints(vehicle.rows.slice(start, Math.max(index, 0) + 1).map(function (r) { return vector(r, PLACE); }));
+      var log = vehicle.log, row = rowAt(log, time);
+      vehicle.body.position.copy(vector(log, row, PLACE));
+      var before = pointArrow(vehicle.before, log, row, BEFORE), after = pointArrow(vehicle.after, log, row, AFTER);
+      words.push(log.vehicle + (before ? ' ' + before + (AFTER ? ' \u2192 ' + (after || '0') : '') + ' ' + data.unit : ''));
+      say('\u25CF ' + words[words.length - 1], page(vehicle.color));
     });
-    say(words.join(', '));
     renderer.domElement.setAttribute('aria-label', 'Vehicles in space at ' + time.toFixed(2) + ' s. ' + words.join(', '));
     draw();
   }
   function draw() { renderer.render(scene, camera); }
   function resize() {
-    var width = stage.clientWidth, height = Math.round(Math.min(0.6 * width, 480));
+    var width = stage.clientWidth, height = Math.round(Math.min(0.75 * width, 480));
     if (width === 0) return;
     renderer.setPixelRatio(window.devicePixelRatio || 1);
     renderer.setSize(width, height, false);
@@ -197,7 +259,6 @@
     requestAnimationFrame(frame);
   });
   slider.addEventListener('input', function () { stop(); at(Number(slider.value)); });
-  which.addEventListener('change', function () { stop(); build(); });
   window.addEventListener('resize', function () { resize(); });
   renderer.domElement.addEventListener('keydown', function (event) {
     var turn = {ArrowLeft: [0.1, 0], ArrowRight: [-0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1]}[event.key];
@@ -217,8 +278,9 @@
     draw();
   });
   document.querySelectorAll('button.jump').forEach(function (button) {
+    button.hidden = false;
     button.addEventListener('click', function () {
-      data.flights.forEach(function (flight, i) {
+      flights.forEach(function (flight, i) {
         if (flight.name !== button.dataset.flight) return;
         stop();
         which.value = i;
@@ -227,6 +289,7 @@
       });
     });
   });
+  if (flights.length === 0) return;
   build();
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', function () { var t = now; build(); at(t); });
 })();

@@ -1,7 +1,6 @@
 #include "analysis/report/report.h"
 
 #include <fmt/core.h>
-#include <openssl/evp.h>
 #include <openssl/sha.h>
 
 #include <algorithm>
@@ -19,25 +18,15 @@
 namespace swarmcert::analysis {
 namespace {
 
-std::string base64(const unsigned char* bytes, std::size_t size) {
-  std::string text(4 * ((size + 2) / 3) + 1, '\0');
-  text.resize(static_cast<std::size_t>(
-      EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()), bytes, static_cast<int>(size))));
-  return text;
-}
-
 /// Returns the source "'sha256-...'" by which a content security policy admits exactly this script or style.
 std::string policy_source(std::string_view text) {
   unsigned char digest[SHA256_DIGEST_LENGTH];
   SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest);
-  return "'sha256-" + base64(digest, sizeof digest) + "'";
+  return "'sha256-" + base64(std::string_view(reinterpret_cast<const char*>(digest), sizeof digest)) + "'";
 }
 
 /// Returns a drawing as the address of an image: browsers do not run scripts in images and load nothing for them.
-std::string image_address(const std::string& svg) {
-  return "data:image/svg+xml;base64," +
-         base64(reinterpret_cast<const unsigned char*>(svg.data()), svg.size());
-}
+std::string image_address(const std::string& svg) { return "data:image/svg+xml;base64," + base64(svg); }
 
 /// Whether a cell is a number, possibly with a unit; such cells are right-aligned.
 bool is_number(const std::string& cell) {
@@ -57,6 +46,8 @@ void Report::made_by(const std::string& command) { command_ = command; }
 void Report::heading(const std::string& text) { body_.push_back("<h2>" + html_text(text) + "</h2>\n"); }
 
 void Report::paragraph(const std::string& text) { body_.push_back("<p>" + html_text(text) + "</p>\n"); }
+
+void Report::literal(const std::string& text) { body_.push_back("<pre>" + html_text(text) + "</pre>\n"); }
 
 void Report::table(const std::vector<std::string>& header,
                    const std::vector<std::vector<std::string>>& rows) {
@@ -106,39 +97,37 @@ void Report::bars(const std::string& name, const std::vector<Bar>& bars, const s
          caption, 120 + 32 * static_cast<int>(bars.size()));
 }
 
-void Report::time_series(const std::vector<TimeSeries>& all, const std::string& unit,
-                         const std::string& caption) {
-  if (kTimeSeriesScript.empty()) {
-    paragraph("Time series with zoom are missing: the tool was built without dygraphs (libjs-dygraphs).");
-    return;
-  }
-  has_time_series_ = true;
-  body_.push_back(interactive("time-series", data_of(all, unit), caption));
-}
-
-void Report::replay(const std::vector<Replay>& flights, const std::string& unit, const std::string& caption) {
-  if (kReplayScript.empty()) {
-    paragraph("The replay in space is missing: the tool was built without three.js (libjs-three).");
-    return;
-  }
-  has_replay_ = true;
-  body_.push_back(interactive("replay", data_of(flights, unit), caption));
+void Report::flown(const Flown& flown, const std::string& over_time, const std::string& in_space) {
+  has_time_series_ = !kTimeSeriesScript.empty();
+  has_replay_ = !kReplayScript.empty();
+  if (has_time_series_ || has_replay_)
+    body_.push_back("<script type=\"application/json\" id=\"flown-data\">" + data_of(flown) + "</script>\n");
+  heading("Over time");
+  if (has_time_series_)
+    body_.push_back(interactive("time-series", over_time));
+  else
+    paragraph("Signals over time are missing: the tool was built without dygraphs (libjs-dygraphs).");
+  heading("In space");
+  if (has_replay_)
+    body_.push_back(interactive("replay", in_space));
+  else
+    paragraph("The view in space is missing: the tool was built without three.js (libjs-three).");
 }
 
 void Report::moments(const std::vector<ShownMoment>& moments) {
   std::string html =
       "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"worst moments\"><table><thead><tr>"
       "<th scope=\"col\">rank</th><th scope=\"col\">log</th><th scope=\"col\">time on the log [s]</th>"
-      "<th scope=\"col\">residual</th><th scope=\"col\">look</th></tr></thead><tbody>\n";
+      "<th scope=\"col\">residual</th></tr></thead><tbody>\n";
   int rank = 0;
   for (const ShownMoment& moment : moments) {
     html += fmt::format(
-        "<tr><td class=\"number\">{}</td><td>{}</td><td class=\"number\">{:.2f}</td><td>{}</td>"
-        "<td><button type=\"button\" class=\"jump\" aria-label=\"Show worst moment {}\" data-series=\"{}\" "
-        "data-time=\"{:.3f}\" data-flight=\"{}\" data-flight-time=\"{:.3f}\">Show</button></td></tr>\n",
-        rank + 1, html_text(moment.series), moment.series_time_s, html_text(moment.size), rank + 1,
-        html_text(moment.series), moment.series_time_s, html_text(moment.flight), moment.flight_time_s);
-    ++rank;
+        "<tr><td class=\"number\">{0} <button type=\"button\" class=\"jump\" hidden "
+        "aria-label=\"Show worst moment {0}\" data-flight=\"{1}\" data-vehicle=\"{2}\" "
+        "data-flight-time=\"{3:.3f}\">Show</button></td><td>{1} {2}</td><td class=\"number\">{4:.2f}</td>"
+        "<td>{5}</td></tr>\n",
+        ++rank, html_text(moment.flight), html_text(moment.vehicle), moment.time_s, moment.log_time_s,
+        html_text(moment.size));
   }
   body_.push_back(html + "</tbody></table></div>\n");
 }

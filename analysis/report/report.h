@@ -10,37 +10,36 @@
 
 namespace swarmcert::analysis {
 
-/// Force residuals of one vehicle over time.
-struct TimeSeries {
-  std::string name;
-  /// Time in s; x, y, z; z without effects; z of another model, NaN if there is none. NaN interrupts the curves.
-  std::vector<std::array<float, 6>> rows;
+/// Signals of flights, for figures that scripts draw: curves over time, and vehicles in space.
+struct Flown {
+  struct Group {
+    std::string name, unit;
+    std::vector<std::string> columns;
+  };
+  struct Log {
+    std::string flight, vehicle;
+    /// [1 + columns of all groups][rows]: time in s, then the groups; NaN: unknown, interrupts curves.
+    std::vector<std::vector<float>> columns;
+  };
   struct Mark {
-    float time_s;  ///< of a row
+    std::string flight, vehicle;
+    double time_s;
     int rank;
-    double size;  ///< in the unit of the rows
+    double size;  ///< in force_unit
   };
+  std::vector<Group>
+      groups;  ///< with "position", "velocity" and "residual"; also "set point", "residual after", ...
+  std::vector<Log> logs;  ///< those of one flight follow each other
   std::vector<Mark> marks;
+  std::string force_unit;
+  int axis = 2;  ///< of the residual that is shown at first
 };
 
-/// A flight for the 3D replay.
-struct Replay {
-  std::string name;
-  struct Vehicle {
-    std::string name;
-    /// Time in s; position in m; force before; force after. NaN: unknown.
-    std::vector<std::array<float, 10>> rows;
-  };
-  std::vector<Vehicle> vehicles;
-};
-
-/// A moment that the time series and the replay can jump to.
+/// A moment that the figures of Flown can jump to.
 struct ShownMoment {
-  std::string series;  ///< name of a TimeSeries
-  double series_time_s;
-  std::string flight;  ///< name of a Replay
-  double flight_time_s;
-  std::string size;  ///< text with its unit
+  std::string flight, vehicle;
+  double time_s, log_time_s;  ///< in the flight, and on the clock of the log
+  std::string size;           ///< text with its unit
 };
 
 /// One bar with its interval; NaN for an unknown end.
@@ -66,6 +65,8 @@ class Report {
 
   void heading(const std::string& text);
   void paragraph(const std::string& text);
+  /// Equations and commands: in a typeface of fixed width, in lines as given.
+  void literal(const std::string& text);
   /// @param rows cells as text, as many per row as `header` has.
   void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
   /// A table of a described result.
@@ -85,17 +86,11 @@ class Report {
   void bars(const std::string& name, const std::vector<Bar>& bars, const std::string& quantity,
             const std::string& caption);
 
-  /// Adds curves with zoom, one vehicle at a time; at most once per report. If the tool was built without dygraphs,
-  /// the report says so.
-  /// @param unit unit of the forces
-  void time_series(const std::vector<TimeSeries>& all, const std::string& unit, const std::string& caption);
+  /// Adds signals over time and the vehicles in space, each under a heading; at most once per report. What the tool was
+  /// built without (dygraphs, three.js) is said instead.
+  void flown(const Flown& flown, const std::string& over_time, const std::string& in_space);
 
-  /// Adds flights in space with a time slider; at most once per report. If the tool was built without three.js, the
-  /// report says so.
-  /// @param unit unit of the forces
-  void replay(const std::vector<Replay>& flights, const std::string& unit, const std::string& caption);
-
-  /// Adds a table of moments; a button in each row moves the time series and the replay to that moment.
+  /// Adds a table of moments; a button in each row moves the figures of flown() to that moment, if there are any.
   void moments(const std::vector<ShownMoment>& moments);
 
   /// Writes FOLDER/`page` and the files of the figures, and returns the path of the page. If gnuplot is missing or

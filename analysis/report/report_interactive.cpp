@@ -1,7 +1,9 @@
 #include "analysis/report/report_interactive.h"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 
 #include "analysis/report/report_text.h"
 #include "nn/base/json.h"
@@ -9,59 +11,68 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// Rounds to a thousandth of a unit, which is less than a pixel; more digits would double the file.
-files::Json thousandths(double x) {
-  return std::isfinite(x) ? files::Json(std::round(x * 1000) / 1000) : files::Json(nullptr);
+template <class T>
+std::string base64_of(const std::vector<T>& numbers) {
+  return base64({reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(T)});
 }
 
-template <std::size_t Columns>
-files::Json rows_json(const std::vector<std::array<float, Columns>>& rows) {
-  files::Json json = files::Json::array();
-  for (const std::array<float, Columns>& row : rows) {
-    files::Json cells = files::Json::array();
-    for (const float x : row) cells.push_back(thousandths(static_cast<double>(x)));
-    json.push_back(std::move(cells));
+files::Json column_json(const std::vector<float>& column) {
+  constexpr std::int16_t kUnknown = std::numeric_limits<std::int16_t>::min();
+  constexpr double kSteps = 65534;
+  float low = std::numeric_limits<float>::infinity(), high = -low;
+  bool is_complete = true;
+  for (const float x : column) {
+    if (std::isfinite(x)) {
+      low = std::min(low, x);
+      high = std::max(high, x);
+    } else {
+      is_complete = false;
+    }
   }
-  return json;
-}
-
-std::string in_page(const files::Json& json) {
-  return script_json(json.dump(-1, ' ', true, files::Json::error_handler_t::replace));
+  if (!(low <= high)) return nullptr;
+  if (low == high && is_complete) return low;
+  std::vector<std::int16_t> steps;
+  const double width = std::max(static_cast<double>(high) - static_cast<double>(low), 1e-30);
+  for (const float x : column) {
+    const double place = (static_cast<double>(x) - static_cast<double>(low)) / width;
+    steps.push_back(std::isfinite(x) ? static_cast<std::int16_t>(std::lround(place * kSteps) - 32767)
+                                     : kUnknown);
+  }
+  return {{"low", low}, {"high", high}, {"data", base64_of(steps)}};
 }
 
 }  // namespace
 
-std::string data_of(const std::vector<TimeSeries>& all, const std::string& unit) {
-  files::Json series_json = files::Json::array();
-  bool has_other = false;
-  for (const TimeSeries& series : all) {
-    files::Json marks = files::Json::array();
-    for (const TimeSeries::Mark& mark : series.marks) {
-      marks.push_back({{"time", thousandths(static_cast<double>(mark.time_s))},
-                       {"rank", mark.rank},
-                       {"size", thousandths(mark.size)}});
-    }
-    for (const std::array<float, 6>& row : series.rows) has_other = has_other || std::isfinite(row[5]);
-    series_json.push_back(
-        {{"name", series.name}, {"rows", rows_json(series.rows)}, {"marks", std::move(marks)}});
+std::string data_of(const Flown& flown) {
+  files::Json groups = files::Json::array(), logs = files::Json::array(), marks = files::Json::array();
+  for (const Flown::Group& group : flown.groups)
+    groups.push_back({{"name", group.name}, {"unit", group.unit}, {"columns", group.columns}});
+  for (const Flown::Log& log : flown.logs) {
+    files::Json columns = files::Json::array({base64_of(log.columns[0])});
+    for (std::size_t k = 1; k < log.columns.size(); ++k) columns.push_back(column_json(log.columns[k]));
+    logs.push_back({{"flight", log.flight},
+                    {"vehicle", log.vehicle},
+                    {"rows", log.columns[0].size()},
+                    {"columns", std::move(columns)}});
   }
-  return in_page({{"unit", unit}, {"has_before", has_other}, {"series", std::move(series_json)}});
+  for (const Flown::Mark& mark : flown.marks) {
+    marks.push_back({{"flight", mark.flight},
+                     {"vehicle", mark.vehicle},
+                     {"time", mark.time_s},
+                     {"rank", mark.rank},
+                     {"size", mark.size}});
+  }
+  const files::Json all = {{"unit", flown.force_unit},
+                           {"axis", flown.axis},
+                           {"groups", std::move(groups)},
+                           {"logs", std::move(logs)},
+                           {"marks", std::move(marks)}};
+  return script_json(all.dump(-1, ' ', true, files::Json::error_handler_t::replace));
 }
 
-std::string data_of(const std::vector<Replay>& flights, const std::string& unit) {
-  files::Json json = files::Json::array();
-  for (const Replay& flight : flights) {
-    files::Json vehicles = files::Json::array();
-    for (const Replay::Vehicle& vehicle : flight.vehicles)
-      vehicles.push_back({{"name", vehicle.name}, {"rows", rows_json(vehicle.rows)}});
-    json.push_back({{"name", flight.name}, {"vehicles", std::move(vehicles)}});
-  }
-  return in_page({{"unit", unit}, {"flights", std::move(json)}});
-}
-
-std::string interactive(const std::string& id, const std::string& data, const std::string& caption) {
-  return "<figure><div id=\"" + id + "\"></div>\n<script type=\"application/json\" id=\"" + id + "-data\">" +
-         data + "</script>\n<figcaption>" + html_text(caption) + "</figcaption></figure>\n";
+std::string interactive(const std::string& id, const std::string& caption) {
+  return "<figure><div id=\"" + id + "\"></div>\n<figcaption>" + html_text(caption) +
+         "</figcaption></figure>\n";
 }
 
 }  // namespace swarmcert::analysis

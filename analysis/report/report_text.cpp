@@ -1,5 +1,7 @@
 #include "analysis/report/report_text.h"
 
+#include <openssl/evp.h>
+
 #include <nlohmann/json.hpp>
 
 namespace swarmcert::analysis {
@@ -83,6 +85,14 @@ std::string plot_string(const std::string& text) {
   for (const char c : valid_utf8(text))
     result += c == '\'' ? std::string("\xE2\x80\x99") : is_control(c) ? " " : std::string(1, c);
   return result + "'";
+}
+
+std::string base64(std::string_view bytes) {
+  std::string text(4 * ((bytes.size() + 2) / 3) + 1, '\0');
+  text.resize(static_cast<std::size_t>(EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
+                                                       reinterpret_cast<const unsigned char*>(bytes.data()),
+                                                       static_cast<int>(bytes.size()))));
+  return text;
 }
 
 std::string shell_line(const std::vector<std::string>& words) {

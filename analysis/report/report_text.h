@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace swarmcert::analysis {
@@ -21,6 +22,9 @@ std::string plot_field(const std::string& text);
 /// Returns `text` as a single-quoted gnuplot string, in which nothing is expanded. Quotes become typographic quotes,
 /// because gnuplot accepts '' inside a string but not at its start.
 std::string plot_string(const std::string& text);
+
+/// Returns the bytes in base64.
+std::string base64(std::string_view bytes);
 
 /// Returns `words` as a line that a POSIX shell parses back into the same words.
 std::string shell_line(const std::vector<std::string>& words);

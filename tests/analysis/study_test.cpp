@@ -93,7 +93,12 @@ TEST_F(Study, AddsWhatIsMissingAndLowersTheErrorOfTestFlights) {
       0);
   EXPECT_EQ(files::read_json(folder_ / "after.json", "swarmcert/compare/1")["overall"]["rmse"]["z"],
             json["after"]["all"]["rmse"]["z"]);
-  EXPECT_NE(read_text(folder_ / "out/study.html").find("Where the model failed"), std::string::npos);
+  const std::string page = read_text(folder_ / "out/study.html");
+  for (const char* const shown :
+       {"Where the model failed", "id=\"flown-data\"", "with all of their records", "held out",
+        "Effect motor_lag: its force over the rate of the thrust", "Effect drag_linear: its force over the v",
+        "Effect downwash: its force over the distance beside the vehicle above"})
+    EXPECT_NE(page.find(shown), std::string::npos) << shown;
   EXPECT_EQ(study("flights -o out -q").exit_code, 3) << "a folder that is not empty is kept";
 }
 
@@ -236,6 +241,32 @@ TEST_F(Study, EveryPageShowsForcesInTheOneUnitThatIsAsked) {
     for (const char* const unit : {"[mN]", "[gf]", "[N]", "[m/s^2]"})
       EXPECT_EQ(text.find(unit) != std::string::npos, unit == page.shown) << page.command << " and " << unit;
   }
+}
+
+TEST_F(Study, APageHoldsNoSignalsOfTheLogsIfItIsToldSo) {
+  fly(1);
+  const std::string compare =
+      "swarmcert compare " + source_path("stability/models/crazyflie-small.toml") + " flights -q --report ";
+  ASSERT_EQ(run_shell(compare + "with", folder_.path()).exit_code, 0);
+  ASSERT_EQ(run_shell(compare + "without --no-embed", folder_.path()).exit_code, 0);
+  const std::string with = read_text(folder_ / "with/report.html"),
+                    without = read_text(folder_ / "without/report.html");
+  EXPECT_NE(with.find("id=\"flown-data\""), std::string::npos);
+  EXPECT_EQ(without.find("id=\"flown-data\""), std::string::npos);
+  EXPECT_NE(without.find("This page holds no signals of the logs."), std::string::npos);
+  EXPECT_LT(without.size(), with.size() / 2);
+}
+
+TEST_F(Study, APageOfAnHourStaysSmallAndSaysThatItIsThinned_slow) {
+  fly(source_path("stability/models/crazyflie-small-effects.toml"), 1, 3600, 1, 1);
+  const Outcome outcome =
+      run_shell("swarmcert compare " + source_path("stability/models/crazyflie-small.toml") +
+                    " flights -q --report page",
+                folder_.path());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const std::string page = read_text(folder_ / "page/report.html");
+  EXPECT_LT(page.size(), 5'000'000U);
+  EXPECT_NE(page.find("complete only around the worst moments"), std::string::npos);
 }
 
 TEST_F(Study, WordsThatMakeNoSenseAreExplained) {

@@ -75,12 +75,13 @@ Report report_with(const std::vector<std::string>& text) {
       "set xlabel " + plot_string(text[9]) + "\nplot 'curve.dat' using 1:2:xtic(3) with lines title 't'\n",
       text[10]);
   report.bars("bars", {{text[11], 1, 0.5, 2}, {text[12], 2, NAN, NAN}}, text[13], text[14]);
-  TimeSeries series;
-  series.name = text[15];
-  series.rows = {{0, 1, 2, 3, 4, 5}, {1, 2, 3, 4, 5, 6}};
-  report.time_series({series}, text[17], text[16]);
-  report.replay({{text[18], {{text[19], {{0, 1, 2, 3}, {1, 2, 3, 4}}}}}}, text[20], text[21]);
-  report.moments({{text[22], 1, text[23], 2, text[24]}});
+  Flown flown;
+  flown.groups = {{"position", text[15], {"x", "y", "z"}}};
+  flown.logs = {{text[18], text[19], {{0, 1}, {1, 2}, {2, 2}, {NAN, 4}}}};
+  flown.marks = {{text[18], text[19], 1, 1, 2}};
+  flown.force_unit = text[20];
+  report.flown(flown, text[16], text[21]);
+  report.moments({{text[22], text[23], 1, 2, text[24]}});
   return report;
 }
 

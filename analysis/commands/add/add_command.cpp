@@ -80,12 +80,16 @@ void report_ladders(const AddOptions& options, const CommonOptions& common, cons
   if (common.prints_text()) fmt::print("report: {}\n", path);
 }
 
-BeforeAfter before_and_after(const residuals::Inputs& inputs, const Ladder& ladder, int jobs) {
+BeforeAfter before_and_after(const residuals::Inputs& inputs, const Ladder& ladder, bool embeds, int jobs) {
   const auto silent = [](int, int) {};
   residuals::Inputs fitted = inputs;
   fitted.models[0] = ladder.model;
-  return {residuals::compare(inputs, jobs, silent), residuals::compare(fitted, jobs, silent),
-          identification::picture_data(inputs, inputs.models[0], ladder.model)};
+  BeforeAfter change = {residuals::compare(inputs, jobs, silent),
+                        residuals::compare(fitted, jobs, silent),
+                        identification::picture_data(inputs, inputs.models[0], ladder.model),
+                        {}};
+  if (embeds) change.flights = residuals::flown_signals(inputs, &fitted, change.before.moments);
+  return change;
 }
 
 /// Comment lines at the head of the model file.
@@ -195,7 +199,8 @@ int climb(const AddOptions& options, const CommonOptions& common) {
     ladders.push_back({"The model's ladder so far, on the flights of then", ladder.earlier, {}});
   ladders.push_back({"On these flights", ladder.rows, ladder.model.effects});
   std::optional<BeforeAfter> change;
-  if (ladder.any_accepted && !options.report.empty()) change = before_and_after(inputs, ladder, common.jobs);
+  if (ladder.any_accepted && !options.report.empty())
+    change = before_and_after(inputs, ladder, !options.flights.no_embed, common.jobs);
   report_ladders(options, common, result, ladders, page_unit(options.flights, inputs),
                  change ? &*change : nullptr);
   return kDone;
@@ -254,6 +259,7 @@ Command add_command() {
             "Write an HTML report into this folder: the error ladder, and maps, curves and worst moments "
             "before and after");
         declare_unit(app, options->flights);
+        declare_no_embed(app, options->flights);
         return [options](const CommonOptions& common) { return run_add(*options, common); };
       },
       fields_of<AddResult>()};

@@ -94,8 +94,8 @@ std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const
     report.heading("What was added");
     add_effect_curves(report, change->pictures.effects, unit);
     report.heading("Worst moments");
-    add_worst_moments(report, change->before, change->after, unit);
-    add_time_series(report, change->after, &change->before, unit.name, unit.per_newton());
+    add_moments(report, change->before, unit);
+    add_flown(report, change->flights, change->before, unit);
   }
   return report.write(folder, overwrite);
 }

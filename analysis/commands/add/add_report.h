@@ -7,6 +7,7 @@
 #include "analysis/commands/add/add_output.h"
 #include "analysis/commands/shared/before_after.h"
 #include "analysis/report/report.h"
+#include "analysis/residuals/flown_signals.h"
 #include "nn/base/json.h"
 #include "stability/model.h"
 
@@ -16,6 +17,7 @@ namespace swarmcert::analysis {
 struct BeforeAfter {
   residuals::Comparison before, after;
   identification::PictureData pictures;
+  std::vector<residuals::FlownFlight> flights;  ///< empty: the page holds no signals
 };
 
 /// Writes FOLDER/report.html with a plot and a table per ladder, the parameters of the effects and the JSON `result`.

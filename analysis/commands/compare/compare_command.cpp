@@ -267,7 +267,11 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
                  next_command("diagnose", {inputs.models[0].path}, options.flights, inputs, {}));
   }
   if (!options.report.empty()) {
-    const std::string path = write_compare_report(result, unit, described, options.report, common.force);
+    const std::vector<residuals::FlownFlight> flights =
+        options.flights.no_embed ? std::vector<residuals::FlownFlight>()
+                                 : residuals::flown_signals(inputs, nullptr, result.comparison.moments);
+    const std::string path =
+        write_compare_report(result, flights, unit, described, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
   return exit_code_of(result.comparison);
@@ -293,6 +297,7 @@ Command compare_command() {
         declare_flights(app, options->flights, true);
         add_output(app, "--report", options->report, "Write an HTML report into this folder");
         declare_unit(app, options->flights, "");
+        declare_no_embed(app, options->flights);
         app.add_option(
             "--gains", options->gains,
             "gains.toml, or KIND=gains.toml for each kind: also simulates the closed loop from the "

@@ -9,6 +9,7 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/shared/prediction_output.h"
+#include "analysis/commands/shared/report_head.h"
 #include "analysis/commands/shared/time_plots.h"
 #include "analysis/report/report.h"
 #include "analysis/residuals/force_unit.h"
@@ -174,20 +175,16 @@ void add_learning_error(Report& report, const residuals::LearningError& learning
 
 }  // namespace
 
-std::string write_compare_report(const CompareResult& result, const residuals::ForceUnit& unit,
-                                 const files::Node& described, const std::string& folder, bool overwrite) {
+std::string write_compare_report(const CompareResult& result,
+                                 const std::vector<residuals::FlownFlight>& flights,
+                                 const residuals::ForceUnit& unit, const files::Node& described,
+                                 const std::string& folder, bool overwrite) {
   const residuals::Comparison& comparison = result.comparison;
   const residuals::Inputs& inputs = result.inputs;
   Report report("Model against flights");
   report.made_by(command_to_copy());
   report.result(described);
-  for (const stability::Model& model : inputs.models) {
-    std::string effects;
-    for (const stability::EffectSpec& effect : model.effects)
-      effects += (effects.empty() ? "" : ", ") + effect.name;
-    report.paragraph(fmt::format("Model {}: {}, {}; effects: {}.", model.path, model.kind,
-                                 residuals::mass_text(model.mass_kg), effects.empty() ? "none" : effects));
-  }
+  add_report_head(report, inputs, comparison, nullptr);
   report.paragraph(
       "Force residual: mass times measured specific force minus thrust and effects, in the world frame, in " +
       std::string(unit.name) + (inputs.rules.per_mass ? ": no mass is known. " : ". ") +
@@ -217,10 +214,14 @@ std::string write_compare_report(const CompareResult& result, const residuals::F
   for (int variable = 0; variable < kPlottedVariables; ++variable)
     add_region_plot(report, comparison, variable, kVariableUnits[variable], unit);
   add_neighbour_map(report, comparison.neighbours, unit);
-  add_time_series(report, comparison, nullptr, unit.name, 1 / unit.size_N);
+  add_moments(report, comparison, unit);
+  add_flown(report, flights, comparison, unit);
   add_trajectories(report, comparison);
   add_learning_error(report, comparison.learning_error, unit);
-  if (result.prediction) add_prediction(report, *result.prediction);
+  if (result.prediction) {
+    report.heading("Prediction");
+    add_prediction(report, {{"model", *result.prediction}});
+  }
 
   report.heading("Flights");
   rows.clear();
@@ -251,7 +252,6 @@ std::string write_compare_report(const CompareResult& result, const residuals::F
                         : "not estimated"});
   }
   report.table({"", "records cut", "the log", "clock offset"}, rows);
-  for (const std::string& problem : comparison.problems) report.paragraph("Not judged: " + problem);
   return report.write(folder, overwrite);
 }
 

@@ -135,7 +135,7 @@ std::string study_flights(const fs::path& folder, const CommonOptions& common, c
   result.headline = sentence;
   result.verdict = name(answer.found.judgement.verdict);
   const files::Json document = to_json(result_of("study", inputs.files(), std::nullopt, answer));
-  return write_study_folder(answer, {}, unit, document, output);
+  return write_study_folder(answer, studied(study, inputs, true), {}, unit, document, output);
 }
 
 int run_demo(const DemoOptions& options, const CommonOptions& common) {

@@ -11,6 +11,7 @@
 #include "analysis/commands/diagnose/each_output.h"
 #include "analysis/commands/diagnose/remainder_output.h"
 #include "analysis/commands/shared/effect_output.h"
+#include "analysis/identification/verdict.h"
 #include "analysis/report/report.h"
 
 namespace swarmcert::analysis {
@@ -54,25 +55,26 @@ void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& 
                     values_of(missing),
                     missing.equivalence_class == missing.effect ? "" : missing.equivalence_class,
                     joined(finding.confounded_with()), missing.excitation});
-    bars.push_back({missing.effect, 100 * drop(missing), 100 * finding.drop_interval.lower,
-                    100 * finding.drop_interval.upper});
+    const double of_given = 100 * finding.rmse_before_N / diagnosis.rmse_before_N;
+    bars.push_back({missing.effect, of_given * drop(missing), of_given * finding.drop_interval.lower,
+                    of_given * finding.drop_interval.upper});
   }
   report.table({"effect", std::string("RMSE [") + unit.name + "]", "fall, 90 %", "values, 90 %",
                 "flights cannot tell apart", "these flights cannot tell it from", "what separates them"},
                rows);
   // Users choose the names of kinds, so figures are numbered.
-  report.bars(name, bars, "fall of the error [%]",
-              "How far each effect lowers the cross-validated error when it is added to those above it, with "
-              "90 % intervals from resampled blocks.");
+  report.bars(name, bars, "fall of the error [% of the given model's]",
+              "How far each effect lowers the cross-validated error when it is added to those above it, in "
+              "percent of the error of the given model, with 90 % intervals from resampled blocks.");
 }
 
 void add_left(Report& report, const Diagnosis& diagnosis, const residuals::ForceUnit& unit) {
   const identification::Remainder& rest = diagnosis.remainder;
-  report.paragraph(
-      fmt::format("Left: {:.4g} {}; low frequencies {:.1f} times the noise floor: {}{}",
-                  unit.per_newton() * diagnosis.rmse_after_N, unit.name, rest.ratio,
-                  rest.stands_out() ? "not everything is explained" : "nothing stands out",
-                  rest.depends_on.empty() ? "." : ". It depends on " + joined(rest.depends_on) + "."));
+  report.paragraph(fmt::format(
+      "Left: {:.4g} {}; low frequencies {:.1f} times the noise floor: {}{}",
+      unit.per_newton() * diagnosis.rmse_after_N, unit.name, rest.ratio,
+      identification::leaves_something(diagnosis) ? "not everything is explained" : "nothing stands out",
+      rest.depends_on.empty() ? "." : ". It depends on " + joined(rest.depends_on) + "."));
   if (!diagnosis.contradicted.empty()) {
     report.paragraph(
         "Not counted, because set points contradict them (the controller's response to something else): " +

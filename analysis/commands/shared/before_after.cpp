@@ -8,6 +8,7 @@
 #include "analysis/commands/shared/time_plots.h"
 #include "analysis/report/report_drawing.h"
 #include "analysis/report/report_text.h"
+#include "analysis/report/table.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -146,52 +147,29 @@ void add_effect_curves(Report& report, const std::vector<EffectCurve>& effects,
                        const residuals::ForceUnit& unit) {
   std::size_t number = 0;
   for (const EffectCurve& curve : effects) {
-    std::string data = "# predicted measured standard_error records\n";
-    double least = INFINITY, most = -INFINITY;
+    const auto [per_unit, unit_name] = shown_unit(curve.unit, {unit.name, unit.size_N});
+    std::string data = "# variable predicted measured standard_error records\n";
     for (const EffectCurve::Point& point : curve.points) {
-      least = std::min(least, point.predicted_N * unit.per_newton());
-      most = std::max(most, point.predicted_N * unit.per_newton());
-      data +=
-          fmt::format("{:.6g} {:.6g} {:.6g} {}\n", point.predicted_N * unit.per_newton(),
-                      point.measured_N * unit.per_newton(), point.error_N * unit.per_newton(), point.records);
+      data += fmt::format("{:.6g} {:.6g} {:.6g} {:.6g} {}\n", point.at * per_unit,
+                          point.predicted_N * unit.per_newton(), point.measured_N * unit.per_newton(),
+                          point.error_N * unit.per_newton(), point.records);
     }
+    const double length = (curve.points.back().at - curve.points.front().at) * per_unit;
     const std::string name = fmt::format("effect_{}", ++number);
     report.figure(
         name, data,
         fmt::format(
-            "set xlabel {0}\nset ylabel {1}\nif (exists('narrow')) {{ set xtics {3:g} }}\nset key top left\n"
-            "plot x title 'the fitted formula' "
-            "linecolor 'gray', '{2}.dat' using 1:2:(1.645*$3) with yerrorbars title 'measured, 90 %'\n",
-            plot_string(fmt::format("{} as fitted, along {} [{}]", curve.effect, curve.axis, unit.name)),
-            plot_string(fmt::format("measured without it [{}]", unit.name)), name,
-            2 * tick_step(most - least)),
-        "Effect " + curve.effect +
-            ": the residual of the model with every effect but this one, over the prediction of this effect. "
-            "Points on the line confirm the fit.");
+            "set xlabel {0}\nset ylabel {1}\nif (exists('narrow')) {{ set xtics {3:g} }}\n"
+            "plot 0 linecolor 'gray' dashtype 1 notitle, '{2}.dat' using 1:2 with lines linetype 1 "
+            "title 'the fitted effect', '' using 1:3:(1.645*$4) with yerrorbars linetype 2 dashtype 1 "
+            "title 'measured, 90 %'\n",
+            plot_string(curve.variable + (unit_name.empty() ? "" : " [" + unit_name + "]")),
+            plot_string(fmt::format("force along {} [{}]", curve.axis, unit.name)), name,
+            2 * tick_step(length)),
+        fmt::format("Effect {}: its force over the {}, which explains {:.0f} % of how it varies, and what is "
+                    "measured of it: the residual of the model with every other effect.",
+                    curve.effect, curve.variable, 100 * curve.share));
   }
-}
-
-void add_worst_moments(Report& report, const residuals::Comparison& before,
-                       const residuals::Comparison& after, const residuals::ForceUnit& unit) {
-  constexpr std::size_t kMost = 10;
-  std::vector<std::vector<std::string>> rows;
-  const auto add = [&](const char* when, const std::vector<residuals::Moment>& moments) {
-    for (std::size_t i = 0; i < std::min(kMost, moments.size()); ++i) {
-      const residuals::Moment& moment = moments[i];
-      const Eigen::Vector3d force = unit.per_newton() * moment.residual_N;
-      rows.push_back({when, moment.flight, moment.vehicle, fmt::format("{:.2f}", moment.time_s),
-                      fmt::format("{:.3g}", force.x()), fmt::format("{:.3g}", force.y()),
-                      fmt::format("{:.3g}", force.z()), fmt::format("{:.3g}", force.norm())});
-    }
-  };
-  add("before", before.moments);
-  add("after", after.moments);
-  if (rows.empty()) return;
-  const std::string in_unit = std::string(" [") + unit.name + "]";
-  report.paragraph("The moments at which the force residual (mean over 0.1 s) is largest, before and after:");
-  report.table(
-      {"", "flight", "vehicle", "time [s]", "x" + in_unit, "y" + in_unit, "z" + in_unit, "total" + in_unit},
-      rows);
 }
 
 }  // namespace swarmcert::analysis

@@ -17,12 +17,8 @@ void add_before_and_after(Report& report, const residuals::Comparison& before,
                           const residuals::Comparison& after, const identification::RoomMap& room,
                           const residuals::ForceUnit& unit);
 
-/// Adds the measurements of each effect with the fitted formula as a line. At most once per report.
+/// Adds the force of each effect over its own variable, as fitted and as measured. At most once per report.
 void add_effect_curves(Report& report, const std::vector<identification::EffectCurve>& effects,
                        const residuals::ForceUnit& unit);
-
-/// Adds a table of the largest residuals under both models.
-void add_worst_moments(Report& report, const residuals::Comparison& before,
-                       const residuals::Comparison& after, const residuals::ForceUnit& unit);
 
 }  // namespace swarmcert::analysis

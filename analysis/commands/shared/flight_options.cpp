@@ -78,6 +78,11 @@ void declare_unit(CLI::App& app, FlightOptions& options, const std::string& stan
   if (!standard.empty()) unit->capture_default_str();
 }
 
+void declare_no_embed(CLI::App& app, FlightOptions& options) {
+  app.add_flag("--no-embed", options.no_embed,
+               "Leave the signals of the logs out of the page: no curves over time, nothing in space");
+}
+
 residuals::ForceUnit page_unit(const FlightOptions& options, const residuals::Inputs& inputs) {
   const bool is_acceleration = options.unit == "m_s2";
   if (inputs.rules.per_mass) {

@@ -15,8 +15,9 @@ struct FlightOptions {
   std::vector<std::string> models;  ///< --model
   std::string fleet, columns, network;
   bool published_filter = false, published_signals = false;
-  bool keep = false;  ///< --keep
-  std::string unit;   ///< --unit, see declare_unit()
+  bool keep = false;      ///< --keep
+  std::string unit;       ///< --unit, see declare_unit()
+  bool no_embed = false;  ///< --no-embed
 };
 
 /// Declares --flights, --columns and either MODEL... FLIGHTS... (if `positional_models`) or --model and FLIGHTS...
@@ -33,6 +34,9 @@ residuals::Inputs read_flights(const FlightOptions& options, bool own_models = f
 /// Declares --unit, the unit of all forces on a page.
 /// @param standard default: "N", "gf", "m_s2", or empty for gf below 1 N of vehicle weight, else N
 void declare_unit(CLI::App& app, FlightOptions& options, const std::string& standard = "N");
+
+/// Declares --no-embed of commands that write a page.
+void declare_no_embed(CLI::App& app, FlightOptions& options);
 
 /// Returns the unit requested by --unit; m/s^2 if no mass is known.
 /// @throws UsageError if the flights do not support the unit: forces without a mass, or one mass for several kinds.

@@ -121,22 +121,37 @@ void print_prediction(const std::optional<Prediction>& prediction) {
   }
 }
 
-void add_prediction(Report& report, const std::optional<Prediction>& prediction) {
-  if (!prediction) return;
-  report.heading("Prediction");
-  std::string data;
-  for (std::size_t h = 0; h < prediction->steps(); ++h) {
-    data += fmt::format("{}", static_cast<double>(h + 1) * prediction->step_s);
-    for (const HorizonErrors& errors : prediction->errors) data += fmt::format(" {}", errors.mean[h]);
+void add_prediction(Report& report, const std::vector<NamedPrediction>& named) {
+  if (named.empty() || !named[0].prediction) return;
+  const Prediction& first = *named[0].prediction;
+  std::string data,
+      script =
+          "if (exists('narrow')) { set terminal svg size 400,1100 dynamic noenhanced font 'sans-serif,13'; "
+          "set multiplot layout 4,1 } else { set multiplot layout 2,2 }\n"
+          "set key top left inside vertical noopaque\nset xlabel 'horizon [s]'\nset yrange [0:*]\n";
+  for (std::size_t h = 0; h < first.steps(); ++h) {
+    data += fmt::format("{:.6g}", static_cast<double>(h + 1) * first.step_s);
+    for (std::size_t k = 0; k < kQuantities.size(); ++k) {
+      for (const NamedPrediction& one : named) {
+        const bool has_step = one.prediction && h < one.prediction->steps();
+        data += fmt::format(" {:.6g}", has_step ? one.prediction->errors[k].mean[h] : NAN);
+      }
+    }
     data += "\n";
   }
-  std::string script = "set xlabel 'horizon [s]'\nset ylabel 'mean error'\nset logscale y\nplot ";
   for (std::size_t k = 0; k < kQuantities.size(); ++k) {
-    script += fmt::format("{}'prediction.dat' using 1:{} with lines title '{} [{}]'", k == 0 ? "" : ", ",
-                          k + 2, kQuantities[k].words, kQuantities[k].unit);
+    script += fmt::format("set ylabel '{} [{}]'\nplot ", kQuantities[k].words, kQuantities[k].unit);
+    for (std::size_t i = 0; i < named.size(); ++i)
+      script += fmt::format("{}'prediction.dat' using 1:{} with lines {}", i == 0 ? "" : ", ",
+                            2 + k * named.size() + i,
+                            named.size() == 1 ? "notitle" : fmt::format("title '{}'", named[i].name));
+    script += "\n";
   }
-  report.figure("prediction", data, script + "\n",
-                "Error of the multi-step prediction over its horizon: mean over all measured states.");
+  report.figure("prediction", data, script + "unset multiplot\n",
+                fmt::format("Error of predictions against their horizon: means over {} measured states from "
+                            "which the logged inputs were applied.",
+                            first.starts),
+                640);
 }
 
 void write_predictions(const std::vector<FlightPrediction>& flights, const std::string& folder,

@@ -29,8 +29,14 @@ std::optional<Prediction> prediction_of(std::vector<residuals::FlightPrediction>
 
 void print_prediction(const std::optional<Prediction>& prediction);
 
-/// Adds the error against the horizon to the report.
-void add_prediction(Report& report, const std::optional<Prediction>& prediction);
+/// The prediction of a model that a figure calls `name`.
+struct NamedPrediction {
+  const char* name;
+  const std::optional<Prediction>& prediction;
+};
+/// Adds a figure of the errors of position, velocity, rotation and body rate against the horizon, one curve per model.
+/// Nothing is added if the first predicted nothing.
+void add_prediction(Report& report, const std::vector<NamedPrediction>& named);
 
 /// Writes FLIGHT.npy for each predicted log, FLIGHT being its file name without ending: float32, [starts x steps x 13],
 /// the state predicted from each record: x y z vx vy vz qx qy qz qw wx wy wz. NaN where nothing is predicted.

@@ -1,10 +1,12 @@
-/// @file Residuals over time with zoom, and definitions shared by plots of residuals.
+/// @file What vehicles flew, over time and in space, and definitions shared by plots of residuals.
 #pragma once
 
-#include <string>
+#include <vector>
 
 #include "analysis/report/report.h"
 #include "analysis/residuals/comparison.h"
+#include "analysis/residuals/flown_signals.h"
+#include "analysis/residuals/force_unit.h"
 
 namespace swarmcert::analysis {
 
@@ -14,16 +16,13 @@ inline constexpr int kPlottedVariables = 6;
 inline constexpr const char* kVariableUnits[kPlottedVariables] = {"[m]", "[m/s]", "[-]",
                                                                   "[V]", "[s]",   "[degrees]"};
 
-/// Returns the name that time series and worst moments use for a log.
-std::string series_name(const residuals::TrackErrors& track);
+/// Adds a table of the worst moments, to which the figures of add_flown() can jump.
+void add_moments(Report& report, const residuals::Comparison& comparison, const residuals::ForceUnit& unit);
 
-/// Adds residuals over time with zoom: vehicles with the worst moments first, then the others, as far as they fit on
-/// a page.
-/// @param before the same logs under another model, whose vertical residual is shown alongside and whose worst
-///     moments are marked; or null.
-/// @param unit unit of the forces shown.
-/// @param per_newton factor from newton to that unit.
-void add_time_series(Report& report, const residuals::Comparison& comparison,
-                     const residuals::Comparison* before, const std::string& unit, double per_newton);
+/// Adds signals over time and the flights in space, and says which part of the logs they hold.
+/// @param flights empty: says that the page holds no signals
+/// @param comparison of the given model: its worst moments are marked, and the axis that fails is shown first
+void add_flown(Report& report, const std::vector<residuals::FlownFlight>& flights,
+               const residuals::Comparison& comparison, const residuals::ForceUnit& unit);
 
 }  // namespace swarmcert::analysis

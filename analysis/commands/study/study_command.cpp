@@ -109,7 +109,8 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
   result.found.judgement.append(ranked(labels));
   if (others) result.changes = changes_against(*others, other_files, study, inputs, common.jobs);
   const files::Node document = result_of("study", files, std::nullopt, result);
-  const std::string page = write_study_folder(result, notes, unit, to_json(document), options.output);
+  const std::string page = write_study_folder(result, studied(study, inputs, !options.flights.no_embed),
+                                              notes, unit, to_json(document), options.output);
   write_result(common, document);
   if (common.prints_text()) {
     print_study(result, unit);
@@ -143,6 +144,7 @@ Command study_command() {
                            "Other flights (the healthy vehicle, the last release): the page also shows what "
                            "changed beyond their scatter, like diagnose --against");
             declare_unit(app, options->flights);
+            declare_no_embed(app, options->flights);
             add_output(app, "-o,--output", options->output, "Folder for page, result and fitted model")
                 ->required();
             return [options](const CommonOptions& common) { return run_study(*options, common); };

@@ -2,10 +2,7 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
-#include <array>
 #include <filesystem>
-#include <set>
 
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/add/add_report.h"
@@ -13,10 +10,10 @@
 #include "analysis/commands/diagnose/diagnose_report.h"
 #include "analysis/commands/diagnose/remainder_output.h"
 #include "analysis/commands/shared/effect_output.h"
+#include "analysis/commands/shared/report_head.h"
 #include "analysis/commands/shared/time_plots.h"
 #include "analysis/commands/study/study_output.h"
 #include "analysis/report/report.h"
-#include "analysis/report/report_text.h"
 #include "nn/base/file_io.h"
 
 namespace swarmcert::analysis {
@@ -49,46 +46,6 @@ void add_findings(Report& report, const Study& study) {
         rows);
 }
 
-void add_moments(Report& report, const Study& study, const residuals::ForceUnit& unit) {
-  std::vector<ShownMoment> shown;
-  for (const residuals::Moment& moment : study.before.all.moments) {
-    for (const residuals::TrackErrors& track : study.before.all.tracks) {
-      if (track.path != moment.path) continue;
-      shown.push_back({series_name(track), moment.time_s, track.flight, moment.time_s - track.clock_offset_s,
-                       fmt::format("{:.3g} {}", moment.residual_N.norm() * unit.per_newton(), unit.name)});
-    }
-  }
-  if (shown.empty()) return;
-  report.paragraph("The worst moments of the given model, means over 0.1 s:");
-  report.moments(shown);
-}
-
-std::size_t count_flights(const residuals::Comparison& comparison) {
-  std::set<std::string> flights;
-  for (const residuals::TrackErrors& track : comparison.tracks) flights.insert(track.flight);
-  return flights.size();
-}
-
-void add_replay(Report& report, const Study& study, const residuals::ForceUnit& unit) {
-  std::vector<Replay> flights;
-  for (const identification::ReplayFlight& flight : study.replay) {
-    Replay replay{flight.name, {}};
-    for (const identification::ReplayVehicle& vehicle : flight.vehicles) {
-      replay.vehicles.push_back({vehicle.name, vehicle.rows});
-      for (std::array<float, 10>& row : replay.vehicles.back().rows)
-        for (std::size_t k = 4; k < row.size(); ++k) row[k] *= static_cast<float>(unit.per_newton());
-    }
-    flights.push_back(std::move(replay));
-  }
-  if (flights.empty()) return;
-  report.heading("In space");
-  report.replay(flights, unit.name,
-                fmt::format("{} of {} flights, those with the worst moments first. Arrows are the residual "
-                            "force on each vehicle under the given and under the fitted model; trails are "
-                            "4 s long. Drag, or use the arrow keys, to turn; + and - zoom.",
-                            flights.size(), count_flights(study.before.all)));
-}
-
 void add_changes(Report& report, const Changes& changes, const residuals::ForceUnit& unit) {
   report.heading("What changed against the other flights");
   for (const std::string& sentence : in_words(changes)) report.paragraph(sentence + ".");
@@ -103,25 +60,41 @@ void add_changes(Report& report, const Changes& changes, const residuals::ForceU
 
 using Notes = std::vector<std::string>;
 
-std::string write_page(const StudyResult& result, const Notes& notes, const residuals::ForceUnit& unit,
-                       const files::Json& document, const std::string& folder) {
+/// Lines that begin with a space are equations.
+void add_answer(Report& report, const StudyResult& result, const Notes& notes,
+                const residuals::ForceUnit& unit) {
+  report.paragraph(headline(result, unit));
+  for (const std::string& line : conclusions(result, unit)) {
+    if (line[0] == ' ')
+      report.literal(line.substr(line.find_first_not_of(' ')));
+    else
+      report.paragraph(line);
+  }
+  for (const std::string& note : notes) report.paragraph(note);
+  report.paragraph("Next:");
+  report.literal(result.next_command);
+}
+
+std::string write_page(const StudyResult& result, const StudyFlights& flights, const Notes& notes,
+                       const residuals::ForceUnit& unit, const files::Json& document,
+                       const std::string& folder) {
   const Study& study = result.study;
   Report report("What does the model lack?");
   report.made_by(command_to_copy());
   report.result(document);
-  report.paragraph(headline(result, unit));
-  for (const std::string& line : conclusions(result, unit)) report.paragraph(line);
-  for (const std::string& note : notes) report.paragraph(note);
-  report.paragraph("Next: " + result.next_command);
-  report.heading("Where the model failed");
-  add_before_and_after(report, study.before.all, study.after.all, study.pictures.room, unit);
-  add_moments(report, study, unit);
+  add_report_head(report, flights.inputs, study.before.all, &study.ladder);
+  add_answer(report, result, notes, unit);
   report.heading("What was missing");
-  if (study.pictures.effects.empty()) report.paragraph("No effect was added.");
+  if (result.causes.empty()) report.paragraph("No effect was added.");
   add_effect_curves(report, study.pictures.effects, unit);
   add_findings(report, study);
   report.heading("How the error fell");
   add_ladder_figure(report, study.ladder.rows, "ladder", unit);
+  add_prediction(report, {{"before", result.predicted_before}, {"after", result.predicted_after}});
+  report.heading("Where the model failed");
+  add_before_and_after(report, study.before.all, study.after.all, study.pictures.room, unit);
+  add_moments(report, study.before.all, unit);
+  add_flown(report, flights.flown, study.before.all, unit);
   report.heading("The remainder, and what to fly next");
   add_left(report, study.diagnosis, unit);
   add_remainder(report, study.diagnosis, 1, unit);
@@ -129,14 +102,19 @@ std::string write_page(const StudyResult& result, const Notes& notes, const resi
     report.paragraph("Another flight would not answer any of the questions that are still open.");
   for (const std::string& flight : result.next) report.paragraph("Fly " + flight + ".");
   if (result.changes) add_changes(report, *result.changes, unit);
-  add_time_series(report, study.after.all, &study.before.all, unit.name, unit.per_newton());
-  add_replay(report, study, unit);
   return report.write(folder, true, "study.html");
 }
 
 }  // namespace
 
-std::string write_study_folder(const StudyResult& result, const Notes& notes,
+StudyFlights studied(const Study& study, const residuals::Inputs& inputs, bool embeds) {
+  if (!embeds) return {inputs, {}};
+  residuals::Inputs fitted = inputs;
+  if (study.ladder.any_accepted) fitted.models[0] = study.ladder.model;
+  return {inputs, residuals::flown_signals(inputs, &fitted, study.before.all.moments)};
+}
+
+std::string write_study_folder(const StudyResult& result, const StudyFlights& flights, const Notes& notes,
                                const residuals::ForceUnit& unit, const files::Json& document,
                                const std::string& folder) {
   const std::filesystem::path path(folder);
@@ -148,7 +126,7 @@ std::string write_study_folder(const StudyResult& result, const Notes& notes,
                       true);
   }
   files::write_file((path / "study.json").string(), files::to_text(document), true);
-  return write_page(result, notes, unit, document, folder);
+  return write_page(result, flights, notes, unit, document, folder);
 }
 
 }  // namespace swarmcert::analysis

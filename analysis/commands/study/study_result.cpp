@@ -23,7 +23,8 @@ void describe_group(Record& record, const residuals::GroupErrors& errors) {
   add("max", s.max, "Its largest magnitude.");
 }
 
-void describe_errors(Record& record, const StudyErrors& errors, const std::optional<Prediction>& prediction) {
+void describe_study_errors(Record& record, const StudyErrors& errors,
+                           const std::optional<Prediction>& prediction) {
   record.object("all", "On all flights.", [&](Record& r) { describe_group(r, errors.all.overall); });
   record.object("test", "On what is held out.", [&](Record& r) { describe_group(r, errors.test.overall); });
   record.may("prediction", prediction, "Of half a second from each measured state of what is held out.");
@@ -49,9 +50,9 @@ void describe_changes(Record& record, const Changes& changes) {
 void describe(Record& record, const StudyResult& result) {
   const identification::Study& study = result.study;
   record.object("before", "Errors of the given model.",
-                [&](Record& r) { describe_errors(r, study.before, result.predicted_before); });
+                [&](Record& r) { describe_study_errors(r, study.before, result.predicted_before); });
   record.object("after", "Errors of the fitted model.",
-                [&](Record& r) { describe_errors(r, study.after, result.predicted_after); });
+                [&](Record& r) { describe_study_errors(r, study.after, result.predicted_after); });
   record.field("fails", result.fails, "Where the given model fails.");
   record.field("causes", result.causes, "What was added, in order, and what each is worth.");
   record.object("held_out", "What no fit has seen; errors of causes are of these.", [&](Record& r) {

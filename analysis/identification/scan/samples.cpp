@@ -24,7 +24,7 @@ constexpr double kMean_s = 0.1;
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 constexpr double kHeightOfNeighbours_m = 1.5;
 
-using Values = std::array<double, static_cast<std::size_t>(kNumScanVariables)>;
+using Values = ScanValues;
 
 double& at(Values& values, ScanVariable variable) { return values[static_cast<std::size_t>(variable)]; }
 
@@ -164,14 +164,10 @@ class TrackSampler {
   void add(std::size_t i) {
     using V = ScanVariable;
     const Instant& now = track_.instants[i];
-    Values values{}, commanded;
+    Values values = scan_values(now), commanded;
     commanded.fill(std::numeric_limits<double>::quiet_NaN());
-    set_motion(now, values);
-    set_neighbour(now, values);
     at(values, V::kAirspeed) = (now.v_W_m_s - wind_m_s_).norm();
     for (std::size_t r = 0; r < 4; ++r) values[static_cast<std::size_t>(V::kDuty1) + r] = track_.duty[i][r];
-    for (const V setpoint : {V::kSetpointX, V::kSetpointY, V::kSetpointZ})
-      at(values, setpoint) = std::numeric_limits<double>::quiet_NaN();
     if (!wanted_.empty()) {
       const Instant& wanted = wanted_[i];
       set_motion(wanted, commanded);
@@ -345,6 +341,14 @@ const std::vector<ScanColumn>& scan_columns(ScanQuantity quantity) {
       {"rotor_force", "body", "rotor_2", "N", ""},     {"rotor_force", "body", "rotor_3", "N", ""},
       {"rotor_force", "body", "rotor_4", "N", ""}};
   return quantity == ScanQuantity::kForce ? kForces : kBalances;
+}
+
+ScanValues scan_values(const stability::Instant& now) {
+  ScanValues values;
+  values.fill(std::numeric_limits<double>::quiet_NaN());
+  set_motion(now, values);
+  set_neighbour(now, values);
+  return values;
 }
 
 const ScanVariableInfo& scan_variable(ScanVariable variable) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -75,6 +76,10 @@ struct ScanVariableInfo {
   bool in_world, in_body;  ///< used for forces along these axes
 };
 const ScanVariableInfo& scan_variable(ScanVariable variable);
+
+using ScanValues = std::array<double, static_cast<std::size_t>(kNumScanVariables)>;
+/// Returns what an instant tells of the variables; the others are NaN.
+ScanValues scan_values(const stability::Instant& now);
 
 /// Relative position and velocity of the laterally nearest neighbour within 1.5 m in height, now and up to 0.5 s ago.
 struct NeighbourPlaces {

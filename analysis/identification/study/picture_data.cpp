@@ -2,19 +2,63 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
+#include <tuple>
+#include <utility>
 
-#include "analysis/identification/study/residual_under.h"
+#include "analysis/identification/scan/samples.h"
+#include "analysis/residuals/residual_under.h"
+#include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
 namespace {
 
 constexpr double kPictureBlock_s = 2;
 
+/// Variables over which effects may be drawn: those of the scan that an instant tells, and two more.
+constexpr std::size_t kScanned = static_cast<std::size_t>(kNumScanVariables);
+constexpr std::size_t kThrustRate = kScanned, kBesideUpper = kScanned + 1, kDrawable = kScanned + 2;
+using Drawable = std::array<float, kDrawable>;
+
+std::pair<std::string, std::string> name_and_unit(std::size_t variable) {
+  if (variable == kThrustRate) return {"rate of the thrust", "N/s"};
+  if (variable == kBesideUpper) return {"distance beside the vehicle above", "m"};
+  const ScanVariableInfo& info = scan_variable(static_cast<ScanVariable>(variable));
+  std::string unit = info.unit;
+  std::replace(unit.begin(), unit.end(), '_', '/');
+  return {info.name, unit};
+}
+
+/// The horizontal distance to the nearest vehicle that is higher; NaN if there is none.
+double beside_upper_m(const stability::Instant& now) {
+  double least_m = std::numeric_limits<double>::quiet_NaN();
+  for (int j = 0; j < now.num_neighbours; ++j) {
+    const Eigen::Vector3d& dp_m = now.neighbours[j].dp_W_m;
+    if (dp_m.z() > 0 && !(dp_m.head<2>().norm() >= least_m)) least_m = dp_m.head<2>().norm();
+  }
+  return least_m;
+}
+
+Drawable drawable_of(const residuals::Track& track, std::size_t i) {
+  const stability::Instant& now = track.instants[i];
+  const ScanValues values = scan_values(now);
+  Drawable all;
+  std::transform(values.begin(), values.end(), all.begin(), [](double x) { return static_cast<float>(x); });
+  all[kThrustRate] = std::numeric_limits<float>::quiet_NaN();
+  if (i > 0 && track.restarts[i] == 0) {
+    const stability::Instant& last = track.instants[i - 1];
+    all[kThrustRate] = static_cast<float>((now.thrust_N - last.thrust_N) / (now.time_s - last.time_s));
+  }
+  all[kBesideUpper] = static_cast<float>(beside_upper_m(now));
+  return all;
+}
+
 /// Residuals of the uncut records of a track with several models.
 struct Records {
+  std::vector<Drawable> variables;
   std::vector<Eigen::Vector2f> place_m;
   std::vector<int> block;
   std::vector<std::vector<Eigen::Vector3f>> residual_N;  ///< [model][record]
@@ -23,7 +67,8 @@ struct Records {
 void add_track(const residuals::Track& track, const std::vector<stability::Model>& models,
                const residuals::Inputs& inputs, int& next_block, Records& all) {
   std::vector<std::vector<Eigen::Vector3d>> residual;
-  for (const stability::Model& model : models) residual.push_back(residual_under(model, inputs, track));
+  for (const stability::Model& model : models)
+    residual.push_back(residuals::residual_under(model, inputs, track));
   double block_start_s = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
     if (track.cut[i] != residuals::Cut::kNone) continue;
@@ -33,6 +78,7 @@ void add_track(const residuals::Track& track, const std::vector<stability::Model
       ++next_block;
     }
     all.place_m.emplace_back(now.p_W_m.head<2>().cast<float>());
+    all.variables.push_back(drawable_of(track, i));
     all.block.push_back(next_block);
     for (std::size_t m = 0; m < models.size(); ++m) all.residual_N[m].push_back(residual[m][i].cast<float>());
   }
@@ -92,20 +138,117 @@ RoomMap room_map(const Records& records, std::size_t before, std::size_t after) 
   return map;
 }
 
+/// The middle 99 % of the values of a variable, in steps.
+struct VariableSteps {
+  static constexpr int kCount = 100;
+  double lower = 0, width = 0;
+
+  /// -1: unknown or outside.
+  int of(float value) const {
+    const double place = (static_cast<double>(value) - lower) / width;
+    return place >= 0 && place <= kCount ? std::min(kCount - 1, static_cast<int>(place)) : -1;
+  }
+};
+
+VariableSteps steps_over(const Records& records, std::size_t variable) {
+  std::vector<float> values;
+  for (const Drawable& all : records.variables)
+    if (std::isfinite(all[variable])) values.push_back(all[variable]);
+  if (values.size() < records.variables.size() / 20 + 1) return {};
+  const auto quantile = [&values](double share) {
+    const auto at =
+        values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return static_cast<double>(*at);
+  };
+  const double lower = quantile(0.005), upper = quantile(0.995);
+  return {lower, (upper - lower) / VariableSteps::kCount};
+}
+
+/// Sum and number of the values within a step.
+struct StepSum {
+  double sum = 0, count = 0;
+  double mean() const { return sum / count; }
+};
+using StepSums = std::array<StepSum, VariableSteps::kCount>;
+
+StepSums sums_over(const Records& records, std::size_t variable, const VariableSteps& steps,
+                   const std::vector<double>& force_N) {
+  StepSums sums;
+  for (std::size_t i = 0; i < force_N.size(); ++i) {
+    const int step = steps.of(records.variables[i][variable]);
+    if (step < 0) continue;
+    sums[static_cast<std::size_t>(step)].sum += force_N[i];
+    ++sums[static_cast<std::size_t>(step)].count;
+  }
+  return sums;
+}
+
+/// Returns the sum of squares about the mean of all that the means of the steps explain.
+double explained_N2(const StepSums& sums, double mean_N) {
+  double explained = 0;
+  for (const StepSum& step : sums)
+    if (step.count > 0) explained += step.count * (step.mean() - mean_N) * (step.mean() - mean_N);
+  return explained;
+}
+
+/// The force of one effect at each record along one axis, and what is measured of it.
+struct EffectForce {
+  std::vector<double> predicted_N, measured_N;
+  double mean_N = 0, squares_N2 = 0;  ///< of predicted_N; squares about the mean
+};
+
+EffectForce effect_force(const Records& records, std::size_t with, std::size_t without, int axis) {
+  EffectForce force;
+  for (std::size_t i = 0; i < records.block.size(); ++i) {
+    force.measured_N.push_back(static_cast<double>(records.residual_N[without][i][axis]));
+    force.predicted_N.push_back(force.measured_N.back() -
+                                static_cast<double>(records.residual_N[with][i][axis]));
+    force.mean_N += force.predicted_N.back();
+  }
+  force.mean_N /= static_cast<double>(records.block.size());
+  for (const double x : force.predicted_N) force.squares_N2 += (x - force.mean_N) * (x - force.mean_N);
+  return force;
+}
+
+/// Joins steps to at most kBins bins, each with the same part of the range and of the way of the force over it.
+std::array<std::size_t, VariableSteps::kCount> bins_of(const StepSums& sums) {
+  constexpr double kBins = 24;
+  std::array<double, VariableSteps::kCount> way;
+  double last = 0, total = 0;
+  bool has_last = false;
+  for (std::size_t k = 0; k < way.size(); ++k) {
+    if (sums[k].count > 0) {
+      total += has_last ? std::abs(sums[k].mean() - last) : 0;
+      last = sums[k].mean();
+      has_last = true;
+    }
+    way[k] = total;
+  }
+  std::array<std::size_t, VariableSteps::kCount> bins;
+  for (std::size_t k = 0; k < way.size(); ++k) {
+    const double range = static_cast<double>(k) / VariableSteps::kCount;
+    bins[k] = static_cast<std::size_t>((kBins - 1) * (total > 0 ? (range + way[k] / total) / 2 : range));
+  }
+  return bins;
+}
+
 /// Returns one bin of an effect's curve. The error is that of the mean over blocks, as records within a block are
 /// correlated.
-EffectCurve::Point point_of(const std::vector<std::size_t>& bin, const std::vector<double>& predicted_N,
-                            const std::vector<double>& measured_N, const std::vector<int>& block) {
+EffectCurve::Point point_of(const std::vector<std::size_t>& bin, const EffectForce& force,
+                            const Records& records, std::size_t variable) {
   EffectCurve::Point point;
   std::map<int, std::pair<double, double>> blocks;  // sum, count
   for (const std::size_t i : bin) {
-    point.predicted_N += predicted_N[i];
-    point.measured_N += measured_N[i];
-    blocks[block[i]].first += measured_N[i];
-    blocks[block[i]].second += 1;
+    point.at += static_cast<double>(records.variables[i][variable]);
+    point.predicted_N += force.predicted_N[i];
+    point.measured_N += force.measured_N[i];
+    blocks[records.block[i]].first += force.measured_N[i];
+    blocks[records.block[i]].second += 1;
   }
   const auto count = static_cast<double>(bin.size());
   point.records = bin.size();
+  point.at /= count;
   point.predicted_N /= count;
   point.measured_N /= count;
   double squares = 0;
@@ -117,38 +260,49 @@ EffectCurve::Point point_of(const std::vector<std::size_t>& bin, const std::vect
   return point;
 }
 
-EffectCurve effect_curve(const Records& records, const std::string& effect, std::size_t with,
+bool may_vary_with(const std::string& effect, std::size_t variable) {
+  const stability::EffectTraits& traits = stability::traits_of(effect);
+  return traits.variables.empty() || traits.varies_with(name_and_unit(variable).first);
+}
+
+EffectCurve effect_curve(const Records& records, const stability::EffectSpec& effect, std::size_t with,
                          std::size_t without) {
-  constexpr std::size_t kBins = 12, kFewest = 20;
-  const std::size_t count = records.block.size();
+  constexpr std::size_t kFewest = 20;
   EffectCurve curve;
-  curve.effect = effect;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero(), squares = mean;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Eigen::Vector3d force =
-        (records.residual_N[without][i] - records.residual_N[with][i]).cast<double>();
-    mean += force;
-    squares += force.cwiseAbs2();
+  curve.effect = effect.name + (effect.vehicle.empty() ? "" : " of " + effect.vehicle);
+  if (records.block.empty()) return curve;
+  double best_N2 = 0;
+  std::size_t variable = kDrawable;
+  EffectForce force;
+  VariableSteps steps;
+  StepSums sums;
+  for (int axis = 0; axis < 3; ++axis) {
+    EffectForce along = effect_force(records, with, without, axis);
+    for (std::size_t v = 0; v < kDrawable && along.squares_N2 > best_N2; ++v) {
+      const VariableSteps over = may_vary_with(effect.name, v) ? steps_over(records, v) : VariableSteps{};
+      if (!(over.width > 0)) continue;
+      const StepSums of = sums_over(records, v, over, along.predicted_N);
+      const double explained = explained_N2(of, along.mean_N);
+      if (!(explained > best_N2)) continue;
+      best_N2 = explained;
+      variable = v;
+      force = along;
+      steps = over;
+      sums = of;
+      curve.axis = "xyz"[axis];
+    }
   }
-  if (count == 0) return curve;
-  mean /= static_cast<double>(count);
-  int axis = 2;
-  (squares / static_cast<double>(count) - mean.cwiseAbs2()).maxCoeff(&axis);
-  curve.axis = "xyz"[axis];
-  std::vector<double> predicted_N(count), measured_N(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    measured_N[i] = static_cast<double>(records.residual_N[without][i][axis]);
-    predicted_N[i] = measured_N[i] - static_cast<double>(records.residual_N[with][i][axis]);
-  }
-  const auto [least, most] = std::minmax_element(predicted_N.begin(), predicted_N.end());
-  if (!(*most > *least)) return curve;  // an effect that is constant has no curve
-  std::vector<std::vector<std::size_t>> bins(kBins);
-  for (std::size_t i = 0; i < count; ++i) {
-    const double place = (predicted_N[i] - *least) / (*most - *least);
-    bins[std::min(kBins - 1, static_cast<std::size_t>(place * kBins))].push_back(i);
+  if (variable == kDrawable) return curve;  // an effect that is constant has no curve
+  std::tie(curve.variable, curve.unit) = name_and_unit(variable);
+  curve.share = std::min(1.0, best_N2 / force.squares_N2);
+  const auto bin_of_step = bins_of(sums);
+  std::vector<std::vector<std::size_t>> bins(bin_of_step.back() + 1);
+  for (std::size_t i = 0; i < records.block.size(); ++i) {
+    const int step = steps.of(records.variables[i][variable]);
+    if (step >= 0) bins[bin_of_step[static_cast<std::size_t>(step)]].push_back(i);
   }
   for (const std::vector<std::size_t>& bin : bins)
-    if (bin.size() >= kFewest) curve.points.push_back(point_of(bin, predicted_N, measured_N, records.block));
+    if (bin.size() >= kFewest) curve.points.push_back(point_of(bin, force, records, variable));
   return curve;
 }
 
@@ -157,19 +311,15 @@ EffectCurve effect_curve(const Records& records, const std::string& effect, std:
 PictureData picture_data(const residuals::Inputs& inputs, const stability::Model& before,
                          const stability::Model& after) {
   std::vector<stability::Model> models = {before, after};
-  std::vector<std::string> names;
   for (std::size_t k = 0; k < after.effects.size(); ++k) {
-    stability::Model without = after;
-    without.effects.erase(without.effects.begin() + static_cast<std::ptrdiff_t>(k));
-    models.push_back(without);
-    const stability::EffectSpec& effect = after.effects[k];
-    names.push_back(effect.name + (effect.vehicle.empty() ? "" : " of " + effect.vehicle));
+    models.push_back(after);
+    models.back().effects.erase(models.back().effects.begin() + static_cast<std::ptrdiff_t>(k));
   }
   const Records records = collect(inputs, models);
   PictureData data;
   data.room = room_map(records, 0, 1);
-  for (std::size_t k = 0; k < names.size(); ++k) {
-    EffectCurve curve = effect_curve(records, names[k], 1, 2 + k);
+  for (std::size_t k = 0; k < after.effects.size(); ++k) {
+    EffectCurve curve = effect_curve(records, after.effects[k], 1, 2 + k);
     if (curve.points.size() >= 3) data.effects.push_back(std::move(curve));
   }
   return data;

@@ -1,4 +1,5 @@
-/// @file Data for the figures of a study: residuals over the room before and after, and each effect as measured.
+/// @file Data for the figures of a study: residuals over the room before and after, and the force of
+/// each effect over its own variable.
 #pragma once
 
 #include <string>
@@ -21,22 +22,26 @@ struct RoomMap {
   std::vector<Cell> cells;  ///< [kCells * kCells], x fastest; empty without flight
 };
 
-/// An effect compared with flights: the residual of the model with all other effects, over the prediction of this
-/// effect. If the effect describes the flights, the points lie on the diagonal.
+/// An effect over its own variable: the force that it exerts, and what is measured of it, the residual of the model
+/// with all other effects.
 struct EffectCurve {
   std::string effect;
-  char axis = 'z';  ///< the world axis in which the effect varies most
+  char axis = 'z';  ///< of the world
+  std::string variable,
+      unit;          ///< "z", "m": of those that the effect is known to vary with, the one that explains most
+  double share = 0;  ///< of the effect's variance along the axis that the variable explains: estimate
   struct Point {
+    double at = 0;                           ///< mean of the variable
     double predicted_N = 0, measured_N = 0;  ///< means of the bin
     double error_N = 0;                      ///< standard error of measured_N over blocks of 2 s
     std::size_t records = 0;
   };
-  std::vector<Point> points;  ///< sorted by predicted_N
+  std::vector<Point> points;  ///< by the variable; denser where the force is steep
 };
 
 struct PictureData {
   RoomMap room;
-  std::vector<EffectCurve> effects;  ///< for effects of the fitted model that exert a force, in their order
+  std::vector<EffectCurve> effects;  ///< for effects of the fitted model whose force varies, in their order
 };
 
 /// @param before, after models of the same kind of vehicle; vehicles of other kinds are ignored

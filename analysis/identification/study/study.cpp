@@ -69,7 +69,6 @@ Study study(const residuals::Inputs& inputs, const std::optional<Split>& split, 
   result.after = errors_of(inputs, divided, chosen, fitted, jobs);
   progress(4, kSteps, "pictures");
   result.pictures = picture_data(inputs, given, fitted);
-  result.replay = replay_data(inputs, given, fitted, result.before.all.moments);
   progress(kSteps, kSteps, "done");
   return result;
 }

@@ -9,7 +9,6 @@
 #include "analysis/identification/diagnose.h"
 #include "analysis/identification/ladder.h"
 #include "analysis/identification/study/picture_data.h"
-#include "analysis/identification/study/replay_data.h"
 #include "analysis/residuals/comparison.h"
 #include "analysis/residuals/prediction.h"
 
@@ -29,7 +28,6 @@ struct Study {
   Ladder ladder;        ///< effects added one by one; ladder.model is the fitted model
   StudyErrors before, after;
   PictureData pictures;
-  std::vector<ReplayFlight> replay;  ///< flights with the worst moments of the given model first
 };
 
 /// Reports progress: number of steps done, out of all steps, and the current activity.
