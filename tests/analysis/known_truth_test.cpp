@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "analysis/identification/diagnose.h"
+#include "analysis/identification/ladder.h"
 #include "data.h"
 
 namespace swarmcert::identification {
@@ -88,6 +89,48 @@ TEST(KnownTruth, StrongerMotorsAreAThrustRatioThenDrag) {
     EXPECT_LT(diagnosis.ranking[1].parameters.at("drag_N_s_m"), 0.014);
     EXPECT_EQ(place_of(diagnosis, "ceiling"), -1) << "flights that never come away from one show none";
   }
+}
+
+/// Returns the ladder of `add auto`, with a mass for every flight.
+Ladder ladder_of(const std::vector<std::string>& flights, double mass_kg) {
+  residuals::InputArguments arguments;
+  arguments.models = {tests::source_path("stability/models/crazyflie-small.toml")};
+  for (const std::string& flight : flights)
+    arguments.flights.push_back(tests::data_path("collections/" + flight));
+  residuals::Inputs inputs = residuals::read_inputs(arguments);
+  inputs.models[0].mass_kg = mass_kg;
+  return climb(inputs, {}, 2, [](int, int) {});
+}
+
+TEST(KnownTruth, WhatIsAddedRaisesNoErrorOfFlightsThatNothingSaw_slow) {
+  if (!has_collection("crazypad")) GTEST_SKIP() << "no recorded data";
+  std::vector<std::vector<std::string>> sets = {{"crazypad/normal_flight"},
+                                                {"crazypad/tape_on_propeller_M3"},
+                                                {"crazypad/weight_on_string_W2_near_M3"},
+                                                {"crazypad"},
+                                                {"nanobench"},
+                                                {"nanodrone"},
+                                                {"crazyswarm2-tools"}};
+  // Of the same vehicle, five flights each; log41 flies 0.4 m higher than log36 to log39.
+  for (const int first : {12, 36, 43, 49, 121, 133}) {
+    sets.emplace_back();
+    for (int log = first; log < first + 5; ++log) {
+      const std::string name = "crazyswarm2-tools/logs/log" + std::to_string(log);
+      if (has_collection(name)) sets.back().push_back(name);
+    }
+  }
+  int judged = 0;
+  for (const std::vector<std::string>& set : sets) {
+    const Ladder ladder = ladder_of(set, 0.0375);
+    if (!ladder.too_poor.empty() || !ladder.is_tested) continue;
+    SCOPED_TRACE(set[0]);
+    double last_N = ladder.rows[0].test_rmse_N;
+    for (const stability::LadderRow& row : ladder.rows)
+      if (row.accepted) last_N = row.test_rmse_N;
+    EXPECT_LE(last_N, 1.01 * ladder.rows[0].test_rmse_N);
+    ++judged;
+  }
+  EXPECT_GE(judged, 7);
 }
 
 }  // namespace
