@@ -199,7 +199,8 @@ TurningFlights::NormalEquations TurningFlights::normal_equations(const TurningTr
   for (Eigen::Index k = -1; k < unknowns; ++k) {
     Eigen::VectorXd changed = c;
     if (k >= 0) changed[k] += coefficients.difference(k);
-    predictors.emplace_back(with_effects(t.model, coefficients.specs(changed)), kinds_, t.track);
+    predictors.emplace_back(with_effects(t.model, coefficients.specs(changed)), kinds_, t.track,
+                            residuals::Between::kMean);
   }
   NormalEquations sum = {Eigen::MatrixXd::Zero(unknowns, unknowns), Eigen::VectorXd::Zero(unknowns), 0, {}};
   std::vector<PredictedState> states(predictors.size());

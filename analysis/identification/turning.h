@@ -2,7 +2,8 @@
 ///
 /// Logged torques of rotors are noisy, and the attitude loop reacts to what they lack: a regression of omega' on them
 /// understates every gain, and what multiplies the rates or the velocity takes over what is missing. Here the model is
-/// integrated from measured states (analysis/residuals/prediction.h), and the coefficients c minimise
+/// integrated from measured states (analysis/residuals/prediction.h), with the means of two records between them, and
+/// the coefficients c minimise
 ///   sum_(starts, steps h) rho(|omega_h(c) - omega_h| / s_omega) + rho(|theta_h(c)| / s_theta),
 /// with theta_h the rotation from the measured to the predicted attitude, s the root mean square of these errors if
 /// nothing changes over the horizon, and rho Huber's loss. They predict best over the horizon from such signals; they

@@ -33,8 +33,6 @@ class TurningSearch {
   double error_ratio(const Turned& next) const { return error_ratio(next, kNorm); }
   /// Returns the best of `names` that explain a motion: the error about an axis falls by 5 %, and by as much of what the
   /// rate about that axis does in flight as an effect of the force needs to be found; that of the vector does not rise.
-  /// Torques that are held from record to record are late: without the second, what makes up for that would be an
-  /// effect.
   std::optional<Turned> best_of(const std::vector<std::string>& names) const;
   void accept(const Turned& next) { accepted_ = next; }
 

@@ -67,8 +67,9 @@ void divide(PredictionErrors& errors, double count) {
 
 }  // namespace
 
-Predictor::Predictor(const stability::Model& model, const Kinds& kinds, const Track& track)
+Predictor::Predictor(const stability::Model& model, const Kinds& kinds, const Track& track, Between between)
     : track_(track),
+      between_(between),
       mass_kg_(model.mass_kg),
       inertia_kg_m2_(model.inertia_kg_m2[0], model.inertia_kg_m2[1], model.inertia_kg_m2[2]),
       rotor_torque_B_Nm_(rotor_torques(model, kinds, track)) {
@@ -107,11 +108,12 @@ Predictor::Slope Predictor::slope(std::size_t record, const PredictedState& stat
   now.v_W_m_s = state.v_W_m_s;
   now.R_WB = state.q_WB.toRotationMatrix();
   now.omega_B_rad_s = state.omega_B_rad_s;
-  if (has_torque()) now.torque_B_Nm = rotor_torque_B_Nm_[record];
+  now.thrust_N = between(record, [&](std::size_t i) { return track_.instants[i].thrust_N; });
+  if (has_torque()) now.torque_B_Nm = between(record, [&](std::size_t i) { return rotor_torque_B_Nm_[i]; });
   stability::Wrench sum = {now.thrust_N * now.b3_W(), now.torque_B_Nm};
   if (!remembered_.empty()) {
-    sum.force_W_N += remembered_[record].force_W_N;
-    sum.torque_B_Nm += remembered_[record].torque_B_Nm;
+    sum.force_W_N += between(record, [&](std::size_t i) { return remembered_[i].force_W_N; });
+    sum.torque_B_Nm += between(record, [&](std::size_t i) { return remembered_[i].torque_B_Nm; });
   }
   for (const auto& effect : effects_) {
     const stability::Wrench wrench = effect->wrench(now);

@@ -30,12 +30,17 @@ struct PredictedState {
 /// Length of PredictedState as numbers: x y z vx vy vz qx qy qz qw wx wy wz.
 inline constexpr int kPredictedNumbers = 13;
 
+/// What acts between two records: the thrust and the torque of the first, as a prediction knows them, or the means of
+/// both, which do not come half a step late.
+enum class Between { kFirst, kMean };
+
 /// Predicts along one track. The track must outlive it.
 class Predictor {
  public:
   /// Precondition: apply_model(), and the track has rates.
   /// @throws files::InputError if an effect of the model cannot be created.
-  Predictor(const stability::Model& model, const Kinds& kinds, const Track& track);
+  Predictor(const stability::Model& model, const Kinds& kinds, const Track& track,
+            Between between = Between::kFirst);
 
   /// False if the log does not give the force of each rotor: then omega' = 0.
   bool has_torque() const { return !rotor_torque_B_Nm_.empty(); }
@@ -52,7 +57,15 @@ class Predictor {
   };
   Slope slope(std::size_t record, const PredictedState& state) const;
 
+  /// Returns a quantity of each record between `record` and the next one.
+  template <class Quantity>
+  auto between(std::size_t record, const Quantity& of) const {
+    using Value = std::decay_t<decltype(of(record))>;
+    return between_ == Between::kFirst ? Value(of(record)) : Value((of(record) + of(record + 1)) / 2);
+  }
+
   const Track& track_;
+  Between between_;
   double mass_kg_;
   Eigen::Vector3d inertia_kg_m2_;
   std::vector<Eigen::Vector3d> rotor_torque_B_Nm_;  ///< empty: has_torque() is false

@@ -22,7 +22,7 @@ const Eigen::Vector3d kTurnedInertia_kg_m2(2.6e-5, 2.6e-5, 4.6e-5);
 /// The truth about the torques, relative to the model below.
 struct TurningTruth {
   Eigen::Vector3d change = Eigen::Vector3d::Zero();  ///< of the torque of the rotors
-  double flow_N_s = 0, damping_N_m_s = 0;
+  double flow_N_s = 0, damping_N_m_s = 0, rotor_inertia_kg_m2 = 0;
 };
 
 std::string turned_model() {
@@ -62,6 +62,9 @@ class TurningFlight {
 
   double noise(double sigma) { return std::normal_distribution<double>(0, sigma)(random_); }
 
+  /// The sum of the speeds, counterclockwise positive.
+  double spin() const { return Eigen::Vector4d(1, -1, 1, -1).dot(speed_rad_s_); }
+
   Eigen::Vector4d forces_N() const { return kForcePerSquare * speed_rad_s_.cwiseAbs2(); }
 
   Eigen::Vector3d specific_force_B() const {
@@ -85,12 +88,15 @@ class TurningFlight {
                                 torque.z() / kTorquePerThrust_m);
     const double signs[4][3] = {{-1, -1, -1}, {-1, 1, 1}, {1, 1, -1}, {1, -1, 1}};
     Eigen::Vector3d rotors = Eigen::Vector3d::Zero();
+    const double spin_rad_s = spin();
     for (int k = 0; k < 4; ++k) {
       const Eigen::Vector3d sign(signs[k]);
       const double force_N = std::max((thrust_N + sign.dot(share)) / 4, 0.01);
       speed_rad_s_[k] += kStep_s / 0.03 * (std::sqrt(force_N / kForcePerSquare) - speed_rad_s_[k]);
       rotors += forces_N()[k] * sign.cwiseProduct(Eigen::Vector3d(kLever_m, kLever_m, kTorquePerThrust_m));
     }
+    const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+    rotors -= truth_.rotor_inertia_kg_m2 * ((spin() - spin_rad_s) / kStep_s * up + omega_.cross(spin() * up));
     const Eigen::Vector3d v_B = R.transpose() * v_;
     const Eigen::Vector3d sum = rotors + truth_.change.cwiseProduct(rotors) +
                                 truth_.flow_N_s * Eigen::Vector3d(v_B.y(), -v_B.x(), 0) -
@@ -157,6 +163,15 @@ TEST(Turning, FlowTorqueAndInertiaAreFoundTogetherWithTheirValues) {
   const files::Json& ratio = (*cause_named(result, "torque_ratio"))["parameters"]["change_x"];
   EXPECT_NEAR(ratio["value"].get<double>(), truth.change.x(), 0.1);
   EXPECT_LT(rate_error(result, "after"), 0.3 * rate_error(result, "before"));
+}
+
+TEST(Turning, MomentumOfTheRotorsIsFoundInTheYaw) {
+  TurningTruth truth;
+  truth.rotor_inertia_kg_m2 = 5e-8;
+  const files::Json result = study_of(truth);
+  ASSERT_NE(cause_named(result, "rotor_momentum"), nullptr) << result["causes"].dump(1);
+  const files::Json& inertia = (*cause_named(result, "rotor_momentum"))["parameters"]["inertia_kg_m2"];
+  EXPECT_NEAR(inertia["value"].get<double>(), 5e-8, 1e-8);
 }
 
 TEST(Turning, WithNothingHiddenNothingIsClaimed) {
