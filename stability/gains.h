@@ -55,13 +55,7 @@ struct Gains {
 /// Describes gains.toml.
 void describe_gains_file(files::Keys& keys);
 
-/// Reads gains.toml (schema swarmcert/gains/1).
-///   [position] Kp, Kd, Ki: three numbers, or one for all axes; or Lambda, K: 3x3, three (diagonal), or one number.
-///              integrator_limit (m s), rate_hz, integrator_step_s: optional. Or, of the Crazyflie's Mellinger
-///              controller, kp_xy, kd_xy, ki_xy, i_range_xy and the same for z, with `mass`, which it is told, in kg.
-///   [attitude] law = "lee" | "robust"; KR, Kw, KI: three numbers about the body axes, or one for all; KI may be left
-///              out. [lag] motor_s, attitude_s, body_rate_s, delay_s;  [network] rate_hz, latency_s: optional.
-/// Does not check whether Lambda and K satisfy the theorem's hypotheses.
+/// Reads gains.toml. Does not check whether Lambda and K satisfy the theorem's hypotheses.
 /// @throws files::InputError with line, key, value and hint: unknown keys, both forms or neither, negative or
 ///     non-finite numbers, times above one second, rates outside 1 Hz .. 100 kHz, gains too large for any vehicle (Kp
 ///     above 1e7 1/s^2, ...), an integrator step without a rate.

@@ -164,10 +164,6 @@ void describe_head(files::Record& record, const std::string& command, const std:
 
 }  // namespace
 
-files::Json result_head(const std::string& command, const std::vector<std::string>& input_files) {
-  return files::to_json(described_result(command, input_files, std::nullopt, [](files::Record&) {}));
-}
-
 files::Node described_result(const std::string& command, const std::vector<std::string>& input_files,
                              std::optional<std::uint64_t> seed,
                              const std::function<void(files::Record&)>& describe_fields) {
@@ -202,13 +198,11 @@ void refuse_folder(const CommonOptions& common, const std::string& folder) {
       {folder, "", "", "", "exists and is not an empty folder", "--force writes into it"});
 }
 
-void write_result(const CommonOptions& common, const files::Json& result) {
-  if (host() != nullptr) host()->result = result;
-  if (!common.json.empty()) files::write_file(common.json, files::to_text(result), common.force);
-}
-
 void write_result(const CommonOptions& common, const files::Node& result) {
-  if (host() != nullptr || !common.json.empty()) write_result(common, files::to_json(result));
+  if (host() == nullptr && common.json.empty()) return;
+  const files::Json json = files::to_json(result);
+  if (host() != nullptr) host()->result = json;
+  if (!common.json.empty()) files::write_file(common.json, files::to_text(json), common.force);
 }
 
 std::vector<std::string> input_files(const files::Network& network) {

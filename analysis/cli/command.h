@@ -74,12 +74,9 @@ files::Network load_any_net(const files::NetworkArguments& arguments);
 /// much rounding of folded weights can change slopes.
 std::vector<std::string> reading_notes(const files::Weights& weights);
 
-/// Returns the head of a result: schema "swarmcert/<command>/1", tool version, SHA-256 of every input file,
-/// and the command line without options that cannot change the result (--jobs, -q, --force, output paths).
-/// `seed` is null until it is set.
-files::Json result_head(const std::string& command, const std::vector<std::string>& input_files);
-
-/// Returns the result of `command`: its head, as result_head(), then the fields that `describe_fields` describes.
+/// Returns the result of `command`: its head, then the fields that `describe_fields` describes. The head is the schema
+/// "swarmcert/<command>/1", tool version, SHA-256 of every input file, seed, and the command line without options that
+/// cannot change the result (--jobs, -q, --force, output paths).
 /// @param seed of the random numbers; empty if none are used
 files::Node described_result(const std::string& command, const std::vector<std::string>& input_files,
                              std::optional<std::uint64_t> seed,
@@ -112,7 +109,6 @@ void refuse_to_replace(const CommonOptions& common, const std::string& path);
 void refuse_folder(const CommonOptions& common, const std::string& folder);
 
 /// Writes `result` to the destination given by --json, if any, and passes it to the host, if there is one.
-void write_result(const CommonOptions& common, const files::Json& result);
 void write_result(const CommonOptions& common, const files::Node& result);
 
 /// Returns the files from which NET was read; empty for a network supplied by the host.

@@ -90,12 +90,11 @@ using Fleet = std::map<std::string, VehicleUse>;
 /// Describes flights.toml.
 void describe_flights_file(files::Keys& keys);
 
-/// Reads `[vehicle.cf50] model = "...", use = "all" | "position"`; model paths are relative to the file's folder.
+/// Reads the tables [vehicle.NAME]; model paths are relative to the file's folder.
 /// @throws files::InputError with line and key; also if a model cannot be read.
 Fleet read_fleet(const std::string& path);
 
-/// Reads the tables [log."NAME"] of the same file, where NAME may contain wildcards: vehicle, flight, model, gains,
-/// mass_kg and use ("all", "position" or "none"); paths are relative to the file's folder.
+/// Reads the tables [log."NAME"] of the same file, where NAME may contain wildcards.
 /// @throws files::InputError with line and key.
 LogRules read_log_rules(const std::string& path);
 

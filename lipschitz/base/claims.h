@@ -71,9 +71,8 @@ std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptio
 /// Describes box.toml.
 void describe_box_file(files::Keys& keys);
 
-/// Reads a box.toml: `schema = "swarmcert/box/1"`, `lower` and `upper` with one number per input of the plain network
-/// or of the neighbours' phi. An optional table `ground` has the same keys for the ground's inputs (-z and -v); without
-/// it, the ground gets the last four intervals.
+/// Reads a box.toml of the plain network's inputs or of the neighbours' phi; without a table `ground`, the ground's
+/// inputs (-z and -v) get the last four intervals.
 /// @throws files::InputError with line, field, value and hint.
 Domain read_domain(const std::string& path, const files::Network& network);
 

@@ -62,12 +62,7 @@ const std::vector<Quantity>& grid_quantities();
 /// Describes grid.toml.
 void describe_grid_file(files::Keys& keys);
 
-/// Reads grid.toml (schema swarmcert/grid/1):
-///   gains = "...", model = "...": files relative to the grid's folder; axis = "x" | "y" | "z"
-///   compute = [...]; pareto = [...]
-///   [axes.NAME] from, to, steps, scale = "linear" | "log"
-///   [limits.QUANTITY] least, most
-///   [disturbance] amplitude_N, rate_N_s, variation_N, impulse_N_s
+/// Reads grid.toml.
 /// @throws files::InputError with line, key, value and hint; more than ten million cells are refused.
 Grid load_grid(const std::string& path);
 

@@ -253,9 +253,9 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   learning::write_models(inputs, data.layout, options.output, outcome.kept());
   certify_and_score(options, common.jobs, data, network, outcome);
 
-  const files::Json result = files::to_json(
+  const files::Node result =
       described_result("train", files_of(flights), options.run.trainer.seed,
-                       [&](files::Record& record) { describe_training(record, options, data, outcome); }));
+                       [&](files::Record& record) { describe_training(record, options, data, outcome); });
   write_result(common, result);
   if (common.prints_text()) print_training(options, data, outcome);
   if (!options.report.empty()) {

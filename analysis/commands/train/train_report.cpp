@@ -118,14 +118,14 @@ void add_map(Report& report, const LearningData& data, const learning::Run& run,
 }  // namespace
 
 std::string write_train_report(const LearningData& data, const learning::Run& run,
-                               const learning::OutputSupport& support, const files::Json& result,
+                               const learning::OutputSupport& support, const files::Node& result,
                                const std::string& folder, bool overwrite) {
   Report report("Training of a deep set");
   report.made_by(command_to_copy());
   report.result(result);
   report.heading("Learning curve");
-  const bool was_taught = result["kept_seed"] == result["seed"];
-  add_curve(report, data, run, was_taught ? result["teachers"].size() : 0);
+  const bool was_taught = result.find("kept_seed")->value == result.find("seed")->value;
+  add_curve(report, data, run, was_taught ? result.find("teachers")->members.size() : 0);
   report.heading("What is left");
   const int components = data.samples.outputs;
   training::Matrix outputs = learning::outputs_for(data, run.theta, Use::kTest);

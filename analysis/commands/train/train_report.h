@@ -5,13 +5,13 @@
 
 #include "analysis/learning/output_scale.h"
 #include "analysis/learning/training_run.h"
-#include "nn/base/json.h"
+#include "nn/base/record.h"
 
 namespace swarmcert::analysis {
 
 /// Writes the report, including the result of the command, into `folder`. Returns the path of the HTML file.
 std::string write_train_report(const learning::LearningData& data, const learning::Run& run,
-                               const learning::OutputSupport& support, const files::Json& result,
+                               const learning::OutputSupport& support, const files::Node& result,
                                const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

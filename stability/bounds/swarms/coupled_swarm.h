@@ -23,8 +23,7 @@ struct CoupledSwarm {
 /// Describes swarm.toml.
 void describe_swarm_file(files::Keys& keys);
 
-/// Reads swarm.toml (schema swarmcert/swarm/1): vehicles = N, [[coupling]] on, by, position_N_m, velocity_N_s_m,
-/// speed_m_s, acceleration_m_s2, cross_rate_N_s, direction = "apart" | "together" if the force's sign is known.
+/// Reads swarm.toml.
 /// @throws files::InputError with line, key, value and hint.
 CoupledSwarm read_coupled_swarm(const std::string& path);
 
