@@ -158,7 +158,7 @@
       return {log: log, body: body, color: color, before: arrow('--curve-x'), after: arrow('--curve-z')};
     });
     camera = new THREE.PerspectiveCamera(45, 1, 0.01 * metres, 40 * metres);
-    camera.position.set(middle.x + 0.62 * metres, middle.y - 0.85 * metres, middle.z + 0.5 * metres);
+    camera.position.set(middle.x + 0.7 * metres, middle.y - 0.95 * metres, middle.z + 0.55 * metres);
     if (orbit) orbit.dispose();
     orbit = new THREE.OrbitControls(camera, renderer.domElement);
     orbit.target.copy(middle);

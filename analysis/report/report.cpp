@@ -49,8 +49,16 @@ void Report::paragraph(const std::string& text) { body_.push_back("<p>" + html_t
 
 void Report::literal(const std::string& text) { body_.push_back("<pre>" + html_text(text) + "</pre>\n"); }
 
+void Report::facts(const std::vector<std::pair<std::string, std::string>>& facts) {
+  std::string html = "<dl>\n";
+  for (const auto& [name, words] : facts)
+    html += "<dt>" + html_text(name) + "</dt><dd>" + html_text(words) + "</dd>\n";
+  body_.push_back(html + "</dl>\n");
+}
+
 void Report::table(const std::vector<std::string>& header,
                    const std::vector<std::vector<std::string>>& rows) {
+  constexpr std::size_t kLong_chars = 40;
   // Wide tables scroll on their own, also by keyboard.
   std::string html = fmt::format(
       "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"table {}\"><table><thead><tr>",
@@ -61,7 +69,10 @@ void Report::table(const std::vector<std::string>& header,
   for (const std::vector<std::string>& row : rows) {
     html += "<tr>";
     for (const std::string& cell : row)
-      html += (is_number(cell) ? "<td class=\"number\">" : "<td>") + html_text(cell) + "</td>";
+      html += (is_number(cell)             ? "<td class=\"number\">"
+               : cell.size() > kLong_chars ? "<td class=\"long\">"
+                                           : "<td>") +
+              html_text(cell) + "</td>";
     html += "</tr>\n";
   }
   body_.push_back(html + "</tbody></table></div>\n");

@@ -28,8 +28,13 @@
     choice.addEventListener('change', changed);
     return choice;
   }
+  /// The log with the worst moment.
+  function worst() {
+    var mark = data.marks.length > 0 ? data.marks[0] : {};
+    return Math.max(0, data.logs.findIndex(function (log) { return log.flight === mark.flight && log.vehicle === mark.vehicle; }));
+  }
   var bar = element('div', '', box);
-  var which = selection('Log', data.logs.map(function (log) { return log.flight + ' ' + log.vehicle; }), 0, bar, show);
+  var which = selection('Log', data.logs.map(function (log) { return log.flight + ' ' + log.vehicle; }), worst(), bar, show);
   var along = selection('Residual along', ['x', 'y', 'z', 'all axes (size)'], data.axis, bar, function () {
     show();
     scatter();

@@ -11,7 +11,7 @@ namespace swarmcert::residuals {
 namespace {
 
 constexpr std::size_t kMostLogs = 24;
-constexpr std::size_t kMostRows = 24000;  // of all logs: about 1.5 MB
+constexpr std::size_t kMostRows = 30000;  // of all logs: about 2 MB
 constexpr double kAroundMoment_s = 2;
 constexpr float kNoValue = std::numeric_limits<float>::quiet_NaN();
 
@@ -151,7 +151,7 @@ const std::vector<FlownGroup>& flown_groups() {
 std::vector<FlownFlight> flown_signals(const Inputs& inputs, const Inputs* fitted,
                                        const std::vector<Moment>& worst) {
   const std::vector<std::size_t> chosen = flights_that_fit(inputs, worst);
-  std::size_t logs = 1;
+  std::size_t logs = 0;
   for (const std::size_t i : chosen) logs += inputs.found.flights[i].logs.size();
   std::vector<FlownFlight> flights;
   for (const std::size_t i : chosen) {
@@ -164,7 +164,7 @@ std::vector<FlownFlight> flown_signals(const Inputs& inputs, const Inputs* fitte
         if (moment.path == track.path) moments_s.push_back(moment.time_s - track.clock_offset_s);
       flight.vehicles.push_back(flown_vehicle(track, inputs, fitted));
       std::vector<FlownRow>& rows = flight.vehicles.back().rows;
-      rows = thinned(rows, kMostRows / logs, moments_s);
+      rows = thinned(rows, kMostRows / std::max<std::size_t>(1, logs), moments_s);
     }
     if (!flight.vehicles.empty()) flights.push_back(std::move(flight));
   }

@@ -96,8 +96,8 @@ TEST_F(Study, AddsWhatIsMissingAndLowersTheErrorOfTestFlights) {
   const std::string page = read_text(folder_ / "out/study.html");
   for (const char* const shown :
        {"Where the model failed", "id=\"flown-data\"", "with all of their records", "held out",
-        "Effect motor_lag: its force over the rate of the thrust", "Effect drag_linear: its force over the v",
-        "Effect downwash: its force over the distance beside the vehicle above"})
+        "Effect motor_lag: its force over thrust rate", "Effect drag_linear: its force over v",
+        "Effect downwash: its force over lateral distance to a vehicle above"})
     EXPECT_NE(page.find(shown), std::string::npos) << shown;
   EXPECT_EQ(study("flights -o out -q").exit_code, 3) << "a folder that is not empty is kept";
 }

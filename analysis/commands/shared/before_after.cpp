@@ -166,7 +166,7 @@ void add_effect_curves(Report& report, const std::vector<EffectCurve>& effects,
             plot_string(curve.variable + (unit_name.empty() ? "" : " [" + unit_name + "]")),
             plot_string(fmt::format("force along {} [{}]", curve.axis, unit.name)), name,
             2 * tick_step(length)),
-        fmt::format("Effect {}: its force over the {}, which explains {:.0f} % of how it varies, and what is "
+        fmt::format("Effect {}: its force over {}, which explains {:.0f} % of how it varies, and what is "
                     "measured of it: the residual of the model with every other effect.",
                     curve.effect, curve.variable, 100 * curve.share));
   }
