@@ -98,9 +98,10 @@ FlownVehicle flown_vehicle(const Track& track, const Inputs& inputs, const Input
 }
 
 /// Returns the least and the largest value of each signal over rows [begin, end), in the order in which they occur.
+/// Positions stay those of single rows: the extremes of their axes are not places where the vehicle was.
 std::array<FlownRow, 2> extremes_of(const std::vector<FlownRow>& rows, std::size_t begin, std::size_t end) {
   std::array<FlownRow, 2> pair = {rows[begin], rows[(begin + end) / 2]};
-  for (std::size_t column = 1; column < kFlownColumns; ++column) {
+  for (std::size_t column = kFlownSetPoint; column < kFlownColumns; ++column) {
     std::size_t least = end, most = end;
     for (std::size_t i = begin; i < end; ++i) {
       if (std::isnan(rows[i][column])) continue;
@@ -124,9 +125,10 @@ std::vector<FlownRow> thinned(const std::vector<FlownRow>& rows, std::size_t mos
   const std::size_t interval = (2 * rows.size() + most - 1) / most;
   std::vector<FlownRow> fewer;
   for (std::size_t i = 0; i < rows.size();) {
-    std::size_t end = i + 1;
+    std::size_t end = std::min(i + 2, rows.size());
     if (is_kept(rows[i])) {
-      fewer.push_back(rows[i]);
+      fewer.insert(fewer.end(), rows.begin() + static_cast<std::ptrdiff_t>(i),
+                   rows.begin() + static_cast<std::ptrdiff_t>(end));
     } else {
       while (end < std::min(i + interval, rows.size()) && !is_kept(rows[end])) ++end;
       for (const FlownRow& row : extremes_of(rows, i, end)) fewer.push_back(row);
