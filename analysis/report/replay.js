@@ -1,13 +1,14 @@
-// Flights in space: all vehicles with their whole trajectories, coloured by the residual force, and the force on each at
-// one time as an arrow.
+// Flights in space: all vehicles with their whole trajectories, coloured by the residual force, and the force on each
+// at one time as an arrow.
 (function () {
   'use strict';
   var box = document.getElementById('replay');
   var data = window.flown(), flights = [];
   data.logs.forEach(function (log) {
     if (!log.columns[data.group('position').at].some(isFinite)) return;
-    if (flights.length === 0 || flights[flights.length - 1].name !== log.flight) flights.push({name: log.flight, logs: []});
-    flights[flights.length - 1].logs.push(log);
+    var last = flights[flights.length - 1];
+    if (!last || last.name !== log.flight) flights.push(last = {name: log.flight, logs: []});
+    last.logs.push(log);
   });
   var PLACE = data.group('position').at, BEFORE = data.group('residual').at;
   var AFTER = data.group('residual after') ? data.group('residual after').at : null;
@@ -41,7 +42,7 @@
   }
   options(which, flights.map(function (flight) { return flight.name; }), function () { stop(); build(); });
   var coloured = element('select', 'colour of the trajectories', bar);
-  options(coloured, AFTER ? ['coloured by the residual before', 'coloured by the residual after'] : ['coloured by the residual'],
+  options(coloured, AFTER ? ['residual before', 'residual after'] : ['residual'],
           function () { var t = now; build(); at(t); });
   var play = element('button', '', bar);
   play.type = 'button';
@@ -69,7 +70,7 @@
   THREE.Object3D.DefaultUp.set(0, 0, 1);
   var scene, camera, orbit, vehicles, metres, square, large, low, high, now, perUnit;
   function finite(log, row, first) {
-    return isFinite(log.columns[first][row]) && isFinite(log.columns[first + 1][row]) && isFinite(log.columns[first + 2][row]);
+    return [first, first + 1, first + 2].every(function (k) { return isFinite(log.columns[k][row]); });
   }
   function vector(log, row, first) {
     return new THREE.Vector3(log.columns[first][row], log.columns[first + 1][row], log.columns[first + 2][row]);
@@ -93,11 +94,17 @@
     });
     return around;
   }
+  /// The size of the mean force of two rows: what is thinned holds the extremes of an interval.
+  function error(log, row, first) {
+    var even = row - row % 2, odd = Math.min(even + 1, log.rows - 1);
+    if (!finite(log, even, first) || !finite(log, odd, first)) return NaN;
+    return vector(log, even, first).add(vector(log, odd, first)).length() / 2;
+  }
   /// 95 % of the forces before are smaller.
   function largeForce(flight) {
     var sizes = [];
     flight.logs.forEach(function (log) {
-      for (var i = 0; i < log.rows; ++i) if (finite(log, i, BEFORE)) sizes.push(vector(log, i, BEFORE).length());
+      for (var i = 0; i < log.rows; ++i) if (isFinite(error(log, i, BEFORE))) sizes.push(error(log, i, BEFORE));
     });
     sizes.sort(function (a, b) { return a - b; });
     return sizes[Math.floor(0.95 * sizes.length)] || 0;
@@ -107,10 +114,11 @@
     return new THREE.Color(SCALE[k]).lerp(new THREE.Color(SCALE[k + 1]), place - k);
   }
   function trajectory(log) {
-    var first = coloured.value === '1' ? AFTER : BEFORE, places = [], colors = [], cut = new THREE.Color(page('--line'));
+    var first = coloured.value === '1' ? AFTER : BEFORE, cut = new THREE.Color(page('--line'));
+    var places = [], colors = [];
     for (var i = 0; i + 1 < log.rows; ++i) {
       if (!finite(log, i, PLACE) || !finite(log, i + 1, PLACE)) continue;
-      var color = finite(log, i, first) && large > 0 ? colorAt(vector(log, i, first).length() / large) : cut;
+      var size = error(log, i, first), color = isFinite(size) && large > 0 ? colorAt(size / large) : cut;
       [i, i + 1].forEach(function (k) {
         places.push(log.columns[PLACE][k], log.columns[PLACE + 1][k], log.columns[PLACE + 2][k]);
         colors.push(color.r, color.g, color.b);
@@ -158,7 +166,7 @@
       return {log: log, body: body, color: color, before: arrow('--curve-x'), after: arrow('--curve-z')};
     });
     camera = new THREE.PerspectiveCamera(45, 1, 0.01 * metres, 40 * metres);
-    camera.position.set(middle.x + 0.62 * metres, middle.y - 0.85 * metres, middle.z + 0.5 * metres);
+    camera.position.set(middle.x + 0.7 * metres, middle.y - 0.95 * metres, middle.z + 0.55 * metres);
     if (orbit) orbit.dispose();
     orbit = new THREE.OrbitControls(camera, renderer.domElement);
     orbit.target.copy(middle);
@@ -219,10 +227,12 @@
       var log = vehicle.log, row = rowAt(log, time);
       vehicle.body.position.copy(vector(log, row, PLACE));
       var before = pointArrow(vehicle.before, log, row, BEFORE), after = pointArrow(vehicle.after, log, row, AFTER);
-      words.push(log.vehicle + (before ? ' ' + before + (AFTER ? ' \u2192 ' + (after || '0') : '') + ' ' + data.unit : ''));
+      var force = before + (AFTER ? ' \u2192 ' + (after || '0') : '') + ' ' + data.unit;
+      words.push(log.vehicle + (before ? ' ' + force : ''));
       say('\u25CF ' + words[words.length - 1], page(vehicle.color));
     });
-    renderer.domElement.setAttribute('aria-label', 'Vehicles in space at ' + time.toFixed(2) + ' s. ' + words.join(', '));
+    renderer.domElement.setAttribute('aria-label',
+                                     'Vehicles in space at ' + time.toFixed(2) + ' s. ' + words.join(', '));
     draw();
   }
   function draw() { renderer.render(scene, camera); }

@@ -33,6 +33,15 @@ bool is_number(const std::string& cell) {
   return !cell.empty() && cell.find_first_not_of("0123456789.+-eE %") == std::string::npos;
 }
 
+/// How a cell breaks into lines: numbers and short texts do not, long texts get room.
+const char* class_of(const std::string& cell) {
+  constexpr std::size_t kShort_chars = 26, kLong_chars = 40;
+  return is_number(cell)               ? "number"
+         : cell.size() <= kShort_chars ? "short"
+         : cell.size() > kLong_chars   ? "long"
+                                       : "text";
+}
+
 }  // namespace
 
 Report::Report(std::string title) : title_(std::move(title)) {}
@@ -49,6 +58,13 @@ void Report::paragraph(const std::string& text) { body_.push_back("<p>" + html_t
 
 void Report::literal(const std::string& text) { body_.push_back("<pre>" + html_text(text) + "</pre>\n"); }
 
+void Report::facts(const std::vector<std::pair<std::string, std::string>>& facts) {
+  std::string html = "<dl>\n";
+  for (const auto& [name, words] : facts)
+    html += "<dt>" + html_text(name) + "</dt><dd>" + html_text(words) + "</dd>\n";
+  body_.push_back(html + "</dl>\n");
+}
+
 void Report::table(const std::vector<std::string>& header,
                    const std::vector<std::vector<std::string>>& rows) {
   // Wide tables scroll on their own, also by keyboard.
@@ -61,7 +77,7 @@ void Report::table(const std::vector<std::string>& header,
   for (const std::vector<std::string>& row : rows) {
     html += "<tr>";
     for (const std::string& cell : row)
-      html += (is_number(cell) ? "<td class=\"number\">" : "<td>") + html_text(cell) + "</td>";
+      html += fmt::format("<td class=\"{}\">", class_of(cell)) + html_text(cell) + "</td>";
     html += "</tr>\n";
   }
   body_.push_back(html + "</tbody></table></div>\n");

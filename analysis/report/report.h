@@ -4,6 +4,7 @@
 #include <array>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/report/table.h"
@@ -67,6 +68,8 @@ class Report {
   void paragraph(const std::string& text);
   /// Equations and commands: in a typeface of fixed width, in lines as given.
   void literal(const std::string& text);
+  /// Names with what is to be said of each.
+  void facts(const std::vector<std::pair<std::string, std::string>>& facts);
   /// @param rows cells as text, as many per row as `header` has.
   void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
   /// A table of a described result.

@@ -5,7 +5,7 @@
   var box = document.getElementById('time-series');
   var data = window.flown(), unit = data.unit;
   var before = data.group('residual'), after = data.group('residual after');
-  var words = after ? ['before', 'after'] : ['residual'];
+  var models = [before, after].filter(Boolean), words = after ? ['before', 'after'] : ['residual'];
   var graphs = [], shown = null, linking = false;
   // Colours of the page by name, because dygraphs draws on a canvas, which does not resolve CSS variables.
   function page(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
@@ -28,8 +28,16 @@
     choice.addEventListener('change', changed);
     return choice;
   }
+  /// The log with the worst moment.
+  function worst() {
+    var mark = data.marks.length > 0 ? data.marks[0] : {};
+    return Math.max(0, data.logs.findIndex(function (log) {
+      return log.flight === mark.flight && log.vehicle === mark.vehicle;
+    }));
+  }
   var bar = element('div', '', box);
-  var which = selection('Log', data.logs.map(function (log) { return log.flight + ' ' + log.vehicle; }), 0, bar, show);
+  var names = data.logs.map(function (log) { return log.flight + ' ' + log.vehicle; });
+  var which = selection('Log', names, worst(), bar, show);
   var along = selection('Residual along', ['x', 'y', 'z', 'all axes (size)'], data.axis, bar, function () {
     show();
     scatter();
@@ -47,9 +55,12 @@
   }
   /// The panels of a log: those of its signals that change.
   function panels_of(log) {
-    var list = [{title: 'force residual along ' + 'xyz'.charAt(Number(along.value)), unit: unit, labels: words, colors: MODELS,
-                 of: [before, after].filter(Boolean).map(function (group) { return residual(log, group); }), marked: words[0]}];
-    if (Number(along.value) === 3) list[0].title = 'size of the force residual';
+    var axis = Number(along.value);
+    var list = [{
+      title: axis < 3 ? 'force residual along ' + 'xyz'.charAt(axis) : 'size of the force residual',
+      unit: unit, labels: words, colors: MODELS, marked: words[0],
+      of: models.map(function (group) { return residual(log, group); })
+    }];
     var wanted = data.group('set point');
     data.groups.forEach(function (group) {
       if (/^residual|^set point/.test(group.name)) return;
@@ -78,7 +89,8 @@
       entry.textContent = (panel.dashed && panel.dashed.indexOf(label) >= 0 ? '\u2504 ' : '\u25A0 ') + label +
           (isFinite(value) ? ' ' + number(value) : '') + '   ';
     });
-    if (row !== undefined) panel.legend.appendChild(document.createTextNode('at ' + shown.columns[0][row].toFixed(2) + ' s'));
+    if (row === undefined) return;
+    panel.legend.appendChild(document.createTextNode('at ' + shown.columns[0][row].toFixed(2) + ' s'));
   }
   // The legend of dygraphs needs style attributes, which the content security policy forbids; this page has its own.
   Dygraph.PLUGINS = Dygraph.PLUGINS.filter(function (plugin) { return plugin !== Dygraph.Plugins.Legend; });
@@ -176,7 +188,7 @@
   variables.push({name: 'time', unit: 's', of: function (log, i) { return log.columns[0][i]; }});
   var against = selection('Residual against', variables.map(function (v) { return v.name; }), 2, against_bar, scatter);
   var cloud = {title: '', legend: element('div', 'legend', box), plot: element('div', 'plot cloud', box), graph: null};
-  /// The means of two rows each: what is thinned holds the least and the largest value of an interval.
+  /// The means of two rows each: what is thinned holds the extremes of an interval.
   function pairs(log, of) {
     var means = [];
     for (var i = 0; i + 1 < log.rows; i += 2) means.push((of(i) + of(i + 1)) / 2);
@@ -186,24 +198,26 @@
     var variable = variables[Number(against.value)], points = [];
     data.logs.forEach(function (log) {
       var x = pairs(log, function (i) { return variable.of(log, i); });
-      var y = [before, after].filter(Boolean).map(function (group) { return pairs(log, residual(log, group)); });
+      var y = models.map(function (group) { return pairs(log, residual(log, group)); });
       x.forEach(function (at, i) {
         var row = [at].concat(y.map(function (values) { return values[i]; }));
         if (row.every(isFinite)) points.push(row);
       });
     });
     points.sort(function (a, b) { return a[0] - b[0]; });
+    var nothing = words.map(function () { return null; });
     var BINS = 24, FEWEST = 20, count = points.length, rows = [];
-    var low = count ? points[Math.floor(0.005 * count)][0] : 0, high = count ? points[Math.floor(0.995 * (count - 1))][0] : 1;
+    var low = count ? points[Math.floor(0.005 * count)][0] : 0;
+    var high = count ? points[Math.floor(0.995 * (count - 1))][0] : 1;
     for (var b = 0; b < BINS && high > low; ++b) {
       var from = low + (high - low) * b / BINS, to = low + (high - low) * (b + 1) / BINS;
       var inside = points.filter(function (p) { return p[0] >= from && p[0] <= to; });
       if (inside.length < FEWEST) continue;
       var mean = function (k) { return inside.reduce(function (sum, p) { return sum + p[k]; }, 0) / inside.length; };
-      rows.push([mean(0)].concat(words.map(function () { return null; }), words.map(function (w, k) { return mean(k + 1); })));
+      rows.push([mean(0)].concat(nothing, words.map(function (w, k) { return mean(k + 1); })));
     }
     var step = Math.ceil(count / 4000);
-    points.forEach(function (p, i) { if (i % step === 0) rows.push(p.concat(words.map(function () { return null; }))); });
+    points.forEach(function (p, i) { if (i % step === 0) rows.push(p.concat(nothing)); });
     rows.sort(function (a, b) { return a[0] - b[0]; });
     var settings = options({colors: MODELS.slice(0, words.length).concat(MODELS.slice(0, words.length))});
     settings.labels = ['at'].concat(words, words.map(function (w) { return 'mean ' + w; }));
@@ -217,7 +231,7 @@
     settings.xValueFormatter = settings.valueFormatter = number;
     if (cloud.graph) cloud.graph.destroy();
     cloud.graph = rows.length > 1 ? new Dygraph(cloud.plot, rows, settings) : null;
-    cloud.legend.textContent = 'residual [' + unit + '] of all logs shown here, and its mean over ' + variable.name + '   ';
+    cloud.legend.textContent = 'residual [' + unit + '] of all logs of this page, and its mean   ';
     words.forEach(function (w, k) {
       var entry = element('span', '', cloud.legend);
       entry.style.color = page(MODELS[k]);

@@ -11,7 +11,7 @@ namespace swarmcert::residuals {
 namespace {
 
 constexpr std::size_t kMostLogs = 24;
-constexpr std::size_t kMostRows = 24000;  // of all logs: about 1.5 MB
+constexpr std::size_t kMostRows = 30000;  // of all logs: about 2 MB
 constexpr double kAroundMoment_s = 2;
 constexpr float kNoValue = std::numeric_limits<float>::quiet_NaN();
 
@@ -98,9 +98,10 @@ FlownVehicle flown_vehicle(const Track& track, const Inputs& inputs, const Input
 }
 
 /// Returns the least and the largest value of each signal over rows [begin, end), in the order in which they occur.
+/// Positions stay those of single rows: the extremes of their axes are not places where the vehicle was.
 std::array<FlownRow, 2> extremes_of(const std::vector<FlownRow>& rows, std::size_t begin, std::size_t end) {
   std::array<FlownRow, 2> pair = {rows[begin], rows[(begin + end) / 2]};
-  for (std::size_t column = 1; column < kFlownColumns; ++column) {
+  for (std::size_t column = kFlownSetPoint; column < kFlownColumns; ++column) {
     std::size_t least = end, most = end;
     for (std::size_t i = begin; i < end; ++i) {
       if (std::isnan(rows[i][column])) continue;
@@ -124,9 +125,10 @@ std::vector<FlownRow> thinned(const std::vector<FlownRow>& rows, std::size_t mos
   const std::size_t interval = (2 * rows.size() + most - 1) / most;
   std::vector<FlownRow> fewer;
   for (std::size_t i = 0; i < rows.size();) {
-    std::size_t end = i + 1;
+    std::size_t end = std::min(i + 2, rows.size());
     if (is_kept(rows[i])) {
-      fewer.push_back(rows[i]);
+      fewer.insert(fewer.end(), rows.begin() + static_cast<std::ptrdiff_t>(i),
+                   rows.begin() + static_cast<std::ptrdiff_t>(end));
     } else {
       while (end < std::min(i + interval, rows.size()) && !is_kept(rows[end])) ++end;
       for (const FlownRow& row : extremes_of(rows, i, end)) fewer.push_back(row);
@@ -151,7 +153,7 @@ const std::vector<FlownGroup>& flown_groups() {
 std::vector<FlownFlight> flown_signals(const Inputs& inputs, const Inputs* fitted,
                                        const std::vector<Moment>& worst) {
   const std::vector<std::size_t> chosen = flights_that_fit(inputs, worst);
-  std::size_t logs = 1;
+  std::size_t logs = 0;
   for (const std::size_t i : chosen) logs += inputs.found.flights[i].logs.size();
   std::vector<FlownFlight> flights;
   for (const std::size_t i : chosen) {
@@ -164,7 +166,7 @@ std::vector<FlownFlight> flown_signals(const Inputs& inputs, const Inputs* fitte
         if (moment.path == track.path) moments_s.push_back(moment.time_s - track.clock_offset_s);
       flight.vehicles.push_back(flown_vehicle(track, inputs, fitted));
       std::vector<FlownRow>& rows = flight.vehicles.back().rows;
-      rows = thinned(rows, kMostRows / logs, moments_s);
+      rows = thinned(rows, kMostRows / std::max<std::size_t>(1, logs), moments_s);
     }
     if (!flight.vehicles.empty()) flights.push_back(std::move(flight));
   }

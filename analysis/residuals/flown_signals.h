@@ -39,7 +39,7 @@ struct FlownFlight {
 
 /// The flights with the worst moments first, then others, as many as fit on a page. All records of a log that fits are
 /// kept, and of longer ones those within 2 s of a worst moment; of the others, intervals of several records become two
-/// rows that hold the least and the largest value of each signal.
+/// rows, 2 k and 2 k + 1, that hold the least and the largest value of each signal, and two positions.
 /// @param fitted the same inputs with other models; null: there is no second residual
 std::vector<FlownFlight> flown_signals(const Inputs& inputs, const Inputs* fitted,
                                        const std::vector<Moment>& worst);

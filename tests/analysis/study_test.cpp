@@ -2,11 +2,14 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <set>
 #include <utility>
 #include <vector>
 
+#include "analysis/residuals/flown_signals.h"
 #include "analysis/run.h"
 #include "data.h"
 #include "nn/base/json.h"
@@ -96,8 +99,8 @@ TEST_F(Study, AddsWhatIsMissingAndLowersTheErrorOfTestFlights) {
   const std::string page = read_text(folder_ / "out/study.html");
   for (const char* const shown :
        {"Where the model failed", "id=\"flown-data\"", "with all of their records", "held out",
-        "Effect motor_lag: its force over the rate of the thrust", "Effect drag_linear: its force over the v",
-        "Effect downwash: its force over the distance beside the vehicle above"})
+        "Effect motor_lag: its force over thrust rate", "Effect drag_linear: its force over v",
+        "Effect downwash: its force over lateral distance to a vehicle above"})
     EXPECT_NE(page.find(shown), std::string::npos) << shown;
   EXPECT_EQ(study("flights -o out -q").exit_code, 3) << "a folder that is not empty is kept";
 }
@@ -255,6 +258,41 @@ TEST_F(Study, APageHoldsNoSignalsOfTheLogsIfItIsToldSo) {
   EXPECT_EQ(without.find("id=\"flown-data\""), std::string::npos);
   EXPECT_NE(without.find("This page holds no signals of the logs."), std::string::npos);
   EXPECT_LT(without.size(), with.size() / 2);
+}
+
+TEST_F(Study, ThinnedSignalsKeepTheirExtremesAndAllThatIsAroundAWorstMoment) {
+  fly(source_path("stability/models/crazyflie-small-effects.toml"), 1, 400, 1, 1);
+  residuals::InputArguments arguments;
+  arguments.models = {source_path("stability/models/crazyflie-small.toml")};
+  arguments.flights = {folder_ / "flights"};
+  const residuals::Inputs inputs = residuals::read_inputs(arguments);
+  std::vector<std::string> problems;
+  const residuals::Track track = inputs.load(0, problems)[0];
+  residuals::Moment worst;
+  worst.path = track.path;
+  worst.time_s = 200;
+  const std::vector<residuals::FlownFlight> flights = residuals::flown_signals(inputs, nullptr, {worst});
+  ASSERT_EQ(flights.size(), 1U);
+  const residuals::FlownVehicle& vehicle = flights[0].vehicles[0];
+  EXPECT_EQ(vehicle.records, track.instants.size());
+  EXPECT_LT(vehicle.rows.size(), vehicle.records * 9 / 10);
+  constexpr std::size_t kThrust = 16;
+  float least = INFINITY, most = -INFINITY;
+  std::size_t around = 0, all_around = 0;
+  for (const residuals::FlownRow& row : vehicle.rows) {
+    least = std::min(least, row[kThrust]);
+    most = std::max(most, row[kThrust]);
+    around += std::abs(row[0] - 200) < 1.9F ? 1 : 0;
+  }
+  float true_least = INFINITY, true_most = -INFINITY;
+  for (const stability::Instant& now : track.instants) {
+    true_least = std::min(true_least, static_cast<float>(now.thrust_N));
+    true_most = std::max(true_most, static_cast<float>(now.thrust_N));
+    all_around += std::abs(static_cast<float>(now.time_s) - 200) < 1.9F ? 1 : 0;
+  }
+  EXPECT_EQ(least, true_least);
+  EXPECT_EQ(most, true_most);
+  EXPECT_EQ(around, all_around);
 }
 
 TEST_F(Study, APageOfAnHourStaysSmallAndSaysThatItIsThinned_slow) {

@@ -69,6 +69,8 @@ Report report_with(const std::vector<std::string>& text) {
   report.result({{"schema", "swarmcert/test/1"}, {"name", text[1]}});
   report.heading(text[2]);
   report.paragraph(text[3]);
+  report.facts({{text[4], text[5]}});
+  report.literal(text[6]);
   report.table({text[4], "n"}, {{text[5], text[6]}});
   report.figure(
       "curve", "1 2 " + plot_field(text[7]) + "\n2 3 " + plot_field(text[8]) + "\n",

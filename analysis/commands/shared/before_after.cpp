@@ -98,33 +98,41 @@ void add_neighbours(Report& report, const residuals::NeighbourMap& before,
       "after, with a common colour scale.");
 }
 
-/// Plots the mean of the residual over the ranges of one variable, before and after.
-void add_variable(Report& report, const residuals::Comparison& before, const residuals::Comparison& after,
-                  int variable, int axis, const residuals::ForceUnit& unit) {
-  const auto mean_of = [&](const residuals::Comparison& comparison,
-                           int region) -> const residuals::RegionErrors* {
-    for (const residuals::RegionErrors& candidate : comparison.regions)
-      if (candidate.variable == variable && candidate.region == region) return &candidate;
-    return nullptr;
-  };
-  const auto mean_N = [axis](const residuals::RegionErrors& region) {
-    const residuals::Axes& bias = region.statistics.bias;
-    return axis == 0 ? bias.x : axis == 1 ? bias.y : bias.z;
-  };
-  std::string data = "# value before after\n";
+/// The mean of the residual over the ranges of one variable, before and after.
+struct VariableCurve {
+  int variable;
+  std::string data;
   int points = 0;
+  double lowest = INFINITY, highest = -INFINITY;  ///< before
+};
+
+VariableCurve variable_curve(const residuals::Comparison& before, const residuals::Comparison& after,
+                             int variable, int axis, const residuals::ForceUnit& unit) {
+  const auto mean_of = [&](const residuals::Comparison& comparison, int region) {
+    for (const residuals::RegionErrors& candidate : comparison.regions) {
+      const residuals::Axes& bias = candidate.statistics.bias;
+      if (candidate.variable == variable && candidate.region == region)
+        return (axis == 0 ? bias.x : axis == 1 ? bias.y : bias.z) * unit.per_newton();
+    }
+    return static_cast<double>(NAN);
+  };
+  VariableCurve curve{variable, "# value before after\n"};
   for (int region = 0; region < residuals::num_regions(variable); ++region) {
-    const residuals::RegionErrors* was = mean_of(before, region);
-    const residuals::RegionErrors* is = mean_of(after, region);
-    if (was == nullptr || is == nullptr) continue;
-    ++points;
-    data += fmt::format("{:.6g} {:.6g} {:.6g}\n", residuals::region_middle(variable, region),
-                        mean_N(*was) * unit.per_newton(), mean_N(*is) * unit.per_newton());
+    const double was = mean_of(before, region), is = mean_of(after, region);
+    if (std::isnan(was) || std::isnan(is)) continue;
+    ++curve.points;
+    curve.lowest = std::min(curve.lowest, was);
+    curve.highest = std::max(curve.highest, was);
+    curve.data += fmt::format("{:.6g} {:.6g} {:.6g}\n", residuals::region_middle(variable, region), was, is);
   }
-  if (points < 2) return;
-  const std::string label = residuals::variable_name(variable), name = fmt::format("over_{}", variable);
-  const std::string over = label + " " + kVariableUnits[variable], along(1, "xyz"[axis]);
-  report.figure(name, data,
+  return curve;
+}
+
+void add_variable(Report& report, const VariableCurve& curve, int axis, const residuals::ForceUnit& unit) {
+  const std::string label = residuals::variable_name(curve.variable),
+                    name = fmt::format("over_{}", curve.variable);
+  const std::string over = label + " " + kVariableUnits[curve.variable], along(1, "xyz"[axis]);
+  report.figure(name, curve.data,
                 "set xlabel '" + over + "'\nset ylabel 'mean residual along " + along + " [" + unit.name +
                     "]'\nplot '" + name +
                     ".dat' using 1:2 with linespoints title 'before', '' using 1:3 with linespoints title "
@@ -139,8 +147,17 @@ void add_before_and_after(Report& report, const residuals::Comparison& before,
                           const residuals::ForceUnit& unit) {
   add_neighbours(report, before.neighbours, after.neighbours, unit);
   add_room(report, room, unit);
-  for (int variable = 0; variable < kPlottedVariables; ++variable)
-    add_variable(report, before, after, variable, room.axis, unit);
+  constexpr std::size_t kMostVariables = 3;
+  std::vector<VariableCurve> curves;
+  for (int variable = 0; variable < kPlottedVariables; ++variable) {
+    curves.push_back(variable_curve(before, after, variable, room.axis, unit));
+    if (curves.back().points < 2) curves.pop_back();
+  }
+  std::stable_sort(curves.begin(), curves.end(), [](const VariableCurve& a, const VariableCurve& b) {
+    return a.highest - a.lowest > b.highest - b.lowest;
+  });
+  for (std::size_t k = 0; k < std::min(kMostVariables, curves.size()); ++k)
+    add_variable(report, curves[k], room.axis, unit);
 }
 
 void add_effect_curves(Report& report, const std::vector<EffectCurve>& effects,
@@ -166,7 +183,7 @@ void add_effect_curves(Report& report, const std::vector<EffectCurve>& effects,
             plot_string(curve.variable + (unit_name.empty() ? "" : " [" + unit_name + "]")),
             plot_string(fmt::format("force along {} [{}]", curve.axis, unit.name)), name,
             2 * tick_step(length)),
-        fmt::format("Effect {}: its force over the {}, which explains {:.0f} % of how it varies, and what is "
+        fmt::format("Effect {}: its force over {}, which explains {:.0f} % of how it varies, and what is "
                     "measured of it: the residual of the model with every other effect.",
                     curve.effect, curve.variable, 100 * curve.share));
   }

@@ -12,7 +12,7 @@
 namespace swarmcert::analysis {
 
 /// Adds the vertical residuals over neighbour positions, and those along the axis of `room` over the room and over
-/// single variables; each pair of maps has a common colour scale. At most once per report.
+/// the variables with which the former vary most; each pair of maps has a common colour scale. At most once per report.
 void add_before_and_after(Report& report, const residuals::Comparison& before,
                           const residuals::Comparison& after, const identification::RoomMap& room,
                           const residuals::ForceUnit& unit);

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "analysis/cli/command.h"
+#include "analysis/report/report_drawing.h"
 #include "nn/base/file_io.h"
 
 namespace swarmcert::analysis {
@@ -128,7 +129,9 @@ void add_prediction(Report& report, const std::vector<NamedPrediction>& named) {
       script =
           "if (exists('narrow')) { set terminal svg size 400,1100 dynamic noenhanced font 'sans-serif,13'; "
           "set multiplot layout 4,1 } else { set multiplot layout 2,2 }\n"
-          "set key top left inside vertical noopaque\nset xlabel 'horizon [s]'\nset yrange [0:*]\n";
+          "set xlabel 'horizon [s]'\nset yrange [0:*]\n";
+  const double horizon_s = static_cast<double>(first.steps()) * first.step_s;
+  script += fmt::format("set xrange [0:{:.6g}]\nset xtics {:g}\n", horizon_s, tick_step(horizon_s));
   for (std::size_t h = 0; h < first.steps(); ++h) {
     data += fmt::format("{:.6g}", static_cast<double>(h + 1) * first.step_s);
     for (std::size_t k = 0; k < kQuantities.size(); ++k) {

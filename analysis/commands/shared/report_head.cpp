@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/cli/counted.h"
@@ -77,12 +78,12 @@ class Sayings {
 
 void add_report_head(Report& report, const residuals::Inputs& inputs, const residuals::Comparison& comparison,
                      const identification::Ladder* ladder) {
-  std::vector<std::vector<std::string>> rows;
+  std::vector<std::pair<std::string, std::string>> rows;
   const auto add = [&rows](const std::string& name, const std::vector<std::string>& words) {
-    if (!words.empty()) rows.push_back({name, some_of(words, "; ")});
+    if (!words.empty()) rows.emplace_back(name, some_of(words, "; "));
   };
-  for (const stability::Model& model : inputs.models) rows.push_back({"model", model_words(model)});
-  rows.push_back({"flights", flight_words(inputs, comparison)});
+  for (const stability::Model& model : inputs.models) rows.emplace_back("model", model_words(model));
+  rows.emplace_back("flights", flight_words(inputs, comparison));
   if (ladder != nullptr && ladder->split.by != identification::Split::By::kNothing) {
     const auto add_use = [&](const char* use, const std::vector<int>& which) {
       std::vector<std::string> names;
@@ -92,15 +93,22 @@ void add_report_head(Report& report, const residuals::Inputs& inputs, const resi
       add(use, names.empty() ? names : std::vector<std::string>{some_of(names)});
     };
     add_use("fitted", ladder->split.fit);
-    add_use("decide what is added", ladder->split.select);
+    add_use("selecting", ladder->split.select);
     add_use("held out", ladder->split.test);
   }
-  std::vector<std::string> left_out = comparison.problems;
+  std::vector<std::string> left_out;
   for (const std::string& log : inputs.found.left_out)
     left_out.push_back(log + ": flights.toml leaves it out");
   for (const auto& [copy, of] : inputs.found.copies) left_out.push_back(copy + ": a copy of " + of);
-  add("not read or not judged", left_out);
+  add("left out", left_out);
   Sayings positions, warnings;
+  for (const std::string& problem : comparison.problems) {
+    const std::size_t colon = problem.find(": ");
+    if (colon == std::string::npos)
+      warnings.add("all", problem);
+    else
+      warnings.add(problem.substr(0, colon), problem.substr(colon + 2));
+  }
   for (const TrackErrors& track : comparison.tracks) {
     const std::string log = track.flight + " " + track.vehicle;
     for (const logs::Doubt& doubt : track.doubts)
@@ -110,7 +118,7 @@ void add_report_head(Report& report, const residuals::Inputs& inputs, const resi
   add("only as neighbours", positions.all());
   add("cut", cut_words(comparison));
   add("warnings", warnings.all());
-  report.table({"", ""}, rows);
+  report.facts(rows);
 }
 
 }  // namespace swarmcert::analysis

@@ -75,6 +75,18 @@ void add_answer(Report& report, const StudyResult& result, const Notes& notes,
   report.literal(result.next_command);
 }
 
+/// What the ladder added beside the effects that the diagnosis names.
+std::string added_later(const StudyResult& result) {
+  std::string names;
+  for (const Cause& cause : result.causes) {
+    bool is_named = false;
+    for (const identification::Missing& missing : result.study.diagnosis.ranking)
+      is_named = is_named || missing.effect == cause.name;
+    if (!is_named) names += (names.empty() ? "" : ", ") + cause.name;
+  }
+  return names;
+}
+
 std::string write_page(const StudyResult& result, const StudyFlights& flights, const Notes& notes,
                        const residuals::ForceUnit& unit, const files::Json& document,
                        const std::string& folder) {
@@ -96,6 +108,9 @@ std::string write_page(const StudyResult& result, const StudyFlights& flights, c
   add_moments(report, study.before.all, unit);
   add_flown(report, flights.flown, study.before.all, unit);
   report.heading("The remainder, and what to fly next");
+  const std::string later = added_later(result);
+  if (!later.empty())
+    report.paragraph("Of the search for named effects in the force, before this was added: " + later + ".");
   add_left(report, study.diagnosis, unit);
   add_remainder(report, study.diagnosis, 1, unit);
   if (result.next.empty())

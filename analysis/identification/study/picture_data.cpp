@@ -24,8 +24,8 @@ constexpr std::size_t kThrustRate = kScanned, kBesideUpper = kScanned + 1, kDraw
 using Drawable = std::array<float, kDrawable>;
 
 std::pair<std::string, std::string> name_and_unit(std::size_t variable) {
-  if (variable == kThrustRate) return {"rate of the thrust", "N/s"};
-  if (variable == kBesideUpper) return {"distance beside the vehicle above", "m"};
+  if (variable == kThrustRate) return {"thrust rate", "N/s"};
+  if (variable == kBesideUpper) return {"lateral distance to a vehicle above", "m"};
   const ScanVariableInfo& info = scan_variable(static_cast<ScanVariable>(variable));
   std::string unit = info.unit;
   std::replace(unit.begin(), unit.end(), '_', '/');
@@ -48,10 +48,12 @@ Drawable drawable_of(const residuals::Track& track, std::size_t i) {
   Drawable all;
   std::transform(values.begin(), values.end(), all.begin(), [](double x) { return static_cast<float>(x); });
   all[kThrustRate] = std::numeric_limits<float>::quiet_NaN();
-  if (i > 0 && track.restarts[i] == 0) {
-    const stability::Instant& last = track.instants[i - 1];
-    all[kThrustRate] = static_cast<float>((now.thrust_N - last.thrust_N) / (now.time_s - last.time_s));
-  }
+  constexpr double kRate_s = 0.05;
+  std::size_t past = i;
+  while (past > 0 && track.restarts[past] == 0 && now.time_s - track.instants[past].time_s < kRate_s) --past;
+  const stability::Instant& then = track.instants[past];
+  if (now.time_s - then.time_s >= kRate_s)
+    all[kThrustRate] = static_cast<float>((now.thrust_N - then.thrust_N) / (now.time_s - then.time_s));
   all[kBesideUpper] = static_cast<float>(beside_upper_m(now));
   return all;
 }
