@@ -12,13 +12,18 @@
 namespace swarmcert::identification {
 namespace {
 
-Diagnosis diagnosis_of(const std::vector<std::string>& flights, double mass_kg) {
+residuals::Inputs inputs_of(const std::vector<std::string>& flights, double mass_kg) {
   residuals::InputArguments arguments;
   arguments.models = {tests::source_path("stability/models/crazyflie-small.toml")};
   for (const std::string& flight : flights)
     arguments.flights.push_back(tests::data_path("collections/" + flight));
   residuals::Inputs inputs = residuals::read_inputs(arguments);
   inputs.models[0].mass_kg = mass_kg;
+  return inputs;
+}
+
+Diagnosis diagnosis_of(const std::vector<std::string>& flights, double mass_kg) {
+  const residuals::Inputs inputs = inputs_of(flights, mass_kg);
   return diagnose(inputs, "small", every_flight(inputs), 2, [](int, int) {});
 }
 
@@ -91,17 +96,6 @@ TEST(KnownTruth, StrongerMotorsAreAThrustRatioThenDrag) {
   }
 }
 
-/// Returns the ladder of `add auto`, with a mass for every flight.
-Ladder ladder_of(const std::vector<std::string>& flights, double mass_kg) {
-  residuals::InputArguments arguments;
-  arguments.models = {tests::source_path("stability/models/crazyflie-small.toml")};
-  for (const std::string& flight : flights)
-    arguments.flights.push_back(tests::data_path("collections/" + flight));
-  residuals::Inputs inputs = residuals::read_inputs(arguments);
-  inputs.models[0].mass_kg = mass_kg;
-  return climb(inputs, {}, 2, [](int, int) {});
-}
-
 TEST(KnownTruth, WhatIsAddedRaisesNoErrorOfFlightsThatNothingSaw_slow) {
   if (!has_collection("crazypad")) GTEST_SKIP() << "no recorded data";
   std::vector<std::vector<std::string>> sets = {{"crazypad/normal_flight"},
@@ -121,7 +115,7 @@ TEST(KnownTruth, WhatIsAddedRaisesNoErrorOfFlightsThatNothingSaw_slow) {
   }
   int judged = 0;
   for (const std::vector<std::string>& set : sets) {
-    const Ladder ladder = ladder_of(set, 0.0375);
+    const Ladder ladder = climb(inputs_of(set, 0.0375), {}, 2, [](int, int) {});
     if (!ladder.too_poor.empty() || !ladder.is_tested) continue;
     SCOPED_TRACE(set[0]);
     double last_N = ladder.rows[0].test_rmse_N;
