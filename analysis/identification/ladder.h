@@ -37,10 +37,10 @@ struct LadderOptions {
 /// Fits and accepts effects for the only model of `inputs`, if the flights are sufficient. An effect is accepted if the
 /// RMSE on the select flights falls by at least half a percent. An automatic ladder goes on while what is left on the
 /// flights to fit stands out of the noise, with the best formula for it, or else the best shape; these have no name and
-/// must lower the RMSE by 1 %, and raise that of no flight to fit or to select by half a percent. Then effects that turn
-/// the vehicle are added as long as one lowers the error of predicted body rates by 5 % (turning.h). Named effects keep
-/// their values beside forms; otherwise the coefficients of all effects accepted so far are fitted again in
-/// each step. The test flights are scored once, after the last step, so their errors decide nothing.
+/// must lower the RMSE by 1 %, and raise that of no flight to fit or to select by half a percent. Then effects that
+/// turn the vehicle are added as long as one lowers the error of predicted body rates by 5 % (turning.h). Named effects
+/// keep their values beside forms; otherwise the coefficients of all effects accepted so far are fitted again in each
+/// step. The test flights are scored once, after the last step, so their errors decide nothing.
 Ladder climb(residuals::Inputs inputs, const LadderOptions& options, int jobs,
              const residuals::Progress& progress);
 

@@ -282,7 +282,7 @@ TEST(CompareReport, IsOneFileInWhichHostileNamesAreTextAndOnlyItsOwnScriptRuns) 
   EXPECT_EQ(html.find("'unsafe-eval'"), std::string::npos);
   EXPECT_EQ(html.find("'unsafe-inline'"), std::string::npos);
   EXPECT_NE(html.find("script-src 'sha256-"), std::string::npos);
-  const bool has_zoom = html.find("id=\"time-series-data\"") != std::string::npos;
+  const bool has_zoom = html.find("id=\"time-series\"") != std::string::npos;
   EXPECT_NE(has_zoom, html.find("built without dygraphs") != std::string::npos);
 }
 
