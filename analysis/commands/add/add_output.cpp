@@ -101,16 +101,12 @@ void describe(files::Record& record, const AddResult& result) {
   });
 }
 
-/// The rows that something else than the force decided.
-void print_measures(const std::vector<LadderRow>& rows) {
-  for (const LadderRow& row : rows) {
-    if (!row.measure || !row.accepted) continue;
-    const stability::LadderMeasure& m = *row.measure;
-    fmt::print("  {}: {} {:.4g} -> {:.4g} {} on the select flights", row.effect, m.quantity, m.select[0],
-               m.select[1], m.unit);
-    if (m.test[0] > 0) fmt::print(", {:.4g} -> {:.4g} on the test flights", m.test[0], m.test[1]);
-    fmt::print("\n");
-  }
+std::string measure_words(const stability::LadderMeasure& measure) {
+  std::string words = fmt::format("{} {:.4g} -> {:.4g} {} on the select flights", measure.quantity,
+                                  measure.select[0], measure.select[1], measure.unit);
+  if (measure.test[0] > 0)
+    words += fmt::format(", {:.4g} -> {:.4g} on the test flights", measure.test[0], measure.test[1]);
+  return words;
 }
 
 void print_ladder(const std::vector<LadderRow>& rows) {
@@ -124,7 +120,8 @@ void print_ladder(const std::vector<LadderRow>& rows) {
                    : "-",
                row.note.empty() ? "" : (row.accepted ? "  kept although " : "  refused: ") + row.note);
   }
-  print_measures(rows);
+  for (const LadderRow& row : rows)
+    if (row.measure && row.accepted) fmt::print("  {}: {}\n", row.effect, measure_words(*row.measure));
 }
 
 std::string what_rows_measure(const std::vector<stability::LadderRow>& rows) {

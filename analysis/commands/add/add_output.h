@@ -39,6 +39,9 @@ struct AddResult {
 };
 void describe(files::Record& record, const AddResult& result);
 
+/// Returns "imbalance of the rotors 0.012 -> 0.003 N on the select flights, ...".
+std::string measure_words(const stability::LadderMeasure& measure);
+
 /// Prints the ladder as text.
 void print_ladder(const std::vector<stability::LadderRow>& rows);
 /// Says which quantity the errors of the rows measure: the force residual, or the balance of the rotors where that

@@ -20,9 +20,6 @@ std::string step(const stability::LadderRow& row) {
   return (row.effect == "nominal" ? "" : row.accepted ? "+ " : "refused: ") + row.effect;
 }
 
-/// Whether it lowers the error of predicted body rates instead of that of the force.
-bool turns(const stability::LadderRow& row) { return identification::is_turning(row.effect); }
-
 /// Number of decimals with which the largest error has four digits, so that the rows line up.
 int decimals_of(const std::vector<stability::LadderRow>& rows, double per_newton) {
   double largest = 0;
@@ -41,9 +38,8 @@ void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& 
   std::string data = "# fit select test step\n";
   std::vector<std::vector<std::string>> cells;
   const int decimals = decimals_of(rows, per_newton);
-  const bool any_turns = std::any_of(rows.begin(), rows.end(), turns);
   for (const stability::LadderRow& row : rows) {
-    if (row.accepted && !turns(row))
+    if (row.accepted && !row.measure)
       data +=
           fmt::format("{:.8g} {:.8g} {:.8g} {}\n", per_newton * row.fit_rmse_N,
                       per_newton * row.select_rmse_N, per_newton * row.test_rmse_N, plot_field(step(row)));
@@ -51,12 +47,7 @@ void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& 
                      fmt::format("{:.{}f}", per_newton * row.select_rmse_N, decimals),
                      fmt::format("{:.{}f}", per_newton * row.test_rmse_N, decimals),
                      row.noise_floor_N > 0 ? fmt::format("{:.2f}", row.test_rmse_N / row.noise_floor_N) : "-",
-                     row.note});
-    if (any_turns) {
-      const auto rates = [](double value) { return value > 0 ? fmt::format("{:.3g}", value) : "-"; };
-      cells.back().insert(cells.back().end() - 1,
-                          {rates(row.select_rates_rad_s), rates(row.test_rates_rad_s)});
-    }
+                     row.measure && row.note.empty() ? measure_words(*row.measure) : row.note});
   }
   report.figure(
       name, data,
@@ -68,10 +59,9 @@ void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& 
           "'' using 2 title 'flights to select' linetype 6, '' using 3 title 'test flights' linetype 1\n",
       "Error ladder: how the error of the force falls from the nominal model on, effect by effect, on the "
       "fitted, the selecting and the test flights.");
-  std::vector<std::string> header = {
-      "", "fit [" + unit + "]", "select [" + unit + "]", "test [" + unit + "]", "test / noise floor", "note"};
-  if (any_turns) header.insert(header.end() - 1, {"body rates, select [rad/s]", "body rates, test [rad/s]"});
-  report.table(header, cells);
+  report.table({"", "fit [" + unit + "]", "select [" + unit + "]", "test [" + unit + "]",
+                "test / noise floor", "note"},
+               cells);
 }
 
 std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const BeforeAfter* change,
