@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis/report/table.h"
+#include "nn/base/file_keys.h"
 
 namespace swarmcert::tests {
 
@@ -85,6 +86,9 @@ TEST(Table, HeadsCarryTheDescribedUnitAndForcesHaveTheUnitOfTheRun) {
             "  mast  height [m]  wind [mN]\n"
             "  fore        12.0        500\n"
             "  main        17.2       1000\n");
+  EXPECT_EQ(analysis::table(*node.find("masts"), {{"name"}, {"rake?"}}).header.size(), 1u)
+      << "no mast has it";
+  EXPECT_EQ(analysis::cell(*node.find("crew")), "mate 2");
 }
 
 TEST(Table, UnitsThatAreNoForcesStay) {
@@ -92,6 +96,29 @@ TEST(Table, UnitsThatAreNoForcesStay) {
   EXPECT_EQ(analysis::shown_unit("N/s", gram).second, "gf/s");
   EXPECT_NEAR(analysis::shown_unit("N s", gram).first, 101.97162, 1e-4);  // gf in a newton: 1 / 0.00980665
   for (const char* unit : {"N m", "m per N/s", "m"}) EXPECT_EQ(analysis::shown_unit(unit, gram).second, unit);
+}
+
+/// A file's reader and its schema see the same keys.
+TEST(FileKeys, AreKnownToTheReaderAndToTheSchema) {
+  const files::KeysOfTable mast = [](files::Keys& keys) {
+    keys.must<double>("height_m", "Above deck.", "m");
+  };
+  const files::KeysOfTable ship = [&mast](files::Keys& keys) {
+    keys.schema("swarmcert/ship/1");
+    keys.must("rig", "", "", files::OneOf{{"sloop", "ketch"}});
+    keys.may<files::NumberOrThree>("speed_m_s", "");
+    keys.may_tables("mast", "From bow to stern.", mast);
+    keys.must_named_tables("boat", "", mast);
+  };
+  EXPECT_EQ(files::key_names(ship), (std::vector<std::string>{"schema", "rig", "speed_m_s", "mast", "boat"}));
+  const Json schema = files::schema_of(files::shape_of_table(ship), "ship", "", "", false);
+  EXPECT_EQ(schema["required"], Json({"schema", "rig", "boat"}));
+  EXPECT_EQ(schema["properties"]["schema"]["const"], "swarmcert/ship/1");
+  EXPECT_EQ(schema["properties"]["rig"]["enum"], Json({"sloop", "ketch"}));
+  EXPECT_EQ(schema["properties"]["speed_m_s"]["anyOf"].size(), 2u);
+  const Json& height = schema["properties"]["mast"]["items"]["properties"]["height_m"];
+  EXPECT_EQ(height, Json({{"description", "Above deck."}, {"unit", "m"}, {"type", "number"}}));
+  EXPECT_EQ(schema["properties"]["boat"]["additionalProperties"]["properties"]["height_m"], height);
 }
 
 }  // namespace
