@@ -31,8 +31,9 @@ class TurningSearch {
   Turned with(const std::string& name) const;
   /// Returns the mean over flights of the errors with `next`, relative to those with what is accepted.
   double error_ratio(const Turned& next) const { return error_ratio(next, kNorm); }
-  /// Returns the best of `names` that explain a motion: the error about an axis falls by 5 %, and by as much of what the
-  /// rate about that axis does in flight as an effect of the force needs to be found; that of the vector does not rise.
+  /// Returns the best of `names` that explain a motion: the error about an axis falls by 5 %, and by as much of what
+  /// the rate about that axis does in flight as an effect of the force needs to be found; that of the vector does not
+  /// rise.
   std::optional<Turned> best_of(const std::vector<std::string>& names) const;
   void accept(const Turned& next) { accepted_ = next; }
 

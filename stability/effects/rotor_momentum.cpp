@@ -27,9 +27,9 @@ class RotorMomentumStream : public ColumnStream {
   double time_s_ = 0, spin_rad_s_ = 0;
 };
 
-/// tau = -dh/dt in the world, with h = J_r Omega e3 in the body and Omega = sum_k s_k Omega_k, where s_k is 1 for a rotor
-/// that turns counterclockwise seen from above: tau = -J_r (Omega' e3 + omega x Omega e3). It acts where the speeds of
-/// the rotors are measured, and not in the simulation, whose rotors have a force and no speed.
+/// tau = -dh/dt in the world, with h = J_r Omega e3 in the body and Omega = sum_k s_k Omega_k, where s_k is 1 for a
+/// rotor that turns counterclockwise seen from above: tau = -J_r (Omega' e3 + omega x Omega e3). It acts where the
+/// speeds of the rotors are measured, and not in the simulation, whose rotors have a force and no speed.
 class RotorMomentum : public MemoryEffect {
  public:
   RotorMomentum()
