@@ -49,6 +49,10 @@ FailingPlace failing_place(const Comparison& comparison, const ForceUnit& unit) 
   const ErrorStatistics& s = comparison.overall.statistics;
   const double square = squared(s.rmse.total), noise = comparison.overall.noise_floor_N.squaredNorm();
   FailingPlace place;
+  if (s.samples == 0) {
+    place.words = "no record is judged";
+    return place;
+  }
   if (!(square > 0) || (noise > 0 && square <= kNoise * noise)) {
     place.words =
         fmt::format("nowhere above the noise ({:.3g} {})", std::sqrt(noise) * unit.per_newton(), unit.name);

@@ -151,6 +151,10 @@ TEST(FailingPlace, IsNowhereForNoiseEverywhereForAConstantForceAndTheRegionOfALo
   EXPECT_NEAR(region.share, 0.25 * 7.5 * 7.5 / 28, 0.03);
 }
 
+TEST(FailingPlace, OfNoRecordIsNoPlaceWithoutNoise) {
+  EXPECT_EQ(failing_place({}, {}).words, "no record is judged");
+}
+
 TEST(FailingPlace, IsScatteredWhereTheForceIsNotThatOfARegime) {
   Comparison comparison = with_force({0, 0, 0}, 0);
   comparison.overall.noise_floor_N /= 10;

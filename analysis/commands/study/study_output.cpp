@@ -85,6 +85,7 @@ std::string headline(const StudyResult& result, const residuals::ForceUnit& unit
 }
 
 std::vector<std::string> conclusions(const StudyResult& result, const residuals::ForceUnit& unit) {
+  if (result.study.before.all.overall.statistics.samples == 0) return {};
   std::vector<std::string> sentences = {"It fails " + result.fails.words + "."};
   for (const Cause& cause : result.causes) {
     sentences.push_back(sentence(cause, unit) + ".");
