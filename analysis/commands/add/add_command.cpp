@@ -241,9 +241,9 @@ Command add_command() {
       "vehicle_offset is a constant force of each vehicle; rotor_thrust a factor for each rotor, from its "
       "duty in slow\n"
       "flight; com_offset and torque_bias are fitted to the rotors' mean torques, accelerometer_scale to\n"
-      "the change of the velocity: that and imu_tilt correct a sensor. undo goes back by one accepted "
-      "effect; show prints the\n"
-      "ladders of all --model files.\n\n"
+      "the change of the velocity: that and imu_tilt correct a sensor. torque_ratio, rate_damping,\n"
+      "flow_torque and rotor_momentum are fitted to predictions of half a second, from measured rotor\n"
+      "speeds. undo goes back by one accepted effect; show prints the ladders of all --model files.\n\n"
       "Examples: swarmcert add auto --model stability/models/crazyflie-small.toml flights/ -o fitted.toml\n"
       "          swarmcert add undo --model fitted.toml -o before.toml",
       [](CLI::App& app) {
