@@ -45,7 +45,11 @@ def main():
     parser.add_argument("-o", dest="folder", type=Path, required=True)
     parser.add_argument("--mass", type=float, default=0.045, help="kg, as published")
     arguments = parser.parse_args()
+    if arguments.folder.exists():
+        parser.error(f"{arguments.folder} exists; name a new folder")
     flights = sorted(arguments.training.glob("*.csv"))
+    if not flights:
+        parser.error(f"{arguments.training} has no CSV files")
     print(f"{'':24s}" + "".join(f"{name.split('_')[0]:>10s}" for name in ERRORS))
     if arguments.test:
         test = sorted(arguments.test.glob("*.csv"))
