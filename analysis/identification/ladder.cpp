@@ -195,12 +195,15 @@ class Climb {
     return turning_->is_possible();
   }
 
-  void accept(const Turned& next) {
+  /// @param although why it would be refused, if it is kept nevertheless
+  void accept(const Turned& next, const std::string& although = "") {
     Trial now = unmoved(next.name);
     now.row.measure = measure(next);
+    now.row.note = although;
     turning_->accept(next);
     now.turning = next.specs;
-    now.model = with_effects(without_turning(), next.specs);
+    if (!although.empty()) now.turning.back().fit.note = "kept although " + although;
+    now.model = with_effects(without_turning(), now.turning);
     keep(std::move(now));
   }
 
@@ -215,9 +218,10 @@ class Climb {
                     "no flight shows how the vehicle turns: body rates are needed, and measured rotor "
                     "speeds, or the force of each rotor at 400 Hz");
     const Turned next = turning_->with(name);
-    if (turning_->error_ratio(next) > 1 - kLeastFall && !keeps_anyway_)
-      return refuse(name, in_words(measure(next)));
-    accept(next);
+    const bool helps = turning_->error_ratio(next) <= 1 - kLeastFall;
+    const std::string why = helps ? "" : in_words(measure(next));
+    if (!helps && !keeps_anyway_) return refuse(name, why);
+    accept(next, why);
     return true;
   }
 
@@ -308,10 +312,10 @@ class Climb {
 
   /// Adds a row that repeats the best one. Returns false.
   bool refuse(const std::string& effect, const std::string& why) {
-    trials_.push_back(best());
-    trials_.back().row.effect = effect;
-    trials_.back().row.accepted = false;
-    trials_.back().row.note = why;
+    Trial now = unmoved(effect);
+    now.row.accepted = false;
+    now.row.note = why;
+    trials_.push_back(std::move(now));
     return false;
   }
 

@@ -23,11 +23,6 @@ constexpr std::size_t kMostPredictedSteps = 40'000, kMostRecordsOfTurning = 1'00
 /// Slower logs with measured rotor speeds miss the motion of the attitude loop.
 constexpr double kLeastRateOfSpeeds_hz = 50, kLeastRateOfForces_hz = 400;
 
-/// Errors of a prediction in units of those of a state that is held.
-struct ScaledError {
-  Eigen::Vector3d rates, rotation;
-};
-
 /// Returns the rotation from `from` to `to` as a vector, in rad, in the frame of `from`.
 Eigen::Vector3d rotation_between(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to) {
   const Eigen::Quaterniond turn = from.conjugate() * to;

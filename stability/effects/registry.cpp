@@ -144,6 +144,30 @@ double size_of(Unit unit, const Model& model) {
   return 1;
 }
 
+std::string size_words(Unit unit) {
+  switch (unit) {
+    case Unit::kOwn:
+      return "";
+    case Unit::kWeight:
+      return "the weight";
+    case Unit::kMass:
+      return "the mass";
+    case Unit::kArm:
+      return "the arm";
+    case Unit::kWeightArm:
+      return "weight times arm";
+    case Unit::kWeightPerArm:
+      return "weight over arm";
+    case Unit::kDrag:
+      return "weight over body length";
+    case Unit::kSquaredDrag:
+      return "weight over squared body length";
+    case Unit::kPerBattery:
+      return "the inverse of the largest voltage";
+  }
+  return "";
+}
+
 EffectInfo effect_info(const std::string& name, const Model& model) {
   EffectInfo info = find(name).info;
   for (std::vector<Parameter>* parameters : {&info.linear, &info.shape}) {

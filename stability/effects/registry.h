@@ -50,6 +50,9 @@ std::unique_ptr<Effect> make_effect(const EffectSpec& spec, const EffectContext&
 /// Returns the size of a unit for a vehicle. Precondition: its mass and arm are positive.
 double size_of(Unit unit, const Model& model);
 
+/// Returns size_of() in words: "weight times arm"; empty for kOwn.
+std::string size_words(Unit unit);
+
 /// Returns the description of a registered effect with bounds for this vehicle.
 EffectInfo effect_info(const std::string& name, const Model& model);
 

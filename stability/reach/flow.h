@@ -50,7 +50,7 @@ enum class Side { kLargest, kSmallest };
 /// Encloses an extreme of state i from step `first` on. Outer bound: between the ends of a cell of length d, every
 /// solution is within d^2/8 max|x_i''| of its chord. Inner bound: the value at the ends of cells.
 /// @param cells per step.
-/// @param initial the first so many symbols stand for initial states, each of which can occur.
+/// @param initial number of leading symbols that stand for initial states, each of which can occur
 Extreme extreme(const std::vector<FlowStep>& steps, std::size_t first, std::size_t i, Side side, int cells,
                 std::size_t initial);
 

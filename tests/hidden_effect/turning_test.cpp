@@ -159,7 +159,7 @@ TEST(Turning, FlowTorqueAndInertiaAreFoundTogetherWithTheirValues) {
   for (const char* const name : {"torque_ratio", "flow_torque"})
     ASSERT_NE(cause_named(result, name), nullptr) << result["causes"].dump(1);
   const files::Json& flow = (*cause_named(result, "flow_torque"))["parameters"]["moment_N_s"];
-  EXPECT_NEAR(flow["value"].get<double>(), truth.flow_N_s, 0.15 * truth.flow_N_s);
+  EXPECT_NEAR(flow["value"].get<double>(), truth.flow_N_s, 0.06 * truth.flow_N_s);
   const files::Json& ratio = (*cause_named(result, "torque_ratio"))["parameters"]["change_x"];
   EXPECT_NEAR(ratio["value"].get<double>(), truth.change.x(), 0.1);
   EXPECT_LT(rate_error(result, "after"), 0.3 * rate_error(result, "before"));

@@ -119,12 +119,23 @@ bounds = { a = [-0.05, 0.0] }
 grid = { w = [0.03, 0.05] }
 )toml",
                             "m.toml");
+  LadderRow row;
+  row.effect = "flow_torque";
+  row.measure = LadderMeasure{"error of body rates", "rad/s", {0.5, 0.25}, {0.625, 0.375}};
+  LadderRow nominal;
+  nominal.effect = "nominal";
+  model.ladder = {nominal, row};
   const std::string text = to_toml(model, {"a comment"});
   const Model again = parse_model(text, "n.toml");
   EXPECT_EQ(to_toml(again, {"a comment"}), text);
   EXPECT_EQ(again.effects[0].fit.flights, model.effects[0].fit.flights);
   EXPECT_EQ(again.effects[0].fit.note, "line\nbreak");
   EXPECT_EQ(again.effects[1].expression.formulas, model.effects[1].expression.formulas);
+  EXPECT_FALSE(again.ladder[0].measure);
+  ASSERT_TRUE(again.ladder[1].measure);
+  EXPECT_EQ(again.ladder[1].measure->quantity, row.measure->quantity);
+  EXPECT_EQ(again.ladder[1].measure->select, row.measure->select);
+  EXPECT_EQ(again.ladder[1].measure->test, row.measure->test);
   EXPECT_EQ(again.sensor.accelerometer_cutoff_hz, 42.5);
   EXPECT_EQ(again.inertia_kg_m2, model.inertia_kg_m2);
 }

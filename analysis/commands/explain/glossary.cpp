@@ -17,8 +17,9 @@ namespace swarmcert::analysis {
 namespace {
 
 std::string parameter_text(const stability::Parameter& parameter) {
-  return fmt::format("{}: {}, between {:g} and {:g}", parameter.name, parameter.meaning, parameter.lower,
-                     parameter.upper);
+  const std::string size = stability::size_words(parameter.unit);
+  return fmt::format("{}: {}, between {:g} and {:g}{}", parameter.name, parameter.meaning, parameter.lower,
+                     parameter.upper, size.empty() ? "" : " times " + size);
 }
 
 GlossaryEntry entry_of(const stability::EffectInfo& info) {

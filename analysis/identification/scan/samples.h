@@ -78,7 +78,7 @@ struct ScanVariableInfo {
 const ScanVariableInfo& scan_variable(ScanVariable variable);
 
 using ScanValues = std::array<double, static_cast<std::size_t>(kNumScanVariables)>;
-/// Returns what an instant tells of the variables; the others are NaN.
+/// Returns the values of the variables that an instant holds, and NaN for the others.
 ScanValues scan_values(const stability::Instant& now);
 
 /// Relative position and velocity of the laterally nearest neighbour within 1.5 m in height, now and up to 0.5 s ago.

@@ -32,7 +32,7 @@ std::pair<std::string, std::string> name_and_unit(std::size_t variable) {
   return {info.name, unit};
 }
 
-/// The horizontal distance to the nearest vehicle that is higher; NaN if there is none.
+/// Returns the horizontal distance to the nearest vehicle that flies higher; NaN if none does.
 double beside_upper_m(const stability::Instant& now) {
   double least_m = std::numeric_limits<double>::quiet_NaN();
   for (int j = 0; j < now.num_neighbours; ++j) {
