@@ -38,4 +38,12 @@ OtherErrors DisturbanceSource::other(int of_axis, const InitialError& initial, c
   return errors;
 }
 
+void declare_no_class(DisturbanceSource& source) {
+  source.kind = "declared";
+  source.note = "as given; no force error other than a constant one";
+  for (Disturbance& d : source.axis)
+    d.amplitude_N = d.variation_N = d.impulse_N_s = 0;  // the rate of a constant force is zero
+  source.rate_norm_N_s = 0;
+}
+
 }  // namespace swarmcert::stability

@@ -46,4 +46,7 @@ struct DisturbanceSource {
   bool f_hat_rate_known = false;
 };
 
+/// States that the force error consists of its constant part only.
+void declare_no_class(DisturbanceSource& source);
+
 }  // namespace swarmcert::stability

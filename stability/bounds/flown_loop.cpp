@@ -47,6 +47,21 @@ std::optional<AxisLoop> alone(const FlownLoop& loop, const PidMatrices& law, int
   return with_gains(loop, axis, law.Kp(axis, axis), law.Kd(axis, axis), law.Ki(axis, axis));
 }
 
+/// The lags, the thrust ratio and, for x and y, the attitude law of an axis, without its position gains.
+Cascade without_position(const FlownLoop& loop, int axis) {
+  Cascade result;
+  result.ratio = loop.plant.thrust_scale;
+  result.lag_s = loop.gains.motor_lag_s;
+  if (axis == 2) return result;
+  const auto about = static_cast<std::size_t>(1 - axis);  // the vehicle tilts about its other horizontal axis
+  const AttitudeGains& law = *loop.gains.attitude;
+  const double inertia = loop.model.inertia_kg_m2[about];
+  result.attitude = AttitudeLoop{law.KR_Nm[about] / inertia, law.Kw_Nm_s[about] / inertia,
+                                 law.KI_Nm_per_s[about] / inertia};
+  result.body_rate_lag_s = loop.gains.body_rate_lag_s;
+  return result;
+}
+
 SampledLoop at_rate(const FlownLoop& loop, const AxisLoop& axis) {
   return {axis, 1 / loop.gains.rate_hz, loop.gains.integrator_step_s};
 }
@@ -65,8 +80,7 @@ std::vector<Fact> FlownLoop::facts() const {
   add(rate_hz > 0, Fact::kSampling);
   add(std::abs(integral_share() - 1) >= 1e-9, Fact::kIntegratorStep);
   add(motor_lag_s > 0, Fact::kMotorLag);
-  // The attitude law, its gains and the lag of the measured body rates act through the lag of the thrust's direction.
-  add(attitude_lag_s > 0, Fact::kAttitudeLag);
+  add(true, Fact::kAttitude);  // its law, gains, lag and the lag of the measured body rates
   add(delay_s > 0, Fact::kDelay);
   add(std::any_of(integrator_limit.begin(), integrator_limit.end(),
                   [](double m_s) { return std::isfinite(m_s); }),
@@ -119,6 +133,48 @@ std::optional<SampledLoop> FlownLoop::sampled(int axis) const {
   return at_rate(*this, *written);
 }
 
+FlownLoop FlownLoop::with_axis(int axis, const AxisLoop& written) const {
+  PerAxis Kp{}, Kd{}, Ki{};
+  for (int i = 0; i < 3; ++i) {
+    const AxisLoop one = i == axis ? written : sampled(i)->plant;
+    const auto k = static_cast<std::size_t>(i);
+    Kp[k] = one.Kp / command_scale();
+    Kd[k] = one.Kd / command_scale();
+    Ki[k] = one.Ki / command_scale();
+  }
+  FlownLoop result = *this;
+  result.gains.composite.reset();
+  result.gains.pid = PidGains{{Kp[0], Kp[1], Kp[2]}, {Kd[0], Kd[1], Kd[2]}, {Ki[0], Ki[1], Ki[2]}};
+  return result;
+}
+
+std::vector<int> FlownLoop::coupled_axes() const {
+  std::vector<int> result;
+  for (int axis = 0; axis < 3; ++axis)
+    if (!continuous(axis)) result.push_back(axis);
+  return result;
+}
+
+std::optional<Cascade> FlownLoop::cascade(int axis) const {
+  const std::optional<AxisLoop> position = continuous(axis);
+  if (axis == 2 || !position || !gains.attitude || !(model.inertia_kg_m2[0] > 0)) return std::nullopt;
+  Cascade result = without_position(*this, axis);
+  // The gains of the loop already contain the thrust scale.
+  result.Kp = position->Kp / result.ratio;
+  result.Kd = position->Kd / result.ratio;
+  result.Ki = position->Ki / result.ratio;
+  return result;
+}
+
+CoupledCascade FlownLoop::coupled_cascade(const std::vector<int>& axes) const {
+  CoupledCascade result;
+  const PidMatrices all = pid_matrices(*gains.composite, plant.mass_kg);
+  result.position = {all.Kp(axes, axes), all.Kd(axes, axes), all.Ki(axes, axes)};
+  result.position.Ki *= integral_share();
+  for (const int axis : axes) result.channels.push_back(without_position(*this, axis));
+  return result;
+}
+
 double FlownLoop::spectral_radius() const {
   double largest = 0;
   bool is_coupled = false;
@@ -156,6 +212,14 @@ double FlownLoop::spectral_radius() const {
 }
 
 std::optional<bool> FlownLoop::is_stable() const {
+  for (int axis = 0; axis < 2; ++axis) {
+    const std::optional<Cascade> around = cascade(axis);
+    if (around && !(cascade_margins(*around).delay_s > gains.delay_s)) return false;
+  }
+  const std::vector<int> coupled = coupled_axes();
+  if (gains.attitude && model.inertia_kg_m2[0] > 0 && !coupled.empty() &&
+      !stability::is_stable(coupled_cascade(coupled)))
+    return false;
   if (is_sampled()) return spectral_radius() < 1;
   for (int axis = 0; axis < 3; ++axis) {
     if (const std::optional<AxisLoop> one = continuous(axis)) {

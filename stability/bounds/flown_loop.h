@@ -30,7 +30,7 @@ enum class Fact {
   kIntegratorStep,   ///< integrator_step_s differs from the period
   kIntegratorClamp,  ///< integrator_limit
   kMotorLag,
-  kAttitudeLag,
+  kAttitude,  ///< the thrust's direction follows the attitude: at once, with a lag, or as [attitude] says
   kDelay,
   kNetworkRate,     ///< the learned force is a staircase
   kNetworkLatency,  ///< the learned force is late
@@ -74,11 +74,22 @@ struct FlownLoop {
   /// Returns the axis as firmware runs it; nothing without rate_hz.
   std::optional<SampledLoop> sampled(int axis) const;
 
+  /// Returns the loop with other gains on one axis, as written in firmware. Requires is_sampled() and uncoupled axes.
+  FlownLoop with_axis(int axis, const AxisLoop& written) const;
+  /// Returns the axes that Lambda or K couples to others, ascending.
+  std::vector<int> coupled_axes() const;
+  /// Returns a horizontal axis in continuous time around the attitude loop of [attitude], which takes the place of the
+  /// attitude lag, without delay; nothing without such gains or an inertia, for z, and for coupled axes.
+  std::optional<Cascade> cascade(int axis) const;
+  /// The same for coupled axes, z among them without an attitude law. Requires gains.attitude.
+  CoupledCascade coupled_cascade(const std::vector<int>& axes) const;
+
   /// Returns the largest modulus of an eigenvalue of the map from one sample to the next, of all axes together, coupled
   /// or not. Requires is_sampled().
   double spectral_radius() const;
-  /// Returns whether the loop that flies is stable: the sampled one with rate_hz, else the continuous one. Nothing if
-  /// that is not decided: continuous axes that are coupled and delayed.
+  /// Returns whether the loop that flies is stable: the sampled one with rate_hz, else the continuous one, and that
+  /// around the attitude loop if gains.toml states one. Nothing if that is not decided: continuous axes that are coupled
+  /// and delayed.
   std::optional<bool> is_stable() const;
 
   /// Returns the actual force of all rotors together, N; the largest is infinite if unknown.

@@ -12,12 +12,6 @@
 namespace swarmcert::stability {
 namespace {
 
-std::string decimals(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
-
 AxisLoop& plant_of_loop(AxisLoop& loop) { return loop; }
 AxisLoop& plant_of_loop(SampledLoop& loop) { return loop.plant; }
 
@@ -154,6 +148,12 @@ std::string why_undecided(const FlownLoop& loop, const DisturbanceSource& source
 }
 
 }  // namespace
+
+std::string decimals(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
 
 double Saturation::tilt_rad() const {
   return least_N > 0 ? std::atan2(std::hypot(feedback_N[0], feedback_N[1]), least_N) : std::acos(-1.0);

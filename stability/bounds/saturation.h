@@ -46,6 +46,9 @@ Saturation saturation_of(const FlownLoop& loop, const PerAxis& feedback_N, doubl
 double replace_integral_N(AxisLoop& loop, double limit_m_s);
 double replace_integral_N(SampledLoop& loop, double limit_m_s);
 
+/// Returns a number in four digits, for the reasons of verdicts.
+std::string decimals(double value);
+
 /// Returns "proved", "refuted" or "undecided".
 const char* name(Saturation::Verdict verdict);
 

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "nn/base/doubles.h"
+#include "stability/bounds/around_attitude.h"
 #include "stability/bounds/sampled_bounds.h"
 #include "stability/bounds/thrust_ratio.h"
 
@@ -40,6 +41,19 @@ AxisFacts facts_of(const FlownLoop& flown, int axis, double bias_N) {
 
 using AddAssumption = std::function<void(const char* name, const char* status, const std::string& note)>;
 
+void assume_attitude(const FlownLoop& loop, const AddAssumption& add) {
+  const bool has_lag = loop.gains.attitude_lag_s > 0;
+  const char* const name = has_lag ? "first-order lag of the thrust's direction"
+                                   : "the thrust's direction follows the command at once";
+  const std::optional<double> beyond = gain_beyond_lag(loop);
+  if (!beyond) return add(name, "assumed", has_lag ? "as in [lag]" : "[lag] states no attitude_s");
+  if (*beyond <= 1) return add(name, "assumed", "no gain is larger around the loop of [attitude]");
+  const std::optional<double> enough_s = lag_that_contains_attitude_s(loop);
+  add(name, "refuted",
+      "around the loop of [attitude] a gain of x or y is " + decimals(*beyond) + " times as large" +
+          (enough_s ? "; [lag] attitude_s = " + decimals(*enough_s) + " contains it" : ""));
+}
+
 /// Visits one fact of the loop that flies: adds what the bounds assume about it.
 void assume(Fact fact, const FlownLoop& loop, const DisturbanceSource& source, const AddAssumption& add) {
   switch (fact) {
@@ -52,8 +66,8 @@ void assume(Fact fact, const FlownLoop& loop, const DisturbanceSource& source, c
       return add(kContinuousLoop, "assumed", "not needed for rows named 'sampled'");
     case Fact::kMotorLag:
       return add("first-order lag of the thrust", "assumed", "as in [lag]");
-    case Fact::kAttitudeLag:
-      add("first-order lag of the thrust's direction", "assumed", "as in [lag]");
+    case Fact::kAttitude:
+      assume_attitude(loop, add);
       return add("attitude error small", "assumed", "the direction of thrust is treated as linear");
     case Fact::kDelay:
       return add("constant delay", "assumed", "as in [lag]");

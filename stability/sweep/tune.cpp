@@ -23,21 +23,7 @@ void require(nlopt_result result) {
   if (result < 0) throw std::logic_error(std::string("NLopt: ") + nlopt_result_to_string(result));
 }
 
-double objective_of(const GainNorms& norms, TuneObjective objective) {
-  switch (objective) {
-    case TuneObjective::kAmplitude:
-      return norms.amplitude;
-    case TuneObjective::kImpulse:
-      return norms.impulse;
-    case TuneObjective::kEdge:
-      return norms.edge;
-    case TuneObjective::kRate:
-      return norms.rate;
-  }
-  return kWorst;
-}
-
-constexpr std::size_t kNumConstraints = 5;
+constexpr std::size_t kNumConstraints = 6;
 
 /// Returns the relative distance of the gains from being clear of a limit cycle. The 1 % margin avoids a decision by
 /// round-off.
@@ -56,11 +42,14 @@ std::array<double, kNumConstraints> excesses(const TunedPoint& p, const TuneCons
   };
   return {above(p.noise_m_s2, c.most_noise_m_s2),
           c.least_lag_limit_s > 0 ? 1 - p.lag_limit_s / c.least_lag_limit_s : -1.0,
-          above(p.norms.rate, c.most_rate), above(p.effort, c.most_effort), limit_cycle_excess(p.margins)};
+          above(p.norms.rate, c.most_rate),
+          above(p.effort, c.most_effort),
+          limit_cycle_excess(p.margins),
+          p.disturbed ? std::clamp(-p.disturbed->thrust_margin_N, -1.0, kWorst) : -1.0};
 }
 
-constexpr std::array<const char*, kNumConstraints> kConstraintNames = {"noise", "lag_limit", "rate", "effort",
-                                                                       "limit_cycle"};
+constexpr std::array<const char*, kNumConstraints> kConstraintNames = {"noise",  "lag_limit",   "rate",
+                                                                       "effort", "limit_cycle", "thrust"};
 
 /// Returns true if some oscillation keeps more than half of its amplitude over 10 cycles. Such a loop is no candidate,
 /// and its norms are expensive.
@@ -78,7 +67,7 @@ double effort_of(const SampledLoop& loop, const GainNorms& norms) {
 }
 
 /// Returns everything of evaluate_gains() but the effort, which is infinite.
-TunedPoint without_effort(const SampledLoop& loop, TuneObjective objective) {
+TunedPoint without_effort(const SampledLoop& loop, const TuneOptions& options) {
   TunedPoint point;
   point.Kp = loop.plant.Kp;
   point.Kd = loop.plant.Kd;
@@ -88,7 +77,10 @@ TunedPoint without_effort(const SampledLoop& loop, TuneObjective objective) {
   const bool is_candidate = spectral_radius(loop) < 1 && !rings(acting);
   point.norms = is_candidate ? sampled_norms(loop, Channel::kForce, Instants::kAll)
                              : GainNorms{kInfinity, kInfinity, kInfinity, kInfinity};
-  point.objective = objective_of(point.norms, objective);
+  if (options.under_disturbance)
+    point.disturbed = is_candidate ? options.under_disturbance(loop) : DisturbedLoop{kInfinity, -kWorst};
+  point.objective = options.objective != nullptr ? point.norms.*options.objective : point.disturbed->error_m;
+  if (options.attitude) point.margins = margins_of(loop, *options.attitude);
   point.noise_m_s2 = noise_deviation(loop, 1e-3, 0.05).command_m_s2;
   point.lag_limit_s = lag_limit(acting);
   point.effort = kInfinity;
@@ -104,9 +96,8 @@ class Search {
     loop.plant.Kp = std::exp(log_gains[0]);
     loop.plant.Kd = std::exp(log_gains[1]);
     loop.plant.Ki = dimension() == 3 ? std::exp(log_gains[2]) : 0;
-    TunedPoint point = without_effort(loop, options_.objective);
+    TunedPoint point = without_effort(loop, options_);
     if (options_.constraints.most_effort > 0) point.effort = effort_of(loop, point.norms);
-    if (options_.attitude) point.margins = margins_of(loop, *options_.attitude);
     return judged(std::move(point));
   }
 
@@ -190,22 +181,8 @@ class Search {
 
 }  // namespace
 
-const char* name(TuneObjective objective) {
-  switch (objective) {
-    case TuneObjective::kAmplitude:
-      return "amplitude";
-    case TuneObjective::kImpulse:
-      return "impulse";
-    case TuneObjective::kEdge:
-      return "edge";
-    case TuneObjective::kRate:
-      return "rate";
-  }
-  return "unknown";
-}
-
-TunedPoint evaluate_gains(const SampledLoop& loop, TuneObjective objective) {
-  TunedPoint point = without_effort(loop, objective);
+TunedPoint evaluate_gains(const SampledLoop& loop, const TuneOptions& options) {
+  TunedPoint point = without_effort(loop, options);
   point.effort = effort_of(loop, point.norms);
   return point;
 }
@@ -230,9 +207,7 @@ TuneResult tune(const SampledLoop& loop, const TuneOptions& options) {
     high[i] += std::log(options.range);
   }
   search.cached(given.data());
-  TunedPoint shipped = evaluate_gains(loop, options.objective);
-  if (options.attitude) shipped.margins = margins_of(loop, *options.attitude);
-  result.shipped = search.judged(std::move(shipped));
+  result.shipped = search.judged(evaluate_gains(loop, options));
   const double largest_Ki = effective_Ki(loop) * options.range;
   if (options.constraints.most_rate > 0 && loop.plant.Ki > 0 &&
       1 / (loop.plant.mass_kg * largest_Ki) > options.constraints.most_rate) {

@@ -21,10 +21,20 @@ struct TuneConstraints {
   double most_effort = 0;  ///< N/N; 0: no such constraint
 };
 
-enum class TuneObjective { kAmplitude, kImpulse, kEdge, kRate };
+/// The gain of the sampled loop that is minimised; null: the error under the declared disturbance.
+using TuneObjective = double GainNorms::*;
+
+/// What a declared disturbance does to the vehicle.
+struct DisturbedLoop {
+  double error_m = 0;          ///< upper bound on the axis
+  double thrust_margin_N = 0;  ///< Saturation::margin_N()
+};
 
 struct TuneOptions {
-  TuneObjective objective = TuneObjective::kImpulse;
+  TuneObjective objective = &GainNorms::impulse;
+  /// The vehicle with other gains on the axis, as written in firmware; empty: no disturbance is declared. Gains under
+  /// which the thrust is not proved to suffice are then infeasible.
+  std::function<DisturbedLoop(const SampledLoop&)> under_disturbance = {};
   TuneConstraints constraints;
   /// The attitude loop as flown, with the motor lag and the thrust ratio; its position gains are ignored. Gains that
   /// nearness_to_limit_cycle() classifies as close or unstable are then infeasible.
@@ -42,7 +52,8 @@ struct TunedPoint {
   double objective = 0;
   GainNorms norms;  ///< force channel of the sampled loop, at and between its samples
   double noise_m_s2 = 0, lag_limit_s = 0, effort = 0;
-  std::optional<CascadeMargins> margins;  ///< with TuneOptions::attitude
+  std::optional<CascadeMargins> margins;   ///< with TuneOptions::attitude
+  std::optional<DisturbedLoop> disturbed;  ///< with TuneOptions::under_disturbance
   bool feasible = false;
   double excess = 0;  ///< relative violation of the worst constraint; at most 0 if feasible
 };
@@ -58,8 +69,8 @@ struct TuneResult {
   std::string stopped;  ///< why the search ended; it does not prove that the gains found are optimal
 };
 
-/// Evaluates all constraints and objectives for one set of gains, given as in the firmware.
-TunedPoint evaluate_gains(const SampledLoop& loop, TuneObjective objective);
+/// Evaluates objective and constraints for one set of gains, given as in the firmware.
+TunedPoint evaluate_gains(const SampledLoop& loop, const TuneOptions& options);
 
 /// Returns the margins of these gains around the attitude loop.
 /// @param loop its gains divided by `attitude.ratio` are the firmware gains.
@@ -70,8 +81,5 @@ CascadeMargins margins_of(const SampledLoop& loop, const Cascade& attitude);
 /// gains. The objective is that of the sampled loop; it has no derivative because of its kinks (sign changes of the
 /// kernel). The result is never worse than the given gains if those are feasible.
 TuneResult tune(const SampledLoop& loop, const TuneOptions& options);
-
-/// "amplitude", "impulse", "edge", "rate".
-const char* name(TuneObjective objective);
 
 }  // namespace swarmcert::stability

@@ -232,6 +232,28 @@ TEST(TuneCommand, TunesWithoutAnIntegratorWhatHasNone) {
   EXPECT_EQ(run_shell("swarmcert tune" + gains + " --axis x --max-rate 1", folder.path()).exit_code, 2);
 }
 
+TEST(TuneCommand, TheErrorThatItMinimisesIsTheOneThatBoundAnswersForTheTunedGains) {
+  const ScratchFolder folder;
+  write_text(folder / "disturbance.toml",
+             "schema = \"swarmcert/disturbance/1\"\namplitude_N = 0.01\nbias_N = [0, 0, 0.01]\n");
+  const std::string law = "rate_hz = 100\nintegrator_limit = 0.1\n[lag]\nmotor_s = 0.03\n",
+                    under = " --disturbance disturbance.toml";
+  const std::string gains = gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 5\n" + law);
+  const Json found = json_of(folder, "tune" + gains + " --axis z --objective error --nodes 100" + under);
+  ASSERT_EQ(found["verdict"], "found");
+  EXPECT_LT(found["tuned"]["error_m"].get<double>(), found["shipped"]["error_m"].get<double>());
+  EXPECT_GE(found["tuned"]["thrust_margin_N"].get<double>(), 0);
+  const auto of_z = [&](const char* gain, const char* others) {
+    return std::string(gain) + " = [" + others + ", " + others + ", " + found["gains"][gain].dump() + "]\n";
+  };
+  write_text(folder / "tuned.toml", "schema = \"swarmcert/gains/1\"\n[position]\n" + of_z("Kp", "10") +
+                                        of_z("Kd", "5") + of_z("Ki", "5") + law);
+  const Json bound = json_of(folder, "bound --gains tuned.toml" + kModel + under);
+  EXPECT_NEAR(bound["answer"]["error_m"]["z"].get<double>(), found["tuned"]["error_m"].get<double>(), 1e-4);
+  EXPECT_NEAR(bound["thrust_margin_N"].get<double>(), found["tuned"]["thrust_margin_N"].get<double>(), 1e-9);
+  EXPECT_EQ(run_shell("swarmcert tune" + gains + " --objective error", folder.path()).exit_code, 2);
+}
+
 TEST(TuneCommand, ProposesNothingCloseToALimitCycleOfTheAttitudeLoop) {
   const ScratchFolder folder;
   const std::string attitude = " --attitude-gains 0.007,0.001125,0.030";

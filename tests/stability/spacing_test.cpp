@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "stability/stepped_loop.h"
 #include "stability/vehicle.h"
@@ -29,8 +31,14 @@ FlownLoop flown(double largest_thrust_N) {
   return {gains, {tests::kMass_kg, 1, largest_thrust_N}};
 }
 
+DisturbanceSource nothing() {
+  DisturbanceSource source;
+  declare_no_class(source);
+  return source;
+}
+
 Spacing spacing_of(const SpacingQuestion& question, double largest_thrust_N = 0.6) {
-  return spacing(flown(largest_thrust_N), field(), question);
+  return spacing(flown(largest_thrust_N), field(), nothing(), question);
 }
 
 TEST(Spacing, FieldFallsAsItsFormulaAndIsConstantWhereItIsNearest) {
@@ -89,9 +97,12 @@ TEST(Spacing, NoSequenceOfPassesExceedsTheLimit) {
         "gains.toml");
     const FlownLoop loop = {gains, {tests::kMass_kg, 1, 0.6}};
     int crossings = 0;
-    for (const double dwell_s : {0.3, 2.0}) {
+    for (const auto& [dwell_s, beside_N] : {std::pair(0.3, 0.0), std::pair(2.0, 0.0), std::pair(2.0, 5e-3)}) {
       question.dwell_s = dwell_s;
-      for (const SpacingRow& row : spacing(loop, field(), question).shape) {
+      DisturbanceSource beside = nothing();
+      beside.axis[2] = {};
+      beside.axis[2].amplitude_N = beside_N;
+      for (const SpacingRow& row : spacing(loop, field(), beside, question).shape) {
         if (!(row.least_speed_m_s > 0) || !std::isfinite(row.least_speed_m_s)) continue;
         ++crossings;
         const double spread_m = field().spread_at_m(row.height_gap_m + question.max_error_m);
@@ -105,7 +116,8 @@ TEST(Spacing, NoSequenceOfPassesExceedsTheLimit) {
         for (int k = 0; k * flight.step_s() < 12 * turn_s; ++k) {
           const double at_s = std::fmod(k * flight.step_s(), turn_s), r = -R + at_s * row.least_speed_m_s;
           const double force_N =
-              at_s < pass_s ? row.peak_force_N * std::exp(-r * r / (2 * spread_m * spread_m)) : outside_N;
+              beside_N +
+              (at_s < pass_s ? row.peak_force_N * std::exp(-r * r / (2 * spread_m * spread_m)) : outside_N);
           most_m = std::max(most_m, std::abs(flight.step(force_N, force_N)));
         }
         EXPECT_LE(most_m, question.max_error_m) << row.height_gap_m;
@@ -114,6 +126,29 @@ TEST(Spacing, NoSequenceOfPassesExceedsTheLimit) {
     }
     EXPECT_GT(crossings, 0);
   }
+}
+
+TEST(Spacing, WhatDisturbsTheVehicleBesideTheFieldTakesItsShareOfErrorAndThrust) {
+  SpacingQuestion question;
+  question.max_error_m = 0.06;
+  question.steps = 9;
+  const FlownLoop loop = flown(0.6);
+  DisturbanceSource beside = nothing();
+  beside.bias_N[0] = 0.05;  // sideways: thrust, but no vertical error
+  beside.bias_N[2] = 4e-3;
+  const Spacing alone = spacing(loop, field(), nothing(), question),
+                both = spacing(loop, field(), beside, question);
+  const double own_m = axis_bounds(loop, flown_gains(loop, 2, Channel::kForce), beside, {}).bounds.least();
+  ASSERT_GT(own_m, 0);
+  for (std::size_t i = 0; i < both.shape.size(); ++i) {
+    EXPECT_NEAR(both.shape[i].stay_error_m, alone.shape[i].stay_error_m + own_m, 1e-12);
+    EXPECT_GE(both.shape[i].least_speed_m_s, alone.shape[i].least_speed_m_s);
+  }
+  EXPECT_GT(both.least_gap_to_stay_m, alone.least_gap_to_stay_m);
+  const double up_N = saturation(loop, beside, {}).feedback_N[2];
+  EXPECT_LE(both.shape.back().thrust_margin_N, alone.shape.back().thrust_margin_N - up_N);
+  beside.thrust_ratio_error = 0.1;
+  EXPECT_THROW(spacing(loop, field(), beside, question), std::invalid_argument);
 }
 
 TEST(Spacing, MoreNeighboursAndALargerGuardNeverComeCloser) {

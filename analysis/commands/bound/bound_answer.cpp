@@ -39,16 +39,22 @@ double proved_amplitude_N(const Tracking& input, DisturbanceSource source, const
   return low_N;
 }
 
+std::string why_divergent(const Tracking& input) {
+  const double radius = input.is_sampled() ? input.spectral_radius() : 0;
+  if (radius >= 1)
+    return fmt::format("the loop diverges: spectral radius {:.4g} at {:g} Hz", radius, input.gains.rate_hz);
+  return input.gains.attitude ? "the loop around that of [attitude] diverges" : "the loop diverges";
+}
+
 void add_limits(const Tracking& input, const TrackingReport& report, BoundAnswer& answer) {
   if (report.is_stable == false) {
-    answer.limits.push_back(input.is_sampled()
-                                ? fmt::format("the loop diverges: spectral radius {:.4g} at {:g} Hz",
-                                              input.spectral_radius(), input.gains.rate_hz)
-                                : std::string("the loop diverges"));
+    answer.limits.push_back(why_divergent(input));
     return;
   }
   const Saturation& thrust = report.saturation;
-  if (!thrust.is_proved()) answer.limits.push_back(thrust.why);
+  for (const Assumption& one : report.assumptions)
+    if (one.status == "refuted") answer.limits.push_back(one.note);
+  if (thrust.verdict == Saturation::Verdict::kUndecided) answer.limits.push_back(thrust.why);
   if (std::isfinite(thrust.most_N)) {
     answer.limits.push_back(
         fmt::format("thrust: {:.3g} to {:.3g} N commanded at most, {:.3g} to {:.3g} N available",
@@ -95,7 +101,9 @@ BoundAnswer bound_answer(const Tracking& input, const DisturbanceSource& source,
     answer.flies = false;
     return answer;
   }
-  bool has_all = report.is_stable.has_value() && thrust == Saturation::Verdict::kProved;
+  const auto is_refuted = [](const Assumption& one) { return one.status == "refuted"; };
+  bool has_all = report.is_stable.has_value() && thrust == Saturation::Verdict::kProved &&
+                 std::none_of(report.assumptions.begin(), report.assumptions.end(), is_refuted);
   for (int axis = 0; axis < 3 && source.kind != "none"; ++axis) {
     const std::optional<double> error_m = largest_error_m(input, report, axis);
     if (source.bounds_learning_error() && error_m && std::isfinite(*error_m)) {

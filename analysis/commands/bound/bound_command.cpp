@@ -150,7 +150,7 @@ struct BoundResult {
   // What was requested in addition to the bounds:
   std::optional<Uncertain> uncertain;
   std::optional<CoverageBound> coverage;
-  std::optional<std::vector<AttitudeRow>> attitude;
+  std::optional<std::vector<stability::AttitudeRow>> attitude;
   std::optional<VerifiedGains> verified;
   std::optional<std::vector<AxisTube>> tube;
   std::optional<TaskTube> local_tube;
@@ -188,7 +188,7 @@ void add_extras(const BoundOptions& options, const CommonOptions& common, const 
     result.coverage = promise_of(input, result.tracking.report, load_disturbance(others, input).source,
                                  options.initial, options.disturbance.from, options.coverage);
   }
-  if (has_attitude_gains(input, options.attitude)) result.attitude = attitude_rows(input, options.attitude);
+  if (input.gains.attitude) result.attitude = attitude_rows(input);
   if (options.verified) result.verified = verified_gains(input);
   if (options.tube) result.tube = tubes_over_time(input, source, 101);
   if (!options.swarm.empty()) result.swarm = swarm_bound(input, options.swarm, source);
@@ -232,7 +232,8 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_to_replace(common, options.certificate);
   refuse_folder(common, options.report);
-  const Tracking input = load_tracking(options.tracking);
+  Tracking input = load_tracking(options.tracking);
+  state_attitude_gains(options.attitude, input);
   refuse_coupled_axes(options, input);
   std::vector<std::string> inputs = {options.tracking.gains, options.tracking.model};
   if (!options.swarm.empty()) inputs.push_back(options.swarm);
@@ -297,10 +298,7 @@ CLI::Option* declare_extras(CLI::App& app, BoundOptions& options) {
                  "bounds if the limit is reached")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option(
-      "--attitude-gains", options.attitude,
-      "KR,Kw,KI of the attitude law, N m, N m s, N m/s: gains and limit-cycle margins of the cascade "
-      "(default: [attitude] of gains.toml, if present)");
+  declare_attitude(app, options.attitude);
   app.add_option("--coverage", options.coverage,
                  "Bound that a further flight exchangeable with those of --from keeps with this probability "
                  "(split-conformal prediction over flights); with --tube --task, the tube, where --truth "

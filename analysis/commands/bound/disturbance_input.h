@@ -35,9 +35,6 @@ struct LoadedDisturbance {
   std::vector<std::string> inputs;  ///< files that were read
 };
 
-/// States that the force error consists of its constant part only.
-void declare_no_class(stability::DisturbanceSource& source);
-
 /// Evaluates the sources in this order: --disturbance, then --rate and the other class options, which replace its
 /// numbers (declared), --from (measured), --truth
 /// (with the rate of the network if one is given), a certificate or a network with --speed (rate of f_hat, which is

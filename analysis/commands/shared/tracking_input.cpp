@@ -16,4 +16,11 @@ Tracking load_tracking(const TrackingArguments& arguments) {
   return tracking;
 }
 
+stability::DisturbanceSource load_disturbance_file(const std::string& path) {
+  stability::DisturbanceSource source;
+  if (!path.empty()) stability::read_disturbance_file(path, source);
+  if (source.kind == "none") declare_no_class(source);
+  return source;
+}
+
 }  // namespace swarmcert::analysis

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "analysis/cli/command.h"
+#include "stability/bounds/declared_disturbance.h"
 #include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::analysis {
@@ -21,5 +22,9 @@ using Tracking = stability::FlownLoop;
 /// Calls stability::load_flown_loop() with the declared options.
 /// @throws UsageError if the battery voltage is outside the range of the model.
 Tracking load_tracking(const TrackingArguments& arguments);
+
+/// Returns what the file declares; without a file, that nothing disturbs the vehicle.
+/// @throws files::InputError as stability::read_disturbance_file().
+stability::DisturbanceSource load_disturbance_file(const std::string& path);
 
 }  // namespace swarmcert::analysis

@@ -20,6 +20,7 @@ struct SpacingOptions {
   TrackingArguments tracking;
   std::string neighbour_model;
   stability::SpacingQuestion question;
+  std::string disturbance;
   std::string report;
 };
 
@@ -55,6 +56,7 @@ DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, 
 struct SpacingResult {
   stability::SpacingQuestion question;
   std::string field_from;
+  std::string beside;  ///< disturbance.toml; empty: nothing else disturbs the lower vehicle
   stability::Spacing found;
 };
 
@@ -81,6 +83,8 @@ void describe(files::Record& record, const SpacingResult& result) {
   record.field("neighbours", result.question.neighbours, "Vehicles above at the same time.");
   record.field("guard", result.question.guard, "Factor on predicted forces.");
   record.field("field", result.field_from, "Where the field of force comes from.");
+  record.field("beside", result.beside,
+               "What else disturbs the lower vehicle, contained in every number; empty: nothing.");
   record.field("least_gap_to_stay_m", result.found.least_gap_to_stay_m,
                "Least gap at which a vehicle may stay below; null: none in range.", "m");
   record.field("least_gap_to_cross_m", result.found.least_gap_to_cross_m,
@@ -105,9 +109,9 @@ std::string gap_text(double gap_m) {
 
 void print_spacing(const SpacingResult& result, const files::Node& described) {
   const stability::SpacingQuestion& question = result.question;
-  fmt::print("Error at most {} m below {} vehicle(s), no feed-forward; field: {}; guard factor {}\n\n{}",
+  fmt::print("Error at most {} m below {} vehicle(s), no feed-forward; field: {}; guard factor {}{}\n\n{}",
              question.max_error_m, question.neighbours, result.field_from, question.guard,
-             to_text(rows_of(described)));
+             result.beside.empty() ? "" : "; beside " + result.beside, to_text(rows_of(described)));
   fmt::print(
       "\nEach line holds for any number of straight passes at this speed or faster, with {:g} s or more "
       "outside the "
@@ -141,7 +145,12 @@ int run_spacing(const SpacingOptions& options, const CommonOptions& common) {
   SpacingResult result;
   result.question = options.question;
   const DownwashField field = field_of(input.model, neighbour_mass_kg, result.field_from);
-  result.found = spacing(input, field, options.question);
+  const stability::DisturbanceSource beside = load_disturbance_file(options.disturbance);
+  if (!options.disturbance.empty()) inputs.push_back(options.disturbance);
+  if (beside.thrust_ratio_error > 0)
+    throw UsageError(options.disturbance + ": spacing contains no thrust_ratio_error; leave it out");
+  result.beside = options.disturbance;
+  result.found = spacing(input, field, beside, options.question);
 
   const files::Node described = result_of("spacing", inputs, std::nullopt, result);
   write_result(common, described);
@@ -187,6 +196,8 @@ Command spacing_command() {
                 ->check(CLI::PositiveNumber);
             app.add_option("--steps", question.steps, "Number of height gaps (default 27)")
                 ->check(CLI::Range(1, 10000));
+            app.add_option("--disturbance", options->disturbance,
+                           "disturbance.toml: what disturbs the lower vehicle beside the field");
             add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
             return [options](const CommonOptions& common) { return run_spacing(*options, common); };
           },

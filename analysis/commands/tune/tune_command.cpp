@@ -1,6 +1,9 @@
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <map>
 #include <memory>
 
 #include "analysis/cli/command_line.h"
@@ -25,12 +28,20 @@ struct TuneOptions {
   std::string objective = "impulse";
   std::string axis = "z";
   bool without_integrator = false;
-  std::string attitude;  ///< empty: no attitude loop
+  std::string attitude;     ///< empty: no attitude loop
+  std::string disturbance;  ///< empty: none is declared
   std::string report;
 };
 
 /// By default the tuned gains must tolerate this share of the additional lag that the shipped gains tolerate.
 constexpr double kKeptLag = 0.5;
+
+const std::map<std::string, stability::TuneObjective> kObjectives = {
+    {"rate", &stability::GainNorms::rate},
+    {"amplitude", &stability::GainNorms::amplitude},
+    {"edge", &stability::GainNorms::edge},
+    {"impulse", &stability::GainNorms::impulse},
+    {"error", nullptr}};
 
 /// The gains under the names used in the published firmware.
 struct FirmwareGain {
@@ -55,6 +66,10 @@ std::vector<TunedQuantity> quantities(const std::string& axis, const TuneResult&
                          {"noise of the command", a.noise_m_s2, b.noise_m_s2, "m/s^2"},
                          {"additional lag allowed", a.lag_limit_s, b.lag_limit_s, "s"},
                          {"effort", a.effort, b.effort, "N/N"}});
+  if (a.disturbed && b.disturbed) {
+    all.push_back({"largest error", a.disturbed->error_m, b.disturbed->error_m, "m"});
+    all.push_back({"thrust left", a.disturbed->thrust_margin_N, b.disturbed->thrust_margin_N, "N"});
+  }
   return all;
 }
 
@@ -66,7 +81,7 @@ void print_result(const TuneOptions& options, const TuneResult& found) {
   const stability::TuneConstraints& limits = options.tune.constraints;
   const TunedPoint& a = found.shipped;
   const TunedPoint& b = found.best;
-  fmt::print("Axis {}, least {} gain under: noise at most {:.6g} m/s^2, additional lag of {:.6g} s allowed",
+  fmt::print("Axis {}, least {} under: noise at most {:.6g} m/s^2, additional lag of {:.6g} s allowed",
              options.axis, options.objective, limits.most_noise_m_s2, limits.least_lag_limit_s);
   if (limits.most_rate > 0) fmt::print(", rate gain at most {:.6g}", limits.most_rate);
   if (limits.most_effort > 0) fmt::print(", effort at most {:.6g}", limits.most_effort);
@@ -113,19 +128,34 @@ stability::SampledLoop loop_of(const TuneOptions& options, const Tracking& input
   return *loop;
 }
 
+/// What the declared disturbance does to the vehicle with other gains on the axis.
+std::function<stability::DisturbedLoop(const stability::SampledLoop&)> disturbed_by(
+    const TuneOptions& options, const Tracking& input, int axis) {
+  const stability::DisturbanceSource source = load_disturbance_file(options.disturbance);
+  if (!input.coupled_axes().empty())
+    throw UsageError("--disturbance: Lambda or K couples axes: make them diagonal");
+  return [source, input, axis](const stability::SampledLoop& loop) {
+    const Tracking changed = input.with_axis(axis, loop.plant);
+    stability::DisturbedLoop result;
+    for (const auto channel : {stability::Channel::kForce, stability::Channel::kCommand})
+      result.error_m = std::max(
+          result.error_m, axis_bounds(changed, flown_gains(changed, axis, channel), source, {}).least());
+    result.thrust_margin_N = saturation(changed, source, {}).margin_N();
+    return result;
+  };
+}
+
 /// Sets the objective and the limits that the command line leaves out: by default nothing may be worse than with the
 /// given gains, except the tolerated lag.
 void set_limits(const stability::SampledLoop& loop, const Tracking& input, int axis, TuneOptions& options) {
   if (!options.attitude.empty() && axis == 2)
     throw UsageError("--attitude-gains: the z axis has no attitude loop");
-  if (axis < 2 && has_attitude_gains(input, options.attitude)) {
-    options.tune.attitude = attitude_cascade(input, options.attitude, axis);
-  }
-  options.tune.objective = options.objective == "amplitude" ? stability::TuneObjective::kAmplitude
-                           : options.objective == "edge"    ? stability::TuneObjective::kEdge
-                           : options.objective == "rate"    ? stability::TuneObjective::kRate
-                                                            : stability::TuneObjective::kImpulse;
-  const TunedPoint shipped = evaluate_gains(loop, options.tune.objective);
+  options.tune.attitude = input.cascade(axis);
+  options.tune.objective = kObjectives.at(options.objective);
+  if (!options.disturbance.empty()) options.tune.under_disturbance = disturbed_by(options, input, axis);
+  if (options.tune.objective == nullptr && options.disturbance.empty())
+    throw UsageError("--objective error: state what disturbs the vehicle: --disturbance FILE");
+  const TunedPoint shipped = evaluate_gains(loop, options.tune);
   stability::TuneConstraints& limits = options.tune.constraints;
   constexpr double kSlack = 1e-9;  // for round-off error
   if (limits.most_noise_m_s2 == 0) limits.most_noise_m_s2 = shipped.noise_m_s2 * (1 + kSlack);
@@ -148,6 +178,11 @@ void describe_point(files::Record& record, const TunedPoint& p) {
   record.field("lag_limit_s", p.lag_limit_s, "Additional first-order lag that the loop tolerates.", "s");
   record.field("effort", p.effort, "Feedback force per amplitude of force.", "N/N");
   record.field("feasible", p.feasible, "Whether all limits are kept.");
+  const auto disturbed = p.disturbed.value_or(stability::DisturbedLoop());
+  record.may_fields(p.disturbed.has_value(), [&disturbed](files::Record& r) {
+    r.field("error_m", disturbed.error_m, "Largest error under --disturbance.", "m", "upper bound");
+    r.field("thrust_margin_N", disturbed.thrust_margin_N, "Thrust that is left; negative: saturates.", "N");
+  });
   record.may_object(p.margins.has_value(), "limit_cycle", "With an attitude loop.",
                     [&](files::Record& cycle) {
                       const auto margins = p.margins.value_or(std::decay_t<decltype(*p.margins)>());
@@ -221,7 +256,8 @@ void describe(files::Record& record, const TuneOutcome& outcome) {
 int run_tune(TuneOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
-  const Tracking input = load_tracking(options.tracking);
+  Tracking input = load_tracking(options.tracking);
+  state_attitude_gains(options.attitude, input);
   const int axis = options.axis == "x" ? 0 : options.axis == "y" ? 1 : 2;
   const stability::SampledLoop loop = loop_of(options, input, axis);
   set_limits(loop, input, axis, options);
@@ -231,14 +267,15 @@ int run_tune(TuneOptions options, const CommonOptions& common) {
   options.tune.cancelled = interrupt.flag();
   const TuneResult found = stability::tune(loop, options.tune);
 
-  const files::Node result = result_of("tune", {options.tracking.gains, options.tracking.model},
-                                       options.tune.seed, TuneOutcome{options, found});
+  std::vector<std::string> inputs = {options.tracking.gains, options.tracking.model};
+  if (!options.disturbance.empty()) inputs.push_back(options.disturbance);
+  const files::Node result = result_of("tune", inputs, options.tune.seed, TuneOutcome{options, found});
   write_result(common, result);
   if (common.prints_text()) print_result(options, found);
   if (!options.report.empty()) {
     const std::string verdict = fmt::format(
-        "Axis {}, least {} gain: {}. Active constraints: {}. Good gains, not proved to be the best.",
-        options.axis, options.objective, verdict_of(found), constraint_names(found.active_constraints));
+        "Axis {}, least {}: {}. Active constraints: {}. Good gains, not proved to be the best.", options.axis,
+        options.objective, verdict_of(found), constraint_names(found.active_constraints));
     const std::string path = write_tune_report(
         verdict, found.best.feasible ? quantities(options.axis, found) : std::vector<TunedQuantity>(), result,
         options.report, common.force);
@@ -266,8 +303,11 @@ Command tune_command() {
         declare_tracking(app, options->tracking);
         app.add_option("--axis", options->axis, "x, y or z (default z)")
             ->check(CLI::IsMember({"x", "y", "z"}));
-        app.add_option("--objective", options->objective, "Gain to minimize (default impulse)")
-            ->check(CLI::IsMember({"rate", "amplitude", "edge", "impulse"}));
+        app.add_option("--objective", options->objective,
+                       "Gain to minimize (default impulse), or the largest error under --disturbance")
+            ->check(CLI::IsMember(kObjectives));
+        app.add_option("--disturbance", options->disturbance,
+                       "disturbance.toml, under which the thrust must suffice");
         auto& limits = options->tune.constraints;
         app.add_option(
                "--max-noise", limits.most_noise_m_s2,
@@ -283,10 +323,7 @@ Command tune_command() {
             ->check(CLI::PositiveNumber);
         app.add_flag("--no-integrator", options->without_integrator,
                      "Search Kp and Kd with Ki = 0, as if the gains given had Ki = 0");
-        app.add_option(
-            "--attitude-gains", options->attitude,
-            "KR,Kw,KI of the attitude law, N m, N m s, N m/s (x and y): propose no gains that bound reports "
-            "as close to a limit cycle (default: [attitude] of gains.toml, if present)");
+        declare_attitude(app, options->attitude);
         app.add_option("--range", options->tune.range, "Gains at most this factor away (default 8)")
             ->check(CLI::Range(1.01, 100.0));
         app.add_option("--nodes", options->tune.global_evaluations, "Evaluations of the global search")

@@ -10,10 +10,11 @@
 namespace swarmcert::stability {
 namespace {
 
-/// The error and the feedback of the lower vehicle under a lasting force F and passes of impulse J: linear in both.
+/// The error and the feedback of the lower vehicle under a lasting force F and passes of impulse J, beside what else is
+/// declared: linear in both.
 class LowerVehicle {
  public:
-  LowerVehicle(const FlownLoop& loop, double dwell_s) {
+  LowerVehicle(const FlownLoop& loop, double dwell_s, const DisturbanceSource& beside) {
     Disturbance force, passes, nothing;
     force.amplitude_N = 1;
     nothing.amplitude_N = 0;
@@ -21,20 +22,24 @@ class LowerVehicle {
     passes.passes = Disturbance::kManyPasses;
     passes.pass_period_s = dwell_s;  // from the end of a pass, so that its length does not matter
     const ExactGains gains = flown_gains(loop, 2, Channel::kForce);
+    const AxisBounds others = axis_bounds(loop, gains, beside, {});
+    const OtherErrors other = beside.other(2, {}, loop.plant);
     const auto effort = [&](const auto& one, double constant_N) -> Linear {
       return {effort_of_class_N(one, Channel::kForce, force), effort_of_class_N(one, Channel::kForce, passes),
-              constant_N};
+              constant_N + effort_of_class_N(one, Channel::kForce, beside.axis[2]) + effort_N(one, other) +
+                  loop.plant.mass_kg * other.reference.fed_forward_m_s2()};
     };
     const auto set = [&](auto one, double limit_m_s, double by_impulse) {
       const ClampBounds of_force = clamp_bounds(one, Channel::kForce, force, {}, limit_m_s);
       const ClampBounds of_passes = clamp_bounds(one, Channel::kForce, passes, {}, limit_m_s);
-      linear_ = {gains.all_times.amplitude, by_impulse, 0};
+      linear_ = {gains.all_times.amplitude, by_impulse, others.bounds.least()};
       effort_ = effort(one, 0);
       if (!of_force.exists) return;
       limit_m_s_ = limit_m_s;
-      demand_ = {of_force.demand_m_s, of_passes.demand_m_s, 0};
+      demand_ = {of_force.demand_m_s, of_passes.demand_m_s, others.clamp.demand_m_s};
       const double constant_m = clamp_bounds(one, Channel::kForce, nothing, {}, limit_m_s).by_amplitude;
-      clamped_ = {of_force.by_amplitude - constant_m, of_passes.by_impulse - constant_m, constant_m};
+      clamped_ = {of_force.by_amplitude - constant_m, of_passes.by_impulse - constant_m,
+                  std::min(others.clamp.by_amplitude, others.clamp.by_impulse)};
       const double integral_N = replace_integral_N(one, limit_m_s);
       clamped_effort_ = effort(one, integral_N);
     };
@@ -106,12 +111,16 @@ double DownwashField::line_integral() const {
   return std::sqrt(2 * pi / tail) * std::exp(std::lgamma(1 / tail - 0.5) - std::lgamma(1 / tail));
 }
 
-Spacing spacing(const FlownLoop& loop, const DownwashField& field, const SpacingQuestion& question) {
+Spacing spacing(const FlownLoop& loop, const DownwashField& field, const DisturbanceSource& beside,
+                const SpacingQuestion& question) {
   if (!loop.continuous(2)) throw std::invalid_argument("Lambda or K couples the z axis to others");
+  if (beside.thrust_ratio_error > 0)
+    throw std::invalid_argument("an error of the thrust ratio is not contained");
   Spacing result;
   result.least_gap_to_stay_m = kInfinity;
   result.least_gap_to_cross_m = kInfinity;
-  const LowerVehicle lower(loop, question.dwell_s);
+  const LowerVehicle lower(loop, question.dwell_s, beside);
+  const PerAxis sideways = saturation(loop, beside, {}).feedback_N;
   const double limit_m = question.max_error_m;
   for (int i = 0; i < question.steps; ++i) {
     SpacingRow row;
@@ -125,7 +134,8 @@ Spacing spacing(const FlownLoop& loop, const DownwashField& field, const Spacing
     // No force is larger than the peak, so that staying below also bounds the feedback of a pass.
     const double stay_N = lower.feedback_N(row.peak_force_N, 0);
     const auto thrust = [&](double force_N, double impulse_N_s) {
-      return saturation_of(loop, {0, 0, std::min(stay_N, lower.feedback_N(force_N, impulse_N_s))});
+      return saturation_of(
+          loop, {sideways[0], sideways[1], std::min(stay_N, lower.feedback_N(force_N, impulse_N_s))});
     };
     const auto holds = [&](double force_N, double impulse_N_s) {
       return lower.error_m(force_N, impulse_N_s) <= limit_m && thrust(force_N, impulse_N_s).is_proved();

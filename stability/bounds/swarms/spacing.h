@@ -63,7 +63,9 @@ struct Spacing {
 /// without integral, plus the effect of the largest integral, if the clamp may act. In the same way the feedback is at
 /// most E F + C J, and at most E times the peak, with E and C the gains to the command; the thrust must suffice for it.
 /// The bounds hold for forces within the field; `guard` accounts for its deviation from flights.
-/// @throws std::invalid_argument if Lambda or K couples the z axis to others.
-Spacing spacing(const FlownLoop& loop, const DownwashField& field, const SpacingQuestion& question);
+/// @param beside all else that disturbs the lower vehicle; its error and its share of the thrust are contained.
+/// @throws std::invalid_argument if Lambda or K couples the z axis to others, and for an error of the thrust ratio.
+Spacing spacing(const FlownLoop& loop, const DownwashField& field, const DisturbanceSource& beside,
+                const SpacingQuestion& question);
 
 }  // namespace swarmcert::stability

@@ -1,0 +1,77 @@
+#include "stability/bounds/around_attitude.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace swarmcert::stability {
+namespace {
+
+/// Subtracts the delay of gains.toml from the delay margin. If the delay uses up the whole margin, the loop is
+/// unstable.
+CascadeMargins left_by_delay(CascadeMargins margins, const FlownLoop& loop) {
+  margins.delay_s = std::max(0.0, margins.delay_s - loop.gains.delay_s);
+  return margins.delay_s == 0 ? CascadeMargins{} : margins;
+}
+
+AttitudeRow decoupled_row(const FlownLoop& loop, const Cascade& cascade, int axis) {
+  const auto gains = [&cascade](CascadeInput of) { return response_norms(cascade_transfer(cascade, of)); };
+  AttitudeRow row;
+  row.axes = {axis};
+  row.margins = left_by_delay(cascade_margins(cascade), loop);
+  row.nearness = nearness_to_limit_cycle(row.margins);
+  row.exact = CascadeGains{gains(CascadeInput::kAcceleration), gains(CascadeInput::kVelocityError),
+                           gains(CascadeInput::kAngularAcceleration)};
+  return row;
+}
+
+AttitudeRow coupled_row(const FlownLoop& loop, const std::vector<int>& axes) {
+  CoupledMargins margins = coupled_margins(loop.coupled_cascade(axes));
+  margins.together = left_by_delay(margins.together, loop);
+  for (CascadeMargins& alone : margins.alone) {
+    // If the delay of all motors makes the loop unstable, no channel has a margin left.
+    alone = margins.together.gain > 0 ? left_by_delay(alone, loop) : CascadeMargins{};
+  }
+  return {axes, margins.together, nearness_to_limit_cycle(margins), std::nullopt, margins.alone};
+}
+
+}  // namespace
+
+std::vector<AttitudeRow> attitude_rows(const FlownLoop& loop) {
+  std::vector<AttitudeRow> rows;
+  for (int axis = 0; axis < 2; ++axis) {
+    if (const std::optional<Cascade> cascade = loop.cascade(axis))
+      rows.push_back(decoupled_row(loop, *cascade, axis));
+  }
+  const std::vector<int> coupled = loop.coupled_axes();
+  if (!coupled.empty()) rows.push_back(coupled_row(loop, coupled));
+  return rows;
+}
+
+std::optional<double> gain_beyond_lag(const FlownLoop& loop) {
+  double largest = 0;
+  for (int axis = 0; axis < 2; ++axis) {
+    const std::optional<Cascade> cascade = loop.cascade(axis);
+    if (!cascade) return std::nullopt;
+    AxisLoop lagged = *loop.continuous(axis);
+    lagged.delay_s = 0;  // as in the cascade
+    const ResponseNorms around = response_norms(cascade_transfer(*cascade, CascadeInput::kAcceleration));
+    const GainNorms with_lag = continuous_norms(lagged, Channel::kForce);
+    for (const auto& [gain, of_lag] :
+         {std::pair(around.integral_abs, with_lag.amplitude), std::pair(around.step_max_abs, with_lag.edge),
+          std::pair(around.max_abs(), with_lag.impulse)})
+      largest = std::max(largest, gain / (lagged.mass_kg * of_lag));
+  }
+  return std::isfinite(largest) ? std::optional<double>(largest) : std::nullopt;
+}
+
+std::optional<double> lag_that_contains_attitude_s(FlownLoop loop) {
+  constexpr double kShortest_s = 1e-3, kLongest_s = 1, kStep = 1.1;
+  for (double lag_s = kShortest_s; lag_s <= kLongest_s; lag_s *= kStep) {
+    loop.gains.attitude_lag_s = lag_s;
+    const std::optional<double> ratio = gain_beyond_lag(loop);
+    if (ratio && *ratio > 0 && *ratio <= 1) return lag_s;
+  }
+  return std::nullopt;
+}
+
+}  // namespace swarmcert::stability
