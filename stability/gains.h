@@ -22,8 +22,8 @@ using PidGains = controller::PidGains<double>;
 using CompositeGains = controller::CompositeGains<double>;
 using controller::AttitudeLaw;
 
-/// Gains of the attitude law about the body axes: torque = -(KR e_R + Kw e_w + KI int e_R). The robust law has this
-/// form with Kw = K, KR = K Lambda.
+/// Gains of the attitude law about the body axes: torque = -(KR e_R + Kw e_w + KI int e_R). The robust law without its
+/// integral has this form with Kw = K + J Lambda, KR = K Lambda.
 struct AttitudeGains {
   PerAxis KR_Nm;
   PerAxis Kw_Nm_s;

@@ -1,5 +1,6 @@
 #include "analysis/identification/turning_search.h"
 
+#include <algorithm>
 #include <numeric>
 
 #include "analysis/identification/selection.h"
@@ -64,6 +65,21 @@ std::optional<Turned> TurningSearch::best_of(const std::vector<std::string>& nam
     if (explains_motion(next) && (!best || next.mean_rad_s() < best->mean_rad_s())) best = std::move(next);
   }
   return best;
+}
+
+std::vector<TurningStep> turning_steps(const residuals::Inputs& inputs, const std::string& kind,
+                                       const std::vector<int>& fit, const std::vector<int>& select,
+                                       int jobs) {
+  std::vector<TurningStep> steps;
+  TurningSearch search(inputs, kind, fit, select, jobs);
+  if (!search.is_possible()) return steps;
+  std::vector<std::string> left = turning_effects();
+  while (const std::optional<Turned> next = search.best_of(left)) {
+    steps.push_back({*next, search.accepted().mean_rad_s()});
+    search.accept(*next);
+    left.erase(std::find(left.begin(), left.end(), next->name));
+  }
+  return steps;
 }
 
 }  // namespace swarmcert::identification

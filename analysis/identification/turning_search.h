@@ -46,4 +46,15 @@ class TurningSearch {
   Turned accepted_;
 };
 
+/// One step of a forward selection.
+struct TurningStep {
+  Turned found;
+  double before_rad_s = 0;  ///< mean error of the body rates on the flights to select, before it
+};
+
+/// Returns the effects that turn the vehicles of one kind, the best one first, as long as one predicts the body rates
+/// much better: fitted to `fit`, judged on `select`. Empty if these flights do not show how vehicles turn.
+std::vector<TurningStep> turning_steps(const residuals::Inputs& inputs, const std::string& kind,
+                                       const std::vector<int>& fit, const std::vector<int>& select, int jobs);
+
 }  // namespace swarmcert::identification

@@ -47,29 +47,59 @@ std::vector<AttitudeRow> attitude_rows(const FlownLoop& loop) {
   return rows;
 }
 
-std::optional<double> gain_beyond_lag(const FlownLoop& loop) {
+namespace {
+
+/// Gains of x or y around the attitude loop, of the loop that flies.
+GainNorms norms_around(const FlownLoop& loop, const Cascade& cascade, int axis) {
+  if (const std::optional<SampledLoop> sampled = loop.sampled_cascade(axis))
+    return sampled_norms(*sampled, Channel::kForce, Instants::kAll);
+  const ResponseNorms h = response_norms(cascade_transfer(cascade, CascadeInput::kAcceleration));
+  const double mass_kg = loop.plant.mass_kg;
+  return {0, h.integral_abs / mass_kg, h.step_max_abs / mass_kg, h.max_abs() / mass_kg};
+}
+
+GainNorms norms_with_lag(const FlownLoop& loop, int axis) {
+  if (loop.is_sampled()) return sampled_norms(*loop.sampled(axis), Channel::kForce, Instants::kAll);
+  AxisLoop lagged = *loop.continuous(axis);
+  lagged.delay_s = 0;  // as in the cascade
+  return continuous_norms(lagged, Channel::kForce);
+}
+
+/// Gains around the attitude loop, of both horizontal axes; empty without one.
+std::vector<GainNorms> norms_around(const FlownLoop& loop) {
+  std::vector<GainNorms> norms;
+  for (int axis = 0; axis < 2; ++axis)
+    if (const std::optional<Cascade> cascade = loop.cascade(axis))
+      norms.push_back(norms_around(loop, *cascade, axis));
+  return norms.size() == 2 ? norms : std::vector<GainNorms>();
+}
+
+double largest_ratio(const std::vector<GainNorms>& around, const FlownLoop& loop) {
   double largest = 0;
   for (int axis = 0; axis < 2; ++axis) {
-    const std::optional<Cascade> cascade = loop.cascade(axis);
-    if (!cascade) return std::nullopt;
-    AxisLoop lagged = *loop.continuous(axis);
-    lagged.delay_s = 0;  // as in the cascade
-    const ResponseNorms around = response_norms(cascade_transfer(*cascade, CascadeInput::kAcceleration));
-    const GainNorms with_lag = continuous_norms(lagged, Channel::kForce);
-    for (const auto& [gain, of_lag] :
-         {std::pair(around.integral_abs, with_lag.amplitude), std::pair(around.step_max_abs, with_lag.edge),
-          std::pair(around.max_abs(), with_lag.impulse)})
-      largest = std::max(largest, gain / (lagged.mass_kg * of_lag));
+    const GainNorms with_lag = norms_with_lag(loop, axis);
+    for (const auto gain : {&GainNorms::amplitude, &GainNorms::edge, &GainNorms::impulse})
+      largest = std::max(largest, around[static_cast<std::size_t>(axis)].*gain / with_lag.*gain);
   }
-  return std::isfinite(largest) ? std::optional<double>(largest) : std::nullopt;
+  return largest;
+}
+
+}  // namespace
+
+std::optional<double> gain_beyond_lag(const FlownLoop& loop) {
+  const std::vector<GainNorms> around = norms_around(loop);
+  if (around.empty()) return std::nullopt;
+  const double ratio = largest_ratio(around, loop);
+  return std::isfinite(ratio) && ratio > 0 ? std::optional<double>(ratio) : std::nullopt;
 }
 
 std::optional<double> lag_that_contains_attitude_s(FlownLoop loop) {
   constexpr double kShortest_s = 1e-3, kLongest_s = 1, kStep = 1.1;
-  for (double lag_s = kShortest_s; lag_s <= kLongest_s; lag_s *= kStep) {
+  const std::vector<GainNorms> around = norms_around(loop);
+  for (double lag_s = kShortest_s; !around.empty() && lag_s <= kLongest_s; lag_s *= kStep) {
     loop.gains.attitude_lag_s = lag_s;
-    const std::optional<double> ratio = gain_beyond_lag(loop);
-    if (ratio && *ratio > 0 && *ratio <= 1) return lag_s;
+    const double ratio = largest_ratio(around, loop);
+    if (ratio > 0 && ratio <= 1) return lag_s;
   }
   return std::nullopt;
 }

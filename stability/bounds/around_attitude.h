@@ -29,8 +29,9 @@ struct AttitudeRow {
 std::vector<AttitudeRow> attitude_rows(const FlownLoop& loop);
 
 /// Returns by how much the gains from a force to x and y around the attitude loop exceed those of the loop with
-/// `attitude_lag_s`, both in continuous time: the largest ratio of amplitude, edge and impulse gain. Nothing without
-/// gains.attitude, with coupled horizontal axes, and if a loop is unstable.
+/// `attitude_lag_s`: the largest ratio of amplitude, edge and impulse gain. Both are sampled, and delayed, with rate_hz;
+/// else both are in continuous time without delay. Nothing without gains.attitude, with coupled horizontal axes, and if
+/// a loop is unstable.
 std::optional<double> gain_beyond_lag(const FlownLoop& loop);
 
 /// Returns a lag, s, whose loop has no smaller gain: gain_beyond_lag() <= 1. Nothing if none of 1 ms to 1 s is found.

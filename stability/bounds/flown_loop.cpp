@@ -15,6 +15,9 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
+/// The flight code runs its attitude law at 500 Hz. A torque that is held for a period acts half of it late on average.
+constexpr double kAttitudePeriod_s = 0.002;
+
 /// One axis with the given gains; lags and delay as declared.
 AxisLoop with_gains(const FlownLoop& loop, int axis, double Kp, double Kd, double Ki) {
   AxisLoop result = {loop.plant.mass_kg, Kp, Kd, Ki, {}, loop.gains.delay_s};
@@ -166,6 +169,18 @@ std::optional<Cascade> FlownLoop::cascade(int axis) const {
   return result;
 }
 
+std::optional<SampledLoop> FlownLoop::sampled_cascade(int axis) const {
+  const std::optional<Cascade> around = cascade(axis);
+  std::optional<SampledLoop> result = sampled(axis);
+  if (!around || !result) return std::nullopt;
+  const AttitudeLoop& law = *around->attitude;
+  const double ratio = around->ratio;
+  result->attitude = AttitudeLoop{ratio * law.KR_J_s2, ratio * law.Kw_J_s, ratio * law.KI_J_s3};
+  result->body_rate_lag_s = around->body_rate_lag_s;
+  result->plant.lags_s = {around->lag_s, kAttitudePeriod_s / 2};
+  return result;
+}
+
 CoupledCascade FlownLoop::coupled_cascade(const std::vector<int>& axes) const {
   CoupledCascade result;
   const PidMatrices all = pid_matrices(*gains.composite, plant.mass_kg);
@@ -215,6 +230,8 @@ std::optional<bool> FlownLoop::is_stable() const {
   for (int axis = 0; axis < 2; ++axis) {
     const std::optional<Cascade> around = cascade(axis);
     if (around && !(cascade_margins(*around).delay_s > gains.delay_s)) return false;
+    const std::optional<SampledLoop> flown = sampled_cascade(axis);
+    if (flown && stability::spectral_radius(*flown) >= 1) return false;
   }
   const std::vector<int> coupled = coupled_axes();
   if (gains.attitude && model.inertia_kg_m2[0] > 0 && !coupled.empty() &&

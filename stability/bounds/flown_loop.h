@@ -81,7 +81,10 @@ struct FlownLoop {
   /// Returns a horizontal axis in continuous time around the attitude loop of [attitude], which takes the place of the
   /// attitude lag, without delay; nothing without such gains or an inertia, for z, and for coupled axes.
   std::optional<Cascade> cascade(int axis) const;
-  /// The same for coupled axes, z among them without an attitude law. Requires gains.attitude.
+  /// Returns a horizontal axis as firmware runs it around that attitude loop, with the motor lag on the torque and the
+  /// delay; nothing also without rate_hz.
+  std::optional<SampledLoop> sampled_cascade(int axis) const;
+  /// The same as cascade() for coupled axes, z among them without an attitude law. Requires gains.attitude.
   CoupledCascade coupled_cascade(const std::vector<int>& axes) const;
 
   /// Returns the largest modulus of an eigenvalue of the map from one sample to the next, of all axes together, coupled

@@ -149,6 +149,11 @@ std::string why_undecided(const FlownLoop& loop, const DisturbanceSource& source
 
 }  // namespace
 
+double Saturation::beyond_linear_N() const {
+  const double sine = std::sin(std::min(tilt_rad(), std::acos(0.0)));
+  return 2 * most_N * sine * sine + (most_N - least_N) * sine;
+}
+
 std::string decimals(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.4g", value);

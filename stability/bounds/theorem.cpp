@@ -111,7 +111,9 @@ void visit(Fact fact, const FlownLoop& loop, const std::optional<PerAxis>& needs
       return object_to_clamps(loop, needs_m_s, theorem);
     case Fact::kMotorLag:
       return object("thrust lags by " + number(gains.motor_lag_s) + " s");
-    case Fact::kAttitudeLag:
+    case Fact::
+        kAttitude:  // without a lag, a condition of every statement: see assume() in tracking_bounds.cpp
+      if (gains.attitude_lag_s == 0) return;
       return object("the thrust's direction lags by " + number(gains.attitude_lag_s) + " s");
     case Fact::kDelay:
       return object("the force is delayed by " + number(gains.delay_s) + " s");

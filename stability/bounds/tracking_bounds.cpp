@@ -55,7 +55,8 @@ void assume_attitude(const FlownLoop& loop, const AddAssumption& add) {
 }
 
 /// Visits one fact of the loop that flies: adds what the bounds assume about it.
-void assume(Fact fact, const FlownLoop& loop, const DisturbanceSource& source, const AddAssumption& add) {
+void assume(Fact fact, const FlownLoop& loop, const DisturbanceSource& source, const Saturation& thrust,
+            const AddAssumption& add) {
   switch (fact) {
     case Fact::kGainsOfLaw:
     case Fact::kIntegratorStep:   // the Ki that acts is used
@@ -68,7 +69,13 @@ void assume(Fact fact, const FlownLoop& loop, const DisturbanceSource& source, c
       return add("first-order lag of the thrust", "assumed", "as in [lag]");
     case Fact::kAttitude:
       assume_attitude(loop, add);
-      return add("attitude error small", "assumed", "the direction of thrust is treated as linear");
+      return add(
+          "attitude error small", "assumed",
+          "the direction of thrust is treated as linear" +
+              (std::isfinite(thrust.most_N)
+                   ? ": up to a tilt of " + decimals(thrust.tilt_rad() * 180 / std::acos(-1.0)) +
+                         " degrees, which leaves out about " + decimals(thrust.beyond_linear_N()) + " N"
+                   : ""));
     case Fact::kDelay:
       return add("constant delay", "assumed", "as in [lag]");
     case Fact::kNetworkRate:
@@ -127,7 +134,7 @@ void add_assumptions(const FlownLoop& loop, const DisturbanceSource& source, Tra
     add("exact position and velocity", "assumed",
         "--velocity-error and --position-error bound the effect of estimation errors");
   }
-  for (const Fact fact : loop.facts()) assume(fact, loop, source, add);
+  for (const Fact fact : loop.facts()) assume(fact, loop, source, report.saturation, add);
 }
 
 /// @param of_class disturbance_bounds() of the class alone.

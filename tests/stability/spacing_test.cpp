@@ -135,7 +135,7 @@ TEST(Spacing, WhatDisturbsTheVehicleBesideTheFieldTakesItsShareOfErrorAndThrust)
   const FlownLoop loop = flown(0.6);
   DisturbanceSource beside = nothing();
   beside.bias_N[0] = 0.05;  // sideways: thrust, but no vertical error
-  beside.bias_N[2] = 4e-3;
+  beside.bias_N[2] = 8e-3;
   const Spacing alone = spacing(loop, field(), nothing(), question),
                 both = spacing(loop, field(), beside, question);
   const double own_m = axis_bounds(loop, flown_gains(loop, 2, Channel::kForce), beside, {}).bounds.least();

@@ -14,6 +14,7 @@
 #include "analysis/commands/diagnose/diagnose_result.h"
 #include "analysis/commands/diagnose/each_output.h"
 #include "analysis/commands/diagnose/rotor_output.h"
+#include "analysis/commands/diagnose/turning_output.h"
 #include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/shared/label_output.h"
@@ -119,6 +120,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
     // With --against the rotors are compared one by one with those of the healthy flights.
     result.torques = judge_torques(inputs, common.jobs, prints, judgement);
     result.sensors = judge_accelerometers(inputs, common.jobs, prints, judgement);
+    judge_turning(inputs, answers.diagnoses, common.jobs, prints, judgement);
   }
   judgement.append(ranked(clocks));
   judgement.append(ranked(labels));

@@ -6,7 +6,7 @@
 ///   g theta_c = -ratio (Kp e + Kd (e' + n) + Ki int e),  L = lag s + 1.
 /// The law measures theta' behind a separate lag: Kw theta' stands for Kw (rate_lag s + 1)^-1 theta'. Lee's law has
 /// this form if its feedforward of the body rate is omitted; the robust law
-/// tau = -K (omega - omega_r), omega_r = -Lambda theta, has it with Kw = K, KR = K Lambda.
+/// tau = J omega_r' - K (omega - omega_r), omega_r = -Lambda theta, has it with Kw = K + J Lambda, KR = K Lambda.
 #pragma once
 
 #include <complex>

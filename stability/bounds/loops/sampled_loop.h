@@ -1,16 +1,22 @@
 /// @file The position loop as firmware runs it: sampled, zero-order hold, any integrator step.
 #pragma once
 
+#include <optional>
+
+#include "stability/bounds/loops/attitude_cascade.h"
 #include "stability/bounds/loops/axis_loop.h"
 
 namespace swarmcert::stability {
 
 /// Every period: measure e and e'; I += integrator_step_s e; command -m (Kp e + Kd e' + Ki I), held until the next
-/// command, delayed by plant.delay_s (not necessarily whole periods) and passed through plant.lags_s.
+/// command, delayed by plant.delay_s (not necessarily whole periods) and passed through plant.lags_s. With an attitude
+/// loop, the command is the acceleration of a tilt, towards which a torque behind the lags turns the vehicle.
 struct SampledLoop {
   AxisLoop plant;  ///< Ki as written in the firmware, not the effective one
   double period_s = 0;
   double integrator_step_s = 0;
+  std::optional<AttitudeLoop> attitude = {};  ///< in continuous time
+  double body_rate_lag_s = 0;                 ///< with `attitude`
 };
 
 /// Returns Ki integrator_step_s / period_s, the equivalent continuous gain of the sampled integrator.

@@ -28,7 +28,9 @@ SampledModel::SampledModel(const SampledLoop& loop) : loop_(loop) {
     if (tau > 0) lags_s.push_back(tau);
   }
   const auto lags = static_cast<Index>(lags_s.size());
-  plant_ = 2 + lags;
+  const Index turning =
+      loop.attitude ? 2 + (loop.body_rate_lag_s > 0 ? 1 : 0) + (loop.attitude->KI_J_s3 > 0 ? 1 : 0) : 0;
+  plant_ = 2 + turning + lags;
   const double periods = loop.plant.delay_s / loop.period_s;
   double whole = std::floor(periods + 1e-9);
   shift_s_ = loop.plant.delay_s - whole * loop.period_s;
@@ -38,12 +40,15 @@ SampledModel::SampledModel(const SampledLoop& loop) : loop_(loop) {
 
   generator_ = MatrixXd::Zero(plant_ + 1, plant_ + 1);
   generator_(0, 1) = 1;
-  generator_(1, 2) = 1;  // the last lag's output, or the command itself without a lag
+  // The last lag's output, or the tilt; the command itself without either.
+  generator_(1, 2) = 1;
+  const Index lag = 2 + turning;
   for (Index i = 0; i < lags; ++i) {
     const double tau = lags_s[static_cast<std::size_t>(i)];
-    generator_(2 + i, 2 + i) = -1 / tau;
-    generator_(2 + i, 3 + i) = 1 / tau;
+    generator_(lag + i, lag + i) = -1 / tau;
+    generator_(lag + i, lag + i + 1) = 1 / tau;
   }
+  if (loop.attitude) add_attitude(lag, lag + lags);
 
   control_ = MatrixXd::Zero(size() + 1, size());
   control_.topLeftCorner(plant_ + 1, plant_ + 1).setIdentity();
@@ -57,6 +62,36 @@ SampledModel::SampledModel(const SampledLoop& loop) : loop_(loop) {
   hold_.topRows(plant_) = plant_at(loop.period_s);
   hold_(plant_, plant_) = 1;
   for (Index i = 0; i < past_; ++i) hold_(plant_ + 1 + i, command_index() + i) = 1;
+}
+
+void SampledModel::add_attitude(Index torque, Index command) {
+  constexpr Index kTilt = 2, kRate = 3;  // of g theta and g theta'
+  const AttitudeLoop& law = *loop_.attitude;
+  MatrixXd angular_acceleration = MatrixXd::Zero(1, generator_.cols());
+  angular_acceleration(0, command) = law.KR_J_s2;
+  angular_acceleration(0, kTilt) = -law.KR_J_s2;
+  generator_(kTilt, kRate) = 1;
+  Index next = kRate + 1, measured_rate = kRate;
+  if (loop_.body_rate_lag_s > 0) {
+    measured_rate = next++;
+    generator_(measured_rate, kRate) = 1 / loop_.body_rate_lag_s;
+    generator_(measured_rate, measured_rate) = -1 / loop_.body_rate_lag_s;
+  }
+  angular_acceleration(0, measured_rate) = -law.Kw_J_s;
+  if (law.KI_J_s3 > 0) {  // of the integral of theta - theta_c
+    generator_(next, kTilt) = 1;
+    generator_(next, command) = -1;
+    angular_acceleration(0, next) = -law.KI_J_s3;
+  }
+  if (torque == command) {
+    generator_.row(kRate) = angular_acceleration;
+    return;
+  }
+  // Behind the lags, of which the first one reads the law in place of the command.
+  generator_(kRate, torque) = 1;
+  const double rate = generator_(command - 1, command);
+  generator_(command - 1, command) = 0;
+  generator_.row(command - 1) += rate * angular_acceleration;
 }
 
 MatrixXd SampledModel::map() const {

@@ -10,7 +10,7 @@ namespace swarmcert::stability {
 /// Returns exp(A t) of a small matrix, by scaling and squaring of the Taylor series.
 Eigen::MatrixXd exponential(const Eigen::MatrixXd& At);
 
-/// State before the control of a period: e, e', lag outputs, I, past commands (newest first). State after the control:
+/// State before the control of a period: e, e', tilt and its rate if there is an attitude loop, lag outputs, I, past commands (newest first). State after the control:
 /// the same with the new command before the past ones. Commands are accelerations.
 class SampledModel {
  public:
@@ -34,13 +34,16 @@ class SampledModel {
   Eigen::Index command_index() const { return plant_ + 1; }
 
  private:
+  /// Adds the attitude loop to the plant: states 2 and on, before the lags.
+  /// @param torque, command indices of the last lag's output and of the command in the generator; equal without lags.
+  void add_attitude(Eigen::Index torque, Eigen::Index command);
   /// Returns the plant's state after `duration_s` under a held command (last column), [plant x plant + 1].
   Eigen::MatrixXd plant_step(double duration_s) const;
   /// Returns the plant's state at `phase_s` as rows over the state after the control.
   Eigen::MatrixXd plant_at(double phase_s) const;
 
   SampledLoop loop_;
-  Eigen::Index plant_ = 0;   ///< e, e', lags
+  Eigen::Index plant_ = 0;   ///< e, e', tilt, lags
   Eigen::Index past_ = 0;    ///< past commands that are still to act
   double shift_s_ = 0;       ///< part of a period during which the older command still acts
   Eigen::Index newest_ = 0;  ///< command that acts after shift_s_, counted from the new one
