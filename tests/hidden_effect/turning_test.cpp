@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <set>
 #include <string>
 
 #include "analysis/run.h"
@@ -127,7 +128,16 @@ class TurningFlight {
   Eigen::Vector4d speed_rad_s_;
 };
 
-/// Returns the result of `study` on three flights of 25 s.
+/// The effects of `list` that turn a vehicle.
+std::set<std::string> turning_of(const files::Json& list, const char* key) {
+  const std::set<std::string> turning = {"torque_ratio", "rate_damping", "flow_torque", "rotor_momentum"};
+  std::set<std::string> names;
+  for (const files::Json& one : list)
+    if (turning.count(one[key]) > 0) names.insert(one[key].get<std::string>());
+  return names;
+}
+
+/// Returns the result of `study` on three flights of 25 s. `diagnose` names the same effects that turn the vehicle.
 files::Json study_of(const TurningTruth& truth) {
   const ScratchFolder folder;
   for (unsigned run = 1; run <= 3; ++run)
@@ -137,7 +147,14 @@ files::Json study_of(const TurningTruth& truth) {
       "swarmcert study model.toml turns_run1.csv turns_run2.csv turns_run3.csv -q -o page --json result.json",
       folder.path());
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
-  return files::read_json(folder / "result.json", "swarmcert/study/1");
+  const Outcome diagnosed = run_shell(
+      "swarmcert diagnose model.toml turns_run1.csv turns_run2.csv turns_run3.csv -q --json diagnosed.json",
+      folder.path());
+  EXPECT_EQ(diagnosed.exit_code, 0) << diagnosed.output;
+  const files::Json result = files::read_json(folder / "result.json", "swarmcert/study/1");
+  const files::Json ranking = files::read_json(folder / "diagnosed.json", "swarmcert/diagnose/1")["ranking"];
+  EXPECT_EQ(turning_of(ranking, "effect"), turning_of(result["causes"], "name"));
+  return result;
 }
 
 const files::Json* cause_named(const files::Json& result, const std::string& name) {

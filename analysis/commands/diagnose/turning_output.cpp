@@ -10,14 +10,15 @@
 namespace swarmcert::analysis {
 namespace {
 
-Ranked ranked_turning(const identification::TurningStep& step, const std::string& kind) {
-  const stability::EffectSpec& spec = step.found.specs.back();
+/// @param spec with its value beside all other effects that were found.
+Ranked ranked_turning(const identification::TurningStep& step, const stability::EffectSpec& spec,
+                      const std::string& kind) {
   Ranked entry;
-  entry.effect = step.found.name;
+  entry.effect = spec.name;
   entry.kind = kind;
-  entry.parameters = fitted_values(entry.effect, spec.parameters, {});
-  entry.equivalence_class = stability::effect_info(entry.effect).equivalence_class;
-  entry.separated_by = stability::effect_info(entry.effect).excitation;
+  entry.parameters = fitted_values(spec.name, spec.parameters, {});
+  entry.equivalence_class = stability::effect_info(spec.name).equivalence_class;
+  entry.separated_by = stability::effect_info(spec.name).excitation;
   entry.statement =
       fmt::format("body rates half a second ahead are predicted to {:.3g} instead of {:.3g} rad/s",
                   step.found.mean_rad_s(), step.before_rad_s);
@@ -33,12 +34,14 @@ void judge_turning(residuals::Inputs inputs, const std::vector<identification::D
     inputs.models[i] = identification::with_effects(inputs.models[i], specs_of(forces[i].ranking));
   const identification::Split split = identification::split_flights(inputs);
   for (const stability::Model& model : inputs.models) {
-    for (const identification::TurningStep& step :
-         identification::turning_steps(inputs, model.kind, split.fit, split.select, jobs)) {
-      causes.push_back(ranked_turning(step, model.kind));
+    const std::vector<identification::TurningStep> steps =
+        identification::turning_steps(inputs, model.kind, split.fit, split.select, jobs);
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+      const stability::EffectSpec& spec = steps.back().found.specs[k];
+      causes.push_back(ranked_turning(steps[k], spec, model.kind));
       if (!prints) continue;
-      fmt::print("  {:<15} {}\n", step.found.name, *causes.back().statement);
-      print_values(step.found.name, "    ", step.found.specs.back().parameters, {});
+      fmt::print("  {:<15} {}\n", spec.name, *causes.back().statement);
+      print_values(spec.name, "    ", spec.parameters, {});
     }
   }
   judgement.append(std::move(causes));
