@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 
+#include "analysis/logs/column_names.h"
+#include "analysis/logs/dictionary.h"
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
 
@@ -26,12 +28,7 @@ double seconds_per_unit(std::vector<double> clock) {
 }
 
 int clock_by_name(const RawTopic& topic) {
-  for (const char* const name :
-       {"t",       "time",        "timestamp",    "time.s",       "time.ms",      "time.us",
-        "time.ns", "timestamp.s", "timestamp.ms", "timestamp.us", "timestamp.ns", "t.s",
-        "t.ms",    "t.us",        "t.ns",         "date.time",    "datetime",     "sec",
-        "secs",    "seconds",     "stamp",        "header.stamp", "time.sec",     "rosbag.timestamp",
-        "tick"}) {
+  for (const std::string& name : words_of_kind("clock")) {
     for (std::size_t c = 0; c < topic.columns.size(); ++c) {
       if (plain_name(topic.columns[c].name) == name) return static_cast<int>(c);
     }

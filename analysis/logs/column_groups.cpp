@@ -5,6 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "analysis/logs/message_frames.h"
+
 namespace swarmcert::logs {
 namespace {
 
@@ -127,7 +129,7 @@ class Grouping {
 }  // namespace
 
 bool is_plain_table(const RawLog& log, const RawTopic& topic) {
-  return topic.type.empty() && log.format != "ulog" && log.format != "ardupilot";
+  return topic.type.empty() && firmware_of(log, topic).empty();
 }
 
 std::vector<ColumnGroup> column_groups(const RawLog& log, const std::vector<std::vector<char>>& taken) {

@@ -1,14 +1,12 @@
 #include "analysis/logs/name_reading.h"
 
 #include <cctype>
-#include <iterator>
 #include <map>
 #include <optional>
-#include <set>
-#include <sstream>
 #include <vector>
 
 #include "analysis/logs/column_names.h"
+#include "analysis/logs/dictionary.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -20,67 +18,23 @@ constexpr double kForeign = 25;      ///< bits against the vehicle's own motion
 
 using WordBits = std::map<int, double>;
 
-std::set<std::string> words_in(const std::string& text) {
-  std::istringstream in(text);
-  return {std::istream_iterator<std::string>(in), {}};
-}
-
 /// Words that name a quantity; other quantities lose kNamedOther bits.
 const std::map<std::string, WordBits>& quantity_words() {
   static const std::map<std::string, WordBits> words = [] {
+    const std::vector<std::string> names = {"position",   "velocity", "specific_force", "rates",
+                                            "quaternion", "angles",   "motors",         "battery"};
     std::map<std::string, WordBits> all;
-    const auto add = [&](const WordBits& bits, const std::string& spellings) {
-      for (const std::string& word : words_in(spellings)) all[word] = bits;
-    };
-    add({{kIsPosition, kNamed}}, "pos position p loc location translation t point coord");
-    add({{kIsVelocity, kNamed}}, "vel velocity v speed linvel dot d");
-    add({{kIsSpecificForce, kNamed}}, "acc accel acceleration accelerometer a acel xl");
-    add({{kIsSpecificForce, 3 * kNamed}}, "specific");
-    add({}, "force f jerk snap torque tau moment");
-    add({{kIsRates, kNamed}}, "gyro gyr gyroscope omega om rate rates w g angvel bodyrate bodyrates");
-    add({{kIsQuaternion, kNamed}}, "q quat quaternion");
-    add({{kIsQuaternion, kNamed}, {kIsAngles, kNamed}}, "att attitude ori orient orientation rot rotation");
-    add({{kIsAngles, kNamed}}, "rpy euler angle angles");
-    add({{kIsMotors, kNamed}}, "motor motors mot m u pwm duty rotor act actuator esc throttle servo");
-    add({{kIsMotors, 6}}, "thrust out output");
-    add({{kIsBattery, kNamed}}, "vbat vbatt battery bat batt voltage volt volts");
+    for (const files::TomlTable& entry : dictionary_table("words.toml").tables("quantity")) {
+      const files::TomlTable stated = entry.table("bits");
+      stated.allow_only(names);
+      WordBits bits;
+      for (int q = 0; q < static_cast<int>(names.size()); ++q)
+        if (stated.has(names[static_cast<std::size_t>(q)]))
+          bits[q] = stated.number(names[static_cast<std::size_t>(q)]);
+      for (const std::string& word : entry.texts("words")) all[word] = bits;
+    }
     return all;
   }();
-  return words;
-}
-
-const std::set<std::string>& wish_words() {
-  static const std::set<std::string> words = words_in(
-      "target ref reference des desired sp setpoint set cmd command commanded goal traj trajectory "
-      "ctrltarget plan "
-      "planned nominal");
-  return words;
-}
-
-const std::set<std::string>& foreign_words() {
-  static const std::set<std::string> words = words_in(
-      "wind gust airspeed payload load cargo sling cable tether home neighbour neighbor leader follower peer "
-      "other ball "
-      "gate obstacle anchor tag beacon marker waypoint wp landing pad boat ship truck platform person human "
-      "origin "
-      "initial init error err bias offset residual innov innovation cov var std variance noise integral mag "
-      "magn "
-      "magnetometer mag1 baro temp current flow imu2");
-  return words;
-}
-
-/// Words that say how the vehicle's own motion was found.
-const std::set<std::string>& neutral_words() {
-  static const std::set<std::string> words = words_in(
-      "est estimate estimated estimator state stateestimate drone uav quad quadrotor copter vehicle robot "
-      "agent cf "
-      "crazyflie fc px4 body base link world local global map inertial enu ned flu frd mocap vicon opti "
-      "optitrack "
-      "qualisys motive rigid pose odom odometry twist ekf kf kalman vio slam lighthouse uwb gps meas "
-      "measured fused filt "
-      "filtered raw sensor nav ins ahrs log data value values ros signal gt ground truth true self own ext "
-      "lin linear "
-      "actual now");
   return words;
 }
 
@@ -92,16 +46,12 @@ struct Index {
 std::optional<Index> index_of(const std::string& word) {
   static const std::map<std::string, Index> known = [] {
     std::map<std::string, Index> all;
-    const auto add = [&](IndexKind kind, std::initializer_list<const char*> words) {
+    for (const files::TomlTable& entry : dictionary_table("words.toml").tables("index")) {
+      const IndexKind kinds[] = {IndexKind::kAxis, IndexKind::kCompass, IndexKind::kAngle};
+      const IndexKind kind = kinds[entry.choice("kind", {"axis", "compass", "angle"})];
       int index = 0;
-      for (const char* const spelling : words) all[spelling] = {kind, index++};
-    };
-    add(IndexKind::kAxis, {"x", "y", "z", "w"});
-    add(IndexKind::kCompass, {"north", "east", "down", "up"});
-    add(IndexKind::kCompass, {"n", "e", "d", "u"});
-    add(IndexKind::kAngle, {"roll", "pitch", "yaw"});
-    add(IndexKind::kAngle, {"phi", "theta", "psi"});
-    add(IndexKind::kAngle, {"rol", "pit", "heading"});
+      for (const std::string& spelling : entry.texts("words")) all[spelling] = {kind, index++};
+    }
     return all;
   }();
   const auto found = known.find(word);
@@ -113,10 +63,8 @@ std::optional<Index> index_of(const std::string& word) {
 }
 
 bool is_known(const std::string& word) {
-  return quantity_words().count(word) + wish_words().count(word) + foreign_words().count(word) +
-                 neutral_words().count(word) >
-             0 ||
-         word == "imu";
+  return quantity_words().count(word) > 0 || is_word_of("wish", word) || is_word_of("foreign", word) ||
+         is_word_of("neutral", word) || word == "imu";
 }
 
 /// Returns the words of a name; glued ones are split where both parts are known: "posx", "qw", "pwm1", "xdot".
@@ -231,12 +179,12 @@ NameReading read_name(const std::string& column) {
     } else if (quantity != quantity_words().end() && (index || word.size() > 1)) {
       add_bits(quantity->second, name);
       is_quantity = true;
-    } else if (wish_words().count(word) > 0) {
+    } else if (is_word_of("wish", word)) {
       name.is_wish = true;
-    } else if (foreign_words().count(word) > 0) {
+    } else if (is_word_of("foreign", word)) {
       name.is_foreign = true;
     } else if (word != "imu") {
-      const bool is_neutral = neutral_words().count(word) > 0 || index_of(word);
+      const bool is_neutral = is_word_of("neutral", word) || index_of(word);
       for (double& bits : name.bits) bits -= is_neutral ? 1 : kUnknownWord;
     }
   }

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <optional>
-#include <set>
 #include <unordered_map>
 
 #include "analysis/logs/assignment.h"
 #include "analysis/logs/column_groups.h"
+#include "analysis/logs/column_names.h"
+#include "analysis/logs/message_frames.h"
 #include "analysis/logs/name_reading.h"
 #include "nn/base/input_error.h"
 #include "nn/base/suggest.h"
@@ -48,10 +48,8 @@ class ColumnIndex {
 
   /// Returns whether a name begins with a log group of the Crazyflie firmware that no common word is.
   bool has_crazyflie_names() const {
-    static const std::set<std::string> groups = {"stateestimate", "stateestimatez", "kalman", "stabilizer",
-                                                 "ctrllee",       "ctrlmel",        "pm",     "controller"};
     return std::any_of(whole_.begin(), whole_.end(), [](const auto& name) {
-      return groups.count(name.first.substr(0, name.first.find('.'))) > 0;
+      return is_crazyflie_group(name.first.substr(0, name.first.find('.')));
     });
   }
 
@@ -111,15 +109,10 @@ bool is_wish(const RawTopic& topic, int signal) {
   return false;
 }
 
-/// Messages of known firmware carry signals only under the names of message_frames.h.
-bool has_own_names(const RawLog& log, const RawTopic& topic) {
-  return log.format == "ulog" || log.format == "ardupilot" || topic.type.rfind("px4_msgs", 0) == 0;
-}
-
 void recognise_row(const RawLog& log, const std::vector<ColumnIndex>& indices, const NamedColumns& row,
                    bool is_shortened, Recognition& found) {
   for (std::size_t t = 0; t < log.topics.size() && found.find(row.signal) == nullptr; ++t) {
-    if (row.origin != Origin::kOwn && has_own_names(log, log.topics[t])) continue;
+    if (row.origin != Origin::kOwn && !firmware_of(log, log.topics[t]).empty()) continue;
     const bool is_of_messages =
         row.origin == Origin::kMessages || (row.origin == Origin::kOwn && log.format == "csv");
     if (is_of_messages && is_plain_table(log, log.topics[t])) continue;
@@ -160,24 +153,16 @@ void recognise_by_names(const RawLog& log, Recognition& found) {
   const bool is_crazyflie = std::any_of(indices.begin(), indices.end(),
                                         [](const ColumnIndex& index) { return index.has_crazyflie_names(); });
   for (const NamedColumns& row : column_names()) {
+    if (row.origin == Origin::kFirmware) continue;
     if (row.origin == Origin::kCommonWords && !is_crazyflie && log.format != "usd") continue;
     recognise_row(log, indices, row, false, found);
     if (row.origin == Origin::kPrograms) recognise_row(log, indices, row, true, found);
   }
 }
 
-/// Returns the first signal of the group that a signal belongs to.
-int first_of_group(int signal) {
-  static const std::set<int> firsts = {
-      kPosition, kVelocity, kForceWorld, kForceBody,      kAccelerationWorld, kAttitude,     kPackedAttitude,
-      kRates,    kDuty,     kBattery,    kTargetPosition, kTargetVelocity,    kMotorForce,   kThrust,
-      kTorque,   kEuler,    kRequested,  kRotorSpeed,     kMotorCommand,      kThrustCommand};
-  return *std::prev(firsts.upper_bound(signal));
-}
-
 /// Adds the column of one signal to the group of its topic that has its unit, up to the sign.
 void join(Carried one, Recognition& found) {
-  const int first = first_of_group(one.signal);
+  const int first = kind_of_signal(one.signal).first;
   const auto place = static_cast<std::size_t>(one.signal - first);
   Carried* group = found.find(first);
   const bool is_alike = group != nullptr && group->topic == one.topic && group->divide == one.divide &&

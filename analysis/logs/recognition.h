@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/logs/column_names.h"
+#include "analysis/logs/dictionary.h"
 #include "analysis/logs/raw_log.h"
 
 namespace swarmcert::logs {

@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "analysis/logs/collector.h"
+#include "analysis/logs/dictionary.h"
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/formats.h"
 #include "nn/base/csv.h"
@@ -84,13 +85,10 @@ bool names_crazyflies(std::string_view column) {
 }
 
 bool may_name_vehicles(std::string_view column) {
-  static const std::set<std::string> kThings = {"vehicle", "drone",   "uav",       "agent",
-                                                "robot",   "cf",      "quad",      "body",
-                                                "model",   "subject", "crazyflie", "rigidbody"};
-  std::string name = joined_words(column);
-  if (name == "id" || name == "name" || kThings.count(name) != 0) return true;
+  const std::string name = joined_words(column);
+  if (name == "id" || name == "name" || is_word_of("vehicle", name)) return true;
   for (const std::string_view ending : {"id", "name", "number"}) {
-    if (files::ends_with(name, ending) && kThings.count(name.substr(0, name.size() - ending.size())) != 0)
+    if (files::ends_with(name, ending) && is_word_of("vehicle", name.substr(0, name.size() - ending.size())))
       return true;
   }
   return false;
