@@ -13,10 +13,12 @@
 #include <set>
 #include <string_view>
 
-#include "analysis/logs/collector.h"
+#include "analysis/logs/clock.h"
+#include "analysis/logs/csv.h"
 #include "analysis/logs/dictionary.h"
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/formats.h"
+#include "analysis/logs/recognition.h"
 #include "nn/base/csv.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
@@ -27,47 +29,6 @@ namespace {
 
 constexpr std::size_t kMostVehicles = 64;
 constexpr std::size_t kFewestRows = 10;
-
-/// Returns the line that starts at `at` without its end, and moves `at` behind it.
-std::string_view take_text_line(std::string_view text, std::size_t& at) {
-  const std::size_t end = std::min(text.find('\n', at), text.size());
-  std::string_view line = text.substr(at, end - at);
-  at = end + 1;
-  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-  return line;
-}
-
-/// The line with the column names: the first line that is no comment or, if that is a record, the comment before it.
-struct TableHeader {
-  std::size_t begin = 0, end = 0;  ///< of its line in the text, with the line end
-  char separator = ',';
-  std::vector<std::string_view> names;
-};
-
-std::optional<TableHeader> header_of(std::string_view text) {
-  TableHeader header;
-  std::string_view line, comment;
-  std::size_t at = text.substr(0, 3) == "\xEF\xBB\xBF" ? 3 : 0, comment_at = at;
-  for (;;) {
-    if (at >= text.size()) return std::nullopt;
-    header.begin = at;
-    line = take_text_line(text, at);
-    if (line.empty() || line[0] != '#') break;
-    comment_at = header.begin;
-    comment = line.substr(1);
-  }
-  header.end = std::min(at, text.size());
-  double number = 0;
-  const std::string_view first = files::without_blanks(line.substr(0, line.find_first_of(",;\t")));
-  if (!comment.empty() && (line.empty() || files::csv_number(first, number))) {
-    header.end = header.begin;
-    header.begin = comment_at;
-    line = comment;
-  }
-  header.separator = files::csv_separator(line, ',');
-  header.names = files::csv_cells(line, header.separator);
-  return header;
-}
 
 /// Returns the words of `name` in lower case without what separates them: "Drone ID" becomes "droneid".
 std::string joined_words(std::string_view name) {
@@ -296,7 +257,7 @@ std::vector<std::string> vehicles_in(const std::string& path, bool by_columns) {
   std::vector<std::string> vehicles;
   if (!may_hold_several(path)) return vehicles;
   const std::string beginning = beginning_of(path);
-  const std::optional<TableHeader> header = header_of(beginning);
+  const std::optional<TableHeader> header = header_of(beginning, ',');
   if (!header) return vehicles;
   if (by_columns) {
     for (const auto& [vehicle, columns] : prefixed_columns(*header)) vehicles.push_back(vehicle);
@@ -305,7 +266,7 @@ std::vector<std::string> vehicles_in(const std::string& path, bool by_columns) {
     return vehicles;
   try {
     const std::string text = files::read_file(path, kLargestLog_bytes);
-    const std::optional<TableHeader> whole = header_of(text);
+    const std::optional<TableHeader> whole = header_of(text, ',');
     const std::optional<VehicleColumn> found = whole ? vehicle_column(text, *whole) : std::nullopt;
     if (!found) return vehicles;
     for (const auto& [vehicle, entry] : found->entries) vehicles.push_back(vehicle);
@@ -325,7 +286,7 @@ std::vector<std::string> addresses_in(const std::string& path, bool by_columns) 
 std::string table_of(const LogAddress& address) {
   std::string table;
   const std::string text = files::read_file(address.file, kLargestLog_bytes);
-  const std::optional<TableHeader> header = header_of(text);
+  const std::optional<TableHeader> header = header_of(text, ',');
   if (header && may_hold_several(address.file)) {
     const VehicleColumns columns = prefixed_columns(*header);
     if (!columns.empty()) {

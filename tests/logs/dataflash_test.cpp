@@ -1,5 +1,3 @@
-#include "analysis/logs/formats/dataflash.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

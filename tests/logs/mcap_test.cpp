@@ -1,5 +1,3 @@
-#include "analysis/logs/formats/mcap.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "analysis/logs/formats/ros_messages.h"
+#include "analysis/logs/formats/ros_types.h"
 #include "logs/cdr_writer.h"
 #include "logs/raw_log_invariant.h"
 #include "logs/topics.h"

@@ -1,5 +1,3 @@
-#include "analysis/logs/formats/ulog.h"
-
 #include <gtest/gtest.h>
 
 #include <sstream>

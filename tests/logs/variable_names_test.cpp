@@ -104,7 +104,7 @@ TEST(ColumnNames, AUnitBehindTheNameCountsOnlyForSignalsOfThatUnit) {
 
 TEST(Formats, EachIsOneLineOfTheListAndOneSource) {
   const std::filesystem::path folder = source_path("analysis/logs/formats");
-  std::ifstream in(folder / "formats.cpp");
+  std::ifstream in(folder / "formats.h");
   std::ostringstream text;
   text << in.rdbuf();
   const std::string list = text.str();

@@ -1,13 +1,11 @@
-#include "analysis/logs/formats/cfclient_folder.h"
-
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <regex>
 #include <utility>
 
-#include "analysis/logs/collector.h"
-#include "analysis/logs/formats/merge.h"
+#include "analysis/logs/csv.h"
+#include "analysis/logs/formats/formats.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {

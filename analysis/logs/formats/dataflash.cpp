@@ -1,18 +1,123 @@
-#include "analysis/logs/formats/dataflash.h"
-
+/// @file ArduPilot dataflash logs (`.bin`).
+///
+/// Reads a log. Topics are named after their message ("XKF1", "ATT", "RCOU", "BAT", "MOTB"); a field that the log
+/// declares as the instance becomes RawTopic::instance. Times come from `TimeUS` or `TimeMS`. Values have the units
+/// stated in the log (UNIT), with its multipliers (MULT) and those of the number types (centidegrees to degrees, 1e-7
+/// degrees to degrees) applied. Parameters are the first values in PARM; later values become parameter_changes. MSG
+/// gives the messages.
+/// If no message follows, the reader searches for the next two consecutive messages and counts the damaged place and
+/// the skipped bytes.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "analysis/logs/formats/bytes.h"
-#include "analysis/logs/formats/dataflash_fields.h"
+#include "analysis/logs/formats/formats.h"
 
 namespace swarmcert::logs {
 namespace {
+
+constexpr std::size_t kDataflashHead_bytes = 3;  ///< of each message: two fixed bytes and the format
+
+/// How a field type, a single letter, is stored.
+struct FieldType {
+  std::optional<Scalar> number;  ///< empty: text or a 16-bit float
+  std::size_t bytes = 0;
+  std::size_t count = 1;
+  double scale = 1;  ///< factor for the stored value
+  bool is_text = false;
+};
+
+struct DataflashField {
+  std::string name;
+  char letter;
+  FieldType type;
+  std::size_t offset;  ///< from the end of the message's header
+  std::string unit;
+  bool is_instance = false;
+};
+struct DataflashFormat {
+  std::string name, definition;
+  std::size_t bytes = 0;               ///< of a message including its header
+  std::vector<DataflashField> fields;  ///< empty if the definition is inconsistent
+
+  const DataflashField* find(const std::string& field) const {
+    for (const DataflashField& candidate : fields)
+      if (candidate.name == field) return &candidate;
+    return nullptr;
+  }
+};
+
+std::optional<FieldType> field_type(char letter) {
+  const auto number = [](Scalar type, double scale = 1, std::size_t count = 1) {
+    return FieldType{type, count * size_of(type), count, scale, false};
+  };
+  const auto text = [](std::size_t bytes) { return FieldType{std::nullopt, bytes, 1, 1, true}; };
+  switch (letter) {
+    case 'a':
+      return number(Scalar::kInt16, 1, 32);
+    case 'M':
+      return number(Scalar::kUint8);
+    case 'g':
+      return FieldType{std::nullopt, 2, 1, 1, false};
+    case 'c':
+      return number(Scalar::kInt16, 0.01);
+    case 'C':
+      return number(Scalar::kUint16, 0.01);
+    case 'e':
+      return number(Scalar::kInt32, 0.01);
+    case 'E':
+      return number(Scalar::kUint32, 0.01);
+    case 'L':
+      return number(Scalar::kInt32, 1e-7);
+    case 'n':
+      return text(4);
+    case 'N':
+      return text(16);
+    case 'Z':
+      return text(64);
+    default:
+      break;
+  }
+  const std::optional<Scalar> plain = scalar_of_letter(letter);
+  return plain ? std::optional(number(*plain)) : std::nullopt;
+}
+
+/// Returns the IEEE 754 binary16 number at `bytes`.
+double half_float(const char* bytes) {
+  const auto bits = static_cast<unsigned>(value_of(Scalar::kUint16, bytes));
+  const int exponent = static_cast<int>(bits >> 10 & 31);
+  const double fraction = bits & 1023;
+  const double sign = (bits & 0x8000) != 0 ? -1 : 1;
+  if (exponent == 31) return fraction == 0 ? sign * INFINITY : NAN;
+  return sign * (exponent == 0 ? std::ldexp(fraction, -24) : std::ldexp(1024 + fraction, exponent - 25));
+}
+
+/// Parses field types ("QBff") and names ("TimeUS,I,AccX,AccY"). Returns nothing if they contradict each other or
+/// `bytes`.
+std::vector<DataflashField> parse_fields(const std::string& letters, const std::string& names,
+                                         std::size_t bytes) {
+  std::vector<DataflashField> fields;
+  std::set<std::string> seen;
+  std::size_t offset = 0, begin = 0;
+  for (const char letter : letters) {
+    const std::size_t end = std::min(names.find(',', begin), names.size());
+    const std::string name = begin < names.size() ? names.substr(begin, end - begin) : "";
+    const std::optional<FieldType> type = field_type(letter);
+    if (!type || !is_identifier(name) || !seen.insert(name).second) return {};
+    fields.push_back({name, letter, *type, offset, "", false});
+    offset += type->bytes;
+    begin = end + 1;
+  }
+  const bool fits = begin > names.size() && offset + kDataflashHead_bytes == bytes;
+  return fits ? fields : std::vector<DataflashField>();
+}
 
 constexpr std::string_view kDataflashStart = "\xA3\x95";
 constexpr std::uint8_t kFormatId = 128;

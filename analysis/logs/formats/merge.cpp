@@ -1,7 +1,7 @@
-#include "analysis/logs/formats/merge.h"
-
 #include <algorithm>
 #include <limits>
+
+#include "analysis/logs/formats/formats.h"
 
 namespace swarmcert::logs {
 namespace {

@@ -6,7 +6,6 @@
 
 #include "analysis/logs/formats/cdr.h"
 #include "analysis/logs/formats/column_table.h"
-#include "analysis/logs/formats/ros_messages.h"
 
 namespace swarmcert::logs {
 namespace {

@@ -21,7 +21,7 @@ struct RosLayout {
   bool is_beginning = false;  ///< messages continue after what the schema describes
 };
 
-/// Returns the layout of messages of `type`, preferably from the file's definition, else from ros_messages.h. Returns
+/// Returns the layout of messages of `type`, preferably from the file's definition, else built in. Returns
 /// nullptr and sets `fault` if there is none.
 /// @param text the file's definition; empty if it has none
 std::shared_ptr<const RosLayout> ros_layout(const std::string& type, std::string_view text,

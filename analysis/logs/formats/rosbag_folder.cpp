@@ -1,5 +1,3 @@
-#include "analysis/logs/formats/rosbag_folder.h"
-
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -9,7 +7,6 @@
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/decompress.h"
 #include "analysis/logs/formats/formats.h"
-#include "analysis/logs/formats/merge.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 

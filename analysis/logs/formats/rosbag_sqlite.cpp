@@ -1,5 +1,13 @@
-#include "analysis/logs/formats/rosbag_sqlite.h"
-
+/// @file rosbag2 in SQLite (`.db3`), the default of ROS 2 before Iron.
+///
+/// Reads topics as read_mcap() does. Message definitions are taken from the database if it has them (since Iron), else
+/// from ros_messages.h; topics of other types are listed in `skipped`. Single messages compressed with zstd are
+/// supported.
+///
+/// The database is read from memory: nothing is written, locked or created. A journal beside it is not applied; if it
+/// holds messages, `health.truncated` is set and `skipped` lists it. Views, triggers, virtual tables and computed
+/// columns are refused; work and sizes are limited by the size of the file. Reading stops at a damaged page; everything
+/// before it is kept.
 #include <fmt/core.h>
 #include <sqlite3.h>
 
@@ -11,6 +19,7 @@
 
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/decompress.h"
+#include "analysis/logs/formats/formats.h"
 #include "analysis/logs/formats/ros_topic.h"
 #include "nn/base/input_error.h"
 

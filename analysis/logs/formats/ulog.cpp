@@ -1,17 +1,119 @@
-#include "analysis/logs/formats/ulog.h"
-
+/// @file PX4 ULog (`.ulg`), file format versions 0 and 1.
+///
+/// Reads a log. Topics are identified by name and instance (multi_id); times come from their field `timestamp`. Texts
+/// are the information messages; several with the same key become `key[0]`, `key[1]`, ... Parameters are those at the
+/// start of the log; later settings become parameter_changes. A topic whose subscription or format is lost is listed in
+/// `skipped`. Messages of unknown types are skipped, as the format requires. If no valid message follows, the reader
+/// searches for the next valid message that is followed by others, and counts the damaged place and the skipped bytes
+/// in `health`. Sections appended after a crash are read as well.
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <limits>
 
 #include "analysis/logs/formats/bytes.h"
+#include "analysis/logs/formats/formats.h"
 #include "analysis/logs/formats/ulog_formats.h"
-#include "analysis/logs/formats/ulog_messages.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
 namespace {
+
+/// The message types known to this reader.
+constexpr std::string_view kUlogTypes = "ABCDFILMOPQRS";
+
+/// A message: its type and body.
+struct UlogMessage {
+  char type;
+  std::string_view body;
+};
+
+/// A key "type name" and the bytes that follow it, as in information and parameter messages.
+struct KeyedValue {
+  std::string type, name;
+  std::string_view value;
+};
+
+constexpr std::string_view kSyncMagic = "\x2F\x73\x13\x20\x25\x0C\xBB\x12";
+constexpr std::size_t kLongestName = 256;
+constexpr std::size_t kParameter_bytes = 4;
+
+/// Splits `body` into key and value; returns nothing if it has no such key.
+std::optional<KeyedValue> keyed_value(std::string_view body) {
+  if (body.empty()) return std::nullopt;
+  const std::size_t length = static_cast<unsigned char>(body[0]);
+  if (length == 0 || length > body.size() - 1) return std::nullopt;
+  const std::string_view key = body.substr(1, length);
+  const std::size_t blank = key.find(' ');
+  if (blank == std::string_view::npos) return std::nullopt;
+  return KeyedValue{std::string(key.substr(0, blank)), std::string(key.substr(blank + 1)),
+                    body.substr(1 + length)};
+}
+
+/// Returns true if the value has the size that its type requires, or if the type is unknown.
+bool value_size_fits(const KeyedValue& entry) {
+  if (const std::optional<Scalar> number = ulog_number(entry.type))
+    return entry.value.size() == size_of(*number);
+  if (entry.type.compare(0, 5, "char[") != 0) return true;
+  return entry.type == "char[" + std::to_string(entry.value.size()) + "]";
+}
+
+/// Returns the value of a parameter; nothing if it is neither an int32_t nor a float.
+std::optional<double> parameter_of(const KeyedValue& entry) {
+  if (entry.value.size() != kParameter_bytes) return std::nullopt;
+  if (entry.type == "int32_t") return value_of(Scalar::kInt32, entry.value.data());
+  if (entry.type == "float") return value_of(Scalar::kFloat, entry.value.data());
+  return std::nullopt;
+}
+
+/// Returns information as text: characters verbatim, numbers in decimal.
+std::string text_of(const KeyedValue& entry) {
+  if (entry.type == "uint64_t" && entry.value.size() == 8)
+    return std::to_string(*integer_at<std::uint64_t>(entry.value, 0));
+  if (entry.type == "int64_t" && entry.value.size() == 8)
+    return std::to_string(*integer_at<std::int64_t>(entry.value, 0));
+  const std::optional<Scalar> number = ulog_number(entry.type);
+  if (number && entry.value.size() == size_of(*number))
+    return fmt::format("{}", value_of(*number, entry.value.data()));
+  return until_nul(entry.value);
+}
+
+/// Returns true if the body has the form required by its type; false for data ('D'), whose form is defined in the file,
+/// and for unknown types. Looks at only a few bytes.
+bool has_form(const UlogMessage& message) {
+  const std::string_view body = message.body;
+  const auto has_key = [&](std::size_t at) {
+    return body.size() > at + 1 && is_identifier(body.substr(at + 1, 1)) && keyed_value(body.substr(at));
+  };
+  switch (message.type) {
+    case 'B':
+      return body.size() >= 40;
+    case 'F':
+      return is_identifier(body.substr(0, 1)) &&
+             body.substr(0, kLongestName).find(':') != std::string_view::npos;
+    case 'I':
+      return has_key(0);
+    case 'P':
+      return has_key(0) && body.size() == 1 + kParameter_bytes + static_cast<unsigned char>(body[0]);
+    case 'M':
+      return !body.empty() && (body[0] == 0 || body[0] == 1) && has_key(1);
+    case 'Q':
+      return has_key(1) && body.size() == 2 + kParameter_bytes + static_cast<unsigned char>(body[1]);
+    case 'A':
+      return body.size() >= 4 && is_identifier(body.substr(3), kLongestName);
+    case 'R':
+    case 'O':
+      return body.size() == 2;
+    case 'L':
+      return body.size() >= 9;
+    case 'C':
+      return body.size() >= 11;
+    case 'S':
+      return body == kSyncMagic;
+    default:
+      return false;
+  }
+}
 
 constexpr std::string_view kUlogMagic = "ULog\x01\x12\x35";
 constexpr std::size_t kFileHead_bytes = 16;

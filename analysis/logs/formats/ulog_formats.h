@@ -11,6 +11,9 @@
 
 namespace swarmcert::logs {
 
+/// Returns the type called "int8_t", ..., "float", "double", "bool".
+std::optional<Scalar> ulog_number(std::string_view type);
+
 /// A number in a record.
 struct UlogNumber {
   std::string name;  ///< `q[0]`, `esc[2].rpm`

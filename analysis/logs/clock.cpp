@@ -1,4 +1,4 @@
-#include "analysis/logs/collector.h"
+#include "analysis/logs/clock.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +10,12 @@
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
+namespace {
+
+[[noreturn]] void refuse_without_clock(const RawLog& log) {
+  throw files::InputError({log.path, "line 1", "time", "", "no column carries it",
+                           "log it, or name its column in a columns.toml (--columns)"});
+}
 
 double seconds_per_unit(std::vector<double> clock) {
   clock.erase(std::remove_if(clock.begin(), clock.end(), [](double t) { return !std::isfinite(t); }),
@@ -25,15 +31,6 @@ double seconds_per_unit(std::vector<double> clock) {
     if (step * unit_s <= kSlowest_s) return unit_s;
   }
   return steps.empty() ? 1 : 1e-9;
-}
-
-int clock_by_name(const RawTopic& topic) {
-  for (const std::string& name : words_of_kind("clock")) {
-    for (std::size_t c = 0; c < topic.columns.size(); ++c) {
-      if (plain_name(topic.columns[c].name) == name) return static_cast<int>(c);
-    }
-  }
-  return -1;
 }
 
 int clock_by_steps(const RawTopic& topic) {
@@ -54,8 +51,6 @@ int clock_by_steps(const RawTopic& topic) {
   }
   return best;
 }
-
-namespace {
 
 /// Drops the records of which only other blocks have numbers.
 void drop_records_of_others(RawTopic& topic, const std::map<std::vector<bool>, RawTopic>& blocks) {
@@ -79,8 +74,6 @@ void drop_records_of_others(RawTopic& topic, const std::map<std::vector<bool>, R
   for (RawColumn& column : topic.columns) keep(column.values);
   keep(topic.time_s);
 }
-
-}  // namespace
 
 void separate_blocks(RawLog& log) {
   constexpr double kWhole = 0.9;
@@ -120,73 +113,51 @@ void separate_blocks(RawLog& log) {
   }
 }
 
-void Collector::begin(const std::vector<std::string>& names) {
-  log_.topics.emplace_back();
-  RawTopic& topic = log_.topics.back();
-  for (const std::string& name : names) topic.columns.push_back({name, "", {}});
-  int clock = -1;
-  const auto find_clock = [&](const std::string& name, double unit_s) {
-    const RawColumn* const column = topic.find(name);
-    if (column == nullptr || clock >= 0) return;
-    clock = static_cast<int>(column - topic.columns.data());
-    scale_s_ = unit_s;
-  };
-  for (const SignalSource& source : map_)
-    if (source.signal == kTime) find_clock(source.column, 1e-6 * source.multiply / source.divide);
-  if (map_.empty()) {
-    // "time[ms]" of the published CSV files is in microseconds.
-    for (const char* const name : {"time_us", "time[ms]"}) find_clock(name, 1e-6);
-    if (clock < 0) clock = clock_by_name(topic);
-  }
-  if (log_.format == "usd") scale_s_ = 1e-6;  // the ticks of the deck
-  if (clock < 0 && !map_.empty()) refuse_without_clock();
-  needs_.assign(names.size(), 0);
-  has_clock_ = clock >= 0;
-  if (has_clock_) time_ = static_cast<std::size_t>(clock);
-  if (has_clock_) needs_[time_] = 1;
-  for (const Carried& carried : recognise(log_, map_).groups) {
-    for (const int column : carried.columns) {
-      if (column >= 0) needs_[static_cast<std::size_t>(column)] = 1;
+}  // namespace
+
+int clock_by_name(const RawTopic& topic) {
+  for (const std::string& name : words_of_kind("clock")) {
+    for (std::size_t c = 0; c < topic.columns.size(); ++c) {
+      if (plain_name(topic.columns[c].name) == name) return static_cast<int>(c);
     }
   }
+  return -1;
 }
 
-void Collector::record(const std::vector<double>& values) {
-  RawTopic& topic = log_.topics.back();
-  for (std::size_t c = 0; c < values.size(); ++c) topic.columns[c].values.push_back(values[c]);
-}
-
-void Collector::refuse_without_clock() const {
-  throw files::InputError({log_.path, "line 1", "time", "", "no column carries it",
-                           "log it, or name its column in a columns.toml (--columns)"});
-}
-
-void Collector::end() {
-  RawTopic& topic = log_.topics.back();
-  if (!has_clock_) {
-    const int clock = clock_by_steps(topic);
-    if (clock < 0) refuse_without_clock();
-    time_ = static_cast<std::size_t>(clock);
+std::optional<Clock> stated_clock(const RawLog& log, const SignalMap& map) {
+  const RawTopic& topic = log.topics.back();
+  std::optional<Clock> clock;
+  const auto find = [&](const std::string& name, double unit_s) {
+    const RawColumn* const column = topic.find(name);
+    if (column != nullptr && !clock)
+      clock = {static_cast<std::size_t>(column - topic.columns.data()), unit_s};
+  };
+  for (const SignalSource& source : map)
+    if (source.signal == kTime) find(source.column, 1e-6 * source.multiply / source.divide);
+  if (map.empty()) {
+    // "time[ms]" of the published CSV files is in microseconds.
+    for (const char* const name : {"time_us", "time[ms]"}) find(name, 1e-6);
+    const int named = clock_by_name(topic);
+    if (!clock && named >= 0) clock = {static_cast<std::size_t>(named), 0};
   }
-  const std::vector<double>& clock = topic.columns[time_].values;
-  const double scale_s = scale_s_ > 0 ? scale_s_ : seconds_per_unit(clock);
-  topic.time_s.reserve(clock.size());
-  for (const double time : clock) topic.time_s.push_back(time * scale_s);
-  topic.clock = topic.columns[time_].name;
-  topic.clock_unit_s = scale_s;
-  separate_blocks(log_);
+  if (!clock && !map.empty()) refuse_without_clock(log);
+  return clock;
 }
 
-RawLog read_table(std::istream& in, const std::string& path, const SignalMap& map) {
-  RawLog log;
-  log.path = path;
-  log.format = "csv";
-  Collector collector(log, map);
-  const std::optional<files::InputFault> damage = read_csv(in, path, collector, log.health);
-  collector.end();
-  log.health.records = log.topics.front().time_s.size();
-  if (damage && log.health.records == 0) throw files::InputError(*damage);
-  return log;
+void set_times(RawLog& log, std::optional<Clock> clock) {
+  RawTopic& topic = log.topics.back();
+  if (!clock) {
+    const int steady = clock_by_steps(topic);
+    if (steady < 0) refuse_without_clock(log);
+    clock = {static_cast<std::size_t>(steady), 0};
+  }
+  const RawColumn& column = topic.columns[clock->column];
+  topic.clock = column.name;
+  topic.clock_unit_s = log.format == "usd" ? 1e-6  // the ticks of the deck
+                       : clock->unit_s > 0 ? clock->unit_s
+                                           : seconds_per_unit(column.values);
+  for (const double time : column.values) topic.time_s.push_back(time * topic.clock_unit_s);
+  separate_blocks(log);
 }
 
 }  // namespace swarmcert::logs
