@@ -21,10 +21,8 @@ double seconds_per_unit(std::vector<double> clock) {
   clock.erase(std::remove_if(clock.begin(), clock.end(), [](double t) { return !std::isfinite(t); }),
               clock.end());
   std::sort(clock.begin(), clock.end());  // rows may be in any order
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < clock.size(); ++i) {
-    if (clock[i] > clock[i - 1]) steps.push_back(clock[i] - clock[i - 1]);
-  }
+  std::vector<double> steps = steps_of(clock);
+  steps.erase(std::remove(steps.begin(), steps.end(), 0.0), steps.end());
   constexpr double kSlowest_s = 0.5;
   const double step = median(steps);
   for (const double unit_s : {1.0, 1e-3, 1e-6}) {
@@ -37,9 +35,7 @@ int clock_by_steps(const RawTopic& topic) {
   int best = -1;
   double least = INFINITY;
   for (std::size_t c = 0; c < topic.columns.size(); ++c) {
-    const std::vector<double>& values = topic.columns[c].values;
-    std::vector<double> steps;
-    for (std::size_t i = 1; i < values.size(); ++i) steps.push_back(values[i] - values[i - 1]);
+    const std::vector<double> steps = steps_of(topic.columns[c].values);
     const double step = median(steps);
     if (steps.size() < 10 || !(step > 0) || !(quantile_of(steps, 0.01) > 0)) continue;
     // A constant step of exactly one means a record counter; a clock has another unit or some jitter.

@@ -6,14 +6,10 @@
 #include <utility>
 
 #include "analysis/logs/message_frames.h"
+#include "analysis/logs/statistics_of_series.h"
 
 namespace swarmcert::logs {
 namespace {
-
-bool holds_numbers(const RawColumn& column) {
-  return column.values.empty() ||
-         std::any_of(column.values.begin(), column.values.end(), [](double x) { return std::isfinite(x); });
-}
 
 class Grouping {
  public:
@@ -22,7 +18,7 @@ class Grouping {
     const std::vector<RawColumn>& columns = log.topics[topic].columns;
     for (std::size_t c = 0; c < columns.size(); ++c) {
       readings_.push_back(read_name(columns[c].name));
-      if (taken[c] != 0 || !holds_numbers(columns[c])) {
+      if (taken[c] != 0 || (!columns[c].values.empty() && !holds_numbers(columns[c].values))) {
         grouped_[c] = 1;
         continue;
       }

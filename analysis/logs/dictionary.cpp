@@ -136,7 +136,7 @@ const std::vector<SignalKind>& signal_kinds() {
     int first = 0;
     for (const TomlTable& table : dictionary_table("signals.toml").tables("signal")) {
       all.push_back({first, table.text("name"), table.texts("columns"), units_named(table.text("units")),
-                     texts_or(table, "frames")});
+                     texts_or(table, "frames"), table.has("command"), table.has("partial")});
       first += static_cast<int>(all.back().columns.size());
     }
     return all;

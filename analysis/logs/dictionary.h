@@ -37,6 +37,8 @@ struct SignalKind {
   std::vector<std::string> columns;  ///< one per part, as in columns.toml
   std::vector<Unit> units;
   std::vector<std::string> frames;  ///< that columns.toml may state
+  bool is_command = false;          ///< zero is a value, and topics of set points have it
+  bool may_be_partial = false;      ///< a vertical velocity alone is useful, half a quaternion is not
 };
 const std::vector<SignalKind>& signal_kinds();
 /// Returns the kind to which a signal belongs.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/logs/dictionary.h"
+#include "analysis/logs/statistics_of_series.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -54,8 +55,7 @@ std::vector<std::string> outputs_of_motors(const NamedColumns& row, const Parame
 
 /// Outputs in use have numbers; as servo signals in microseconds (values below about 900 mean off), changing ones.
 bool is_in_use(const std::vector<double>& values, const std::string& unit) {
-  if (unit != "us")
-    return std::any_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+  if (unit != "us") return holds_numbers(values);
   if (values.empty()) return false;
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
   return *high >= 900 && *high <= 2500 && *high != *low;

@@ -53,16 +53,6 @@ double noise_of_slope(const SignalTable& t, const std::vector<double>& column,
                          : sigma * std::sqrt(720 * runs / n) / (window_s * window_s);
 }
 
-double root_mean_square(const std::vector<double>& values) {
-  double squares = 0, count = 0;
-  for (const double value : values) {
-    if (!std::isfinite(value)) continue;
-    squares += value * value;
-    ++count;
-  }
-  return count > 0 ? std::sqrt(squares / count) : std::nan("");
-}
-
 Vector rotated(const SignalTable& t, std::size_t i, const Vector& body) {
   const auto R = t.attitude(i).rotation();
   Vector world{};
@@ -94,11 +84,11 @@ void settle_velocity_frame(Draft& draft) {
     const Vector body = t.three(kVelocity, i), world = rotated(t, i, body);
     for (std::size_t k = 0; k < 3; ++k) {
       turned[k][i] = world[k];
-      as_world.push_back(slope[k][i] - body[k]);
-      as_body.push_back(slope[k][i] - world[k]);
+      as_world.push_back(std::pow(slope[k][i] - body[k], 2));
+      as_body.push_back(std::pow(slope[k][i] - world[k], 2));
     }
   }
-  const double world_m_s = root_mean_square(as_world), body_m_s = root_mean_square(as_body);
+  const double world_m_s = std::sqrt(mean_of(as_world)), body_m_s = std::sqrt(mean_of(as_body));
   const bool is_body = body_m_s < world_m_s;
   draft.note(fmt::format(
       "{}: along the axes of the {}; {:.2g} m/s from the derivative of the position, against {:.2g}", names,

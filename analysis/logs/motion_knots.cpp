@@ -22,11 +22,9 @@ Knots knots_of(const RawLog& log) {
   }
   Knots knots;
   if (longest == nullptr || longest->time_s.size() < 8) return knots;
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < longest->time_s.size(); ++i) {
-    const double step = longest->time_s[i] - longest->time_s[i - 1];
-    if (step > 0) steps.push_back(step);
-  }
+  std::vector<double> steps = steps_of(longest->time_s);
+  steps.erase(std::remove_if(steps.begin(), steps.end(), [](double step) { return !(step > 0); }),
+              steps.end());
   const double first = quantile_of(longest->time_s, 0), last = quantile_of(longest->time_s, 1);
   const double step = median(steps);
   if (!(step > 0)) return knots;

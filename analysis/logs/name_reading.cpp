@@ -144,9 +144,8 @@ void add_index_bits(const Index& index, NameReading& name) {
 /// A stated unit rules out the quantities that do not have it.
 void add_unit_bits(NameReading& name) {
   if (name.unit.empty()) return;
-  const int signals[] = {kPosition, kVelocity, kForceBody, kRates, kAttitude, kEuler};
   for (std::size_t q = kIsPosition; q <= kIsAngles; ++q)
-    name.bits[q] += !unit_factor(signals[q], name.unit) ? -kForeign : name.bits[q] < 0 ? 4 : -0.5;
+    name.bits[q] += !unit_factor(kSignalOfQuantity[q], name.unit) ? -kForeign : name.bits[q] < 0 ? 4 : -0.5;
 }
 
 /// A set point is the target's position or velocity where the other words are those of the vehicle's.

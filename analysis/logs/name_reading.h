@@ -4,6 +4,8 @@
 #include <array>
 #include <string>
 
+#include "analysis/logs/signals.h"
+
 namespace swarmcert::logs {
 
 /// What a group of columns may be.
@@ -20,6 +22,9 @@ enum Quantity : int {
   kIsTargetVelocity,
   kNumQuantities
 };
+
+/// The signal that a group of this quantity carries, in the order of the quantities of a motion.
+inline constexpr int kSignalOfQuantity[] = {kPosition, kVelocity, kForceBody, kRates, kAttitude, kEuler};
 
 /// log2 of the odds for each quantity against a column without a name.
 using NameBits = std::array<double, kNumQuantities>;

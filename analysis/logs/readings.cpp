@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <iterator>
 #include <optional>
 
 #include "analysis/logs/angles.h"
@@ -28,6 +28,10 @@ double size_bits(double size, double usual, double factor) {
 
 double spread_of(const std::vector<double>& values) {
   return values.empty() ? 0 : quantile_of(values, 0.95) - quantile_of(values, 0.05);
+}
+
+double largest_spread(const Reading& reading) {
+  return std::max({spread_of(reading.value[0]), spread_of(reading.value[1]), spread_of(reading.value[2])});
 }
 
 const std::vector<double>& stored(const RawLog& log, const Carried& carried, std::size_t k) {
@@ -132,9 +136,7 @@ class Reader {
     const bool is_place = per_time.empty();
     for (const UnitPrior& unit : {UnitPrior{"m", 0}, {"mm", kOtherUnit}, {"cm", kOtherUnit}})
       each_frame(signal, what, unit.name + per_time, unit.bits, [&](Reading& reading) {
-        double size = 0;
-        for (const auto& axis : reading.value) size = std::max(size, spread_of(axis));
-        reading.bits += size_bits(size, usual, factor);
+        reading.bits += size_bits(largest_spread(reading), usual, factor);
         if (is_place) reading.bits += height_bits(reading);
       });
     return std::move(readings_);
@@ -156,11 +158,8 @@ class Reader {
   std::vector<Reading> rates() {
     if (!is_whole()) return {};
     for (const UnitPrior& unit : {UnitPrior{"rad/s", 0}, {"deg/s", 1}, {"mrad/s", kOtherUnit}})
-      each_frame(kRates, "body rates", unit.name, unit.bits, [&](Reading& reading) {
-        double size = 0;
-        for (const auto& axis : reading.value) size = std::max(size, spread_of(axis));
-        reading.bits += size_bits(size, 1, 6);
-      });
+      each_frame(kRates, "body rates", unit.name, unit.bits,
+                 [&](Reading& reading) { reading.bits += size_bits(largest_spread(reading), 1, 6); });
     return std::move(readings_);
   }
 
@@ -369,15 +368,10 @@ class Reader {
 };
 
 std::optional<Quantity> quantity_of(int signal) {
-  static const std::map<int, Quantity> quantities = {{kPosition, kIsPosition},
-                                                     {kVelocity, kIsVelocity},
-                                                     {kForceBody, kIsSpecificForce},
-                                                     {kForceWorld, kIsSpecificForce},
-                                                     {kRates, kIsRates},
-                                                     {kAttitude, kIsQuaternion},
-                                                     {kEuler, kIsAngles}};
-  const auto found = quantities.find(signal);
-  return found == quantities.end() ? std::nullopt : std::optional(found->second);
+  if (signal == kForceWorld) return kIsSpecificForce;
+  const auto* const found = std::find(std::begin(kSignalOfQuantity), std::end(kSignalOfQuantity), signal);
+  if (found == std::end(kSignalOfQuantity)) return std::nullopt;
+  return static_cast<Quantity>(found - kSignalOfQuantity);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "analysis/logs/column_names.h"
 #include "analysis/logs/message_frames.h"
 #include "analysis/logs/name_reading.h"
+#include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
 #include "nn/base/suggest.h"
 
@@ -58,28 +59,11 @@ class ColumnIndex {
   Index exact_, whole_, shortened_;
 };
 
-/// Returns false for groups that need all their columns: a vertical velocity alone is useful, half a quaternion is not.
-bool may_be_partial(const NamedColumns& row) {
-  const int signal = row.signal;
-  return signal == kEuler || signal == kPosition || signal == kVelocity || signal == kTargetPosition ||
-         signal == kTargetVelocity;
-}
-
 /// Ignores columns without any number.
 void drop_empty_columns(const RawTopic& topic, Carried& carried) {
-  if (topic.time_s.empty()) return;
-  for (int& c : carried.columns) {
-    if (c < 0) continue;
-    const std::vector<double>& values = topic.columns[static_cast<std::size_t>(c)].values;
-    if (std::none_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); })) c = -1;
-  }
-}
-
-/// Motors are at rest in a log on the ground, so their zeros are valid. So are setpoints at the origin.
-bool may_be_zero(int signal) {
-  return signal == kDuty || signal == kRequested || signal == kMotorCommand || signal == kThrust ||
-         signal == kThrustCommand || signal == kTorque || signal == kMotorForce ||
-         signal == kTargetVelocity || signal == kTargetPosition;
+  for (int& c : carried.columns)
+    if (c >= 0 && !topic.time_s.empty() && !holds_numbers(topic.columns[static_cast<std::size_t>(c)].values))
+      c = -1;
 }
 
 bool is_unit_quaternion(const RawTopic& topic, const Carried& carried) {
@@ -97,10 +81,7 @@ bool is_unit_quaternion(const RawTopic& topic, const Carried& carried) {
 
 /// A position in a topic of setpoints is a desired one.
 bool is_wish(const RawTopic& topic, int signal) {
-  const bool may_be = signal == kTargetPosition || signal == kTargetVelocity || signal == kMotorCommand ||
-                      signal == kThrustCommand || signal == kThrust || signal == kTorque ||
-                      signal == kMotorForce;
-  if (may_be) return false;
+  if (kind_of_signal(signal).is_command) return false;
   const std::string name = plain_name(topic.name);
   for (const char* const word :
        {"setpoint", "set.point", "target", "reference", "desired", "command", "cmd"}) {
@@ -112,10 +93,11 @@ bool is_wish(const RawTopic& topic, int signal) {
 void recognise_row(const RawLog& log, const std::vector<ColumnIndex>& indices, const NamedColumns& row,
                    bool is_shortened, Recognition& found) {
   for (std::size_t t = 0; t < log.topics.size() && found.find(row.signal) == nullptr; ++t) {
-    if (row.origin != Origin::kOwn && !firmware_of(log, log.topics[t]).empty()) continue;
+    const RawTopic& topic = log.topics[t];
+    if (row.origin != Origin::kOwn && !firmware_of(log, topic).empty()) continue;
     const bool is_of_messages =
         row.origin == Origin::kMessages || (row.origin == Origin::kOwn && log.format == "csv");
-    if (is_of_messages && is_plain_table(log, log.topics[t])) continue;
+    if (is_of_messages && is_plain_table(log, topic)) continue;
     Carried carried{row.signal,
                     t,
                     indices[t].columns_called(row.names, is_shortened),
@@ -125,26 +107,24 @@ void recognise_row(const RawLog& log, const std::vector<ColumnIndex>& indices, c
                     row.ask,
                     row.sign};
     const std::vector<int> named = carried.columns;
-    drop_empty_columns(log.topics[t], carried);
+    drop_empty_columns(topic, carried);
     const auto missing = std::count(carried.columns.begin(), carried.columns.end(), -1);
     const auto size = static_cast<std::ptrdiff_t>(carried.columns.size());
-    if (missing == size || (missing > 0 && !may_be_partial(row))) continue;
-    if (is_wish(log.topics[t], row.signal)) continue;
-    const auto reject = [&](const char* why) {
-      found.rejected.push_back(names_of(log, carried) + ": " + why);
-    };
+    const SignalKind& kind = kind_of_signal(row.signal);
+    if (missing == size || (missing > 0 && !kind.may_be_partial) || is_wish(topic, row.signal)) continue;
     const bool is_quaternion = row.signal == kAttitude;
-    if (!log.topics[t].time_s.empty() && ((is_dead(log.topics[t], carried) && !may_be_zero(row.signal)) ||
-                                          (is_quaternion && !is_unit_quaternion(log.topics[t], carried)))) {
-      reject(is_quaternion ? "no unit quaternions" : "only zeros");
-    } else {
-      for (std::size_t k = 0; k < named.size(); ++k) {
-        if (carried.columns[k] == named[k]) continue;
-        const std::string& column = log.topics[t].columns[static_cast<std::size_t>(named[k])].name;
-        found.rejected.push_back(column + ": it holds no number");
-      }
-      found.groups.push_back(std::move(carried));
+    const bool is_sound =
+        is_quaternion ? is_unit_quaternion(topic, carried) : kind.is_command || !is_dead(topic, carried);
+    if (!topic.time_s.empty() && !is_sound) {
+      found.rejected.push_back(names_of(log, carried) +
+                               (is_quaternion ? ": no unit quaternions" : ": only zeros"));
+      continue;
     }
+    for (std::size_t k = 0; k < named.size(); ++k)
+      if (carried.columns[k] != named[k])
+        found.rejected.push_back(topic.columns[static_cast<std::size_t>(named[k])].name +
+                                 ": it holds no number");
+    found.groups.push_back(std::move(carried));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "analysis/logs/angles.h"
+#include "analysis/logs/statistics_of_series.h"
 #include "nn/base/median.h"
 #include "nn/base/pi.h"
 
@@ -16,11 +17,7 @@ namespace {
 constexpr double kLongestPause_us = 10e6;
 constexpr double kInt16Range = 65536;
 
-double median_step(const std::vector<double>& times) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
-  return upper_median(std::move(steps));
-}
+double median_step(const std::vector<double>& times) { return upper_median(steps_of(times)); }
 
 /// Undoes wraps of positions stored as 16-bit integers, where neighbours differ by almost the whole range. (Velocities
 /// and accelerations may jump that far in a crash.) Values that stay at the ends of the range are reported.

@@ -19,6 +19,25 @@ inline double quantile_of(std::vector<double> values, double share) {
 
 inline double median(const std::vector<double>& values) { return quantile_of(values, 0.5); }
 
+inline bool holds_numbers(const std::vector<double>& values) {
+  return std::any_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+}
+
+/// Returns the mean of the finite values; 0 if there are none.
+inline double mean_of(const std::vector<double>& values) {
+  double sum = 0, count = 0;
+  for (const double value : values)
+    if (std::isfinite(value)) sum += value, ++count;
+  return count > 0 ? sum / count : 0;
+}
+
+/// Returns the differences between neighbours.
+inline std::vector<double> steps_of(const std::vector<double>& values) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < values.size(); ++i) steps.push_back(values[i] - values[i - 1]);
+  return steps;
+}
+
 /// The least squares line y = slope x + offset through the records where both values are finite.
 struct Line {
   double slope = 0, offset = 0, correlation = 0, rms = 0;

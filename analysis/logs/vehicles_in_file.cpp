@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "analysis/logs/clock.h"
+#include "analysis/logs/column_names.h"
 #include "analysis/logs/csv.h"
 #include "analysis/logs/dictionary.h"
 #include "analysis/logs/formats/bytes.h"
@@ -32,11 +33,8 @@ constexpr std::size_t kFewestRows = 10;
 
 /// Returns the words of `name` in lower case without what separates them: "Drone ID" becomes "droneid".
 std::string joined_words(std::string_view name) {
-  std::string joined;
-  for (const char c : name) {
-    if (std::isalnum(static_cast<unsigned char>(c)) != 0)
-      joined += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  }
+  std::string joined = plain_name(std::string(name));
+  joined.erase(std::remove(joined.begin(), joined.end(), '.'), joined.end());
   return joined;
 }
 

@@ -94,52 +94,22 @@ std::optional<McapRecord> mcap_record_at(std::string_view bytes, std::size_t at)
 
 /// Returns true if the content has the form required by its opcode. Accepts unknown and private opcodes.
 bool has_mcap_form(const McapRecord& record) {
+  // Bytes of integers; s: a text or bytes, S: with a length of 8 bytes; *: more may follow.
+  static const std::map<unsigned char, std::string_view> forms = {
+      {kHeader, "ss*"},   {kFooter, "884"},      {kSchema, "2sss"}, {kChannel, "22sss"}, {kMessage, "2488*"},
+      {kChunk, "8884sS"}, {kMessageIndex, "2s"}, {kMetadata, "ss"}, {kDataEnd, "4"}};
+  const auto form = forms.find(record.code);
+  if (form == forms.end()) return record.code != 0;
   McapFields fields(record.content);
-  switch (record.code) {
-    case 0:
-      return false;
-    case kHeader:
-      fields.bytes();
-      fields.bytes();
-      return fields.is_sound();
-    case kFooter:
-      return record.content.size() == 20;
-    case kSchema:
-      fields.number<std::uint16_t>();
-      fields.bytes();
-      fields.bytes();
-      fields.bytes();
-      return fields.is_at_end();
-    case kChannel:
-      fields.number<std::uint16_t>();
-      fields.number<std::uint16_t>();
-      fields.bytes();
-      fields.bytes();
-      fields.bytes();
-      return fields.is_at_end();
-    case kMessage:
-      return record.content.size() >= 22;
-    case kChunk:
-      fields.number<std::uint64_t>();
-      fields.number<std::uint64_t>();
-      fields.number<std::uint64_t>();
-      fields.number<std::uint32_t>();
-      fields.bytes();
-      fields.bytes<std::uint64_t>();
-      return fields.is_at_end();
-    case kMessageIndex:
-      fields.number<std::uint16_t>();
-      fields.bytes();
-      return fields.is_at_end();
-    case kMetadata:
-      fields.bytes();
-      fields.bytes();
-      return fields.is_at_end();
-    case kDataEnd:
-      return record.content.size() == 4;
-    default:
-      return true;
+  for (const char part : form->second) {
+    if (part == '*') return fields.is_sound();
+    if (part == 's') fields.bytes();
+    if (part == 'S') fields.bytes<std::uint64_t>();
+    if (part == '2') fields.number<std::uint16_t>();
+    if (part == '4') fields.number<std::uint32_t>();
+    if (part == '8') fields.number<std::uint64_t>();
   }
+  return fields.is_at_end();
 }
 
 /// Returns the chunk in the content of a record, which may be truncated.
@@ -165,9 +135,6 @@ constexpr std::size_t kLongestMcapName = 1024;
 struct McapSchema {
   std::string name, encoding;
   std::string_view text;
-  bool is_parsed = false;
-  std::shared_ptr<const RosLayout> layout;  ///< set once it has been parsed
-  std::string fault;                        ///< why there is no layout after parsing
 };
 struct McapChannel {
   std::uint16_t schema = 0;
@@ -382,24 +349,12 @@ class McapReader {
   }
 
   FoundTopic begin_topic(const McapChannel& channel) {
-    FoundTopic topic;
-    topic.name = channel.topic;
-    auto schema = schemas_.find(channel.schema);
-    if (channel.encoding != "cdr") {
-      topic.fault =
-          "its messages have the encoding \"" + channel.encoding.substr(0, 64) + "\", known is \"cdr\"";
-    } else if (schema == schemas_.end()) {
-      topic.fault = "the file lost the definition of its messages";
-    } else {
-      McapSchema& used = schema->second;
-      if (!used.is_parsed) {
-        used.layout = ros_layout(used.name, used.encoding == "ros2msg" ? used.text : "", used.fault);
-        used.is_parsed = true;
-      }
-      topic.fault = used.fault;
-      if (used.layout) topic.topic.emplace(channel.topic, used.layout, budget_);
-    }
-    return topic;
+    const auto schema = schemas_.find(channel.schema);
+    if (schema == schemas_.end() && channel.encoding == "cdr")
+      return {std::nullopt, channel.topic, "the file lost the definition of its messages"};
+    const McapSchema used = schema == schemas_.end() ? McapSchema() : schema->second;
+    return found_topic(channel.topic, channel.encoding, used.name,
+                       used.encoding == "ros2msg" ? used.text : "", budget_);
   }
 
   void finish() {

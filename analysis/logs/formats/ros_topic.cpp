@@ -211,6 +211,22 @@ void FoundTopic::move_to(RawLog& log, const std::string& id) {
     log.skipped.push_back({name.empty() ? id : name, fault, lost});
 }
 
+FoundTopic found_topic(const std::string& name, const std::string& encoding, const std::string& type,
+                       std::string_view text, RosBudget& budget) {
+  FoundTopic found;
+  found.name = name;
+  if (encoding != "cdr") {
+    found.fault = "its messages have the encoding \"" + encoding.substr(0, 64) + "\", known is \"cdr\"";
+    return found;
+  }
+  const auto [known, is_new] = budget.layouts.try_emplace({type, text});
+  auto& [layout, fault] = known->second;
+  if (is_new) layout = ros_layout(type, text, fault);
+  found.fault = fault;
+  if (layout) found.topic.emplace(name, layout, budget);
+  return found;
+}
+
 void number_instances(RawLog& log) {
   std::map<std::string, int> counts;
   for (RawTopic& topic : log.topics) topic.instance = counts[topic.name]++;

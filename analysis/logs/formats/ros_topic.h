@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "analysis/logs/formats/ros_types.h"
@@ -27,10 +28,13 @@ struct RosLayout {
 std::shared_ptr<const RosLayout> ros_layout(const std::string& type, std::string_view text,
                                             std::string& fault);
 
-/// Limits the memory of all topics of a log together; compressed files can hold far more than their size suggests.
+/// Layouts, and limits of the memory, of all topics of a log together; compressed files can hold far more than their size suggests.
 struct RosBudget {
   std::size_t places = std::size_t{1} << 20;  ///< fields and array elements
   std::size_t values = std::size_t{1} << 28;  ///< numbers: 2 GiB
+  /// By type and definition, each parsed once; with the fault where there is none.
+  std::map<std::pair<std::string, std::string_view>, std::pair<std::shared_ptr<const RosLayout>, std::string>>
+      layouts{};
 };
 
 /// Turns serialized messages (CDR in either byte order, versions 1 and 2) into a RawTopic.
@@ -65,6 +69,11 @@ struct FoundTopic {
   /// Moves the collected columns to `log`, or notes there what was lost and why. `id` replaces an empty name.
   void move_to(RawLog& log, const std::string& id);
 };
+
+/// Begins a topic; its messages are known only in the encoding "cdr".
+/// @param type, text as for ros_layout()
+FoundTopic found_topic(const std::string& name, const std::string& encoding, const std::string& type,
+                       std::string_view text, RosBudget& budget);
 
 /// Numbers topics of the same name as its instances 0, 1, ...
 void number_instances(RawLog& log);

@@ -198,30 +198,13 @@ class RosbagReader {
     if (!rows.is_prepared()) refuse_columns("topics");
     while (rows.next() && topics_.size() < kMostTopics) {
       const std::string type(rows.bytes(2).substr(0, 256));
-      const std::string encoding(rows.bytes(3).substr(0, 64));
-      FoundTopic topic;
-      topic.name = rows.bytes(1).substr(0, 1024);
-      if (encoding != "cdr") {
-        topic.fault = "its messages have the encoding \"" + encoding + "\", known is \"cdr\"";
-      } else if (const auto layout = layout_of(type, topic.fault)) {
-        topic.topic.emplace(topic.name, layout, budget_);
-      }
-      topics_.emplace(rows.integer(0), std::move(topic));
-    }
-    if (rows.is_damaged()) ++log_.health.damaged_blocks;
-  }
-
-  std::shared_ptr<const RosLayout> layout_of(const std::string& type, std::string& fault) {
-    auto known = layouts_.find(type);
-    if (known == layouts_.end()) {
       const auto definition = definitions_.find(type);
       const bool has_text = definition != definitions_.end() && definition->second.encoding == "ros2msg";
-      std::string why;
-      const auto layout = ros_layout(type, has_text ? std::string_view(definition->second.text) : "", why);
-      known = layouts_.emplace(type, std::pair{layout, why}).first;
+      topics_.emplace(rows.integer(0),
+                      found_topic(std::string(rows.bytes(1).substr(0, 1024)), std::string(rows.bytes(3)),
+                                  type, has_text ? std::string_view(definition->second.text) : "", budget_));
     }
-    fault = known->second.second;
-    return known->second.first;
+    if (rows.is_damaged()) ++log_.health.damaged_blocks;
   }
 
   [[noreturn]] void refuse_columns(const std::string& table) const {
@@ -295,7 +278,6 @@ class RosbagReader {
   RosBudget budget_;
   std::size_t bytes_left_ = 0, decompression_left_ = 0, without_topic_ = 0;
   std::map<std::string, Definition> definitions_;
-  std::map<std::string, std::pair<std::shared_ptr<const RosLayout>, std::string>> layouts_;
   std::map<std::int64_t, FoundTopic> topics_;
 };
 
