@@ -323,7 +323,7 @@ class Assigner {
       for (std::size_t c = 0; c < topic.columns.size() && topic.time_s.size() > 8; ++c) {
         const IndexKind kind = read_name(topic.columns[c].name).kind;
         if (kind != IndexKind::kNone && kind != IndexKind::kNumber) continue;
-        if (line_through(topic.time_s, topic.columns[c].values).correlation > 0.9999) taken_[t][c] = 1;
+        if (correlation_of(topic.time_s, topic.columns[c].values) > 0.9999) taken_[t][c] = 1;
       }
     }
   }

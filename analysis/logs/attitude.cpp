@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdint>
 
-#include "analysis/logs/angles.h"
 #include "analysis/logs/interpretation.h"
 #include "analysis/logs/statistics_of_series.h"
 

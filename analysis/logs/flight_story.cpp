@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "analysis/logs/dictionary.h"
-#include "analysis/logs/limit_cycles.h"
 #include "analysis/logs/statistics_of_series.h"
 
 namespace swarmcert::logs {

@@ -7,10 +7,8 @@
 #include <map>
 #include <set>
 
-#include "analysis/logs/absolute_time.h"
-#include "analysis/logs/angles.h"
+#include "analysis/logs/clock.h"
 #include "analysis/logs/message_frames.h"
-#include "analysis/logs/record_order.h"
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
 

@@ -15,7 +15,7 @@ using Source = SignalInfo::Source;
 /// Returns the standard deviation of the noise of a derived acceleration: the residual of the smoother is taken as the
 /// noise of the column and propagated through the weights of the smoother. The autocorrelation of the noise is
 /// included.
-/// @param smooth local_derivative() with derivative 0.
+/// @param smooth local_derivatives() of order 0.
 double noise_of_slope(const SignalTable& t, const std::vector<double>& column,
                       const std::vector<double>& smooth, double window_s, int derivative) {
   std::vector<double> left(column.size());
@@ -76,7 +76,7 @@ void settle_velocity_frame(Draft& draft) {
   std::array<std::vector<double>, 3> slope, turned;
   for (int k = 0; k < 3; ++k) {
     slope[static_cast<std::size_t>(k)] =
-        local_derivative(t, t[kPosition + k], velocity_window_s(t.step_s()), 2, 1);
+        local_derivatives(t, t[kPosition + k], velocity_window_s(t.step_s()), 2, {1})[0];
     turned[static_cast<std::size_t>(k)].resize(t.size());
   }
   std::vector<double> as_world, as_body;
@@ -194,7 +194,8 @@ void settle_specific_force(Draft& draft) {
   std::vector<double> differences;
   for (std::size_t k = 0; k < 3; ++k) {
     if (draft.acceleration_m_s2[k].empty()) continue;
-    const std::vector<double> smooth = local_derivative(t, force[k], velocity_window_s(t.step_s()), 2, 0);
+    const std::vector<double> smooth =
+        local_derivatives(t, force[k], velocity_window_s(t.step_s()), 2, {0})[0];
     std::vector<double> axis;
     for (std::size_t i = 0; i < smooth.size(); ++i) {
       const bool lateral = t.has(kVelocity) && t.has(kVelocity + 1);

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <complex>
 
-#include "analysis/logs/angles.h"
 #include "analysis/logs/statistics_of_series.h"
 
 namespace swarmcert::logs {

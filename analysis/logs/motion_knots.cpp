@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/logs/angles.h"
 #include "analysis/logs/column_groups.h"
 #include "analysis/logs/statistics_of_series.h"
 

@@ -9,7 +9,6 @@
 #include <regex>
 #include <sstream>
 
-#include "analysis/logs/absolute_time.h"
 #include "analysis/logs/clock.h"
 #include "analysis/logs/csv.h"
 #include "analysis/logs/formats/formats.h"

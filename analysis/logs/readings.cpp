@@ -7,8 +7,9 @@
 #include <iterator>
 #include <optional>
 
-#include "analysis/logs/angles.h"
+#include "analysis/logs/signal_table.h"
 #include "analysis/logs/statistics_of_series.h"
+#include "nn/base/pi.h"
 
 namespace swarmcert::logs {
 namespace {

@@ -11,7 +11,6 @@
 #include "analysis/logs/column_groups.h"
 #include "analysis/logs/column_names.h"
 #include "analysis/logs/message_frames.h"
-#include "analysis/logs/name_reading.h"
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
 #include "nn/base/suggest.h"

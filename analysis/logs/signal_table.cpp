@@ -6,7 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include "analysis/logs/angles.h"
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/median.h"
 #include "nn/base/pi.h"
@@ -263,11 +262,11 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, LogH
                               carried.signal == kPosition || carried.signal == kTargetPosition, events)
               : column.values;
       const double sign = k < carried.sign.size() ? carried.sign[k] : 1;
-      for (double& value : values)
+      for (double& value : values) {
         value = sign * (value - carried.offset) * carried.multiply / carried.divide;
-      // Pulses of a servo signal go beyond the ends of its range.
-      for (double& value : values)
-        value = carried.offset != 0 && std::isfinite(value) ? std::clamp(value, 0.0, 1.0) : value;
+        // Pulses of a servo signal go beyond the ends of its range.
+        if (carried.offset != 0 && std::isfinite(value)) value = std::clamp(value, 0.0, 1.0);
+      }
       for (std::size_t i = 0; i < signs.size(); ++i) values[i] *= signs[i];
       const int signal = carried.signal + static_cast<int>(k);
       if (carried.topic != recognition.clock) {

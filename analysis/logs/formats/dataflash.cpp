@@ -3,8 +3,7 @@
 /// Reads a log. Topics are named after their message ("XKF1", "ATT", "RCOU", "BAT", "MOTB"); a field that the log
 /// declares as the instance becomes RawTopic::instance. Times come from `TimeUS` or `TimeMS`. Values have the units
 /// stated in the log (UNIT), with its multipliers (MULT) and those of the number types (centidegrees to degrees, 1e-7
-/// degrees to degrees) applied. Parameters are the first values in PARM; later values become parameter_changes. MSG
-/// gives the messages.
+/// degrees to degrees) applied. Parameters are the first values in PARM. MSG gives the messages.
 /// If no message follows, the reader searches for the next two consecutive messages and counts the damaged place and
 /// the skipped bytes.
 #include <fmt/core.h>
@@ -139,7 +138,7 @@ class DataflashReader {
     walk([this](std::uint8_t id, std::string_view body) { take_definition(id, body); });
     apply_units();
     log_.health = {};
-    unknown_ids_.clear();
+    left_out_.clear();
     walk([this](std::uint8_t id, std::string_view body) { take_message(id, body); });
     finish();
     return std::move(log_);
@@ -186,7 +185,8 @@ class DataflashReader {
       log_.health.truncated = true;
       log_.health.skipped_bytes += next - at;
     } else if (is_unknown) {
-      ++unknown_ids_[static_cast<std::uint8_t>(bytes_[at + 2])];
+      ++left_out_[{fmt::format("message id {}", static_cast<std::uint8_t>(bytes_[at + 2])),
+                   "the file lost the definition of its format"}];
     } else {
       ++log_.health.damaged_blocks;
       log_.health.skipped_bytes += next - at;
@@ -292,11 +292,12 @@ class DataflashReader {
     if (time_s) last_time_s_ = *time_s;
     if (format.name == "PARM") return take_parameter(format, body);
     if (format.name == "MSG") {
-      log_.messages.push_back({last_time_s_, 0, text_in(format, body, "Message")});
+      log_.messages.push_back({last_time_s_, text_in(format, body, "Message")});
       return;
     }
     if (format.fields.empty() || !time_s) {
-      ++(format.fields.empty() ? contradictory_ : without_time_)[format.name];
+      ++left_out_[{format.name, format.fields.empty() ? "the definition of its format contradicts itself"
+                                                      : "it has no field \"TimeUS\" or \"TimeMS\""}];
       return;
     }
     RawTopic& topic = topic_of(id, body);
@@ -304,12 +305,7 @@ class DataflashReader {
     std::size_t column = 0;
     for (const DataflashField& field : format.fields) {
       const char* const data = body.data() + field.offset;
-      if (field.type.is_text) {
-        std::string& text = topic.texts[field.name];
-        if (text.empty()) text = until_nul({data, field.type.bytes});
-        continue;
-      }
-      if (is_time(field)) continue;
+      if (field.type.is_text || is_time(field)) continue;
       for (std::size_t i = 0; i < field.type.count; ++i)
         topic.columns[column++].values.push_back(number_of(field, data, i));
     }
@@ -355,22 +351,12 @@ class DataflashReader {
   void take_parameter(const DataflashFormat& format, std::string_view body) {
     const std::string name = text_in(format, body, "Name");
     const double value = number_in(format, body, "Value");
-    const double standard = number_in(format, body, "Default");
-    if (name.empty()) return;
-    const auto [known, is_new] = log_.parameters.emplace(name, value);
-    if (!is_new && known->second != value) log_.parameter_changes.push_back({last_time_s_, name, value});
-    if (!std::isnan(standard)) log_.default_parameters.emplace(name, standard);
+    if (!name.empty()) log_.parameters.emplace(name, value);
   }
 
   void finish() {
     log_.health.damaged_blocks += damaged_formats_;
-    for (const auto& [id, count] : unknown_ids_)
-      log_.skipped.push_back(
-          {fmt::format("message id {}", id), "the file lost the definition of its format", count});
-    for (const auto& [name, count] : contradictory_)
-      log_.skipped.push_back({name, "the definition of its format contradicts itself", count});
-    for (const auto& [name, count] : without_time_)
-      log_.skipped.push_back({name, "it has no field \"TimeUS\" or \"TimeMS\"", count});
+    for (const auto& [what, count] : left_out_) log_.skipped.push_back({what.first, what.second, count});
   }
 
   const std::string_view bytes_;
@@ -383,8 +369,7 @@ class DataflashReader {
   std::map<char, double> multipliers_;
   std::map<std::pair<std::uint8_t, int>, std::size_t> topics_;  ///< index in log_.topics
   std::map<std::string, std::uint8_t> names_;
-  std::map<std::uint8_t, std::size_t> unknown_ids_;
-  std::map<std::string, std::size_t> contradictory_, without_time_;
+  std::map<std::pair<std::string, std::string>, std::size_t> left_out_;  ///< messages by name and reason
   std::size_t damaged_formats_ = 0;
   double last_time_s_ = NAN;
 };

@@ -60,7 +60,7 @@ bool is_foreign_log(std::string_view head);
 [[noreturn]] void refuse_unknown(std::string_view head, const std::string& path);
 
 /// Appends `more` to `log`. Records of a common topic are appended to those of `log`; columns that only one of the two
-/// has are NaN in the other. If both have a text of the same name, that of `log` is kept.
+/// has are NaN in the other.
 void append(RawLog& log, RawLog&& more);
 
 /// Returns true for a folder with a metadata.yaml of rosbag2.

@@ -129,7 +129,6 @@ McapChunk chunk_of(std::string_view content) {
 
 std::size_t size_of(const McapRecord& record) { return kMcapHead_bytes + record.content.size(); }
 
-constexpr std::size_t kLongestMcapText_bytes = std::size_t{1} << 16;
 constexpr std::size_t kLongestMcapName = 1024;
 
 struct McapSchema {
@@ -248,20 +247,11 @@ class McapReader {
   void take_top(std::size_t at) {
     const McapRecord record = *mcap_record_at(bytes_, at);
     switch (record.code) {
-      case kHeader: {
-        McapFields fields(record.content);
-        log_.texts.emplace("profile", fields.bytes().substr(0, kLongestMcapText_bytes));
-        log_.texts.emplace("library", fields.bytes().substr(0, kLongestMcapText_bytes));
-        break;
-      }
       case kMessage:
         take_message(record.content);
         break;
       case kChunk:
         take_chunk(chunk_of(record.content), at);
-        break;
-      case kMetadata:
-        take_metadata(record.content);
         break;
       case kDataEnd: {
         // Only the first one is checked: a malicious file could contain many.
@@ -272,18 +262,6 @@ class McapReader {
       }
       default:
         break;
-    }
-  }
-
-  void take_metadata(std::string_view content) {
-    McapFields fields(content);
-    const std::string name(fields.bytes().substr(0, 256));
-    McapFields entries(fields.bytes());
-    while (!entries.rest().empty() && log_.texts.size() < kMostElements) {
-      const std::string key(entries.bytes().substr(0, 256));
-      const std::string_view value = entries.bytes();
-      if (!entries.is_sound()) return;
-      log_.texts[name + "." + key] = value.substr(0, kLongestMcapText_bytes);
     }
   }
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "analysis/logs/csv.h"
 #include "analysis/logs/dictionary.h"
 
 namespace swarmcert::logs {
@@ -20,13 +21,6 @@ std::optional<Scalar> ros_number(std::string_view name) {
   if (name == "float32") return Scalar::kFloat;
   if (name == "float64") return Scalar::kDouble;
   return name == "float" || name == "double" ? std::nullopt : scalar_called(name);
-}
-
-std::string_view next_line(std::string_view& text) {
-  const std::size_t end = std::min(text.find('\n'), text.size());
-  const std::string_view line = text.substr(0, end);
-  text.remove_prefix(std::min(end + 1, text.size()));
-  return line;
 }
 
 /// Removes and returns the next word; `line` keeps the rest.
@@ -143,12 +137,12 @@ class SchemaBuilder {
   /// Parses all definitions of `text` into written_; the first one is `name`.
   bool parse(std::string name, std::string_view text) {
     WrittenType type;
-    while (!text.empty()) {
-      std::string_view line = next_line(text);
+    for (std::size_t at = 0; at < text.size();) {
+      const std::string_view line = take_text_line(text, at);
       if (line.substr(0, 3) == "===") {
         written_.emplace(name, std::move(type));
         type.clear();
-        std::string_view head = next_line(text);
+        std::string_view head = take_text_line(text, at);
         if (next_word(head) != "MSG:") return fail("its definition has no \"MSG:\" after a line of \"=\"");
         name = short_type_name(next_word(head));
         if (written_.size() > kMostTypes) return fail("its definition has over 512 types");

@@ -41,6 +41,14 @@ struct RosSchema {
   std::vector<RosType> types;
 };
 
+/// Layout of the messages of a topic.
+struct RosLayout {
+  std::string type;  ///< long name, for RawTopic
+  /// One schema, or versions that differ only in their number types; the size of a message selects the version.
+  std::vector<RosSchema> versions;
+  bool is_beginning = false;  ///< messages continue after what the schema describes
+};
+
 /// Result of parsing a definition: the schema, or why it cannot be used.
 struct RosDefinition {
   std::optional<RosSchema> schema;

@@ -1,7 +1,7 @@
 /// @file rosbag2 in SQLite (`.db3`), the default of ROS 2 before Iron.
 ///
 /// Reads topics as read_mcap() does. Message definitions are taken from the database if it has them (since Iron), else
-/// from ros_messages.h; topics of other types are listed in `skipped`. Single messages compressed with zstd are
+/// built in; topics of other types are listed in `skipped`. Single messages compressed with zstd are
 /// supported.
 ///
 /// The database is read from memory: nothing is written, locked or created. A journal beside it is not applied; if it
@@ -169,10 +169,12 @@ class RosbagReader {
     return count > 0;
   }
 
-  void demand_table(const std::string& name) {
-    if (is_plain_table(name)) return;
-    throw files::InputError({path_, "", "table", files::in_quotes(name), "is missing or cannot be read",
+  [[noreturn]] void refuse_table(const std::string& name, const std::string& what) const {
+    throw files::InputError({path_, "", "table", files::in_quotes(name), what,
                              "this SQLite database is not a rosbag2 log, or it is damaged"});
+  }
+  void demand_table(const std::string& name) {
+    if (!is_plain_table(name)) refuse_table(name, "is missing or cannot be read");
   }
 
   void read_definitions() {
@@ -195,7 +197,7 @@ class RosbagReader {
 
   void read_topics() {
     Rows rows(database_, "SELECT id, name, type, serialization_format FROM topics NOT INDEXED");
-    if (!rows.is_prepared()) refuse_columns("topics");
+    if (!rows.is_prepared()) refuse_table("topics", "does not have the columns of a rosbag2");
     while (rows.next() && topics_.size() < kMostTopics) {
       const std::string type(rows.bytes(2).substr(0, 256));
       const auto definition = definitions_.find(type);
@@ -207,16 +209,10 @@ class RosbagReader {
     if (rows.is_damaged()) ++log_.health.damaged_blocks;
   }
 
-  [[noreturn]] void refuse_columns(const std::string& table) const {
-    throw files::InputError({path_, "", "table", files::in_quotes(table),
-                             "does not have the columns of a rosbag2",
-                             "this SQLite database is not a rosbag2 log, or it is damaged"});
-  }
-
   void read_messages() {
     // In file order: sorting would need the same amount of memory again.
     Rows rows(database_, "SELECT topic_id, timestamp, data FROM messages NOT INDEXED");
-    if (!rows.is_prepared()) refuse_columns("messages");
+    if (!rows.is_prepared()) refuse_table("messages", "does not have the columns of a rosbag2");
     while (rows.next()) {
       const std::string_view data = rows.bytes(2);
       if (!take_bytes(data.size() + 1)) {

@@ -1,11 +1,10 @@
 /// @file PX4 ULog (`.ulg`), file format versions 0 and 1.
 ///
-/// Reads a log. Topics are identified by name and instance (multi_id); times come from their field `timestamp`. Texts
-/// are the information messages; several with the same key become `key[0]`, `key[1]`, ... Parameters are those at the
-/// start of the log; later settings become parameter_changes. A topic whose subscription or format is lost is listed in
-/// `skipped`. Messages of unknown types are skipped, as the format requires. If no valid message follows, the reader
-/// searches for the next valid message that is followed by others, and counts the damaged place and the skipped bytes
-/// in `health`. Sections appended after a crash are read as well.
+/// Reads a log. Topics are identified by name and instance (multi_id); times come from their field `timestamp`.
+/// Parameters are those at the start of the log. A topic whose subscription or format is lost is listed in `skipped`.
+/// Messages of unknown types are skipped, as the format requires. If no valid message follows, the reader searches for
+/// the next valid message that is followed by others, and counts the damaged place and the skipped bytes in `health`.
+/// Sections appended after a crash are read as well.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -64,18 +63,6 @@ std::optional<double> parameter_of(const KeyedValue& entry) {
   if (entry.type == "int32_t") return value_of(Scalar::kInt32, entry.value.data());
   if (entry.type == "float") return value_of(Scalar::kFloat, entry.value.data());
   return std::nullopt;
-}
-
-/// Returns information as text: characters verbatim, numbers in decimal.
-std::string text_of(const KeyedValue& entry) {
-  if (entry.type == "uint64_t" && entry.value.size() == 8)
-    return std::to_string(*integer_at<std::uint64_t>(entry.value, 0));
-  if (entry.type == "int64_t" && entry.value.size() == 8)
-    return std::to_string(*integer_at<std::int64_t>(entry.value, 0));
-  const std::optional<Scalar> number = ulog_number(entry.type);
-  if (number && entry.value.size() == size_of(*number))
-    return fmt::format("{}", value_of(*number, entry.value.data()));
-  return until_nul(entry.value);
 }
 
 /// Returns true if the body has the form required by its type; false for data ('D'), whose form is defined in the file,
@@ -137,7 +124,7 @@ class UlogReader {
       read_section(begin, end, end == bytes_.size());
       begin = end;
     }
-    report_skipped();
+    for (const auto& [what, records] : left_out_) log_.skipped.push_back({what.first, what.second, records});
     return std::move(log_);
   }
 
@@ -161,7 +148,6 @@ class UlogReader {
     const int version = static_cast<unsigned char>(bytes_[7]);
     if (version > 1)
       refuse_at(path_, 7, "version", std::to_string(version), "is not known", "supported are 0 and 1");
-    log_.texts["file_timestamp_us"] = std::to_string(*integer_at<std::uint64_t>(bytes_, 8));
   }
 
   /// Returns the offsets of appended sections in ascending order.
@@ -293,15 +279,16 @@ class UlogReader {
   /// Precondition: is_unknown(message).
   void leave_out(const UlogMessage& message) {
     if (message.type != 'D') {
-      ++unknown_types_[message.type];
+      ++left_out_[{fmt::format("message type {:#04x}", static_cast<unsigned char>(message.type)),
+                   "is not known"}];
       return;
     }
     const std::uint16_t id = *integer_at<std::uint16_t>(message.body, 0);
     const auto found = subscriptions_.find(id);
     if (found == subscriptions_.end())
-      ++unknown_ids_[id];
+      ++left_out_[{fmt::format("message id {}", id), "the file lost the message that names its topic"}];
     else
-      ++without_format_[found->second.name];
+      ++left_out_[{found->second.name, "its format, or one that it uses, is not defined in the file"}];
   }
 
   void take(const UlogMessage& message) {
@@ -310,17 +297,8 @@ class UlogReader {
       case 'F':
         if (!formats_.add(body)) ++log_.health.damaged_blocks;
         break;
-      case 'I':
-        take_information(body, false);
-        break;
-      case 'M':
-        take_information(body.substr(1), body[0] == 1, true);
-        break;
       case 'P':
         take_parameter(body);
-        break;
-      case 'Q':
-        take_default(body);
         break;
       case 'A':
         subscribe(body);
@@ -332,33 +310,17 @@ class UlogReader {
         take_record(body);
         break;
       case 'L':
-        take_line(body[0], body.substr(1));
+        take_line(body.substr(1));
         break;
       case 'C':
-        take_line(body[0], body.substr(3));
+        take_line(body.substr(3));
         break;
       case 'O':
         log_.dropouts.push_back({last_time_s_, *integer_at<std::uint16_t>(body, 0) / 1e3});
         break;
-      default:  // flags and synchronisation
+      default:  // flags, information, defaults and synchronisation
         break;
     }
-  }
-
-  /// @param continues the text continues the last message with this key
-  void take_information(std::string_view body, bool continues, bool is_one_of_several = false) {
-    const std::optional<KeyedValue> entry = keyed_value(body);
-    if (!entry) {
-      ++log_.health.damaged_blocks;
-      return;
-    }
-    if (!is_one_of_several) {
-      log_.texts.emplace(entry->name, text_of(*entry));
-      return;
-    }
-    std::size_t& count = num_texts_[entry->name];
-    if (!continues || count == 0) ++count;
-    log_.texts[fmt::format("{}[{}]", entry->name, count - 1)] += text_of(*entry);
   }
 
   void take_parameter(std::string_view body) {
@@ -368,20 +330,6 @@ class UlogReader {
       ++log_.health.damaged_blocks;
     else if (log_.health.records == 0)
       log_.parameters[entry->name] = *value;
-    else
-      log_.parameter_changes.push_back({last_time_s_, entry->name, *value});
-  }
-
-  /// Defaults of the airframe (bit 1) take precedence over those of the firmware (bit 0).
-  void take_default(std::string_view body) {
-    const std::optional<KeyedValue> entry = keyed_value(body.substr(1));
-    const std::optional<double> value = entry ? parameter_of(*entry) : std::nullopt;
-    if (!value)
-      ++log_.health.damaged_blocks;
-    else if ((body[0] & 2) != 0)
-      log_.default_parameters[entry->name] = *value;
-    else
-      log_.default_parameters.emplace(entry->name, *value);
   }
 
   void subscribe(std::string_view body) {
@@ -392,11 +340,9 @@ class UlogReader {
   }
 
   /// @param body timestamp and text
-  void take_line(char level, std::string_view body) {
-    // The firmware writes the level as an ASCII digit.
-    const int number = level >= '0' && level <= '9' ? level - '0' : static_cast<unsigned char>(level);
+  void take_line(std::string_view body) {
     const double time_s = static_cast<double>(*integer_at<std::uint64_t>(body, 0)) / 1e6;
-    log_.messages.push_back({time_s, number, until_nul(body.substr(8))});
+    log_.messages.push_back({time_s, until_nul(body.substr(8))});
   }
 
   Topic& topic_of(Subscription& subscription) {
@@ -433,7 +379,6 @@ class UlogReader {
     const UlogLayout& layout = topic.layout;
     if (!layout.timestamp) return;
     const char* const record = body.data() + 2;
-    const std::size_t size = body.size() - 2;
     RawTopic& raw = log_.topics[topic.index];
     last_time_s_ = value_of(layout.timestamp->type, record + layout.timestamp->offset) / 1e6;
     raw.time_s.push_back(last_time_s_);
@@ -441,23 +386,7 @@ class UlogReader {
       const UlogNumber& number = layout.numbers[i];
       raw.columns[i].values.push_back(value_of(number.type, record + number.offset));
     }
-    for (const UlogText& text : layout.texts) {
-      if (text.offset + text.size > size) continue;
-      std::string& stored = raw.texts[text.name];
-      if (stored.empty()) stored = until_nul({record + text.offset, text.size});
-    }
     ++log_.health.records;
-  }
-
-  void report_skipped() {
-    for (const auto& [id, records] : unknown_ids_)
-      log_.skipped.push_back(
-          {fmt::format("message id {}", id), "the file lost the message that names its topic", records});
-    for (const auto& [name, records] : without_format_)
-      log_.skipped.push_back({name, "its format, or one that it uses, is not defined in the file", records});
-    for (const auto& [type, records] : unknown_types_)
-      log_.skipped.push_back(
-          {fmt::format("message type {:#04x}", static_cast<unsigned char>(type)), "is not known", records});
   }
 
   const std::string_view bytes_;
@@ -466,11 +395,8 @@ class UlogReader {
   UlogFormats formats_;
   std::map<std::uint16_t, Subscription> subscriptions_;
   std::vector<Topic> topics_;
-  std::map<std::pair<std::string, int>, std::size_t> topics_of_;  ///< index in topics_
-  std::map<std::string, std::size_t> num_texts_;
-  std::map<std::uint16_t, std::size_t> unknown_ids_;
-  std::map<std::string, std::size_t> without_format_;
-  std::map<char, std::size_t> unknown_types_;
+  std::map<std::pair<std::string, int>, std::size_t> topics_of_;         ///< index in topics_
+  std::map<std::pair<std::string, std::string>, std::size_t> left_out_;  ///< records by name and reason
   std::size_t looked_at_bytes_ = 0;
   double last_time_s_ = std::numeric_limits<double>::quiet_NaN();
 };

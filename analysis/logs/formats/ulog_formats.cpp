@@ -127,10 +127,8 @@ void UlogFormats::lay_out(const Format& format, const std::string& prefix, std::
     const bool is_time = prefix.empty() && name == "timestamp" && field.number && !field.is_array;
     if (is_time) {
       layout.timestamp = UlogNumber{name, *field.number, offset};
-    } else if (field.is_text && !field.is_padding()) {
-      layout.texts.push_back({name, offset, size});
-    } else if (field.is_padding()) {
-      // Padding carries no data.
+    } else if (field.is_text || field.is_padding()) {
+      // No signal.
     } else if (field.count > kMostElements) {
       layout.large_arrays.push_back(name);
     } else if (!field.is_array) {

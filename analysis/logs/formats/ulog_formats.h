@@ -20,15 +20,9 @@ struct UlogNumber {
   Scalar type;
   std::size_t offset;
 };
-/// A text in a record.
-struct UlogText {
-  std::string name;
-  std::size_t offset, size;
-};
 struct UlogLayout {
-  std::optional<UlogNumber> timestamp;  ///< microseconds
-  std::vector<UlogNumber> numbers;      ///< without the timestamp and padding
-  std::vector<UlogText> texts;
+  std::optional<UlogNumber> timestamp;    ///< microseconds
+  std::vector<UlogNumber> numbers;        ///< without the timestamp and padding
   std::vector<std::string> large_arrays;  ///< skipped fields with more than kMostElements elements
   bool has_too_many_columns = false;      ///< more than kMostColumns; `numbers` is truncated there
 };
