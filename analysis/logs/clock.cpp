@@ -135,29 +135,6 @@ int clock_by_steps(const RawTopic& topic) {
   return best;
 }
 
-/// Drops the records of which only other blocks have numbers.
-void drop_records_of_others(RawTopic& topic, const std::map<std::vector<bool>, RawTopic>& blocks) {
-  if (blocks.empty()) return;
-  const std::size_t n = topic.time_s.size();
-  std::vector<char> numbers(n, 0), others(n, 0);
-  for (const RawColumn& column : topic.columns) {
-    if (column.name == topic.clock) continue;
-    for (std::size_t i = 0; i < n; ++i)
-      if (std::isfinite(column.values[i])) numbers[i] = 1;
-  }
-  for (const auto& [has_number, block] : blocks)
-    for (std::size_t i = 0; i < n; ++i)
-      if (has_number[i]) others[i] = 1;
-  const auto keep = [&](std::vector<double>& values) {
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < n; ++i)
-      if (numbers[i] != 0 || others[i] == 0) values[kept++] = values[i];
-    values.resize(kept);
-  };
-  for (RawColumn& column : topic.columns) keep(column.values);
-  keep(topic.time_s);
-}
-
 void separate_blocks(RawLog& log) {
   constexpr double kWhole = 0.9;
   constexpr std::size_t kFew = 20;  // too few to tell blocks from damage
@@ -168,12 +145,17 @@ void separate_blocks(RawLog& log) {
   if (records < kFew) return;
   std::map<std::vector<bool>, RawTopic> blocks;  // by the records that have numbers
   std::vector<RawColumn> whole;
+  // Records of which only other blocks have numbers are dropped.
+  std::vector<char> here(joined.time_s.size(), 0), elsewhere = here;
   for (RawColumn& column : joined.columns) {
     std::vector<bool> has_number;
     for (std::size_t i = 0; i < joined.time_s.size(); ++i)
       has_number.push_back(has_time(i) && std::isfinite(column.values[i]));
     const auto count = static_cast<std::size_t>(std::count(has_number.begin(), has_number.end(), true));
-    if (count == 0 || static_cast<double>(count) > kWhole * static_cast<double>(records)) {
+    const bool is_whole = count == 0 || static_cast<double>(count) > kWhole * static_cast<double>(records);
+    for (std::size_t i = 0; i < has_number.size(); ++i)
+      if (has_number[i] && column.name != joined.clock) (is_whole ? here : elsewhere)[i] = 1;
+    if (is_whole) {
       whole.push_back(std::move(column));
       continue;
     }
@@ -187,7 +169,14 @@ void separate_blocks(RawLog& log) {
     }
   }
   joined.columns = std::move(whole);
-  drop_records_of_others(joined, blocks);
+  const auto keep = [&](std::vector<double>& values) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < here.size(); ++i)
+      if (here[i] != 0 || elsewhere[i] == 0) values[kept++] = values[i];
+    values.resize(kept);
+  };
+  for (RawColumn& column : joined.columns) keep(column.values);
+  keep(joined.time_s);
   log.health.repaired.merged_blocks += blocks.size();
   const std::string name = joined.name + (joined.name.empty() ? "block " : " block ");
   for (auto& [has_number, block] : blocks) {

@@ -175,15 +175,6 @@ bool may_hold_several(const std::string& path) {
   return format_of(head) == nullptr;
 }
 
-/// Returns the beginning of a file, enough for its header unless that is absurdly long.
-std::string beginning_of(const std::string& path) {
-  std::string text(std::size_t{1} << 16, '\0');
-  std::ifstream in(path, std::ios::binary);
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  return text;
-}
-
 std::string rows_of_vehicle(std::string_view text, const TableHeader& header, const VehicleColumn& by,
                             const std::string& vehicle) {
   std::string rows(text.substr(0, header.end));
@@ -239,6 +230,22 @@ std::string columns_of_vehicle(std::string_view text, const TableHeader& header,
   return table;
 }
 
+/// The vehicles of a table, by columns or by rows.
+struct Vehicles {
+  TableHeader header;
+  VehicleColumns columns;
+  VehicleColumn rows;
+};
+Vehicles vehicles_of(std::string_view text, bool by_columns) {
+  Vehicles found;
+  const std::optional<TableHeader> header = header_of(text, ',');
+  if (!header) return found;
+  found.header = *header;
+  if (by_columns) found.columns = prefixed_columns(*header);
+  if (found.columns.empty()) found.rows = vehicle_column(text, *header).value_or(VehicleColumn());
+  return found;
+}
+
 }  // namespace
 
 LogAddress address_of(const std::string& path) {
@@ -252,26 +259,17 @@ LogAddress address_of(const std::string& path) {
 }
 
 std::vector<std::string> vehicles_in(const std::string& path, bool by_columns) {
-  std::vector<std::string> vehicles;
-  if (!may_hold_several(path)) return vehicles;
-  const std::string beginning = beginning_of(path);
-  const std::optional<TableHeader> header = header_of(beginning, ',');
-  if (!header) return vehicles;
-  if (by_columns) {
-    for (const auto& [vehicle, columns] : prefixed_columns(*header)) vehicles.push_back(vehicle);
-  }
-  if (!vehicles.empty() || std::none_of(header->names.begin(), header->names.end(), may_name_vehicles))
-    return vehicles;
+  std::vector<std::string> names;
+  if (!may_hold_several(path)) return names;
   try {
     const std::string text = files::read_file(path, kLargestLog_bytes);
-    const std::optional<TableHeader> whole = header_of(text, ',');
-    const std::optional<VehicleColumn> found = whole ? vehicle_column(text, *whole) : std::nullopt;
-    if (!found) return vehicles;
-    for (const auto& [vehicle, entry] : found->entries) vehicles.push_back(vehicle);
+    const Vehicles found = vehicles_of(text, by_columns);
+    for (const auto& [vehicle, columns] : found.columns) names.push_back(vehicle);
+    for (const auto& [vehicle, entry] : found.rows.entries) names.push_back(vehicle);
   } catch (const files::InputError&) {
     return {};
   }
-  return vehicles;
+  return names;
 }
 
 std::vector<std::string> addresses_in(const std::string& path, bool by_columns) {
@@ -284,14 +282,10 @@ std::vector<std::string> addresses_in(const std::string& path, bool by_columns) 
 std::string table_of(const LogAddress& address) {
   std::string table;
   const std::string text = files::read_file(address.file, kLargestLog_bytes);
-  const std::optional<TableHeader> header = header_of(text, ',');
-  if (header && may_hold_several(address.file)) {
-    const VehicleColumns columns = prefixed_columns(*header);
-    if (!columns.empty()) {
-      table = columns_of_vehicle(text, *header, columns, address.vehicle);
-    } else if (const std::optional<VehicleColumn> found = vehicle_column(text, *header)) {
-      table = rows_of_vehicle(text, *header, *found, address.vehicle);
-    }
+  if (may_hold_several(address.file)) {
+    const Vehicles found = vehicles_of(text, true);
+    table = found.columns.empty() ? rows_of_vehicle(text, found.header, found.rows, address.vehicle)
+                                  : columns_of_vehicle(text, found.header, found.columns, address.vehicle);
   }
   if (table.empty()) {
     const std::vector<std::string> vehicles = vehicles_in(address.file);
