@@ -172,9 +172,4 @@ std::string line_that_logs(const std::string& program, const std::string& signal
   return lines.text("where") + lines.text(signal);
 }
 
-bool is_crazyflie_group(const std::string& word) {
-  static const std::vector<std::string> groups = dictionary_table("crazyflie.toml").texts("groups");
-  return std::find(groups.begin(), groups.end(), word) != groups.end();
-}
-
 }  // namespace swarmcert::logs

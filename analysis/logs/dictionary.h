@@ -57,7 +57,7 @@ enum class Origin {
   kPrograms,     ///< known programs: specific enough to be found after another first word
   kMessages,     ///< fields of ROS messages: only in topics of a known type
   kStated,       ///< names that state what they are: only as they are
-  kCommonWords,  ///< of the Crazyflie firmware, but common words: only beside its other names
+  kCommonWords,  ///< of a program, but common words: only beside its other names
   kFirmware      ///< fields of the messages of PX4 or ArduPilot, which become columns of kOwn
 };
 
@@ -97,8 +97,5 @@ const std::vector<Sign>& signs_of_vehicle();
 
 /// Returns what to write into the configuration of the logger of a program, "crazyflie", to log a signal.
 std::string line_that_logs(const std::string& program, const std::string& signal);
-
-/// Returns whether a word is a log group of the Crazyflie firmware that no common word is.
-bool is_crazyflie_group(const std::string& word);
 
 }  // namespace swarmcert::logs

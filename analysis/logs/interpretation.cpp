@@ -179,6 +179,13 @@ void Draft::add_measured(const std::string& name, int signal) const {
   log.sources.push_back({name, Source::kMeasured, from, unit, rate_hz, kNaN, odds_bits, runner_up});
 }
 
+void Draft::add_measured_or_missing(const std::string& name, int signal, bool is_there) const {
+  if (is_there)
+    add_measured(name, signal);
+  else
+    add(name, Source::kMissing, "", kind_of_signal(signal).units[0].name);
+}
+
 void settle_judgement(Draft& draft) {
   const SignalTable& t = draft.table;
   Signals& signals = draft.log.signals;

@@ -105,10 +105,8 @@ void derive_kinematics(Draft& draft) {
   settle_velocity_frame(draft);
   signals.position = t.has_group(kPosition, 3);
   const char* const axes[] = {"x", "y", "z"};
-  if (t.has(kPosition) || t.has(kPosition + 1) || t.has(kPosition + 2))
-    draft.add_measured("position", kPosition);
-  else
-    draft.add("position", Source::kMissing, "", "m");
+  draft.add_measured_or_missing("position", kPosition,
+                                t.has(kPosition) || t.has(kPosition + 1) || t.has(kPosition + 2));
   const bool has_velocity = t.has(kVelocity) || t.has(kVelocity + 1) || t.has(kVelocity + 2);
   const double step_s = t.step_s();
   const double velocity_s = velocity_window_s(step_s), position_s = position_window_s(step_s);
@@ -138,13 +136,11 @@ void derive_kinematics(Draft& draft) {
     from += axes[k];
     if (std::isfinite(axis_noise)) noise = std::max(noise, axis_noise);
   }
-  if (has_velocity)
-    draft.add_measured("velocity", kVelocity);
-  else if (!velocity_from.empty())
+  if (!has_velocity && !velocity_from.empty())
     draft.add("velocity", Source::kDerived, "position " + velocity_from + ": local quadratic over 100 ms",
               "m/s", velocity_noise);
   else
-    draft.add("velocity", Source::kMissing, "", "m/s");
+    draft.add_measured_or_missing("velocity", kVelocity, has_velocity);
   if (from.empty()) {
     draft.add("acceleration", Source::kMissing, "", "m/s^2");
     return;

@@ -165,10 +165,11 @@ class Reader {
   }
 
   std::vector<Reading> quaternions() {
-    if (group_.columns.size() != 4 || !is_whole()) return {};
+    if (group_.columns.size() != 4 || !is_whole() ||
+        !is_unit_quaternion(log_.topics[group_.topic], group_.columns))
+      return {};
     std::array<KnotSeries, 4> parts = quaternion_parts();
     const double norm_bits = unit_norm_bits();
-    if (norm_bits < 0) return {};
     for (const bool w_first : {false, true}) {
       // w is named, or an array usually begins with it.
       const double order_bits = group_.kind == IndexKind::kAxis ? (w_first ? kOtherOrder : 0)
@@ -290,43 +291,27 @@ class Reader {
     return is_gravity ? 6 + 3 * size_bits(size, kGravity_m_s2, 1.1) : kNever;
   }
 
-  /// Returns the four parts at the knots; q and -q are the same rotation.
+  /// Returns the four parts at the knots.
   std::array<KnotSeries, 4> quaternion_parts() const {
     const RawTopic& topic = log_.topics[group_.topic];
-    std::array<std::vector<double>, 4> parts;
-    for (std::size_t k = 0; k < 4; ++k) parts[k] = stored(log_, base_.carried, k);
-    Four last{};
-    for (std::size_t i = 0; i < topic.time_s.size(); ++i) {
-      double dot = 0;
-      for (std::size_t k = 0; k < 4; ++k) dot += last[k] * parts[k][i];
-      for (std::size_t k = 0; k < 4; ++k) {
-        if (dot < 0) parts[k][i] = -parts[k][i];
-        if (std::isfinite(parts[k][i])) last[k] = parts[k][i];
-      }
-    }
+    const std::vector<double> signs = continuous_signs(topic, group_.columns);
     std::array<KnotSeries, 4> series;
-    for (std::size_t k = 0; k < 4; ++k) series[k] = at_knots(knots_, topic.time_s, parts[k]);
+    for (std::size_t k = 0; k < 4; ++k) {
+      std::vector<double> part = stored(log_, base_.carried, k);
+      for (std::size_t i = 0; i < part.size(); ++i) part[i] *= signs[i];
+      series[k] = at_knots(knots_, topic.time_s, part);
+    }
     return series;
   }
 
   /// A unit norm is rare by chance, unless the four are constant.
   double unit_norm_bits() const {
-    std::size_t unit = 0, count = 0;
-    double least = INFINITY, most = -INFINITY;
-    for (std::size_t i = 0; i < log_.topics[group_.topic].time_s.size(); ++i) {
-      double norm = 0, sum = 0;
-      for (std::size_t k = 0; k < 4; ++k) {
-        const double part = stored(log_, base_.carried, k)[i];
-        norm += part * part;
-        sum += part * (1 + static_cast<double>(k));
-      }
-      if (!std::isfinite(norm)) continue;
-      ++count;
-      unit += std::abs(norm - 1) < 0.05 ? 1 : 0;
-      least = std::min(least, sum), most = std::max(most, sum);
+    bool changes = false;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::vector<double>& part = stored(log_, base_.carried, k);
+      changes = changes || quantile_of(part, 1) > quantile_of(part, 0);
     }
-    if (2 * unit < count || count == 0) return -1;
-    return most > least ? 40 : 4;
+    return changes ? 40 : 4;
   }
 
   /// R = Rz(yaw) Ry(pitch) Rx(roll).

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <unordered_map>
 
 #include "analysis/logs/assignment.h"
@@ -46,13 +47,6 @@ class ColumnIndex {
     return columns;
   }
 
-  /// Returns whether a name begins with a log group of the Crazyflie firmware that no common word is.
-  bool has_crazyflie_names() const {
-    return std::any_of(whole_.begin(), whole_.end(), [](const auto& name) {
-      return is_crazyflie_group(name.first.substr(0, name.first.find('.')));
-    });
-  }
-
  private:
   using Index = std::unordered_map<std::string, int>;
   Index exact_, whole_, shortened_;
@@ -63,19 +57,6 @@ void drop_empty_columns(const RawTopic& topic, Carried& carried) {
   for (int& c : carried.columns)
     if (c >= 0 && !topic.time_s.empty() && !holds_numbers(topic.columns[static_cast<std::size_t>(c)].values))
       c = -1;
-}
-
-bool is_unit_quaternion(const RawTopic& topic, const Carried& carried) {
-  std::size_t unit = 0;
-  for (std::size_t i = 0; i < topic.time_s.size(); ++i) {
-    double norm = 0;
-    for (const int c : carried.columns) {
-      const double q = topic.columns[static_cast<std::size_t>(c)].values[i];
-      norm += q * q;
-    }
-    if (std::abs(norm - 1) < 0.05) ++unit;
-  }
-  return 2 * unit >= topic.time_s.size();
 }
 
 /// A position in a topic of setpoints is a desired one.
@@ -112,8 +93,8 @@ void recognise_row(const RawLog& log, const std::vector<ColumnIndex>& indices, c
     const SignalKind& kind = kind_of_signal(row.signal);
     if (missing == size || (missing > 0 && !kind.may_be_partial) || is_wish(topic, row.signal)) continue;
     const bool is_quaternion = row.signal == kAttitude;
-    const bool is_sound =
-        is_quaternion ? is_unit_quaternion(topic, carried) : kind.is_command || !is_dead(topic, carried);
+    const bool is_sound = is_quaternion ? is_unit_quaternion(topic, carried.columns)
+                                        : kind.is_command || !is_dead(topic, carried);
     if (!topic.time_s.empty() && !is_sound) {
       found.rejected.push_back(names_of(log, carried) +
                                (is_quaternion ? ": no unit quaternions" : ": only zeros"));
@@ -129,13 +110,15 @@ void recognise_row(const RawLog& log, const std::vector<ColumnIndex>& indices, c
 
 void recognise_by_names(const RawLog& log, Recognition& found) {
   const std::vector<ColumnIndex> indices(log.topics.begin(), log.topics.end());
-  const bool is_crazyflie = std::any_of(indices.begin(), indices.end(),
-                                        [](const ColumnIndex& index) { return index.has_crazyflie_names(); });
+  std::set<std::string> programs;  // of which names are found
   for (const NamedColumns& row : column_names()) {
     if (row.origin == Origin::kFirmware) continue;
-    if (row.origin == Origin::kCommonWords && !is_crazyflie && log.format != "usd") continue;
+    if (row.origin == Origin::kCommonWords && programs.count(row.program) == 0 && log.format != "usd")
+      continue;
+    const std::size_t before = found.groups.size();
     recognise_row(log, indices, row, false, found);
     if (row.origin == Origin::kPrograms) recognise_row(log, indices, row, true, found);
+    if (found.groups.size() > before) programs.insert(row.program);
   }
 }
 
@@ -212,6 +195,32 @@ bool is_dead(const RawTopic& topic, const Carried& carried) {
     const std::vector<double>& values = topic.columns[static_cast<std::size_t>(c)].values;
     return std::all_of(values.begin(), values.end(), [](double x) { return !std::isfinite(x) || x == 0; });
   });
+}
+
+bool is_unit_quaternion(const RawTopic& topic, const std::vector<int>& columns) {
+  std::size_t unit = 0, count = 0;
+  for (std::size_t i = 0; i < topic.time_s.size(); ++i) {
+    double norm = 0;
+    for (const int c : columns) norm += std::pow(topic.columns[static_cast<std::size_t>(c)].values[i], 2);
+    count += std::isfinite(norm) ? 1 : 0;
+    unit += std::abs(norm - 1) < 0.05 ? 1 : 0;
+  }
+  return count > 0 && 2 * unit >= count;
+}
+
+std::vector<double> continuous_signs(const RawTopic& topic, const std::vector<int>& columns) {
+  std::vector<double> signs(topic.time_s.size(), 1), last(columns.size(), 0);
+  for (std::size_t i = 0; i < signs.size(); ++i) {
+    double dot = 0;
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      dot += last[k] * topic.columns[static_cast<std::size_t>(columns[k])].values[i];
+    if (dot < 0) signs[i] = -1;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const double part = topic.columns[static_cast<std::size_t>(columns[k])].values[i];
+      if (std::isfinite(part)) last[k] = signs[i] * part;
+    }
+  }
+  return signs;
 }
 
 Recognition recognise(const RawLog& log, const SignalMap& map) {

@@ -50,6 +50,12 @@ bool has_torque_signals(const Recognition& recognition);
 /// Returns whether no column holds a number other than zero.
 bool is_dead(const RawTopic& topic, const Carried& carried);
 
+/// Returns whether most records with numbers are unit quaternions.
+bool is_unit_quaternion(const RawTopic& topic, const std::vector<int>& columns);
+
+/// q and -q are the same rotation: returns signs with which neighbouring records are close, so that they can be averaged.
+std::vector<double> continuous_signs(const RawTopic& topic, const std::vector<int>& columns);
+
 /// Returns what `recognition` says of each column, as a columns.toml would. Accelerations without gravity, which
 /// nothing uses, have no name there.
 SignalMap meaning_of(const RawLog& log, const Recognition& recognition);

@@ -57,20 +57,6 @@ void unwrap(std::vector<double>& angles, double turn) {
   }
 }
 
-/// q and -q are the same rotation: chooses signs so that neighbours are close and can be averaged.
-std::vector<double> continuous_signs(const RawTopic& topic, const Carried& carried) {
-  std::vector<double> signs(topic.time_s.size(), 1);
-  for (std::size_t i = 1; i < signs.size(); ++i) {
-    double dot = 0;
-    for (const int c : carried.columns) {
-      const std::vector<double>& q = topic.columns[static_cast<std::size_t>(c)].values;
-      dot += q[i - 1] * q[i];
-    }
-    signs[i] = dot < 0 ? -signs[i - 1] : signs[i - 1];
-  }
-  return signs;
-}
-
 struct Series {
   std::vector<double> time_s, values;
 };
@@ -252,7 +238,7 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, LogH
     }
     std::vector<double> signs;
     if (carried.topic != recognition.clock && carried.signal == kAttitude && carried.size() == 4)
-      signs = continuous_signs(topic, carried);
+      signs = continuous_signs(topic, carried.columns);
     for (std::size_t k = 0; k < carried.size(); ++k) {
       if (carried.columns[k] < 0) continue;
       const RawColumn& column = topic.columns[static_cast<std::size_t>(carried.columns[k])];

@@ -75,7 +75,7 @@ TEST(Dictionary, EveryRowHasKnownKeysASignalAndAUnitAndNoNameHasTwoMeanings) {
   for (const auto& [file, text] : logs::dictionary_files()) {
     if (!files::ends_with(file, ".toml") || !logs::dictionary_table(file).has("columns")) continue;
     const files::TomlTable table = logs::dictionary_table(file);
-    table.allow_only({"source", "found", "frame", "columns", "groups", "signs", "vehicles", "log_this"});
+    table.allow_only({"source", "found", "frame", "columns", "signs", "vehicles", "log_this"});
     for (const files::TomlTable& row : table.tables("columns")) EXPECT_NO_THROW(row.allow_only(keys)) << file;
   }
   // column_names() refuses signals that do not exist and units that the signal does not have.
