@@ -1,5 +1,5 @@
-/// @file Names of columns: the forms in which they are compared, and what their words suggest, a prior in bits and never a
-/// decision.
+/// @file Names of columns: the forms in which they are compared, and what their words suggest, a prior in bits and
+/// never a decision.
 #pragma once
 
 #include <array>

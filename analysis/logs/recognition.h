@@ -53,7 +53,7 @@ bool is_dead(const RawTopic& topic, const Carried& carried);
 /// Returns whether most records with numbers are unit quaternions.
 bool is_unit_quaternion(const RawTopic& topic, const std::vector<int>& columns);
 
-/// q and -q are the same rotation: returns signs with which neighbouring records are close, so that they can be averaged.
+/// q and -q are the same rotation: returns signs with which neighbouring records are close and can be averaged.
 std::vector<double> continuous_signs(const RawTopic& topic, const std::vector<int>& columns);
 
 /// Returns what `recognition` says of each column, as a columns.toml would. Accelerations without gravity, which

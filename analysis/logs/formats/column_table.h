@@ -19,7 +19,8 @@ namespace swarmcert::logs {
 
 inline constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 
-/// Layouts, and limits of the memory, of all topics of a log together; compressed files can hold far more than their size suggests.
+/// Layouts, and limits of the memory, of all topics of a log together; compressed files can hold far more than their
+/// size suggests.
 struct RosBudget {
   std::size_t places = std::size_t{1} << 20;  ///< fields and array elements
   std::size_t values = std::size_t{1} << 28;  ///< numbers: 2 GiB

@@ -1,5 +1,5 @@
-/// @file Logs in several files: rosbag2 folders with metadata.yaml, and sessions of the Crazyflie client, a folder with one
-/// CSV file for each log block.
+/// @file Logs in several files: rosbag2 folders with metadata.yaml, and sessions of the Crazyflie client, a folder with
+/// one CSV file for each log block.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>

@@ -1,8 +1,9 @@
 /// @file Logs of the Crazyflie's micro-SD deck: the old format, and the formats with magic 0xBC.
 ///
 /// Old: u8 number of variables, that many "name(type)," tokens, u32 checksum; then blocks of u8 n, n packed
-/// little-endian records, u32 checksum over both. The stored checksum is the bitwise NOT of CRC-32. A block with a wrong
-/// checksum is skipped: the reader searches for the next byte at which a valid block with a plausible time starts.
+/// little-endian records, u32 checksum over both. The stored checksum is the bitwise NOT of CRC-32. A block with a
+/// wrong checksum is skipped: the reader searches for the next byte at which a valid block with a plausible time
+/// starts.
 ///
 /// Versions 1 (times in ms) and 2 (times in us): the file ends with the CRC-32 of everything before it. Each record
 /// belongs to an event, and each event becomes a topic with its own times. If no known event follows, the reader
@@ -68,8 +69,8 @@ struct UsdVariables {
   }
 };
 
-/// Reads what starts at bytes between `at` and `end`: `size_at` returns its size, 0 if nothing does, `take` reads it, and
-/// `ends_early` says whether the file ends within what should be there. Counts what lies between.
+/// Reads what starts at bytes between `at` and `end`: `size_at` returns its size, 0 if nothing does, `take` reads it,
+/// and `ends_early` says whether the file ends within what should be there. Counts what lies between.
 template <typename SizeAt, typename EndsEarly, typename Take>
 void read_between_damage(std::size_t at, std::size_t end, LogHealth& health, const SizeAt& size_at,
                          const EndsEarly& ends_early, const Take& take) {
@@ -106,8 +107,8 @@ RawLog read_blocks(const std::string& bytes, const std::string& path) {
   const auto body_at = [&](std::size_t at) { return 1 + count_at(at) * variables.record_bytes; };
   const auto fits = [&](std::size_t at) { return body_at(at) + kChecksum_bytes <= bytes.size() - at; };
   std::uint32_t last_time = 0;
-  // After damage, a block is not empty and its first time is soon after the last. This avoids a checksum at almost every
-  // byte; an empty block is only five bytes, which occur by chance.
+  // After damage, a block is not empty and its first time is soon after the last. This avoids a checksum at almost
+  // every byte; an empty block is only five bytes, which occur by chance.
   const auto may_start = [&](std::size_t at) {
     if (count_at(at) == 0 || bytes.size() - at < 1 + variables.record_bytes) return false;
     if (variables.places[0].first != Scalar::kUint32) return true;
@@ -265,8 +266,8 @@ bool has_events(std::string_view head) {
 
 }  // namespace
 
-/// An old log starts with the number of variables and "name(type),", which may look like text. "Time (s),X (m)" of a CSV
-/// is not such a list: names contain no blanks, and "s" is not a type.
+/// An old log starts with the number of variables and "name(type),", which may look like text. "Time (s),X (m)" of a
+/// CSV is not such a list: names contain no blanks, and "s" is not a type.
 bool looks_like_usd(std::string_view head) {
   head = head.substr(0, 80);
   const std::size_t bracket = head.find('(');
