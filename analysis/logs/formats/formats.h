@@ -11,7 +11,7 @@
 namespace swarmcert::logs {
 
 /// All formats, in the order in which they are tried: the name for messages, and the stem of the source and its
-/// functions. <stem>.cpp defines looks_like_<stem>() and read_<stem>().
+/// functions: STEM.cpp defines looks_like_STEM() and read_STEM().
 #define SWARMCERT_LOG_FORMATS(FORMAT)        \
   FORMAT("micro-SD logs", usd)               \
   FORMAT("PX4 ULog", ulog)                   \
