@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <set>
 
 #include "analysis/logs/motion_evidence.h"
@@ -134,11 +133,19 @@ class MotionSearch {
     double bits = 0;
     for (const std::size_t slot : {kPositionSlot, kVelocitySlot, kAttitudeSlot})
       if (c[slot] != kNone) bits += reading(slot, c[slot]).bits;
-    const bool has_position = c[kPositionSlot] != kNone, has_velocity = c[kVelocitySlot] != kNone;
-    if (c[kAttitudeSlot] == kNone || !(has_position || has_velocity)) return bits;
-    const std::size_t from = has_velocity ? kVelocitySlot : kPositionSlot;
+    const std::size_t from = motion_slot(c);
+    if (c[kAttitudeSlot] == kNone || c[from] == kNone) return bits;
     return bits +
            thrust_axis_[from][static_cast<std::size_t>(c[from])][static_cast<std::size_t>(c[kAttitudeSlot])];
+  }
+
+  /// The acceleration is the slope of the velocity or, without one, the curvature of the position.
+  static std::size_t motion_slot(const Choice& c) {
+    return c[kVelocitySlot] != kNone ? kVelocitySlot : kPositionSlot;
+  }
+  const ThreeSeries* acceleration(const Choice& c) const {
+    const std::size_t from = motion_slot(c);
+    return c[from] == kNone ? nullptr : &accelerations_[from][static_cast<std::size_t>(c[from])];
   }
 
   /// Most people log z up, and rarely mix frames or units.
@@ -159,23 +166,24 @@ class MotionSearch {
   }
 
   /// Chooses the reading of a slot that adds most, if any adds something.
-  void choose_best(std::size_t slot, const std::function<double(const Reading&)>& evidence,
-                   Scored& scored) const {
+  void choose_best(std::size_t slot, Scored& scored) const {
     double most = 0;
-    for (std::size_t i = 0; i < readings_[slot].size(); ++i) {
-      const Reading& candidate = readings_[slot][i];
+    for (int i = 0; i < count(slot); ++i) {
       bool is_free = true;
       for (std::size_t other = 0; other < kNumSlots; ++other)
-        if (other != slot && scored.choice[other] != kNone &&
-            overlap(candidate, reading(other, scored.choice[other])))
-          is_free = false;
-      if (!is_free) continue;
-      const double bits = candidate.bits + evidence(candidate);
+        is_free = is_free && (other == slot || !clash(slot, i, other, scored.choice[other]));
+      const double bits =
+          is_free ? reading(slot, i).bits + evidence(slot, scored.choice, reading(slot, i)) : 0;
       if (bits <= most) continue;
       most = bits;
-      scored.choice[slot] = static_cast<int>(i);
+      scored.choice[slot] = i;
     }
     scored.bits += most;
+  }
+
+  int count(std::size_t slot) const { return static_cast<int>(readings_[slot].size()); }
+  bool clash(std::size_t a, int i, std::size_t b, int k) const {
+    return i != kNone && k != kNone && overlap(reading(a, i), reading(b, k));
   }
 
   const Reading* chosen(const Choice& c, std::size_t slot) const {
@@ -184,53 +192,37 @@ class MotionSearch {
 
   double force_evidence(const Choice& c, const Reading& force) const {
     const Reading* const attitude = chosen(c, kAttitudeSlot);
-    const std::size_t from = c[kVelocitySlot] != kNone ? kVelocitySlot : kPositionSlot;
-    double bits = 0;
-    if (c[from] != kNone)
-      bits = specific_force_bits(knots_, accelerations_[from][static_cast<std::size_t>(c[from])], attitude,
-                                 force);
-    const bool is_down = attitude != nullptr && attitude->is_down;
-    return bits - (attitude != nullptr && force.is_down != is_down ? 3 : 0);
+    const ThreeSeries* const moves = acceleration(c);
+    const double bits = moves != nullptr ? specific_force_bits(knots_, *moves, attitude, force) : 0;
+    return bits - (attitude != nullptr && force.is_down != attitude->is_down ? 3 : 0);
   }
   double rate_evidence(const Choice& c, const Reading& rates) const {
     const Reading* const attitude = chosen(c, kAttitudeSlot);
-    const Reading* const force = chosen(c, kForceSlot);
-    const Reading* const velocity = chosen(c, kVelocitySlot);
-    const Reading* const like = force != nullptr      ? force
-                                : attitude != nullptr ? attitude
-                                : velocity != nullptr ? velocity
-                                                      : chosen(c, kPositionSlot);
+    const ThreeSeries* const moves = acceleration(c);
+    const Reading* like = nullptr;
+    for (const std::size_t slot : {kForceSlot, kAttitudeSlot, kVelocitySlot, kPositionSlot})
+      if (like == nullptr) like = chosen(c, slot);
+    const double bits = attitude != nullptr ? rate_bits(knots_, *attitude, rates)
+                        : moves != nullptr  ? tilt_rate_bits(knots_, *moves, rates)
+                                            : 0;
     const bool is_down = like != nullptr && like->is_down;
-    const std::size_t from = c[kVelocitySlot] != kNone ? kVelocitySlot : kPositionSlot;
-    const double bits =
-        attitude != nullptr ? rate_bits(knots_, *attitude, rates)
-        : c[from] != kNone
-            ? tilt_rate_bits(knots_, accelerations_[from][static_cast<std::size_t>(c[from])], rates)
-            : 0;
     return bits - (rates.is_down == is_down ? 0 : like != nullptr ? 6 : kDown);
   }
-
-  void complete(Scored& scored) const {
-    choose_best(
-        kForceSlot, [&](const Reading& force) { return force_evidence(scored.choice, force); }, scored);
-    choose_best(
-        kRateSlot, [&](const Reading& rates) { return rate_evidence(scored.choice, rates); }, scored);
+  double evidence(std::size_t slot, const Choice& c, const Reading& candidate) const {
+    return slot == kForceSlot ? force_evidence(c, candidate) : rate_evidence(c, candidate);
   }
 
   void score_all() {
     std::vector<Scored> all;
-    const auto count = [&](std::size_t slot) { return static_cast<int>(readings_[slot].size()); };
     for (int p = kNone; p < count(kPositionSlot); ++p) {
       for (int v = kNone; v < count(kVelocitySlot); ++v) {
-        if (p != kNone && v != kNone && overlap(reading(kPositionSlot, p), reading(kVelocitySlot, v)))
-          continue;
+        if (clash(kPositionSlot, p, kVelocitySlot, v)) continue;
         const double of_pair = p == kNone || v == kNone ? 0
                                                         : derivative_bits(knots_, reading(kPositionSlot, p),
                                                                           reading(kVelocitySlot, v));
         for (int a = kNone; a < count(kAttitudeSlot); ++a) {
           const Choice choice = {p, v, a, kNone, kNone};
-          if (a != kNone && ((p != kNone && overlap(reading(kAttitudeSlot, a), reading(kPositionSlot, p))) ||
-                             (v != kNone && overlap(reading(kAttitudeSlot, a), reading(kVelocitySlot, v)))))
+          if (clash(kAttitudeSlot, a, kPositionSlot, p) || clash(kAttitudeSlot, a, kVelocitySlot, v))
             continue;
           all.push_back({choice, of_pair + motion_bits(choice) + frame_bits(choice)});
         }
@@ -238,7 +230,8 @@ class MotionSearch {
     }
     std::sort(all.begin(), all.end(), [](const Scored& a, const Scored& b) { return a.bits > b.bits; });
     keep_contenders(all);
-    for (Scored& scored : scored_) complete(scored);
+    for (Scored& scored : scored_)
+      for (const std::size_t slot : {kForceSlot, kRateSlot}) choose_best(slot, scored);
     std::stable_sort(scored_.begin(), scored_.end(),
                      [](const Scored& a, const Scored& b) { return a.bits > b.bits; });
     add_variants();
@@ -260,12 +253,9 @@ class MotionSearch {
     const Scored winner = best();
     for (const std::size_t slot : {kForceSlot, kRateSlot}) {
       if (winner.choice[slot] == kNone) continue;
-      const auto bits_of = [&](const Reading& r) {
-        return r.bits +
-               (slot == kForceSlot ? force_evidence(winner.choice, r) : rate_evidence(winner.choice, r));
-      };
+      const auto bits_of = [&](const Reading& r) { return r.bits + evidence(slot, winner.choice, r); };
       const double own = bits_of(reading(slot, winner.choice[slot]));
-      for (int i = kNone; i < static_cast<int>(readings_[slot].size()); ++i) {
+      for (int i = kNone; i < count(slot); ++i) {
         Scored variant = winner;
         variant.choice[slot] = i;
         variant.bits += (i == kNone ? 0 : bits_of(reading(slot, i))) - own;
@@ -282,26 +272,19 @@ class MotionSearch {
   std::vector<Scored> scored_;                                   ///< best first
 };
 
-/// Signals that a slot can hold, the first of which columns.toml names.
-const std::vector<std::vector<int>>& signals_of_slots() {
-  static const std::vector<std::vector<int>> signals = {
-      {kPosition}, {kVelocity}, {kAttitude, kPackedAttitude, kEuler}, {kForceBody, kForceWorld}, {kRates}};
-  return signals;
-}
-
-Slot slot_of(Quantity quantity) {
-  switch (quantity) {
-    case kIsPosition:
-      return kPositionSlot;
-    case kIsVelocity:
-      return kVelocitySlot;
-    case kIsSpecificForce:
-      return kForceSlot;
-    case kIsRates:
-      return kRateSlot;
-    default:
-      return kAttitudeSlot;
-  }
+/// The quantities and signals that a slot can hold.
+struct SlotKind {
+  std::vector<Quantity> quantities;
+  std::vector<int> signals;
+};
+const std::array<SlotKind, kNumSlots>& slot_kinds() {
+  static const std::array<SlotKind, kNumSlots> kinds = {
+      {{{kIsPosition}, {kPosition}},
+       {{kIsVelocity}, {kVelocity}},
+       {{kIsQuaternion, kIsAngles}, {kAttitude, kPackedAttitude, kEuler}},
+       {{kIsSpecificForce}, {kForceBody, kForceWorld}},
+       {{kIsRates}, {kRates}}}};
+  return kinds;
 }
 
 class Assigner {
@@ -340,7 +323,7 @@ class Assigner {
       for (std::size_t c = 0; c < topic.columns.size() && topic.time_s.size() > 8; ++c) {
         const IndexKind kind = read_name(topic.columns[c].name).kind;
         if (kind != IndexKind::kNone && kind != IndexKind::kNumber) continue;
-        if (line_through(topic.time_s, topic.columns[c].values).correlation > 0.9999) taken_[t][c] = 1;
+        if (correlation_of(topic.time_s, topic.columns[c].values) > 0.9999) taken_[t][c] = 1;
       }
     }
   }
@@ -384,10 +367,9 @@ class Assigner {
 
   /// Only a header is known: the likeliest names, in SI units or those that they state.
   void assign_names() {
-    const std::pair<Quantity, int> wanted[] = {{kIsPosition, kPosition},       {kIsVelocity, kVelocity},
-                                               {kIsQuaternion, kAttitude},     {kIsAngles, kEuler},
-                                               {kIsSpecificForce, kForceBody}, {kIsRates, kRates}};
-    for (const auto& [quantity, signal] : wanted) {
+    for (const Quantity quantity :
+         {kIsPosition, kIsVelocity, kIsQuaternion, kIsAngles, kIsSpecificForce, kIsRates}) {
+      const int signal = kSignalOfQuantity[quantity];
       if (known({signal}) != nullptr) continue;
       const std::size_t width = signal == kAttitude ? 4 : 3;
       const ColumnGroup* const group = likeliest(quantity, width);
@@ -411,11 +393,10 @@ class Assigner {
     return best;
   }
 
-  std::vector<Reading> readings(const std::vector<Quantity>& quantities,
-                                const std::vector<int>& signals) const {
-    if (const Carried* const carried = known(signals)) return readings_of_known(log_, knots_, *carried);
+  std::vector<Reading> readings(const SlotKind& kind) const {
+    if (const Carried* const carried = known(kind.signals)) return readings_of_known(log_, knots_, *carried);
     std::vector<Reading> all;
-    for (const Quantity quantity : quantities)
+    for (const Quantity quantity : kind.quantities)
       for (const ColumnGroup& group : groups_) {
         if (group.is_foreign || group.is_wish || group.bits[quantity] < -15) continue;
         for (Reading& reading : readings_of(log_, knots_, group, quantity)) all.push_back(std::move(reading));
@@ -424,18 +405,15 @@ class Assigner {
   }
 
   void assign_motion() {
-    const auto& signals = signals_of_slots();
-    const MotionSearch search(
-        log_, knots_,
-        {readings({kIsPosition}, signals[kPositionSlot]), readings({kIsVelocity}, signals[kVelocitySlot]),
-         readings({kIsQuaternion, kIsAngles}, signals[kAttitudeSlot]),
-         readings({kIsSpecificForce}, signals[kForceSlot]), readings({kIsRates}, signals[kRateSlot])});
+    std::array<std::vector<Reading>, kNumSlots> all;
+    for (std::size_t slot = 0; slot < kNumSlots; ++slot) all[slot] = readings(slot_kinds()[slot]);
+    const MotionSearch search(log_, knots_, std::move(all));
     for (std::size_t slot = 0; slot < kNumSlots; ++slot) {
       const int index = search.best().choice[slot];
       if (index == kNone) continue;
       const Reading& winner = search.reading(slot, index);
-      if (known(signals[slot]) != nullptr) {
-        correct(winner, std::min(search.lead_over(slot, *known(signals[slot])), search.confirmation()));
+      if (const Carried* const named = known(slot_kinds()[slot].signals)) {
+        correct(winner, std::min(search.lead_over(slot, *named), search.confirmation()));
         continue;
       }
       const MotionSearch::Odds odds = search.odds_of(slot);
@@ -477,9 +455,7 @@ class Assigner {
 
   /// Outputs of an array that never leave their least value drive no motor.
   ColumnGroup without_idle(const ColumnGroup& group) const {
-    double least = INFINITY;
-    for (std::size_t k = 0; k < group.columns.size(); ++k)
-      least = std::min(least, quantile_of(values(group, k), 0));
+    const double least = range_of(group).first;
     ColumnGroup driven = group;
     driven.columns.clear();
     for (std::size_t k = 0; k < group.columns.size(); ++k)
@@ -487,24 +463,24 @@ class Assigner {
     return driven.columns.size() >= 4 ? driven : group;
   }
 
-  bool is_command(const ColumnGroup& group) const {
-    double low = INFINITY, high = -INFINITY;
+  /// Returns the least and the largest value.
+  std::pair<double, double> range_of(const ColumnGroup& group) const {
+    std::pair<double, double> range = {INFINITY, -INFINITY};
     for (std::size_t k = 0; k < group.columns.size(); ++k) {
-      low = std::min(low, quantile_of(values(group, k), 0));
-      high = std::max(high, quantile_of(values(group, k), 1));
+      range.first = std::min(range.first, quantile_of(values(group, k), 0));
+      range.second = std::max(range.second, quantile_of(values(group, k), 1));
     }
-    return std::isnan(low) || (low >= 0 && high < 65536);
+    return range;
   }
 
   void assign_motors() {
     if (known({kDuty, kRequested, kMotorCommand, kRotorSpeed, kMotorForce}) != nullptr) return;
     const ColumnGroup* const group = likeliest(kIsMotors, 4);
-    if (group == nullptr || !is_command(*group)) return;
+    if (group == nullptr) return;
+    const auto [low, high] = range_of(*group);
+    if (!std::isnan(low) && !(low >= 0 && high < 65536)) return;
     const ColumnGroup driven = without_idle(*group);
     if (driven.columns.size() == 4) add({kDuty, driven.topic, driven.columns, "", 1, 1, Ask::kMotors});
-    double high = 0;
-    for (std::size_t k = 0; k < driven.columns.size(); ++k)
-      high = std::max(high, quantile_of(values(driven, k), 1));
     const double scale = high <= 1.001 ? 1 : high <= 100 ? 100 : high <= 1000 ? 1000 : 65536;
     if (driven.columns.size() > 4) add({kMotorCommand, driven.topic, driven.columns, "1", 1, scale});
   }
@@ -555,10 +531,12 @@ class Assigner {
           knots_.time_s.empty())
         continue;
       const auto named = std::max_element(group.bits.begin(), group.bits.begin() + kIsMotors);
-      const std::size_t slot = slot_of(static_cast<Quantity>(named - group.bits.begin()));
+      const auto slot = std::find_if(slot_kinds().begin(), slot_kinds().end(), [&](const SlotKind& kind) {
+        return std::count(kind.quantities.begin(), kind.quantities.end(), named - group.bits.begin()) > 0;
+      });
       if (group.is_foreign)
         report(group, "not the vehicle's motion, as its name says");
-      else if (*named > kLikelyName && known(signals_of_slots()[slot]) == nullptr)
+      else if (*named > kLikelyName && known(slot->signals) == nullptr)
         report(group, is_dead(log_.topics[group.topic], carried_of(group))
                           ? "only zeros"
                           : "the rest of the log contradicts its name");

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdint>
 
-#include "analysis/logs/angles.h"
 #include "analysis/logs/interpretation.h"
 #include "analysis/logs/statistics_of_series.h"
 
@@ -106,10 +105,7 @@ void settle_attitude(Draft& draft) {
                                   : "thrust axis along acceleration + g; yaw unknown",
               "1");
   }
-  if (draft.is_measured(kRates) && t.has_group(kRates, 3))
-    draft.add_measured("rates", kRates);
-  else
-    draft.add("rates", SignalInfo::Source::kMissing, "", "rad/s");
+  draft.add_measured_or_missing("rates", kRates, draft.is_measured(kRates) && t.has_group(kRates, 3));
 }
 
 }  // namespace swarmcert::logs

@@ -5,13 +5,11 @@
 #include <map>
 #include <utility>
 
+#include "analysis/logs/message_frames.h"
+#include "analysis/logs/statistics_of_series.h"
+
 namespace swarmcert::logs {
 namespace {
-
-bool holds_numbers(const RawColumn& column) {
-  return column.values.empty() ||
-         std::any_of(column.values.begin(), column.values.end(), [](double x) { return std::isfinite(x); });
-}
 
 class Grouping {
  public:
@@ -20,7 +18,7 @@ class Grouping {
     const std::vector<RawColumn>& columns = log.topics[topic].columns;
     for (std::size_t c = 0; c < columns.size(); ++c) {
       readings_.push_back(read_name(columns[c].name));
-      if (taken[c] != 0 || !holds_numbers(columns[c])) {
+      if (taken[c] != 0 || (!columns[c].values.empty() && !holds_numbers(columns[c].values))) {
         grouped_[c] = 1;
         continue;
       }
@@ -127,7 +125,7 @@ class Grouping {
 }  // namespace
 
 bool is_plain_table(const RawLog& log, const RawTopic& topic) {
-  return topic.type.empty() && log.format != "ulog" && log.format != "ardupilot";
+  return topic.type.empty() && firmware_of(log, topic).empty();
 }
 
 std::vector<ColumnGroup> column_groups(const RawLog& log, const std::vector<std::vector<char>>& taken) {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/logs/name_reading.h"
+#include "analysis/logs/column_names.h"
 #include "analysis/logs/raw_log.h"
 
 namespace swarmcert::logs {

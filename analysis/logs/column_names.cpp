@@ -2,182 +2,160 @@
 
 #include <cctype>
 #include <map>
+#include <optional>
 
-#include "analysis/logs/angles.h"
-#include "nn/base/pi.h"
+#include "analysis/logs/dictionary.h"
 
 namespace swarmcert::logs {
 namespace {
 
-/// Returns `pattern` with '#' replaced by each of `words`.
-std::vector<std::string> each(const std::string& pattern, const std::vector<std::string>& words) {
-  std::vector<std::string> names;
-  for (const std::string& word : words) {
-    std::string name = pattern;
-    const std::size_t at = name.find('#');
-    names.push_back(at == std::string::npos ? name : name.replace(at, 1, word));
-  }
-  return names;
-}
-
-std::vector<std::string> axes(const std::string& pattern) { return each(pattern, {"x", "y", "z"}); }
-std::vector<std::string> rotors(const std::string& pattern) { return each(pattern, {"1", "2", "3", "4"}); }
-std::vector<std::string> quaternion(const std::string& pattern) {
-  return each(pattern, {"x", "y", "z", "w"});
-}
-std::vector<std::string> euler(const std::string& pattern) { return each(pattern, {"roll", "pitch", "yaw"}); }
-
-using Table = std::vector<NamedColumns>;
-
-/// The names of columns.toml, in SI units, as produced by message_frames.h.
-void add_own(Table& t) {
-  t.push_back({kPosition, axes("position.#"), "m"});
-  t.push_back({kVelocity, axes("velocity.#"), "m/s"});
-  t.push_back({kForceBody, axes("specific.force.body.#"), "m/s^2"});
-  t.push_back({kAttitude, quaternion("attitude.#"), "1"});
-  t.push_back({kEuler, axes("euler.#"), "rad"});
-  t.push_back({kRates, axes("rate.#"), "rad/s"});
-  t.push_back({kBattery, {"battery.volt"}, "V"});
-  t.push_back({kTargetPosition, axes("target.position.#"), "m"});
-  t.push_back({kTargetVelocity, axes("target.velocity.#"), "m/s"});
-  for (int motors = 8; motors >= 3; --motors) {
-    std::vector<std::string> names;
-    for (int k = 1; k <= motors; ++k) names.push_back("motor.command." + std::to_string(k));
-    t.push_back({kMotorCommand, names, "1"});
-  }
-  t.push_back({kThrustCommand, {"thrust.command.normalised"}, "1"});
-}
-
-/// The CSV files of the published flights. Their "a" is a specific force in the world frame.
-void add_published(Table& t) {
-  t.push_back({kPosition, axes("#[m]"), "m"});
-  t.push_back({kVelocity, axes("v#[m/s]"), "m/s"});
-  t.push_back({kForceWorld, axes("a#[m/s^2]"), "m/s^2"});
-  t.push_back({kRates, axes("w#[rad/s]"), "rad/s"});
-  t.push_back({kDuty, rotors("u#[PWM]"), "1"});
-  t.push_back({kMotorForce, rotors("u#[N]"), "N"});
-  t.push_back({kBattery, {"Vbat[V]"}, "V"});
-  t.push_back({kThrust, {"thrust_des[g]"}, "gf", kGravity_m_s2, 1000});
-  t.push_back({kTorque, axes("torque#[Nm]"), "N m"});
-}
-
-/// Log variables of the Crazyflie firmware.
-void add_crazyflie(Table& t) {
-  t.push_back({kPosition, axes("stateestimatez.#"), "mm", 1, 1000});
-  t.push_back({kPosition, axes("stateestimate.#"), "m"});
-  t.push_back({kPosition, axes("kalman.state#"), "m"});
-  t.push_back({kPosition, axes("locsrv.#"), "m"});
-  t.push_back({kPosition, axes("locsrvz.#"), "mm", 1, 1000});
-  t.push_back({kPosition, axes("extpos.#"), "m"});
-  t.push_back({kVelocity, axes("stateestimatez.v#"), "mm/s", 1, 1000});
-  t.push_back({kVelocity, axes("stateestimate.v#"), "m/s"});
-  // kalman.stateP* is a velocity in the body frame, so for kalman.state* the velocity is derived from the position.
-  t.push_back({kForceWorld, axes("stateestimatez.a#"), "mm/s^2", 1, 1000});
-  t.push_back({kAttitude, quaternion("stateestimate.q#"), "1"});
-  t.push_back({kPackedAttitude, {"stateestimatez.quat"}, "packed"});
-  t.push_back({kAttitude, each("kalman.q#", {"1", "2", "3", "0"}), "1"});
-  t.push_back({kAttitude, quaternion("locsrv.q#"), "1"});
-  t.push_back({kEuler, axes("ctrllee.rpy#"), "rad"});
-  // The firmware's legacy convention: degrees, and positive pitch raises the nose.
-  for (const char* group : {"stateestimate.#", "stabilizer.#"})
-    t.push_back(
-        {kEuler, euler(group), "deg", kDegree_rad, 1, Ask::kNothing, Origin::kPrograms, {1, -1, 1, 1}});
-  t.push_back({kRates, each("stateestimatez.rate#", {"roll", "pitch", "yaw"}), "mrad/s", 1, 1000});
-  t.push_back({kRates, axes("ctrllee.omega#"), "rad/s"});
-  t.push_back({kRates,
-               each("ctrlmel.r.#", {"roll", "pitch", "yaw"}),
-               "rad/s",
-               1,
-               1,
-               Ask::kNothing,
-               Origin::kPrograms,
-               {1, -1, 1, 1}});
-  t.push_back({kDuty, rotors("pwm.m#.pwm"), "1/65536", 1, 65536});
-  // The request before battery compensation; since November 2022 the duty after it, without an upper limit.
-  t.push_back({kRequested, rotors("motor.m#req"), "1/65536", 1, 65536, Ask::kMotors});
-  t.push_back({kRequested, rotors("motor.m#"), "1/65536", 1, 65536, Ask::kMotors});
-  t.push_back({kBattery, {"pm.vbatmv"}, "mV", 1, 1000});
-  t.push_back({kBattery, {"pm.vbat"}, "V"});
-  t.push_back({kTargetPosition, axes("ctrltargetz.#"), "mm", 1, 1000});
-  t.push_back({kTargetPosition, axes("ctrltarget.#"), "m"});
-  t.push_back({kTargetVelocity, axes("ctrltargetz.v#"), "mm/s", 1, 1000});
-  t.push_back({kTargetVelocity, axes("ctrltarget.v#"), "m/s"});
-  t.push_back({kMotorForce, rotors("motor.f#"), "N"});
-  t.push_back({kThrust, {"motor.thrust"}, "N"});
-  t.push_back({kThrust, {"ctrllee.thrustsi"}, "N"});
-  t.push_back({kThrust, {"ctrlmel.thrustsi"}, "N"});
-  t.push_back({kTorque, axes("motor.torque#"), "N m"});
-  t.push_back({kTorque, axes("ctrllee.torque#"), "N m"});
-  for (const char* name : {"ctrlmel.cmd.thrust", "controller.cmd.thrust", "controller.actuatorthrust",
-                           "ctrllee.thrust", "stabilizer.thrust"})
-    t.push_back({kThrustCommand, {name}, "1"});
-  // Accelerations of the estimate come last, because they are derivatives filtered by the estimator.
-  t.push_back({kAccelerationWorld, axes("stateestimate.a#"), "g", kGravity_m_s2, 1});
-}
-
-/// Log variables of the Crazyflie firmware that other programs use too.
-void add_common_words(Table& t) {
-  t.push_back({kForceBody, axes("acc.#"), "g", kGravity_m_s2, 1});
-  t.push_back({kRates, axes("gyro.#"), "deg/s", kDegree_rad, 1});
-  t.push_back({kPosition, axes("ext.pos.#"), "m"});
-}
-
-/// Fields of ROS messages.
-void add_messages(Table& t) {
-  for (const char* group : {"pose.position.#", "pose.pose.position.#", "odom.position.#",
-                            "transform.translation.#", "point.#", "position.#"})
-    t.push_back({kPosition, axes(group), "m"});
-  t.push_back({kVelocity, axes("velocity.#"), "m/s"});
-  t.push_back({kForceBody, axes("linear.acceleration.#"), "m/s^2"});
-  for (const char* group :
-       {"pose.orientation.#", "pose.pose.orientation.#", "transform.rotation.#", "orientation.#"})
-    t.push_back({kAttitude, quaternion(group), "1"});
-  for (const char* group : {"angular.velocity.#", "twist.angular.#", "twist.twist.angular.#"})
-    t.push_back({kRates, axes(group), "rad/s"});
-  t.push_back({kBattery, {"voltage"}, "V"});
-}
-
-/// Rotor speeds, collective commands, and velocities in a frame that only the motion tells.
-void add_stated(Table& t) {
-  for (const char* group : {"twist.twist.linear.#", "twist.linear.#"})
-    t.push_back({kVelocity, axes(group), "m/s", 1, 1, Ask::kVelocityFrame});
-  for (const char* group :
-       {"rpm#", "rpm.#", "rpm.m#", "motor.rpm.#", "rotor.speed.#", "motor.speed.#", "omega.m#"})
-    t.push_back({kRotorSpeed, rotors(group), "rpm", 2 * kPi, 60});
-  for (const char* group : {"m#.rads", "m#.rad.s", "motor#.rad.s", "rotor.speed.#.rad.s"})
-    t.push_back({kRotorSpeed, rotors(group), "rad/s"});
-  // Electrical revolutions per minute: the brushless motors of a Crazyflie have six pole pairs.
-  for (const char* group : {"m#.erpm", "erpm.m#", "erpm#", "erpm.#", "motor#.erpm"})
-    t.push_back({kRotorSpeed, rotors(group), "erpm", 2 * kPi, 60 * 6});
-  for (const char* name : {"thrust", "thrust.cmd", "cmd.thrust", "collective.thrust", "thrust.setpoint"})
-    t.push_back({kThrustCommand, {name}, "1"});
-}
-
-void add_rows(Table& table, void (*add)(Table&), Origin origin) {
-  const std::size_t first = table.size();
-  add(table);
-  for (std::size_t i = first; i < table.size(); ++i) table[i].origin = origin;
-}
-
-Table make_table() {
-  Table table;
-  add_rows(table, add_own, Origin::kOwn);
-  add_rows(table, add_published, Origin::kPrograms);
-  add_rows(table, add_crazyflie, Origin::kPrograms);
-  add_rows(table, add_common_words, Origin::kCommonWords);
-  add_rows(table, add_messages, Origin::kMessages);
-  add_rows(table, add_stated, Origin::kUnits);
-  return table;
-}
-
 bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; }
 
-}  // namespace
+constexpr double kNamed = 10,
+                 kNamedOther = 20;   ///< bits for the quantity that a word names, and against the others
+constexpr double kUnknownWord = 12;  ///< bits against a word that may be any thing's
+constexpr double kForeign = 25;      ///< bits against the vehicle's own motion
 
-const std::vector<NamedColumns>& column_names() {
-  static const Table table = make_table();
-  return table;
+using WordBits = std::map<int, double>;
+
+/// Words that name a quantity; other quantities lose kNamedOther bits.
+const std::map<std::string, WordBits>& quantity_words() {
+  static const std::map<std::string, WordBits> words = [] {
+    const std::vector<std::string> names = {"position",   "velocity", "specific_force", "rates",
+                                            "quaternion", "angles",   "motors",         "battery"};
+    std::map<std::string, WordBits> all;
+    for (const files::TomlTable& entry : dictionary_table("words.toml").tables("quantity")) {
+      const files::TomlTable stated = entry.table("bits");
+      stated.allow_only(names);
+      WordBits bits;
+      for (int q = 0; q < static_cast<int>(names.size()); ++q)
+        if (stated.has(names[static_cast<std::size_t>(q)]))
+          bits[q] = stated.number(names[static_cast<std::size_t>(q)]);
+      for (const std::string& word : entry.texts("words")) all[word] = bits;
+    }
+    return all;
+  }();
+  return words;
 }
+
+struct Index {
+  IndexKind kind;
+  int index;
+};
+
+std::optional<Index> index_of(const std::string& word) {
+  static const std::map<std::string, Index> known = [] {
+    std::map<std::string, Index> all;
+    for (const files::TomlTable& entry : dictionary_table("words.toml").tables("index")) {
+      const IndexKind kinds[] = {IndexKind::kAxis, IndexKind::kCompass, IndexKind::kAngle};
+      const IndexKind kind = kinds[entry.choice("kind", {"axis", "compass", "angle"})];
+      int index = 0;
+      for (const std::string& spelling : entry.texts("words")) all[spelling] = {kind, index++};
+    }
+    return all;
+  }();
+  const auto found = known.find(word);
+  if (found != known.end()) return found->second;
+  bool is_number = !word.empty() && word.size() < 3;
+  for (const char c : word) is_number = is_number && std::isdigit(static_cast<unsigned char>(c)) != 0;
+  if (is_number) return Index{IndexKind::kNumber, std::stoi(word)};
+  return std::nullopt;
+}
+
+bool is_known(const std::string& word) {
+  return quantity_words().count(word) > 0 || is_word_of("wish", word) || is_word_of("foreign", word) ||
+         is_word_of("neutral", word) || word == "imu";
+}
+
+/// Returns the words of a name; glued ones are split where both parts are known: "posx", "qw", "pwm1", "xdot".
+std::vector<std::string> words_of(const std::string& plain) {
+  std::vector<std::string> words;
+  std::string word;
+  const auto end_word = [&] {
+    if (word.empty()) return;
+    const std::string head = word.substr(0, word.size() - 1), tail = word.substr(word.size() - 1);
+    if (word.size() == 1 || is_known(word) || index_of(word)) {
+      words.push_back(word);
+    } else if (index_of(tail) && is_known(head)) {
+      words.insert(words.end(), {head, tail});
+    } else if (index_of(word.substr(0, 1)) && is_known(word.substr(1))) {
+      words.insert(words.end(), {word.substr(1), word.substr(0, 1)});
+    } else if (index_of(tail)) {
+      words.insert(words.end(), {head, tail});
+    } else {
+      words.push_back(word);
+    }
+    word.clear();
+  };
+  for (const char c : plain) {
+    if (c == '.')
+      end_word();
+    else
+      word += c;
+  }
+  end_word();
+  return words;
+}
+
+/// "PosX" becomes "Pos_X", "batteryVoltage" "battery_Voltage".
+std::string with_words_apart(const std::string& column) {
+  std::string apart;
+  for (std::size_t i = 0; i < column.size(); ++i) {
+    const auto is = [&](std::size_t at, int (*test)(int)) {
+      return test(static_cast<unsigned char>(column[at])) != 0;
+    };
+    if (i > 0 && is(i, std::isupper) && is(i - 1, std::islower)) apart += '_';
+    apart += column[i];
+  }
+  return apart;
+}
+
+/// Takes the last word that can be an index out of `words`. A lone p, q or r is a body rate.
+std::optional<Index> take_index(std::vector<std::string>& words) {
+  if (words.size() == 1 && (words[0] == "p" || words[0] == "q" || words[0] == "r")) {
+    const int index = words[0] == "p" ? 0 : words[0] == "q" ? 1 : 2;
+    words.clear();
+    return Index{IndexKind::kRate, index};
+  }
+  for (std::size_t i = words.size(); i-- > 0;) {
+    const std::optional<Index> index = index_of(words[i]);
+    if (!index) continue;
+    words.erase(words.begin() + static_cast<std::ptrdiff_t>(i));
+    return index;
+  }
+  return std::nullopt;
+}
+
+void add_bits(const WordBits& bits, NameReading& name) {
+  for (int q = 0; q < kNumQuantities; ++q) {
+    const auto found = bits.find(q);
+    name.bits[static_cast<std::size_t>(q)] += found != bits.end() ? found->second : -kNamedOther;
+  }
+}
+
+/// The index alone tells a quantity where no word does: x is a position, roll an angle, p a rate.
+void add_index_bits(const Index& index, NameReading& name) {
+  if (index.kind == IndexKind::kAxis || index.kind == IndexKind::kCompass)
+    add_bits({{kIsPosition, kNamed}}, name);
+  if (index.kind == IndexKind::kAngle) add_bits({{kIsAngles, kNamed}}, name);
+  if (index.kind == IndexKind::kRate) add_bits({{kIsRates, kNamed}}, name);
+}
+
+/// A stated unit rules out the quantities that do not have it.
+void add_unit_bits(NameReading& name) {
+  if (name.unit.empty()) return;
+  for (std::size_t q = kIsPosition; q <= kIsAngles; ++q)
+    name.bits[q] += !unit_factor(kSignalOfQuantity[q], name.unit) ? -kForeign : name.bits[q] < 0 ? 4 : -0.5;
+}
+
+/// A set point is the target's position or velocity where the other words are those of the vehicle's.
+void make_wish(NameReading& name) {
+  name.bits[kIsTargetPosition] = name.bits[kIsPosition];
+  name.bits[kIsTargetVelocity] = name.bits[kIsVelocity];
+  for (int q = kIsPosition; q <= kIsAngles; ++q) name.bits[static_cast<std::size_t>(q)] -= kForeign;
+}
+
+}  // namespace
 
 std::string plain_name(const std::string& column) {
   std::string plain;
@@ -198,14 +176,13 @@ std::string plain_name(const std::string& column) {
 }
 
 StatedUnit stated_unit(const std::string& column) {
-  static const std::map<std::string, const char*> spelled = {
-      {"m", "m"},         {"mm", "mm"},      {"cm", "cm"},         {"m.s", "m/s"},       {"mps", "m/s"},
-      {"mm.s", "mm/s"},   {"mmps", "mm/s"},  {"cm.s", "cm/s"},     {"cmps", "cm/s"},     {"m.s2", "m/s^2"},
-      {"m.s.2", "m/s^2"}, {"mps2", "m/s^2"}, {"mm.s2", "mm/s^2"},  {"mm.s.2", "mm/s^2"}, {"g", "g"},
-      {"mg", "mg"},       {"rad", "rad"},    {"deg", "deg"},       {"degrees", "deg"},   {"rad.s", "rad/s"},
-      {"radps", "rad/s"}, {"rads", "rad/s"}, {"mrad.s", "mrad/s"}, {"deg.s", "deg/s"},   {"degps", "deg/s"},
-      {"dps", "deg/s"},   {"v", "V"},        {"volt", "V"},        {"volts", "V"},       {"mv", "mV"},
-      {"pct", "%"},       {"percent", "%"},  {"pwm", "PWM"}};
+  static const std::map<std::string, std::string> spelled = [] {
+    std::map<std::string, std::string> all;
+    const files::TomlTable table = dictionary_table("words.toml").table("spelled");
+    for (const std::string& unit : table.keys())
+      for (const std::string& spelling : table.texts(unit)) all[spelling] = unit;
+    return all;
+  }();
   const std::string plain = plain_name(column);
   const std::size_t open = column.find_last_of("[("), close = column.find_last_of("])");
   if (open != std::string::npos && close != std::string::npos && close > open) {
@@ -227,6 +204,55 @@ std::vector<std::string> called_names(const std::string& column) {
   if (dot == std::string::npos || column.find('.', dot + 1) == std::string::npos) return names;
   names.push_back(column.substr(dot + 1));
   return names;
+}
+
+NameReading read_name(const std::string& column) {
+  NameReading name;
+  const StatedUnit stated = stated_unit(with_words_apart(column));
+  name.unit = stated.unit;
+  std::vector<std::string> words = words_of(stated.plain);
+  const std::optional<Index> index = take_index(words);
+  if (index) {
+    name.kind = index->kind;
+    name.index = index->index;
+  }
+  bool is_quantity = false, is_angular = false;
+  for (const std::string& word : words) {
+    name.family += (name.family.empty() ? "" : ".") + word;
+    const auto quantity = quantity_words().find(word);
+    name.says_down = name.says_down || word == "ned" || word == "frd";
+    name.says_up = name.says_up || word == "enu" || word == "flu";
+    if (word == "ang" || word == "angular") {
+      is_angular = true;
+    } else if (quantity != quantity_words().end() && (index || word.size() > 1)) {
+      add_bits(quantity->second, name);
+      is_quantity = true;
+    } else if (is_word_of("wish", word)) {
+      name.is_wish = true;
+    } else if (is_word_of("foreign", word)) {
+      name.is_foreign = true;
+    } else if (word != "imu") {
+      const bool is_neutral = is_word_of("neutral", word) || index_of(word);
+      for (double& bits : name.bits) bits -= is_neutral ? 1 : kUnknownWord;
+    }
+  }
+  if (index && !is_quantity && !is_angular) add_index_bits(*index, name);
+  if (index && index->kind == IndexKind::kAngle) {
+    if (name.bits[kIsVelocity] > 0) std::swap(name.bits[kIsVelocity], name.bits[kIsRates]);    // phi_dot
+    if (unit_factor(kRates, name.unit)) std::swap(name.bits[kIsAngles], name.bits[kIsRates]);  // roll_deg_s
+  }
+  if (is_angular) {
+    if (!is_quantity) name.bits[kIsAngles] += kNamed;
+    if (name.bits[kIsVelocity] > 0) std::swap(name.bits[kIsVelocity], name.bits[kIsRates]);
+    name.bits[kIsVelocity] -= kForeign;
+    name.bits[kIsSpecificForce] -= kForeign;
+  }
+  add_unit_bits(name);
+  name.bits[kIsTargetPosition] = name.bits[kIsTargetVelocity] = -kForeign;
+  if (name.is_wish) make_wish(name);
+  if (name.is_foreign)
+    for (double& bits : name.bits) bits -= kForeign;
+  return name;
 }
 
 }  // namespace swarmcert::logs

@@ -1,7 +1,5 @@
-/// @file The names under which known programs log their signals.
-///
-/// Each name is one line of the table in column_names.cpp. Formats with their own messages (PX4, ROS, ArduPilot) are
-/// first converted to the names of columns.toml (message_frames.h), so that each signal is interpreted in one place.
+/// @file Names of columns: the forms in which they are compared, and what their words suggest, a prior in bits and
+/// never a decision.
 #pragma once
 
 #include <array>
@@ -12,35 +10,46 @@
 
 namespace swarmcert::logs {
 
-/// What the names leave open and the data must decide.
-enum class Ask {
-  kNothing,
-  kMotors,        ///< requested thrust or applied duty; scale
-  kVelocityFrame  ///< along the axes of the world or of the body
+/// What a group of columns may be.
+enum Quantity : int {
+  kIsPosition,
+  kIsVelocity,
+  kIsSpecificForce,
+  kIsRates,
+  kIsQuaternion,
+  kIsAngles,
+  kIsMotors,
+  kIsBattery,
+  kIsTargetPosition,
+  kIsTargetVelocity,
+  kNumQuantities
 };
 
-/// Where names come from.
-enum class Origin {
-  kOwn,         ///< columns.toml; message_frames.h converts messages of known firmware to them
-  kPrograms,    ///< known programs: specific enough to be found after another first word
-  kMessages,    ///< fields of ROS messages: only in topics of a known type
-  kUnits,       ///< names that state what they are: only as they are
-  kCommonWords  ///< of the Crazyflie firmware, but common words: only beside its other names
+/// The signal that a group of this quantity carries, in the order of the quantities of a motion.
+inline constexpr int kSignalOfQuantity[] = {kPosition, kVelocity, kForceBody, kRates, kAttitude, kEuler};
+
+/// log2 of the odds for each quantity against a column without a name.
+using NameBits = std::array<double, kNumQuantities>;
+
+/// How the columns of a group are told apart.
+enum class IndexKind { kNone, kAxis, kCompass, kNumber, kAngle, kRate };
+
+/// The name of one column, taken apart.
+struct NameReading {
+  std::string family;  ///< the words without the index; columns of one vector have it in common
+  IndexKind kind = IndexKind::kNone;
+  int index = 0;  ///< x y z w, roll pitch yaw, p q r: 0 .. 3; north 0, east 1, down 2, up 3; or the number
+  NameBits bits{};
+  std::string unit;                         ///< as stated_unit()
+  bool says_down = false, says_up = false;  ///< "ned", "frd"; "enu", "flu"
+  bool is_wish = false;                     ///< a set point
+  bool is_foreign = false;  ///< a word says that something else than the vehicle's motion is meant
 };
 
-/// Columns of one topic that together carry a group of signals, starting with `signal`.
-struct NamedColumns {
-  int signal;
-  std::vector<std::string> names;  ///< as returned by plain_name(), or verbatim if they contain a bracket
-  std::string unit;
-  double multiply = 1, divide = 1;
-  Ask ask = Ask::kNothing;
-  Origin origin = Origin::kPrograms;
-  std::array<double, 4> sign{1, 1, 1, 1};
-};
-
-/// Returns the table, in order of preference: if several rows give the same signal, the first one in the file is used.
-const std::vector<NamedColumns>& column_names();
+/// Splits the name into words at signs, capitals and the last letter ("posX", "vel_n", "m1") and adds the bits of each
+/// word: of the quantity that it names, of a set point, of things that are not the vehicle (wind, payload), of words
+/// that say nothing (est, drone) and of unknown words.
+NameReading read_name(const std::string& column);
 
 /// Returns the name in lower case, without a unit in brackets, with each run of other characters than letters and
 /// digits replaced by a dot.

@@ -7,20 +7,13 @@
 #include <set>
 
 #include "analysis/logs/column_groups.h"
+#include "analysis/logs/dictionary.h"
 #include "analysis/logs/read_log.h"
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
 namespace {
-
-const char* frame_of(int signal) {
-  const bool is_body =
-      (signal >= kForceBody && signal < kAccelerationWorld) || (signal >= kRates && signal < kDuty);
-  const bool is_world =
-      (signal > kTime && signal < kForceBody) || (signal >= kTargetPosition && signal < kMotorForce);
-  return is_body ? "body" : is_world ? "world" : nullptr;
-}
 
 /// "0.12 .. 4.5, median 1.1"; "always 3"; "no numbers".
 std::string range_in_words(const RawColumn& column) {
@@ -34,13 +27,13 @@ struct Writer {
   std::string text;
   std::set<std::string> used, signals;
 
-  void line(const std::string& signal, const std::string& column, const std::string& unit, const char* frame,
-            const std::string& evidence) {
+  void line(const std::string& signal, const std::string& column, const std::string& unit,
+            const std::vector<std::string>& frames, const std::string& evidence) {
     std::string escaped;
     for (const char c : column)
       escaped += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
     text += fmt::format("{} = {{ column = \"{}\", unit = \"{}\"{} }}{}\n", signal, escaped, unit,
-                        frame == nullptr ? "" : fmt::format(", frame = \"{}\"", frame),
+                        frames.empty() ? "" : fmt::format(", frame = \"{}\"", frames[0]),
                         evidence.empty() ? "" : "  # " + evidence);
     used.insert(column);
     signals.insert(signal);
@@ -90,8 +83,8 @@ std::string columns_draft(const std::string& path) {
   writer.text += "schema = \"swarmcert/columns/1\"\n";
   for (const SignalSource& source : meaning)
     if (!source.unit.empty())
-      writer.line(columns_name(source.signal), source.column, source.unit, frame_of(source.signal),
-                  source.why);
+      writer.line(columns_name(source.signal), source.column, source.unit,
+                  kind_of_signal(source.signal).frames, source.why);
   add_missing(raw, writer);
   return writer.text;
 }

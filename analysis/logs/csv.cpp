@@ -1,38 +1,20 @@
-#include "nn/base/csv.h"
+#include "analysis/logs/csv.h"
 
 #include <algorithm>
 #include <charconv>
-#include <istream>
 #include <limits>
-#include <optional>
 #include <set>
 
-#include "analysis/logs/record_source.h"
+#include "analysis/logs/clock.h"
+#include "analysis/logs/formats/bytes.h"
+#include "analysis/logs/recognition.h"
+#include "nn/base/csv.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
 namespace {
 
-constexpr std::size_t kLongestLine_bytes = std::size_t{1} << 16;
-
-/// Reads the next line without its line end; returns false at the end of the file. Overlong lines are truncated and
-/// count as damage.
-bool next_line(std::istream& in, std::string& line, bool& complete) {
-  line.clear();
-  complete = false;
-  std::streambuf* const buffer = in.rdbuf();
-  bool any = false;
-  for (int c = buffer->sbumpc(); c != std::char_traits<char>::eof(); c = buffer->sbumpc()) {
-    any = true;
-    if (c == '\n') {
-      complete = true;
-      break;
-    }
-    if (line.size() <= kLongestLine_bytes) line.push_back(static_cast<char>(c));
-  }
-  if (!line.empty() && line.back() == '\r') line.pop_back();
-  return any;
-}
+constexpr std::size_t kLongestHeader_bytes = std::size_t{1} << 16;
 
 /// Consumes the number at the start of `text`.
 template <typename Number>
@@ -109,20 +91,20 @@ bool parse_cell(std::string_view cell, bool decimal_comma, double& value) {
   return time_s.has_value();
 }
 
-/// A fault of a line that does not have exactly values.size() cells, each a number or empty where the sink needs it.
-/// States the column of the offending cell, or none.
+/// A fault of a line that does not have exactly values.size() cells, each a number or empty where one is needed. States
+/// the column of the offending cell, or none.
 struct LineFault {
   std::size_t column;
   std::string_view cell;
 };
-std::optional<LineFault> parse_line(std::string_view line, char separator, const RecordSink& sink,
+std::optional<LineFault> parse_line(std::string_view line, char separator, const std::vector<char>& needs,
                                     std::vector<double>& values) {
   std::size_t at = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (separator == ' ') at = std::min(line.find_first_not_of(' ', at), line.size());
     const std::size_t end = std::min(line.find(separator, at), line.size());
     const std::string_view cell = line.substr(at, end - at);
-    if (!parse_cell(cell, separator != ',', values[i]) && sink.needs(i)) return LineFault{i, cell};
+    if (!parse_cell(cell, separator != ',', values[i]) && needs[i] != 0) return LineFault{i, cell};
     const bool last = i + 1 == values.size();
     if (last != (end == line.size())) return LineFault{values.size(), {}};
     at = end + 1;
@@ -164,102 +146,129 @@ std::string without_lists(std::string_view line, char separator, std::vector<std
   return flat;
 }
 
-/// The line with the column names. Comment lines may precede it, and it may itself start with "#".
-class Header {
- public:
-  /// @return false if `in` has no header line
-  bool read(std::istream& in) {
-    std::string comment;
-    bool complete = false;
-    for (;;) {
-      if (!next_line(in, line, complete)) return lines > 0;
-      if (++lines == 1 && line.compare(0, 3, "\xEF\xBB\xBF") == 0) line.erase(0, 3);
-      if (line.empty() || line[0] != '#') break;
-      comment = line.substr(1);
-    }
-    double number = 0;
-    const std::string_view first =
-        std::string_view(line).substr(0, line.find(files::csv_separator(line, ' ')));
-    if (comment.empty() || (!line.empty() && !parse_cell(first, false, number))) return true;
-    if (complete || !line.empty()) first_record = line;
-    line = comment;
-    return true;
+/// Returns the names with those of lists repeated, name[0], name[1], ...
+std::vector<std::string> with_elements(const std::vector<std::string>& names,
+                                       const std::vector<std::size_t>& counts) {
+  std::vector<std::string> flat;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::size_t count = i < counts.size() ? counts[i] : 1;
+    for (std::size_t k = 0; k < count; ++k)
+      flat.push_back(count == 1 ? names[i] : names[i] + '[' + std::to_string(k) + ']');
   }
+  return flat;
+}
 
-  std::string line;
-  std::optional<std::string> first_record;  ///< already read, after a header that is a comment
-  std::size_t lines = 0;                    ///< lines read so far
-};
+/// Begins the topic of a table; returns which columns must hold numbers.
+std::vector<char> begin_topic(RawLog& log, const std::vector<std::string>& names, const SignalMap& map,
+                              std::optional<Clock>& clock) {
+  log.topics.emplace_back();
+  for (const std::string& name : names) log.topics.back().columns.push_back({name, "", {}});
+  clock = stated_clock(log, map);
+  std::vector<char> needs(names.size(), 0);
+  if (clock) needs[clock->column] = 1;
+  for (const Carried& carried : recognise(log, map).groups)
+    for (const int column : carried.columns)
+      if (column >= 0) needs[static_cast<std::size_t>(column)] = 1;
+  return needs;
+}
+
+files::InputFault damage_of(const LineFault& fault, const std::vector<std::string>& names,
+                            const std::string& path, std::size_t line) {
+  const bool is_cell = fault.column < names.size();
+  return {path,
+          "line " + std::to_string(line),
+          is_cell ? names[fault.column] : "cells",
+          is_cell ? files::in_quotes(std::string(fault.cell)) : "",
+          is_cell ? "is not a number" : "do not match the number of names in the header",
+          "times may be seconds, or dates like 2026-03-02T12:34:56.7; numbers have a "
+          "decimal point, or a decimal comma if commas do not separate cells"};
+}
 
 }  // namespace
 
-std::optional<files::InputFault> read_csv(std::istream& in, const std::string& path, RecordSink& sink,
-                                          LogHealth& health) {
-  Header header;
-  if (!header.read(in)) {
-    throw files::InputError(
-        {path, "line 1", "", "", "the file is empty", "the recording failed; exclude this file"});
+std::string_view take_text_line(std::string_view text, std::size_t& at) {
+  const std::size_t end = std::min(text.find('\n', at), text.size());
+  std::string_view line = text.substr(at, end - at);
+  at = end + 1;
+  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  return line;
+}
+
+std::optional<TableHeader> header_of(std::string_view text, char otherwise) {
+  TableHeader header;
+  std::string_view line, comment;
+  std::size_t at = text.substr(0, 3) == "\xEF\xBB\xBF" ? 3 : 0, comment_at = at;
+  do {
+    if (at >= text.size()) return std::nullopt;
+    if (!line.empty()) comment = line.substr(1), comment_at = header.begin;
+    header.begin = at;
+    line = take_text_line(text, at);
+    ++header.line;
+  } while (!line.empty() && line[0] == '#');
+  header.end = std::min(at, text.size());
+  double number = 0;
+  const std::string_view first = line.substr(0, line.find(files::csv_separator(line, ' ')));
+  if (!comment.empty() && (line.empty() || parse_cell(first, false, number))) {
+    header.end = header.begin;
+    header.begin = comment_at;
+    --header.line;
+    line = comment;
   }
-  const std::string where = "line " + std::to_string(header.lines - (header.first_record ? 1 : 0));
-  const char separator = files::csv_separator(header.line, ' ');
-  const std::vector<std::string_view> cells = files::csv_cells(header.line, separator);
-  std::vector<std::string> names(cells.begin(), cells.end());
-  std::string line;
-  bool complete = true, is_read = header.first_record.has_value();
-  if (is_read)
-    line = *header.first_record;
-  else if ((is_read = next_line(in, line, complete)))
-    ++header.lines;
+  header.separator = files::csv_separator(line, otherwise);
+  header.names = files::csv_cells(line, header.separator);
+  return header;
+}
+
+RawLog read_table(std::istream& in, const std::string& path, const SignalMap& map) {
+  RawLog log;
+  log.path = path;
+  log.format = "csv";
+  const std::string text = read_all(in, path);
+  const std::optional<TableHeader> header = header_of(text, ' ');
+  std::vector<std::string> names;
+  if (header) names.assign(header->names.begin(), header->names.end());
+  const std::string where = "line " + std::to_string(header ? header->line : 1);
+  std::size_t at = header ? header->end : 0, number = header ? header->line : 0;
+  std::size_t first = at;
   std::vector<std::size_t> counts;
-  const bool has_lists = separator != ' ' && line.find_first_of("[(") != std::string::npos;
+  const std::string_view second = take_text_line(text, first);
+  const bool has_lists =
+      header && header->separator != ' ' && second.find_first_of("[(") != std::string_view::npos;
   if (has_lists) {
-    line = without_lists(line, separator, counts);
-    std::vector<std::string> flat;
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      const std::size_t count = i < counts.size() ? counts[i] : 1;
-      for (std::size_t k = 0; k < count; ++k)
-        flat.push_back(count == 1 ? names[i] : names[i] + '[' + std::to_string(k) + ']');
-    }
-    names = std::move(flat);
+    without_lists(second, header->separator, counts);
+    names = with_elements(names, counts);
   }
-  if (names.size() < 2 || header.line.size() > kLongestLine_bytes) {
-    throw files::InputError({path, where, "header", files::in_quotes(header.line), "does not name columns",
+  if (names.size() < 2 || header->end - header->begin > kLongestHeader_bytes) {
+    const std::string stated = header ? text.substr(header->begin, header->end - header->begin) : "";
+    throw files::InputError({path, where, "header", files::in_quotes(stated), "does not name columns",
                              "the first line names them, separated by commas, semicolons, tabs or blanks"});
   }
   if (std::set<std::string>(names.begin(), names.end()).size() != names.size())
     throw files::InputError({path, where, "header", "", "names a column twice", "rename one of them"});
-  sink.begin(names);
+  std::optional<Clock> clock;
+  const std::vector<char> needs = begin_topic(log, names, map, clock);
   std::vector<double> values(names.size());
   std::optional<files::InputFault> damage;
-  std::size_t number = header.lines;
-  const auto take_line = [&] {
-    if (line.empty()) return;
-    const std::optional<LineFault> fault = parse_line(line, separator, sink, values);
-    if (!fault) {
-      sink.record(values);
-    } else if (!complete) {
-      health.truncated = true;
-    } else {
-      ++health.damaged_lines;
-      if (damage) return;
-      const bool is_cell = fault->column < names.size();
-      damage =
-          files::InputFault{path,
-                            "line " + std::to_string(number),
-                            is_cell ? names[fault->column] : "cells",
-                            is_cell ? files::in_quotes(std::string(fault->cell)) : "",
-                            is_cell ? "is not a number" : "do not match the number of names in the header",
-                            "times may be seconds, or dates like 2026-03-02T12:34:56.7; numbers have a "
-                            "decimal point, or a decimal comma if commas do not separate cells"};
-    }
-  };
-  if (is_read) take_line();
-  while (next_line(in, line, complete)) {
+  std::string flat;
+  while (at < text.size()) {
+    std::string_view line = take_text_line(text, at);
     ++number;
-    if (has_lists) line = without_lists(line, separator, counts);
-    take_line();
+    if (line.empty()) continue;
+    if (has_lists) line = flat = without_lists(line, header->separator, counts);
+    const std::optional<LineFault> fault = parse_line(line, header->separator, needs, values);
+    if (!fault) {
+      for (std::size_t c = 0; c < values.size(); ++c) log.topics[0].columns[c].values.push_back(values[c]);
+    } else if (at > text.size()) {
+      log.health.truncated = true;
+    } else {
+      ++log.health.damaged_lines;
+      if (!damage) damage = damage_of(*fault, names, path, number);
+    }
   }
-  return damage;
+  set_times(log, clock);
+  log.health.records = log.topics.front().time_s.size();
+  if (damage && log.health.records == 0) throw files::InputError(*damage);
+  return log;
 }
 
 }  // namespace swarmcert::logs

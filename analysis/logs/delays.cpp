@@ -20,7 +20,7 @@ double correlation_at(const SignalTable& t, double step_s, const std::vector<dou
     x.push_back(a[at]);
     y.push_back(b[other]);
   }
-  return line_through(x, y).correlation;
+  return correlation_of(x, y);
 }
 
 /// Returns the changes over 60 ms, which suppresses slow drifts.

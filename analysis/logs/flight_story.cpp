@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/logs/limit_cycles.h"
+#include "analysis/logs/dictionary.h"
 #include "analysis/logs/statistics_of_series.h"
 
 namespace swarmcert::logs {
@@ -143,31 +143,8 @@ void add_events(const Log& log, const std::vector<char>& air, FlightStory& story
 
 /// Returns the configuration lines that log a signal, in the syntax of the firmware that wrote the log.
 std::string lines_for(const Log& log, const std::string& signal) {
-  struct Lines {
-    const char *signal, *crazyflie, *px4, *other;
-  };
-  static const Lines kLines[] = {
-      {"attitude", "stateEstimate.qx stateEstimate.qy stateEstimate.qz stateEstimate.qw", "vehicle_attitude",
-       "the attitude as a quaternion"},
-      {"specific_force", "acc.x acc.y acc.z", "vehicle_acceleration", "the accelerometer"},
-      {"velocity", "stateEstimate.vx stateEstimate.vy stateEstimate.vz", "vehicle_local_position",
-       "the velocity"},
-      {"position", "stateEstimate.x stateEstimate.y stateEstimate.z", "vehicle_local_position",
-       "the position"},
-      {"duty", "pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm", "actuator_motors",
-       "the command of every motor"},
-      {"battery", "pm.vbatMV", "battery_status", "the battery's voltage"},
-      {"rates", "gyro.x gyro.y gyro.z (at 500 Hz)", "vehicle_angular_velocity (at 400 Hz or more)",
-       "the angular rates at 400 Hz or more"},
-      {"target", "ctrltarget.x ctrltarget.y ctrltarget.z ctrltarget.vx ctrltarget.vy ctrltarget.vz",
-       "trajectory_setpoint", "the set points of position and velocity"}};
-  for (const Lines& lines : kLines) {
-    if (signal != lines.signal) continue;
-    if (log.format.rfind("usd", 0) == 0) return std::string("config.txt: ") + lines.crazyflie;
-    if (log.format == "ulog") return std::string("logger_topics.txt: ") + lines.px4;
-    return lines.other;
-  }
-  return "";
+  const bool is_crazyflie = log.format.rfind("usd", 0) == 0;
+  return line_that_logs(is_crazyflie ? "crazyflie" : log.format == "ulog" ? "px4" : "stated", signal);
 }
 
 void add_missing(const Log& log, FlightStory& story) {

@@ -7,10 +7,8 @@
 #include <map>
 #include <set>
 
-#include "analysis/logs/absolute_time.h"
-#include "analysis/logs/angles.h"
+#include "analysis/logs/clock.h"
 #include "analysis/logs/message_frames.h"
-#include "analysis/logs/record_order.h"
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
 
@@ -27,24 +25,19 @@ std::string name_space(const std::string& topic) {
 
 /// If a bag holds several vehicles, "/cf1/pose" and "/cf2/pose", keeps only the topics of the first one.
 void keep_one_vehicle(RawLog& raw, Log& log) {
-  std::map<std::string, std::vector<std::string>> spaces;  // by the rest of the topic's name, in file order
-  for (const RawTopic& topic : raw.topics) {
-    const std::string space = name_space(topic.name);
-    if (space.empty()) continue;
-    std::vector<std::string>& of_rest = spaces[topic.name.substr(space.size() + 1)];
-    if (std::find(of_rest.begin(), of_rest.end(), space) == of_rest.end()) of_rest.push_back(space);
-  }
+  const auto rest_of = [](const RawTopic& topic) {
+    return topic.name.substr(std::min(topic.name.size(), name_space(topic.name).size() + 1));
+  };
+  std::map<std::string, std::set<std::string>> spaces;  // by the rest of the topic's name
+  for (const RawTopic& topic : raw.topics)
+    if (!name_space(topic.name).empty()) spaces[rest_of(topic)].insert(name_space(topic.name));
   std::set<std::string> others;
   std::string first;
   for (const RawTopic& topic : raw.topics) {
     const std::string space = name_space(topic.name);
-    if (space.empty() || !first.empty()) continue;
-    const std::vector<std::string>& all = spaces[topic.name.substr(space.size() + 1)];
-    if (all.size() < 2) continue;
-    first = space;
-  }
-  for (const auto& [rest, all] : spaces) {
-    if (all.size() > 1) others.insert(all.begin(), all.end());
+    if (space.empty() || spaces[rest_of(topic)].size() < 2) continue;
+    if (first.empty()) first = space;
+    others.insert(space);
   }
   others.erase(first);
   if (others.empty()) return;
@@ -154,10 +147,7 @@ void count_repaired(const std::vector<Repaired>& of_topics, const Recognition& r
 }
 
 double rate_hz_of(const RawTopic& topic) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < topic.time_s.size(); ++i)
-    steps.push_back(topic.time_s[i] - topic.time_s[i - 1]);
-  const double step = median(steps);
+  const double step = median(steps_of(topic.time_s));
   return step > 0 ? 1 / step : 0;
 }
 
@@ -173,15 +163,9 @@ void Draft::add(const std::string& name, SignalInfo::Source source, const std::s
 void Draft::add_measured(const std::string& name, int signal) const {
   std::string from, unit, topic, runner_up;
   double rate_hz = 0, odds_bits = kNaN;
-  const bool is_four = signal == kAttitude || signal == kDuty || signal == kMotorForce ||
-                       signal == kRequested || signal == kRotorSpeed;
-  const int width = signal == kMotorCommand ? 8 : is_four ? 4 : 3;
   // A columns.toml assigns each axis separately.
   for (const Carried& carried : recognition.groups) {
-    const bool belongs = carried.signal == signal ||
-                         (recognition.groups.size() > 1 && carried.size() == 1 && carried.signal > signal &&
-                          carried.signal < signal + width && signal != kBattery && signal != kPackedAttitude);
-    if (!belongs) continue;
+    if (kind_of_signal(carried.signal).first != signal) continue;
     const RawTopic& carrier = raw.topics[carried.topic];
     from += from.empty() ? "" : ", ";
     if (raw.topics.size() > 1 && !carrier.name.empty() && carrier.name != topic) from += carrier.name + ": ";
@@ -193,6 +177,13 @@ void Draft::add_measured(const std::string& name, int signal) const {
     runner_up = carried.runner_up;
   }
   log.sources.push_back({name, Source::kMeasured, from, unit, rate_hz, kNaN, odds_bits, runner_up});
+}
+
+void Draft::add_measured_or_missing(const std::string& name, int signal, bool is_there) const {
+  if (is_there)
+    add_measured(name, signal);
+  else
+    add(name, Source::kMissing, "", kind_of_signal(signal).units[0].name);
 }
 
 void settle_judgement(Draft& draft) {

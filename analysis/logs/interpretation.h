@@ -28,6 +28,7 @@ struct Draft {
            const std::string& unit, double noise = std::numeric_limits<double>::quiet_NaN()) const;
   /// Adds a group of signals that columns carry.
   void add_measured(const std::string& name, int signal) const;
+  void add_measured_or_missing(const std::string& name, int signal, bool is_there) const;
 };
 
 /// Derives the velocity if only a position is logged, and the smoothed acceleration with its noise.

@@ -1,12 +1,11 @@
-#include "analysis/logs/limit_cycles.h"
-
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/logs/angles.h"
+#include "analysis/logs/flight_story.h"
 #include "analysis/logs/statistics_of_series.h"
+#include "nn/base/pi.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -87,7 +86,7 @@ void add_cycles(const std::vector<Period>& periods, const char* axis, std::vecto
       events.push_back(
           {"limit cycle", periods[first].start_s, length_s,
            fmt::format("{} periods of {} at {:.2g} Hz, {:.2g} degrees to either side", end - first, axis,
-                       static_cast<double>(end - first) / length_s, tilt_rad / kDegree_rad)});
+                       static_cast<double>(end - first) / length_s, tilt_rad * 180 / kPi)});
     }
     first = std::max(end, first + 1);
   }

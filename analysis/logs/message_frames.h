@@ -8,6 +8,9 @@
 
 namespace swarmcert::logs {
 
+/// Returns the firmware that wrote the messages of a topic, "px4" or "ardupilot"; empty for others.
+std::string firmware_of(const RawLog& log, const RawTopic& topic);
+
 /// Adds columns named position_x, attitude_w, motor_command_1, ... to the topics of PX4 (ULog, px4_msgs in ROS) and
 /// ArduPilot that carry these signals. NED and FRD become z up and FLU: (x, -y, -z), q = (w, x, -y, -z). If a message
 /// has several instances, the first one that is not constant is used. Positions and velocities that PX4's estimator

@@ -15,7 +15,7 @@ using Source = SignalInfo::Source;
 /// Returns the standard deviation of the noise of a derived acceleration: the residual of the smoother is taken as the
 /// noise of the column and propagated through the weights of the smoother. The autocorrelation of the noise is
 /// included.
-/// @param smooth local_derivative() with derivative 0.
+/// @param smooth local_derivatives() of order 0.
 double noise_of_slope(const SignalTable& t, const std::vector<double>& column,
                       const std::vector<double>& smooth, double window_s, int derivative) {
   std::vector<double> left(column.size());
@@ -53,16 +53,6 @@ double noise_of_slope(const SignalTable& t, const std::vector<double>& column,
                          : sigma * std::sqrt(720 * runs / n) / (window_s * window_s);
 }
 
-double root_mean_square(const std::vector<double>& values) {
-  double squares = 0, count = 0;
-  for (const double value : values) {
-    if (!std::isfinite(value)) continue;
-    squares += value * value;
-    ++count;
-  }
-  return count > 0 ? std::sqrt(squares / count) : std::nan("");
-}
-
 Vector rotated(const SignalTable& t, std::size_t i, const Vector& body) {
   const auto R = t.attitude(i).rotation();
   Vector world{};
@@ -86,7 +76,7 @@ void settle_velocity_frame(Draft& draft) {
   std::array<std::vector<double>, 3> slope, turned;
   for (int k = 0; k < 3; ++k) {
     slope[static_cast<std::size_t>(k)] =
-        local_derivative(t, t[kPosition + k], velocity_window_s(t.step_s()), 2, 1);
+        local_derivatives(t, t[kPosition + k], velocity_window_s(t.step_s()), 2, {1})[0];
     turned[static_cast<std::size_t>(k)].resize(t.size());
   }
   std::vector<double> as_world, as_body;
@@ -94,11 +84,11 @@ void settle_velocity_frame(Draft& draft) {
     const Vector body = t.three(kVelocity, i), world = rotated(t, i, body);
     for (std::size_t k = 0; k < 3; ++k) {
       turned[k][i] = world[k];
-      as_world.push_back(slope[k][i] - body[k]);
-      as_body.push_back(slope[k][i] - world[k]);
+      as_world.push_back(std::pow(slope[k][i] - body[k], 2));
+      as_body.push_back(std::pow(slope[k][i] - world[k], 2));
     }
   }
-  const double world_m_s = root_mean_square(as_world), body_m_s = root_mean_square(as_body);
+  const double world_m_s = std::sqrt(mean_of(as_world)), body_m_s = std::sqrt(mean_of(as_body));
   const bool is_body = body_m_s < world_m_s;
   draft.note(fmt::format(
       "{}: along the axes of the {}; {:.2g} m/s from the derivative of the position, against {:.2g}", names,
@@ -115,10 +105,8 @@ void derive_kinematics(Draft& draft) {
   settle_velocity_frame(draft);
   signals.position = t.has_group(kPosition, 3);
   const char* const axes[] = {"x", "y", "z"};
-  if (t.has(kPosition) || t.has(kPosition + 1) || t.has(kPosition + 2))
-    draft.add_measured("position", kPosition);
-  else
-    draft.add("position", Source::kMissing, "", "m");
+  draft.add_measured_or_missing("position", kPosition,
+                                t.has(kPosition) || t.has(kPosition + 1) || t.has(kPosition + 2));
   const bool has_velocity = t.has(kVelocity) || t.has(kVelocity + 1) || t.has(kVelocity + 2);
   const double step_s = t.step_s();
   const double velocity_s = velocity_window_s(step_s), position_s = position_window_s(step_s);
@@ -148,13 +136,11 @@ void derive_kinematics(Draft& draft) {
     from += axes[k];
     if (std::isfinite(axis_noise)) noise = std::max(noise, axis_noise);
   }
-  if (has_velocity)
-    draft.add_measured("velocity", kVelocity);
-  else if (!velocity_from.empty())
+  if (!has_velocity && !velocity_from.empty())
     draft.add("velocity", Source::kDerived, "position " + velocity_from + ": local quadratic over 100 ms",
               "m/s", velocity_noise);
   else
-    draft.add("velocity", Source::kMissing, "", "m/s");
+    draft.add_measured_or_missing("velocity", kVelocity, has_velocity);
   if (from.empty()) {
     draft.add("acceleration", Source::kMissing, "", "m/s^2");
     return;
@@ -204,7 +190,8 @@ void settle_specific_force(Draft& draft) {
   std::vector<double> differences;
   for (std::size_t k = 0; k < 3; ++k) {
     if (draft.acceleration_m_s2[k].empty()) continue;
-    const std::vector<double> smooth = local_derivative(t, force[k], velocity_window_s(t.step_s()), 2, 0);
+    const std::vector<double> smooth =
+        local_derivatives(t, force[k], velocity_window_s(t.step_s()), 2, {0})[0];
     std::vector<double> axis;
     for (std::size_t i = 0; i < smooth.size(); ++i) {
       const bool lateral = t.has(kVelocity) && t.has(kVelocity + 1);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <complex>
 
-#include "analysis/logs/angles.h"
+#include "analysis/logs/statistics_of_series.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -26,16 +26,6 @@ double agreement_bits(const Knots& knots, const std::vector<double>& a, const st
   const double bits = knots.independent(static_cast<std::size_t>(n)) / 2 *
                       std::log2((std::min(va, vb) + noise) / (difference + noise));
   return std::clamp(bits, -60.0, 1000.0);
-}
-
-double mean_of_finite(const std::vector<double>& values) {
-  double sum = 0, count = 0;
-  for (const double value : values) {
-    if (!std::isfinite(value)) continue;
-    sum += value;
-    ++count;
-  }
-  return count > 0 ? sum / count : 0;
 }
 
 }  // namespace
@@ -91,7 +81,7 @@ double specific_force_bits(const Knots& knots, const ThreeSeries& acceleration, 
       expected[i] = along - (k == 2 ? kGravity_m_s2 : 0);
     }
     bits += agreement_bits(knots, acceleration[k], expected, kTolerance_m_s2);
-    if (std::abs(mean_of_finite(expected) - mean_of_finite(acceleration[k])) > kMean_m_s2) bits -= kWrongMean;
+    if (std::abs(mean_of(expected) - mean_of(acceleration[k])) > kMean_m_s2) bits -= kWrongMean;
   }
   return bits;
 }
@@ -149,7 +139,7 @@ double following_bits(const Knots& knots, const Reading& a, const Reading& b) {
   for (std::size_t k = 0; k < 3; ++k) {
     bits += agreement_bits(knots, a.value[k], b.value[k], kTolerance);
     if (a.value[k].empty() || b.value[k].empty()) continue;
-    bits -= std::min(10.0, 2 * std::abs(mean_of_finite(a.value[k]) - mean_of_finite(b.value[k])));
+    bits -= std::min(10.0, 2 * std::abs(mean_of(a.value[k]) - mean_of(b.value[k])));
   }
   return bits;
 }

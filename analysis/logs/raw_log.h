@@ -27,7 +27,6 @@ struct RawTopic {
   std::string clock{};         ///< the column that holds the times; empty: none does
   double clock_unit_s = 1;     ///< its unit
   std::vector<RawColumn> columns;
-  std::map<std::string, std::string> texts;  ///< text fields: the first non-empty text
 
   /// Returns the column with this name; nullptr if there is none.
   const RawColumn* find(const std::string& column) const {
@@ -40,7 +39,6 @@ struct RawTopic {
 /// A line that the vehicle wrote while logging, e.g. "Takeoff detected".
 struct RawMessage {
   double time_s = 0;
-  int level = 0;  ///< as stored; ULog and MAVLink use syslog levels: 0 emergency ... 7 debug
   std::string text;
 };
 
@@ -48,13 +46,6 @@ struct RawMessage {
 struct RawDropout {
   double time_s = 0;  ///< of the last record before the pause
   double duration_s = 0;
-};
-
-/// A parameter that was set during the log.
-struct RawParameterChange {
-  double time_s = 0;
-  std::string name;
-  double value = 0;
 };
 
 /// Something in the file that the reader did not pass on.
@@ -70,12 +61,9 @@ struct RawLog {
   std::vector<RawTopic> topics;
   /// Parameters of the vehicle at the start of the log, by their names in the file.
   std::map<std::string, double> parameters;
-  std::map<std::string, double> default_parameters;  ///< if the file states them
-  std::vector<RawParameterChange> parameter_changes;
   std::vector<RawMessage> messages;
   std::vector<RawDropout> dropouts;
   std::vector<RawSkip> skipped;
-  std::map<std::string, std::string> texts;  ///< other information about the file, e.g. "sys_name"
   LogHealth health;
 };
 

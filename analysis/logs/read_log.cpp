@@ -9,9 +9,8 @@
 #include <regex>
 #include <sstream>
 
-#include "analysis/logs/absolute_time.h"
-#include "analysis/logs/byte_window.h"
-#include "analysis/logs/collector.h"
+#include "analysis/logs/clock.h"
+#include "analysis/logs/csv.h"
 #include "analysis/logs/formats/formats.h"
 #include "analysis/logs/interpretation.h"
 #include "analysis/logs/variable_names.h"
@@ -21,31 +20,16 @@
 namespace swarmcert::logs {
 namespace {
 
-enum class Format { kUsd, kUsdEvents, kCsv, kUnknown };
-
-/// Returns the format by the first bytes. An old binary log starts with the number of variables and "name(type),",
-/// which may look like text, but its header has no line end before its checksum.
-Format kind_of(std::istream& in) {
-  char head[80] = {};
-  in.read(head, sizeof head);
-  const auto size = static_cast<std::size_t>(in.gcount());
-  in.clear();
-  in.seekg(0);
-  const std::string start(head, size);
-  if (size >= 3 && static_cast<unsigned char>(start[0]) == 0xBC && start[2] == 0) return Format::kUsdEvents;
-  // "Time (s),X (m)" of a CSV is not such a list: names contain no blanks, and "s" is not a type.
-  const std::size_t bracket = start.find('(');
-  if (bracket != std::string::npos && bracket >= 2 && bracket + 3 < size && start[bracket + 2] == ')' &&
-      start[bracket + 3] == ',' && size_of(start[bracket + 1]) > 0 && start[bracket - 1] != ' ')
-    return Format::kUsd;
-  if (start[0] == '#' && start.find('\0') == std::string::npos)
-    return Format::kCsv;  // a comment may have no separator
-  for (const char c : start) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < ' ' && c != '\n' && c != '\r' && c != '\t') return Format::kUnknown;
-  }
-  return start.find_first_of(",;\t") == std::string::npos ? Format::kUnknown : Format::kCsv;
+/// Returns whether the first bytes are text with a separator; a comment may have none.
+bool looks_like_table(std::string_view head) {
+  head = head.substr(0, 80);
+  if (!head.empty() && head[0] == '#' && head.find('\0') == std::string_view::npos) return true;
+  const bool is_text = std::all_of(head.begin(), head.end(), [](char c) {
+    return static_cast<unsigned char>(c) >= ' ' || c == '\n' || c == '\r' || c == '\t';
+  });
+  return is_text && head.find_first_of(",;\t") != std::string_view::npos;
 }
+bool is_table(std::string_view head) { return format_of(head) == nullptr && looks_like_table(head); }
 
 std::size_t bytes_in(std::istream& in) {
   in.seekg(0, std::ios::end);
@@ -55,31 +39,12 @@ std::size_t bytes_in(std::istream& in) {
   return size > 0 ? static_cast<std::size_t>(size) : 0;
 }
 
-/// Micro-SD logs and CSV files are streams of records; formats/formats.h handles the other formats.
 RawLog raw_of(std::istream& in, const std::string& path, const SignalMap& map) {
   const std::size_t bytes = bytes_in(in);
   const std::string head = format_head(in);
   if (is_foreign_log(head)) refuse_unknown(head, path);
-  RawLog log;
-  // The header of an old micro-SD log names variables like a CSV header.
-  const Format kind = kind_of(in);
-  switch (kind) {
-    case Format::kUsd: {
-      log.path = path;
-      log.format = "usd";
-      Collector collector(log, map);
-      read_usd(in, path, collector, log.health);
-      collector.end();
-      break;
-    }
-    case Format::kUsdEvents:
-      log.path = path;
-      log.format = fmt::format("usd version {}", read_usd_events(in, path, log));
-      break;
-    case Format::kCsv:
-    case Format::kUnknown:
-      log = kind == Format::kCsv ? read_table(in, path, map) : parse_raw(in, path);
-  }
+  RawLog log = is_table(head) ? read_table(in, path, map) : parse_raw(in, path);
+  if (log.format == "usd") set_times(log, stated_clock(log, map));
   log.health.bytes = bytes;
   return log;
 }
@@ -155,10 +120,8 @@ bool looks_like_log(const std::string& path) {
   if (is_pipe(path)) return false;
   std::ifstream in(path, std::ios::binary);
   if (!in) return false;
-  if (is_foreign_log(format_head(in))) return true;
-  const Format format = kind_of(in);
-  if (format == Format::kCsv) return is_flight_table(path);
-  return format == Format::kUsd || format == Format::kUsdEvents;
+  const std::string head = format_head(in);
+  return is_foreign_log(head) || (is_table(head) && is_flight_table(path));
 }
 
 namespace {
@@ -189,8 +152,9 @@ std::pair<std::string, std::string> ends_of(const std::string& path, std::stream
 bool is_flight_table(const std::string& path) {
   constexpr std::streamoff kHead_bytes = 16384;
   try {
-    std::istringstream in(ends_of(path, kHead_bytes).first);
-    if (kind_of(in) != Format::kCsv) return false;
+    const std::string head = ends_of(path, kHead_bytes).first;
+    if (!is_table(head)) return false;
+    std::istringstream in(head);
     const RawLog log = read_table(in, path, known_columns());
     const Recognition found = recognise(log, known_columns());
     return found.find(kPosition) != nullptr || found.find(kVelocity) != nullptr ||
@@ -204,10 +168,9 @@ Interval time_span_s(const std::string& path) {
   constexpr std::streamoff kEnd_bytes = 16384;
   try {
     std::ifstream whole(path, std::ios::binary);
-    const Format kind = kind_of(whole);
-    if (kind == Format::kUsd || kind == Format::kUsdEvents)
-      return {0, 0};  // their clocks start with the vehicle
-    if (kind != Format::kCsv) return absolute_span_s(read_raw(path));
+    const std::string first = format_head(whole);
+    if (looks_like_usd(first)) return {0, 0};  // its clock starts with the vehicle
+    if (!is_table(first)) return absolute_span_s(read_raw(path));
     const auto [head, tail] = ends_of(path, kEnd_bytes);
     std::istringstream in(head.substr(0, head.rfind('\n') + 1) + tail);
     const RawLog log = read_table(in, path, known_columns());

@@ -4,11 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <iterator>
 #include <optional>
 
-#include "analysis/logs/angles.h"
+#include "analysis/logs/signal_table.h"
 #include "analysis/logs/statistics_of_series.h"
+#include "nn/base/pi.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -28,6 +29,10 @@ double size_bits(double size, double usual, double factor) {
 
 double spread_of(const std::vector<double>& values) {
   return values.empty() ? 0 : quantile_of(values, 0.95) - quantile_of(values, 0.05);
+}
+
+double largest_spread(const Reading& reading) {
+  return std::max({spread_of(reading.value[0]), spread_of(reading.value[1]), spread_of(reading.value[2])});
 }
 
 const std::vector<double>& stored(const RawLog& log, const Carried& carried, std::size_t k) {
@@ -132,9 +137,7 @@ class Reader {
     const bool is_place = per_time.empty();
     for (const UnitPrior& unit : {UnitPrior{"m", 0}, {"mm", kOtherUnit}, {"cm", kOtherUnit}})
       each_frame(signal, what, unit.name + per_time, unit.bits, [&](Reading& reading) {
-        double size = 0;
-        for (const auto& axis : reading.value) size = std::max(size, spread_of(axis));
-        reading.bits += size_bits(size, usual, factor);
+        reading.bits += size_bits(largest_spread(reading), usual, factor);
         if (is_place) reading.bits += height_bits(reading);
       });
     return std::move(readings_);
@@ -156,19 +159,17 @@ class Reader {
   std::vector<Reading> rates() {
     if (!is_whole()) return {};
     for (const UnitPrior& unit : {UnitPrior{"rad/s", 0}, {"deg/s", 1}, {"mrad/s", kOtherUnit}})
-      each_frame(kRates, "body rates", unit.name, unit.bits, [&](Reading& reading) {
-        double size = 0;
-        for (const auto& axis : reading.value) size = std::max(size, spread_of(axis));
-        reading.bits += size_bits(size, 1, 6);
-      });
+      each_frame(kRates, "body rates", unit.name, unit.bits,
+                 [&](Reading& reading) { reading.bits += size_bits(largest_spread(reading), 1, 6); });
     return std::move(readings_);
   }
 
   std::vector<Reading> quaternions() {
-    if (group_.columns.size() != 4 || !is_whole()) return {};
+    if (group_.columns.size() != 4 || !is_whole() ||
+        !is_unit_quaternion(log_.topics[group_.topic], group_.columns))
+      return {};
     std::array<KnotSeries, 4> parts = quaternion_parts();
     const double norm_bits = unit_norm_bits();
-    if (norm_bits < 0) return {};
     for (const bool w_first : {false, true}) {
       // w is named, or an array usually begins with it.
       const double order_bits = group_.kind == IndexKind::kAxis ? (w_first ? kOtherOrder : 0)
@@ -290,43 +291,27 @@ class Reader {
     return is_gravity ? 6 + 3 * size_bits(size, kGravity_m_s2, 1.1) : kNever;
   }
 
-  /// Returns the four parts at the knots; q and -q are the same rotation.
+  /// Returns the four parts at the knots.
   std::array<KnotSeries, 4> quaternion_parts() const {
     const RawTopic& topic = log_.topics[group_.topic];
-    std::array<std::vector<double>, 4> parts;
-    for (std::size_t k = 0; k < 4; ++k) parts[k] = stored(log_, base_.carried, k);
-    Four last{};
-    for (std::size_t i = 0; i < topic.time_s.size(); ++i) {
-      double dot = 0;
-      for (std::size_t k = 0; k < 4; ++k) dot += last[k] * parts[k][i];
-      for (std::size_t k = 0; k < 4; ++k) {
-        if (dot < 0) parts[k][i] = -parts[k][i];
-        if (std::isfinite(parts[k][i])) last[k] = parts[k][i];
-      }
-    }
+    const std::vector<double> signs = continuous_signs(topic, group_.columns);
     std::array<KnotSeries, 4> series;
-    for (std::size_t k = 0; k < 4; ++k) series[k] = at_knots(knots_, topic.time_s, parts[k]);
+    for (std::size_t k = 0; k < 4; ++k) {
+      std::vector<double> part = stored(log_, base_.carried, k);
+      for (std::size_t i = 0; i < part.size(); ++i) part[i] *= signs[i];
+      series[k] = at_knots(knots_, topic.time_s, part);
+    }
     return series;
   }
 
   /// A unit norm is rare by chance, unless the four are constant.
   double unit_norm_bits() const {
-    std::size_t unit = 0, count = 0;
-    double least = INFINITY, most = -INFINITY;
-    for (std::size_t i = 0; i < log_.topics[group_.topic].time_s.size(); ++i) {
-      double norm = 0, sum = 0;
-      for (std::size_t k = 0; k < 4; ++k) {
-        const double part = stored(log_, base_.carried, k)[i];
-        norm += part * part;
-        sum += part * (1 + static_cast<double>(k));
-      }
-      if (!std::isfinite(norm)) continue;
-      ++count;
-      unit += std::abs(norm - 1) < 0.05 ? 1 : 0;
-      least = std::min(least, sum), most = std::max(most, sum);
+    bool changes = false;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::vector<double>& part = stored(log_, base_.carried, k);
+      changes = changes || quantile_of(part, 1) > quantile_of(part, 0);
     }
-    if (2 * unit < count || count == 0) return -1;
-    return most > least ? 40 : 4;
+    return changes ? 40 : 4;
   }
 
   /// R = Rz(yaw) Ry(pitch) Rx(roll).
@@ -369,15 +354,10 @@ class Reader {
 };
 
 std::optional<Quantity> quantity_of(int signal) {
-  static const std::map<int, Quantity> quantities = {{kPosition, kIsPosition},
-                                                     {kVelocity, kIsVelocity},
-                                                     {kForceBody, kIsSpecificForce},
-                                                     {kForceWorld, kIsSpecificForce},
-                                                     {kRates, kIsRates},
-                                                     {kAttitude, kIsQuaternion},
-                                                     {kEuler, kIsAngles}};
-  const auto found = quantities.find(signal);
-  return found == quantities.end() ? std::nullopt : std::optional(found->second);
+  if (signal == kForceWorld) return kIsSpecificForce;
+  const auto* const found = std::find(std::begin(kSignalOfQuantity), std::end(kSignalOfQuantity), signal);
+  if (found == std::end(kSignalOfQuantity)) return std::nullopt;
+  return static_cast<Quantity>(found - kSignalOfQuantity);
 }
 
 }  // namespace
@@ -452,6 +432,64 @@ bool is_same_signal(const Reading& a, const Reading& b) {
   for (std::size_t k = 0; k < 3; ++k)
     if (differ(a.value[k], b.value[k], 1e-3)) return false;
   return true;
+}
+
+double Knots::independent(std::size_t count) const {
+  constexpr double kMemory_s = 0.2;  // of a vehicle's motion
+  return static_cast<double>(count) * std::min(1.0, step_s / kMemory_s);
+}
+
+Knots knots_of(const RawLog& log) {
+  const RawTopic* longest = nullptr;
+  for (const RawTopic& topic : log.topics) {
+    if (!is_plain_table(log, topic)) continue;
+    if (longest == nullptr || topic.time_s.size() > longest->time_s.size()) longest = &topic;
+  }
+  Knots knots;
+  if (longest == nullptr || longest->time_s.size() < 8) return knots;
+  std::vector<double> steps = steps_of(longest->time_s);
+  steps.erase(std::remove_if(steps.begin(), steps.end(), [](double step) { return !(step > 0); }),
+              steps.end());
+  const double first = quantile_of(longest->time_s, 0), last = quantile_of(longest->time_s, 1);
+  const double step = median(steps);
+  if (!(step > 0)) return knots;
+  knots.window_s = std::max(0.1, 4.01 * step);
+  knots.step_s = knots.window_s / 2;
+  const double most_s = knots.step_s * static_cast<double>(Knots::kMost - 1);
+  // The middle of a long log is flight.
+  double now = last - first > most_s ? (first + last - most_s) / 2 : first;
+  for (; now <= last && knots.time_s.size() < Knots::kMost; now += knots.step_s) knots.time_s.push_back(now);
+  return knots;
+}
+
+KnotSeries at_knots(const Knots& knots, const std::vector<double>& time_s,
+                    const std::vector<double>& values) {
+  KnotSeries series{std::vector<double>(knots.time_s.size(), kNaN),
+                    std::vector<double>(knots.time_s.size(), kNaN)};
+  std::size_t from = 0;
+  for (std::size_t k = 0; k < knots.time_s.size(); ++k) {
+    const double now = knots.time_s[k];
+    while (from < time_s.size() && !(time_s[from] >= now - knots.window_s / 2)) ++from;
+    double count = 0, st = 0, sx = 0, stt = 0, stx = 0;
+    for (std::size_t i = from; i < time_s.size() && time_s[i] <= now + knots.window_s / 2; ++i) {
+      if (!std::isfinite(values[i])) continue;
+      const double t = time_s[i] - now;
+      ++count;
+      st += t, sx += values[i], stt += t * t, stx += t * values[i];
+    }
+    const double spread = count * stt - st * st;
+    if (count < 3 || !(spread > 0)) continue;
+    series.slope[k] = (count * stx - st * sx) / spread;
+    series.value[k] = (sx - series.slope[k] * st) / count;
+  }
+  return series;
+}
+
+std::vector<double> difference_of(const Knots& knots, const std::vector<double>& series) {
+  std::vector<double> difference(series.size(), kNaN);
+  for (std::size_t i = 1; i + 1 < series.size(); ++i)
+    difference[i] = (series[i + 1] - series[i - 1]) / (knots.time_s[i + 1] - knots.time_s[i - 1]);
+  return difference;
 }
 
 }  // namespace swarmcert::logs

@@ -4,14 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <optional>
 #include <set>
 #include <unordered_map>
 
 #include "analysis/logs/assignment.h"
 #include "analysis/logs/column_groups.h"
-#include "analysis/logs/name_reading.h"
+#include "analysis/logs/column_names.h"
+#include "analysis/logs/message_frames.h"
+#include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
 #include "nn/base/suggest.h"
 
@@ -46,63 +47,21 @@ class ColumnIndex {
     return columns;
   }
 
-  /// Returns whether a name begins with a log group of the Crazyflie firmware that no common word is.
-  bool has_crazyflie_names() const {
-    static const std::set<std::string> groups = {"stateestimate", "stateestimatez", "kalman", "stabilizer",
-                                                 "ctrllee",       "ctrlmel",        "pm",     "controller"};
-    return std::any_of(whole_.begin(), whole_.end(), [](const auto& name) {
-      return groups.count(name.first.substr(0, name.first.find('.'))) > 0;
-    });
-  }
-
  private:
   using Index = std::unordered_map<std::string, int>;
   Index exact_, whole_, shortened_;
 };
 
-/// Returns false for groups that need all their columns: a vertical velocity alone is useful, half a quaternion is not.
-bool may_be_partial(const NamedColumns& row) {
-  const int signal = row.signal;
-  return signal == kEuler || signal == kPosition || signal == kVelocity || signal == kTargetPosition ||
-         signal == kTargetVelocity;
-}
-
 /// Ignores columns without any number.
 void drop_empty_columns(const RawTopic& topic, Carried& carried) {
-  if (topic.time_s.empty()) return;
-  for (int& c : carried.columns) {
-    if (c < 0) continue;
-    const std::vector<double>& values = topic.columns[static_cast<std::size_t>(c)].values;
-    if (std::none_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); })) c = -1;
-  }
-}
-
-/// Motors are at rest in a log on the ground, so their zeros are valid. So are setpoints at the origin.
-bool may_be_zero(int signal) {
-  return signal == kDuty || signal == kRequested || signal == kMotorCommand || signal == kThrust ||
-         signal == kThrustCommand || signal == kTorque || signal == kMotorForce ||
-         signal == kTargetVelocity || signal == kTargetPosition;
-}
-
-bool is_unit_quaternion(const RawTopic& topic, const Carried& carried) {
-  std::size_t unit = 0;
-  for (std::size_t i = 0; i < topic.time_s.size(); ++i) {
-    double norm = 0;
-    for (const int c : carried.columns) {
-      const double q = topic.columns[static_cast<std::size_t>(c)].values[i];
-      norm += q * q;
-    }
-    if (std::abs(norm - 1) < 0.05) ++unit;
-  }
-  return 2 * unit >= topic.time_s.size();
+  for (int& c : carried.columns)
+    if (c >= 0 && !topic.time_s.empty() && !holds_numbers(topic.columns[static_cast<std::size_t>(c)].values))
+      c = -1;
 }
 
 /// A position in a topic of setpoints is a desired one.
 bool is_wish(const RawTopic& topic, int signal) {
-  const bool may_be = signal == kTargetPosition || signal == kTargetVelocity || signal == kMotorCommand ||
-                      signal == kThrustCommand || signal == kThrust || signal == kTorque ||
-                      signal == kMotorForce;
-  if (may_be) return false;
+  if (kind_of_signal(signal).is_command) return false;
   const std::string name = plain_name(topic.name);
   for (const char* const word :
        {"setpoint", "set.point", "target", "reference", "desired", "command", "cmd"}) {
@@ -111,18 +70,14 @@ bool is_wish(const RawTopic& topic, int signal) {
   return false;
 }
 
-/// Messages of known firmware carry signals only under the names of message_frames.h.
-bool has_own_names(const RawLog& log, const RawTopic& topic) {
-  return log.format == "ulog" || log.format == "ardupilot" || topic.type.rfind("px4_msgs", 0) == 0;
-}
-
 void recognise_row(const RawLog& log, const std::vector<ColumnIndex>& indices, const NamedColumns& row,
                    bool is_shortened, Recognition& found) {
   for (std::size_t t = 0; t < log.topics.size() && found.find(row.signal) == nullptr; ++t) {
-    if (row.origin != Origin::kOwn && has_own_names(log, log.topics[t])) continue;
+    const RawTopic& topic = log.topics[t];
+    if (row.origin != Origin::kOwn && !firmware_of(log, topic).empty()) continue;
     const bool is_of_messages =
         row.origin == Origin::kMessages || (row.origin == Origin::kOwn && log.format == "csv");
-    if (is_of_messages && is_plain_table(log, log.topics[t])) continue;
+    if (is_of_messages && is_plain_table(log, topic)) continue;
     Carried carried{row.signal,
                     t,
                     indices[t].columns_called(row.names, is_shortened),
@@ -132,52 +87,44 @@ void recognise_row(const RawLog& log, const std::vector<ColumnIndex>& indices, c
                     row.ask,
                     row.sign};
     const std::vector<int> named = carried.columns;
-    drop_empty_columns(log.topics[t], carried);
+    drop_empty_columns(topic, carried);
     const auto missing = std::count(carried.columns.begin(), carried.columns.end(), -1);
     const auto size = static_cast<std::ptrdiff_t>(carried.columns.size());
-    if (missing == size || (missing > 0 && !may_be_partial(row))) continue;
-    if (is_wish(log.topics[t], row.signal)) continue;
-    const auto reject = [&](const char* why) {
-      found.rejected.push_back(names_of(log, carried) + ": " + why);
-    };
+    const SignalKind& kind = kind_of_signal(row.signal);
+    if (missing == size || (missing > 0 && !kind.may_be_partial) || is_wish(topic, row.signal)) continue;
     const bool is_quaternion = row.signal == kAttitude;
-    if (!log.topics[t].time_s.empty() && ((is_dead(log.topics[t], carried) && !may_be_zero(row.signal)) ||
-                                          (is_quaternion && !is_unit_quaternion(log.topics[t], carried)))) {
-      reject(is_quaternion ? "no unit quaternions" : "only zeros");
-    } else {
-      for (std::size_t k = 0; k < named.size(); ++k) {
-        if (carried.columns[k] == named[k]) continue;
-        const std::string& column = log.topics[t].columns[static_cast<std::size_t>(named[k])].name;
-        found.rejected.push_back(column + ": it holds no number");
-      }
-      found.groups.push_back(std::move(carried));
+    const bool is_sound = is_quaternion ? is_unit_quaternion(topic, carried.columns)
+                                        : kind.is_command || !is_dead(topic, carried);
+    if (!topic.time_s.empty() && !is_sound) {
+      found.rejected.push_back(names_of(log, carried) +
+                               (is_quaternion ? ": no unit quaternions" : ": only zeros"));
+      continue;
     }
+    for (std::size_t k = 0; k < named.size(); ++k)
+      if (carried.columns[k] != named[k])
+        found.rejected.push_back(topic.columns[static_cast<std::size_t>(named[k])].name +
+                                 ": it holds no number");
+    found.groups.push_back(std::move(carried));
   }
 }
 
 void recognise_by_names(const RawLog& log, Recognition& found) {
   const std::vector<ColumnIndex> indices(log.topics.begin(), log.topics.end());
-  const bool is_crazyflie = std::any_of(indices.begin(), indices.end(),
-                                        [](const ColumnIndex& index) { return index.has_crazyflie_names(); });
+  std::set<std::string> programs;  // of which names are found
   for (const NamedColumns& row : column_names()) {
-    if (row.origin == Origin::kCommonWords && !is_crazyflie && log.format != "usd") continue;
+    if (row.origin == Origin::kFirmware) continue;
+    if (row.origin == Origin::kCommonWords && programs.count(row.program) == 0 && log.format != "usd")
+      continue;
+    const std::size_t before = found.groups.size();
     recognise_row(log, indices, row, false, found);
     if (row.origin == Origin::kPrograms) recognise_row(log, indices, row, true, found);
+    if (found.groups.size() > before) programs.insert(row.program);
   }
-}
-
-/// Returns the first signal of the group that a signal belongs to.
-int first_of_group(int signal) {
-  static const std::set<int> firsts = {
-      kPosition, kVelocity, kForceWorld, kForceBody,      kAccelerationWorld, kAttitude,     kPackedAttitude,
-      kRates,    kDuty,     kBattery,    kTargetPosition, kTargetVelocity,    kMotorForce,   kThrust,
-      kTorque,   kEuler,    kRequested,  kRotorSpeed,     kMotorCommand,      kThrustCommand};
-  return *std::prev(firsts.upper_bound(signal));
 }
 
 /// Adds the column of one signal to the group of its topic that has its unit, up to the sign.
 void join(Carried one, Recognition& found) {
-  const int first = first_of_group(one.signal);
+  const int first = kind_of_signal(one.signal).first;
   const auto place = static_cast<std::size_t>(one.signal - first);
   Carried* group = found.find(first);
   const bool is_alike = group != nullptr && group->topic == one.topic && group->divide == one.divide &&
@@ -248,6 +195,32 @@ bool is_dead(const RawTopic& topic, const Carried& carried) {
     const std::vector<double>& values = topic.columns[static_cast<std::size_t>(c)].values;
     return std::all_of(values.begin(), values.end(), [](double x) { return !std::isfinite(x) || x == 0; });
   });
+}
+
+bool is_unit_quaternion(const RawTopic& topic, const std::vector<int>& columns) {
+  std::size_t unit = 0, count = 0;
+  for (std::size_t i = 0; i < topic.time_s.size(); ++i) {
+    double norm = 0;
+    for (const int c : columns) norm += std::pow(topic.columns[static_cast<std::size_t>(c)].values[i], 2);
+    count += std::isfinite(norm) ? 1 : 0;
+    unit += std::abs(norm - 1) < 0.05 ? 1 : 0;
+  }
+  return count > 0 && 2 * unit >= count;
+}
+
+std::vector<double> continuous_signs(const RawTopic& topic, const std::vector<int>& columns) {
+  std::vector<double> signs(topic.time_s.size(), 1), last(columns.size(), 0);
+  for (std::size_t i = 0; i < signs.size(); ++i) {
+    double dot = 0;
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      dot += last[k] * topic.columns[static_cast<std::size_t>(columns[k])].values[i];
+    if (dot < 0) signs[i] = -1;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const double part = topic.columns[static_cast<std::size_t>(columns[k])].values[i];
+      if (std::isfinite(part)) last[k] = signs[i] * part;
+    }
+  }
+  return signs;
 }
 
 Recognition recognise(const RawLog& log, const SignalMap& map) {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/logs/column_names.h"
+#include "analysis/logs/dictionary.h"
 #include "analysis/logs/raw_log.h"
 
 namespace swarmcert::logs {
@@ -49,6 +49,12 @@ bool has_torque_signals(const Recognition& recognition);
 
 /// Returns whether no column holds a number other than zero.
 bool is_dead(const RawTopic& topic, const Carried& carried);
+
+/// Returns whether most records with numbers are unit quaternions.
+bool is_unit_quaternion(const RawTopic& topic, const std::vector<int>& columns);
+
+/// q and -q are the same rotation: returns signs with which neighbouring records are close and can be averaged.
+std::vector<double> continuous_signs(const RawTopic& topic, const std::vector<int>& columns);
 
 /// Returns what `recognition` says of each column, as a columns.toml would. Accelerations without gravity, which
 /// nothing uses, have no name there.

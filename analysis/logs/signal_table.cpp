@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "analysis/logs/angles.h"
+#include "analysis/logs/statistics_of_series.h"
 #include "nn/base/median.h"
 #include "nn/base/pi.h"
 
@@ -16,11 +16,7 @@ namespace {
 constexpr double kLongestPause_us = 10e6;
 constexpr double kInt16Range = 65536;
 
-double median_step(const std::vector<double>& times) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
-  return upper_median(std::move(steps));
-}
+double median_step(const std::vector<double>& times) { return upper_median(steps_of(times)); }
 
 /// Undoes wraps of positions stored as 16-bit integers, where neighbours differ by almost the whole range. (Velocities
 /// and accelerations may jump that far in a crash.) Values that stay at the ends of the range are reported.
@@ -59,20 +55,6 @@ void unwrap(std::vector<double>& angles, double turn) {
     const double turns = std::round((angles[i] - angles[i - 1]) / turn);
     if (std::isfinite(turns)) angles[i] -= turns * turn;
   }
-}
-
-/// q and -q are the same rotation: chooses signs so that neighbours are close and can be averaged.
-std::vector<double> continuous_signs(const RawTopic& topic, const Carried& carried) {
-  std::vector<double> signs(topic.time_s.size(), 1);
-  for (std::size_t i = 1; i < signs.size(); ++i) {
-    double dot = 0;
-    for (const int c : carried.columns) {
-      const std::vector<double>& q = topic.columns[static_cast<std::size_t>(c)].values;
-      dot += q[i - 1] * q[i];
-    }
-    signs[i] = dot < 0 ? -signs[i - 1] : signs[i - 1];
-  }
-  return signs;
 }
 
 struct Series {
@@ -256,7 +238,7 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, LogH
     }
     std::vector<double> signs;
     if (carried.topic != recognition.clock && carried.signal == kAttitude && carried.size() == 4)
-      signs = continuous_signs(topic, carried);
+      signs = continuous_signs(topic, carried.columns);
     for (std::size_t k = 0; k < carried.size(); ++k) {
       if (carried.columns[k] < 0) continue;
       const RawColumn& column = topic.columns[static_cast<std::size_t>(carried.columns[k])];
@@ -266,11 +248,11 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, LogH
                               carried.signal == kPosition || carried.signal == kTargetPosition, events)
               : column.values;
       const double sign = k < carried.sign.size() ? carried.sign[k] : 1;
-      for (double& value : values)
+      for (double& value : values) {
         value = sign * (value - carried.offset) * carried.multiply / carried.divide;
-      // Pulses of a servo signal go beyond the ends of its range.
-      for (double& value : values)
-        value = carried.offset != 0 && std::isfinite(value) ? std::clamp(value, 0.0, 1.0) : value;
+        // Pulses of a servo signal go beyond the ends of its range.
+        if (carried.offset != 0 && std::isfinite(value)) value = std::clamp(value, 0.0, 1.0);
+      }
       for (std::size_t i = 0; i < signs.size(); ++i) values[i] *= signs[i];
       const int signal = carried.signal + static_cast<int>(k);
       if (carried.topic != recognition.clock) {

@@ -8,6 +8,9 @@
 
 namespace swarmcert::logs {
 
+/// Rz(yaw) Ry(pitch) Rx(roll)
+Attitude attitude_of_angles(double roll, double pitch, double yaw);
+
 /// One column per Signal with one value per record; empty if no column of the log carries the signal.
 struct SignalTable {
   std::vector<double> time_us;  ///< strictly increasing

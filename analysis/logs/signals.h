@@ -49,7 +49,7 @@ struct SignalSource {
   std::string why{};  ///< evidence, in words
 };
 
-/// The user's meaning of the columns. If empty, columns are recognised by name (column_names.h).
+/// The user's meaning of the columns. If empty, columns are recognised by name (dictionary.h) and evidence.
 using SignalMap = std::vector<SignalSource>;
 
 /// A stored number less `offset`, times multiply / divide, is the signal in its own unit.

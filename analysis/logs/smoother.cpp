@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 namespace swarmcert::logs {
 namespace {
@@ -83,11 +82,6 @@ std::vector<std::vector<double>> local_derivatives(const SignalTable& table,
     default:
       return derivatives_of_fits<3>(table, series, window_s, derivatives);
   }
-}
-
-std::vector<double> local_derivative(const SignalTable& table, const std::vector<double>& series,
-                                     double window_s, int degree, int derivative) {
-  return std::move(local_derivatives(table, series, window_s, degree, {derivative})[0]);
 }
 
 }  // namespace swarmcert::logs

@@ -15,14 +15,10 @@ inline constexpr double kVelocityWindow_s = 0.10, kPositionWindow_s = 0.16;
 inline double velocity_window_s(double step_s) { return std::max(kVelocityWindow_s, 4.01 * step_s); }
 inline double position_window_s(double step_s) { return std::max(kPositionWindow_s, 6.01 * step_s); }
 
-/// Returns a derivative of `series` at each record from a polynomial fitted by least squares to the records within half
-/// a window, never across a gap. At the ends of a stretch the window is one-sided. NaN if a stretch is too short.
-/// @param degree     1 to 3
-/// @param derivative 0 to degree
-std::vector<double> local_derivative(const SignalTable& table, const std::vector<double>& series,
-                                     double window_s, int degree, int derivative);
-
-/// Returns several derivatives of the same polynomials, in this order.
+/// Returns derivatives of `series` at each record, in this order, from a polynomial fitted by least squares to the
+/// records within half a window, never across a gap. At the ends of a stretch the window is one-sided. NaN if a stretch
+/// is too short.
+/// @param degree 1 to 3; `derivatives` are 0 to degree
 std::vector<std::vector<double>> local_derivatives(const SignalTable& table,
                                                    const std::vector<double>& series, double window_s,
                                                    int degree, const std::vector<int>& derivatives);

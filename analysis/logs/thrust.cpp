@@ -25,7 +25,7 @@ struct Rotors {
 /// Returns, per record, the specific force along the thrust axis over g, which thrust over weight should equal.
 std::vector<double> load_factor(const Draft& draft) {
   const SignalTable& t = draft.table;
-  std::vector<double> load(t.size(), std::nan(""));
+  std::vector<double> load(t.size(), kNaN);
   if (!t.has_group(kForceWorld, 3)) return load;
   for (std::size_t i = 0; i < t.size(); ++i) {
     const double x = t[kAttitude][i], y = t[kAttitude + 1][i];
@@ -120,22 +120,6 @@ bool settle_duty_scale(Draft& draft) {
   return true;
 }
 
-void settle_battery(Draft& draft) {
-  SignalTable& t = draft.table;
-  if (t.has(kBattery)) {
-    const double middle = median(t[kBattery]);
-    if (middle > 500 && draft.asks_physics) {
-      for (double& v : t[kBattery]) v /= 1000;
-      draft.recognition.find(kBattery)->divide *= 1000;
-      draft.recognition.find(kBattery)->unit = "mV";
-      draft.note(fmt::format("battery: median {:.0f}, read as millivolt", middle));
-    }
-    draft.add_measured("battery", kBattery);
-    return;
-  }
-  draft.add("battery", Source::kMissing, "", "V");
-}
-
 /// "motor.m1" is the requested thrust in some firmware versions and the applied duty in others: decided by which of the
 /// two follows the load factor while the battery voltage drops.
 bool is_requested(Draft& draft) {
@@ -174,11 +158,10 @@ void derive_duty(Draft& draft, const std::string& from) {
 }
 
 /// Derives the battery voltage at which the firmware's compensation turns the total request into the total duty.
-void derive_battery(Draft& draft) {
-  SignalTable& t = draft.table;
+void derive_battery(SignalTable& t) {
   std::vector<double>& battery = t[kBattery];
-  battery.assign(t.size(), std::nan(""));
-  double last = std::nan("");
+  battery.assign(t.size(), kNaN);
+  double last = kNaN;
   for (std::size_t i = 0; i < t.size(); ++i) {
     double wanted_V = 0, duty = 0;
     for (int k = 0; k < kFour; ++k) {
@@ -190,11 +173,26 @@ void derive_battery(Draft& draft) {
   }
   const double middle = median(battery);
   for (double& v : battery) v = std::isfinite(v) ? v : middle;
-  for (SignalInfo& info : draft.log.sources) {
-    if (info.name == "battery")
-      info = {
-          "battery", Source::kDerived, "requested thrust and duty: the firmware's battery compensation", "V",
-          0,         std::nan("")};
+}
+
+/// @param can_derive from the requested thrust and the duty
+void settle_battery(Draft& draft, bool can_derive) {
+  SignalTable& t = draft.table;
+  if (t.has(kBattery)) {
+    const double middle = median(t[kBattery]);
+    if (middle > 500 && draft.asks_physics) {
+      for (double& v : t[kBattery]) v /= 1000;
+      draft.recognition.find(kBattery)->divide *= 1000;
+      draft.recognition.find(kBattery)->unit = "mV";
+      draft.note(fmt::format("battery: median {:.0f}, read as millivolt", middle));
+    }
+    draft.add_measured("battery", kBattery);
+  } else if (can_derive) {
+    derive_battery(draft.table);
+    draft.add("battery", Source::kDerived, "requested thrust and duty: the firmware's battery compensation",
+              "V");
+  } else {
+    draft.add("battery", Source::kMissing, "", "V");
   }
 }
 
@@ -205,10 +203,8 @@ void replace_broken_rotor_speeds(Draft& draft) {
   std::array<double, kFour> middle{};
   std::vector<double> all;
   for (int k = 0; k < kFour; ++k) {
-    std::vector<double> turning;
-    for (const double speed : t[kRotorSpeed + k]) {
-      if (speed > 0) turning.push_back(speed);
-    }
+    std::vector<double> turning = t[kRotorSpeed + k];
+    for (double& speed : turning) speed = speed > 0 ? speed : kNaN;
     middle[static_cast<std::size_t>(k)] = median(turning);
     all.push_back(middle[static_cast<std::size_t>(k)]);
   }
@@ -258,12 +254,11 @@ void settle_thrust(Draft& draft) {
   SignalTable& t = draft.table;
   Signals& signals = draft.log.signals;
   const bool has_duty = settle_duty_scale(draft) && t.has_group(kDuty, kFour);
-  settle_battery(draft);
   bool has_request = t.has_group(kRequested, kFour);
+  settle_battery(draft, has_duty && has_request);
   if (has_duty) {
     draft.add_measured("duty", kDuty);
     if (has_request) draft.add_measured("requested_thrust", kRequested);
-    if (has_request && !t.has(kBattery)) derive_battery(draft);
   } else if (has_request) {
     const std::string from = names_of(draft.raw, *draft.recognition.find(kRequested));
     if (!is_requested(draft)) {

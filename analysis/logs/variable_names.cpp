@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "analysis/logs/csv.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 
@@ -16,7 +17,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kLargestYaml_bytes = std::size_t{1} << 20;
 
 std::string_view trimmed(std::string_view text) {
-  const auto is_blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  const auto is_blank = [](char c) { return c == ' ' || c == '\t'; };
   while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
   while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
   return text;
@@ -81,10 +82,10 @@ class YamlReader {
     if (path_.back().name == "type" && !robot.empty() && path_[depth - 2].name == robot)
       found_.type_of_robot[robot] = unquoted(text);
     if (path_.back().name != "vars" || depth < 3 || path_[depth - 3].name != "custom_topics") return;
-    CustomTopics::Variables& variables = !robot.empty()  ? found_.of_robot[robot]
-                                         : !type.empty() ? found_.of_type[type]
-                                                         : found_.of_all;
-    list_ = &variables[path_[depth - 2].name];
+    const std::string owner = !robot.empty()  ? "robots/" + robot
+                              : !type.empty() ? "robot_types/" + type
+                                              : "all";
+    list_ = &found_.named[{owner, path_[depth - 2].name}];
     list_->clear();
     if (text.empty() || text.front() != '[') return;
     in_brackets_ = true;
@@ -143,34 +144,21 @@ std::string rename_values(RawTopic& topic, const std::vector<std::string>& varia
 std::vector<std::string> CustomTopics::variables(const std::string& topic) const {
   const std::size_t slash = topic.rfind('/');
   if (slash == std::string::npos) return {};
-  const std::string name = topic.substr(slash + 1);
-  const std::size_t before = slash == 0 ? std::string::npos : topic.rfind('/', slash - 1);
-  const std::string robot =
-      before == std::string::npos ? topic.substr(0, slash) : topic.substr(before + 1, slash - before - 1);
-  const auto look_up = [&name](const auto& owners,
-                               const std::string& owner) -> const std::vector<std::string>* {
-    const auto variables = owners.find(owner);
-    if (variables == owners.end()) return nullptr;
-    const auto found = variables->second.find(name);
-    return found == variables->second.end() ? nullptr : &found->second;
-  };
-  if (const auto* const own = look_up(of_robot, robot)) return *own;
+  const std::string space = topic.substr(0, slash), robot = space.substr(space.rfind('/') + 1);
   const auto type = type_of_robot.find(robot);
-  if (type != type_of_robot.end()) {
-    if (const auto* const of_its_type = look_up(of_type, type->second)) return *of_its_type;
+  for (const std::string& owner :
+       {"robots/" + robot, type == type_of_robot.end() ? "" : "robot_types/" + type->second,
+        std::string("all")}) {
+    const auto found = named.find({owner, topic.substr(slash + 1)});
+    if (found != named.end()) return found->second;
   }
-  const auto common = of_all.find(name);
-  return common == of_all.end() ? std::vector<std::string>{} : common->second;
+  return {};
 }
 
 CustomTopics parse_custom_topics(std::string_view yaml) {
   CustomTopics found;
   YamlReader reader(found);
-  while (!yaml.empty()) {
-    const std::size_t end = std::min(yaml.find('\n'), yaml.size());
-    reader.line(yaml.substr(0, end));
-    yaml.remove_prefix(std::min(end + 1, yaml.size()));
-  }
+  for (std::size_t at = 0; at < yaml.size();) reader.line(take_text_line(yaml, at));
   return found;
 }
 

@@ -4,6 +4,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "analysis/logs/raw_log.h"
@@ -12,11 +13,9 @@ namespace swarmcert::logs {
 
 /// Log variables of the custom topics in a crazyflies.yaml.
 struct CustomTopics {
-  /// Variables by topic, in the order of the values.
-  using Variables = std::map<std::string, std::vector<std::string>>;
-  std::map<std::string, Variables> of_robot, of_type;
+  /// In the order of the values, by owner ("robots/cf1", "robot_types/heavy", "all") and topic.
+  std::map<std::pair<std::string, std::string>, std::vector<std::string>> named;
   std::map<std::string, std::string> type_of_robot;
-  Variables of_all;
 
   /// Returns the variables of "/<robot>/<topic>" as defined for the robot, else for its type, else for all robots.
   /// Empty if not defined.

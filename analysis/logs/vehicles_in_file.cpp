@@ -13,9 +13,13 @@
 #include <set>
 #include <string_view>
 
-#include "analysis/logs/collector.h"
+#include "analysis/logs/clock.h"
+#include "analysis/logs/column_names.h"
+#include "analysis/logs/csv.h"
+#include "analysis/logs/dictionary.h"
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/formats.h"
+#include "analysis/logs/recognition.h"
 #include "nn/base/csv.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
@@ -27,54 +31,10 @@ namespace {
 constexpr std::size_t kMostVehicles = 64;
 constexpr std::size_t kFewestRows = 10;
 
-/// Returns the line that starts at `at` without its end, and moves `at` behind it.
-std::string_view take_text_line(std::string_view text, std::size_t& at) {
-  const std::size_t end = std::min(text.find('\n', at), text.size());
-  std::string_view line = text.substr(at, end - at);
-  at = end + 1;
-  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-  return line;
-}
-
-/// The line with the column names: the first line that is no comment or, if that is a record, the comment before it.
-struct TableHeader {
-  std::size_t begin = 0, end = 0;  ///< of its line in the text, with the line end
-  char separator = ',';
-  std::vector<std::string_view> names;
-};
-
-std::optional<TableHeader> header_of(std::string_view text) {
-  TableHeader header;
-  std::string_view line, comment;
-  std::size_t at = text.substr(0, 3) == "\xEF\xBB\xBF" ? 3 : 0, comment_at = at;
-  for (;;) {
-    if (at >= text.size()) return std::nullopt;
-    header.begin = at;
-    line = take_text_line(text, at);
-    if (line.empty() || line[0] != '#') break;
-    comment_at = header.begin;
-    comment = line.substr(1);
-  }
-  header.end = std::min(at, text.size());
-  double number = 0;
-  const std::string_view first = files::without_blanks(line.substr(0, line.find_first_of(",;\t")));
-  if (!comment.empty() && (line.empty() || files::csv_number(first, number))) {
-    header.end = header.begin;
-    header.begin = comment_at;
-    line = comment;
-  }
-  header.separator = files::csv_separator(line, ',');
-  header.names = files::csv_cells(line, header.separator);
-  return header;
-}
-
 /// Returns the words of `name` in lower case without what separates them: "Drone ID" becomes "droneid".
 std::string joined_words(std::string_view name) {
-  std::string joined;
-  for (const char c : name) {
-    if (std::isalnum(static_cast<unsigned char>(c)) != 0)
-      joined += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  }
+  std::string joined = plain_name(std::string(name));
+  joined.erase(std::remove(joined.begin(), joined.end(), '.'), joined.end());
   return joined;
 }
 
@@ -84,13 +44,10 @@ bool names_crazyflies(std::string_view column) {
 }
 
 bool may_name_vehicles(std::string_view column) {
-  static const std::set<std::string> kThings = {"vehicle", "drone",   "uav",       "agent",
-                                                "robot",   "cf",      "quad",      "body",
-                                                "model",   "subject", "crazyflie", "rigidbody"};
-  std::string name = joined_words(column);
-  if (name == "id" || name == "name" || kThings.count(name) != 0) return true;
+  const std::string name = joined_words(column);
+  if (name == "id" || name == "name" || is_word_of("vehicle", name)) return true;
   for (const std::string_view ending : {"id", "name", "number"}) {
-    if (files::ends_with(name, ending) && kThings.count(name.substr(0, name.size() - ending.size())) != 0)
+    if (files::ends_with(name, ending) && is_word_of("vehicle", name.substr(0, name.size() - ending.size())))
       return true;
   }
   return false;
@@ -218,15 +175,6 @@ bool may_hold_several(const std::string& path) {
   return format_of(head) == nullptr;
 }
 
-/// Returns the beginning of a file, enough for its header unless that is absurdly long.
-std::string beginning_of(const std::string& path) {
-  std::string text(std::size_t{1} << 16, '\0');
-  std::ifstream in(path, std::ios::binary);
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  return text;
-}
-
 std::string rows_of_vehicle(std::string_view text, const TableHeader& header, const VehicleColumn& by,
                             const std::string& vehicle) {
   std::string rows(text.substr(0, header.end));
@@ -282,6 +230,22 @@ std::string columns_of_vehicle(std::string_view text, const TableHeader& header,
   return table;
 }
 
+/// The vehicles of a table, by columns or by rows.
+struct Vehicles {
+  TableHeader header;
+  VehicleColumns columns;
+  VehicleColumn rows;
+};
+Vehicles vehicles_of(std::string_view text, bool by_columns) {
+  Vehicles found;
+  const std::optional<TableHeader> header = header_of(text, ',');
+  if (!header) return found;
+  found.header = *header;
+  if (by_columns) found.columns = prefixed_columns(*header);
+  if (found.columns.empty()) found.rows = vehicle_column(text, *header).value_or(VehicleColumn());
+  return found;
+}
+
 }  // namespace
 
 LogAddress address_of(const std::string& path) {
@@ -295,26 +259,17 @@ LogAddress address_of(const std::string& path) {
 }
 
 std::vector<std::string> vehicles_in(const std::string& path, bool by_columns) {
-  std::vector<std::string> vehicles;
-  if (!may_hold_several(path)) return vehicles;
-  const std::string beginning = beginning_of(path);
-  const std::optional<TableHeader> header = header_of(beginning);
-  if (!header) return vehicles;
-  if (by_columns) {
-    for (const auto& [vehicle, columns] : prefixed_columns(*header)) vehicles.push_back(vehicle);
-  }
-  if (!vehicles.empty() || std::none_of(header->names.begin(), header->names.end(), may_name_vehicles))
-    return vehicles;
+  std::vector<std::string> names;
+  if (!may_hold_several(path)) return names;
   try {
     const std::string text = files::read_file(path, kLargestLog_bytes);
-    const std::optional<TableHeader> whole = header_of(text);
-    const std::optional<VehicleColumn> found = whole ? vehicle_column(text, *whole) : std::nullopt;
-    if (!found) return vehicles;
-    for (const auto& [vehicle, entry] : found->entries) vehicles.push_back(vehicle);
+    const Vehicles found = vehicles_of(text, by_columns);
+    for (const auto& [vehicle, columns] : found.columns) names.push_back(vehicle);
+    for (const auto& [vehicle, entry] : found.rows.entries) names.push_back(vehicle);
   } catch (const files::InputError&) {
     return {};
   }
-  return vehicles;
+  return names;
 }
 
 std::vector<std::string> addresses_in(const std::string& path, bool by_columns) {
@@ -327,14 +282,10 @@ std::vector<std::string> addresses_in(const std::string& path, bool by_columns) 
 std::string table_of(const LogAddress& address) {
   std::string table;
   const std::string text = files::read_file(address.file, kLargestLog_bytes);
-  const std::optional<TableHeader> header = header_of(text);
-  if (header && may_hold_several(address.file)) {
-    const VehicleColumns columns = prefixed_columns(*header);
-    if (!columns.empty()) {
-      table = columns_of_vehicle(text, *header, columns, address.vehicle);
-    } else if (const std::optional<VehicleColumn> found = vehicle_column(text, *header)) {
-      table = rows_of_vehicle(text, *header, *found, address.vehicle);
-    }
+  if (may_hold_several(address.file)) {
+    const Vehicles found = vehicles_of(text, true);
+    table = found.columns.empty() ? rows_of_vehicle(text, found.header, found.rows, address.vehicle)
+                                  : columns_of_vehicle(text, found.header, found.columns, address.vehicle);
   }
   if (table.empty()) {
     const std::vector<std::string> vehicles = vehicles_in(address.file);

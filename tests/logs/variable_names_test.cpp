@@ -11,6 +11,7 @@
 
 #include "analysis/logs/column_names.h"
 #include "analysis/logs/formats/formats.h"
+#include "analysis/logs/message_frames.h"
 #include "analysis/logs/read_log.h"
 #include "analysis/logs/recognition.h"
 #include "data.h"
@@ -29,8 +30,16 @@ TEST(ColumnNames, EveryRowOfTheTableIsASignalByItself) {
     log.topics.emplace_back();
     logs::RawTopic& topic = log.topics.back();
     topic.time_s = {0, 0.01, 0.02};
+    std::vector<std::string> notes;
     if (row.origin == logs::Origin::kMessages) topic.type = "sensor_msgs/msg/Imu";
     for (const std::string& name : row.names) topic.columns.push_back({name, "", {0.5, 0.5, 0.5}});
+    if (row.origin == logs::Origin::kFirmware) {
+      log.format = row.program == "px4" ? "ulog" : row.program;
+      topic.name = row.message;
+      if (row.unit == "us")
+        for (logs::RawColumn& column : topic.columns) column.values = {1000, 1500, 2000};
+      logs::add_own_names(log, notes);
+    }
     const logs::Recognition found = logs::recognise(log, logs::known_columns());
     const logs::Carried* const carried = found.find(row.signal);
     ASSERT_NE(carried, nullptr) << row.names[0];
@@ -95,7 +104,7 @@ TEST(ColumnNames, AUnitBehindTheNameCountsOnlyForSignalsOfThatUnit) {
 
 TEST(Formats, EachIsOneLineOfTheListAndOneSource) {
   const std::filesystem::path folder = source_path("analysis/logs/formats");
-  std::ifstream in(folder / "formats.cpp");
+  std::ifstream in(folder / "formats.h");
   std::ostringstream text;
   text << in.rdbuf();
   const std::string list = text.str();

@@ -1,8 +1,11 @@
 #include "analysis/logs/formats/bytes.h"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <cstring>
 #include <istream>
+#include <iterator>
 
 #include "nn/base/input_error.h"
 
@@ -47,49 +50,38 @@ void refuse_at(const std::string& path, std::size_t offset, const std::string& f
 }
 
 std::size_t size_of(Scalar type) {
-  switch (type) {
-    case Scalar::kInt8:
-    case Scalar::kUint8:
-      return 1;
-    case Scalar::kInt16:
-    case Scalar::kUint16:
-      return 2;
-    case Scalar::kInt32:
-    case Scalar::kUint32:
-    case Scalar::kFloat:
-      return 4;
-    case Scalar::kInt64:
-    case Scalar::kUint64:
-    case Scalar::kDouble:
-      break;
-  }
-  return 8;
+  constexpr std::size_t sizes[] = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
+  return sizes[static_cast<std::size_t>(type)];
+}
+
+std::optional<Scalar> scalar_of_letter(char letter) {
+  const std::size_t at = std::string_view("bBhHiIqQfd").find(letter);
+  return at == std::string_view::npos ? std::nullopt : std::optional(static_cast<Scalar>(at));
+}
+
+std::optional<Scalar> scalar_called(std::string_view name) {
+  constexpr std::string_view names[] = {"int8",   "uint8", "int16",  "uint16", "int32",
+                                        "uint32", "int64", "uint64", "float",  "double"};
+  const auto* const found = std::find(std::begin(names), std::end(names), name);
+  return found == std::end(names) ? std::nullopt : std::optional(static_cast<Scalar>(found - names));
 }
 
 double value_of(Scalar type, const char* bytes, bool is_big_endian) {
-  switch (type) {
-    case Scalar::kInt8:
-      return number_at<std::int8_t>(bytes, is_big_endian);
-    case Scalar::kUint8:
-      return number_at<std::uint8_t>(bytes, is_big_endian);
-    case Scalar::kInt16:
-      return number_at<std::int16_t>(bytes, is_big_endian);
-    case Scalar::kUint16:
-      return number_at<std::uint16_t>(bytes, is_big_endian);
-    case Scalar::kInt32:
-      return number_at<std::int32_t>(bytes, is_big_endian);
-    case Scalar::kUint32:
-      return number_at<std::uint32_t>(bytes, is_big_endian);
-    case Scalar::kInt64:
-      return number_at<std::int64_t>(bytes, is_big_endian);
-    case Scalar::kUint64:
-      return number_at<std::uint64_t>(bytes, is_big_endian);
-    case Scalar::kFloat:
-      return number_at<float>(bytes, is_big_endian);
-    case Scalar::kDouble:
-      break;
+  constexpr double (*read[])(const char*, bool) = {
+      number_at<std::int8_t>,  number_at<std::uint8_t>,  number_at<std::int16_t>, number_at<std::uint16_t>,
+      number_at<std::int32_t>, number_at<std::uint32_t>, number_at<std::int64_t>, number_at<std::uint64_t>,
+      number_at<float>,        number_at<double>};
+  return read[static_cast<std::size_t>(type)](bytes, is_big_endian);
+}
+
+std::uint32_t crc32_of(std::string_view bytes) {
+  uLong sum = 0;
+  constexpr std::size_t kPart_bytes = std::size_t{1} << 30;  // zlib uses 32-bit sizes
+  for (std::size_t at = 0; at < bytes.size(); at += kPart_bytes) {
+    const std::string_view part = bytes.substr(at, kPart_bytes);
+    sum = crc32(sum, reinterpret_cast<const Bytef*>(part.data()), static_cast<uInt>(part.size()));
   }
-  return number_at<double>(bytes, is_big_endian);
+  return static_cast<std::uint32_t>(sum);
 }
 
 std::string until_nul(std::string_view text) { return std::string(text.substr(0, text.find('\0'))); }

@@ -42,6 +42,12 @@ enum class Scalar : unsigned char {
 
 std::size_t size_of(Scalar type);
 
+/// Returns the type with this letter in Python's struct module: b B h H i I q Q f d.
+std::optional<Scalar> scalar_of_letter(char letter);
+
+/// Returns the type called "int8", ..., "uint64", "float", "double".
+std::optional<Scalar> scalar_called(std::string_view name);
+
 /// Returns the number at `bytes`, which need not be aligned. Integers above 2^53 are rounded.
 double value_of(Scalar type, const char* bytes, bool is_big_endian = false);
 
@@ -54,6 +60,9 @@ std::optional<Integer> integer_at(std::string_view bytes, std::size_t offset) {
     value = value << 8 | static_cast<unsigned char>(bytes[offset + i]);
   return static_cast<Integer>(value);
 }
+
+/// Returns the CRC-32 of `bytes`.
+std::uint32_t crc32_of(std::string_view bytes);
 
 /// Returns `text` up to its first NUL.
 std::string until_nul(std::string_view text);

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,19 +12,29 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/logs/formats/ros_topic.h"
+#include "analysis/logs/formats/ros_types.h"
+#include "analysis/logs/raw_log.h"
 
 namespace swarmcert::logs {
 
 inline constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
-inline constexpr std::size_t kLongestText_bytes = 4096;
+
+/// Layouts, and limits of the memory, of all topics of a log together; compressed files can hold far more than their
+/// size suggests.
+struct RosBudget {
+  std::size_t places = std::size_t{1} << 20;  ///< fields and array elements
+  std::size_t values = std::size_t{1} << 28;  ///< numbers: 2 GiB
+  /// By type and definition, each parsed once; with the fault where there is none.
+  std::map<std::pair<std::string, std::string_view>, std::pair<std::shared_ptr<const RosLayout>, std::string>>
+      layouts{};
+};
 
 /// A field of a message or an element of an array. Caches its column, so that the column's name is built only once.
 struct RosNode {
   const RosNode* parent = nullptr;
   std::string label;  ///< ".x", "[3]"
   std::optional<std::size_t> column;
-  bool is_stamp = false, has_text = false;
+  bool is_stamp = false;
   std::vector<std::unique_ptr<RosNode>> children;
 
   std::string name() const {
@@ -34,10 +45,7 @@ struct RosNode {
 };
 
 /// The values of one message, held back until the whole message has been checked.
-struct RosRecord {
-  std::vector<std::pair<RosNode*, double>> numbers;
-  std::vector<std::pair<RosNode*, std::string_view>> texts;
-};
+using RosRecord = std::vector<std::pair<RosNode*, double>>;
 
 /// A RawTopic under construction.
 class ColumnTable {
@@ -75,18 +83,12 @@ class ColumnTable {
     if (!given_up_.empty()) return;
     const std::size_t row = topic_.time_s.size();
     topic_.time_s.push_back(time_s);
-    for (const auto& [node, value] : record.numbers) {
+    for (const auto& [node, value] : record) {
       if (!node->column) node->column = new_column(*node, row);
       if (*node->column < topic_.columns.size()) topic_.columns[*node->column].values.push_back(value);
     }
     for (RawColumn& column : topic_.columns)
       if (column.values.size() == row) column.values.push_back(kNoValue);
-    for (const auto& [node, text] : record.texts) {
-      if (node->has_text || text.empty()) continue;
-      node->has_text = true;
-      if (topic_.texts.size() < kMostElements)
-        topic_.texts[node->name()] = text.substr(0, kLongestText_bytes);
-    }
     limit_values();
   }
 

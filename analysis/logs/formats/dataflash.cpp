@@ -1,18 +1,122 @@
-#include "analysis/logs/formats/dataflash.h"
-
+/// @file ArduPilot dataflash logs (`.bin`).
+///
+/// Reads a log. Topics are named after their message ("XKF1", "ATT", "RCOU", "BAT", "MOTB"); a field that the log
+/// declares as the instance becomes RawTopic::instance. Times come from `TimeUS` or `TimeMS`. Values have the units
+/// stated in the log (UNIT), with its multipliers (MULT) and those of the number types (centidegrees to degrees, 1e-7
+/// degrees to degrees) applied. Parameters are the first values in PARM. MSG gives the messages.
+/// If no message follows, the reader searches for the next two consecutive messages and counts the damaged place and
+/// the skipped bytes.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "analysis/logs/formats/bytes.h"
-#include "analysis/logs/formats/dataflash_fields.h"
+#include "analysis/logs/formats/formats.h"
 
 namespace swarmcert::logs {
 namespace {
+
+constexpr std::size_t kDataflashHead_bytes = 3;  ///< of each message: two fixed bytes and the format
+
+/// How a field type, a single letter, is stored.
+struct FieldType {
+  std::optional<Scalar> number;  ///< empty: text or a 16-bit float
+  std::size_t bytes = 0;
+  std::size_t count = 1;
+  double scale = 1;  ///< factor for the stored value
+  bool is_text = false;
+};
+
+struct DataflashField {
+  std::string name;
+  char letter;
+  FieldType type;
+  std::size_t offset;  ///< from the end of the message's header
+  std::string unit;
+  bool is_instance = false;
+};
+struct DataflashFormat {
+  std::string name, definition;
+  std::size_t bytes = 0;               ///< of a message including its header
+  std::vector<DataflashField> fields;  ///< empty if the definition is inconsistent
+
+  const DataflashField* find(const std::string& field) const {
+    for (const DataflashField& candidate : fields)
+      if (candidate.name == field) return &candidate;
+    return nullptr;
+  }
+};
+
+std::optional<FieldType> field_type(char letter) {
+  const auto number = [](Scalar type, double scale = 1, std::size_t count = 1) {
+    return FieldType{type, count * size_of(type), count, scale, false};
+  };
+  const auto text = [](std::size_t bytes) { return FieldType{std::nullopt, bytes, 1, 1, true}; };
+  switch (letter) {
+    case 'a':
+      return number(Scalar::kInt16, 1, 32);
+    case 'M':
+      return number(Scalar::kUint8);
+    case 'g':
+      return FieldType{std::nullopt, 2, 1, 1, false};
+    case 'c':
+      return number(Scalar::kInt16, 0.01);
+    case 'C':
+      return number(Scalar::kUint16, 0.01);
+    case 'e':
+      return number(Scalar::kInt32, 0.01);
+    case 'E':
+      return number(Scalar::kUint32, 0.01);
+    case 'L':
+      return number(Scalar::kInt32, 1e-7);
+    case 'n':
+      return text(4);
+    case 'N':
+      return text(16);
+    case 'Z':
+      return text(64);
+    default:
+      break;
+  }
+  const std::optional<Scalar> plain = scalar_of_letter(letter);
+  return plain ? std::optional(number(*plain)) : std::nullopt;
+}
+
+/// Returns the IEEE 754 binary16 number at `bytes`.
+double half_float(const char* bytes) {
+  const auto bits = static_cast<unsigned>(value_of(Scalar::kUint16, bytes));
+  const int exponent = static_cast<int>(bits >> 10 & 31);
+  const double fraction = bits & 1023;
+  const double sign = (bits & 0x8000) != 0 ? -1 : 1;
+  if (exponent == 31) return fraction == 0 ? sign * INFINITY : NAN;
+  return sign * (exponent == 0 ? std::ldexp(fraction, -24) : std::ldexp(1024 + fraction, exponent - 25));
+}
+
+/// Parses field types ("QBff") and names ("TimeUS,I,AccX,AccY"). Returns nothing if they contradict each other or
+/// `bytes`.
+std::vector<DataflashField> parse_fields(const std::string& letters, const std::string& names,
+                                         std::size_t bytes) {
+  std::vector<DataflashField> fields;
+  std::set<std::string> seen;
+  std::size_t offset = 0, begin = 0;
+  for (const char letter : letters) {
+    const std::size_t end = std::min(names.find(',', begin), names.size());
+    const std::string name = begin < names.size() ? names.substr(begin, end - begin) : "";
+    const std::optional<FieldType> type = field_type(letter);
+    if (!type || !is_identifier(name) || !seen.insert(name).second) return {};
+    fields.push_back({name, letter, *type, offset, "", false});
+    offset += type->bytes;
+    begin = end + 1;
+  }
+  const bool fits = begin > names.size() && offset + kDataflashHead_bytes == bytes;
+  return fits ? fields : std::vector<DataflashField>();
+}
 
 constexpr std::string_view kDataflashStart = "\xA3\x95";
 constexpr std::uint8_t kFormatId = 128;
@@ -34,7 +138,7 @@ class DataflashReader {
     walk([this](std::uint8_t id, std::string_view body) { take_definition(id, body); });
     apply_units();
     log_.health = {};
-    unknown_ids_.clear();
+    left_out_.clear();
     walk([this](std::uint8_t id, std::string_view body) { take_message(id, body); });
     finish();
     return std::move(log_);
@@ -81,7 +185,8 @@ class DataflashReader {
       log_.health.truncated = true;
       log_.health.skipped_bytes += next - at;
     } else if (is_unknown) {
-      ++unknown_ids_[static_cast<std::uint8_t>(bytes_[at + 2])];
+      ++left_out_[{fmt::format("message id {}", static_cast<std::uint8_t>(bytes_[at + 2])),
+                   "the file lost the definition of its format"}];
     } else {
       ++log_.health.damaged_blocks;
       log_.health.skipped_bytes += next - at;
@@ -187,11 +292,12 @@ class DataflashReader {
     if (time_s) last_time_s_ = *time_s;
     if (format.name == "PARM") return take_parameter(format, body);
     if (format.name == "MSG") {
-      log_.messages.push_back({last_time_s_, 0, text_in(format, body, "Message")});
+      log_.messages.push_back({last_time_s_, text_in(format, body, "Message")});
       return;
     }
     if (format.fields.empty() || !time_s) {
-      ++(format.fields.empty() ? contradictory_ : without_time_)[format.name];
+      ++left_out_[{format.name, format.fields.empty() ? "the definition of its format contradicts itself"
+                                                      : "it has no field \"TimeUS\" or \"TimeMS\""}];
       return;
     }
     RawTopic& topic = topic_of(id, body);
@@ -199,12 +305,7 @@ class DataflashReader {
     std::size_t column = 0;
     for (const DataflashField& field : format.fields) {
       const char* const data = body.data() + field.offset;
-      if (field.type.is_text) {
-        std::string& text = topic.texts[field.name];
-        if (text.empty()) text = until_nul({data, field.type.bytes});
-        continue;
-      }
-      if (is_time(field)) continue;
+      if (field.type.is_text || is_time(field)) continue;
       for (std::size_t i = 0; i < field.type.count; ++i)
         topic.columns[column++].values.push_back(number_of(field, data, i));
     }
@@ -250,22 +351,12 @@ class DataflashReader {
   void take_parameter(const DataflashFormat& format, std::string_view body) {
     const std::string name = text_in(format, body, "Name");
     const double value = number_in(format, body, "Value");
-    const double standard = number_in(format, body, "Default");
-    if (name.empty()) return;
-    const auto [known, is_new] = log_.parameters.emplace(name, value);
-    if (!is_new && known->second != value) log_.parameter_changes.push_back({last_time_s_, name, value});
-    if (!std::isnan(standard)) log_.default_parameters.emplace(name, standard);
+    if (!name.empty()) log_.parameters.emplace(name, value);
   }
 
   void finish() {
     log_.health.damaged_blocks += damaged_formats_;
-    for (const auto& [id, count] : unknown_ids_)
-      log_.skipped.push_back(
-          {fmt::format("message id {}", id), "the file lost the definition of its format", count});
-    for (const auto& [name, count] : contradictory_)
-      log_.skipped.push_back({name, "the definition of its format contradicts itself", count});
-    for (const auto& [name, count] : without_time_)
-      log_.skipped.push_back({name, "it has no field \"TimeUS\" or \"TimeMS\"", count});
+    for (const auto& [what, count] : left_out_) log_.skipped.push_back({what.first, what.second, count});
   }
 
   const std::string_view bytes_;
@@ -278,8 +369,7 @@ class DataflashReader {
   std::map<char, double> multipliers_;
   std::map<std::pair<std::uint8_t, int>, std::size_t> topics_;  ///< index in log_.topics
   std::map<std::string, std::uint8_t> names_;
-  std::map<std::uint8_t, std::size_t> unknown_ids_;
-  std::map<std::string, std::size_t> contradictory_, without_time_;
+  std::map<std::pair<std::string, std::string>, std::size_t> left_out_;  ///< messages by name and reason
   std::size_t damaged_formats_ = 0;
   double last_time_s_ = NAN;
 };

@@ -6,26 +6,11 @@
 #include <fstream>
 #include <iterator>
 
-#include "analysis/logs/formats/cfclient_folder.h"
-#include "analysis/logs/formats/rosbag_folder.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
 
-/// All formats, in the order in which they are tried: the name for messages, and the stem of the source and its
-/// functions. <stem>.cpp defines looks_like_<stem>() and read_<stem>().
-#define SWARMCERT_LOG_FORMATS(FORMAT)        \
-  FORMAT("PX4 ULog", ulog)                   \
-  FORMAT("rosbag2 in MCAP", mcap)            \
-  FORMAT("rosbag2 in SQLite", rosbag_sqlite) \
-  FORMAT("ArduPilot dataflash", dataflash)
-
-#define SWARMCERT_DECLARE(name, stem)            \
-  bool looks_like_##stem(std::string_view head); \
-  RawLog read_##stem(std::istream& in, const std::string& path);
 #define SWARMCERT_ENTRY(name, stem) {name, looks_like_##stem, read_##stem},
-
-SWARMCERT_LOG_FORMATS(SWARMCERT_DECLARE)
 
 namespace {
 
@@ -85,7 +70,7 @@ bool is_foreign_log(std::string_view head) {
 void refuse_unknown(std::string_view head, const std::string& path) {
   if (const ForeignFormat* const foreign = foreign_format_of(head))
     throw files::InputError({path, "offset 0", "", "", foreign->what, foreign->hint});
-  std::string hint = "supported are micro-SD logs, CSV";
+  std::string hint = "supported are CSV";
   for (const LogFormat& format : log_formats()) hint += std::string(", ") + format.name;
   throw files::InputError({path, "offset 0", "", "", "is not a flight log", hint});
 }
@@ -149,6 +134,4 @@ RawLog read_raw(const std::string& path) {
 
 }  // namespace swarmcert::logs
 
-#undef SWARMCERT_LOG_FORMATS
-#undef SWARMCERT_DECLARE
 #undef SWARMCERT_ENTRY

@@ -10,6 +10,22 @@
 
 namespace swarmcert::logs {
 
+/// All formats, in the order in which they are tried: the name for messages, and the stem of the source and its
+/// functions: STEM.cpp defines looks_like_STEM() and read_STEM().
+#define SWARMCERT_LOG_FORMATS(FORMAT)        \
+  FORMAT("micro-SD logs", usd)               \
+  FORMAT("PX4 ULog", ulog)                   \
+  FORMAT("rosbag2 in MCAP", mcap)            \
+  FORMAT("rosbag2 in SQLite", rosbag_sqlite) \
+  FORMAT("ArduPilot dataflash", dataflash)
+
+#define SWARMCERT_DECLARE(name, stem)            \
+  bool looks_like_##stem(std::string_view head); \
+  RawLog read_##stem(std::istream& in, const std::string& path);
+
+SWARMCERT_LOG_FORMATS(SWARMCERT_DECLARE)
+#undef SWARMCERT_DECLARE
+
 /// How a format is recognised and read. `looks_like` decides by the first kFormatHead_bytes of a file, or fewer.
 struct LogFormat {
   const char* name;  ///< for messages, e.g. "PX4 ULog"
@@ -42,6 +58,26 @@ bool is_foreign_log(std::string_view head);
 
 /// @throws files::InputError that says what the file is, if known, and what to do.
 [[noreturn]] void refuse_unknown(std::string_view head, const std::string& path);
+
+/// Appends `more` to `log`. Records of a common topic are appended to those of `log`; columns that only one of the two
+/// has are NaN in the other.
+void append(RawLog& log, RawLog&& more);
+
+/// Returns true for a folder with a metadata.yaml of rosbag2.
+bool looks_like_rosbag_folder(const std::string& path);
+
+/// Reads the files of the folder as one log, in the order of metadata.yaml; topics continue from file to file. Only
+/// files inside the folder are read, whatever metadata.yaml says. Files compressed as a whole (`.zstd`) are supported.
+/// A file that is missing or cannot be read is listed in `skipped` and sets `health.truncated`.
+/// @throws files::InputError if none of the files can be read.
+RawLog read_rosbag_folder(const std::string& path);
+
+/// Returns true for a folder whose CSV files all have names as `pose-20260131T12-00-59.csv`.
+bool looks_like_cfclient_folder(const std::string& path);
+
+/// Reads a session as one log with a topic for each block.
+/// @throws files::InputError if a file cannot be read
+RawLog read_cfclient_folder(const std::string& path);
 
 /// Returns true for a folder that holds one log: a rosbag2 folder with its metadata.yaml, or a cfclient session.
 bool is_log_folder(const std::string& path);

@@ -1,5 +1,10 @@
-#include "analysis/logs/formats/mcap.h"
-
+/// @file rosbag2 in MCAP (`.mcap`).
+///
+/// Reads the topics of ROS 2 messages (encoding "cdr", definitions "ros2msg"). Times are the messages' log times, in
+/// seconds since 1970 or on whatever clock the recorder used. Chunks may be uncompressed or compressed with zstd or
+/// lz4. The summary section is not needed. A chunk with a wrong checksum is skipped and counted; of a truncated chunk,
+/// the part before the cut is kept. Topics with other encodings are listed in `skipped`. If the records become invalid,
+/// the reader searches for the next byte at which two valid records follow each other.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -9,21 +14,126 @@
 
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/decompress.h"
-#include "analysis/logs/formats/mcap_records.h"
+#include "analysis/logs/formats/formats.h"
 #include "analysis/logs/formats/ros_topic.h"
 
 namespace swarmcert::logs {
 namespace {
 
-constexpr std::size_t kLongestMcapText_bytes = std::size_t{1} << 16;
+constexpr std::string_view kMcapMagic = "\x89MCAP0\r\n";
+constexpr std::size_t kMcapHead_bytes = 9;  ///< of a record: opcode and length
+
+enum McapCode : unsigned char {
+  kHeader = 0x01,
+  kFooter = 0x02,
+  kSchema = 0x03,
+  kChannel = 0x04,
+  kMessage = 0x05,
+  kChunk = 0x06,
+  kMessageIndex = 0x07,
+  kMetadata = 0x0C,
+  kDataEnd = 0x0F
+};
+
+struct McapRecord {
+  unsigned char code = 0;
+  std::string_view content;
+};
+
+/// Reads fields from the front of a record; once a field is missing, all later fields are empty.
+class McapFields {
+ public:
+  explicit McapFields(std::string_view content) : rest_(content) {}
+
+  template <typename Integer>
+  Integer number() {
+    const std::optional<Integer> value = integer_at<Integer>(rest_, 0);
+    take(sizeof(Integer));
+    return value.value_or(0);
+  }
+  /// Reads a length-prefixed text, or bytes whose length is stored as a `Length`.
+  template <typename Length = std::uint32_t>
+  std::string_view bytes() {
+    return take(number<Length>());
+  }
+  std::string_view rest() const { return rest_; }
+  bool is_sound() const { return is_sound_; }
+  bool is_at_end() const { return is_sound_ && rest_.empty(); }
+
+ private:
+  std::string_view take(std::uint64_t size) {
+    if (size > rest_.size()) {
+      is_sound_ = false;
+      rest_ = {};
+      return {};
+    }
+    const std::string_view taken = rest_.substr(0, size);
+    rest_.remove_prefix(size);
+    return taken;
+  }
+
+  std::string_view rest_;
+  bool is_sound_ = true;
+};
+
+struct McapChunk {
+  std::uint64_t uncompressed_bytes = 0;
+  std::uint32_t checksum = 0;  ///< 0: none
+  std::string_view compression, records;
+  std::uint64_t stated_bytes = 0;  ///< of `records`
+  bool is_whole = true;            ///< false if the file ends within it
+};
+
+/// Returns the record that starts at `at`, valid or not; nothing if it extends beyond `bytes`.
+std::optional<McapRecord> mcap_record_at(std::string_view bytes, std::size_t at) {
+  if (at > bytes.size() || bytes.size() - at < kMcapHead_bytes) return std::nullopt;
+  const std::uint64_t size = *integer_at<std::uint64_t>(bytes, at + 1);
+  if (size > bytes.size() - at - kMcapHead_bytes) return std::nullopt;
+  return McapRecord{static_cast<unsigned char>(bytes[at]), bytes.substr(at + kMcapHead_bytes, size)};
+}
+
+/// Returns true if the content has the form required by its opcode. Accepts unknown and private opcodes.
+bool has_mcap_form(const McapRecord& record) {
+  // Bytes of integers; s: a text or bytes, S: with a length of 8 bytes; *: more may follow.
+  static const std::map<unsigned char, std::string_view> forms = {
+      {kHeader, "ss*"},   {kFooter, "884"},      {kSchema, "2sss"}, {kChannel, "22sss"}, {kMessage, "2488*"},
+      {kChunk, "8884sS"}, {kMessageIndex, "2s"}, {kMetadata, "ss"}, {kDataEnd, "4"}};
+  const auto form = forms.find(record.code);
+  if (form == forms.end()) return record.code != 0;
+  McapFields fields(record.content);
+  for (const char part : form->second) {
+    if (part == '*') return fields.is_sound();
+    if (part == 's') fields.bytes();
+    if (part == 'S') fields.bytes<std::uint64_t>();
+    if (part == '2') fields.number<std::uint16_t>();
+    if (part == '4') fields.number<std::uint32_t>();
+    if (part == '8') fields.number<std::uint64_t>();
+  }
+  return fields.is_at_end();
+}
+
+/// Returns the chunk in the content of a record, which may be truncated.
+McapChunk chunk_of(std::string_view content) {
+  McapFields fields(content);
+  McapChunk chunk;
+  fields.number<std::uint64_t>();
+  fields.number<std::uint64_t>();
+  chunk.uncompressed_bytes = fields.number<std::uint64_t>();
+  chunk.checksum = fields.number<std::uint32_t>();
+  chunk.compression = fields.bytes();
+  chunk.stated_bytes = fields.number<std::uint64_t>();
+  chunk.is_whole = fields.is_sound() && chunk.stated_bytes <= fields.rest().size();
+  chunk.records = fields.rest().substr(0, chunk.stated_bytes);
+  return chunk;
+}
+
+std::size_t size_of(const McapRecord& record) { return kMcapHead_bytes + record.content.size(); }
+
 constexpr std::size_t kLongestMcapName = 1024;
 
 struct McapSchema {
   std::string name, encoding;
   std::string_view text;
-  bool is_parsed = false;
-  std::shared_ptr<const RosLayout> layout;  ///< set once it has been parsed
-  std::string fault;                        ///< why there is no layout after parsing
 };
 struct McapChannel {
   std::uint16_t schema = 0;
@@ -57,7 +167,7 @@ class McapReader {
     while (at < bytes_.size()) {
       if (bytes_.substr(at) == kMcapMagic) return found;
       const std::optional<McapRecord> record = mcap_record_at(bytes_, at);
-      if (record && has_form(*record)) {
+      if (record && has_mcap_form(*record)) {
         found.push_back(at);
         at += size_of(*record);
         continue;
@@ -77,10 +187,10 @@ class McapReader {
     for (++at; at < bytes_.size(); ++at) {
       if (bytes_.substr(at) == kMcapMagic) return at;
       const std::optional<McapRecord> first = mcap_record_at(bytes_, at);
-      if (!first || first->code > kDataEnd || !has_form(*first)) continue;
+      if (!first || first->code > kDataEnd || !has_mcap_form(*first)) continue;
       const std::size_t behind = at + size_of(*first);
       const std::optional<McapRecord> second = mcap_record_at(bytes_, behind);
-      if (second && second->code <= kDataEnd && has_form(*second)) return at;
+      if (second && second->code <= kDataEnd && has_mcap_form(*second)) return at;
       if (bytes_.substr(behind) == kMcapMagic) return at;
     }
     return bytes_.size();
@@ -137,42 +247,21 @@ class McapReader {
   void take_top(std::size_t at) {
     const McapRecord record = *mcap_record_at(bytes_, at);
     switch (record.code) {
-      case kHeader: {
-        McapFields fields(record.content);
-        log_.texts.emplace("profile", fields.bytes().substr(0, kLongestMcapText_bytes));
-        log_.texts.emplace("library", fields.bytes().substr(0, kLongestMcapText_bytes));
-        break;
-      }
       case kMessage:
         take_message(record.content);
         break;
       case kChunk:
         take_chunk(chunk_of(record.content), at);
         break;
-      case kMetadata:
-        take_metadata(record.content);
-        break;
       case kDataEnd: {
         // Only the first one is checked: a malicious file could contain many.
         const std::uint32_t stored = is_past_data_end_ ? 0 : *integer_at<std::uint32_t>(record.content, 0);
         is_past_data_end_ = true;
-        if (stored != 0 && stored != mcap_checksum(bytes_.substr(0, at))) log_.health.checksum_failed = true;
+        if (stored != 0 && stored != crc32_of(bytes_.substr(0, at))) log_.health.checksum_failed = true;
         break;
       }
       default:
         break;
-    }
-  }
-
-  void take_metadata(std::string_view content) {
-    McapFields fields(content);
-    const std::string name(fields.bytes().substr(0, 256));
-    McapFields entries(fields.bytes());
-    while (!entries.rest().empty() && log_.texts.size() < kMostElements) {
-      const std::string key(entries.bytes().substr(0, 256));
-      const std::string_view value = entries.bytes();
-      if (!entries.is_sound()) return;
-      log_.texts[name + "." + key] = value.substr(0, kLongestMcapText_bytes);
     }
   }
 
@@ -188,8 +277,7 @@ class McapReader {
     const Decompressed content = decompress(compression->second, chunk.records, limit);
     decompression_left_ -= std::min(decompression_left_, content.bytes.size());
     bool is_sound_chunk = content.is_whole && content.bytes.size() == chunk.uncompressed_bytes;
-    if (is_sound_chunk && chunk.checksum != 0)
-      is_sound_chunk = mcap_checksum(content.bytes) == chunk.checksum;
+    if (is_sound_chunk && chunk.checksum != 0) is_sound_chunk = crc32_of(content.bytes) == chunk.checksum;
     if (chunk.is_whole && !is_sound_chunk) {
       ++log_.health.damaged_blocks;
       log_.health.skipped_bytes += chunk.records.size();
@@ -207,7 +295,7 @@ class McapReader {
     std::size_t at = 0;
     while (at < content.size()) {
       const std::optional<McapRecord> record = mcap_record_at(content, at);
-      if (!record || !has_form(*record)) {
+      if (!record || !has_mcap_form(*record)) {
         if (is_whole) ++log_.health.damaged_blocks;
         log_.health.skipped_bytes += content.size() - at;
         return;
@@ -239,24 +327,12 @@ class McapReader {
   }
 
   FoundTopic begin_topic(const McapChannel& channel) {
-    FoundTopic topic;
-    topic.name = channel.topic;
-    auto schema = schemas_.find(channel.schema);
-    if (channel.encoding != "cdr") {
-      topic.fault =
-          "its messages have the encoding \"" + channel.encoding.substr(0, 64) + "\", known is \"cdr\"";
-    } else if (schema == schemas_.end()) {
-      topic.fault = "the file lost the definition of its messages";
-    } else {
-      McapSchema& used = schema->second;
-      if (!used.is_parsed) {
-        used.layout = ros_layout(used.name, used.encoding == "ros2msg" ? used.text : "", used.fault);
-        used.is_parsed = true;
-      }
-      topic.fault = used.fault;
-      if (used.layout) topic.topic.emplace(channel.topic, used.layout, budget_);
-    }
-    return topic;
+    const auto schema = schemas_.find(channel.schema);
+    if (schema == schemas_.end() && channel.encoding == "cdr")
+      return {std::nullopt, channel.topic, "the file lost the definition of its messages"};
+    const McapSchema used = schema == schemas_.end() ? McapSchema() : schema->second;
+    return found_topic(channel.topic, channel.encoding, used.name,
+                       used.encoding == "ros2msg" ? used.text : "", budget_);
   }
 
   void finish() {

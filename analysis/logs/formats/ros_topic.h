@@ -4,34 +4,22 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include "analysis/logs/formats/ros_types.h"
-#include "analysis/logs/raw_log.h"
+#include "analysis/logs/formats/cdr.h"
+#include "analysis/logs/formats/column_table.h"
 
 namespace swarmcert::logs {
 
-/// Layout of the messages of a topic.
-struct RosLayout {
-  std::string type;  ///< long name, for RawTopic
-  /// One schema, or versions that differ only in their number types; the size of a message selects the version.
-  std::vector<RosSchema> versions;
-  bool is_beginning = false;  ///< messages continue after what the schema describes
-};
-
-/// Returns the layout of messages of `type`, preferably from the file's definition, else from ros_messages.h. Returns
+/// Returns the layout of messages of `type`, preferably from the file's definition, else built in. Returns
 /// nullptr and sets `fault` if there is none.
 /// @param text the file's definition; empty if it has none
 std::shared_ptr<const RosLayout> ros_layout(const std::string& type, std::string_view text,
                                             std::string& fault);
-
-/// Limits the memory of all topics of a log together; compressed files can hold far more than their size suggests.
-struct RosBudget {
-  std::size_t places = std::size_t{1} << 20;  ///< fields and array elements
-  std::size_t values = std::size_t{1} << 28;  ///< numbers: 2 GiB
-};
 
 /// Turns serialized messages (CDR in either byte order, versions 1 and 2) into a RawTopic.
 ///
@@ -42,9 +30,8 @@ struct RosBudget {
 class RosTopic {
  public:
   /// @param budget must outlive this object
-  RosTopic(std::string name, std::shared_ptr<const RosLayout> layout, RosBudget& budget);
-  ~RosTopic();
-  RosTopic(RosTopic&&) noexcept;
+  RosTopic(const std::string& name, std::shared_ptr<const RosLayout> layout, RosBudget& budget)
+      : name_(name), layout_(std::move(layout)), budget_(budget), main_(name, layout_->type, budget) {}
 
   /// Returns false, and keeps nothing, if `message` does not match the layout.
   bool add(double time_s, std::string_view message);
@@ -52,8 +39,31 @@ class RosTopic {
   void move_to(RawLog& log);
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  /// A record for the topic of an element of a named array.
+  struct NamedRecord {
+    ColumnTable* table;
+    RosRecord record;
+    std::size_t bytes;
+  };
+
+  bool read_version(std::size_t index, std::string_view message, RosRecord& record);
+  bool read_message(std::size_t type, ColumnTable& table, RosNode* node, RosRecord& record);
+  bool read_field(const RosField& field, ColumnTable& table, RosNode* node, RosRecord& record);
+  bool read_value(const RosField& field, ColumnTable& table, RosNode* node, RosRecord& record);
+  bool read_named_array(const RosField& field);
+  ColumnTable* table_of(std::string_view element_name, const std::string& type);
+
+  const std::string name_;
+  const std::shared_ptr<const RosLayout> layout_;
+  RosBudget& budget_;
+  ColumnTable main_;
+  std::map<std::string, ColumnTable> named_;
+  std::set<std::string> large_arrays_;
+  std::size_t version_ = 0, malformed_ = 0;
+  // Of the message being read.
+  const RosSchema* schema_ = nullptr;
+  CdrCursor cursor_;
+  std::vector<NamedRecord> named_records_;
 };
 
 /// A topic of a file, or the reason why its messages cannot be read.
@@ -65,6 +75,11 @@ struct FoundTopic {
   /// Moves the collected columns to `log`, or notes there what was lost and why. `id` replaces an empty name.
   void move_to(RawLog& log, const std::string& id);
 };
+
+/// Begins a topic; its messages are known only in the encoding "cdr".
+/// @param type, text as for ros_layout()
+FoundTopic found_topic(const std::string& name, const std::string& encoding, const std::string& type,
+                       std::string_view text, RosBudget& budget);
 
 /// Numbers topics of the same name as its instances 0, 1, ...
 void number_instances(RawLog& log);

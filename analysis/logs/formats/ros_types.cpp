@@ -5,7 +5,8 @@
 #include <map>
 #include <set>
 
-#include "analysis/logs/formats/ros_messages.h"
+#include "analysis/logs/csv.h"
+#include "analysis/logs/dictionary.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -16,21 +17,10 @@ constexpr std::size_t kLargestFixedArray = std::size_t{1} << 20;
 constexpr int kDeepestMessage = 12;
 
 std::optional<Scalar> ros_number(std::string_view name) {
-  static const std::map<std::string_view, Scalar> types = {
-      {"bool", Scalar::kUint8},    {"byte", Scalar::kUint8},    {"char", Scalar::kUint8},
-      {"int8", Scalar::kInt8},     {"uint8", Scalar::kUint8},   {"int16", Scalar::kInt16},
-      {"uint16", Scalar::kUint16}, {"int32", Scalar::kInt32},   {"uint32", Scalar::kUint32},
-      {"int64", Scalar::kInt64},   {"uint64", Scalar::kUint64}, {"float32", Scalar::kFloat},
-      {"float64", Scalar::kDouble}};
-  const auto found = types.find(name);
-  return found == types.end() ? std::nullopt : std::optional<Scalar>(found->second);
-}
-
-std::string_view next_line(std::string_view& text) {
-  const std::size_t end = std::min(text.find('\n'), text.size());
-  const std::string_view line = text.substr(0, end);
-  text.remove_prefix(std::min(end + 1, text.size()));
-  return line;
+  if (name == "bool" || name == "byte" || name == "char") return Scalar::kUint8;
+  if (name == "float32") return Scalar::kFloat;
+  if (name == "float64") return Scalar::kDouble;
+  return name == "float" || name == "double" ? std::nullopt : scalar_called(name);
 }
 
 /// Removes and returns the next word; `line` keeps the rest.
@@ -147,12 +137,12 @@ class SchemaBuilder {
   /// Parses all definitions of `text` into written_; the first one is `name`.
   bool parse(std::string name, std::string_view text) {
     WrittenType type;
-    while (!text.empty()) {
-      std::string_view line = next_line(text);
+    for (std::size_t at = 0; at < text.size();) {
+      const std::string_view line = take_text_line(text, at);
       if (line.substr(0, 3) == "===") {
         written_.emplace(name, std::move(type));
         type.clear();
-        std::string_view head = next_line(text);
+        std::string_view head = take_text_line(text, at);
         if (next_word(head) != "MSG:") return fail("its definition has no \"MSG:\" after a line of \"=\"");
         name = short_type_name(next_word(head));
         if (written_.size() > kMostTypes) return fail("its definition has over 512 types");
@@ -216,6 +206,20 @@ class SchemaBuilder {
 };
 
 }  // namespace
+
+std::vector<RosMessageText> builtin_ros_definitions(const std::string& name) {
+  constexpr std::string_view kStart = "\nMSG: ";
+  const std::string_view all = dictionary_text("ros_messages.msg");
+  std::vector<RosMessageText> found;
+  for (std::size_t at = all.find(kStart); at < all.size();) {
+    const std::size_t begin = at + kStart.size(), end = all.find('\n', begin);
+    at = std::min(all.find(kStart, begin), all.size());
+    const std::string_view text = all.substr(end, at - end);
+    if (all.substr(begin, end - begin) == name)
+      found.push_back({text, text.find("\n# ...") != std::string_view::npos});
+  }
+  return found;
+}
 
 std::string short_type_name(std::string_view name) {
   const std::size_t first = name.find('/');

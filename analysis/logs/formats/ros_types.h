@@ -41,6 +41,14 @@ struct RosSchema {
   std::vector<RosType> types;
 };
 
+/// Layout of the messages of a topic.
+struct RosLayout {
+  std::string type;  ///< long name, for RawTopic
+  /// One schema, or versions that differ only in their number types; the size of a message selects the version.
+  std::vector<RosSchema> versions;
+  bool is_beginning = false;  ///< messages continue after what the schema describes
+};
+
 /// Result of parsing a definition: the schema, or why it cannot be used.
 struct RosDefinition {
   std::optional<RosSchema> schema;
@@ -52,10 +60,21 @@ std::string short_type_name(std::string_view name);
 /// Returns "geometry_msgs/msg/Pose" for both.
 std::string long_type_name(std::string_view name);
 
+/// A definition in the syntax of `.msg` files.
+struct RosMessageText {
+  std::string_view text;
+  /// The definition covers only the first fields, which all versions of the message share; the rest is not read.
+  bool is_beginning = false;
+};
+
+/// Returns the built-in definitions of `name` ("geometry_msgs/Pose"); empty if there is none. Several definitions are
+/// versions of the message that differ only in their number types; the size of a message selects one.
+std::vector<RosMessageText> builtin_ros_definitions(const std::string& name);
+
 /// Parses a message definition.
 /// @param name type of the message
 /// @param text its definition, followed by the definitions it uses, each after a line of "=" and a line "MSG:
-///   package/Type". Types missing from the text are taken from ros_messages.h.
+///   package/Type". Types missing from the text are built in (dictionary/ros_messages.msg).
 RosDefinition parse_ros_definition(const std::string& name, std::string_view text);
 
 }  // namespace swarmcert::logs

@@ -1,5 +1,13 @@
-#include "analysis/logs/formats/rosbag_sqlite.h"
-
+/// @file rosbag2 in SQLite (`.db3`), the default of ROS 2 before Iron.
+///
+/// Reads topics as read_mcap() does. Message definitions are taken from the database if it has them (since Iron), else
+/// built in; topics of other types are listed in `skipped`. Single messages compressed with zstd are
+/// supported.
+///
+/// The database is read from memory: nothing is written, locked or created. A journal beside it is not applied; if it
+/// holds messages, `health.truncated` is set and `skipped` lists it. Views, triggers, virtual tables and computed
+/// columns are refused; work and sizes are limited by the size of the file. Reading stops at a damaged page; everything
+/// before it is kept.
 #include <fmt/core.h>
 #include <sqlite3.h>
 
@@ -11,6 +19,7 @@
 
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/decompress.h"
+#include "analysis/logs/formats/formats.h"
 #include "analysis/logs/formats/ros_topic.h"
 #include "nn/base/input_error.h"
 
@@ -160,10 +169,12 @@ class RosbagReader {
     return count > 0;
   }
 
-  void demand_table(const std::string& name) {
-    if (is_plain_table(name)) return;
-    throw files::InputError({path_, "", "table", files::in_quotes(name), "is missing or cannot be read",
+  [[noreturn]] void refuse_table(const std::string& name, const std::string& what) const {
+    throw files::InputError({path_, "", "table", files::in_quotes(name), what,
                              "this SQLite database is not a rosbag2 log, or it is damaged"});
+  }
+  void demand_table(const std::string& name) {
+    if (!is_plain_table(name)) refuse_table(name, "is missing or cannot be read");
   }
 
   void read_definitions() {
@@ -186,45 +197,22 @@ class RosbagReader {
 
   void read_topics() {
     Rows rows(database_, "SELECT id, name, type, serialization_format FROM topics NOT INDEXED");
-    if (!rows.is_prepared()) refuse_columns("topics");
+    if (!rows.is_prepared()) refuse_table("topics", "does not have the columns of a rosbag2");
     while (rows.next() && topics_.size() < kMostTopics) {
       const std::string type(rows.bytes(2).substr(0, 256));
-      const std::string encoding(rows.bytes(3).substr(0, 64));
-      FoundTopic topic;
-      topic.name = rows.bytes(1).substr(0, 1024);
-      if (encoding != "cdr") {
-        topic.fault = "its messages have the encoding \"" + encoding + "\", known is \"cdr\"";
-      } else if (const auto layout = layout_of(type, topic.fault)) {
-        topic.topic.emplace(topic.name, layout, budget_);
-      }
-      topics_.emplace(rows.integer(0), std::move(topic));
-    }
-    if (rows.is_damaged()) ++log_.health.damaged_blocks;
-  }
-
-  std::shared_ptr<const RosLayout> layout_of(const std::string& type, std::string& fault) {
-    auto known = layouts_.find(type);
-    if (known == layouts_.end()) {
       const auto definition = definitions_.find(type);
       const bool has_text = definition != definitions_.end() && definition->second.encoding == "ros2msg";
-      std::string why;
-      const auto layout = ros_layout(type, has_text ? std::string_view(definition->second.text) : "", why);
-      known = layouts_.emplace(type, std::pair{layout, why}).first;
+      topics_.emplace(rows.integer(0),
+                      found_topic(std::string(rows.bytes(1).substr(0, 1024)), std::string(rows.bytes(3)),
+                                  type, has_text ? std::string_view(definition->second.text) : "", budget_));
     }
-    fault = known->second.second;
-    return known->second.first;
-  }
-
-  [[noreturn]] void refuse_columns(const std::string& table) const {
-    throw files::InputError({path_, "", "table", files::in_quotes(table),
-                             "does not have the columns of a rosbag2",
-                             "this SQLite database is not a rosbag2 log, or it is damaged"});
+    if (rows.is_damaged()) ++log_.health.damaged_blocks;
   }
 
   void read_messages() {
     // In file order: sorting would need the same amount of memory again.
     Rows rows(database_, "SELECT topic_id, timestamp, data FROM messages NOT INDEXED");
-    if (!rows.is_prepared()) refuse_columns("messages");
+    if (!rows.is_prepared()) refuse_table("messages", "does not have the columns of a rosbag2");
     while (rows.next()) {
       const std::string_view data = rows.bytes(2);
       if (!take_bytes(data.size() + 1)) {
@@ -286,7 +274,6 @@ class RosbagReader {
   RosBudget budget_;
   std::size_t bytes_left_ = 0, decompression_left_ = 0, without_topic_ = 0;
   std::map<std::string, Definition> definitions_;
-  std::map<std::string, std::pair<std::shared_ptr<const RosLayout>, std::string>> layouts_;
   std::map<std::int64_t, FoundTopic> topics_;
 };
 

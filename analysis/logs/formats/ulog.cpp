@@ -1,17 +1,106 @@
-#include "analysis/logs/formats/ulog.h"
-
+/// @file PX4 ULog (`.ulg`), file format versions 0 and 1.
+///
+/// Reads a log. Topics are identified by name and instance (multi_id); times come from their field `timestamp`.
+/// Parameters are those at the start of the log. A topic whose subscription or format is lost is listed in `skipped`.
+/// Messages of unknown types are skipped, as the format requires. If no valid message follows, the reader searches for
+/// the next valid message that is followed by others, and counts the damaged place and the skipped bytes in `health`.
+/// Sections appended after a crash are read as well.
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <limits>
 
 #include "analysis/logs/formats/bytes.h"
+#include "analysis/logs/formats/formats.h"
 #include "analysis/logs/formats/ulog_formats.h"
-#include "analysis/logs/formats/ulog_messages.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
 namespace {
+
+/// The message types known to this reader.
+constexpr std::string_view kUlogTypes = "ABCDFILMOPQRS";
+
+/// A message: its type and body.
+struct UlogMessage {
+  char type;
+  std::string_view body;
+};
+
+/// A key "type name" and the bytes that follow it, as in information and parameter messages.
+struct KeyedValue {
+  std::string type, name;
+  std::string_view value;
+};
+
+constexpr std::string_view kSyncMagic = "\x2F\x73\x13\x20\x25\x0C\xBB\x12";
+constexpr std::size_t kLongestName = 256;
+constexpr std::size_t kParameter_bytes = 4;
+
+/// Splits `body` into key and value; returns nothing if it has no such key.
+std::optional<KeyedValue> keyed_value(std::string_view body) {
+  if (body.empty()) return std::nullopt;
+  const std::size_t length = static_cast<unsigned char>(body[0]);
+  if (length == 0 || length > body.size() - 1) return std::nullopt;
+  const std::string_view key = body.substr(1, length);
+  const std::size_t blank = key.find(' ');
+  if (blank == std::string_view::npos) return std::nullopt;
+  return KeyedValue{std::string(key.substr(0, blank)), std::string(key.substr(blank + 1)),
+                    body.substr(1 + length)};
+}
+
+/// Returns true if the value has the size that its type requires, or if the type is unknown.
+bool value_size_fits(const KeyedValue& entry) {
+  if (const std::optional<Scalar> number = ulog_number(entry.type))
+    return entry.value.size() == size_of(*number);
+  if (entry.type.compare(0, 5, "char[") != 0) return true;
+  return entry.type == "char[" + std::to_string(entry.value.size()) + "]";
+}
+
+/// Returns the value of a parameter; nothing if it is neither an int32_t nor a float.
+std::optional<double> parameter_of(const KeyedValue& entry) {
+  if (entry.value.size() != kParameter_bytes) return std::nullopt;
+  if (entry.type == "int32_t") return value_of(Scalar::kInt32, entry.value.data());
+  if (entry.type == "float") return value_of(Scalar::kFloat, entry.value.data());
+  return std::nullopt;
+}
+
+/// Returns true if the body has the form required by its type; false for data ('D'), whose form is defined in the file,
+/// and for unknown types. Looks at only a few bytes.
+bool has_form(const UlogMessage& message) {
+  const std::string_view body = message.body;
+  const auto has_key = [&](std::size_t at) {
+    return body.size() > at + 1 && is_identifier(body.substr(at + 1, 1)) && keyed_value(body.substr(at));
+  };
+  switch (message.type) {
+    case 'B':
+      return body.size() >= 40;
+    case 'F':
+      return is_identifier(body.substr(0, 1)) &&
+             body.substr(0, kLongestName).find(':') != std::string_view::npos;
+    case 'I':
+      return has_key(0);
+    case 'P':
+      return has_key(0) && body.size() == 1 + kParameter_bytes + static_cast<unsigned char>(body[0]);
+    case 'M':
+      return !body.empty() && (body[0] == 0 || body[0] == 1) && has_key(1);
+    case 'Q':
+      return has_key(1) && body.size() == 2 + kParameter_bytes + static_cast<unsigned char>(body[1]);
+    case 'A':
+      return body.size() >= 4 && is_identifier(body.substr(3), kLongestName);
+    case 'R':
+    case 'O':
+      return body.size() == 2;
+    case 'L':
+      return body.size() >= 9;
+    case 'C':
+      return body.size() >= 11;
+    case 'S':
+      return body == kSyncMagic;
+    default:
+      return false;
+  }
+}
 
 constexpr std::string_view kUlogMagic = "ULog\x01\x12\x35";
 constexpr std::size_t kFileHead_bytes = 16;
@@ -35,7 +124,7 @@ class UlogReader {
       read_section(begin, end, end == bytes_.size());
       begin = end;
     }
-    report_skipped();
+    for (const auto& [what, records] : left_out_) log_.skipped.push_back({what.first, what.second, records});
     return std::move(log_);
   }
 
@@ -59,7 +148,6 @@ class UlogReader {
     const int version = static_cast<unsigned char>(bytes_[7]);
     if (version > 1)
       refuse_at(path_, 7, "version", std::to_string(version), "is not known", "supported are 0 and 1");
-    log_.texts["file_timestamp_us"] = std::to_string(*integer_at<std::uint64_t>(bytes_, 8));
   }
 
   /// Returns the offsets of appended sections in ascending order.
@@ -191,15 +279,16 @@ class UlogReader {
   /// Precondition: is_unknown(message).
   void leave_out(const UlogMessage& message) {
     if (message.type != 'D') {
-      ++unknown_types_[message.type];
+      ++left_out_[{fmt::format("message type {:#04x}", static_cast<unsigned char>(message.type)),
+                   "is not known"}];
       return;
     }
     const std::uint16_t id = *integer_at<std::uint16_t>(message.body, 0);
     const auto found = subscriptions_.find(id);
     if (found == subscriptions_.end())
-      ++unknown_ids_[id];
+      ++left_out_[{fmt::format("message id {}", id), "the file lost the message that names its topic"}];
     else
-      ++without_format_[found->second.name];
+      ++left_out_[{found->second.name, "its format, or one that it uses, is not defined in the file"}];
   }
 
   void take(const UlogMessage& message) {
@@ -208,17 +297,8 @@ class UlogReader {
       case 'F':
         if (!formats_.add(body)) ++log_.health.damaged_blocks;
         break;
-      case 'I':
-        take_information(body, false);
-        break;
-      case 'M':
-        take_information(body.substr(1), body[0] == 1, true);
-        break;
       case 'P':
         take_parameter(body);
-        break;
-      case 'Q':
-        take_default(body);
         break;
       case 'A':
         subscribe(body);
@@ -230,33 +310,17 @@ class UlogReader {
         take_record(body);
         break;
       case 'L':
-        take_line(body[0], body.substr(1));
+        take_line(body.substr(1));
         break;
       case 'C':
-        take_line(body[0], body.substr(3));
+        take_line(body.substr(3));
         break;
       case 'O':
         log_.dropouts.push_back({last_time_s_, *integer_at<std::uint16_t>(body, 0) / 1e3});
         break;
-      default:  // flags and synchronisation
+      default:  // flags, information, defaults and synchronisation
         break;
     }
-  }
-
-  /// @param continues the text continues the last message with this key
-  void take_information(std::string_view body, bool continues, bool is_one_of_several = false) {
-    const std::optional<KeyedValue> entry = keyed_value(body);
-    if (!entry) {
-      ++log_.health.damaged_blocks;
-      return;
-    }
-    if (!is_one_of_several) {
-      log_.texts.emplace(entry->name, text_of(*entry));
-      return;
-    }
-    std::size_t& count = num_texts_[entry->name];
-    if (!continues || count == 0) ++count;
-    log_.texts[fmt::format("{}[{}]", entry->name, count - 1)] += text_of(*entry);
   }
 
   void take_parameter(std::string_view body) {
@@ -266,20 +330,6 @@ class UlogReader {
       ++log_.health.damaged_blocks;
     else if (log_.health.records == 0)
       log_.parameters[entry->name] = *value;
-    else
-      log_.parameter_changes.push_back({last_time_s_, entry->name, *value});
-  }
-
-  /// Defaults of the airframe (bit 1) take precedence over those of the firmware (bit 0).
-  void take_default(std::string_view body) {
-    const std::optional<KeyedValue> entry = keyed_value(body.substr(1));
-    const std::optional<double> value = entry ? parameter_of(*entry) : std::nullopt;
-    if (!value)
-      ++log_.health.damaged_blocks;
-    else if ((body[0] & 2) != 0)
-      log_.default_parameters[entry->name] = *value;
-    else
-      log_.default_parameters.emplace(entry->name, *value);
   }
 
   void subscribe(std::string_view body) {
@@ -290,11 +340,9 @@ class UlogReader {
   }
 
   /// @param body timestamp and text
-  void take_line(char level, std::string_view body) {
-    // The firmware writes the level as an ASCII digit.
-    const int number = level >= '0' && level <= '9' ? level - '0' : static_cast<unsigned char>(level);
+  void take_line(std::string_view body) {
     const double time_s = static_cast<double>(*integer_at<std::uint64_t>(body, 0)) / 1e6;
-    log_.messages.push_back({time_s, number, until_nul(body.substr(8))});
+    log_.messages.push_back({time_s, until_nul(body.substr(8))});
   }
 
   Topic& topic_of(Subscription& subscription) {
@@ -331,7 +379,6 @@ class UlogReader {
     const UlogLayout& layout = topic.layout;
     if (!layout.timestamp) return;
     const char* const record = body.data() + 2;
-    const std::size_t size = body.size() - 2;
     RawTopic& raw = log_.topics[topic.index];
     last_time_s_ = value_of(layout.timestamp->type, record + layout.timestamp->offset) / 1e6;
     raw.time_s.push_back(last_time_s_);
@@ -339,23 +386,7 @@ class UlogReader {
       const UlogNumber& number = layout.numbers[i];
       raw.columns[i].values.push_back(value_of(number.type, record + number.offset));
     }
-    for (const UlogText& text : layout.texts) {
-      if (text.offset + text.size > size) continue;
-      std::string& stored = raw.texts[text.name];
-      if (stored.empty()) stored = until_nul({record + text.offset, text.size});
-    }
     ++log_.health.records;
-  }
-
-  void report_skipped() {
-    for (const auto& [id, records] : unknown_ids_)
-      log_.skipped.push_back(
-          {fmt::format("message id {}", id), "the file lost the message that names its topic", records});
-    for (const auto& [name, records] : without_format_)
-      log_.skipped.push_back({name, "its format, or one that it uses, is not defined in the file", records});
-    for (const auto& [type, records] : unknown_types_)
-      log_.skipped.push_back(
-          {fmt::format("message type {:#04x}", static_cast<unsigned char>(type)), "is not known", records});
   }
 
   const std::string_view bytes_;
@@ -364,11 +395,8 @@ class UlogReader {
   UlogFormats formats_;
   std::map<std::uint16_t, Subscription> subscriptions_;
   std::vector<Topic> topics_;
-  std::map<std::pair<std::string, int>, std::size_t> topics_of_;  ///< index in topics_
-  std::map<std::string, std::size_t> num_texts_;
-  std::map<std::uint16_t, std::size_t> unknown_ids_;
-  std::map<std::string, std::size_t> without_format_;
-  std::map<char, std::size_t> unknown_types_;
+  std::map<std::pair<std::string, int>, std::size_t> topics_of_;         ///< index in topics_
+  std::map<std::pair<std::string, std::string>, std::size_t> left_out_;  ///< records by name and reason
   std::size_t looked_at_bytes_ = 0;
   double last_time_s_ = std::numeric_limits<double>::quiet_NaN();
 };

@@ -11,17 +11,14 @@ namespace {
 constexpr std::size_t kLargestRecord_bytes = 65535;
 constexpr int kDeepestUlogNesting = 8;
 
-std::optional<Scalar> number_type(std::string_view name) {
-  static const std::map<std::string_view, Scalar> types = {
-      {"int8_t", Scalar::kInt8},     {"uint8_t", Scalar::kUint8},   {"int16_t", Scalar::kInt16},
-      {"uint16_t", Scalar::kUint16}, {"int32_t", Scalar::kInt32},   {"uint32_t", Scalar::kUint32},
-      {"int64_t", Scalar::kInt64},   {"uint64_t", Scalar::kUint64}, {"float", Scalar::kFloat},
-      {"double", Scalar::kDouble},   {"bool", Scalar::kUint8}};
-  const auto found = types.find(name);
-  return found == types.end() ? std::nullopt : std::optional<Scalar>(found->second);
-}
-
 }  // namespace
+
+std::optional<Scalar> ulog_number(std::string_view type) {
+  if (type == "bool") return Scalar::kUint8;
+  const std::size_t end = type.rfind("_t");
+  return end + 2 == type.size() || type == "float" || type == "double" ? scalar_called(type.substr(0, end))
+                                                                       : std::nullopt;
+}
 
 std::optional<UlogFormats::Field> UlogFormats::parse_field(std::string_view text) {
   const std::size_t blank = text.find(' ');
@@ -40,7 +37,7 @@ std::optional<UlogFormats::Field> UlogFormats::parse_field(std::string_view text
     type = type.substr(0, bracket);
   }
   if (!is_identifier(field.name) || !is_identifier(type)) return std::nullopt;
-  field.number = number_type(type);
+  field.number = ulog_number(type);
   field.is_text = type == "char";
   if (!field.number && !field.is_text) field.nested = type;
   return field;
@@ -130,10 +127,8 @@ void UlogFormats::lay_out(const Format& format, const std::string& prefix, std::
     const bool is_time = prefix.empty() && name == "timestamp" && field.number && !field.is_array;
     if (is_time) {
       layout.timestamp = UlogNumber{name, *field.number, offset};
-    } else if (field.is_text && !field.is_padding()) {
-      layout.texts.push_back({name, offset, size});
-    } else if (field.is_padding()) {
-      // Padding carries no data.
+    } else if (field.is_text || field.is_padding()) {
+      // No signal.
     } else if (field.count > kMostElements) {
       layout.large_arrays.push_back(name);
     } else if (!field.is_array) {

@@ -11,21 +11,18 @@
 
 namespace swarmcert::logs {
 
+/// Returns the type called "int8_t", ..., "float", "double", "bool".
+std::optional<Scalar> ulog_number(std::string_view type);
+
 /// A number in a record.
 struct UlogNumber {
   std::string name;  ///< `q[0]`, `esc[2].rpm`
   Scalar type;
   std::size_t offset;
 };
-/// A text in a record.
-struct UlogText {
-  std::string name;
-  std::size_t offset, size;
-};
 struct UlogLayout {
-  std::optional<UlogNumber> timestamp;  ///< microseconds
-  std::vector<UlogNumber> numbers;      ///< without the timestamp and padding
-  std::vector<UlogText> texts;
+  std::optional<UlogNumber> timestamp;    ///< microseconds
+  std::vector<UlogNumber> numbers;        ///< without the timestamp and padding
   std::vector<std::string> large_arrays;  ///< skipped fields with more than kMostElements elements
   bool has_too_many_columns = false;      ///< more than kMostColumns; `numbers` is truncated there
 };
