@@ -16,7 +16,7 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 class FlightWriter {
  public:
   FlightWriter(const AppParameters& normal, std::uint64_t seed) : normal_(normal), random_(seed) {
-    tick_.now_ms = 1000;
+    tick_.now_ms = static_cast<std::uint32_t>(random_.bits());  // what depends on the time may come late
     for (int i = 0; i < kAppPeers; ++i) tick_.peers[i].id = static_cast<std::uint8_t>(201 + i);
   }
 

@@ -9,6 +9,7 @@
 #include <set>
 #include <unordered_set>
 
+#include "analysis/firmware/app_in_image.h"
 #include "analysis/firmware/export_source.h"
 #include "nn/dense_layer.h"
 #include "nn/weights/functions.h"
@@ -104,9 +105,7 @@ std::vector<WeightsObject> weights_objects(const files::Network& network, const 
 std::string duplicate_symbol(const ElfImage& image) {
   std::map<std::string, std::uint32_t> seen;
   for (const Symbol& symbol : image.symbols) {
-    const bool is_ours = symbol.name.find("swarmcert") != std::string::npos || symbol.name == "appMain" ||
-                         symbol.name.rfind("controllerOutOfTree", 0) == 0;
-    if (!is_ours || symbol.name.find('.') != std::string::npos) continue;
+    if (!is_name_of_app(symbol.name) || symbol.name.find('.') != std::string::npos) continue;
     const auto [at, is_new] = seen.emplace(symbol.name, symbol.address);
     if (!is_new && at->second != symbol.address)
       return fmt::format("two symbols {}, at {:#x} and {:#x}", symbol.name, at->second, symbol.address);

@@ -128,7 +128,8 @@ void match_elf(const files::Network& network, const std::string& path, const std
   if (image.why_not.empty() && !network.plain) {
     const std::vector<WeightsObject> objects = weights_objects(network, image);
     blocks = blocks_of(objects, std::move(blocks));
-    std::string twice = duplicate_symbol(image);
+    std::string twice = image.contradiction;
+    if (twice.empty()) twice = duplicate_symbol(image);
     const bool has_names = std::all_of(objects.begin(), objects.end(),
                                        [](const WeightsObject& object) { return object.symbol != nullptr; });
     if (twice.empty() && has_names) twice = second_copy(network, objects, image);
@@ -141,7 +142,8 @@ void match_elf(const files::Network& network, const std::string& path, const std
   const CodeMatch code = match_code(network, image, options.most_neighbours, options.app);
   for (const std::string& what : code.compared) result.compared.push_back(path + ": " + what);
   result.not_covered = code.not_covered;
-  result.holds_app = code.holds_app;
+  if (options.needs_app && code.outcome == CodeMatch::Outcome::kSame && !code.holds_app)
+    result.first_difference = path + " does not hold the app, so that nothing says what flies";
   if (code.outcome == CodeMatch::Outcome::kNotChecked)
     result.not_checked.push_back("the code in " + path + ": " + code.why_not);
   if (code.outcome == CodeMatch::Outcome::kDifferent) result.first_difference = path + ": " + code.difference;
