@@ -29,22 +29,6 @@ float float_of(std::uint32_t bits) {
   return value;
 }
 
-/// Index of the matrix entry (row-major) stored at each position of an array.
-using Order = std::vector<std::size_t>;
-
-/// The layouts in which weights are stored: row-major, column-major, nn::Layout::kBlocks.
-std::vector<Order> orders(const files::Layer& layer) {
-  const auto rows = static_cast<std::size_t>(layer.outputs), columns = static_cast<std::size_t>(layer.inputs);
-  std::vector<Order> result(3);
-  for (std::size_t i = 0; i < rows * columns; ++i) result[0].push_back(i);
-  for (std::size_t j = 0; j < columns; ++j) {
-    for (std::size_t i = 0; i < rows; ++i) result[1].push_back(i * columns + j);
-  }
-  result[2].resize(rows * columns);
-  nn::to_blocks(result[0].data(), layer.outputs, layer.inputs, result[2].data());
-  return result;
-}
-
 Bits reordered(const Bits& matrix, const Order& order) {
   Bits result;
   result.reserve(matrix.size());
@@ -143,6 +127,18 @@ bool resembles(const Place& place, const Bits& expected) {
 }
 
 }  // namespace
+
+std::vector<Order> orders(const files::Layer& layer) {
+  const auto rows = static_cast<std::size_t>(layer.outputs), columns = static_cast<std::size_t>(layer.inputs);
+  std::vector<Order> result(3);
+  for (std::size_t i = 0; i < rows * columns; ++i) result[0].push_back(i);
+  for (std::size_t j = 0; j < columns; ++j) {
+    for (std::size_t i = 0; i < rows; ++i) result[1].push_back(i * columns + j);
+  }
+  result[2].resize(rows * columns);
+  nn::to_blocks(result[0].data(), layer.outputs, layer.inputs, result[2].data());
+  return result;
+}
 
 MatchResult match(const files::Network& network, const std::vector<FloatBlock>& blocks) {
   MatchResult result;

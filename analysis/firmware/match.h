@@ -26,7 +26,13 @@ struct MatchResult {
   std::optional<Difference> first_difference;
 };
 
-/// Searches for every weight matrix (row-major, column-major or in nn::Layout::kBlocks) and every bias vector as
+/// Index of the matrix entry (row-major) stored at each position of an array.
+using Order = std::vector<std::size_t>;
+
+/// The layouts in which weights are stored: row-major, column-major, nn::Layout::kBlocks.
+std::vector<Order> orders(const files::Layer& layer);
+
+/// Searches for every weight matrix (in any of orders()) and every bias vector as
 /// contiguous runs of the same bits. A bias must be in the variable named like its matrix with "bias" instead of
 /// "weight". If there is no such name, it must follow its matrix or, if it has at least four numbers, may be
 /// anywhere: shorter runs occur by chance. Guarantee: `equal` means that all of them are in the file, bit for bit. It

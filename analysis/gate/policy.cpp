@@ -8,6 +8,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/file_keys.h"
 #include "nn/base/input_error.h"
+#include "nn/base/text.h"
 #include "nn/base/toml.h"
 #include "stability/model.h"
 
@@ -144,6 +145,8 @@ Policy read_policy(const std::string& path) {
   policy.path = path;
   policy.release = read_release(top.table("release"), path);
   policy.release_line = top.line("release");
+  for (const std::string& key : top.table("release").keys()) policy.named.insert(key);
+  if (policy.release.has_network()) policy.named.insert("network");
   for (const CheckKind& kind : check_kinds()) {
     if (!top.has(kind.name)) {
       policy.not_run.emplace_back(kind.name);
@@ -151,6 +154,7 @@ Policy read_policy(const std::string& path) {
     }
     const TomlTable table = top.table(kind.name);
     if (kind.describe_keys != nullptr) table.allow_only(files::key_names(kind.describe_keys));
+    for (const std::string& key : files::split_at_commas(kind.needs)) require_file(table, policy, key);
     policy.checks.push_back({kind.name, table.line(), kind.read(table, policy)});
   }
   if (policy.checks.empty()) top.refuse("", "", "asks for no check", "add a table, such as [certificate]");
@@ -199,9 +203,10 @@ int whole_number(const TomlTable& table, const std::string& key, int otherwise) 
   return static_cast<int>(value);
 }
 
-void require_file(const TomlTable& table, const std::string& file, const std::string& key) {
-  if (file.empty())
-    table.refuse("", "", "needs a file that [release] does not name", "add " + key + " there");
+void require_file(const TomlTable& table, const Policy& policy, const std::string& key,
+                  const std::string& otherwise) {
+  if (policy.named.count(key) == 0)
+    table.refuse("", "", "needs a file that [release] does not name", "add " + key + otherwise + " there");
 }
 
 void refuse_without_limit(const TomlTable& table, const std::string& example) {

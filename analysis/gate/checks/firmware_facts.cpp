@@ -115,8 +115,6 @@ void describe_firmware_facts_keys(files::Keys& keys) {
 }
 
 Run read_firmware_facts(const files::TomlTable& table, Policy& policy) {
-  if (!policy.release.has_network()) require_file(table, "", "network");
-  require_file(table, policy.release.facts, "facts");
   std::vector<Wanted> all;
   const auto add = [&](const char* key, const std::string& name, std::vector<std::string> path) {
     if (const auto limit = gate::limit(table, key, "bytes"))

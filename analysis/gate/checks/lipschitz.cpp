@@ -144,7 +144,6 @@ void describe_lipschitz_keys(files::Keys& keys) {
 }
 
 Run read_lipschitz(const files::TomlTable& table, Policy& policy) {
-  if (!policy.release.has_network()) require_file(table, "", "network");
   std::vector<WantedBound> all;
   const auto add = [&all](const char* name, const char* block, const std::optional<Limit>& limit) {
     if (limit) all.push_back({name, std::nullopt, block, *limit});

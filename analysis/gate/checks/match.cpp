@@ -63,15 +63,14 @@ void describe_match_keys(files::Keys& keys) {
 }
 
 Run read_match(const files::TomlTable& table, Policy& policy) {
-  if (!policy.release.has_network()) require_file(table, "", "network");
-  if (policy.release.source.empty()) require_file(table, policy.release.elf, "source or elf");
+  if (policy.release.elf.empty()) require_file(table, policy, "source", " or elf");
   if (!policy.release.is_float32)
     table.refuse("", "", "compares float32 weights with a network that is used in float64");
   const bool needs_app = table.has("entry") && table.choice("entry", kEntries) == 1;
   if (needs_app) {
-    require_file(table, policy.release.elf, "elf");
-    require_file(table, policy.release.gains, "gains");
-    require_file(table, policy.release.model, "model");
+    require_file(table, policy, "elf");
+    require_file(table, policy, "gains");
+    require_file(table, policy, "model");
   }
   return [line = table.line(), needs_app](Evidence& evidence, Checks& checks) {
     const Release& release = evidence.release();
