@@ -114,7 +114,7 @@ void describe_firmware_facts_keys(files::Keys& keys) {
   keys.may<std::map<std::string, double>>("functions_us", "By function.", "us");
 }
 
-Run read_firmware_facts(const files::TomlTable& table, Policy& policy) {
+Run read_firmware_facts(const files::TomlTable& table, Policy&) {
   std::vector<Wanted> all;
   const auto add = [&](const char* key, const std::string& name, std::vector<std::string> path) {
     if (const auto limit = gate::limit(table, key, "bytes"))
