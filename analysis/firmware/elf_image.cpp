@@ -2,6 +2,7 @@
 
 #include <elf.h>
 
+#include <algorithm>
 #include <cstring>
 #include <stdexcept>
 #include <utility>
@@ -75,7 +76,13 @@ std::string contradiction_in(const std::string& bytes, const Elf32_Ehdr& header,
       any_overlap(image.segments, [](const Segment& s) { return Range(s.flashed_at, s.bytes.size()); }))
     return "segments that overlap";
   std::vector<Segment> by_section = image.segments;
-  for (Segment& segment : by_section) segment.bytes.assign(segment.bytes.size(), '\0');
+  // A linker may place the file's own headers in the first segment; a firmware has few of them.
+  const std::size_t headers =
+      sizeof(Elf32_Ehdr) + std::min<std::size_t>(header.e_phnum, 16) * sizeof(Elf32_Phdr);
+  for (Segment& segment : by_section) {
+    const std::size_t kept = segment.bytes.compare(0, SELFMAG, ELFMAG) == 0 ? headers : 0;
+    std::fill(segment.bytes.begin() + std::min(kept, segment.bytes.size()), segment.bytes.end(), '\0');
+  }
   for (std::uint64_t i = 0; i < header.e_shnum; ++i) {
     const auto section = get<Elf32_Shdr>(bytes, std::uint64_t{header.e_shoff} + i * sizeof(Elf32_Shdr));
     if ((section.sh_flags & SHF_ALLOC) == 0 || section.sh_type == SHT_NOBITS) continue;

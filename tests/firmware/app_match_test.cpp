@@ -203,6 +203,13 @@ TEST_F(AppMatch, AFileFromWhichToolsFlashDifferentProgramsIsRefused) {
   over.append(reinterpret_cast<const char*>(segments.data()), size + sizeof moved);
   expect_refused("a segment that is flashed over the controller", over + "\x70\x47\x70\x47");
   expect_match("app.elf", 0, {"equal"});
+  // Linkers for large pages place the file's headers in the first segment, below the program.
+  std::string script = read_text(script_);
+  script.replace(script.find("0x08000000"), 10, "0x08004000");
+  script_ = folder_ / "boot.ld";
+  write_text(script_, script);
+  ASSERT_EQ(link("boot.elf", "-Wl,--gc-sections -Wl,-z,max-page-size=65536").exit_code, 0);
+  expect_match("boot.elf", 0, {"equal"});
 }
 
 TEST_F(AppMatch, SecondCopiesAndSecondEvaluatorsAreRefused) {
