@@ -15,11 +15,7 @@ using Bits = std::vector<std::uint32_t>;
 
 Bits bits_of(const std::vector<double>& values) {
   Bits bits;
-  for (const double value : values) {
-    const float narrow = static_cast<float>(value);
-    bits.emplace_back();
-    std::memcpy(&bits.back(), &narrow, sizeof narrow);
-  }
+  for (const double value : values) bits.push_back(float_bits(static_cast<float>(value)));
   return bits;
 }
 
@@ -190,7 +186,6 @@ MatchResult match(const files::Network& network, const std::vector<FloatBlock>& 
       }
     }
   }
-  result.equal = !result.first_difference.has_value();
   return result;
 }
 

@@ -20,7 +20,7 @@ struct Difference {
 };
 
 struct MatchResult {
-  bool equal = false;
+  bool equal() const { return !first_difference; }
   int arrays = 0;           ///< weight matrices and bias vectors searched for
   std::size_t numbers = 0;  ///< weights and biases in them
   std::optional<Difference> first_difference;

@@ -31,7 +31,7 @@ std::string in_words(const FileDifference& d) {
 void add_weights(const MatchResult& weights, const std::string& path, ArtefactMatch& result) {
   result.arrays = weights.arrays;
   result.numbers = weights.numbers;
-  if (weights.equal || result.first_difference) return;
+  if (weights.equal() || result.first_difference) return;
   result.number_difference = weights.first_difference;
   result.first_difference = in_words(*weights.first_difference, path);
 }
@@ -87,7 +87,7 @@ void add_weights_of_export(const files::Network& network, ArtefactMatch& result)
       const MatchResult weights = match(network, blocks_in_source(bytes, file));
       result.arrays = weights.arrays;
       result.numbers = weights.numbers;
-      if (weights.equal || !result.first_difference) return;
+      if (weights.equal() || !result.first_difference) return;
       result.number_difference = weights.first_difference;
       result.first_difference = in_words(*weights.first_difference, file) + "; " + *result.first_difference;
     } catch (const files::InputError&) {

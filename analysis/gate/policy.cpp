@@ -20,6 +20,24 @@ using files::TomlTable;
 constexpr char kSchema[] = "swarmcert/policy/1";
 const std::vector<std::string> kPrecisions = {"float32", "float64"};
 
+/// Files that are named by one key each.
+struct ReleaseFile {
+  const char *key, *meaning;
+  std::string Release::*path;
+};
+constexpr ReleaseFile kReleaseFiles[] = {
+    {"certificate", "Of the network.", &Release::certificate},
+    {"box", "box.toml.", &Release::box},
+    {"gains", "gains.toml.", &Release::gains},
+    {"model", "model.toml.", &Release::model},
+    {"source", "The exported source, a folder or file.", &Release::source},
+    {"elf", "The firmware.", &Release::elf},
+    {"facts", "firmware-facts.json.", &Release::facts},
+    {"swarm", "swarm.toml.", &Release::swarm},
+    {"promise", "Result of bound --coverage.", &Release::promise},
+    {"vehicles", "flights.toml.", &Release::vehicles},
+    {"columns", "columns.toml of the flights.", &Release::columns}};
+
 /// Resolves `path` relative to the folder of the policy, unless it is absolute.
 std::string resolve(const std::string& policy, const std::string& path) {
   return (std::filesystem::path(policy).parent_path() / path).lexically_normal().string();
@@ -63,17 +81,7 @@ void describe_release(files::Keys& keys) {
   keys.may<Layers>("phi_order", "Of the layers of phi.");
   keys.may<Layers>("rho_order", "Of the layers of rho.");
   keys.may("precision", "In flight.", "", files::OneOf{kPrecisions});
-  keys.may<std::string>("certificate", "Of the network.");
-  keys.may<std::string>("box", "box.toml.");
-  keys.may<std::string>("gains", "gains.toml.");
-  keys.may<std::string>("model", "model.toml.");
-  keys.may<std::string>("source", "The exported source, a folder or file.");
-  keys.may<std::string>("elf", "The firmware.");
-  keys.may<std::string>("facts", "firmware-facts.json.");
-  keys.may<std::string>("swarm", "swarm.toml.");
-  keys.may<std::string>("promise", "Result of bound --coverage.");
-  keys.may<std::string>("vehicles", "flights.toml.");
-  keys.may<std::string>("columns", "columns.toml of the flights.");
+  for (const ReleaseFile& one : kReleaseFiles) keys.may<std::string>(one.key, one.meaning);
   keys.may<files::TextOrTexts>("flights", "Reference flights.");
   keys.may<int>("logs", "How many logs the flights are, so that a missing one is noticed.");
   keys.may<double>("battery_V", "Of the theorem and of the thrust.", "V");
@@ -101,17 +109,7 @@ Release read_release(const TomlTable& table, const std::string& policy) {
   if (!release.network.phi.empty() && !release.network.file.empty())
     table.refuse("network", "", "conflicts with phi and rho", "name one or the other");
   if (table.has("precision")) release.is_float32 = table.choice("precision", kPrecisions) == 0;
-  release.certificate = file("certificate");
-  release.box = file("box");
-  release.gains = file("gains");
-  release.model = file("model");
-  release.source = file("source");
-  release.elf = file("elf");
-  release.facts = file("facts");
-  release.swarm = file("swarm");
-  release.promise = file("promise");
-  release.vehicles = file("vehicles");
-  release.columns = file("columns");
+  for (const ReleaseFile& one : kReleaseFiles) release.*one.path = file(one.key);
   read_recordings(table, policy, release);
   if (table.has("battery_V")) release.battery_V = table.number("battery_V");
   if (!(release.battery_V > 0)) table.refuse("battery_V", "", "must be positive");

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "nn/base/json.h"
 
@@ -19,16 +21,14 @@ bool is_unprintable(std::string_view character) {
          character == "\xEF\xBF\xBD" || character == "\xEF\xBF\xBE" || character == "\xEF\xBF\xBF";
 }
 
-/// Replaces every character by the result of `escape`; nullptr keeps the character.
-template <class Escape>
-std::string escaped(const std::string& text, const Escape& escape) {
+using Replacements = std::vector<std::pair<char, const char*>>;
+
+std::string escaped(const std::string& text, const Replacements& replacements) {
   std::string result;
   for (const char c : text) {
-    if (const char* const replacement = escape(c)) {
-      result += replacement;
-    } else {
-      result += c;
-    }
+    const auto found = std::find_if(replacements.begin(), replacements.end(),
+                                    [c](const auto& one) { return one.first == c; });
+    result += found == replacements.end() ? std::string(1, c) : found->second;
   }
   return result;
 }
@@ -49,22 +49,8 @@ std::string printable(const std::string& text) {
 }
 
 std::string xml(const std::string& text) {
-  return escaped(printable(text), [](char c) -> const char* {
-    switch (c) {
-      case '&':
-        return "&amp;";
-      case '<':
-        return "&lt;";
-      case '>':
-        return "&gt;";
-      case '"':
-        return "&quot;";
-      case '\'':
-        return "&apos;";
-      default:
-        return nullptr;
-    }
-  });
+  return escaped(printable(text),
+                 {{'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&apos;"}});
 }
 
 std::string markdown(const std::string& text) {
@@ -92,22 +78,9 @@ std::string github(const std::string& text, bool is_property) {
     if (end < text.size()) lines += text[end];
     at = end + 1;
   }
-  return escaped(lines, [is_property](char c) -> const char* {
-    switch (c) {
-      case '%':
-        return "%25";
-      case '\r':
-        return "%0D";
-      case '\n':
-        return "%0A";
-      case ':':
-        return is_property ? "%3A" : nullptr;
-      case ',':
-        return is_property ? "%2C" : nullptr;
-      default:
-        return nullptr;
-    }
-  });
+  Replacements replacements = {{'%', "%25"}, {'\r', "%0D"}, {'\n', "%0A"}};
+  if (is_property) replacements.insert(replacements.end(), {{':', "%3A"}, {',', "%2C"}});
+  return escaped(lines, replacements);
 }
 
 std::string uri(const std::string& path) {

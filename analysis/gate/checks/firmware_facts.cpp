@@ -64,10 +64,6 @@ std::string why_of_another(Evidence& evidence, const Json& facts, const std::str
   return "";
 }
 
-}  // namespace
-
-namespace {
-
 void describe_cost(files::Keys& keys) {
   keys.may<int>("instructions", "Counted under QEMU.");
   keys.must<Interval>("modelled_us", "Modelled, not measured: least and most.", "us");
