@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
+#include <string_view>
+#include <utility>
 
 #include "analysis/firmware/app_layout.h"
 #include "analysis/firmware/float_blocks.h"
@@ -25,16 +28,16 @@ constexpr unsigned char kReplacements[] = {
     0x01, 0x48, 0x00, 0x68, 0x70, 0x47, 0x00, 0xbf, 0x00, 0x80, 0x02, 0x20,
     // 0x0c pmGetBatteryVoltage: ldr r0, =kBattery; ldr r0, [r0]; vmov s0, r0; bx lr
     0x02, 0x48, 0x00, 0x68, 0x00, 0xee, 0x10, 0x0a, 0x70, 0x47, 0x00, 0xbf, 0x04, 0x80, 0x02, 0x20,
-    // 0x1c usecTimestamp: movs r0, #0; movs r1, #0; bx lr
-    0x00, 0x20, 0x00, 0x21, 0x70, 0x47, 0x00, 0xbf,
-    // 0x24 peerLocalizationGetPositionByIdx: ldr r1, =kSizeOfPeer; ldr r2, [r1]; muls r0, r2; add r0, r1;
+    // 0x1c usecTimestamp, the same number: ldr.w r0, =kNow; ldr r0, [r0]; movs r1, #0; bx lr
+    0x5f, 0xf8, 0x18, 0x00, 0x00, 0x68, 0x00, 0x21, 0x70, 0x47, 0x00, 0xbf,
+    // 0x28 peerLocalizationGetPositionByIdx: ldr r1, =kSizeOfPeer; ldr r2, [r1]; muls r0, r2; add r0, r1;
     //      adds r0, #kPeersAt - kSizeOfPeer; bx lr
     0x02, 0x49, 0x0a, 0x68, 0x50, 0x43, 0x08, 0x44, 0x38, 0x30, 0x70, 0x47, 0x08, 0x80, 0x02, 0x20,
-    // 0x34 logGetFloat: cmp r0, #7; it hi; movhi r0, #7; ldr r1, =kEstimate; ldr.w r0, [r1, r0, lsl #2]; vmov s0, r0;
+    // 0x38 logGetFloat: cmp r0, #7; it hi; movhi r0, #7; ldr r1, =kEstimate; ldr.w r0, [r1, r0, lsl #2]; vmov s0, r0;
     //      bx lr
     0x07, 0x28, 0x88, 0xbf, 0x07, 0x20, 0x03, 0x49, 0x51, 0xf8, 0x20, 0x00, 0x00, 0xee, 0x10, 0x0a, 0x70,
     0x47, 0x00, 0xbf, 0x10, 0x80, 0x02, 0x20,
-    // 0x4c logGetVarId: the place of a hash of both names in a table, 7 if it is not there.
+    // 0x50 logGetVarId: the place of a hash of both names in a table, 7 if it is not there.
     //      push {r4, r5, lr}; movs r2, #0; movs r4, #2
     0x30, 0xb5, 0x00, 0x22, 0x02, 0x24,
     //      next: ldrb.w r3, [r0], #1; cbz r3, end; lsls r5, r2, #5; subs r2, r5, r2; adds r2, r2, r3; b next
@@ -53,6 +56,14 @@ constexpr char kController[] = "controllerOutOfTree", kInit[] = "controllerOutOf
                kLayout[] = "swarmcert_layout",
                kSettings[] = "_ZN9swarmcert9crazyflie12_GLOBAL__N_18settingsE";
 constexpr std::uint32_t kParametersSize = 32, kStatusSize = 20;
+constexpr std::string_view kOwnNames[] = {kController,       kInit,        kTest, kLayout, kSettings,
+                                          kParametersObject, kStatusObject};
+/// The replaced functions, by their offsets in kReplacements.
+constexpr std::pair<const char*, std::uint32_t> kReplaced[] = {
+    {"xTaskGetTickCount", 0x00}, {"pmGetBatteryVoltage", 0x0c},
+    {"usecTimestamp", 0x1c},     {"peerLocalizationGetPositionByIdx", 0x28},
+    {"logGetFloat", 0x38},       {"logGetVarId", 0x50}};
+constexpr const char* kDelays[] = {"vTaskDelayUntil", "xTaskDelayUntil"};
 
 template <class T>
 T value_at(const std::string& bytes, std::size_t offset) {
@@ -141,7 +152,19 @@ void load(CortexM& target, const ElfImage& image) {
   }
 }
 
-bool holds_app(const ElfImage& image) { return image.find(kController) != nullptr; }
+bool is_name_of_app(const std::string& name) {
+  const auto same = [&name](const auto& one) { return name == one; };
+  return name.find("swarmcert") != std::string::npos || name == kTask ||
+         std::any_of(std::begin(kOwnNames), std::end(kOwnNames), same) ||
+         std::any_of(std::begin(kDelays), std::end(kDelays), same) ||
+         std::any_of(std::begin(kReplaced), std::end(kReplaced),
+                     [&](const auto& one) { return same(one.first); });
+}
+
+bool holds_app(const ElfImage& image) {
+  return std::any_of(std::begin(kOwnNames), std::end(kOwnNames),
+                     [&image](std::string_view name) { return image.find(std::string(name)) != nullptr; });
+}
 
 AppInImage::AppInImage(const ElfImage& image) : image_(image), layout_(layout_of(image)) {
   for (const char* const name : {kController, kInit, kTest, kTask, kSettings}) address(name);
@@ -156,13 +179,12 @@ AppInImage::AppInImage(const ElfImage& image) : image_(image), layout_(layout_of
     if (segment.address <= kCodeAt + 4096 && std::uint64_t{segment.address} + segment.bytes.size() > kCodeAt)
       throw NotRun("it leaves no flash for the replaced functions of the firmware");
   machine_.write(kCodeAt, std::string(reinterpret_cast<const char*>(kReplacements), sizeof kReplacements));
-  replace("xTaskGetTickCount", 0x00);
-  replace("pmGetBatteryVoltage", 0x0c);
-  replace("usecTimestamp", 0x1c);
-  replace("peerLocalizationGetPositionByIdx", 0x24);
-  replace("logGetFloat", 0x34);
-  replace("logGetVarId", 0x4c);
-  delay_ = image.find("vTaskDelayUntil") != nullptr ? address("vTaskDelayUntil") : address("xTaskDelayUntil");
+  for (const auto& [name, offset] : kReplaced) {
+    const std::uint32_t at = address(name);
+    if (image.find(name)->size < 4) throw NotRun(fmt::format("{} is too short to be replaced", name));
+    machine_.write(at, jump(at, kCodeAt + offset));
+  }
+  delay_ = address(kDelays[image.find(kDelays[0]) != nullptr ? 0 : 1]);
   machine_.call(address(kInit), {0, 0, 0, 0}, 0);
 }
 
@@ -170,12 +192,6 @@ std::uint32_t AppInImage::address(const char* name) const {
   const Symbol* const symbol = image_.find(name);
   if (symbol == nullptr) throw NotRun(fmt::format("it has no symbol of {}", name));
   return symbol->address;
-}
-
-void AppInImage::replace(const char* name, std::uint32_t offset) {
-  const std::uint32_t at = address(name);
-  if (image_.find(name)->size < 4) throw NotRun(fmt::format("{} is too short to be replaced", name));
-  machine_.write(at, jump(at, kCodeAt + offset));
 }
 
 std::string AppInImage::inputs_of(const Tick& tick) const {

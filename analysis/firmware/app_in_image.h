@@ -19,7 +19,11 @@ namespace swarmcert::firmware {
 /// @throws NotRun if they do not fit.
 void load(CortexM& target, const ElfImage& image);
 
-/// True if the image contains the app's controller.
+/// Whether the app's code is examined by this name: a function or object of the app, or a function of the firmware that
+/// is replaced.
+bool is_name_of_app(const std::string& name);
+
+/// True if the image contains any function or object of the app.
 bool holds_app(const ElfImage& image);
 
 class AppInImage {
@@ -42,7 +46,6 @@ class AppInImage {
 
  private:
   std::uint32_t address(const char* name) const;
-  void replace(const char* name, std::uint32_t offset);
   std::string inputs_of(const Tick& tick) const;
 
   const ElfImage& image_;

@@ -177,7 +177,7 @@ extern "C" {
 
 TickType_t xTaskGetTickCount() { return swarmcert::firmware::world.tick.now_ms; }
 void vTaskDelayUntil(TickType_t*, TickType_t) {}
-std::uint64_t usecTimestamp() { return 0; }
+std::uint64_t usecTimestamp() { return swarmcert::firmware::world.tick.now_ms; }
 float pmGetBatteryVoltage() { return swarmcert::firmware::world.tick.battery_V; }
 peerLocalizationOtherPosition_t* peerLocalizationGetPositionByIdx(std::uint8_t index) {
   return &swarmcert::firmware::world.peers[index];

@@ -8,7 +8,9 @@
 namespace swarmcert::firmware {
 
 struct Segment {
-  std::uint32_t address = 0;       ///< load address
+  std::uint32_t address = 0;  ///< where the program finds it
+  std::uint32_t flashed_at =
+      0;  ///< where it is written to; the program's start-up code copies what it finds elsewhere
   std::uint32_t bytes_in_use = 0;  ///< size from `address`, including zeros that the file does not store
   std::string bytes;
 };
@@ -24,6 +26,9 @@ struct Symbol {
 
 struct ElfImage {
   std::string why_not;  ///< reason why the program cannot be loaded and run; empty if it can
+  /// Why tools would flash different programs from this file, some by its sections, some by its segments; empty if they
+  /// would not.
+  std::string contradiction;
   std::vector<Segment> segments;
   std::vector<Symbol> symbols;  ///< with an address in the program
 

@@ -1,6 +1,7 @@
 #include "analysis/firmware/golden_flight.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 
 #include "nn/base/random.h"
@@ -11,12 +12,22 @@ namespace {
 constexpr std::uint32_t kPeriod_ms = 10;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
+/// Values that the controller must not use.
+struct Invalid {
+  std::array<float, 3> Tick::*member;
+  float value;
+};
+constexpr Invalid kInvalid[] = {{&Tick::state_position_m, kNaN}, {&Tick::state_position_m, 2000},
+                                {&Tick::state_velocity_m_s, 60}, {&Tick::position_m, kNaN},
+                                {&Tick::position_m, -1500},      {&Tick::velocity_m_s, -70},
+                                {&Tick::acceleration_m_s2, 90},  {&Tick::rates_deg_s, 9000}};
+
 /// Draws the inputs of one period after another. A period of 10 ms has one call of the task and five of the
 /// controller, of which one falls on a skipped tick.
 class FlightWriter {
  public:
   FlightWriter(const AppParameters& normal, std::uint64_t seed) : normal_(normal), random_(seed) {
-    tick_.now_ms = 1000;
+    tick_.now_ms = static_cast<std::uint32_t>(random_.bits());  // what depends on the time may come late
     for (int i = 0; i < kAppPeers; ++i) tick_.peers[i].id = static_cast<std::uint8_t>(201 + i);
   }
 
@@ -103,79 +114,60 @@ class FlightWriter {
     late_ms_ = 0;
     if (period % 2 == 0) return;
     const std::size_t axis = static_cast<std::size_t>(period / 2) % 3;
-    switch (period / 2 % 25) {
-      case 0:
-        tick_.state_position_m[axis] = kNaN;
-        break;
-      case 1:
-        tick_.state_position_m[axis] = 2000;
-        break;
-      case 2:
-        tick_.state_velocity_m_s[axis] = 60;
-        break;
-      case 3:
-        tick_.position_m[axis] = kNaN;
-        break;
-      case 4:
-        tick_.position_m[axis] = -1500;
-        break;
-      case 5:
-        tick_.velocity_m_s[axis] = -70;
-        break;
-      case 6:
-        tick_.acceleration_m_s2[axis] = 90;
-        break;
-      case 7:
+    const std::size_t kind = static_cast<std::size_t>(period / 2) % 25;
+    if (kind < std::size(kInvalid)) {
+      (tick_.*kInvalid[kind].member)[axis] = kInvalid[kind].value;
+      return;
+    }
+    switch (kind) {
+      case 8:
         tick_.battery_V = axis == 0 ? 0.0f : axis == 1 ? 9.0f : kNaN;
         break;
-      case 8:
+      case 9:
         tick_.estimate[axis] = kNaN;
         break;
-      case 9:
+      case 10:
         tick_.estimate[axis] = 1e9f;
         break;
-      case 10:
+      case 11:
         tick_.estimate[3 + axis] = kNaN;
         break;
-      case 11:
+      case 12:
         tick_.peers[axis].position_W_m[axis] = kNaN;
         break;
-      case 12:
+      case 13:
         tick_.peers[axis].position_W_m[axis] = 5000;
         break;
-      case 13:
+      case 14:
         tick_.modes[axis] = 2;
         break;
-      case 14:
-        tick_.modes[axis] = 0;
-        break;
       case 15:
-        tick_.modes = {0, 0, 0, 0, 0};
+        tick_.modes[axis] = 0;
         break;
       case 16:
         tick_.modes = {0, 0, 0, 0, 0};
-        tick_.thrust = 1;
         break;
       case 17:
-        tick_.modes[3] = 2;
+        tick_.modes = {0, 0, 0, 0, 0};
+        tick_.thrust = 1;
         break;
       case 18:
-        tick_.modes[4] = 1;
+        tick_.modes[3] = 2;
         break;
       case 19:
-        tick_.parameters.enable = static_cast<std::uint8_t>(axis == 2 ? 3 : axis);
+        tick_.modes[4] = 1;
         break;
       case 20:
+        tick_.parameters.enable = static_cast<std::uint8_t>(axis == 2 ? 3 : axis);
+        break;
+      case 21:
         tick_.parameters.own_kind = 200;
         break;
-      case 23:
+      case 22:
         self_test_of_task_ = axis == 0 ? kSelfTestFailed : kSelfTestPassed;
         self_test_of_controller_ = kSelfTestFailed;
         break;
-      case 21:
-        tick_.rates_deg_s[axis] = 9000;
-        break;
-      case 22:
+      case 23:
         tick_.parameters.mass_kg *= 1.3f;
         for (float& gain : tick_.parameters.gains) gain *= 1 + within(0.3f);
         break;

@@ -15,6 +15,43 @@ namespace {
 /// Range of the own state for the ground's phi. Neighbours' states lie in the clamp, or in this range if there is none.
 constexpr float kMostPosition_m = 1, kMostVelocity_m_s = 2;
 
+/// Random states of the vehicle and of its neighbours, which have random kinds if `kinds` is empty.
+GoldenVector random_vector(const files::Network& network, int neighbours, std::vector<int> kinds,
+                           files::Random& random) {
+  const auto within = [&](float range) { return range * static_cast<float>(random.symmetric()); };
+  const std::vector<std::string> known = files::neighbour_kinds(network);
+  const int inputs =
+      files::inputs(network, files::FunctionId::set(known.front(), network.rho.begin()->first));
+  GoldenVector vector;
+  for (int i = 0; i < files::kGroundInputs; ++i)
+    vector.own.push_back(within(i == 0 ? kMostPosition_m : kMostVelocity_m_s));
+  vector.inputs.resize(static_cast<std::size_t>(neighbours));
+  const bool draws_kinds = kinds.empty();
+  for (std::vector<float>& input : vector.inputs) {
+    for (int i = 0; i < inputs; ++i) {
+      const double side =
+          !network.clamp ? 0 : std::max(std::abs(network.clamp->lower[i]), std::abs(network.clamp->upper[i]));
+      const float range = network.clamp ? static_cast<float>(1.5 * std::min(side, 1e3))
+                                        : (i < 3 ? kMostPosition_m : kMostVelocity_m_s);
+      input.push_back(within(range));
+    }
+    if (draws_kinds) kinds.push_back(static_cast<int>(random.below(known.size())));
+  }
+  vector.kinds = std::move(kinds);
+  return vector;
+}
+
+/// The neighbours' kinds in each silent composition, as indices.
+std::vector<std::vector<int>> silent_kinds(const files::Network& network, const std::string& own) {
+  const std::vector<int> counts = files::silent_counts(network, own);
+  const std::size_t kinds = files::neighbour_kinds(network).size();
+  std::vector<std::vector<int>> result(counts.size() / kinds);
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    result[i / kinds].insert(result[i / kinds].end(), static_cast<std::size_t>(counts[i]),
+                             static_cast<int>(i % kinds));
+  return result;
+}
+
 }  // namespace
 
 FlightEvaluator::FlightEvaluator(const files::Network& network, int most_neighbours)
@@ -60,47 +97,6 @@ float newton_per_unit(const files::Network& network) {
   files::require_force_z(network);
   return network.output_unit == "N" ? 1.0f : 9.81e-3f;
 }
-
-namespace {
-
-/// Random states of the vehicle and of its neighbours, which have random kinds if `kinds` is empty.
-GoldenVector random_vector(const files::Network& network, int neighbours, std::vector<int> kinds,
-                           files::Random& random) {
-  const auto within = [&](float range) { return range * static_cast<float>(random.symmetric()); };
-  const std::vector<std::string> known = files::neighbour_kinds(network);
-  const int inputs =
-      files::inputs(network, files::FunctionId::set(known.front(), network.rho.begin()->first));
-  GoldenVector vector;
-  for (int i = 0; i < files::kGroundInputs; ++i)
-    vector.own.push_back(within(i == 0 ? kMostPosition_m : kMostVelocity_m_s));
-  vector.inputs.resize(static_cast<std::size_t>(neighbours));
-  const bool draws_kinds = kinds.empty();
-  for (std::vector<float>& input : vector.inputs) {
-    for (int i = 0; i < inputs; ++i) {
-      const double side =
-          !network.clamp ? 0 : std::max(std::abs(network.clamp->lower[i]), std::abs(network.clamp->upper[i]));
-      const float range = network.clamp ? static_cast<float>(1.5 * std::min(side, 1e3))
-                                        : (i < 3 ? kMostPosition_m : kMostVelocity_m_s);
-      input.push_back(within(range));
-    }
-    if (draws_kinds) kinds.push_back(static_cast<int>(random.below(known.size())));
-  }
-  vector.kinds = std::move(kinds);
-  return vector;
-}
-
-/// The neighbours' kinds in each silent composition, as indices.
-std::vector<std::vector<int>> silent_kinds(const files::Network& network, const std::string& own) {
-  const std::vector<int> counts = files::silent_counts(network, own);
-  const std::size_t kinds = files::neighbour_kinds(network).size();
-  std::vector<std::vector<int>> result(counts.size() / kinds);
-  for (std::size_t i = 0; i < counts.size(); ++i)
-    result[i / kinds].insert(result[i / kinds].end(), static_cast<std::size_t>(counts[i]),
-                             static_cast<int>(i % kinds));
-  return result;
-}
-
-}  // namespace
 
 std::vector<GoldenVector> golden_vectors(const files::Network& network, int count, int most_neighbours,
                                          std::uint64_t seed) {

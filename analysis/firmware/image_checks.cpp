@@ -9,19 +9,23 @@
 #include <set>
 #include <unordered_set>
 
+#include "analysis/firmware/app_in_image.h"
 #include "analysis/firmware/export_source.h"
-#include "nn/dense_layer.h"
+#include "analysis/firmware/match.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::firmware {
 namespace {
 
-std::vector<float> as_floats(const std::vector<double>& values) { return {values.begin(), values.end()}; }
+std::string bytes_of(const std::vector<double>& values) {
+  const std::vector<float> narrow(values.begin(), values.end());
+  return {reinterpret_cast<const char*>(narrow.data()), 4 * narrow.size()};
+}
 
-std::string bytes_of(const std::vector<float>& values) {
-  std::string bytes(4 * values.size(), '\0');
-  std::memcpy(bytes.data(), values.data(), bytes.size());
-  return bytes;
+std::string bytes_of(const std::vector<double>& values, const Order& order) {
+  std::vector<double> ordered;
+  for (const std::size_t i : order) ordered.push_back(values[i]);
+  return bytes_of(ordered);
 }
 
 constexpr std::size_t kRun_bytes = 16;
@@ -33,8 +37,7 @@ bool is_telling(const char* run) {
   return std::set<std::uint32_t>(words, words + 4).size() >= 3;
 }
 
-void add_runs(const std::vector<float>& values, std::unordered_set<std::string>& runs) {
-  const std::string bytes = bytes_of(values);
+void add_runs(const std::string& bytes, std::unordered_set<std::string>& runs) {
   for (std::size_t at = 0; at + kRun_bytes <= bytes.size(); at += 4)
     if (is_telling(bytes.data() + at)) runs.insert(bytes.substr(at, kRun_bytes));
 }
@@ -43,17 +46,8 @@ std::unordered_set<std::string> runs_of(const files::Network& network) {
   std::unordered_set<std::string> runs;
   for (const auto& [part, weights] : files::parts(network)) {
     for (const files::Layer& layer : weights->layers) {
-      const std::vector<float> rows = as_floats(layer.weights);
-      std::vector<float> other(rows.size());
-      add_runs(rows, runs);
-      nn::to_blocks(rows.data(), layer.outputs, layer.inputs, other.data());
-      add_runs(other, runs);
-      const auto inputs = static_cast<std::size_t>(layer.inputs),
-                 outputs = static_cast<std::size_t>(layer.outputs);
-      for (std::size_t i = 0; i < outputs; ++i)
-        for (std::size_t j = 0; j < inputs; ++j) other[j * outputs + i] = rows[i * inputs + j];
-      add_runs(other, runs);
-      add_runs(as_floats(layer.biases), runs);
+      for (const Order& order : orders(layer)) add_runs(bytes_of(layer.weights, order), runs);
+      add_runs(bytes_of(layer.biases), runs);
     }
   }
   return runs;
@@ -91,11 +85,9 @@ std::vector<WeightsObject> weights_objects(const files::Network& network, const 
   for (const auto& [part, weights] : files::parts(network)) {
     for (std::size_t k = 0; k < weights->layers.size(); ++k) {
       const files::Layer& layer = weights->layers[k];
-      const std::vector<float> rows = as_floats(layer.weights);
-      std::vector<float> blocks(rows.size());
-      nn::to_blocks(rows.data(), layer.outputs, layer.inputs, blocks.data());
       const std::string name = weights_object(network, part, k);
-      objects.push_back({image.find(name), name, bytes_of(blocks) + bytes_of(as_floats(layer.biases))});
+      objects.push_back(
+          {image.find(name), name, bytes_of(layer.weights, orders(layer).back()) + bytes_of(layer.biases)});
     }
   }
   return objects;
@@ -104,9 +96,7 @@ std::vector<WeightsObject> weights_objects(const files::Network& network, const 
 std::string duplicate_symbol(const ElfImage& image) {
   std::map<std::string, std::uint32_t> seen;
   for (const Symbol& symbol : image.symbols) {
-    const bool is_ours = symbol.name.find("swarmcert") != std::string::npos || symbol.name == "appMain" ||
-                         symbol.name.rfind("controllerOutOfTree", 0) == 0;
-    if (!is_ours || symbol.name.find('.') != std::string::npos) continue;
+    if (!is_name_of_app(symbol.name) || symbol.name.find('.') != std::string::npos) continue;
     const auto [at, is_new] = seen.emplace(symbol.name, symbol.address);
     if (!is_new && at->second != symbol.address)
       return fmt::format("two symbols {}, at {:#x} and {:#x}", symbol.name, at->second, symbol.address);

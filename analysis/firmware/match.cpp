@@ -15,11 +15,7 @@ using Bits = std::vector<std::uint32_t>;
 
 Bits bits_of(const std::vector<double>& values) {
   Bits bits;
-  for (const double value : values) {
-    const float narrow = static_cast<float>(value);
-    bits.emplace_back();
-    std::memcpy(&bits.back(), &narrow, sizeof narrow);
-  }
+  for (const double value : values) bits.push_back(float_bits(static_cast<float>(value)));
   return bits;
 }
 
@@ -27,22 +23,6 @@ float float_of(std::uint32_t bits) {
   float value = 0;
   std::memcpy(&value, &bits, sizeof value);
   return value;
-}
-
-/// Index of the matrix entry (row-major) stored at each position of an array.
-using Order = std::vector<std::size_t>;
-
-/// The layouts in which weights are stored: row-major, column-major, nn::Layout::kBlocks.
-std::vector<Order> orders(const files::Layer& layer) {
-  const auto rows = static_cast<std::size_t>(layer.outputs), columns = static_cast<std::size_t>(layer.inputs);
-  std::vector<Order> result(3);
-  for (std::size_t i = 0; i < rows * columns; ++i) result[0].push_back(i);
-  for (std::size_t j = 0; j < columns; ++j) {
-    for (std::size_t i = 0; i < rows; ++i) result[1].push_back(i * columns + j);
-  }
-  result[2].resize(rows * columns);
-  nn::to_blocks(result[0].data(), layer.outputs, layer.inputs, result[2].data());
-  return result;
 }
 
 Bits reordered(const Bits& matrix, const Order& order) {
@@ -144,6 +124,18 @@ bool resembles(const Place& place, const Bits& expected) {
 
 }  // namespace
 
+std::vector<Order> orders(const files::Layer& layer) {
+  const auto rows = static_cast<std::size_t>(layer.outputs), columns = static_cast<std::size_t>(layer.inputs);
+  std::vector<Order> result(3);
+  for (std::size_t i = 0; i < rows * columns; ++i) result[0].push_back(i);
+  for (std::size_t j = 0; j < columns; ++j) {
+    for (std::size_t i = 0; i < rows; ++i) result[1].push_back(i * columns + j);
+  }
+  result[2].resize(rows * columns);
+  nn::to_blocks(result[0].data(), layer.outputs, layer.inputs, result[2].data());
+  return result;
+}
+
 MatchResult match(const files::Network& network, const std::vector<FloatBlock>& blocks) {
   MatchResult result;
   const auto note = [&](const files::FunctionId& part, const std::string& layer, Difference difference) {
@@ -194,7 +186,6 @@ MatchResult match(const files::Network& network, const std::vector<FloatBlock>& 
       }
     }
   }
-  result.equal = !result.first_difference.has_value();
   return result;
 }
 

@@ -20,13 +20,19 @@ struct Difference {
 };
 
 struct MatchResult {
-  bool equal = false;
+  bool equal() const { return !first_difference; }
   int arrays = 0;           ///< weight matrices and bias vectors searched for
   std::size_t numbers = 0;  ///< weights and biases in them
   std::optional<Difference> first_difference;
 };
 
-/// Searches for every weight matrix (row-major, column-major or in nn::Layout::kBlocks) and every bias vector as
+/// Index of the matrix entry (row-major) stored at each position of an array.
+using Order = std::vector<std::size_t>;
+
+/// The layouts in which weights are stored: row-major, column-major, nn::Layout::kBlocks.
+std::vector<Order> orders(const files::Layer& layer);
+
+/// Searches for every weight matrix (in any of orders()) and every bias vector as
 /// contiguous runs of the same bits. A bias must be in the variable named like its matrix with "bias" instead of
 /// "weight". If there is no such name, it must follow its matrix or, if it has at least four numbers, may be
 /// anywhere: shorter runs occur by chance. Guarantee: `equal` means that all of them are in the file, bit for bit. It

@@ -31,7 +31,7 @@ std::string in_words(const FileDifference& d) {
 void add_weights(const MatchResult& weights, const std::string& path, ArtefactMatch& result) {
   result.arrays = weights.arrays;
   result.numbers = weights.numbers;
-  if (weights.equal || result.first_difference) return;
+  if (weights.equal() || result.first_difference) return;
   result.number_difference = weights.first_difference;
   result.first_difference = in_words(*weights.first_difference, path);
 }
@@ -87,7 +87,7 @@ void add_weights_of_export(const files::Network& network, ArtefactMatch& result)
       const MatchResult weights = match(network, blocks_in_source(bytes, file));
       result.arrays = weights.arrays;
       result.numbers = weights.numbers;
-      if (weights.equal || !result.first_difference) return;
+      if (weights.equal() || !result.first_difference) return;
       result.number_difference = weights.first_difference;
       result.first_difference = in_words(*weights.first_difference, file) + "; " + *result.first_difference;
     } catch (const files::InputError&) {
@@ -128,7 +128,8 @@ void match_elf(const files::Network& network, const std::string& path, const std
   if (image.why_not.empty() && !network.plain) {
     const std::vector<WeightsObject> objects = weights_objects(network, image);
     blocks = blocks_of(objects, std::move(blocks));
-    std::string twice = duplicate_symbol(image);
+    std::string twice = image.contradiction;
+    if (twice.empty()) twice = duplicate_symbol(image);
     const bool has_names = std::all_of(objects.begin(), objects.end(),
                                        [](const WeightsObject& object) { return object.symbol != nullptr; });
     if (twice.empty() && has_names) twice = second_copy(network, objects, image);
@@ -141,7 +142,8 @@ void match_elf(const files::Network& network, const std::string& path, const std
   const CodeMatch code = match_code(network, image, options.most_neighbours, options.app);
   for (const std::string& what : code.compared) result.compared.push_back(path + ": " + what);
   result.not_covered = code.not_covered;
-  result.holds_app = code.holds_app;
+  if (options.needs_app && code.outcome == CodeMatch::Outcome::kSame && !code.holds_app)
+    result.first_difference = path + " does not hold the app, so that nothing says what flies";
   if (code.outcome == CodeMatch::Outcome::kNotChecked)
     result.not_checked.push_back("the code in " + path + ": " + code.why_not);
   if (code.outcome == CodeMatch::Outcome::kDifferent) result.first_difference = path + ": " + code.difference;

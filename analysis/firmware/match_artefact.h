@@ -30,13 +30,13 @@ struct ArtefactMatch {
   std::optional<ExportOptions> parameters;        ///< parameters of an export as stated by its files
   int arrays = 0;           ///< weight matrices and bias vectors compared; 0: the files contain none
   std::size_t numbers = 0;  ///< number of weights and biases in them
-  bool holds_app = false;   ///< an ELF file with the Crazyflie app, which was compared too
 };
 
 struct ArtefactOptions {
   ExportMatchOptions source;
   int most_neighbours = 10;                         ///< of the export that is contained in an ELF file
   ExpectApp app = [] { return AppExpectation(); };  ///< what the app in an ELF file should hold
+  bool needs_app = false;                           ///< an ELF file without the app is another program
 };
 
 /// Compares depending on what `path` is:

@@ -222,8 +222,11 @@ void match_app(const files::Network& network, const ElfImage& image, int most_ne
                   kPeriodsOfFlight + kPeriodsWithOtherWeights,
                   5 * (kPeriodsOfFlight + kPeriodsWithOtherWeights), path.size() - 2));
   result.not_covered.emplace_back(
-      "the firmware around the app: what it passes to controllerOutOfTree() and what it does with the "
-      "result");
+      "the firmware around the app: its start-up code, what it passes to controllerOutOfTree(), and what it "
+      "does "
+      "with the result");
+  result.not_covered.emplace_back(
+      "inputs other than those of the golden flights, and code that recognises the test by its addresses");
   result.not_covered.emplace_back("the kinds of vehicles listed in vehicles.h");
 }
 

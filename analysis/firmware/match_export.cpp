@@ -124,56 +124,28 @@ std::optional<FileDifference> additional_file(const std::string& folder,
                         "is not a file of the export: a compiler may use it in place of a header"};
 }
 
-/// Compares the files of one export.
-class ExportComparison {
- public:
-  ExportComparison(const files::Network& network, const ExportMatchOptions& options)
-      : network_(network), options_(options) {}
-
-  void add(const std::string& name, const std::string& path, const std::string& bytes) {
-    read_.push_back({name, path, with_line_feeds(bytes)});
-  }
-  void note(FileDifference difference) {
-    if (!result_.first_difference) result_.first_difference = std::move(difference);
-  }
-  void absent(const std::string& path) { result_.absent.push_back(path); }
-
-  ExportMatch run() {
-    result_.parameters = parameters();
-    const std::optional<std::string>& certificate = options_.certificate_sha256;
-    const std::string& stated = result_.parameters.certificate_sha256;
-    const std::vector<SourceFile> expected = export_source(network_, result_.parameters);
-    for (const Read& read : read_) {
-      result_.compared.push_back(read.path);
-      const auto same = [&read](const SourceFile& file) { return file.name == read.name; };
-      const SourceFile& file = *std::find_if(expected.begin(), expected.end(), same);
-      if (auto difference = difference_of(read.path, with_line_feeds(file.contents), read.text))
-        note(std::move(*difference));
-    }
-    if (certificate && !stated.empty() && stated != *certificate && !read_.empty())
-      note({read_.front().path, 0, "", "",
-            "was exported with the certificate " + stated + ", not with " + *certificate});
-    return std::move(result_);
-  }
-
- private:
-  struct Read {
-    std::string name, path, text;
-  };
-
-  /// Taken from the first file that states any; the headers of the evaluator state none.
-  ExportOptions parameters() const {
-    for (const Read& read : read_) {
-      if (read.text.find(kParameterLine) != std::string::npos) return stated_parameters(read.text);
-    }
-    return {};
-  }
-
-  const files::Network& network_;
-  const ExportMatchOptions& options_;
-  std::vector<Read> read_;
-  ExportMatch result_;
+/// A file of an export that was read.
+struct Read {
+  std::string name, path, text;
 };
+
+/// Compares contents with those exported again, with the parameters that the first file states that states any; the
+/// headers of the evaluator state none.
+void compare_files(const files::Network& network, const std::vector<Read>& all, ExportMatch& result) {
+  const auto states_any = [](const Read& read) {
+    return read.text.find(kParameterLine) != std::string::npos;
+  };
+  const auto first = std::find_if(all.begin(), all.end(), states_any);
+  if (first != all.end()) result.parameters = stated_parameters(first->text);
+  const std::vector<SourceFile> expected = export_source(network, result.parameters);
+  for (const Read& read : all) {
+    result.compared.push_back(read.path);
+    const auto same = [&read](const SourceFile& file) { return file.name == read.name; };
+    const SourceFile& file = *std::find_if(expected.begin(), expected.end(), same);
+    auto difference = difference_of(read.path, with_line_feeds(file.contents), read.text);
+    if (!result.first_difference) result.first_difference = std::move(difference);
+  }
+}
 
 }  // namespace
 
@@ -203,38 +175,43 @@ std::vector<std::string> files_of_export(const std::string& path) {
 
 ExportMatch match_export(const files::Network& network, const std::string& path,
                          const ExportMatchOptions& options) {
-  ExportComparison comparison(network, options);
-  const bool is_folder = fs::is_directory(path);
-  const bool needs_all = is_folder || options.needs_all;
+  ExportMatch result;
+  std::vector<Read> read;
+  const bool is_folder = fs::is_directory(path), needs_all = is_folder || options.needs_all;
+  const auto note = [&result](const std::string& file, const std::string& what) {
+    if (!result.first_difference) result.first_difference = FileDifference{file, 0, "", "", what};
+  };
+  const auto add = [&read](const std::string& name, const std::string& file, const std::string& bytes) {
+    read.push_back({name, file, with_line_feeds(bytes)});
+  };
   std::string named, folder = path;
+  bool is_alone = false;  // a copy under another name: no related files next to it
   if (!is_folder) {
     const std::string bytes = files::read_file(path);
     named = generated_name(path, bytes);
-    comparison.add(named, path, bytes);
-    if (!files::ends_with(path, named)) {  // a copy under another name: no related files next to it
-      for (const std::string& name : generated_names())
-        if (name != named) comparison.absent(name);
-      if (options.needs_all)
-        comparison.note({path, 0, "", "", "does not have its name in the export, " + named});
-      return comparison.run();
-    }
-    folder = folder_of(path, named);
+    add(named, path, bytes);
+    is_alone = !files::ends_with(path, named);
+    folder = is_alone ? "" : folder_of(path, named);
+    if (is_alone && needs_all) note(path, "does not have its name in the export, " + named);
   }
   for (const std::string& name : generated_names()) {
     if (name == named) continue;
     const std::string file = (fs::path(folder) / name).lexically_normal().string();
-    if (fs::exists(file)) {
-      comparison.add(name, file, files::read_file(file));
+    if (!is_alone && fs::exists(file)) {
+      add(name, file, files::read_file(file));
     } else {
-      comparison.absent(file);
-      if (needs_all) comparison.note({file, 0, "", "", "is missing"});
+      result.absent.push_back(file);
+      if (needs_all) note(file, "is missing");
     }
   }
-  if (needs_all) {
-    if (auto additional = additional_file(folder, options.other_contents))
-      comparison.note(std::move(*additional));
-  }
-  return comparison.run();
+  if (needs_all && !is_alone && !result.first_difference)
+    result.first_difference = additional_file(folder, options.other_contents);
+  compare_files(network, read, result);
+  const std::string& stated = result.parameters.certificate_sha256;
+  if (const auto& certificate = options.certificate_sha256;
+      certificate && !read.empty() && !stated.empty() && stated != *certificate)
+    note(read.front().path, "was exported with the certificate " + stated + ", not with " + *certificate);
+  return result;
 }
 
 }  // namespace swarmcert::firmware

@@ -13,22 +13,12 @@ namespace {
 constexpr char kBaselineSchema[] = "swarmcert/baseline/3";
 constexpr char kMend[] = "write it again with swarmcert gate --update-baseline";
 
-const files::Node& baseline_shape() {
-  static const files::Node shape = [] {
-    files::Node node;
-    files::Record record(node, true);
-    describe_baseline_file(record);
-    return node;
-  }();
-  return shape;
-}
-
 }  // namespace
 
 Baseline read_baseline(const std::string& path) {
   const files::Json document = files::read_json(path, kBaselineSchema);
   try {
-    const std::vector<std::string> keys = files::field_names(baseline_shape());
+    const std::vector<std::string> keys = files::field_names(files::shape_of<Baseline>());
     files::require_keys(document, {keys.begin(), keys.end()}, "the baseline");
     if (document["content_sha256"] != files::content_sha256(document))
       throw std::invalid_argument("content_sha256 is not that of the content");

@@ -11,6 +11,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
+#include "stability/gains.h"
 
 namespace swarmcert::gate {
 namespace {
@@ -19,7 +20,8 @@ using files::Json;
 
 /// Which value of an entry makes the stronger claim. Sets of numbers are compared member by member.
 enum class Order {
-  kUnknown,   ///< no value is known to be
+  kUnknown,   ///< no value is known to be, nor whether stating one is
+  kFixed,     ///< no value is known to be, but stating one is stronger than stating none
   kSmaller,   ///< limits that a value may not exceed, and what is available to the vehicle
   kLarger,    ///< limits that a value may not fall below, and errors that are assumed
   kWider,     ///< [from, to]: what holds on an interval holds on every part of it
@@ -31,6 +33,7 @@ enum class Order {
 constexpr char kMeasured[] = "measured", kInfinite[] = "infinite";
 /// The entry of a set of limits that holds for members without one of their own.
 constexpr char kOthers[] = "others";
+constexpr char kOfFile[] = "a file", kOfClamp[] = "all that the clamp lets through";
 
 struct Rule {
   const char* keys;  ///< "*" stands for any text; "*." at the beginning for any table
@@ -85,7 +88,10 @@ const std::vector<Rule>& rules() {
       {"firmware_facts.parts_us", Order::kSmaller},
       {"firmware_facts.functions_us", Order::kSmaller},
       {"regression.max_increase_percent", Order::kSmaller},
+      {"box", Order::kLater, {}, {kOfFile, kOfClamp}},
       {"box.*", Order::kWider},
+      {"network.unit", Order::kFixed},
+      {"vehicle.*", Order::kFixed},
       {"inputs.network", Order::kReleased},
       {"inputs.weights", Order::kReleased},
       {"inputs.certificate", Order::kReleased},
@@ -93,7 +99,11 @@ const std::vector<Rule>& rules() {
       {"inputs.source", Order::kReleased},
       {"inputs.elf", Order::kReleased},
       {"inputs.facts", Order::kReleased},
-      {"inputs.*", Order::kUnknown},
+      {"inputs.model", Order::kFixed},
+      {"inputs.network of a model", Order::kFixed},
+      {"inputs.swarm", Order::kFixed},
+      {"inputs.promise", Order::kFixed},
+      {"inputs.log", Order::kFixed},
       {"*.max_*", Order::kSmaller},
       {"*.max", Order::kSmaller},
       {"*.min_*", Order::kLarger},
@@ -102,14 +112,14 @@ const std::vector<Rule>& rules() {
 }
 
 const Rule& rule_of(const std::string& key) {
-  static const Rule unknown = {"*"};
+  static const Rule unknown = {"*"}, presence = {"*", Order::kPinned};
   const std::string entry = key.substr(std::min(key.find('.'), key.size()));
   for (const Rule& rule : rules()) {
     const std::string keys = rule.keys;
     const bool is_of_any_table = keys.rfind("*.", 0) == 0;
     if (is_of_any_table ? fits(keys.substr(1), entry) : fits(keys, key)) return rule;
   }
-  return unknown;
+  return entry.empty() ? presence : unknown;
 }
 
 Json json_of(const toml::node& node) {
@@ -173,9 +183,10 @@ bool contains(const Json& outer, const Json& inner) {
 
 /// True if the claim with the value `a` implies that with the value `b`.
 bool implies(const Rule& rule, const Json& a, const Json& b) {
-  if (a == b || b.is_null() || rule.order == Order::kReleased) return true;
-  if (a.is_null()) return false;
-  if (a.is_object() && b.is_object() && rule.order != Order::kUnknown) {  // limits of members
+  if (a == b || rule.order == Order::kReleased) return true;
+  if (b.is_null()) return rule.order != Order::kUnknown;
+  if (a.is_null() || rule.order == Order::kUnknown || rule.order == Order::kFixed) return false;
+  if (a.is_object() && b.is_object()) {  // limits of members
     for (const auto& [member, limit] : b.items()) {
       const Json own = a.contains(member) ? a[member] : a.value(kOthers, Json());
       if (!implies(rule, own, limit)) return false;
@@ -202,6 +213,7 @@ bool implies(const Rule& rule, const Json& a, const Json& b) {
     case Order::kPinned:
       return true;
     case Order::kUnknown:
+    case Order::kFixed:
     case Order::kReleased:
       break;
   }
@@ -271,8 +283,26 @@ Conditions conditions_of(Evidence& evidence) {
     } catch (const Unfounded&) {
     }
   };
+  const auto& release = policy.release;
+  const auto judged_on = conditions.find("lipschitz.domain");
+  if (conditions.count("range") + conditions.count("float32_error") > 0 ||
+      (judged_on != conditions.end() && judged_on->second == "box"))
+    conditions["box"] = release.box.empty() ? kOfClamp : kOfFile;
+  if_readable([&] {  // limits without a unit are in the network's own
+    if (release.has_network()) conditions["network.unit"] = evidence.flown().output_unit;
+  });
+  if_readable([&] {  // gains.toml also says what the vehicle does with the commands
+    if (release.gains.empty()) return;
+    const stability::Gains gains = stability::load_gains(release.gains);
+    conditions["vehicle.motor_lag_s"] = gains.motor_lag_s;
+    conditions["vehicle.attitude_lag_s"] = gains.attitude_lag_s;
+    conditions["vehicle.body_rate_lag_s"] = gains.body_rate_lag_s;
+    conditions["vehicle.delay_s"] = gains.delay_s;
+    conditions["vehicle.network_rate_hz"] = gains.network_rate_hz;
+    conditions["vehicle.network_latency_s"] = gains.network_latency_s;
+  });
   if_readable([&] {
-    if (policy.release.box.empty()) return;
+    if (release.box.empty()) return;
     for (const auto& [part, box] : evidence.domain()) {
       Json& intervals = conditions["box." + part.name()];
       for (std::size_t k = 0; k < box.lower.size(); ++k) intervals.push_back({box.lower[k], box.upper[k]});

@@ -23,7 +23,7 @@ using Conditions = std::map<std::string, files::Json>;
 Conditions conditions_of_policy(const std::string& text, const std::string& path);
 
 /// Returns the conditions of a whole release: those of the policy, its box, the gamma against which the layers are
-/// judged, and the SHA-256 of every input.
+/// judged, the network's unit, what gains.toml says of the vehicle, and the SHA-256 of every input.
 Conditions conditions_of(Evidence& evidence);
 
 struct Change {

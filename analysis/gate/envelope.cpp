@@ -100,6 +100,10 @@ Json sign(const std::string& statement, const std::string& private_key) {
       {"payload", base64(statement)}, {"payloadType", kStatementType}, {"signatures", Json::array({one})}};
 }
 
+void require_public_key(const std::string& public_key) {
+  read_key(public_key, "public", PEM_read_bio_PUBKEY);
+}
+
 std::string why_not_signed(const Json& envelope, const std::string& statement,
                            const std::string& public_key) {
   const Key key = read_key(public_key, "public", PEM_read_bio_PUBKEY);

@@ -21,6 +21,9 @@ inline constexpr char kStatementType[] = "application/vnd.in-toto+json";
 /// @throws files::InputError if the key cannot be read or cannot sign.
 files::Json sign(const std::string& statement, const std::string& private_key);
 
+/// @throws files::InputError if the file holds no public key in PEM.
+void require_public_key(const std::string& public_key);
+
 /// Returns why `envelope` is not `statement` with a valid signature by `public_key` (PEM file); empty if it is. Every
 /// byte of the envelope is determined by the statement, the key and the signature.
 /// @throws files::InputError if the key cannot be read.

@@ -13,16 +13,21 @@
 namespace swarmcert::gate {
 namespace {
 
+Check bad_input(const std::string& name, int line, const std::string& reason) {
+  Check failed = row(name, line);
+  fail(failed, reason);
+  failed.is_bad_input = true;
+  return failed;
+}
+
 /// Adds the rows of `check`, or a row that states why there are none.
 void run(const PlannedCheck& check, Evidence& evidence, Checks& checks) {
   const std::size_t before = checks.size();
   const auto give_up = [&](const std::string& reason, bool is_bad_input) {
     checks.resize(before);
-    Check failed = row(check.name, check.line);
-    fail(failed, reason);
-    failed.is_bad_input = is_bad_input;
-    failed.stands_for_table = true;
-    checks.push_back(std::move(failed));
+    checks.push_back(bad_input(check.name, check.line, reason));
+    checks.back().is_bad_input = is_bad_input;
+    checks.back().stands_for_table = true;
   };
   try {
     check.run(evidence, checks);
@@ -60,13 +65,6 @@ Check judge_conditions(const Policy& policy, const std::vector<Change>& changes,
     check.witness = more;
   }
   return check;
-}
-
-Check bad_input(const std::string& name, int line, const std::string& reason) {
-  Check failed = row(name, line);
-  fail(failed, reason);
-  failed.is_bad_input = true;
-  return failed;
 }
 
 /// Code scanning shows places by their path from the root of the repository.

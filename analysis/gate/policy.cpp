@@ -8,6 +8,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/file_keys.h"
 #include "nn/base/input_error.h"
+#include "nn/base/text.h"
 #include "nn/base/toml.h"
 #include "stability/model.h"
 
@@ -18,6 +19,24 @@ using files::TomlTable;
 
 constexpr char kSchema[] = "swarmcert/policy/1";
 const std::vector<std::string> kPrecisions = {"float32", "float64"};
+
+/// Files that are named by one key each.
+struct ReleaseFile {
+  const char *key, *meaning;
+  std::string Release::*path;
+};
+constexpr ReleaseFile kReleaseFiles[] = {
+    {"certificate", "Of the network.", &Release::certificate},
+    {"box", "box.toml.", &Release::box},
+    {"gains", "gains.toml.", &Release::gains},
+    {"model", "model.toml.", &Release::model},
+    {"source", "The exported source, a folder or file.", &Release::source},
+    {"elf", "The firmware.", &Release::elf},
+    {"facts", "firmware-facts.json.", &Release::facts},
+    {"swarm", "swarm.toml.", &Release::swarm},
+    {"promise", "Result of bound --coverage.", &Release::promise},
+    {"vehicles", "flights.toml.", &Release::vehicles},
+    {"columns", "columns.toml of the flights.", &Release::columns}};
 
 /// Resolves `path` relative to the folder of the policy, unless it is absolute.
 std::string resolve(const std::string& policy, const std::string& path) {
@@ -62,17 +81,7 @@ void describe_release(files::Keys& keys) {
   keys.may<Layers>("phi_order", "Of the layers of phi.");
   keys.may<Layers>("rho_order", "Of the layers of rho.");
   keys.may("precision", "In flight.", "", files::OneOf{kPrecisions});
-  keys.may<std::string>("certificate", "Of the network.");
-  keys.may<std::string>("box", "box.toml.");
-  keys.may<std::string>("gains", "gains.toml.");
-  keys.may<std::string>("model", "model.toml.");
-  keys.may<std::string>("source", "The exported source, a folder or file.");
-  keys.may<std::string>("elf", "The firmware.");
-  keys.may<std::string>("facts", "firmware-facts.json.");
-  keys.may<std::string>("swarm", "swarm.toml.");
-  keys.may<std::string>("promise", "Result of bound --coverage.");
-  keys.may<std::string>("vehicles", "flights.toml.");
-  keys.may<std::string>("columns", "columns.toml of the flights.");
+  for (const ReleaseFile& one : kReleaseFiles) keys.may<std::string>(one.key, one.meaning);
   keys.may<files::TextOrTexts>("flights", "Reference flights.");
   keys.may<int>("logs", "How many logs the flights are, so that a missing one is noticed.");
   keys.may<double>("battery_V", "Of the theorem and of the thrust.", "V");
@@ -100,17 +109,7 @@ Release read_release(const TomlTable& table, const std::string& policy) {
   if (!release.network.phi.empty() && !release.network.file.empty())
     table.refuse("network", "", "conflicts with phi and rho", "name one or the other");
   if (table.has("precision")) release.is_float32 = table.choice("precision", kPrecisions) == 0;
-  release.certificate = file("certificate");
-  release.box = file("box");
-  release.gains = file("gains");
-  release.model = file("model");
-  release.source = file("source");
-  release.elf = file("elf");
-  release.facts = file("facts");
-  release.swarm = file("swarm");
-  release.promise = file("promise");
-  release.vehicles = file("vehicles");
-  release.columns = file("columns");
+  for (const ReleaseFile& one : kReleaseFiles) release.*one.path = file(one.key);
   read_recordings(table, policy, release);
   if (table.has("battery_V")) release.battery_V = table.number("battery_V");
   if (!(release.battery_V > 0)) table.refuse("battery_V", "", "must be positive");
@@ -144,6 +143,8 @@ Policy read_policy(const std::string& path) {
   policy.path = path;
   policy.release = read_release(top.table("release"), path);
   policy.release_line = top.line("release");
+  for (const std::string& key : top.table("release").keys()) policy.named.insert(key);
+  if (policy.release.has_network()) policy.named.insert("network");
   for (const CheckKind& kind : check_kinds()) {
     if (!top.has(kind.name)) {
       policy.not_run.emplace_back(kind.name);
@@ -151,6 +152,7 @@ Policy read_policy(const std::string& path) {
     }
     const TomlTable table = top.table(kind.name);
     if (kind.describe_keys != nullptr) table.allow_only(files::key_names(kind.describe_keys));
+    for (const std::string& key : files::split_at_commas(kind.needs)) require_file(table, policy, key);
     policy.checks.push_back({kind.name, table.line(), kind.read(table, policy)});
   }
   if (policy.checks.empty()) top.refuse("", "", "asks for no check", "add a table, such as [certificate]");
@@ -199,9 +201,10 @@ int whole_number(const TomlTable& table, const std::string& key, int otherwise) 
   return static_cast<int>(value);
 }
 
-void require_file(const TomlTable& table, const std::string& file, const std::string& key) {
-  if (file.empty())
-    table.refuse("", "", "needs a file that [release] does not name", "add " + key + " there");
+void require_file(const TomlTable& table, const Policy& policy, const std::string& key,
+                  const std::string& otherwise) {
+  if (policy.named.count(key) == 0)
+    table.refuse("", "", "needs a file that [release] does not name", "add " + key + otherwise + " there");
 }
 
 void refuse_without_limit(const TomlTable& table, const std::string& example) {

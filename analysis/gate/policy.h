@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,7 @@ struct Policy {
   std::string path;
   Release release;
   int release_line = 0;
+  std::set<std::string> named;       ///< keys of [release]
   std::vector<PlannedCheck> checks;  ///< in order of the registry
   std::vector<std::string> not_run;  ///< checks that the policy does not request
   Conditions conditions;             ///< its entries, with the defaults of those that are left out
@@ -66,6 +68,7 @@ Policy read_policy(const std::string& path);
 struct CheckKind {
   const char* name;     ///< name of its table
   const char* summary;  ///< one-line description
+  const char* needs;    ///< keys of [release] without which it cannot run, between commas
   /// Describes the keys of the table; nullptr: they are names that the policy chooses.
   void (*describe_keys)(files::Keys& keys);
   /// Reads the table, which has no other keys; may store information for other checks in the policy.
@@ -91,8 +94,9 @@ void describe_force_limit(files::Keys& keys, const char* meaning, const std::str
 /// Reads an integer from 1 to 1000.
 int whole_number(const files::TomlTable& table, const std::string& key, int otherwise);
 
-/// Rejects the table unless [release] names `file`, whose key there is `key`.
-void require_file(const files::TomlTable& table, const std::string& file, const std::string& key);
+/// Rejects the table unless [release] has `key`. @param otherwise what could be done instead.
+void require_file(const files::TomlTable& table, const Policy& policy, const std::string& key,
+                  const std::string& otherwise = "");
 
 /// Rejects a table that states none of its limits.
 [[noreturn]] void refuse_without_limit(const files::TomlTable& table, const std::string& example);

@@ -4,40 +4,31 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "nn/base/json.h"
 
 namespace swarmcert::gate {
 namespace {
 
-/// Returns the number of bytes of the UTF-8 sequence (RFC 3629) that starts at `at`; 0 if there is none.
-std::size_t sequence(const std::string& text, std::size_t at) {
-  const auto byte = [&](std::size_t i) -> unsigned {
-    return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0u;
-  };
-  const unsigned first = byte(0);
-  if (first < 0x80) return 1;
-  const std::size_t size = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
-  if (first < 0xc2 || first > 0xf4) return 0;
-  unsigned code = first & (0x7fu >> size);
-  for (std::size_t i = 1; i < size; ++i) {
-    if ((byte(i) & 0xc0u) != 0x80) return 0;
-    code = code << 6 | (byte(i) & 0x3fu);
-  }
-  const unsigned least = size == 4 ? 0x10000 : size == 3 ? 0x800 : 0x80;
-  const bool is_sound = code >= least && code <= 0x10ffff && !(code >= 0xd800 && code < 0xe000) &&
-                        code != 0xfffe && code != 0xffff;
-  return is_sound ? size : 0;
+/// Whether XML and terminals take no such character: controls, and what stands for bytes that are no UTF-8.
+bool is_unprintable(std::string_view character) {
+  const auto first = static_cast<unsigned char>(character[0]);
+  if (character.size() == 1) return first < 0x20 || first == 0x7f;
+  return (character.size() == 2 && first == 0xc2 && static_cast<unsigned char>(character[1]) < 0xa0) ||
+         character == "\xEF\xBF\xBD" || character == "\xEF\xBF\xBE" || character == "\xEF\xBF\xBF";
 }
 
-/// Replaces every character by the result of `escape`; nullptr keeps the character.
-template <class Escape>
-std::string escaped(const std::string& text, const Escape& escape) {
+using Replacements = std::vector<std::pair<char, const char*>>;
+
+std::string escaped(const std::string& text, const Replacements& replacements) {
   std::string result;
   for (const char c : text) {
-    if (const char* const replacement = escape(c)) {
-      result += replacement;
-    } else {
-      result += c;
-    }
+    const auto found = std::find_if(replacements.begin(), replacements.end(),
+                                    [c](const auto& one) { return one.first == c; });
+    result += found == replacements.end() ? std::string(1, c) : found->second;
   }
   return result;
 }
@@ -45,40 +36,21 @@ std::string escaped(const std::string& text, const Escape& escape) {
 }  // namespace
 
 std::string printable(const std::string& text) {
+  using files::Json;
+  const auto valid =
+      Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
   std::string result;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t size = sequence(text, at);
-    const auto c = static_cast<unsigned char>(text[at]);
-    const bool is_control = size == 1
-                                ? c < 0x20 || c == 0x7f
-                                : size == 2 && c == 0xc2 && static_cast<unsigned char>(text[at + 1]) < 0xa0;
-    if (size == 0 || is_control) {
-      result += '?';
-    } else {
-      result.append(text, at, size);
-    }
-    at += size == 0 ? 1 : size;
+  for (std::size_t at = 0, end = 0; at < valid.size(); at = end) {
+    for (end = at + 1; end < valid.size() && (static_cast<unsigned char>(valid[end]) & 0xc0u) == 0x80;) ++end;
+    const std::string_view character(valid.data() + at, end - at);
+    result += is_unprintable(character) ? "?" : character;
   }
   return result;
 }
 
 std::string xml(const std::string& text) {
-  return escaped(printable(text), [](char c) -> const char* {
-    switch (c) {
-      case '&':
-        return "&amp;";
-      case '<':
-        return "&lt;";
-      case '>':
-        return "&gt;";
-      case '"':
-        return "&quot;";
-      case '\'':
-        return "&apos;";
-      default:
-        return nullptr;
-    }
-  });
+  return escaped(printable(text),
+                 {{'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&apos;"}});
 }
 
 std::string markdown(const std::string& text) {
@@ -106,22 +78,9 @@ std::string github(const std::string& text, bool is_property) {
     if (end < text.size()) lines += text[end];
     at = end + 1;
   }
-  return escaped(lines, [is_property](char c) -> const char* {
-    switch (c) {
-      case '%':
-        return "%25";
-      case '\r':
-        return "%0D";
-      case '\n':
-        return "%0A";
-      case ':':
-        return is_property ? "%3A" : nullptr;
-      case ',':
-        return is_property ? "%2C" : nullptr;
-      default:
-        return nullptr;
-    }
-  });
+  Replacements replacements = {{'%', "%25"}, {'\r', "%0D"}, {'\n', "%0A"}};
+  if (is_property) replacements.insert(replacements.end(), {{':', "%3A"}, {',', "%2C"}});
+  return escaped(lines, replacements);
 }
 
 std::string uri(const std::string& path) {

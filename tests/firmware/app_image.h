@@ -43,13 +43,13 @@ class AppImageTest : public FirmwareTest {
   /// Links all objects, without throwing away what nobody calls, as an attacker would.
   Outcome link(const std::string& image, const std::string& options = "-Wl,--gc-sections",
                const std::string& more = "") {
-    return run(kCompiler + " -nostartfiles -T " SWARMCERT_SOURCE_DIR "/tests/firmware/stm32f405.ld " +
-               options +
+    return run(kCompiler + " -nostartfiles -T " + script_ + " " + options +
                " objects/startup.o objects/firmware.o objects/stub.o objects/flight.o objects/network.o "
                "objects/network_task.o objects/parameters.o " +
                more + " -o " + image);
   }
 
+  std::string script_ = SWARMCERT_SOURCE_DIR "/tests/firmware/stm32f405.ld";
   static inline const std::string kStub = SWARMCERT_SOURCE_DIR "/tests/firmware/crazyflie_stub/";
   static inline const std::string kFlags =
       " -mcpu=cortex-m4 -mthumb -mfpu=fpv4-sp-d16 -mfloat-abi=hard -Os -fno-math-errno -fno-strict-aliasing "

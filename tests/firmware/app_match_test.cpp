@@ -1,7 +1,9 @@
 // What flies is what was certified: byte patches of the linked app, second copies of its weights, and second
 // evaluators are not accepted, unless they change nothing that flies.
+#include <elf.h>
 #include <fmt/core.h>
 
+#include <cstring>
 #include <functional>
 
 #include "analysis/firmware/app_in_image.h"
@@ -158,6 +160,58 @@ TEST_F(AppMatch, BytePatchesOfTheLinkedImageAreNotAcceptedUnlessTheyChangeNothin
               refused, neutral);
 }
 
+TEST_F(AppMatch, AFileFromWhichToolsFlashDifferentProgramsIsRefused) {
+  const std::string good = read_text(folder_ / "app.elf");
+  Elf32_Ehdr header;
+  std::memcpy(&header, good.data(), sizeof header);
+  std::vector<Elf32_Phdr> segments(header.e_phnum);
+  const std::size_t size = segments.size() * sizeof segments[0];
+  std::memcpy(segments.data(), good.data() + header.e_phoff, size);
+  const ElfImage image = firmware::read_arm_image(good);
+  const Symbol* const controller = image.find("controllerOutOfTree");
+  const std::uint32_t at_controller = controller->address - segments[0].p_vaddr;
+  std::string patched = image.segments[0].bytes;
+  patched.replace(at_controller, 2, "\x70\x47");  // returns at once
+  const auto expect_refused = [&](const std::string& what, const std::string& bytes) {
+    write_text(folder_ / "trick.elf", bytes);
+    std::string output;
+    EXPECT_EQ(match("trick.elf", &output), 1) << what << output;
+  };
+  // What is written to flash by segments, and by sections as `objcopy -O binary` does.
+  std::string by_segment = good, by_section = good;
+  by_segment.resize((good.size() + 4095) / 4096 * 4096);
+  Elf32_Phdr moved = segments[0];
+  moved.p_offset = static_cast<std::uint32_t>(by_segment.size());
+  std::memcpy(by_segment.data() + header.e_phoff, &moved, sizeof moved);
+  expect_refused("a patched controller in the segments only", by_segment + patched);
+  for (std::size_t i = 0; i < header.e_shnum; ++i) {
+    Elf32_Shdr section;
+    char* const place = by_section.data() + header.e_shoff + i * sizeof section;
+    std::memcpy(&section, place, sizeof section);
+    if (section.sh_addr > controller->address || controller->address - section.sh_addr >= section.sh_size)
+      continue;
+    section.sh_offset = static_cast<std::uint32_t>(good.size()) + section.sh_addr - segments[0].p_vaddr;
+    std::memcpy(place, &section, sizeof section);
+  }
+  expect_refused("a patched controller in the sections only", by_section + patched);
+  std::string over = good;
+  segments.push_back({PT_LOAD, static_cast<std::uint32_t>(good.size() + size + sizeof moved), 0x2001f000,
+                      controller->address, 4, 4, PF_R, 4});
+  header.e_phoff = static_cast<std::uint32_t>(good.size());
+  ++header.e_phnum;
+  std::memcpy(over.data(), &header, sizeof header);
+  over.append(reinterpret_cast<const char*>(segments.data()), size + sizeof moved);
+  expect_refused("a segment that is flashed over the controller", over + "\x70\x47\x70\x47");
+  expect_match("app.elf", 0, {"equal"});
+  // Linkers for large pages place the file's headers in the first segment, below the program.
+  std::string script = read_text(script_);
+  script.replace(script.find("0x08000000"), 10, "0x08004000");
+  script_ = folder_ / "boot.ld";
+  write_text(script_, script);
+  ASSERT_EQ(link("boot.elf", "-Wl,--gc-sections -Wl,-z,max-page-size=65536").exit_code, 0);
+  expect_match("boot.elf", 0, {"equal"});
+}
+
 TEST_F(AppMatch, SecondCopiesAndSecondEvaluatorsAreRefused) {
   ASSERT_EQ(run("cp -r out other && cp app/network.cpp other_network.cpp").exit_code, 0);
   // The other network: the first weight of every layer, in hexadecimal, with one bit changed.
@@ -294,6 +348,18 @@ TEST_F(AppMatch, SecondCopiesAndSecondEvaluatorsAreRefused) {
        source_trick("flight", "kMaxPredictionAge_ms = 100", "kMaxPredictionAge_ms = 400")},
       {"a gain of the attitude", source_trick("flight", "{10, 10, 4}", "{10, 10, 4.5}")},
       {"another thrust map", source_trick("flight", "20.5733023f", "20.5733043f")},
+      {"the app asks which processor it runs on",
+       source_trick("flight", "applies ? swarmcert_status.predicted_N : 0.0f",
+                    "applies ? (*(volatile unsigned*)0xE000ED00 == 0x410FC241u ? 2 : 1) * "
+                    "swarmcert_status.predicted_N : 0.0f")},
+      {"the app waits for a minute",
+       source_trick("flight", "applies ? swarmcert_status.predicted_N : 0.0f",
+                    "applies ? (usecTimestamp() > 60000 ? 2 : 1) * swarmcert_status.predicted_N : 0.0f")},
+      {"the controller has no name",
+       [&] {
+         source_trick("flight", "{10, 10, 4}", "{10, 10, 4.5}")();
+         return run("arm-none-eabi-objcopy --strip-symbol=controllerOutOfTree trick.elf");
+       }},
       {"an undisturbed torque",
        source_trick("flight", "settings.robust = {{10, 10, 4}", "settings.robust = {{0, 0, 0}")},
   };

@@ -117,11 +117,12 @@ TEST(GateBundle, IsAcceptedAsWrittenAndRejectedWithAnyFileChangedMissingAddedOrS
   EXPECT_EQ(run_shell(verify + "--key key.pub", elsewhere.path()).exit_code, 0);
   EXPECT_EQ(document(elsewhere.path(), "v.json")["not_verified"].size(), 0u);
   EXPECT_EQ(run_shell(verify, elsewhere.path()).exit_code, 0);
-  EXPECT_EQ(document(elsewhere.path(), "v.json")["not_verified"].size(), 1u) << "who made it";
+  EXPECT_EQ(document(elsewhere.path(), "v.json")["not_verified"].size(), 2u) << "who made it, and its words";
   const std::string sha256 = files::sha256(read_text(bundle + "/statement.json"));
   EXPECT_EQ(run_shell(verify + "--sha256 " + sha256, elsewhere.path()).exit_code, 0);
   EXPECT_EQ(run_shell(verify + "--sha256 12", elsewhere.path()).exit_code, 1);
   EXPECT_EQ(run_shell(verify + "--key absent.pub", elsewhere.path()).exit_code, 3);
+  EXPECT_EQ(run_shell(verify + "--key bundle/gate.json", elsewhere.path()).exit_code, 3) << "no key";
 
   const std::vector<std::string> files = files_of(bundle);
   files::Random random(9);
@@ -221,6 +222,8 @@ TEST(GateBundle, EveryRowIsDerivedAgainFromTheEvidenceSoThatRehashedDocumentsHid
       {"a failed verdict", with_rows([](Json& r) { r["verdict"] = "fail"; })},
       {"another input's hash", with_rows([](Json& r) { r["inputs"][1]["sha256"] = files::sha256("x"); })},
       {"an input left out", with_rows([](Json& r) { r["inputs"].erase(r["inputs"].begin()); })},
+      {"a remark added", with_rows([](Json& r) { r["remark"] = "approved for 10 m/s"; })},
+      {"a reason", with_rows([](Json& r) { r["checks"][0]["reason"] = "approved"; })},
       {"a change invented", with_rows([](Json& r) {
          r["changes"].push_back({{"condition", "x"}, {"before", 1}, {"now", 2}, {"claim", "stronger"}});
        })},

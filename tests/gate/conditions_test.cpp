@@ -94,6 +94,9 @@ TEST(GateConditions, AChangeThatNothingOrdersIsOpenAndAnotherReleasedFileIsNone)
                "weaker")
       << "a limit in another unit is another limit";
   EXPECT_STREQ(claim(of("[x]\nnew_key = 1\n"), of("[x]\nnew_key = 2\n")), "open") << "a key without an order";
+  EXPECT_STREQ(claim(of("[x]\n"), of("[x]\nnew_key = 2\n")), "open") << "its absence may be stronger";
+  EXPECT_STREQ(claim({}, {{"inputs.columns", {{"columns.toml", "1"}}}}), "open")
+      << "the logs are read otherwise";
   EXPECT_STREQ(claim({{"inputs.model", {{"m.toml", "1"}}}}, {{"inputs.model", {{"m.toml", "2"}}}}), "open");
   EXPECT_STREQ(claim({{"inputs.log", {{"a", "1"}}}}, {{"inputs.log", {{"a", "1"}, {"b", "2"}}}}), "open")
       << "calm flights would thin out the others";
@@ -163,6 +166,46 @@ TEST(GateCommand, WeakerConditionsFailUnlessTheBaselineIsUpdated) {
   EXPECT_EQ(release.run("swarmcert verify-bundle bundle -q").exit_code, 0);
 }
 
+TEST(GateCommand, WhatReleasedFilesSayOfVehicleUnitAndInputsIsAConditionToo) {
+  const ReleaseFolder release;
+  const std::string command = "swarmcert gate policy.toml -q --baseline baseline.json";
+  const std::string start =
+      "schema = \"swarmcert/policy/1\"\n[release]\nnetwork = \"network/network.toml\"\ngains = "
+      "\"gains.toml\"\n"
+      "model = \"model.toml\"\n";
+  const std::string tables =
+      "[range]\nmax_abs_force = 100\n[tracking]\namplitude_N = 0.001\nguard_factor = 1\nmax_error_m = "
+      "10\nover = "
+      "\"corners\"\n";
+  const std::string gains = read_text(release / "gains.toml"),
+                    network = read_text(release / "network/network.toml");
+  const std::string with_lag = gains + "\n[lag]\nmotor_s = 0.05\n";
+  const std::string clamped =
+      network + "[input.clamp]\nlower = [-1, -1, -1, -2, -2, -2]\nupper = [1, 1, 1, 2, 2, 2]\n";
+  const auto put = [&](const std::string& policy, const std::string& of_gains,
+                       const std::string& of_network) {
+    write_text(release / "policy.toml", policy);
+    write_text(release / "gains.toml", of_gains);
+    write_text(release / "network/network.toml", of_network);
+  };
+  put(start + tables, with_lag, clamped);
+  ASSERT_EQ(release.run(command + " --update-baseline").exit_code, 0);
+  ASSERT_EQ(release.run(command).exit_code, 0);
+  std::string newton = clamped;
+  newton.replace(newton.find("\"gf\""), 4, "\"N\"");
+  const std::tuple<const char*, std::string, std::string, std::string> weaker[] = {
+      {"vehicle.motor_lag_s: 0.05 before, 0 now", start + tables, gains, clamped},
+      {"network.unit: gf before, N now", start + tables, with_lag, newton},
+      {"box: all that the clamp lets through before", start + "box = \"network/box.toml\"\n" + tables,
+       with_lag, clamped}};
+  for (const auto& [word, policy, of_gains, of_network] : weaker) {
+    put(policy, of_gains, of_network);
+    const Outcome outcome = release.run(command);
+    EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
+    EXPECT_NE(outcome.output.find(word), std::string::npos) << word << " in\n" << outcome.output;
+  }
+}
+
 TEST(GateCommand, AnApprovedHashIsThatOfAReleasedFile) {
   const ReleaseFolder release;
   const std::string text = read_text(release / "gains.toml");
@@ -185,14 +228,18 @@ TEST(GateCommand, ADamagedBaselineOrAPipeIsRefusedBeforeAnyCheckAndABrokenPolicy
   EXPECT_EQ(files::parse_json(read_text(release / "gate.json"), "gate.json")["checks"].size(), 1u)
       << "no check has run";
 
-  for (const std::string file : {"baseline.json", "facts.json", "network/network.toml", "policy.toml"}) {
-    const ReleaseFolder other(release);
-    std::filesystem::remove(other / file);
-    const Outcome outcome =
-        other.run("mkfifo " + file + " && timeout 20 swarmcert gate policy.toml --baseline " +
-                  (file == "baseline.json" ? file : "none.json --update-baseline"));
-    EXPECT_EQ(outcome.exit_code, 3) << file << outcome.output;
-    EXPECT_NE(outcome.output.find("is a pipe"), std::string::npos) << file << outcome.output;
+  for (const auto& [make, word] :
+       {std::pair("mkfifo ", "is a pipe"), std::pair("ln -s /dev/zero ", "fail")}) {
+    for (const std::string file :
+         {"baseline.json", "facts.json", "network/network.toml", "policy.toml", "swarm.toml"}) {
+      const ReleaseFolder other(release);
+      std::filesystem::remove(other / file);
+      const Outcome outcome =
+          other.run(make + file + " && timeout 20 swarmcert gate policy.toml --baseline " +
+                    (file == "baseline.json" ? file : "none.json --update-baseline"));
+      EXPECT_EQ(outcome.exit_code, 3) << file << outcome.output;
+      EXPECT_NE(outcome.output.find(word), std::string::npos) << file << outcome.output;
+    }
   }
 
   write_text(release / "policy.toml", "schema = \"swarmcert/policy/1\"\n[release]\n\n[certificat]\n");

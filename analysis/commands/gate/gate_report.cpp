@@ -13,8 +13,6 @@
 namespace swarmcert::analysis {
 namespace {
 
-std::string cell(const std::optional<double>& x) { return x ? gate::number(x) : "-"; }
-
 /// The share of its limit that a check uses, in percent, such that more than 100 fails whether the limit is an upper
 /// or a lower one. NaN if the ratio is meaningless.
 double used_percent(const gate::Check& check) {
@@ -30,9 +28,9 @@ void add_checks(Report& report, const gate::GateResult& result) {
   for (const gate::Check& check : result.checks) {
     const double used = used_percent(check);
     if (std::isfinite(used)) bars.push_back({check.name, used, kNone, kNone});
-    rows.push_back({check.name, gate::name(check.verdict), cell(check.value),
-                    check.limit ? (check.more_is_worse ? "≤ " : "≥ ") + cell(check.limit) : "-",
-                    cell(check.baseline), check.unit, fmt::format("{}", check.line)});
+    rows.push_back({check.name, gate::name(check.verdict), gate::number(check.value),
+                    check.limit ? (check.more_is_worse ? "≤ " : "≥ ") + gate::number(check.limit) : "-",
+                    gate::number(check.baseline), check.unit, fmt::format("{}", check.line)});
   }
   if (!bars.empty())
     report.bars("limits", bars, "used of the limit [%]",

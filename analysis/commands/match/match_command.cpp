@@ -136,6 +136,7 @@ int run_match(MatchOptions options, const CommonOptions& common) {
     throw UsageError("--gains and --model belong together: gains are converted with the vehicle's mass");
   if (!options.gains.empty()) {
     inputs.insert(inputs.end(), {options.gains, options.model});
+    artefact.needs_app = true;
     artefact.app = [&options] { return gate::expected_app(options.gains, options.model); };
   }
   const firmware::ArtefactMatch match = match_artefact(network, options.file, artefact);

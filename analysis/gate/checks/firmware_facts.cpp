@@ -64,10 +64,6 @@ std::string why_of_another(Evidence& evidence, const Json& facts, const std::str
   return "";
 }
 
-}  // namespace
-
-namespace {
-
 void describe_cost(files::Keys& keys) {
   keys.may<int>("instructions", "Counted under QEMU.");
   keys.must<Interval>("modelled_us", "Modelled, not measured: least and most.", "us");
@@ -114,9 +110,7 @@ void describe_firmware_facts_keys(files::Keys& keys) {
   keys.may<std::map<std::string, double>>("functions_us", "By function.", "us");
 }
 
-Run read_firmware_facts(const files::TomlTable& table, Policy& policy) {
-  if (!policy.release.has_network()) require_file(table, "", "network");
-  require_file(table, policy.release.facts, "facts");
+Run read_firmware_facts(const files::TomlTable& table, Policy&) {
   std::vector<Wanted> all;
   const auto add = [&](const char* key, const std::string& name, std::vector<std::string> path) {
     if (const auto limit = gate::limit(table, key, "bytes"))

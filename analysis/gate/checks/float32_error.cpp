@@ -15,8 +15,7 @@ void describe_float32_error_keys(files::Keys& keys) {
   keys.may<double>("input_step", "Of the inputs in flight.");
 }
 
-Run read_float32_error(const files::TomlTable& table, Policy& policy) {
-  if (!policy.release.has_network()) require_file(table, "", "network");
+Run read_float32_error(const files::TomlTable& table, Policy&) {
   const std::optional<Limit> limit = force_limit(table, "max_error");
   if (!limit) refuse_without_limit(table, "max_error_gf = 0.05");
   lipschitz::Float32Options options;

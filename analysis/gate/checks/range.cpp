@@ -81,8 +81,7 @@ void describe_range_keys(files::Keys& keys) {
   keys.may<int>("neighbours", "At most.");
 }
 
-Run read_range(const files::TomlTable& table, Policy& policy) {
-  if (!policy.release.has_network()) require_file(table, "", "network");
+Run read_range(const files::TomlTable& table, Policy&) {
   std::vector<WantedRange> all;
   const auto add = [&](const char* name, const char* stem, RangeQuantity quantity, bool is_most) {
     if (const auto limit = force_limit(table, stem, "", is_most)) all.push_back({name, quantity, *limit});

@@ -13,7 +13,8 @@
 namespace swarmcert::gate {
 namespace {
 
-enum class ResidualQuantity { kRmse, kRmseZ, kBias, kP95, kRecords };
+using residuals::ErrorStatistics;
+using ResidualQuantity = double (*)(const ErrorStatistics&);
 
 struct WantedResidual {
   std::string name;
@@ -21,20 +22,8 @@ struct WantedResidual {
   Limit limit;
 };
 
-double value_of(const residuals::ErrorStatistics& s, ResidualQuantity quantity) {
-  switch (quantity) {
-    case ResidualQuantity::kRmse:
-      return s.rmse.total;
-    case ResidualQuantity::kRmseZ:
-      return s.rmse.z;
-    case ResidualQuantity::kBias:
-      return std::max({std::abs(s.bias.x), std::abs(s.bias.y), std::abs(s.bias.z)});
-    case ResidualQuantity::kP95:
-      return s.p95.total;
-    case ResidualQuantity::kRecords:
-      break;
-  }
-  return static_cast<double>(s.samples);
+double largest_bias(const ErrorStatistics& s) {
+  return std::max({std::abs(s.bias.x), std::abs(s.bias.y), std::abs(s.bias.z)});
 }
 
 /// Names the flight with the largest error, for a row that fails.
@@ -60,28 +49,26 @@ void describe_residual_keys(files::Keys& keys) {
   keys.may<int>("min_records", "On which it is judged.");
 }
 
-Run read_residual(const files::TomlTable& table, Policy& policy) {
-  require_file(table, policy.release.model, "model");
-  require_file(table, policy.release.flights.empty() ? "" : policy.release.flights.front(), "flights");
+Run read_residual(const files::TomlTable& table, Policy&) {
   std::vector<WantedResidual> all;
   const auto add = [&](const char* name, const char* stem, ResidualQuantity quantity) {
     if (const auto limit = force_limit(table, stem)) all.push_back({name, quantity, *limit});
   };
-  add("residual", "max_rmse", ResidualQuantity::kRmse);
-  add("residual.rmse_z", "max_rmse_z", ResidualQuantity::kRmseZ);
-  add("residual.bias", "max_bias", ResidualQuantity::kBias);
-  add("residual.p95", "max_p95", ResidualQuantity::kP95);
+  add("residual", "max_rmse", [](const ErrorStatistics& s) { return s.rmse.total; });
+  add("residual.rmse_z", "max_rmse_z", [](const ErrorStatistics& s) { return s.rmse.z; });
+  add("residual.bias", "max_bias", largest_bias);
+  add("residual.p95", "max_p95", [](const ErrorStatistics& s) { return s.p95.total; });
   if (all.empty()) refuse_without_limit(table, "max_rmse_N = 0.03");
   if (const auto least = limit(table, "min_records", "records", false))
-    all.push_back({"residual.records", ResidualQuantity::kRecords, *least});
+    all.push_back({"residual.records", [](const ErrorStatistics& s) { return double(s.samples); }, *least});
   return [all](Evidence& evidence, Checks& checks) {
     const residuals::Comparison& comparison = evidence.residual_comparison();
-    const residuals::ErrorStatistics& s = comparison.overall.statistics;
+    const ErrorStatistics& s = comparison.overall.statistics;
     for (const WantedResidual& wanted : all) {
       Check check = row(wanted.name, wanted.limit);
       check.witness = worst_track(comparison);
       const double in_unit = wanted.limit.unit_N > 0 ? wanted.limit.unit_N : 1;
-      const double value = value_of(s, wanted.quantity) / in_unit;
+      const double value = wanted.quantity(s) / in_unit;
       if (s.samples == 0) {
         check.value = 0;
         check.reason = "no usable record: nothing was compared";

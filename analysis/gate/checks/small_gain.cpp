@@ -15,10 +15,7 @@ void describe_small_gain_keys(files::Keys& keys) {
   keys.must<double>("min_margin", "Of the small-gain condition.");
 }
 
-Run read_small_gain(const files::TomlTable& table, Policy& policy) {
-  require_file(table, policy.release.gains, "gains");
-  require_file(table, policy.release.model, "model");
-  require_file(table, policy.release.swarm, "swarm");
+Run read_small_gain(const files::TomlTable& table, Policy&) {
   const std::optional<Limit> limit = gate::limit(table, "min_margin", "", false);
   if (!limit) refuse_without_limit(table, "min_margin = 0.1");
   return [limit = *limit](Evidence& evidence, Checks& checks) {

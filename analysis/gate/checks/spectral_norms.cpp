@@ -61,8 +61,7 @@ void describe_spectral_norms_keys(files::Keys& keys) {
   keys.may<double>("max", "Of every layer; absent: the declared gamma.");
 }
 
-Run read_spectral_norms(const files::TomlTable& table, Policy& policy) {
-  if (!policy.release.has_network()) require_file(table, "", "network");
+Run read_spectral_norms(const files::TomlTable& table, Policy&) {
   const std::optional<Limit> own = limit(table, "max", "");
   if (own && !(own->value > 0)) table.refuse("max", fmt::format("{}", own->value), "must be positive");
   return [own, line = table.line()](Evidence& evidence, Checks& checks) {

@@ -16,8 +16,6 @@ void describe_theorem_keys(files::Keys& keys) {
 }
 
 Run read_theorem(const files::TomlTable& table, Policy& policy) {
-  require_file(table, policy.release.gains, "gains");
-  require_file(table, policy.release.model, "model");
   const DisturbanceTable declared = read_disturbance(table);
   const std::optional<Limit> ball = limit(table, "max_ball_m", "m");
   if (ball && !declared.is_declared() && policy.release.flights.empty())

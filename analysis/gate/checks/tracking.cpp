@@ -167,8 +167,6 @@ void describe_tracking_keys(files::Keys& keys) {
 }
 
 Run read_tracking(const files::TomlTable& table, Policy& policy) {
-  require_file(table, policy.release.gains, "gains");
-  require_file(table, policy.release.model, "model");
   const std::optional<Limit> limit = gate::limit(table, "max_error_m", "m");
   if (!limit) refuse_without_limit(table, "max_error_m = 0.15");
   const DisturbanceTable declared = read_disturbance(table);
@@ -184,17 +182,15 @@ Run read_tracking(const files::TomlTable& table, Policy& policy) {
     guard.quantile = kGuardQuantiles[table.choice("guard_quantile", kGuardQuantiles)];
   }
   if (!declared.is_declared())
-    require_file(table, policy.release.flights.empty() ? "" : policy.release.flights.front(),
-                 "flights (or state rate_N_s, amplitude_N, ... here)");
+    require_file(table, policy, "flights", " (or state rate_N_s, amplitude_N, ... here)");
   if (!guard.declared) {
-    require_file(table, policy.release.flights.empty() ? "" : policy.release.flights.front(),
-                 "flights (or state guard_factor here)");
+    require_file(table, policy, "flights", " (or state guard_factor here)");
     policy.wants_guard_factor = true;
   }
   const std::optional<Limit> kept = gate::limit(table, "min_promise_kept", "", false);
   if (kept) {
-    require_file(table, policy.release.promise, "promise");
-    require_file(table, policy.release.flights.empty() ? "" : policy.release.flights.front(), "flights");
+    require_file(table, policy, "promise");
+    require_file(table, policy, "flights");
   }
   const Over over = table.has("over") && table.choice("over", kOver) == 1 ? Over::kCorners : Over::kBox;
   return [declared, estimates, over, uncertainty = read_uncertainty(table), guard, limit = *limit, kept](
