@@ -88,7 +88,8 @@ bool is_log_folder(const std::string& path);
 ///   inside a file is not an error: it is skipped and counted in RawLog::health.
 RawLog read_raw(const std::string& path);
 
-/// Like read_raw() for a seekable stream; `path` is used only in messages.
+/// Like read_raw() for a seekable stream; `path` is used only in messages. An old micro-SD log has columns only: see
+/// set_times() in clock.h.
 RawLog parse_raw(std::istream& in, const std::string& path);
 
 }  // namespace swarmcert::logs
