@@ -24,7 +24,22 @@ std::atomic<bool> interrupted{false};  ///< by a signal or by the time limit
 std::atomic<bool> signalled{false};
 timespec first_interrupt;
 
+/// Time in which a process that is asked to end may still finish.
+constexpr double kGrace_s = 0.5;
+
+void set_timer(double seconds) {
+  itimerval timer{};
+  timer.it_value.tv_sec = static_cast<time_t>(seconds);
+  timer.it_value.tv_usec = static_cast<suseconds_t>(1e6 * (seconds - std::floor(seconds)));
+  setitimer(ITIMER_REAL, &timer, nullptr);
+}
+
 void on_time_limit(int) { interrupted = true; }
+
+void end_now(int) {
+  std::signal(SIGTERM, SIG_DFL);
+  std::raise(SIGTERM);
+}
 
 void on_interrupt(int signal) {
   timespec now;
@@ -40,6 +55,14 @@ void on_interrupt(int signal) {
   if (since_s < kOneWish_s) return;
   std::signal(signal, SIG_DFL);
   std::raise(signal);
+}
+
+void on_term(int signal) {
+  if (!signalled) {  // only calls that are safe in a signal handler
+    std::signal(SIGALRM, end_now);
+    set_timer(kGrace_s);
+  }
+  on_interrupt(signal);
 }
 
 }  // namespace
@@ -69,25 +92,14 @@ void Progress::show(int done, int total, const std::string& what) {
   }
 }
 
-namespace {
-
-void set_timer(double seconds) {
-  itimerval timer{};
-  timer.it_value.tv_sec = static_cast<time_t>(seconds);
-  timer.it_value.tv_usec = static_cast<suseconds_t>(1e6 * (seconds - std::floor(seconds)));
-  setitimer(ITIMER_REAL, &timer, nullptr);
-}
-
-}  // namespace
-
-CancelOnInterrupt::CancelOnInterrupt(double seconds) : host_(host()) {
+CancelOnInterrupt::CancelOnInterrupt(double seconds, Term term) : host_(host()) {
   if (host_ != nullptr) {
     if (seconds > 0) host_->deadline_s = steady_s() + seconds;
     return;
   }
   interrupted = signalled = false;
   std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
+  std::signal(SIGTERM, term == Term::kEndsInTime ? on_term : on_interrupt);
   if (!(seconds > 0 && seconds < kLongestLimit_s)) return;
   std::signal(SIGALRM, on_time_limit);
   set_timer(std::max(seconds, 1e-6));

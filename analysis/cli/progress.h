@@ -37,8 +37,10 @@ class Progress {
 /// which sets the flag.
 class CancelOnInterrupt {
  public:
+  /// What follows SIGTERM: only the flag, or also the end of the process within a second, whatever it does then.
+  enum class Term { kSetsFlag, kEndsInTime };
   /// @param seconds time limit in wall-clock seconds from now; 0: no limit.
-  explicit CancelOnInterrupt(double seconds = 0);
+  explicit CancelOnInterrupt(double seconds = 0, Term term = Term::kSetsFlag);
   ~CancelOnInterrupt();
   CancelOnInterrupt(const CancelOnInterrupt&) = delete;
   CancelOnInterrupt& operator=(const CancelOnInterrupt&) = delete;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "lipschitz/solver/dense_kernels.h"
@@ -12,44 +13,62 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+
+std::vector<SlopeLayer> slope_layers(const LocalChain& chain, const std::vector<NeuronState>& states) {
+  std::vector<SlopeLayer> layers;
+  std::size_t neuron = 0;
+  for (const auto& hidden : chain.hidden) {
+    const Index rows = hidden.weights.rows();
+    layers.push_back({hidden.weights, VectorXd::Zero(rows), VectorXd::Zero(rows)});
+    for (Index i = 0; i < rows; ++i, ++neuron) {
+      layers.back().low(i) = states[neuron] == NeuronState::kOn ? 1 : 0;
+      layers.back().width(i) = states[neuron] == NeuronState::kUndecided ? 1 : 0;
+    }
+  }
+  MatrixXd& first = layers.front().weights;
+  first = MatrixXd(first(Eigen::all, chain.block));
+  for (Index k = 0; k < first.cols(); ++k) first.col(k) *= chain.weight[static_cast<std::size_t>(k)];
+  return layers;
+}
+
+}  // namespace
+
 NodeInequality::NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states,
                                const MatrixXd& gram)
-    : inputs_(static_cast<Index>(chain.block.size())) {
-  for (std::size_t i = 0; i < states.size(); ++i)
-    if (states[i] == NeuronState::kUndecided) undecided_.push_back(static_cast<Index>(i));
+    : NodeInequality(slope_layers(chain, states), gram) {}
+
+NodeInequality::NodeInequality(const std::vector<SlopeLayer>& layers, const MatrixXd& gram)
+    : inputs_(layers.front().weights.cols()) {
+  Index neuron = 0;
+  for (const SlopeLayer& layer : layers)
+    for (const double width : layer.width) {
+      if (width > 0) undecided_.push_back(neuron);
+      ++neuron;
+    }
   const auto free = static_cast<Index>(undecided_.size());
   const Index n = inputs_ + free;
   a_ = MatrixXd::Zero(free, n);
 
   // y and z as linear forms in the variables, layer by layer; y is zero outside of columns [first_used, past_used).
-  MatrixXd y = MatrixXd::Zero(chain.hidden.front().weights.rows(), n);
-  y.leftCols(inputs_) = chain.hidden.front().weights(Eigen::all, chain.block);
-  for (Index k = 0; k < inputs_; ++k) y.col(k) *= chain.weight[static_cast<std::size_t>(k)];
-  Index neuron = 0, variable = 0, first_used = 0;
-  MatrixXd z;
-  for (std::size_t k = 0; k < chain.hidden.size(); ++k) {
-    const Index rows = chain.hidden[k].weights.rows(), before = variable, past_used = inputs_ + before;
-    z = MatrixXd::Zero(rows, n);
-    bool has_on = false;
-    for (Index i = 0; i < rows; ++i, ++neuron) {
-      const NeuronState state = states[static_cast<std::size_t>(neuron)];
-      const auto used = y.row(i).segment(first_used, past_used - first_used);
-      if (state == NeuronState::kOn) {
-        z.row(i).segment(first_used, past_used - first_used) = used;
-        has_on = true;
-      }
-      if (state != NeuronState::kUndecided) continue;
-      z(i, inputs_ + variable) = 1;
-      a_.row(variable).segment(first_used, past_used - first_used) = used;
+  Index variable = 0, first_used = 0;
+  MatrixXd z = MatrixXd::Identity(inputs_, n);
+  for (const SlopeLayer& layer : layers) {
+    const Index rows = layer.weights.rows(), before = variable, past_used = inputs_ + before;
+    const Index used = past_used - first_used;
+    MatrixXd y = MatrixXd::Zero(rows, n);
+    add_product(y.middleCols(first_used, used), layer.weights, z.middleCols(first_used, used));
+    z = layer.low.asDiagonal() * y;
+    for (Index i = 0; i < rows; ++i) {
+      if (!(layer.width(i) > 0)) continue;
+      const double root = std::sqrt(layer.width(i));
+      z(i, inputs_ + variable) = root;
+      a_.row(variable).segment(first_used, used) = root * y.row(i).segment(first_used, used);
       a_(variable, inputs_ + variable) = -1;
       ++variable;
     }
     if (variable > before) blocks_.push_back({before, variable - before, first_used, past_used});
-    if (!has_on) first_used = past_used;
-    if (k + 1 == chain.hidden.size()) break;
-    y = MatrixXd::Zero(chain.hidden[k + 1].weights.rows(), n);
-    const Index used = inputs_ + variable - first_used;
-    add_product(y.middleCols(first_used, used), chain.hidden[k + 1].weights, z.middleCols(first_used, used));
+    if (layer.low.isZero(0)) first_used = past_used;
   }
   MatrixXd gram_z = MatrixXd::Zero(z.rows(), n);
   add_product(gram_z, gram, z);

@@ -13,11 +13,21 @@ namespace swarmcert::lipschitz {
 /// State of a neuron over a box.
 enum class NeuronState : char { kOff, kOn, kUndecided };
 
-/// The matrix S(rho, t) over the moving inputs and the undecided neurons. A neuron that is off has dz = 0, a neuron
-/// that is on has dz = dy; both are substituted, so that S is dense but small. If S is positive semidefinite, then
-/// |df|^2 <= rho |dx|^2 for all pairs of points of the box, because the segment between them stays inside.
+/// One hidden layer; the slope of neuron i lies in [low_i, low_i + width_i].
+struct SlopeLayer {
+  Eigen::MatrixXd weights;
+  Eigen::VectorXd low, width;
+};
+
+/// The matrix S(rho, t) over the moving inputs and a variable w = (dz - low dy) / sqrt(width) for each undecided neuron
+/// with w (sqrt(width) dy - w) >= 0. Neurons of width 0 have dz = low dy, which is substituted, so that S is dense but
+/// small. If S is positive semidefinite, then |df|^2 <= rho |dx|^2 for all pairs of points of the box, because the
+/// segment between them stays inside.
 class NodeInequality final : public RankTwoInequality {
  public:
+  /// @param gram G of the function behind the hidden layers.
+  NodeInequality(const std::vector<SlopeLayer>& layers, const Eigen::MatrixXd& gram);
+  /// Of ReLU: a neuron that is off has dz = 0, one that is on has dz = dy.
   /// @param gram G of the function behind the hidden layers.
   NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states,
                  const Eigen::MatrixXd& gram);

@@ -7,12 +7,13 @@
 #include <queue>
 
 #include "lipschitz/base/rounding.h"
+#include "lipschitz/branch/descend.h"
 #include "lipschitz/branch/search_tree.h"
-#include "lipschitz/checker/centred_form.h"
+#include "lipschitz/checker/proposed_factor.h"
 #include "lipschitz/checker/slope_tree.h"
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/upper/bent_bound.h"
-#include "lipschitz/values/reach.h"
+#include "lipschitz/upper/live_chain.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/functions.h"
 
@@ -23,8 +24,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Relative accuracy to which the program of a part is solved.
-constexpr double kPartGap = 1e-4;
+/// Relative accuracy to which the program of the whole box is solved; parts start from the multipliers of their parent.
+constexpr double kWholeGap = 1e-3;
+/// Neurons whose slopes differ by at most this over a part are eliminated in the search.
+constexpr double kDecided = 0x1p-20;
 /// Number of parts halved at the same time: the length of the queue over kPartsPerRound, at most kMostPerRound. It does
 /// not depend on the number of threads, hence neither does the result.
 constexpr std::size_t kPartsPerRound = 4, kMostPerRound = 8;
@@ -41,7 +44,7 @@ class SlopeSearch {
   LocalBound run() {
     Part root;
     root.box = box_;
-    solve(root);
+    solve(root, nullptr);
     nodes_.push_back({});
     LocalBound result;
     result.nodes = 1;
@@ -73,49 +76,112 @@ class SlopeSearch {
     double rho = std::numeric_limits<double>::infinity();
     int index = 0;  ///< index in nodes_
     Box box;
-    std::vector<double> t;
+    VectorXd weighted;      ///< multipliers times the widths of the slope ranges
+    std::vector<double> t;  ///< multipliers
     std::size_t split = 0;  ///< the coordinate to halve
     bool operator<(const Part& other) const { return rho < other.rho; }
   };
 
-  /// Solves the program of the part and chooses the coordinate to halve.
-  void solve(Part& part) const {
-    const check::Intervals box = intervals(part.box);
-    SdpOptions sdp;
-    sdp.stop = Stop(options_.cancelled);
-    sdp.relative_gap = kPartGap;
-    BentPoints found =
-        bent_points(check::chain_on_box(network_, claim_.function, claim_.block, claim_.scale, box), sdp);
-    if (!found.points.empty()) {
-      part.rho = found.points.back().rho;
-      part.t = std::move(found.points.back().t);
+  /// Finds multipliers of the part, from those of its parent if it has one, and chooses the coordinate to halve.
+  void solve(Part& part, const Part* parent) const {
+    const check::BentChain chain =
+        check::chain_on_box(network_, claim_.function, claim_.block, claim_.scale, intervals(part.box));
+    const std::vector<SlopeLayer> layers = slope_layers(chain);
+    if (parent != nullptr) {
+      const MatrixXd last = rounded({chain.stages.back()}).front();
+      part.weighted = parent->weighted;
+      improve(layers, last.transpose() * last, part);
     }
-    part.split = best_split(part.box, box);
+    if (parent == nullptr || !(part.rho < parent->rho)) solve_anew(chain, part);
+    if (part.weighted.size() > 0) part.split = best_split(part, layers);
   }
 
-  /// Returns the coordinate whose width, times the derivatives of the neurons by it at their middle slopes, times the
-  /// widths of their slope ranges, is largest.
-  std::size_t best_split(const Box& box, const check::Intervals& intervals) const {
-    const files::Weights& weights = *files::parts(network_).at(claim_.function.input_part());
-    const auto slopes = check::slopes_on_box(weights, intervals);
-    VectorXd width(weights.inputs()), score = VectorXd::Zero(weights.inputs());
-    for (Index k = 0; k < width.size(); ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      width(k) = box.upper[at] - box.lower[at];
+  /// Solves the program of the part without a start; keeps its multipliers if they are the better ones.
+  void solve_anew(const check::BentChain& chain, Part& part) const {
+    SdpOptions sdp;
+    sdp.stop = Stop(options_.cancelled);
+    sdp.relative_gap = kWholeGap;
+    BentPoints found = bent_points(chain, sdp);
+    if (found.points.empty() || !(found.points.back().rho < part.rho)) return;
+    part.rho = found.points.back().rho;
+    part.t = std::move(found.points.back().t);
+    const VectorXd width = widths(chain);
+    part.weighted = width.cwiseProduct(Eigen::Map<const VectorXd>(part.t.data(), width.size()));
+  }
+
+  /// Makes Newton steps from the multipliers of the parent.
+  static void improve(std::vector<SlopeLayer> layers, const MatrixXd& gram, Part& part) {
+    VectorXd width(part.weighted.size());
+    Index next = 0;
+    for (SlopeLayer& layer : layers) {
+      width.segment(next, layer.width.size()) = layer.width;
+      next += layer.width.size();
+      for (Index i = 0; i < layer.width.size(); ++i) {
+        if (layer.width(i) > kDecided) continue;
+        layer.low(i) += layer.width(i) / 2;
+        layer.width(i) = 0;
+      }
     }
-    MatrixXd slope = width.asDiagonal();
-    for (std::size_t k = 0; k < slopes.size(); ++k) {
+    const NodeInequality inequality(layers, gram);
+    VectorXd t = descend(inequality, part.weighted(inequality.undecided()), {});
+    part.weighted(inequality.undecided()) = t;
+    part.t.clear();
+    for (Index i = 0; i < width.size(); ++i) {  // single precision halves the length of the certificate
+      part.t.push_back(static_cast<float>(part.weighted(i) / width(i)));
+      part.weighted(i) = part.t.back() * width(i);
+    }
+    part.rho = inequality.least_rho(part.weighted(inequality.undecided()));
+  }
+
+  static VectorXd widths(const check::BentChain& chain) {
+    VectorXd result(static_cast<Index>(chain.slopes.size()));
+    for (Index i = 0; i < result.size(); ++i) {
+      const check::SlopeRange& range = chain.slopes[static_cast<std::size_t>(i)];
+      result(i) = check::to_double(range.high - range.low);
+    }
+    return result;
+  }
+
+  static std::vector<SlopeLayer> slope_layers(const check::BentChain& chain) {
+    const ReluChain stages = rounded(chain.stages);
+    const VectorXd width = widths(chain);
+    std::vector<SlopeLayer> result;
+    Index next = 0;
+    for (std::size_t k = 0; k + 1 < stages.size(); ++k) {
+      const Index rows = stages[k].rows();
+      VectorXd low(rows);
+      for (Index i = 0; i < rows; ++i)
+        low(i) = check::to_double(chain.slopes[static_cast<std::size_t>(next + i)].low);
+      result.push_back({stages[k], low, width.segment(next, rows)});
+      next += rows;
+    }
+    return result;
+  }
+
+  /// Returns the coordinate whose halving is expected to lower the bound the most. The constraint of a neuron is slack
+  /// by up to its multiplier times the width of its slope range times |dy|^2 / 4, and the width goes back to the
+  /// coordinates in the shares in which they move the neuron; derivatives are taken at the middle slopes.
+  std::size_t best_split(const Part& part, const std::vector<SlopeLayer>& slopes) const {
+    const files::Weights& weights = *files::parts(network_).at(claim_.function.input_part());
+    VectorXd side(weights.inputs()), score = VectorXd::Zero(weights.inputs());
+    for (Index k = 0; k < side.size(); ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      side(k) = part.box.upper[at] - part.box.lower[at];
+    }
+    MatrixXd slope = MatrixXd::Identity(side.size(), side.size());
+    Index neuron = 0;
+    for (std::size_t k = 0; k + 1 < weights.layers.size(); ++k) {
       const files::Layer& layer = weights.layers[k];
       slope = (Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
                    layer.weights.data(), layer.outputs, layer.inputs) *
                slope)
                   .eval();
-      for (Index i = 0; i < slope.rows(); ++i) {
-        const check::Interval& range = slopes[k][static_cast<std::size_t>(i)];
-        const double low = to_double(range.lower), high = to_double(range.upper);
-        score += (high - low) * slope.row(i).cwiseAbs().transpose();
-        slope.row(i) *= (low + high) / 2;
+      for (Index i = 0; i < slope.rows(); ++i, ++neuron) {
+        const VectorXd moved = slope.row(i).transpose().cwiseAbs().cwiseProduct(side);
+        const double by = moved.sum(), slack = part.weighted(neuron) * slopes[k].width(i);
+        if (by > 0) score += slack * slope.row(i).squaredNorm() / by * moved;
       }
+      slope = ((slopes[k].low + slopes[k].width / 2).asDiagonal() * slope).eval();
     }
     Index best = 0;
     score.maxCoeff(&best);
@@ -127,7 +193,7 @@ class SlopeSearch {
     std::array<Part, 2> result;
     result[0].box = lower;
     result[1].box = upper;
-    for (Part& half : result) solve(half);
+    for (Part& half : result) solve(half, &part);
     return result;
   }
 
@@ -150,7 +216,7 @@ class SlopeSearch {
 
   /// Returns how many boxes take about ten seconds; one if the program of the whole box was not solved.
   int usual_nodes(const Part& root) const {
-    constexpr double kWork = 4e8, kFewest = 20, kMost = 200;
+    constexpr double kWork = 4e9, kFewest = 20, kMost = 2000;
     if (root.t.empty()) return 1;
     const double size = static_cast<double>(root.t.size() + root.box.lower.size());
     return static_cast<int>(std::clamp(kWork / std::pow(size, 3), kFewest, kMost));
@@ -183,7 +249,7 @@ class SlopeSearch {
     BranchTree tree = in_preorder(nodes_, 1);
     proof.tree.tree = words_of(tree);
     proof.tree.multipliers = std::move(tree.multipliers);
-    for (const double slack : {1e-8, 1e-6, 1e-5, 1e-4, 1e-3}) {
+    for (const double slack : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2}) {
       proof.rho = rho * (1 + slack);
       const check::TreeVerdict verdict =
           check::check_slope_tree(network_, claim_.function, claim_.block, claim_.scale,

@@ -350,7 +350,8 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   // The flag is for computations without their own time limit; those with one report that the time is over rather
   // than a cancellation.
   constexpr double kLater_s = 0.1;
-  const CancelOnInterrupt interrupt(options.seconds > 0 ? options.seconds + kLater_s : 0);
+  const CancelOnInterrupt interrupt(options.seconds > 0 ? options.seconds + kLater_s : 0,
+                                    CancelOnInterrupt::Term::kEndsInTime);
   options.certify.cancelled = interrupt.flag();
   options.certify.seconds = options.seconds;
 
@@ -454,7 +455,8 @@ void declare_limits(CLI::App& app, CertifyOptions& options) {
       ->check(CLI::NonNegativeNumber);
   app.add_option("--time", options.seconds,
                  "Time limit of the whole command in seconds. Bounds are proved all the same; those whose "
-                 "search was cut short have the status interrupted, as after Ctrl-C or SIGTERM")
+                 "search was cut short have the status interrupted, as after Ctrl-C; SIGTERM ends the "
+                 "command within a second, with its result if that is ready by then")
       ->check(CLI::PositiveNumber);
   app.add_option("--seed", options.certify.lower.seed, "Seed of the lower-bound search")
       ->capture_default_str();
