@@ -83,7 +83,8 @@ TEST(Gate, AGoodReleasePassesAndEachPlantedViolationIsCaughtByItsOwnCheckAlone) 
       {"theorem",
        [gains](const ReleaseFolder& release) {
          write_text(release / "gains.toml", gains + "[lag]\nmotor_s = 0.001\n");
-       }},
+       },
+       true},
       {"tracking",
        [](const ReleaseFolder& release) {
          write_text(release / "gains.toml",
