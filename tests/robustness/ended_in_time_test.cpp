@@ -52,7 +52,7 @@ std::pair<long, int> ended(const ScratchFolder& folder, const std::string& comma
   return {milliseconds, code};
 }
 
-TEST(EndedInTime, CertifyAndCheckOfALargeNetworkEndWithinASecondOfSigterm) {
+TEST(EndedInTime, CertifyAndCheckOfALargeNetworkEndWithinASecondOfSigterm_slow) {
   const ScratchFolder folder;
   write_large_network(folder / "large.safetensors", 1000);
   write_text(folder / "box.toml", "schema = \"swarmcert/box/1\"\nlower = [" + std::string("-1, ") +
