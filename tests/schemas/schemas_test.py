@@ -216,6 +216,8 @@ def test_toml_files_conform(folder):
     for path in [*SOURCE.glob("*/**/*.toml"), *folder.rglob("*.toml")]:
         if "build" in path.relative_to(path.anchor).parts and SOURCE / "build" in path.parents:
             continue
+        if path.parent == SOURCE / "analysis/logs/dictionary":  # no user's file: a source of the tool, see Dictionary.*
+            continue
         document = tomllib.loads(path.read_text())
         kind = document["schema"].split("/")[1]
         kinds.add(kind)
