@@ -9,8 +9,8 @@
 
 namespace swarmcert::stability {
 
-/// Exact gains of the loop of one axis around its attitude loop, per unit of one disturbance: of a force per mass, of an
-/// error of the estimated velocity, and of a torque per moment of inertia.
+/// Exact gains of the loop of one axis around its attitude loop, per unit of one disturbance: of a force per mass, of
+/// an error of the estimated velocity, and of a torque per moment of inertia.
 struct CascadeGains {
   ResponseNorms force, velocity_error, torque;
 };
@@ -29,9 +29,9 @@ struct AttitudeRow {
 std::vector<AttitudeRow> attitude_rows(const FlownLoop& loop);
 
 /// Returns by how much the gains from a force to x and y around the attitude loop exceed those of the loop with
-/// `attitude_lag_s`: the largest ratio of amplitude, edge and impulse gain. Both are sampled, and delayed, with rate_hz;
-/// else both are in continuous time without delay. Nothing without gains.attitude, with coupled horizontal axes, and if
-/// a loop is unstable.
+/// `attitude_lag_s`: the largest ratio of amplitude, edge and impulse gain. Both are sampled, and delayed, with
+/// rate_hz; else both are in continuous time without delay. Nothing without gains.attitude, with coupled horizontal
+/// axes, and if a loop is unstable.
 std::optional<double> gain_beyond_lag(const FlownLoop& loop);
 
 /// Returns a lag, s, whose loop has no smaller gain: gain_beyond_lag() <= 1. Nothing if none of 1 ms to 1 s is found.

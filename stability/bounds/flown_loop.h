@@ -91,8 +91,8 @@ struct FlownLoop {
   /// or not. Requires is_sampled().
   double spectral_radius() const;
   /// Returns whether the loop that flies is stable: the sampled one with rate_hz, else the continuous one, and that
-  /// around the attitude loop if gains.toml states one. Nothing if that is not decided: continuous axes that are coupled
-  /// and delayed.
+  /// around the attitude loop if gains.toml states one. Nothing if that is not decided: continuous axes that are
+  /// coupled and delayed.
   std::optional<bool> is_stable() const;
 
   /// Returns the actual force of all rotors together, N; the largest is infinite if unknown.

@@ -31,8 +31,9 @@ struct Saturation {
   double margin_N() const { return std::min(available_N.upper - most_N, least_N - available_N.lower); }
   /// Returns the largest tilt of f_d that U allows, rad.
   double tilt_rad() const;
-  /// Returns the force that the linear loop leaves out to second order at such tilts, N: vertically, where the vehicle
-  /// tilts elsewhere than commanded, 2 F sin^2 theta; horizontally, since the thrust F varies, (F_max - F_min) sin theta.
+  /// Returns the force that the linear loop leaves out to second order at such tilts, N, an estimate: vertically, where
+  /// the vehicle tilts elsewhere than commanded, 2 F sin^2 theta; horizontally, since the thrust F varies,
+  /// (F_max - F_min) sin theta.
   double beyond_linear_N() const;
 };
 

@@ -10,8 +10,9 @@ namespace swarmcert::stability {
 /// Returns exp(A t) of a small matrix, by scaling and squaring of the Taylor series.
 Eigen::MatrixXd exponential(const Eigen::MatrixXd& At);
 
-/// State before the control of a period: e, e', tilt and its rate if there is an attitude loop, lag outputs, I, past commands (newest first). State after the control:
-/// the same with the new command before the past ones. Commands are accelerations.
+/// State before the control of a period: e, e', tilt and its rate if there is an attitude loop, lag outputs, I, past
+/// commands (newest first). State after the control: the same with the new command before the past ones. Commands are
+/// accelerations.
 class SampledModel {
  public:
   explicit SampledModel(const SampledLoop& loop);
