@@ -187,6 +187,7 @@ files::InputFault damage_of(const LineFault& fault, const std::vector<std::strin
 }  // namespace
 
 std::string_view take_text_line(std::string_view text, std::size_t& at) {
+  if (at >= text.size()) return {};
   const std::size_t end = std::min(text.find('\n', at), text.size());
   std::string_view line = text.substr(at, end - at);
   at = end + 1;

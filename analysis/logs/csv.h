@@ -23,7 +23,8 @@ struct TableHeader {
 /// Returns the header of `text`; nothing if there is none.
 std::optional<TableHeader> header_of(std::string_view text, char otherwise);
 
-/// Returns the line that starts at `at` without its end, and moves `at` behind it.
+/// Returns the line that starts at `at` without its end, and moves `at` behind it: to text.size() + 1 if the text ends
+/// within the line. Returns an empty line where nothing is left.
 std::string_view take_text_line(std::string_view text, std::size_t& at);
 
 /// Reads a table: one topic, or one for each block of columns. After the header come lines with the same number of

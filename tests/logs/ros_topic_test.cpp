@@ -93,6 +93,7 @@ TEST(RosTopic, RefusesDefinitionsThatCannotBe) {
       {"T x", "contains itself"},
       {"A x\n===\nMSG: p/A\nB x\n===\nMSG: p/B\nA x\n", "contains itself"},
       {"uint8 x\n=====\nno name\n", "no \"MSG:\""},
+      {"uint8 x\n=====", "no \"MSG:\""},  // cut behind the line of "="
       {std::string(std::size_t{2} << 20, '\n'), "over 1 MiB"},
   };
   for (const auto& [definition, reason] : cases) {
