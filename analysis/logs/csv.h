@@ -20,7 +20,7 @@ struct TableHeader {
   char separator = ',';  ///< the first of comma, semicolon and tab that occurs in it; else `otherwise`
   std::vector<std::string_view> names;
 };
-/// Returns the header of `text`; nothing if there is none.
+/// Returns the header of `text`, or std::nullopt if it has none.
 std::optional<TableHeader> header_of(std::string_view text, char otherwise);
 
 /// Returns the line that starts at `at` without its end, and moves `at` behind it: to text.size() + 1 if the text ends

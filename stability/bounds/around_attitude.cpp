@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stability/bounds/saturation.h"
+
 namespace swarmcert::stability {
 namespace {
 
@@ -91,6 +93,14 @@ std::optional<double> gain_beyond_lag(const FlownLoop& loop) {
   if (around.empty()) return std::nullopt;
   const double ratio = largest_ratio(around, loop);
   return std::isfinite(ratio) && ratio > 0 ? std::optional<double>(ratio) : std::nullopt;
+}
+
+std::string attitude_objection(const FlownLoop& loop) {
+  if (!loop.gains.attitude) return "";
+  if (loop.diverges_around_attitude()) return "the loop around that of [attitude] diverges";
+  const std::optional<double> beyond = gain_beyond_lag(loop);
+  if (!beyond || *beyond <= 1) return "";
+  return "around the loop of [attitude] a gain of x or y is " + decimals(*beyond) + " times as large";
 }
 
 std::optional<double> lag_that_contains_attitude_s(FlownLoop loop) {

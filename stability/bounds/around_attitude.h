@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "stability/bounds/flown_loop.h"
@@ -33,6 +34,10 @@ std::vector<AttitudeRow> attitude_rows(const FlownLoop& loop);
 /// rate_hz; else both are in continuous time without delay. Nothing without gains.attitude, with coupled horizontal
 /// axes, and if a loop is unstable.
 std::optional<double> gain_beyond_lag(const FlownLoop& loop);
+
+/// Returns why no bound of x or y holds around the attitude loop that is stated: it diverges, or gain_beyond_lag() > 1.
+/// Empty if they hold, and without such a loop.
+std::string attitude_objection(const FlownLoop& loop);
 
 /// Returns a lag, s, whose loop has no smaller gain: gain_beyond_lag() <= 1. Nothing if none of 1 ms to 1 s is found.
 std::optional<double> lag_that_contains_attitude_s(FlownLoop loop);

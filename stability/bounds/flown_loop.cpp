@@ -226,17 +226,20 @@ double FlownLoop::spectral_radius() const {
   return largest_modulus(hold * control);
 }
 
-std::optional<bool> FlownLoop::is_stable() const {
+bool FlownLoop::diverges_around_attitude() const {
   for (int axis = 0; axis < 2; ++axis) {
     const std::optional<Cascade> around = cascade(axis);
-    if (around && !(cascade_margins(*around).delay_s > gains.delay_s)) return false;
+    if (around && !(cascade_margins(*around).delay_s > gains.delay_s)) return true;
     const std::optional<SampledLoop> flown = sampled_cascade(axis);
-    if (flown && stability::spectral_radius(*flown) >= 1) return false;
+    if (flown && stability::spectral_radius(*flown) >= 1) return true;
   }
   const std::vector<int> coupled = coupled_axes();
-  if (gains.attitude && model.inertia_kg_m2[0] > 0 && !coupled.empty() &&
-      !stability::is_stable(coupled_cascade(coupled)))
-    return false;
+  return gains.attitude && model.inertia_kg_m2[0] > 0 && !coupled.empty() &&
+         !stability::is_stable(coupled_cascade(coupled));
+}
+
+std::optional<bool> FlownLoop::is_stable() const {
+  if (diverges_around_attitude()) return false;
   if (is_sampled()) return spectral_radius() < 1;
   for (int axis = 0; axis < 3; ++axis) {
     if (const std::optional<AxisLoop> one = continuous(axis)) {

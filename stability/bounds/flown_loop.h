@@ -94,6 +94,8 @@ struct FlownLoop {
   /// around the attitude loop if gains.toml states one. Nothing if that is not decided: continuous axes that are
   /// coupled and delayed.
   std::optional<bool> is_stable() const;
+  /// Returns whether the loop around the attitude loop of gains.toml is unstable; false without one.
+  bool diverges_around_attitude() const;
 
   /// Returns the actual force of all rotors together, N; the largest is infinite if unknown.
   Interval thrust_range_N() const;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nn/base/doubles.h"
+#include "stability/bounds/around_attitude.h"
 #include "stability/bounds/sampled_bounds.h"
 #include "stability/bounds/thrust_ratio.h"
 
@@ -187,8 +188,11 @@ Saturation saturation(const FlownLoop& loop, const DisturbanceSource& source, co
   PerAxis feedback{};
   for (int axis = 0; axis < 3; ++axis)
     feedback[static_cast<std::size_t>(axis)] = feedback_N(loop, source, initial, axis);
+  const std::string objection = attitude_objection(loop);
+  if (!objection.empty()) feedback[0] = feedback[1] = kInfinity;
   Saturation result = saturation_of(loop, feedback, source.thrust_ratio_error);
-  if (result.is_proved()) return result;
+  result.why = objection;
+  if (result.is_proved() || !objection.empty()) return result;
   refute(loop, source, result);
   if (result.verdict == Saturation::Verdict::kUndecided) result.why = why_undecided(loop, source, result);
   return result;

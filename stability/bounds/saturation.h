@@ -2,7 +2,8 @@
 ///
 /// The law commands the force f_d = w e_z + u, with the weight w and u = feedback, fed-forward acceleration and errors
 /// of the command. U_i = sup |u_i| over the declared inputs follows from the exact gains to the command of every axis
-/// (of the sampled loop, and of the loop without integral plus the largest integral if its clamp may act). Then
+/// (of the sampled loop, and of the loop without integral plus the largest integral if its clamp may act); for x and y
+/// it is infinite if attitude_objection() objects (around_attitude.h). Then
 ///   w - U_z <= f_d,z   and   |f_d| <= |(U_x, U_y, w + U_z)|.
 /// If these are within the thrust's range, no declared input saturates the thrust, and the bounds of the linear loop
 /// hold. The torques of the attitude law also use thrust of single rotors; that share is not contained.

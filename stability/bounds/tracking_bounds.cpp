@@ -45,13 +45,11 @@ void assume_attitude(const FlownLoop& loop, const AddAssumption& add) {
   const bool has_lag = loop.gains.attitude_lag_s > 0;
   const char* const name = has_lag ? "first-order lag of the thrust's direction"
                                    : "the thrust's direction follows the command at once";
-  const std::optional<double> beyond = gain_beyond_lag(loop);
-  if (!beyond) return add(name, "assumed", has_lag ? "as in [lag]" : "[lag] states no attitude_s");
-  if (*beyond <= 1) return add(name, "assumed", "no gain is larger around the loop of [attitude]");
+  const std::string objection = attitude_objection(loop);
+  if (objection.empty()) return add(name, "assumed", has_lag ? "as in [lag]" : "[lag] states no attitude_s");
   const std::optional<double> enough_s = lag_that_contains_attitude_s(loop);
   add(name, "refuted",
-      "around the loop of [attitude] a gain of x or y is " + decimals(*beyond) + " times as large" +
-          (enough_s ? "; [lag] attitude_s = " + decimals(*enough_s) + " contains it" : ""));
+      objection + (enough_s ? "; [lag] attitude_s = " + decimals(*enough_s) + " contains it" : ""));
 }
 
 /// Visits one fact of the loop that flies: adds what the bounds assume about it.

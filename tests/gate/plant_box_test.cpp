@@ -69,6 +69,18 @@ TEST(PlantBox, NoCornerIsAboveTheEnclosure) {
   }
 }
 
+TEST(PlantBox, NoBoundHoldsOfALoopThatDivergesAroundTheAttitudeLoopThatItsGainsState) {
+  FlownLoop setup = continuous_setup(0.5);
+  setup.plant.largest_thrust_N = 1;
+  const auto thrust = [&] {
+    return bound_over(setup, box_about(setup), force_and_estimates(1e-3, 0, 0)).saturation;
+  };
+  EXPECT_TRUE(thrust().is_proved());
+  setup.gains.attitude = stability::AttitudeGains{{2e-3, 2e-3, 2e-3}, {2e-5, 2e-5, 2e-5}, {0, 0, 0}};
+  EXPECT_FALSE(thrust().is_proved());
+  EXPECT_NE(thrust().why.find("[attitude] diverges"), std::string::npos);
+}
+
 TEST(PlantBox, TheIntegralOfAnActingClampPassesTheLargestThrustScale) {
   // Thrust of 1.3 times the command: the integral's part of the command acts 1.3 times as well.
   const FlownLoop setup = continuous_setup(0.5);

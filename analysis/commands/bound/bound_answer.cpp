@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "analysis/commands/bound/bound_output.h"
+#include "stability/bounds/around_attitude.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -52,9 +53,7 @@ void add_limits(const Tracking& input, const TrackingReport& report, BoundAnswer
     return;
   }
   const Saturation& thrust = report.saturation;
-  for (const Assumption& one : report.assumptions)
-    if (one.status == "refuted") answer.limits.push_back(one.note);
-  if (thrust.verdict == Saturation::Verdict::kUndecided) answer.limits.push_back(thrust.why);
+  if (!thrust.is_proved()) answer.limits.push_back(thrust.why);
   if (std::isfinite(thrust.most_N)) {
     answer.limits.push_back(
         fmt::format("thrust: {:.3g} to {:.3g} N commanded at most, {:.3g} to {:.3g} N available",
@@ -82,6 +81,10 @@ std::string change_of(const Tracking& input, const DisturbanceSource& source, co
     return input.is_sampled() ? "raise rate_hz, or lower the gains" : "lower the gains";
   if (source.kind == "rate of f_hat") return "state the learning error: --amplitude, --from or --truth";
   if (report.saturation.is_proved() || report.facts.size() < 3) return "";
+  if (!attitude_objection(input).empty()) {
+    const std::optional<double> lag_s = lag_that_contains_attitude_s(input);
+    return lag_s ? fmt::format("[lag] attitude_s = {:.4g} contains the loop of [attitude]", *lag_s) : "";
+  }
   const double amplitude_N = proved_amplitude_N(input, source, initial);
   if (!(amplitude_N > 0)) return "leave more thrust: the other declared inputs alone take it all";
   return fmt::format("for force errors up to --amplitude {:.3g} the thrust provably suffices", amplitude_N);
@@ -101,9 +104,7 @@ BoundAnswer bound_answer(const Tracking& input, const DisturbanceSource& source,
     answer.flies = false;
     return answer;
   }
-  const auto is_refuted = [](const Assumption& one) { return one.status == "refuted"; };
-  bool has_all = report.is_stable.has_value() && thrust == Saturation::Verdict::kProved &&
-                 std::none_of(report.assumptions.begin(), report.assumptions.end(), is_refuted);
+  bool has_all = report.is_stable.has_value() && thrust == Saturation::Verdict::kProved;
   for (int axis = 0; axis < 3 && source.kind != "none"; ++axis) {
     const std::optional<double> error_m = largest_error_m(input, report, axis);
     if (source.bounds_learning_error() && error_m && std::isfinite(*error_m)) {

@@ -24,7 +24,7 @@ inline constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 struct RosBudget {
   std::size_t places = std::size_t{1} << 20;  ///< fields and array elements
   std::size_t values = std::size_t{1} << 28;  ///< numbers: 2 GiB
-  /// By type and definition, each parsed once; with the fault where there is none.
+  /// By type and definition, each parsed once: the layout, or null and the reason why there is none.
   std::map<std::pair<std::string, std::string_view>, std::pair<std::shared_ptr<const RosLayout>, std::string>>
       layouts{};
 };

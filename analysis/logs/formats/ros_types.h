@@ -67,7 +67,7 @@ struct RosMessageText {
   bool is_beginning = false;
 };
 
-/// Returns the built-in definitions of `name` ("geometry_msgs/Pose"); empty if there is none. Several definitions are
+/// Returns the built-in definitions of `name` ("geometry_msgs/Pose"); an empty list if it is unknown. Several are
 /// versions of the message that differ only in their number types; the size of a message selects one.
 std::vector<RosMessageText> builtin_ros_definitions(const std::string& name);
 
